@@ -1,0 +1,486 @@
+//! How close a stroke's joints come to the middle of a limb, on real bodies.
+//!
+//! `RIGSMITH_DATA=../shared/data cargo bench --bench stroke [-- FILTER]` prints, for each body, limb and view, the mean
+//! distance of the joints to the line of the limb's section centroids in parts of the local radius, and, for bent limbs
+//! stroked with `joints: 3`, how far the middle joint lies from the true elbow or knee in parts of the limb's length. The
+//! line is computed here from the mesh itself: planes square to the true bone, the loop of the cut around it, the centroid of
+//! that loop's area. `-- detail` prints every case, `-- time` only the timings.
+
+use std::{collections::BTreeMap, path::PathBuf, time::Instant};
+
+use glam::{Vec2, Vec3};
+use rigsmith::{
+    algo::{
+        placement::PlaceSettings,
+        stroke::{ChainChoice, StrokeSamples, StrokeSettings},
+        view::{View, ViewPlane},
+    },
+    mesh::surface::Surface,
+};
+use serde_json::Value;
+
+const BODIES: [&str; 7] = [
+    "baby",
+    "female_heavy_tpose",
+    "female_young",
+    "female_young_armsdown",
+    "male_child_tpose",
+    "male_muscular_action",
+    "male_young",
+];
+const SEEDS: u64 = 8;
+
+fn main() {
+    let Some(data) = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from) else {
+        println!("skipped: RIGSMITH_DATA is not set");
+        return;
+    };
+    let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let detail = words.iter().any(|w| w == "detail");
+    let mut table = Table::default();
+    for name in BODIES {
+        let Some(body) = Body::load(&data.join("bodies").join(name), name) else {
+            println!("{name}: cannot be read");
+            continue;
+        };
+        if !words.iter().any(|w| w == "time") {
+            centring(&body, detail, &mut table);
+            bending(&body, detail, &mut table);
+        }
+        if name == "male_young" {
+            timing(&body);
+        }
+    }
+    table.print();
+}
+
+/// A mesh with its true bones.
+struct Body {
+    name: &'static str,
+    points: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    bones: Value,
+    surface: Surface,
+    bounds: [Vec3; 2],
+}
+
+impl Body {
+    fn load(folder: &std::path::Path, name: &'static str) -> Option<Self> {
+        let text = std::fs::read_to_string(folder.join("body.obj")).ok()?;
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        for line in text.lines() {
+            let mut words = line.split_whitespace();
+            match words.next() {
+                Some("v") => {
+                    let c: Vec<f32> = words.filter_map(|w| w.parse().ok()).collect();
+                    points.push(Vec3::new(c[0], c[1], c[2]));
+                }
+                Some("f") => {
+                    let c: Vec<u32> = words.filter_map(|w| w.split('/').next()?.parse::<u32>().ok()).collect();
+                    triangles.extend((1..c.len() - 1).map(|k| [c[0] - 1, c[k] - 1, c[k + 1] - 1]));
+                }
+                _ => {}
+            }
+        }
+        let joints: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("joints.json")).ok()?).ok()?;
+        let bounds = points.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[l, h], &p| [l.min(p), h.max(p)]);
+        let surface = Surface::new(points.clone(), triangles.clone());
+        Some(Self { name, bones: joints["default163"].clone(), points, triangles, surface, bounds })
+    }
+
+    fn head(&self, bone: &str) -> Vec3 {
+        let c = |i: usize| self.bones[bone]["head"][i].as_f64().unwrap_or(0.0) as f32;
+        Vec3::new(c(0), c(1), c(2))
+    }
+
+    fn plane(&self, view: View) -> ViewPlane {
+        ViewPlane::orthographic(view, self.bounds)
+    }
+}
+
+/// The line of section centroids along one bone.
+struct Line {
+    from: Vec3,
+    to: Vec3,
+    /// Fraction along the bone, centroid, radius; only where the section is the limb's own.
+    sections: Vec<(f32, Vec3, f32)>,
+}
+
+impl Line {
+    fn new(body: &Body, from: Vec3, to: Vec3) -> Self {
+        let normal = (to - from).normalize();
+        let mut sections: Vec<(f32, Vec3, f32)> = (0..=40)
+            .filter_map(|i| {
+                let t = i as f32 / 40.0;
+                let (centroid, area) = cut(body, from.lerp(to, t), normal)?;
+                Some((t, centroid, (area / std::f32::consts::PI).sqrt()))
+            })
+            .collect();
+        let mut middle: Vec<f32> = sections.iter().filter(|s| (0.4..=0.9).contains(&s.0)).map(|s| s.2).collect();
+        middle.sort_by(f32::total_cmp);
+        let usual = middle[middle.len() / 2];
+        sections.retain(|s| s.2 < 1.5 * usual);
+        Self { from, to, sections }
+    }
+
+    /// Distance of `p` from the line in local radii, and whether the line was extended to reach it.
+    fn distance(&self, p: Vec3) -> (f32, bool) {
+        let n = self.sections.len();
+        let extend = |end: usize, inner: usize| {
+            let (a, b) = (self.sections[end].1, self.sections[inner].1);
+            a + (a - b).normalize() * self.from.distance(self.to)
+        };
+        let step = (n / 4).max(1);
+        let mut best = (f32::INFINITY, self.sections[0].2, false);
+        let mut piece = |a: Vec3, b: Vec3, radius: f32, extended: bool| {
+            let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+            let d = p.distance(a.lerp(b, t));
+            if d < best.0 {
+                best = (d, radius, extended);
+            }
+        };
+        for w in self.sections.windows(2) {
+            piece(w[0].1, w[1].1, 0.5 * (w[0].2 + w[1].2), false);
+        }
+        piece(extend(0, step), self.sections[0].1, self.sections[0].2, true);
+        piece(self.sections[n - 1].1, extend(n - 1, n - 1 - step), self.sections[n - 1].2, true);
+        (best.0 / best.1, best.2)
+    }
+
+    fn radius(&self) -> f32 {
+        let mut radii: Vec<f32> = self.sections.iter().map(|s| s.2).collect();
+        radii.sort_by(f32::total_cmp);
+        radii[radii.len() / 2]
+    }
+}
+
+/// Centroid and area of the loop around `at` where the plane through it cuts the mesh.
+fn cut(body: &Body, at: Vec3, normal: Vec3) -> Option<(Vec3, f32)> {
+    let (u, v) = normal.any_orthonormal_pair();
+    let side: Vec<f32> = body.points.iter().map(|&p| (p - at).dot(normal)).collect();
+    let mut places: BTreeMap<(u32, u32), Vec2> = BTreeMap::new();
+    let mut next: BTreeMap<(u32, u32), Vec<(u32, u32)>> = BTreeMap::new();
+    for t in &body.triangles {
+        let mut ends = Vec::new();
+        for (i, j) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            let (a, b) = (side[i as usize], side[j as usize]);
+            if (a > 0.0) != (b > 0.0) {
+                let p = body.points[i as usize].lerp(body.points[j as usize], a / (a - b)) - at;
+                places.insert((i.min(j), i.max(j)), Vec2::new(p.dot(u), p.dot(v)));
+                ends.push((i.min(j), i.max(j)));
+            }
+        }
+        if let [a, b] = ends[..] {
+            next.entry(a).or_default().push(b);
+            next.entry(b).or_default().push(a);
+        }
+    }
+    let mut best: Option<(bool, f32, Vec2, f32)> = None;
+    while let Some((&start, _)) = next.first_key_value() {
+        let mut edge = start;
+        let mut polygon = Vec::new();
+        while let Some(around) = next.remove(&edge) {
+            polygon.push(places[&edge]);
+            match around.into_iter().find(|e| next.contains_key(e)) {
+                Some(e) => edge = e,
+                None => break,
+            }
+        }
+        let (mut area, mut moment, mut turn) = (0.0, Vec2::ZERO, 0.0);
+        for i in 0..polygon.len() {
+            let (a, b) = (polygon[i], polygon[(i + 1) % polygon.len()]);
+            area += a.perp_dot(b);
+            moment += (a + b) * a.perp_dot(b);
+            turn += a.angle_to(b);
+        }
+        if area.abs() < 1e-9 {
+            continue;
+        }
+        let centre = moment / (3.0 * area);
+        let outside = turn.abs() < 3.0;
+        let key = (outside, centre.length());
+        if best.is_none_or(|b| key < (b.0, b.1)) {
+            best = Some((key.0, key.1, centre, 0.5 * area.abs()));
+        }
+    }
+    best.map(|(_, _, c, area)| (at + u * c.x + v * c.y, area))
+}
+
+/// A small generator of repeatable numbers from -1 to 1.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let mut x = self.0;
+        x ^= x >> 33;
+        x = x.wrapping_mul(0xff51_afd7_ed55_8ccd);
+        x ^= x >> 33;
+        (x >> 40) as f32 / (1u64 << 23) as f32 - 1.0
+    }
+}
+
+/// How a hand strays from the line it means to draw, by at most `reach`.
+#[derive(Clone, Copy, PartialEq)]
+enum Jitter {
+    /// Every point on its own.
+    White,
+    /// A slow waver of a few swings along the stroke.
+    Waver,
+    /// The whole stroke to one side.
+    Shift,
+}
+
+fn jittered(line: &[Vec2], count: usize, reach: f32, jitter: Jitter, seed: u64) -> Vec<Vec2> {
+    let mut random = Random(seed.wrapping_mul(7919).wrapping_add(17));
+    for _ in 0..4 {
+        random.next();
+    }
+    let total: f32 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let phases = [random.next(), random.next(), random.next(), random.next()];
+    let swings = [1.5 + random.next(), 1.5 + random.next()];
+    (0..count)
+        .map(|i| {
+            let t = i as f32 / (count - 1) as f32;
+            let mut left = t * total;
+            let mut p = line[line.len() - 1];
+            for w in line.windows(2) {
+                let l = w[0].distance(w[1]);
+                if left <= l {
+                    p = w[0].lerp(w[1], left / l);
+                    break;
+                }
+                left -= l;
+            }
+            let stray = match jitter {
+                Jitter::White => loop {
+                    let d = Vec2::new(random.next(), random.next());
+                    if d.length() <= 1.0 {
+                        break d;
+                    }
+                },
+                Jitter::Waver => {
+                    let turn = |s: f32, p: f32| (std::f32::consts::PI * (2.0 * s * t + p)).sin();
+                    0.707 * Vec2::new(turn(swings[0], phases[0]), turn(swings[1], phases[1]))
+                }
+                Jitter::Shift => Vec2::new(phases[0], phases[1]).normalize_or(Vec2::X),
+            };
+            p + stray * reach
+        })
+        .collect()
+}
+
+/// Means by row.
+#[derive(Default)]
+struct Table(BTreeMap<String, Vec<f32>>);
+
+impl Table {
+    fn add(&mut self, row: String, value: f32) {
+        self.0.entry(row).or_default().push(value);
+    }
+
+    fn print(&self) {
+        for (row, values) in &self.0 {
+            let mean = values.iter().sum::<f32>() / values.len() as f32;
+            let mut sorted = values.clone();
+            sorted.sort_by(f32::total_cmp);
+            let p90 = sorted[(sorted.len() * 9 / 10).min(sorted.len() - 1)];
+            println!("{row:48} mean {mean:7.3}  p90 {p90:7.3}  worst {:7.3}  n {}", sorted[sorted.len() - 1], sorted.len());
+        }
+    }
+}
+
+const LIMBS: [(&str, &str, &str); 4] = [
+    ("upper arm", "upperarm01", "lowerarm01"),
+    ("forearm", "lowerarm01", "wrist"),
+    ("thigh", "upperleg01", "lowerleg01"),
+    ("calf", "lowerleg01", "foot"),
+];
+
+fn views(side: &str) -> [(View, &'static str); 5] {
+    [
+        (View::Front, "front"),
+        (if side == "L" { View::Left } else { View::Right }, "side"),
+        (View::Top, "top"),
+        (View::Orbit(if side == "L" { 35.0 } else { -35.0 }, 20.0), "orbit"),
+        (View::Back, "back"),
+    ]
+}
+
+fn centring(body: &Body, detail: bool, table: &mut Table) {
+    for (limb, from, to) in LIMBS {
+        for side in ["L", "R"] {
+            let (a, b) = (body.head(&format!("{from}.{side}")), body.head(&format!("{to}.{side}")));
+            let line = Line::new(body, a, b);
+            for (view, view_name) in views(side) {
+                let plane = body.plane(view);
+                let project = |p: Vec3| plane.project(p).unwrap_or(Vec2::ZERO);
+                if project(a).distance(project(b)) < 0.5 * a.distance(b) {
+                    continue;
+                }
+                let arm_from_side = limb.contains("arm") && view_name != "front" && view_name != "back" && view_name != "top";
+                for (jitter, jitter_name) in [(Jitter::White, "white"), (Jitter::Waver, "waver"), (Jitter::Shift, "shift")] {
+                    for (low, high, extent) in [(0.1, 0.9, "inner"), (0.0, 1.0, "whole")] {
+                        let mut seen = Vec::new();
+                        for seed in 0..SEEDS {
+                            // The middle of the limb as seen: what a user traces.
+                            let aim: Vec<Vec2> =
+                                [low, high].iter().map(|&t| project(a.lerp(b, t))).collect();
+                            let stroke = jittered(&aim, 60, 0.3 * line.radius(), jitter, seed);
+                            let settings = StrokeSettings {
+                                place: PlaceSettings { volume: arm_from_side.then_some(1), ..Default::default() },
+                                ..Default::default()
+                            };
+                            let Ok(samples) = StrokeSamples::new(&body.surface, &plane, &stroke, settings) else {
+                                seen.push(9.0);
+                                continue;
+                            };
+                            for joint in samples.chain(&body.surface, ChainChoice::Joints(4)).joints {
+                                let (distance, extended) = line.distance(joint.position);
+                                if !extended {
+                                    seen.push(distance);
+                                }
+                                table.add(
+                                    format!("{extent}{} {limb} {view_name}", if extended { " extended" } else { "" }),
+                                    distance,
+                                );
+                            }
+                        }
+                        let mean = seen.iter().sum::<f32>() / seen.len() as f32;
+                        table.add(format!("all {extent} {}", if limb.contains("arm") { "arms" } else { "legs" }), mean);
+                        if detail {
+                            println!("{} {limb} {side} {view_name} {jitter_name} {extent}: {mean:.3} radii", body.name);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn bending(body: &Body, detail: bool, table: &mut Table) {
+    for (limb, bones) in
+        [("elbow", ["upperarm01", "lowerarm01", "wrist"]), ("knee", ["upperleg01", "lowerleg01", "foot"])]
+    {
+        for side in ["L", "R"] {
+            let [a, b, c] = bones.map(|bone| body.head(&format!("{bone}.{side}")));
+            let bend = (b - a).angle_between(c - b).to_degrees();
+            let length = a.distance(b) + b.distance(c);
+            let radius = Line::new(body, b, c).radius();
+            for (view, view_name) in views(side) {
+                let plane = body.plane(view);
+                let project = |p: Vec3| plane.project(p).unwrap_or(Vec2::ZERO);
+                if project(a).distance(project(b)) + project(b).distance(project(c)) < 0.5 * length {
+                    continue;
+                }
+                let arm_from_side = limb == "elbow" && view_name != "front" && view_name != "back" && view_name != "top";
+                for (jitter, jitter_name) in [(Jitter::White, "white"), (Jitter::Waver, "waver"), (Jitter::Shift, "shift")] {
+                    let mut seen = Vec::new();
+                    for seed in 0..SEEDS {
+                        let mut random = Random(seed + 99);
+                        let ends = [0.06 * random.next(), 0.06 * random.next()];
+                        let aim = [project(a.lerp(b, ends[0].max(0.0))), project(b), project(c.lerp(b, ends[1]))];
+                        let stroke = jittered(&aim, 90, 0.3 * radius, jitter, seed);
+                        let settings = StrokeSettings {
+                            place: PlaceSettings { volume: arm_from_side.then_some(1), ..Default::default() },
+                            ..Default::default()
+                        };
+                        let Ok(samples) = StrokeSamples::new(&body.surface, &plane, &stroke, settings) else {
+                            seen.push(1.0);
+                            continue;
+                        };
+                        let joints = samples.chain(&body.surface, ChainChoice::Joints(3)).joints;
+                        let Some(middle) = joints.get(1) else {
+                            seen.push(1.0);
+                            continue;
+                        };
+                        let (along, t) = along(&[a, b, c], middle.position);
+                        let _ = t;
+                        seen.push((along - a.distance(b)) / length);
+                    }
+                    let mean = seen.iter().map(|e| e.abs()).sum::<f32>() / seen.len() as f32;
+                    let worst = seen.iter().map(|e| e.abs()).fold(0.0, f32::max);
+                    let kind = if bend > 25.0 { "bent" } else { "straight" };
+                    let _ = jitter_name;
+                    for e in &seen {
+                        table.add(format!("{kind} {limb} {view_name}"), e.abs());
+                        table.add(format!("{kind} {limb} all"), e.abs());
+                    }
+                    if detail {
+                        println!(
+                            "{} {limb} {side} {bend:.0}° {view_name} {jitter_name}: mean {mean:.3} worst {worst:.3} signed {:.3}",
+                            body.name,
+                            seen.iter().sum::<f32>() / seen.len() as f32
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// How far along a polyline the nearest point to `p` lies, and its distance.
+fn along(line: &[Vec3], p: Vec3) -> (f32, f32) {
+    let mut best = (0.0, f32::INFINITY);
+    let mut before = 0.0;
+    for (i, w) in line.windows(2).enumerate() {
+        let d = w[1] - w[0];
+        let mut t = (p - w[0]).dot(d) / d.length_squared();
+        if i > 0 {
+            t = t.max(0.0);
+        }
+        if i + 2 < line.len() {
+            t = t.min(1.0);
+        }
+        let distance = p.distance(w[0] + d * t);
+        if distance < best.1 {
+            best = (before + t * d.length(), distance);
+        }
+        before += d.length();
+    }
+    best
+}
+
+/// A stroke of 500 points on a body subdivided to about a million triangles.
+fn timing(body: &Body) {
+    let (mut points, mut triangles) = (body.points.clone(), body.triangles.clone());
+    while triangles.len() < 800_000 {
+        let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+        let mut finer = Vec::with_capacity(4 * triangles.len());
+        for t in &triangles {
+            let m = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(a, b)| {
+                *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    points.push(0.5 * (points[a as usize] + points[b as usize]));
+                    points.len() as u32 - 1
+                })
+            });
+            finer.extend([[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m]);
+        }
+        triangles = finer;
+    }
+    let surface = Surface::new(points, triangles.clone());
+    let plane = body.plane(View::Front);
+    let aim: Vec<Vec2> = ["upperarm01.L", "lowerarm01.L", "wrist.L"]
+        .iter()
+        .map(|b| plane.project(body.head(b)).unwrap_or(Vec2::ZERO))
+        .collect();
+    let stroke = jittered(&aim, 500, 0.01, Jitter::White, 1);
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..30 {
+        let start = Instant::now();
+        let Ok(samples) = StrokeSamples::new(&surface, &plane, &stroke, StrokeSettings::default()) else { return };
+        times[0].push(start.elapsed().as_secs_f64() * 1e3);
+        let start = Instant::now();
+        std::hint::black_box(samples.chain(&surface, ChainChoice::Joints(3)));
+        times[1].push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    for t in &mut times {
+        t.sort_by(f64::total_cmp);
+    }
+    println!(
+        "time, 500 points on {} triangles: samples {:.2} ms, chain {:.3} ms (medians)",
+        triangles.len(),
+        times[0][15],
+        times[1][15]
+    );
+}

@@ -1,0 +1,186 @@
+//! From raw quads to a finished surface: vertices on the field's zero, evenly spread, mirrored, and checked.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, dvec3};
+use rayon::prelude::*;
+
+use crate::{field::gradient, surface_nets::Quads};
+
+/// How [`settle`] moves vertices.
+#[derive(Debug, Clone, Copy)]
+pub struct Settle {
+    /// Rounds of spreading and projecting.
+    pub rounds: usize,
+    /// Share of the way to the neighbours' mean that a vertex moves in its tangent plane each round, 0 to 1.
+    pub spread: f64,
+    /// Longest move of one Newton step, metres; about a cell.
+    pub reach: f64,
+    /// Step of the numeric gradient, metres.
+    pub step: f64,
+}
+
+/// Spreads vertices evenly along the surface and puts them on the field's zero with Newton steps.
+pub fn settle(quads: &mut Quads, field: &(impl Fn(DVec3) -> f64 + Sync), how: Settle) {
+    let neighbours = neighbours(quads);
+    for _ in 0..how.rounds {
+        let before = quads.points.clone();
+        quads.points = (0..before.len())
+            .into_par_iter()
+            .map(|i| {
+                let mut p = before[i];
+                let mean = neighbours[i].iter().map(|&j| before[j as usize]).sum::<DVec3>() / neighbours[i].len() as f64;
+                let normal = gradient(field, p, how.step).normalize_or_zero();
+                let to = mean - p;
+                p += (to - normal * to.dot(normal)) * how.spread;
+                for _ in 0..3 {
+                    let value = field(p);
+                    let slope = gradient(field, p, how.step);
+                    let move_by = slope * (-value / slope.length_squared().max(0.05));
+                    p += move_by.clamp_length_max(how.reach);
+                }
+                if quads.on_plane[i] {
+                    p.x = 0.0;
+                }
+                p
+            })
+            .collect();
+    }
+}
+
+/// The vertices that share an edge with each vertex, in rising order.
+fn neighbours(quads: &Quads) -> Vec<Vec<u32>> {
+    let mut lists = vec![Vec::new(); quads.points.len()];
+    for face in &quads.faces {
+        for k in 0..4 {
+            let (a, b) = (face[k], face[(k + 1) % 4]);
+            lists[a as usize].push(b);
+            lists[b as usize].push(a);
+        }
+    }
+    for list in &mut lists {
+        list.sort_unstable();
+        list.dedup();
+    }
+    lists
+}
+
+/// The whole of a half, the mirrored vertices and faces after the given ones.
+pub fn mirrored(half: &Quads) -> Quads {
+    let mut whole = half.clone();
+    let twin: Vec<u32> = (0..half.points.len())
+        .map(|i| {
+            if half.on_plane[i] {
+                return i as u32;
+            }
+            let p = half.points[i];
+            whole.points.push(dvec3(-p.x, p.y, p.z));
+            whole.on_plane.push(false);
+            whole.points.len() as u32 - 1
+        })
+        .collect();
+    for face in &half.faces {
+        let [a, b, c, d] = face.map(|i| twin[i as usize]);
+        whole.faces.push([d, c, b, a]);
+    }
+    whole
+}
+
+/// Keeps only the largest shell. Returns how many others were dropped.
+pub fn largest_shell(quads: &mut Quads) -> usize {
+    let neighbours = neighbours(quads);
+    let mut shell = vec![usize::MAX; quads.points.len()];
+    let mut sizes = Vec::new();
+    for start in 0..shell.len() {
+        if shell[start] != usize::MAX {
+            continue;
+        }
+        let name = sizes.len();
+        let mut stack = vec![start];
+        shell[start] = name;
+        let mut size = 0;
+        while let Some(i) = stack.pop() {
+            size += 1;
+            for &j in &neighbours[i] {
+                if shell[j as usize] == usize::MAX {
+                    shell[j as usize] = name;
+                    stack.push(j as usize);
+                }
+            }
+        }
+        sizes.push(size);
+    }
+    let Some(best) = (0..sizes.len()).max_by_key(|&i| sizes[i]) else { return 0 };
+    let mut new_index = vec![u32::MAX; shell.len()];
+    let mut kept = Quads::default();
+    for (i, &name) in shell.iter().enumerate() {
+        if name == best {
+            new_index[i] = kept.points.len() as u32;
+            kept.points.push(quads.points[i]);
+            kept.on_plane.push(quads.on_plane[i]);
+        }
+    }
+    for face in &quads.faces {
+        if shell[face[0] as usize] == best {
+            kept.faces.push(face.map(|i| new_index[i as usize]));
+        }
+    }
+    *quads = kept;
+    sizes.len() - 1
+}
+
+/// What keeps a surface from being a closed manifold; empty if nothing does.
+pub fn faults(quads: &Quads) -> Vec<String> {
+    let mut edges: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+    let mut fans: Vec<Vec<(u32, u32)>> = vec![Vec::new(); quads.points.len()];
+    for face in &quads.faces {
+        for k in 0..4 {
+            *edges.entry((face[k], face[(k + 1) % 4])).or_default() += 1;
+            fans[face[k] as usize].push((face[(k + 1) % 4], face[(k + 3) % 4]));
+        }
+    }
+    let mut faults = Vec::new();
+    for (&(a, b), &count) in &edges {
+        if count != 1 || a == b || edges.get(&(b, a)) != Some(&1) {
+            faults.push(format!("edge {a} {b} near {} is not shared by two faces", quads.points[a as usize]));
+        }
+    }
+    for (i, fan) in fans.iter().enumerate() {
+        let next: BTreeMap<u32, u32> = fan.iter().copied().collect();
+        let Some(&(start, _)) = fan.first() else {
+            faults.push(format!("vertex {i} has no face"));
+            continue;
+        };
+        let (mut at, mut steps) = (start, 0);
+        while let Some(&to) = next.get(&at) {
+            at = to;
+            steps += 1;
+            if at == start || steps > fan.len() {
+                break;
+            }
+        }
+        if steps != fan.len() {
+            faults.push(format!("the faces around vertex {i} near {} are not one fan", quads.points[i]));
+        }
+    }
+    faults
+}
+
+/// Smooth unit normals: sums of face normals weighted by area, exactly mirrored where `half` vertices have a twin.
+pub fn normals(half: &Quads) -> Vec<DVec3> {
+    let mut sums = vec![DVec3::ZERO; half.points.len()];
+    for face in &half.faces {
+        let [a, b, c, d] = face.map(|i| half.points[i as usize]);
+        let normal = (c - a).cross(d - b);
+        for &i in face {
+            sums[i as usize] += normal;
+        }
+    }
+    for (sum, &on_plane) in sums.iter_mut().zip(&half.on_plane) {
+        if on_plane {
+            sum.x = 0.0;
+        }
+        *sum = sum.normalize_or(DVec3::Y);
+    }
+    sums
+}

@@ -1,0 +1,88 @@
+//! Picking: which joint the user means.
+//!
+//! A click means the joint spatially nearest to where its ray first meets the mesh (Pencil Rigger, section 3.1), so small
+//! joints are easy to hit. Clicking the same spot again cycles through the next nearest, which that paper leaves to the
+//! future. Where the ray misses the mesh, distances are measured on the view plane instead.
+
+use glam::{Vec2, Vec3};
+
+use super::view::ViewPlane;
+use crate::mesh::surface::Surface;
+
+/// The joints that a click at `point` may mean, nearest first; empty only if there are none.
+///
+/// `joints` are positions in the surface's space; those that are not finite are never picked. `reach` is a length in
+/// model units (some pixels at the current zoom): the list holds the nearest joint, the next nearest, and all joints within
+/// twice the nearest one's distance plus `reach`. One ray; O(joints · log joints).
+pub fn candidates(surface: &Surface, plane: &ViewPlane, point: Vec2, joints: &[Vec3], reach: f32) -> Vec<usize> {
+    let ray = plane.ray(point);
+    let mut hits = Vec::new();
+    surface.hits(&ray, &mut hits);
+    candidates_at(hits.first().map(|hit| ray.at(hit.distance)), plane, point, joints, reach)
+}
+
+/// As [`candidates`], where the ray's first hit is known.
+pub fn candidates_at(first_hit: Option<Vec3>, plane: &ViewPlane, point: Vec2, joints: &[Vec3], reach: f32) -> Vec<usize> {
+    match first_hit {
+        Some(hit) => nearest(joints.iter().map(|joint| joint.distance(hit)), reach),
+        None => nearest_on_plane(plane, point, joints, reach),
+    }
+}
+
+/// As [`candidates`], measured on the view plane: for a click beside the mesh.
+pub fn nearest_on_plane(plane: &ViewPlane, point: Vec2, joints: &[Vec3], reach: f32) -> Vec<usize> {
+    let distance = |joint: &Vec3| plane.project(*joint).map_or(f32::NAN, |place| place.distance(point));
+    nearest(joints.iter().map(distance), reach)
+}
+
+/// Indices of the joints whose place on the view plane lies in the box between two opposite `corners`, rising.
+pub fn in_box(plane: &ViewPlane, corners: [Vec2; 2], joints: &[Vec3]) -> Vec<usize> {
+    let (low, high) = (corners[0].min(corners[1]), corners[0].max(corners[1]));
+    let inside = |place: Vec2| place.cmpge(low).all() && place.cmple(high).all();
+    (0..joints.len()).filter(|&i| plane.project(joints[i]).is_some_and(inside)).collect()
+}
+
+/// Indices by rising distance, as far as they are near; equal distances by index.
+fn nearest(distances: impl Iterator<Item = f32>, reach: f32) -> Vec<usize> {
+    let mut order: Vec<(f32, usize)> = distances.enumerate().map(|(i, d)| (d, i)).filter(|(d, _)| d.is_finite()).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let limit = order.first().map_or(0.0, |&(least, _)| 2.0 * least + reach.max(0.0));
+    // The second nearest always takes part, so that a second click never does nothing.
+    let near = order.partition_point(|&(d, _)| d <= limit).max(2).min(order.len());
+    order.into_iter().take(near).map(|(_, i)| i).collect()
+}
+
+/// Remembers the last click, so that the next one at the same spot takes the next joint.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PickCycle {
+    last: Option<(Vec2, Vec<usize>, usize)>,
+}
+
+impl PickCycle {
+    /// The joint that a click at `point` picks from `candidates` (nearest first).
+    ///
+    /// A click within `same_spot` of the last one, with the same candidates in whatever order, takes the one after the last
+    /// picked in the order of the first click, and starts over after the furthest. Any other click takes the nearest.
+    pub fn click(&mut self, point: Vec2, same_spot: f32, candidates: &[usize]) -> Option<usize> {
+        if candidates.is_empty() {
+            self.last = None;
+            return None;
+        }
+        if let Some((spot, order, picked)) = &mut self.last {
+            let same = spot.distance(point) <= same_spot
+                && order.len() == candidates.len()
+                && order.iter().all(|joint| candidates.contains(joint));
+            if same {
+                *picked = (*picked + 1) % order.len();
+                return Some(order[*picked]);
+            }
+        }
+        self.last = Some((point, candidates.to_vec(), 0));
+        Some(candidates[0])
+    }
+
+    /// Forgets the last click: after an edit, a change of view or a deselection.
+    pub fn reset(&mut self) {
+        self.last = None;
+    }
+}

@@ -1,0 +1,231 @@
+//! A freehand stroke becomes a chain of joints.
+//!
+//! Pencil Rigger (section 5.3) plans it so: a joint at both ends; then, while some point of the stroke lies too far from
+//! the line between two neighbours, a joint at the furthest point on either side of that line, again and again; and
+//! each joint placed in depth like a click. Two things are added here, because a hand is not that steady and a midpoint
+//! of hits is not that central: the stroke stays in the volume it runs in (one leg of two, the arm before the torso), and
+//! each joint takes one step to the centroid of the limb's cross-section.
+//!
+//! The work is in two parts. [`StrokeSamples`] follows the stroke through the mesh with rays, once. From these samples
+//! [`StrokeSamples::chain`] chooses joints, which takes microseconds, so that a preview can vary the threshold or
+//! the number of joints while the user watches.
+
+mod axis;
+mod corners;
+mod gesture;
+mod path;
+mod section;
+mod split;
+mod track;
+
+use glam::{Vec2, Vec3};
+use thiserror::Error;
+
+pub use gesture::{StrokeKind, classify, joint_at};
+
+use self::{
+    axis::Axis,
+    path::Path,
+    section::Fan,
+    track::{Span, Track},
+};
+use super::{placement::PlaceSettings, view::ViewPlane};
+use crate::mesh::{ray::Hit, surface::Surface};
+
+/// How a stroke is placed in depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StrokeSettings {
+    /// Depth and volume, as for a click. A volume says where the stroke starts; from there it stays in it. A depth other
+    /// than one half is kept: recentring then only moves the joint across the view.
+    pub place: PlaceSettings,
+    /// Whether each joint takes one step to the centroid of the limb's section.
+    pub recentre: bool,
+}
+
+impl Default for StrokeSettings {
+    fn default() -> Self {
+        Self { place: PlaceSettings::default(), recentre: true }
+    }
+}
+
+/// Which joints a stroke becomes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ChainChoice {
+    /// Joints wherever the stroke strays further than this from the line between two neighbours; model units on the
+    /// view plane. Zero, negative or NaN makes a joint of every point of the stroke.
+    Threshold(f32),
+    /// Exactly this many joints, where they fit the stroke and the limb best; fewer than two count as two.
+    Joints(usize),
+}
+
+/// Why a stroke cannot become a chain.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum StrokeError {
+    /// Fewer than two different finite points.
+    #[error("the stroke has {finite} usable points of {given}, all at one place: draw at least two different points")]
+    TooShort {
+        /// Points given.
+        given: usize,
+        /// Finite points among them, repetitions counted once.
+        finite: usize,
+    },
+    /// No point of the stroke lies over the mesh.
+    #[error("the stroke does not cross the mesh in this view: draw it over the mesh, or turn the view")]
+    Misses,
+}
+
+/// A joint of a chain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlacedJoint {
+    /// Where it goes, in the surface's space.
+    pub position: Vec3,
+    /// Radius of the circle with the area of the limb's section here; `None` if the surface is open here or recentring is off.
+    pub radius: Option<f32>,
+    /// The point of the stroke it stands for, on the view plane.
+    pub source: Vec2,
+    /// Hits of the ray through that point; 1 means that the joint lies on the surface.
+    pub hits: usize,
+}
+
+/// What the user should hear about a stroke.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StrokeNote {
+    /// The stroke begins or ends beside the mesh; the end joint stands at the nearest point of the stroke that is over it.
+    EndMoved {
+        /// True for the stroke's start, false for its end.
+        start: bool,
+    },
+    /// Where the stroke starts, the ray goes through several volumes, of which this one, counted from one, was taken.
+    VolumeChosen {
+        /// The volume taken.
+        volume: u32,
+        /// How many there are.
+        of: u32,
+    },
+    /// Some inner joints were left out because the mesh has a gap where they would be.
+    JointsLeftOut {
+        /// How many.
+        count: usize,
+    },
+}
+
+/// The joints a stroke becomes, in the stroke's order: each is the parent of the next.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StrokeChain {
+    /// The joints; at least one, two unless both ends fall on one point.
+    pub joints: Vec<PlacedJoint>,
+    /// What the user should hear.
+    pub notes: Vec<StrokeNote>,
+}
+
+/// A stroke followed through the mesh: everything a chain is chosen from.
+#[derive(Debug, Clone)]
+pub struct StrokeSamples {
+    plane: ViewPlane,
+    settings: StrokeSettings,
+    path: Path,
+    track: Track,
+    axis: Option<Axis>,
+    fan: Fan,
+}
+
+impl StrokeSamples {
+    /// Follows the stroke `points` (on `plane`) through `surface`.
+    ///
+    /// Points that are not finite and repetitions are dropped. Costs about a hundred rays and as many fans of section
+    /// rays, whatever the number of points.
+    ///
+    /// # Errors
+    /// [`StrokeError::TooShort`] without two different points, [`StrokeError::Misses`] if nothing lies under the stroke.
+    pub fn new(
+        surface: &Surface,
+        plane: &ViewPlane,
+        points: &[Vec2],
+        settings: StrokeSettings,
+    ) -> Result<Self, StrokeError> {
+        let path = Path::new(points)?;
+        let track = Track::follow(surface, plane, &path, settings.place.volume).ok_or(StrokeError::Misses)?;
+        let fan = Fan::new();
+        let axis = Axis::find(surface, &fan, &track);
+        Ok(Self { plane: *plane, settings, path, track, axis, fan })
+    }
+
+    /// Chooses joints and places them: a ray, and a fan of section rays if recentring is on, for each.
+    pub fn chain(&self, surface: &Surface, choice: ChainChoice) -> StrokeChain {
+        let places = match choice {
+            ChainChoice::Threshold(threshold) => split::by_threshold(&self.path, threshold),
+            ChainChoice::Joints(count) => corners::choose(&self.path, &self.track, self.axis.as_ref(), count.max(2)),
+        };
+        let [first, last] = self.track.covered();
+        let mut notes = Vec::new();
+        if first > 0.0 {
+            notes.push(StrokeNote::EndMoved { start: true });
+        }
+        if last < self.path.length() {
+            notes.push(StrokeNote::EndMoved { start: false });
+        }
+        if self.track.volumes_at_start > 1 {
+            notes.push(StrokeNote::VolumeChosen { volume: self.track.volume_at_start, of: self.track.volumes_at_start });
+        }
+        let mut chain = StrokeChain { joints: Vec::with_capacity(places.len()), notes };
+        let mut left_out = 0;
+        let mut hits = Vec::new();
+        let mut before = None;
+        for at in places {
+            let at = at.clamp(first, last);
+            // Several joints beyond the mesh's edge all land on its last point: one is enough.
+            if before == Some(at) {
+                continue;
+            }
+            before = Some(at);
+            match self.place(surface, at, &mut hits) {
+                Some(joint) => chain.joints.push(joint),
+                None => left_out += 1,
+            }
+        }
+        if left_out > 0 {
+            chain.notes.push(StrokeNote::JointsLeftOut { count: left_out });
+        }
+        chain
+    }
+
+    /// The joint at the arc length `at` of the stroke.
+    fn place(&self, surface: &Surface, at: f32, hits: &mut Vec<Hit>) -> Option<PlacedJoint> {
+        let source = self.path.at(at);
+        let ray = self.plane.ray(source);
+        surface.hits(&ray, hits);
+        let span = self.track.span_at(&ray, hits, at)?;
+        let count = hits.len();
+        let depth = self.settings.place.depth();
+        let middle = ray.at(span.middle());
+        let section = self.settings.recentre.then_some(self.axis.as_ref()).flatten().and_then(|axis| {
+            axis.recentre(surface, &self.fan, at, middle, hits)
+        });
+        let position = match section {
+            Some((centroid, _)) if depth == 0.5 => centroid,
+            // The chosen depth, at the place across the view that the section asks for.
+            Some((centroid, _)) => {
+                let ray = self.plane.project(centroid).map_or(ray, |point| self.plane.ray(point));
+                surface.hits(&ray, hits);
+                let span = self.track.span_at(&ray, hits, at).unwrap_or(span);
+                ray.at(span.at(depth))
+            }
+            None => ray.at(span.at(depth)),
+        };
+        Some(PlacedJoint { position, radius: section.map(|(_, radius)| radius), source, hits: count })
+    }
+}
+
+/// Samples and chooses in one call; see [`StrokeSamples`] for previews.
+///
+/// # Errors
+/// As [`StrokeSamples::new`].
+pub fn stroke_chain(
+    surface: &Surface,
+    plane: &ViewPlane,
+    points: &[Vec2],
+    settings: StrokeSettings,
+    choice: ChainChoice,
+) -> Result<StrokeChain, StrokeError> {
+    Ok(StrokeSamples::new(surface, plane, points, settings)?.chain(surface, choice))
+}

@@ -1,0 +1,81 @@
+//! Where a wanted number of joints goes: the polyline through so many points of the limb's centre line that fits it best.
+//!
+//! The centre line and not the stroke is fitted, because it is known in depth, where the bend of an elbow may lie, and is
+//! steadier than a hand. Where the line does not bend, nothing says where a joint goes; pieces of even length are the
+//! mild preference that decides then.
+
+use glam::Vec3;
+
+use super::{axis::Axis, path::Path, track::Track};
+
+/// How strongly even pieces are preferred: what pieces twice too long or nil would cost, in squared deviations of one
+/// radius of the limb.
+const EVENNESS: f32 = 0.3;
+
+/// Arc lengths of exactly `count` joints, ends included, rising.
+pub(super) fn choose(path: &Path, track: &Track, axis: Option<&Axis>, count: usize) -> Vec<f32> {
+    let _ = path;
+    let [first, last] = track.covered();
+    let even = || (0..count).map(|i| first + (last - first) * (i as f32 / (count - 1) as f32)).collect();
+    let Some(axis) = axis else { return even() };
+    let points = &axis.centres;
+    if count == 2 || count > points.len() / 2 {
+        return even();
+    }
+    let evenness = std::env::var("EVEN").ok().and_then(|v| v.parse().ok()).unwrap_or(EVENNESS);
+    let chosen = fit(points, axis.radius, evenness, count);
+    chosen.into_iter().map(|i| axis.at[i]).collect()
+}
+
+/// Indices of `count` points, the first and last among them, whose polyline has the least mean squared distance from all
+/// points, in squared radii, plus the price of uneven pieces. O(points³ + count · points²).
+fn fit(points: &[Vec3], radius: f32, evenness: f32, count: usize) -> Vec<usize> {
+    let n = points.len();
+    let mut along = vec![0.0; n];
+    for i in 1..n {
+        along[i] = along[i - 1] + points[i].distance(points[i - 1]);
+    }
+    let total = along[n - 1].max(f32::MIN_POSITIVE);
+    let weight: Vec<f32> =
+        (0..n).map(|i| 0.5 * (along[(i + 1).min(n - 1)] - along[i.saturating_sub(1)]) / total).collect();
+    let pieces = (count - 1) as f32;
+    let price = |i: usize, j: usize| {
+        let (a, b) = (points[i], points[j]);
+        let chord = b - a;
+        let squared = chord.length_squared().max(f32::MIN_POSITIVE);
+        let deviation: f32 = (i + 1..j)
+            .map(|k| {
+                let t = ((points[k] - a).dot(chord) / squared).clamp(0.0, 1.0);
+                weight[k] * points[k].distance_squared(a + chord * t)
+            })
+            .sum();
+        let uneven = (along[j] - along[i]) / total * pieces - 1.0;
+        deviation / (radius * radius) + evenness * uneven * uneven / pieces
+    };
+    let mut prices = vec![0.0; n * n];
+    for i in 0..n {
+        for j in i + 1..n {
+            prices[i * n + j] = price(i, j);
+        }
+    }
+    // best[k][j]: the least price of k pieces from the first point to point j.
+    let mut best = vec![f32::INFINITY; count * n];
+    let mut from = vec![0; count * n];
+    best[0] = 0.0;
+    for k in 1..count {
+        for j in k..n {
+            for i in k - 1..j {
+                let sum = best[(k - 1) * n + i] + prices[i * n + j];
+                if sum < best[k * n + j] {
+                    best[k * n + j] = sum;
+                    from[k * n + j] = i;
+                }
+            }
+        }
+    }
+    let mut chosen = vec![n - 1; count];
+    for k in (1..count).rev() {
+        chosen[k - 1] = from[k * n + chosen[k]];
+    }
+    chosen
+}

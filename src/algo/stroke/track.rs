@@ -1,0 +1,140 @@
+//! Following a stroke through the mesh: which of the volumes under it it runs in.
+
+use glam::{Vec2, Vec3};
+
+use super::path::Path;
+use crate::{
+    algo::view::ViewPlane,
+    mesh::{
+        ray::{Hit, Ray},
+        surface::{Surface, volumes},
+    },
+};
+
+/// How many rays follow a stroke, whatever its length.
+pub(super) const SAMPLES: usize = 96;
+
+/// A stretch of a ray, as distances from its origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Span {
+    pub(super) near: f32,
+    pub(super) far: f32,
+}
+
+impl Span {
+    pub(super) fn middle(self) -> f32 {
+        self.at(0.5)
+    }
+
+    pub(super) fn at(self, depth: f32) -> f32 {
+        self.near + (self.far - self.near) * depth
+    }
+
+    fn overlap(self, other: Self) -> f32 {
+        self.far.min(other.far) - self.near.max(other.near)
+    }
+}
+
+/// One ray under the stroke that meets the volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sample {
+    /// Arc length along the stroke.
+    pub(super) at: f32,
+    /// The point on the view plane.
+    pub(super) source: Vec2,
+    /// Entry and exit of the volume.
+    pub(super) span: Span,
+    /// Midway between.
+    pub(super) middle: Vec3,
+}
+
+/// The stroke's way through one volume.
+#[derive(Debug, Clone)]
+pub(super) struct Track {
+    /// Only where the ray meets the volume; by rising arc length; not empty.
+    pub(super) samples: Vec<Sample>,
+    pub(super) volume_at_start: u32,
+    pub(super) volumes_at_start: u32,
+    volume: Option<u32>,
+}
+
+impl Track {
+    /// `None` if no ray meets the surface.
+    pub(super) fn follow(surface: &Surface, plane: &ViewPlane, path: &Path, volume: Option<u32>) -> Option<Self> {
+        let mut hits = Vec::new();
+        let mut samples: Vec<Sample> = Vec::with_capacity(SAMPLES);
+        let (mut volume_at_start, mut volumes_at_start) = (1, 1);
+        for i in 0..SAMPLES {
+            let at = path.length() * (i as f32 / (SAMPLES - 1) as f32);
+            let source = path.at(at);
+            let ray = plane.ray(source);
+            surface.hits(&ray, &mut hits);
+            let spans = spans(&hits);
+            let span = match samples.last() {
+                None if spans.is_empty() => continue,
+                None => {
+                    let chosen = start(&spans, volume);
+                    (volume_at_start, volumes_at_start) = (chosen as u32 + 1, spans.len() as u32);
+                    spans[chosen]
+                }
+                Some(before) => match continuing(&spans, before.span, volume) {
+                    Some(span) => span,
+                    None => continue,
+                },
+            };
+            samples.push(Sample { at, source, span, middle: ray.at(span.middle()) });
+        }
+        (!samples.is_empty()).then_some(Self { samples, volume_at_start, volumes_at_start, volume })
+    }
+
+    /// Arc lengths of the first and last sample.
+    pub(super) fn covered(&self) -> [f32; 2] {
+        [self.samples[0].at, self.samples[self.samples.len() - 1].at]
+    }
+
+    /// The span of a ray that belongs to the tracked volume near the arc length `at`.
+    pub(super) fn span_at(&self, _ray: &Ray, hits: &[Hit], at: f32) -> Option<Span> {
+        let next = self.samples.partition_point(|s| s.at < at).min(self.samples.len() - 1);
+        let nearest = if next > 0 && at - self.samples[next - 1].at < self.samples[next].at - at { next - 1 } else { next };
+        continuing(&spans(hits), self.samples[nearest].span, self.volume)
+    }
+}
+
+/// The volumes of a ray; a single hit, and hits that make no pair, count as one.
+fn spans(hits: &[Hit]) -> Vec<Span> {
+    let pairs: Vec<Span> = volumes(hits).into_iter().map(|v| Span { near: v.near, far: v.far }).collect();
+    match (pairs.is_empty(), hits) {
+        (true, [first, .., last]) => vec![Span { near: first.distance, far: last.distance }],
+        (true, [only]) => vec![Span { near: only.distance, far: only.distance }],
+        _ => pairs,
+    }
+}
+
+/// Which of several volumes a stroke is in when nothing before tells: the one asked for, or the one that holds the
+/// midpoint of the closest and furthest hit, or, where that midpoint lies outside of everything, the nearest.
+fn start(spans: &[Span], volume: Option<u32>) -> usize {
+    if let Some(n) = volume {
+        return n.saturating_sub(1) as usize % spans.len();
+    }
+    let middle = 0.5 * (spans[0].near + spans[spans.len() - 1].far);
+    spans.iter().position(|s| s.near <= middle && middle <= s.far).unwrap_or(0)
+}
+
+/// The volume that goes on from the span `before`; `None` if none does.
+///
+/// Where one volume becomes several, the hips two legs, the choice is made among these as at the start.
+fn continuing(spans: &[Span], before: Span, volume: Option<u32>) -> Option<Span> {
+    let within: Vec<Span> = spans.iter().copied().filter(|s| s.overlap(before) > 0.6 * (s.far - s.near)).collect();
+    if within.len() > 1 {
+        return Some(within[start(&within, volume)]);
+    }
+    let mut best = None;
+    let mut most = f32::NEG_INFINITY;
+    for &span in spans {
+        let overlap = span.overlap(before);
+        if overlap > most {
+            (best, most) = (Some(span), overlap);
+        }
+    }
+    best.filter(|_| most >= 0.0)
+}

@@ -1,0 +1,246 @@
+//! Skin weights of one mesh for another of about the same shape.
+//!
+//! After Abdrashitov and others 2023, "Robust skin weights transfer via weight inpainting": a point takes the weights
+//! of the closest point of the source where that is near and faces the same way; all other points are inpainted from
+//! those by a sparse solve on the target's vertex graph.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::weights::fill::{Graph, Links, Nearest, Sparse, complete, prune};
+use crate::mesh::{model::Weights, surface::Surface};
+
+/// A mesh to transfer from or to; both in the same space.
+#[derive(Debug, Clone, Copy)]
+pub struct TransferMesh<'a> {
+    /// Positions.
+    pub points: &'a [Vec3],
+    /// Corners of triangles over `points`; those out of range are ignored.
+    pub triangles: &'a [[u32; 3]],
+}
+
+/// How [`transfer_weights`] works.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TransferSettings {
+    /// Closest points further than this share of the diagonal of the source's box are not trusted.
+    pub distance: f32,
+    /// Closest points where the cosine of the angle between both normals is less than this are not trusted.
+    pub cosine: f32,
+    /// The largest number of influences of a point.
+    pub influences: usize,
+}
+
+impl Default for TransferSettings {
+    fn default() -> Self {
+        // The paper's thresholds: 5 % and 30 degrees.
+        Self { distance: 0.05, cosine: 0.866, influences: 8 }
+    }
+}
+
+/// Where the weights of the target's points came from; the counts add up to its points.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct TransferReport {
+    /// A point of the source is at the same place: its weights unchanged.
+    pub copied: usize,
+    /// The closest point of the source, near and facing the same way.
+    pub matched: usize,
+    /// Inpainted from matched points around.
+    pub inpainted: usize,
+    /// The closest point of the source although it is far or faces another way, as nothing around matched.
+    pub nearest: usize,
+    /// Points without weights: they are not finite.
+    pub empty: usize,
+}
+
+/// Why weights cannot be transferred.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TransferError {
+    /// The weights are not those of the source mesh.
+    #[error("the source has {points} points but its weights are for {weights}: they belong to another mesh")]
+    WeightCount {
+        /// The number of points of the source.
+        points: usize,
+        /// The number of points of the weights.
+        weights: usize,
+    },
+    /// Nothing to take weights from.
+    #[error("no finite point of the source mesh has weights: bind it first")]
+    NoWeights,
+}
+
+/// Transfers weights from `source` to `target`.
+///
+/// Both meshes are in one space, in any unit; joint indices stay as they are. All finite points of the target get
+/// weights that sum to one (copied ones stay as they were). A shell that is inside-out against the source is
+/// recognised by the majority of its points. Independent of the number of threads. Cost: a closest-point query a point
+/// and a sparse factorisation of what is inpainted.
+///
+/// # Errors
+/// [`TransferError`]: the weights do not fit the source, or it has none.
+pub fn transfer_weights(
+    source: TransferMesh,
+    weights: &Weights,
+    target: TransferMesh,
+    settings: &TransferSettings,
+) -> Result<(Weights, TransferReport), TransferError> {
+    if weights.len() != source.points.len() {
+        return Err(TransferError::WeightCount { points: source.points.len(), weights: weights.len() });
+    }
+    let origin = Source::new(source, weights, settings.influences.max(1))?;
+    let limit = settings.distance.max(0.0) * origin.size;
+    let graph = Graph::new(target.points, target.triangles);
+    let normals = node_normals(&graph, target);
+    let closest: Vec<Option<Closest>> = (0..graph.len()).into_par_iter().map(|n| origin.closest(graph.place(n))).collect();
+
+    let mut known: Vec<Option<Sparse>> = vec![None; graph.len()];
+    let mut origins = vec![From::Inpainted; graph.len()];
+    for island in graph.islands() {
+        let cosine = |n: u32| closest[n as usize].as_ref().map_or(0.0, |c| c.normal.dot(normals[n as usize]));
+        let near = |n: u32| closest[n as usize].as_ref().is_some_and(|c| c.distance <= limit);
+        let facing: f32 = island.iter().filter(|&&n| near(n)).map(|&n| cosine(n).signum()).sum();
+        let side = if facing < 0.0 { -1.0 } else { 1.0 };
+        for &n in &island {
+            let Some(found) = &closest[n as usize] else { continue };
+            // Without a normal on either side there is nothing to compare.
+            let blind = found.normal == Vec3::ZERO || normals[n as usize] == Vec3::ZERO;
+            let trusted = near(n) && (blind || cosine(n) * side >= settings.cosine);
+            if found.same || (trusted && !found.influences.is_empty()) {
+                known[n as usize] = Some(found.influences.clone());
+                origins[n as usize] = if found.same { From::Copied } else { From::Matched };
+            }
+        }
+    }
+    let inpainted = complete(&graph, &known, &vec![false; graph.len()], &Links::default(), settings.influences.max(1));
+    let mut report = TransferReport::default();
+    let mut result = Weights { starts: vec![0], ..Weights::default() };
+    for p in 0..target.points.len() {
+        let Some(node) = graph.node(p) else {
+            report.empty += 1;
+            result.push([]);
+            continue;
+        };
+        let (influences, count) = match (&known[node], &inpainted[node], &closest[node]) {
+            (Some(influences), ..) if origins[node] == From::Copied => (influences.clone(), &mut report.copied),
+            (Some(influences), ..) => (influences.clone(), &mut report.matched),
+            (None, Some(influences), _) => (influences.clone(), &mut report.inpainted),
+            (None, None, Some(found)) if !found.influences.is_empty() => (found.influences.clone(), &mut report.nearest),
+            _ => (origin.nearest(graph.place(node)), &mut report.nearest),
+        };
+        *count += 1;
+        result.push(influences);
+    }
+    Ok((result, report))
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum From {
+    Copied,
+    Matched,
+    Inpainted,
+}
+
+/// The closest point of the source.
+struct Closest {
+    distance: f32,
+    /// Zero if the source has none there.
+    normal: Vec3,
+    influences: Sparse,
+    /// A weighted point of the source is at the very same place.
+    same: bool,
+}
+
+/// What weights are taken from.
+struct Source<'a> {
+    mesh: TransferMesh<'a>,
+    weights: &'a Weights,
+    surface: Surface,
+    normals: Vec<Vec3>,
+    /// Weighted, finite points, and a search tree over them.
+    weighted: Vec<u32>,
+    tree: Nearest,
+    size: f32,
+    most: usize,
+}
+
+impl<'a> Source<'a> {
+    fn new(mesh: TransferMesh<'a>, weights: &'a Weights, most: usize) -> Result<Self, TransferError> {
+        let usable = |p: usize| mesh.points[p].is_finite() && weights.of(p).len() > 0;
+        let weighted: Vec<u32> = (0..mesh.points.len()).filter(|&p| usable(p)).map(|p| p as u32).collect();
+        if weighted.is_empty() {
+            return Err(TransferError::NoWeights);
+        }
+        let places: Vec<Vec3> = weighted.iter().map(|&p| mesh.points[p as usize]).collect();
+        let (low, high) = places.iter().fold((places[0], places[0]), |(l, h), &p| (l.min(p), h.max(p)));
+        let graph = Graph::new(mesh.points, mesh.triangles);
+        let nodes = node_normals(&graph, mesh);
+        let normals = (0..mesh.points.len()).map(|p| graph.node(p).map_or(Vec3::ZERO, |n| nodes[n])).collect();
+        Ok(Self {
+            mesh,
+            weights,
+            surface: Surface::build(mesh.points, mesh.triangles),
+            normals,
+            weighted,
+            tree: Nearest::new(&places),
+            size: (high - low).length(),
+            most,
+        })
+    }
+
+    /// The weights of the nearest weighted point.
+    fn nearest(&self, place: Vec3) -> Sparse {
+        let nearest = self.tree.nearest(place, 1, f32::INFINITY).next();
+        nearest.map(|(at, _)| self.weights.of(self.weighted[at as usize] as usize).collect()).unwrap_or_default()
+    }
+
+    fn closest(&self, place: Vec3) -> Option<Closest> {
+        let (at, distance) = self.tree.nearest(place, 1, f32::INFINITY).next()?;
+        let vertex = self.weighted[at as usize] as usize;
+        if self.mesh.points[vertex] == place {
+            let influences = self.weights.of(vertex).collect();
+            return Some(Closest { distance: 0.0, normal: self.normals[vertex], influences, same: true });
+        }
+        let Some(hit) = self.surface.closest_point(place) else {
+            let influences = self.weights.of(vertex).collect();
+            return Some(Closest { distance, normal: Vec3::ZERO, influences, same: false });
+        };
+        let corners = self.mesh.triangles[hit.triangle as usize].map(|c| c as usize);
+        let shares = hit.barycentric.to_array();
+        let mut influences = Sparse::new();
+        let mut normal = Vec3::ZERO;
+        for (corner, share) in corners.into_iter().zip(shares) {
+            normal += self.normals[corner] * share;
+            for (joint, weight) in self.weights.of(corner) {
+                match influences.iter_mut().find(|i| i.0 == joint) {
+                    Some(found) => found.1 += weight * share,
+                    None => influences.push((joint, weight * share)),
+                }
+            }
+        }
+        let influences = prune(influences, self.most);
+        Some(Closest { distance: hit.distance, normal: normal.normalize_or_zero(), influences, same: false })
+    }
+}
+
+/// Unit normals of the welded vertices, weighted by area; zero where triangles cancel or there are none.
+fn node_normals(graph: &Graph, mesh: TransferMesh) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; graph.len()];
+    for triangle in mesh.triangles {
+        let corner = |i: usize| mesh.points.get(triangle[i] as usize).and_then(|_| graph.node(triangle[i] as usize));
+        if let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) {
+            let (pa, pb, pc) = (graph.place(a), graph.place(b), graph.place(c));
+            // Scaled edge by edge, so that tiny units do not underflow.
+            let (u, v) = (pb - pa, pc - pa);
+            let area = u.length() * v.length();
+            let normal = u.normalize_or_zero().cross(v.normalize_or_zero()) * area.max(f32::MIN_POSITIVE);
+            for node in [a, b, c] {
+                normals[node] += normal;
+            }
+        }
+    }
+    for normal in &mut normals {
+        // Through the largest component first: squares of tiny numbers vanish.
+        let largest = normal.abs().max_element();
+        *normal = if largest > 0.0 && largest.is_finite() { (*normal / largest).normalize_or_zero() } else { Vec3::ZERO };
+    }
+    normals
+}

@@ -1,0 +1,179 @@
+//! Sparse factorisation of a symmetric positive definite matrix, once for many right-hand sides.
+//!
+//! Up-looking `L D Lᵀ` (Davis, *Direct Methods for Sparse Linear Systems*, section 4.8) after approximate minimum degree
+//! ordering by `faer`. Right-hand sides are solved in blocks that share one pass over the factor.
+
+use faer::{
+    dyn_stack::{MemBuffer, MemStack},
+    sparse::{SymbolicSparseColMatRef, linalg::amd},
+};
+
+/// How many right-hand sides a block has.
+pub(crate) const LANES: usize = 8;
+
+/// One row of a block of right-hand sides.
+pub(crate) type Lane = [f64; LANES];
+
+/// A symmetric matrix in compressed rows, without its diagonal, and the diagonal.
+pub(crate) struct Symmetric {
+    pub starts: Vec<u32>,
+    pub columns: Vec<u32>,
+    pub values: Vec<f64>,
+    pub diagonal: Vec<f64>,
+}
+
+/// The factor of a permuted matrix.
+pub(crate) struct Ldl {
+    /// Old index of each new one.
+    order: Vec<u32>,
+    starts: Vec<u32>,
+    rows: Vec<u32>,
+    values: Vec<f64>,
+    inverse_diagonal: Vec<f64>,
+}
+
+impl Ldl {
+    /// Factorises; `None` if the matrix is not positive definite or too large for the index type.
+    pub fn new(matrix: &Symmetric) -> Option<Self> {
+        let n = matrix.diagonal.len();
+        let (order, inverse) = minimum_degree(matrix)?;
+        // Upper triangle of the permuted matrix by columns: entries above the diagonal of column k.
+        let mut parent = vec![u32::MAX; n];
+        let mut flag = vec![u32::MAX; n];
+        let mut count = vec![0u32; n];
+        let row = |k: usize| {
+            let old = order[k] as usize;
+            let range = matrix.starts[old] as usize..matrix.starts[old + 1] as usize;
+            let inverse = &inverse;
+            range.map(move |e| (inverse[matrix.columns[e] as usize] as usize, e)).filter(move |&(i, _)| i < k)
+        };
+        for k in 0..n {
+            flag[k] = k as u32;
+            for (mut i, _) in row(k) {
+                while flag[i] != k as u32 {
+                    if parent[i] == u32::MAX {
+                        parent[i] = k as u32;
+                    }
+                    count[i] += 1;
+                    flag[i] = k as u32;
+                    i = parent[i] as usize;
+                }
+            }
+        }
+        let mut starts = Vec::with_capacity(n + 1);
+        let mut total = 0u32;
+        starts.push(0);
+        for &c in &count {
+            total = total.checked_add(c)?;
+            starts.push(total);
+        }
+        let mut rows = vec![0u32; total as usize];
+        let mut values = vec![0f64; total as usize];
+        let mut diagonal = vec![0f64; n];
+        let mut y = vec![0f64; n];
+        let mut pattern = vec![0u32; n];
+        let mut stack = Vec::new();
+        let mut filled = vec![0u32; n];
+        flag.fill(u32::MAX);
+        for k in 0..n {
+            let mut top = n;
+            flag[k] = k as u32;
+            for (first, entry) in row(k) {
+                y[first] += matrix.values[entry];
+                let mut i = first;
+                stack.clear();
+                while flag[i] != k as u32 {
+                    stack.push(i as u32);
+                    flag[i] = k as u32;
+                    i = parent[i] as usize;
+                }
+                while let Some(i) = stack.pop() {
+                    top -= 1;
+                    pattern[top] = i;
+                }
+            }
+            let mut d = matrix.diagonal[order[k] as usize];
+            for &i in &pattern[top..] {
+                let i = i as usize;
+                let yi = std::mem::take(&mut y[i]);
+                let (start, end) = (starts[i] as usize, (starts[i] + filled[i]) as usize);
+                for (r, v) in rows[start..end].iter().zip(&values[start..end]) {
+                    y[*r as usize] -= v * yi;
+                }
+                let l = yi / diagonal[i];
+                d -= l * yi;
+                rows[end] = k as u32;
+                values[end] = l;
+                filled[i] += 1;
+            }
+            if !(d.is_finite() && d > 0.0) {
+                return None;
+            }
+            diagonal[k] = d;
+        }
+        let inverse_diagonal = diagonal.iter().map(|d| 1.0 / d).collect();
+        Some(Self { order, starts, rows, values, inverse_diagonal })
+    }
+
+    /// Solves for a block of right-hand sides; `block` has one row an unknown and is overwritten with the solution.
+    pub fn solve(&self, block: &mut [Lane]) {
+        let n = self.order.len();
+        let mut x: Vec<Lane> = self.order.iter().map(|&old| block[old as usize]).collect();
+        for k in 0..n {
+            let xk = x[k];
+            if xk == [0.0; LANES] {
+                continue;
+            }
+            for (row, value) in self.column(k) {
+                let target = &mut x[row];
+                for l in 0..LANES {
+                    target[l] -= value * xk[l];
+                }
+            }
+        }
+        for k in (0..n).rev() {
+            let mut xk = x[k];
+            for value in &mut xk {
+                *value *= self.inverse_diagonal[k];
+            }
+            for (row, value) in self.column(k) {
+                let other = &x[row];
+                for l in 0..LANES {
+                    xk[l] -= value * other[l];
+                }
+            }
+            x[k] = xk;
+        }
+        for (row, &old) in x.iter().zip(&self.order) {
+            block[old as usize] = *row;
+        }
+    }
+
+    fn column(&self, k: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.starts[k] as usize..self.starts[k + 1] as usize;
+        self.rows[range.clone()].iter().map(|&r| r as usize).zip(self.values[range].iter().copied())
+    }
+}
+
+/// A fill-reducing order and its inverse.
+fn minimum_degree(matrix: &Symmetric) -> Option<(Vec<u32>, Vec<u32>)> {
+    let n = matrix.diagonal.len();
+    if n > i32::MAX as usize || matrix.columns.len() > i32::MAX as usize {
+        return None;
+    }
+    // Both triangles are given; only entries above the diagonal are read.
+    let mut starts = Vec::with_capacity(n + 1);
+    let mut rows = Vec::with_capacity(matrix.columns.len() / 2);
+    starts.push(0u32);
+    for column in 0..n {
+        let range = matrix.starts[column] as usize..matrix.starts[column + 1] as usize;
+        rows.extend(matrix.columns[range].iter().filter(|&&r| (r as usize) < column));
+        starts.push(rows.len() as u32);
+    }
+    let symbolic = SymbolicSparseColMatRef::<'_, u32>::new_checked(n, n, &starts, None, &rows);
+    let mut order = vec![0u32; n];
+    let mut inverse = vec![0u32; n];
+    let mut memory = MemBuffer::try_new(amd::order_maybe_unsorted_scratch::<u32>(n, rows.len())).ok()?;
+    amd::order_maybe_unsorted(&mut order, &mut inverse, symbolic, amd::Control::default(), MemStack::new(&mut memory)).ok()?;
+    Some((order, inverse))
+}

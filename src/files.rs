@@ -1,0 +1,25 @@
+//! The one file layer: everything Rigsmith saves or reads goes through here.
+//!
+//! - [`save_atomic`] and [`save_all_atomic`] leave the old file or the finished one, whatever fails: each writes a
+//!   temporary file beside its target, syncs it, and renames it over the target.
+//! - [`read_capped`] and [`open`] answer a missing, empty, oversized or forbidden file with an error that says what to do.
+//! - [`ModelFolder`] finds the textures and buffers that a model names, and nothing outside the model's folder.
+//! - [`Disk`] is what they stand on. [`RealDisk`] is the file system; [`FaultyDisk`] fails at a chosen operation in a chosen
+//!   manner, so that a test can try every one of them (as SQLite's tests do), including tests of games that save rigs.
+//!
+//! Temporary files are named `.rigsmith-XXXXXXXXXXXXXXXX.tmp` (16 hexadecimal digits). A killed process can leave one
+//! behind: watchers and listings skip what [`is_temp_name`] recognises, and [`remove_stale_temps`] clears them away.
+//!
+//! Readers and writers elsewhere in the crate take bytes or `Read`, and never a path.
+
+mod atomic;
+mod disk;
+mod fault;
+mod folder;
+mod read;
+
+pub use atomic::{SaveError, SaveStep, is_temp_name, remove_stale_temps, save_all_atomic, save_atomic};
+pub use disk::{Disk, DiskFile, Entry, EntryKind, RealDisk};
+pub use fault::{Fault, FaultPlan, FaultyDisk};
+pub use folder::{ModelFolder, UriError};
+pub use read::{OpenFile, ReadError, open, read_capped};

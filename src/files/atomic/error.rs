@@ -1,0 +1,156 @@
+//! Why a file was not saved, and what to do about it.
+
+use std::{
+    io::{self, ErrorKind},
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+/// Where in saving something failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SaveStep {
+    /// Looking at what is at the path now.
+    Inspect,
+    /// Creating the temporary file.
+    Create,
+    /// Taking over the permissions of the file there.
+    Permissions,
+    /// Writing the content.
+    Write,
+    /// Waiting until the content has reached the device.
+    Sync,
+    /// Putting the finished file in place.
+    Replace,
+}
+
+impl std::fmt::Display for SaveStep {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Inspect => "looking at what is there",
+            Self::Create => "creating a temporary file beside it",
+            Self::Permissions => "keeping its permissions",
+            Self::Write => "writing",
+            Self::Sync => "waiting for the disk",
+            Self::Replace => "putting the finished file in place",
+        })
+    }
+}
+
+/// Why a file was not saved. But for [`SaveError::Unconfirmed`] and [`SaveError::Mixed`], what was there before is unchanged.
+#[derive(Debug, Error)]
+pub enum SaveError {
+    /// The path ends in no file name.
+    #[error("cannot save to `{}`: it names no file; add a file name", path.display())]
+    NoName {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The path is a folder.
+    #[error("cannot save to `{}`: it is a folder; give the name of a file in it", path.display())]
+    IsFolder {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The path is a device, a pipe or a socket.
+    #[error("cannot save to `{}`: it is not a regular file; choose another name", path.display())]
+    NotAFile {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The folder of the path is missing or is a file.
+    #[error("cannot save `{}`: there is no folder `{}`; create it or choose another", path.display(), folder.display())]
+    NoFolder {
+        /// The path as given.
+        path: PathBuf,
+        /// The folder that is missing.
+        folder: PathBuf,
+    },
+    /// The file there is marked read-only.
+    #[error("cannot save `{}`: the file is write-protected; allow writing to it or save under another name", path.display())]
+    WriteProtected {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// Symbolic links lead in a circle.
+    #[error("cannot save `{}`: its symbolic links lead in a circle; remove the link or choose another name", path.display())]
+    LinkLoop {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// Two files of one call aim at the same place.
+    #[error("cannot save `{}` twice in one go: give the files different names", path.display())]
+    SameTarget {
+        /// The path that occurs twice.
+        path: PathBuf,
+    },
+    /// The disk, the quota or the largest file size is exhausted.
+    #[error("cannot save `{}` ({bytes} bytes): the disk is full; free some space or choose another disk; what was there is unchanged", path.display())]
+    NoSpace {
+        /// The path as given.
+        path: PathBuf,
+        /// Size of the content in bytes.
+        bytes: u64,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The folder may not be written to.
+    #[error("cannot save `{}`: no permission to write in `{}`; choose another folder or allow writing there; what was there is unchanged", path.display(), folder.display())]
+    NoAccess {
+        /// The path as given.
+        path: PathBuf,
+        /// The folder that refused.
+        folder: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Anything else that failed.
+    #[error("cannot save `{}`: {step} failed ({source}); what was there is unchanged; try again or choose another disk", path.display())]
+    Io {
+        /// The path as given.
+        path: PathBuf,
+        /// What was being done.
+        step: SaveStep,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file is complete and in place, but the device did not confirm it.
+    #[error("`{}` was written, but the disk did not confirm it ({source}); save again before relying on it", path.display())]
+    Unconfirmed {
+        /// The path as given.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Some files of a set were replaced and could not be put back; each file is whole.
+    #[error("`{}` and what belongs to it were replaced only in part ({source}); each file is whole; save the set again", path.display())]
+    Mixed {
+        /// The main file.
+        path: PathBuf,
+        /// What stopped it.
+        source: io::Error,
+    },
+}
+
+impl SaveError {
+    pub(super) fn new(path: &Path, folder: &Path, bytes: usize, step: SaveStep, source: io::Error) -> Self {
+        let path = path.to_path_buf();
+        match source.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Self::NoSpace {
+                path,
+                bytes: bytes as u64,
+                source,
+            },
+            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => Self::NoAccess {
+                path,
+                folder: folder.to_path_buf(),
+                source,
+            },
+            ErrorKind::NotFound | ErrorKind::NotADirectory if step == SaveStep::Create => Self::NoFolder {
+                path,
+                folder: folder.to_path_buf(),
+            },
+            _ => Self::Io { path, step, source },
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! The primitive operations that saving and reading need, and the file system that carries them out.
+
+use std::{
+    ffi::OsString,
+    fs, io,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+/// What a path leads to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EntryKind {
+    /// A regular file.
+    File,
+    /// A folder.
+    Folder,
+    /// A symbolic link; only when links are not followed.
+    Link,
+    /// A device, a pipe or a socket.
+    Other,
+}
+
+/// What the file system says about a path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Entry {
+    /// File, folder, link or something else.
+    pub kind: EntryKind,
+    /// Length in bytes as claimed; it may change, or lie, by the time the file is read.
+    pub len: u64,
+    /// True if nobody may write to it.
+    pub read_only: bool,
+    /// Time of the last change, where the file system keeps one.
+    pub modified: Option<SystemTime>,
+}
+
+/// A file that is being written.
+pub trait DiskFile: Send {
+    /// Writes some of `bytes` and returns how many, like [`io::Write::write`].
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
+
+    /// Takes over the permissions, and where possible the owner, of the existing file `of`.
+    fn keep_permissions(&mut self, of: &Path) -> io::Result<()>;
+
+    /// Returns once everything written has reached the device.
+    fn sync(&mut self) -> io::Result<()>;
+}
+
+/// The operations on files that Rigsmith uses. Each call may fail on its own; none is assumed to be atomic but `rename`.
+pub trait Disk: Send + Sync {
+    /// Describes what is at `path`; symbolic links are followed if `follow` is set.
+    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry>;
+
+    /// Returns the target of the symbolic link at `path`, as stored.
+    fn read_link(&self, path: &Path) -> io::Result<PathBuf>;
+
+    /// Returns the absolute path with every link resolved; the path must exist.
+    fn canonical(&self, path: &Path) -> io::Result<PathBuf>;
+
+    /// Lists the names in `folder`, sorted; stops after `limit` of them.
+    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>>;
+
+    /// Creates a file that must not exist yet and opens it for writing.
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>>;
+
+    /// Renames a file within its folder in one step, replacing what is at `to`.
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+
+    /// Gives the file at `existing` the further name `path`, which must not exist yet.
+    fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()>;
+
+    /// Returns once the names in `folder` have reached the device; does nothing where folders cannot be synced.
+    fn sync_folder(&self, folder: &Path) -> io::Result<()>;
+
+    /// Removes a file.
+    fn remove(&self, path: &Path) -> io::Result<()>;
+
+    /// Creates a folder and the missing ones above it.
+    fn create_folder(&self, path: &Path) -> io::Result<()>;
+
+    /// Opens a file for reading.
+    fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>>;
+}
+
+/// The file system of this machine.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RealDisk;
+
+impl Disk for RealDisk {
+    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
+        let facts = if follow {
+            fs::metadata(path)?
+        } else {
+            fs::symlink_metadata(path)?
+        };
+        let kind = match facts.file_type() {
+            t if t.is_symlink() => EntryKind::Link,
+            t if t.is_dir() => EntryKind::Folder,
+            t if t.is_file() => EntryKind::File,
+            _ => EntryKind::Other,
+        };
+        Ok(Entry {
+            kind,
+            len: facts.len(),
+            read_only: facts.permissions().readonly(),
+            modified: facts.modified().ok(),
+        })
+    }
+
+    fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
+        fs::read_link(path)
+    }
+
+    fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
+        fs::canonicalize(path)
+    }
+
+    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
+        let mut names = Vec::new();
+        for entry in fs::read_dir(folder)?.take(limit) {
+            names.push(entry?.file_name());
+        }
+        names.sort();
+        Ok(names)
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+        let file = fs::OpenOptions::new().write(true).create_new(true).open(path)?;
+        Ok(Box::new(RealFile(file)))
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        // On Windows a virus scanner or an indexer holds a fresh file open for a moment, and renaming is refused meanwhile.
+        let mut attempts = if cfg!(windows) { 20 } else { 1 };
+        loop {
+            attempts -= 1;
+            match fs::rename(from, to) {
+                Err(error) if attempts > 0 && error.kind() == io::ErrorKind::PermissionDenied => {
+                    std::thread::sleep(std::time::Duration::from_millis(25));
+                }
+                result => return result,
+            }
+        }
+    }
+
+    fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()> {
+        fs::hard_link(existing, path)
+    }
+
+    #[cfg(unix)]
+    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+        use io::ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
+        // A folder that may be written but not listed cannot be opened, and some network file systems cannot sync one.
+        let handle = match fs::File::open(folder) {
+            Err(error) if error.kind() == PermissionDenied => return Ok(()),
+            opened => opened?,
+        };
+        match handle.sync_all() {
+            Err(error) if matches!(error.kind(), InvalidInput | Unsupported) => Ok(()),
+            result => result,
+        }
+    }
+
+    #[cfg(not(unix))]
+    fn sync_folder(&self, _folder: &Path) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        fs::remove_file(path)
+    }
+
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        fs::create_dir_all(path)
+    }
+
+    fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
+        Ok(Box::new(fs::File::open(path)?))
+    }
+}
+
+struct RealFile(fs::File);
+
+impl DiskFile for RealFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        io::Write::write(&mut self.0, bytes)
+    }
+
+    fn keep_permissions(&mut self, of: &Path) -> io::Result<()> {
+        let wanted = fs::metadata(of)?;
+        let found = self.0.metadata()?;
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::{MetadataExt, fchown};
+            // Only the administrator may give a file away: whoever cannot keeps the group if that is allowed.
+            let (uid, gid) = (wanted.uid(), wanted.gid());
+            if (uid, gid) != (found.uid(), found.gid()) && fchown(&self.0, Some(uid), Some(gid)).is_err() {
+                let _ = fchown(&self.0, None, Some(gid));
+            }
+        }
+        // Some mounts refuse every change of permissions, even to what they already are.
+        if wanted.permissions() == found.permissions() {
+            return Ok(());
+        }
+        self.0.set_permissions(wanted.permissions())
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.0.sync_all()
+    }
+}

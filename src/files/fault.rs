@@ -1,0 +1,290 @@
+//! A disk that fails on purpose, so that tests can try every operation of a save, one after the other.
+//!
+//! Run the code once on a [`FaultyDisk`] without a plan, ask it for the number of [`operations`](FaultyDisk::operations), then
+//! run it again for each of them with a [`FaultPlan`] that fails just that one.
+
+use std::{
+    ffi::OsString,
+    io::{self, ErrorKind, Read},
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use super::disk::{Disk, DiskFile, Entry};
+
+/// The manner in which an operation fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// The disk is full. A write still stores half of its bytes.
+    NoSpace,
+    /// The device reports an error. A write still stores half of its bytes.
+    Io,
+    /// The operation is not permitted.
+    NoAccess,
+    /// A write or a read handles only half of its bytes and says so; other operations succeed.
+    Short,
+    /// The process dies: this and all later operations fail, and the files stay as they are. A write stores half of its bytes.
+    Crash,
+    /// Like `Crash`, and files written but not synced lose their content.
+    PowerLoss,
+}
+
+impl Fault {
+    /// Every manner, for loops over all of them.
+    pub const ALL: [Self; 6] = [
+        Self::NoSpace,
+        Self::Io,
+        Self::NoAccess,
+        Self::Short,
+        Self::Crash,
+        Self::PowerLoss,
+    ];
+
+    /// True if nothing runs after the fault, so that temporary files may stay behind.
+    pub fn is_crash(self) -> bool {
+        matches!(self, Self::Crash | Self::PowerLoss)
+    }
+
+    fn error(self) -> io::Error {
+        match self {
+            Self::NoSpace => ErrorKind::StorageFull.into(),
+            Self::NoAccess => ErrorKind::PermissionDenied.into(),
+            Self::Io | Self::Short => io::Error::other("input/output error"),
+            Self::Crash | Self::PowerLoss => io::Error::other("the process is gone"),
+        }
+    }
+}
+
+/// Which operation fails, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FaultPlan {
+    /// The number of the operation, counted from 0.
+    pub at: usize,
+    /// How it fails.
+    pub fault: Fault,
+    /// True if all later operations fail as well, false if only that one does. Crashes last in any case.
+    pub lasting: bool,
+}
+
+/// A [`Disk`] that counts operations and fails as planned. Reads and writes of open files count as operations too.
+pub struct FaultyDisk {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    disk: Box<dyn Disk>,
+    plan: Option<FaultPlan>,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    log: Vec<&'static str>,
+    unsynced: Vec<PathBuf>,
+    lost_power: bool,
+}
+
+impl FaultyDisk {
+    /// Wraps `disk`. Without a plan nothing fails, and operations are only counted.
+    pub fn new(disk: impl Disk + 'static, plan: Option<FaultPlan>) -> Self {
+        Self {
+            inner: Arc::new(Inner {
+                disk: Box::new(disk),
+                plan,
+                state: Mutex::default(),
+            }),
+        }
+    }
+
+    /// Returns how many operations were asked for so far, the failed ones included.
+    pub fn operations(&self) -> usize {
+        self.inner.state().log.len()
+    }
+
+    /// Returns the names of the operations so far, such as `create`, `write`, `rename`.
+    pub fn log(&self) -> Vec<&'static str> {
+        self.inner.state().log.clone()
+    }
+
+    /// Returns whether the planned fault has happened.
+    pub fn has_failed(&self) -> bool {
+        self.inner.plan.is_some_and(|plan| self.operations() > plan.at)
+    }
+}
+
+impl Inner {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Counts an operation and returns the fault that befalls it.
+    fn step(&self, name: &'static str) -> Option<Fault> {
+        let mut state = self.state();
+        let number = state.log.len();
+        state.log.push(name);
+        let plan = self.plan?;
+        let lasting = plan.lasting || plan.fault.is_crash();
+        (number == plan.at || (lasting && number > plan.at)).then_some(plan.fault)
+    }
+
+    /// Empties what was not synced when the power goes.
+    fn settle(&self, fault: Fault) {
+        if fault != Fault::PowerLoss {
+            return;
+        }
+        let mut state = self.state();
+        if std::mem::replace(&mut state.lost_power, true) {
+            return;
+        }
+        for path in std::mem::take(&mut state.unsynced) {
+            if self.disk.remove(&path).is_ok() {
+                let _ = self.disk.create(&path);
+            }
+        }
+    }
+
+    /// Carries out an operation that moves no bytes, or fails it.
+    fn run<T>(&self, name: &'static str, operation: impl FnOnce(&dyn Disk) -> io::Result<T>) -> io::Result<T> {
+        match self.step(name) {
+            None | Some(Fault::Short) => operation(self.disk.as_ref()),
+            Some(fault) => {
+                self.settle(fault);
+                Err(fault.error())
+            }
+        }
+    }
+}
+
+impl Disk for FaultyDisk {
+    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
+        self.inner.run("entry", |disk| disk.entry(path, follow))
+    }
+
+    fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
+        self.inner.run("read_link", |disk| disk.read_link(path))
+    }
+
+    fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
+        self.inner.run("canonical", |disk| disk.canonical(path))
+    }
+
+    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
+        self.inner.run("list", |disk| disk.list(folder, limit))
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+        let file = self.inner.run("create", |disk| disk.create(path))?;
+        self.inner.state().unsynced.push(path.to_path_buf());
+        Ok(Box::new(FaultyFile {
+            file,
+            path: path.to_path_buf(),
+            inner: Arc::clone(&self.inner),
+        }))
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.inner.run("rename", |disk| disk.rename(from, to))?;
+        // Content that was not synced is as unsafe under its other name.
+        for path in self.inner.state().unsynced.iter_mut().filter(|path| *path == from) {
+            *path = to.to_path_buf();
+        }
+        Ok(())
+    }
+
+    fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()> {
+        self.inner.run("hard_link", |disk| disk.hard_link(existing, path))
+    }
+
+    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+        self.inner.run("sync_folder", |disk| disk.sync_folder(folder))
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        self.inner.run("remove", |disk| disk.remove(path))
+    }
+
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        self.inner.run("create_folder", |disk| disk.create_folder(path))
+    }
+
+    fn open(&self, path: &Path) -> io::Result<Box<dyn Read + Send>> {
+        let reader = self.inner.run("open", |disk| disk.open(path))?;
+        Ok(Box::new(FaultyReader {
+            reader,
+            inner: Arc::clone(&self.inner),
+        }))
+    }
+}
+
+struct FaultyFile {
+    file: Box<dyn DiskFile>,
+    path: PathBuf,
+    inner: Arc<Inner>,
+}
+
+impl DiskFile for FaultyFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let half = bytes.get(..bytes.len().div_ceil(2)).unwrap_or_default();
+        // Past a crash nothing reaches the disk any more; at the crash itself half of the bytes do.
+        let crashed = self
+            .inner
+            .plan
+            .is_some_and(|plan| plan.fault.is_crash() && self.inner.state().log.len() > plan.at);
+        match self.inner.step("write") {
+            None => self.file.write(bytes),
+            Some(Fault::Short) => self.file.write(half),
+            Some(fault) => {
+                if !crashed && fault != Fault::NoAccess {
+                    let _ = self.file.write(half);
+                }
+                self.inner.settle(fault);
+                Err(fault.error())
+            }
+        }
+    }
+
+    fn keep_permissions(&mut self, of: &Path) -> io::Result<()> {
+        match self.inner.step("keep_permissions") {
+            None | Some(Fault::Short) => self.file.keep_permissions(of),
+            Some(fault) => {
+                self.inner.settle(fault);
+                Err(fault.error())
+            }
+        }
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        match self.inner.step("sync") {
+            None | Some(Fault::Short) => {
+                self.file.sync()?;
+                self.inner.state().unsynced.retain(|path| *path != self.path);
+                Ok(())
+            }
+            Some(fault) => {
+                self.inner.settle(fault);
+                Err(fault.error())
+            }
+        }
+    }
+}
+
+struct FaultyReader {
+    reader: Box<dyn Read + Send>,
+    inner: Arc<Inner>,
+}
+
+impl Read for FaultyReader {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.inner.step("read") {
+            None => self.reader.read(buffer),
+            Some(Fault::Short) => {
+                let half = buffer.len().div_ceil(2);
+                self.reader.read(buffer.get_mut(..half).unwrap_or_default())
+            }
+            Some(fault) => {
+                self.inner.settle(fault);
+                Err(fault.error())
+            }
+        }
+    }
+}

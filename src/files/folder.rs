@@ -1,0 +1,268 @@
+//! The folder of a model: finds the files that a model names, and nothing outside.
+//!
+//! A model from elsewhere may name `file:///etc/passwd`, `../../secret` or a link that leads out. Only what lies below the
+//! model's own folder, with every link resolved, is ever opened.
+
+use std::{
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+use super::{
+    atomic::folder_of,
+    disk::{Disk, EntryKind},
+    read::{OpenFile, ReadError, open, read_capped},
+};
+
+/// Names looked at for one that differs only in case.
+const MAX_NAMES: usize = 10_000;
+/// Longer references than any file system takes are refused unread.
+const MAX_LENGTH: usize = 4096;
+/// How much of a reference a message shows.
+const SHOWN: usize = 80;
+
+/// Why a file that a model names is not read.
+#[derive(Debug, Error)]
+pub enum UriError {
+    /// The reference is empty, too long or holds control characters.
+    #[error("the model names a file `{uri}`, which is no usable file name ({reason}); correct the reference")]
+    Unusable {
+        /// The reference, shortened.
+        uri: String,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// The reference is a URL.
+    #[error(
+        "the model names `{uri}`, which is a URL; only files are read: put it beside the model and name it without a scheme"
+    )]
+    Url {
+        /// The reference, shortened.
+        uri: String,
+    },
+    /// The reference is an absolute path.
+    #[error("the model names `{uri}` by an absolute path; put the file beside the model and name it relative to that")]
+    Absolute {
+        /// The reference, shortened.
+        uri: String,
+    },
+    /// The reference leads out of the model's folder.
+    #[error("the model names `{uri}`, which is outside its folder `{}`; put the file below that folder", folder.display())]
+    Outside {
+        /// The reference, shortened.
+        uri: String,
+        /// The model's folder.
+        folder: PathBuf,
+    },
+    /// The file is missing or unreadable.
+    #[error("the model names `{uri}`: {source}")]
+    Read {
+        /// The reference, shortened.
+        uri: String,
+        /// What is wrong with the file.
+        source: ReadError,
+    },
+}
+
+/// Resolves the references of one model to files below the model's folder.
+pub struct ModelFolder<'d> {
+    disk: &'d dyn Disk,
+    /// Canonical, so that prefixes can be compared.
+    root: PathBuf,
+}
+
+impl<'d> ModelFolder<'d> {
+    /// Returns the folder in which the file `model` lies.
+    ///
+    /// # Errors
+    /// When the folder does not exist or cannot be reached.
+    pub fn of(disk: &'d dyn Disk, model: &Path) -> Result<Self, ReadError> {
+        Self::at(disk, folder_of(model))
+    }
+
+    /// Returns the folder `folder` itself.
+    ///
+    /// # Errors
+    /// When it does not exist or cannot be reached.
+    pub fn at(disk: &'d dyn Disk, folder: &Path) -> Result<Self, ReadError> {
+        let root = disk
+            .canonical(folder)
+            .map_err(|error| ReadError::new(disk, folder, error))?;
+        Ok(Self { disk, root })
+    }
+
+    /// Returns the folder, absolute and with links resolved.
+    pub fn path(&self) -> &Path {
+        &self.root
+    }
+
+    /// Finds the existing file or folder that the relative reference `uri` names (percent escapes already decoded).
+    ///
+    /// `\` counts as `/`, and where no name fits exactly one that differs only in case is taken (the first in byte order),
+    /// because files written on Windows are like that. The result is absolute, with links resolved.
+    ///
+    /// # Errors
+    /// For anything but a relative reference to something below the folder, and where nothing is there.
+    pub fn resolve(&self, uri: &str) -> Result<PathBuf, UriError> {
+        let names = self.split(uri)?;
+        let mut path = self.root.clone();
+        for (i, name) in names.iter().enumerate() {
+            let exact = path.join(name);
+            path = match self.disk.canonical(&exact) {
+                Ok(found) => found,
+                Err(error) if error.kind() == ErrorKind::NotFound => match self.other_case(&path, name) {
+                    Some(found) => found,
+                    None => return Err(self.missing(uri, &path, &names[i..])),
+                },
+                Err(error) if error.kind() == ErrorKind::NotADirectory => {
+                    return Err(self.missing(uri, &path, &names[i..]));
+                }
+                Err(error) => {
+                    let source = ReadError::new(self.disk, &exact, error);
+                    return Err(UriError::Read {
+                        uri: shown(uri),
+                        source,
+                    });
+                }
+            };
+            // Checked at every step, so that nothing outside is so much as listed.
+            if !path.starts_with(&self.root) {
+                return Err(self.outside(uri));
+            }
+        }
+        Ok(path)
+    }
+
+    /// Reads the whole file that `uri` names, of at most `limit` bytes; see [`resolve`](Self::resolve).
+    ///
+    /// # Errors
+    /// As `resolve`, and as [`read_capped`].
+    pub fn read(&self, uri: &str, limit: u64) -> Result<Vec<u8>, UriError> {
+        let path = self.resolve(uri)?;
+        read_capped(self.disk, &path, limit).map_err(|source| UriError::Read {
+            uri: shown(uri),
+            source,
+        })
+    }
+
+    /// Opens the file that `uri` names for reading in blocks; see [`resolve`](Self::resolve).
+    ///
+    /// # Errors
+    /// As `resolve`, and as [`open`].
+    pub fn open(&self, uri: &str) -> Result<OpenFile, UriError> {
+        let path = self.resolve(uri)?;
+        open(self.disk, &path).map_err(|source| UriError::Read {
+            uri: shown(uri),
+            source,
+        })
+    }
+
+    /// Splits a reference into names below the folder, `.` and `..` worked out.
+    fn split(&self, uri: &str) -> Result<Vec<String>, UriError> {
+        let unusable = |reason| {
+            Err(UriError::Unusable {
+                uri: shown(uri),
+                reason,
+            })
+        };
+        if uri.len() > MAX_LENGTH {
+            return unusable("it is too long");
+        }
+        if uri.chars().any(char::is_control) {
+            return unusable("it holds control characters");
+        }
+        let uri_slashed = uri.replace('\\', "/");
+        if let Some((scheme, _)) = uri_slashed.split_once(':')
+            && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+            && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+        {
+            let uri = shown(uri);
+            // A single letter is a drive of Windows.
+            return Err(if scheme.len() == 1 {
+                UriError::Absolute { uri }
+            } else {
+                UriError::Url { uri }
+            });
+        }
+        if uri_slashed.starts_with('/') {
+            return Err(UriError::Absolute { uri: shown(uri) });
+        }
+        if cfg!(windows) && uri_slashed.contains(':') {
+            return unusable("it holds a colon");
+        }
+        let mut names = Vec::new();
+        for name in uri_slashed.split('/') {
+            match name {
+                "" | "." => {}
+                ".." => {
+                    if names.pop().is_none() {
+                        return Err(self.outside(uri));
+                    }
+                }
+                name => names.push(name.to_owned()),
+            }
+        }
+        if names.is_empty() {
+            return unusable("it names no file");
+        }
+        Ok(names)
+    }
+
+    /// Finds what `name` is called in `folder` if only the case differs.
+    fn other_case(&self, folder: &Path, name: &str) -> Option<PathBuf> {
+        let wanted = name.to_lowercase();
+        let names = self.disk.list(folder, MAX_NAMES).ok()?;
+        let found = names
+            .iter()
+            .find(|found| found.to_str().is_some_and(|found| found.to_lowercase() == wanted))?;
+        self.disk.canonical(&folder.join(found)).ok()
+    }
+
+    fn outside(&self, uri: &str) -> UriError {
+        UriError::Outside {
+            uri: shown(uri),
+            folder: self.root.clone(),
+        }
+    }
+
+    fn missing(&self, uri: &str, folder: &Path, rest: &[String]) -> UriError {
+        let mut path = folder.to_path_buf();
+        path.extend(rest);
+        // Asking for it once more finds the names that are like it.
+        let source = match open(self.disk, &path) {
+            Err(error) => error,
+            Ok(_) => ReadError::Missing {
+                path,
+                hint: "try again".to_owned(),
+            },
+        };
+        UriError::Read {
+            uri: shown(uri),
+            source,
+        }
+    }
+
+    /// Tells whether `uri` names an existing regular file below the folder.
+    pub fn has(&self, uri: &str) -> bool {
+        self.resolve(uri).is_ok_and(|path| {
+            self.disk
+                .entry(&path, true)
+                .is_ok_and(|entry| entry.kind == EntryKind::File)
+        })
+    }
+}
+
+/// A reference as a message shows it: one line, and not the megabytes of an embedded picture.
+fn shown(uri: &str) -> String {
+    let mut text: String = uri
+        .chars()
+        .take(SHOWN)
+        .map(|c| if c.is_control() { '\u{FFFD}' } else { c })
+        .collect();
+    if uri.chars().nth(SHOWN).is_some() {
+        text.push_str("...");
+    }
+    text
+}

@@ -1,0 +1,212 @@
+//! Reading with a limit, and with errors that say what to do.
+
+use std::{
+    io::{self, ErrorKind, Read},
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+use super::{
+    atomic::{folder_of, is_temp_name},
+    disk::{Disk, Entry, EntryKind},
+};
+
+/// The most that is reserved before a single byte has been read, whatever length the file claims.
+const FIRST_RESERVE: u64 = 16 << 20;
+/// Names looked at for a hint.
+const MAX_NAMES: usize = 4096;
+const MAX_HINTS: usize = 3;
+
+/// Why a file could not be read.
+#[derive(Debug, Error)]
+pub enum ReadError {
+    /// Nothing is there.
+    #[error("there is no file `{}`; {hint}", path.display())]
+    Missing {
+        /// The path as given.
+        path: PathBuf,
+        /// What to do; names the nearest existing files.
+        hint: String,
+    },
+    /// The path is a folder.
+    #[error("`{}` is a folder; give the name of a file in it", path.display())]
+    IsFolder {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The path is a device, a pipe or a socket.
+    #[error("`{}` is not a regular file; save what it delivers to a file first", path.display())]
+    NotAFile {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The file has no content.
+    #[error("`{}` is empty; export or copy it again", path.display())]
+    Empty {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The file may not be read.
+    #[error("no permission to read `{}`; allow reading it or copy it elsewhere", path.display())]
+    NoAccess {
+        /// The path as given.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file is longer than what is accepted here.
+    #[error("`{}` is too large: more than {limit} bytes are not read here; make it smaller or split it", path.display())]
+    TooLarge {
+        /// The path as given.
+        path: PathBuf,
+        /// The limit in bytes.
+        limit: u64,
+    },
+    /// Anything else that failed.
+    #[error("cannot read `{}`: {source}; check the disk or copy the file elsewhere", path.display())]
+    Io {
+        /// The path as given.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl ReadError {
+    pub(super) fn new(disk: &dyn Disk, path: &Path, source: io::Error) -> Self {
+        let hint = match source.kind() {
+            ErrorKind::NotFound | ErrorKind::NotADirectory => Some(hint(disk, path)),
+            _ => None,
+        };
+        let path = path.to_path_buf();
+        match (source.kind(), hint) {
+            (_, Some(hint)) => Self::Missing { path, hint },
+            (ErrorKind::PermissionDenied, _) => Self::NoAccess { path, source },
+            (ErrorKind::IsADirectory, _) => Self::IsFolder { path },
+            _ => Self::Io { path, source },
+        }
+    }
+}
+
+/// A file to be read in blocks.
+pub struct OpenFile {
+    /// The content.
+    pub reader: Box<dyn Read + Send>,
+    /// The length in bytes that the file system claims; more or fewer may come.
+    pub len: u64,
+}
+
+impl Read for OpenFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.reader.read(buffer)
+    }
+}
+
+/// Opens a regular, non-empty file for reading in blocks.
+///
+/// # Errors
+/// See [`ReadError`]; `TooLarge` does not occur.
+pub fn open(disk: &dyn Disk, path: &Path) -> Result<OpenFile, ReadError> {
+    let entry = regular(disk, path)?;
+    if entry.len == 0 {
+        return Err(ReadError::Empty {
+            path: path.to_path_buf(),
+        });
+    }
+    let reader = disk.open(path).map_err(|error| ReadError::new(disk, path, error))?;
+    Ok(OpenFile { reader, len: entry.len })
+}
+
+/// Reads a whole regular, non-empty file of at most `limit` bytes.
+///
+/// Memory follows what really arrives: a length that the file system only claims reserves at most 16 MiB.
+///
+/// # Errors
+/// See [`ReadError`].
+pub fn read_capped(disk: &dyn Disk, path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
+    let too_large = || ReadError::TooLarge {
+        path: path.to_path_buf(),
+        limit,
+    };
+    let entry = regular(disk, path)?;
+    if entry.len > limit {
+        return Err(too_large());
+    }
+    let reader = disk.open(path).map_err(|error| ReadError::new(disk, path, error))?;
+    let mut bytes = Vec::with_capacity(usize::try_from(entry.len.min(FIRST_RESERVE)).unwrap_or(0));
+    reader
+        .take(limit.saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(|error| ReadError::new(disk, path, error))?;
+    match bytes.len() as u64 {
+        0 => Err(ReadError::Empty {
+            path: path.to_path_buf(),
+        }),
+        read if read > limit => Err(too_large()),
+        _ => Ok(bytes),
+    }
+}
+
+fn regular(disk: &dyn Disk, path: &Path) -> Result<Entry, ReadError> {
+    let entry = disk
+        .entry(path, true)
+        .map_err(|error| ReadError::new(disk, path, error))?;
+    match entry.kind {
+        EntryKind::File => Ok(entry),
+        EntryKind::Folder => Err(ReadError::IsFolder {
+            path: path.to_path_buf(),
+        }),
+        // Opening a pipe that nobody writes to would wait for ever.
+        EntryKind::Link | EntryKind::Other => Err(ReadError::NotAFile {
+            path: path.to_path_buf(),
+        }),
+    }
+}
+
+/// Says what to do about a missing file: the first folder that is missing, or the names most like the one given.
+fn hint(disk: &dyn Disk, path: &Path) -> String {
+    let folder = folder_of(path);
+    match disk.entry(folder, true) {
+        Ok(entry) if entry.kind == EntryKind::Folder => {}
+        Ok(_) => return format!("`{}` is a file, not a folder", folder.display()),
+        Err(_) => return format!("there is no folder `{}` either; check the path", folder.display()),
+    }
+    let wanted = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    let mut near: Vec<(usize, String)> = disk
+        .list(folder, MAX_NAMES)
+        .unwrap_or_default()
+        .into_iter()
+        .filter(|name| !is_temp_name(name))
+        .filter_map(|name| {
+            let name = name.to_string_lossy().into_owned();
+            let distance = edit_distance(&wanted, &name.to_lowercase());
+            (distance <= 2.max(wanted.chars().count() / 3)).then_some((distance, name))
+        })
+        .collect();
+    near.sort();
+    near.truncate(MAX_HINTS);
+    match near.as_slice() {
+        [] => "check the path".to_owned(),
+        names => {
+            let names: Vec<String> = names.iter().map(|(_, name)| format!("`{name}`")).collect();
+            format!("did you mean {}?", names.join(" or "))
+        }
+    }
+}
+
+/// Levenshtein distance in characters; names are short, and longer ones than 255 do not exist on common file systems.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().take(255).collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().take(255).enumerate() {
+        let mut diagonal = i;
+        row[0] = i + 1;
+        for (j, &y) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}

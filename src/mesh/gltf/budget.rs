@@ -1,0 +1,71 @@
+//! What one reading may cost, and what it has to say.
+
+use std::cell::{Cell, RefCell};
+
+use super::{GltfError, memory_limit};
+
+/// Counts the memory that reading a file takes, before it is taken.
+///
+/// Nothing is ever given back: that bounds the time as well, since no work here is more than linear in what it makes.
+pub(super) struct Budget {
+    input: Cell<u64>,
+    used: Cell<u64>,
+}
+
+impl Budget {
+    pub(super) fn new(input: u64) -> Self {
+        Self { input: Cell::new(input), used: Cell::new(0) }
+    }
+
+    /// Another file's bytes that belong to the input.
+    pub(super) fn add_input(&self, bytes: u64) {
+        self.input.set(self.input.get().saturating_add(bytes));
+    }
+
+    /// Takes `count` elements of `size` bytes for the object at `place`.
+    pub(super) fn take(&self, count: usize, size: usize, place: &str) -> Result<(), GltfError> {
+        let used = self.used.get().saturating_add((count as u64).saturating_mul(size as u64));
+        let limit = memory_limit(self.input.get());
+        if used > limit {
+            return Err(GltfError::TooLarge { file: String::new(), place: place.to_owned(), limit });
+        }
+        self.used.set(used);
+        Ok(())
+    }
+}
+
+/// Sentences for the user, each once, with how often it applied.
+#[derive(Default)]
+pub(super) struct Notes(RefCell<Vec<(String, usize)>>);
+
+/// More different sentences than anyone reads.
+const MAX_NOTES: usize = 100;
+
+impl Notes {
+    pub(super) fn add(&self, sentence: impl Into<String>) {
+        self.add_times(sentence, 1);
+    }
+
+    /// Adds `times` occurrences; none if zero.
+    pub(super) fn add_times(&self, sentence: impl Into<String>, times: usize) {
+        if times == 0 {
+            return;
+        }
+        let sentence = sentence.into();
+        let mut list = self.0.borrow_mut();
+        if let Some((_, count)) = list.iter_mut().find(|(known, _)| *known == sentence) {
+            *count += times;
+        } else if list.len() < MAX_NOTES {
+            list.push((sentence, times));
+        }
+    }
+
+    pub(super) fn sentences(&self) -> Vec<String> {
+        let list = self.0.borrow();
+        let text = |(sentence, count): &(String, usize)| match count {
+            1 => format!("{sentence}."),
+            _ => format!("{sentence} ({count} times)."),
+        };
+        list.iter().map(text).collect()
+    }
+}

@@ -1,0 +1,212 @@
+//! The node hierarchy: checked to be a forest, ordered, placed in model space; and which of it a rig needs.
+
+use std::mem::size_of;
+
+use glam::{DAffine3, DMat4, Quat, Vec3};
+
+use super::{
+    GltfError,
+    accessor::Source,
+    budget::Notes,
+    document::{Document, NodeEntry},
+    json::{At, copy},
+    matrix,
+};
+use crate::mesh::model::{Node, Trs};
+
+/// What is known of each node of the file.
+pub(super) struct Hierarchy {
+    parents: Vec<Option<usize>>,
+    /// All nodes, parents first.
+    order: Vec<usize>,
+    /// True if the node is in the scene that is read.
+    pub(super) visible: Vec<bool>,
+    /// True if a skin lists it.
+    joint: Vec<bool>,
+    /// True if it or an ancestor is a joint or moved by a clip.
+    moves: Vec<bool>,
+    /// Index in the model's nodes.
+    pub(super) kept: Vec<Option<usize>>,
+    rest: Vec<Trs>,
+    /// To model space at rest. Nodes that are not kept keep the shear that [`Trs`] cannot hold.
+    pub(super) world: Vec<DAffine3>,
+}
+
+impl Hierarchy {
+    pub(super) fn new(source: &Source, notes: &Notes) -> Result<Self, GltfError> {
+        let document = source.document;
+        let count = document.nodes.len();
+        source.budget.take(count, size_of::<Trs>() + size_of::<DAffine3>() + 80, "/nodes")?;
+        let parents = parents(document)?;
+        let scene = document.scene.as_deref().unwrap_or_default();
+        let order = depth_first(document, &parents, scene)?;
+
+        let mut visible = vec![document.scene.is_none(); count];
+        for &node in scene {
+            visible[node] = true;
+        }
+        let (mut joint, mut animated) = (vec![false; count], vec![false; count]);
+        for &node in document.skins.iter().flat_map(|skin| &skin.joints) {
+            joint[node] = true;
+        }
+        for channel in document.animations.iter().flat_map(|animation| &animation.channels) {
+            animated[channel.node] |= matches!(channel.path, "translation" | "rotation" | "scale");
+        }
+        let mut moves: Vec<bool> = joint.iter().zip(&animated).map(|(&joint, &animated)| joint || animated).collect();
+        let mut needed = moves.clone();
+        for &node in order.iter().rev() {
+            if let (true, Some(parent)) = (needed[node], parents[node]) {
+                needed[parent] = true;
+            }
+        }
+        let mut kept = vec![None; count];
+        let mut next = 0;
+        for &node in &order {
+            if let Some(parent) = parents[node] {
+                visible[node] |= visible[parent];
+                moves[node] |= moves[parent];
+            }
+            if needed[node] {
+                kept[node] = Some(next);
+                next += 1;
+            }
+        }
+
+        let mut rest = vec![Trs::IDENTITY; count];
+        let mut world = vec![DAffine3::IDENTITY; count];
+        for &node in &order {
+            let entry = &document.nodes[node];
+            let (trs, exact) = rest_transform(&entry.at, notes, needed[node])?;
+            rest[node] = trs;
+            let local = if needed[node] { matrix::affine(&trs) } else { exact };
+            world[node] = parents[node].map_or(local, |parent| world[parent] * local);
+            if !world[node].is_finite() {
+                return Err(GltfError::at(&*entry.at.place, "the transform in model space is not finite"));
+            }
+        }
+        let hierarchy = Self { parents, order, visible, joint, moves, kept, rest, world };
+        hierarchy.note_dropped(document, notes);
+        Ok(hierarchy)
+    }
+
+    /// The nearest kept node at or above a node that a joint or clip moves.
+    pub(super) fn carrier(&self, node: usize) -> Option<usize> {
+        if !self.moves[node] {
+            return None;
+        }
+        let mut node = Some(node);
+        while let Some(at) = node {
+            if let Some(kept) = self.kept[at] {
+                return Some(kept);
+            }
+            node = self.parents[at];
+        }
+        None
+    }
+
+    /// The model's nodes.
+    pub(super) fn kept_nodes(&self, source: &Source) -> Result<Vec<Node>, GltfError> {
+        let Source { document, budget, .. } = source;
+        let mut nodes = Vec::new();
+        for &node in self.order.iter().filter(|&&node| self.kept[node].is_some()) {
+            let entry = &document.nodes[node];
+            let extras = entry.at.map.get("extras");
+            budget.take(1, size_of::<Node>() + entry.name.len(), &entry.at.place)?;
+            nodes.push(Node {
+                name: entry.name.to_owned(),
+                parent: self.parents[node].and_then(|parent| self.kept[parent]),
+                rest: self.rest[node],
+                joint: self.joint[node],
+                extras: extras.map(|extras| copy(extras, budget, &entry.at.place)).transpose()?,
+            });
+        }
+        Ok(nodes)
+    }
+
+    fn note_dropped(&self, document: &Document, notes: &Notes) {
+        let of_scene = |node: &(usize, &NodeEntry)| self.visible[node.0];
+        let count = |what: &dyn Fn(&NodeEntry) -> bool| {
+            document.nodes.iter().enumerate().filter(of_scene).filter(|(_, entry)| what(entry)).count()
+        };
+        let extension = |entry: &NodeEntry, name: &str| {
+            entry.at.map.get("extensions").is_some_and(|extensions| extensions.get(name).is_some())
+        };
+        notes.add_times("A camera was not kept", count(&|entry| entry.camera));
+        notes.add_times("A light was not kept", count(&|entry| extension(entry, "KHR_lights_punctual")));
+        let instanced = count(&|entry| extension(entry, "EXT_mesh_gpu_instancing"));
+        notes.add_times("Instances of a mesh by EXT_mesh_gpu_instancing were not made", instanced);
+        let carries = |entry: &NodeEntry| entry.mesh.is_some() || entry.camera || extension(entry, "KHR_lights_punctual");
+        let plain = document.nodes.iter().enumerate().filter(of_scene);
+        let plain = plain.filter(|(node, entry)| self.kept[*node].is_none() && !carries(entry) && entry.children.is_empty());
+        notes.add_times("A node without mesh, joint or animation was not kept", plain.count());
+    }
+}
+
+/// The parent of each node; a node with two is an error.
+fn parents(document: &Document) -> Result<Vec<Option<usize>>, GltfError> {
+    let mut parents = vec![None; document.nodes.len()];
+    for (node, entry) in document.nodes.iter().enumerate() {
+        for (i, &child) in entry.children.iter().enumerate() {
+            if let Some(other) = parents[child].replace(node) {
+                let what = format!("node {child} is already a child of node {other}");
+                return Err(GltfError::at(format!("/nodes/{node}/children/{i}"), what));
+            }
+        }
+    }
+    Ok(parents)
+}
+
+/// All nodes, each before its children and with all below it: first the scene's, then other roots'. A node that is
+/// below no root is in a cycle, which is an error.
+fn depth_first(document: &Document, parents: &[Option<usize>], scene: &[usize]) -> Result<Vec<usize>, GltfError> {
+    let count = document.nodes.len();
+    let mut order = Vec::with_capacity(count);
+    let mut seen = vec![false; count];
+    let roots = scene.iter().copied().chain(0..count).filter(|&node| parents[node].is_none());
+    let mut stack = Vec::new();
+    for root in roots {
+        if std::mem::replace(&mut seen[root], true) {
+            continue;
+        }
+        stack.push(root);
+        while let Some(node) = stack.pop() {
+            seen[node] = true;
+            order.push(node);
+            stack.extend(document.nodes[node].children.iter().rev());
+        }
+    }
+    match seen.iter().position(|seen| !seen) {
+        None => Ok(order),
+        Some(node) => Err(GltfError::at(format!("/nodes/{node}"), "the node is its own ancestor, or below one that is")),
+    }
+}
+
+/// A node's transform as declared, and the same without losing shear.
+fn rest_transform(at: &At, notes: &Notes, needed: bool) -> Result<(Trs, DAffine3), GltfError> {
+    if let Some(columns) = at.vector::<16>("matrix")? {
+        let matrix = DMat4::from_cols_array(&columns);
+        let last = matrix.row(3);
+        if last.truncate().abs().max_element() > 1e-6 || (last.w - 1.0).abs() > 1e-6 {
+            return Err(at.fail("matrix", "the last row must be 0 0 0 1"));
+        }
+        let (trs, sheared) = matrix::decompose(matrix);
+        if sheared && needed {
+            notes.add("The shear of a node's matrix was not kept");
+        }
+        if ["translation", "rotation", "scale"].iter().any(|key| at.map.contains_key(*key)) {
+            notes.add("A node has a matrix and also translation, rotation or scale; the matrix was used");
+        }
+        return Ok((trs, DAffine3::from_mat4(matrix)));
+    }
+    let vec3 = |key: &str, default: Vec3| {
+        let found = at.vector::<3>(key)?;
+        Ok::<_, GltfError>(found.map_or(default, |v| Vec3::from_array(v.map(|number| number as f32))))
+    };
+    let rotation = match at.vector::<4>("rotation")? {
+        None => Quat::IDENTITY,
+        Some(numbers) => matrix::unit(Quat::from_array(numbers.map(|number| number as f32)))
+            .ok_or_else(|| at.fail("rotation", "must be a unit quaternion, is zero"))?,
+    };
+    let trs = Trs { translation: vec3("translation", Vec3::ZERO)?, rotation, scale: vec3("scale", Vec3::ONE)? };
+    Ok((trs, matrix::affine(&trs)))
+}

@@ -1,0 +1,125 @@
+//! The binary buffer: accessors one after the other, each in a view of its own, aligned to four bytes.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use serde_json::{Map, Value};
+
+use super::floats;
+
+/// What a view holds, as the GPU sees it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Target {
+    Vertices,
+    Indices,
+    Other,
+}
+
+/// The buffer being written, with its views and accessors.
+#[derive(Default)]
+pub(super) struct Bin {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+    /// Key times already written, which channels of a clip mostly share.
+    times: BTreeMap<Vec<u8>, usize>,
+}
+
+impl Bin {
+    /// Appends bytes; returns the view.
+    pub(super) fn view(&mut self, bytes: &[u8], target: Target) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let mut view = Map::new();
+        view.insert("buffer".to_owned(), 0.into());
+        view.insert("byteOffset".to_owned(), self.bytes.len().into());
+        view.insert("byteLength".to_owned(), bytes.len().into());
+        match target {
+            Target::Vertices => drop(view.insert("target".to_owned(), 34962.into())),
+            Target::Indices => drop(view.insert("target".to_owned(), 34963.into())),
+            Target::Other => {}
+        }
+        self.bytes.extend_from_slice(bytes);
+        self.views.push(view.into());
+        self.views.len() - 1
+    }
+
+    fn accessor(&mut self, bytes: &[u8], target: Target, component: u32, kind: &str, count: usize) -> usize {
+        let mut accessor = Map::new();
+        accessor.insert("bufferView".to_owned(), self.view(bytes, target).into());
+        accessor.insert("componentType".to_owned(), component.into());
+        accessor.insert("count".to_owned(), count.into());
+        accessor.insert("type".to_owned(), kind.into());
+        self.accessors.push(accessor.into());
+        self.accessors.len() - 1
+    }
+
+    /// Floats, `N` an element.
+    pub(super) fn floats<const N: usize>(&mut self, elements: &[[f32; N]], target: Target) -> usize {
+        let kind = match N {
+            1 => "SCALAR",
+            2 => "VEC2",
+            3 => "VEC3",
+            4 => "VEC4",
+            _ => "MAT4",
+        };
+        let bytes: Vec<u8> = elements.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        self.accessor(&bytes, target, 5126, kind, elements.len())
+    }
+
+    /// Positions, with the bounds that glTF demands of them.
+    pub(super) fn positions(&mut self, positions: &[Vec3]) -> usize {
+        let elements: Vec<[f32; 3]> = positions.iter().map(Vec3::to_array).collect();
+        let index = self.floats(&elements, Target::Vertices);
+        let low = positions.iter().fold(Vec3::INFINITY, |low, position| low.min(*position));
+        let high = positions.iter().fold(Vec3::NEG_INFINITY, |high, position| high.max(*position));
+        self.bounds(index, &low.to_array(), &high.to_array());
+        index
+    }
+
+    /// Key times, rising; the same times are written once.
+    pub(super) fn times(&mut self, times: &[f32]) -> usize {
+        let bytes: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
+        if let Some(known) = self.times.get(&bytes) {
+            return *known;
+        }
+        let index = self.accessor(&bytes, Target::Other, 5126, "SCALAR", times.len());
+        self.bounds(index, &times[..1], &times[times.len() - 1..]);
+        self.times.insert(bytes, index);
+        index
+    }
+
+    /// Vertex indices below `vertices`, as small as they go; the largest value of each type is reserved.
+    pub(super) fn indices(&mut self, indices: &[u32], vertices: usize) -> usize {
+        if vertices <= 65535 {
+            let bytes: Vec<u8> = indices.iter().flat_map(|index| (*index as u16).to_le_bytes()).collect();
+            self.accessor(&bytes, Target::Indices, 5123, "SCALAR", indices.len())
+        } else {
+            let bytes: Vec<u8> = indices.iter().flat_map(|index| index.to_le_bytes()).collect();
+            self.accessor(&bytes, Target::Indices, 5125, "SCALAR", indices.len())
+        }
+    }
+
+    /// Joints of vertices, as bytes if the skin has few.
+    pub(super) fn joints(&mut self, joints: &[[u16; 4]], of: usize) -> usize {
+        if of <= 256 {
+            let bytes: Vec<u8> = joints.iter().flatten().map(|joint| *joint as u8).collect();
+            self.accessor(&bytes, Target::Vertices, 5121, "VEC4", joints.len())
+        } else {
+            let bytes: Vec<u8> = joints.iter().flatten().flat_map(|joint| joint.to_le_bytes()).collect();
+            self.accessor(&bytes, Target::Vertices, 5123, "VEC4", joints.len())
+        }
+    }
+
+    fn bounds(&mut self, accessor: usize, low: &[f32], high: &[f32]) {
+        if let Some(Value::Object(map)) = self.accessors.get_mut(accessor) {
+            map.insert("min".to_owned(), floats(low));
+            map.insert("max".to_owned(), floats(high));
+        }
+    }
+
+    /// Accessors, views and bytes.
+    pub(super) fn finish(mut self) -> (Vec<Value>, Vec<Value>, Vec<u8>) {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        (self.accessors, self.views, self.bytes)
+    }
+}

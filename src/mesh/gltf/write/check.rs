@@ -1,0 +1,133 @@
+//! A model is checked before it is written: everything after this may index freely.
+
+use crate::mesh::{
+    gltf::GltfError,
+    model::{ChannelTarget, Interpolation, Model, Part, Weights},
+};
+
+/// Fails at the first thing that does not fit together.
+pub(super) fn check(model: &Model) -> Result<(), GltfError> {
+    let fail = |what: String| Err(GltfError::model(what));
+    for (i, node) in model.nodes.iter().enumerate() {
+        if node.parent.is_some_and(|parent| parent >= i) {
+            return fail(format!("node {i} comes before its parent"));
+        }
+        if !(node.rest.affine().is_finite() && node.rest.rotation.length_squared() > 1e-12) {
+            return fail(format!("the rest transform of node {i} is not finite"));
+        }
+    }
+    for (i, skin) in model.skins.iter().enumerate() {
+        if skin.joints.len() != skin.inverse_binds.len() {
+            return fail(format!("skin {i} has {} joints, {} matrices", skin.joints.len(), skin.inverse_binds.len()));
+        }
+        if skin.joints.iter().any(|joint| *joint >= model.nodes.len()) {
+            return fail(format!("skin {i} refers to a node that is not there"));
+        }
+        if skin.inverse_binds.iter().any(|matrix| !matrix.is_finite()) {
+            return fail(format!("an inverse bind matrix of skin {i} is not finite"));
+        }
+    }
+    for (i, object) in model.objects.iter().enumerate() {
+        if object.skin.is_some_and(|skin| skin >= model.skins.len()) {
+            return fail(format!("object {i} refers to a skin that is not there"));
+        }
+        if object.node.is_some_and(|node| node >= model.nodes.len()) {
+            return fail(format!("object {i} refers to a node that is not there"));
+        }
+        if object.skin.is_some() && model.weights.is_none() {
+            return fail(format!("object {i} has a skin, but the model has no weights"));
+        }
+        if !object.morph_weights.is_empty() && object.morph_weights.len() != object.morph_names.len() {
+            return fail(format!("object {i} has a wrong number of morph weights"));
+        }
+        if object.morph_weights.iter().any(|weight| !weight.is_finite()) {
+            return fail(format!("a morph weight of object {i} is not finite"));
+        }
+    }
+    for (i, part) in model.parts.iter().enumerate() {
+        if let Err(what) = check_part(model, part) {
+            return fail(format!("part {i}: {what}"));
+        }
+    }
+    if let Some(weights) = &model.weights
+        && let Err(what) = check_weights(weights, model.points.len(), model.nodes.len())
+    {
+        return fail(what.to_owned());
+    }
+    check_clips(model)
+}
+
+fn check_part(model: &Model, part: &Part) -> Result<(), &'static str> {
+    let Some(object) = model.objects.get(part.object) else {
+        return Err("refers to an object that is not there");
+    };
+    if part.material.is_some_and(|material| material >= model.looks.materials.len()) {
+        return Err("refers to a material that is not there");
+    }
+    let count = part.vertices.len();
+    if part.triangles.iter().flatten().any(|vertex| *vertex as usize >= count) {
+        return Err("a triangle refers to a vertex that is not there");
+    }
+    for point in &part.vertices {
+        match model.points.get(*point as usize) {
+            None => return Err("a vertex refers to a point that is not there"),
+            Some(point) if !point.is_finite() => return Err("a point is not finite"),
+            Some(_) => {}
+        }
+    }
+    let fits = |length: usize| length == 0 || length == count;
+    let lists = [part.normals.len(), part.tangents.len(), part.colors.len()];
+    let morphs = part.morphs.iter().flat_map(|morph| [morph.positions.len(), morph.normals.len(), morph.tangents.len()]);
+    if !lists.into_iter().chain(part.uvs.iter().map(Vec::len)).chain(morphs).all(fits) {
+        return Err("a list of attributes is not as long as the vertices");
+    }
+    if part.morphs.len() != object.morph_names.len() {
+        return Err("has another number of morph targets than its object");
+    }
+    let offsets = |morph: &crate::mesh::model::Morph| {
+        morph.positions.iter().chain(&morph.normals).chain(&morph.tangents).all(|offset| offset.is_finite())
+    };
+    let finite = part.morphs.iter().all(offsets) && part.uvs.iter().flatten().all(|uv| uv.is_finite());
+    if finite { Ok(()) } else { Err("a texture coordinate or morph displacement is not finite") }
+}
+
+fn check_weights(weights: &Weights, points: usize, nodes: usize) -> Result<(), &'static str> {
+    let rising = weights.starts.windows(2).all(|pair| pair[0] <= pair[1]);
+    let ends = weights.starts.first() == Some(&0) && weights.starts.last() == Some(&(weights.joints.len() as u32));
+    if weights.len() != points || !rising || !ends || weights.joints.len() != weights.values.len() {
+        return Err("the weights are not as long as the points");
+    }
+    if weights.joints.iter().any(|joint| *joint as usize >= nodes) {
+        return Err("the weights refer to a node that is not there");
+    }
+    match weights.values.iter().all(|value| value.is_finite()) {
+        true => Ok(()),
+        false => Err("a weight is not finite"),
+    }
+}
+
+fn check_clips(model: &Model) -> Result<(), GltfError> {
+    for (i, clip) in model.clips.iter().enumerate() {
+        for channel in &clip.channels {
+            let components = match channel.target {
+                ChannelTarget::Translation(node) | ChannelTarget::Scale(node) if node < model.nodes.len() => 3,
+                ChannelTarget::Rotation(node) if node < model.nodes.len() => 4,
+                ChannelTarget::MorphWeights(object) if object < model.objects.len() => {
+                    model.objects[object].morph_names.len()
+                }
+                _ => return Err(GltfError::model(format!("clip {i} refers to something that is not there"))),
+            };
+            let per_key = components * if channel.interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+            if channel.values.len() != channel.times.len() * per_key {
+                return Err(GltfError::model(format!("a channel of clip {i} has a wrong number of values")));
+            }
+            let finite = channel.times.iter().chain(&channel.values).all(|value| value.is_finite());
+            let rising = channel.times.windows(2).all(|pair| pair[0] < pair[1]);
+            if !finite || !rising || channel.times.first().is_some_and(|time| *time < 0.0) {
+                let what = format!("a channel of clip {i} is not finite, or its times do not rise from zero");
+                return Err(GltfError::model(what));
+            }
+        }
+    }
+    Ok(())
+}

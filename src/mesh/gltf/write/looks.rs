@@ -1,0 +1,123 @@
+//! Materials, textures and samplers as they came; images into the buffer or into files.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Map, Value};
+
+use super::{
+    buffer::{Bin, Target},
+    insert_name,
+};
+use crate::mesh::{
+    gltf::{
+        looks::{find_extensions, remap},
+        uri::percent_encode,
+    },
+    model::{Image, Looks},
+};
+
+/// What the document gets.
+pub(super) struct Written {
+    pub(super) materials: Vec<Value>,
+    pub(super) textures: Vec<Value>,
+    pub(super) samplers: Vec<Value>,
+    pub(super) images: Vec<Value>,
+    pub(super) files: Vec<(String, Vec<u8>)>,
+    pub(super) extensions_used: Vec<String>,
+    pub(super) extensions_required: Vec<String>,
+}
+
+/// Writes looks; with a stem, images become files. Images without bytes are left out: their textures stay, which glTF
+/// allows, so that materials need not change.
+pub(super) fn write(looks: &Looks, stem: Option<&str>, bin: &mut Bin) -> Written {
+    let mut images = Vec::new();
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    let mut names = BTreeSet::new();
+    let mut image_of = vec![None; looks.images.len()];
+    for (index, image) in looks.images.iter().enumerate().filter(|(_, image)| !image.bytes.is_empty()) {
+        image_of[index] = Some(images.len());
+        let mut map = Map::new();
+        insert_name(&mut map, &image.name);
+        let mime = if image.mime.is_empty() { "image/png" } else { &image.mime };
+        map.insert("mimeType".to_owned(), mime.into());
+        match stem {
+            None => drop(map.insert("bufferView".to_owned(), bin.view(&image.bytes, Target::Other).into())),
+            Some(stem) => {
+                let name = file_name(image, stem, index, &mut names);
+                map.insert("uri".to_owned(), percent_encode(&name).into());
+                files.push((name, image.bytes.clone()));
+            }
+        }
+        map.extend(image.rest.iter().map(|(key, value)| (key.clone(), value.clone())));
+        images.push(map.into());
+    }
+
+    let mut textures = Vec::new();
+    for texture in &looks.textures {
+        let mut texture = texture.clone();
+        if let Value::Object(map) = &mut texture {
+            remap(map, "source", &image_of);
+            if let Some(Value::Object(extensions)) = map.get_mut("extensions") {
+                extensions.retain(|_, value| match value {
+                    Value::Object(extension) if extension.contains_key("source") => {
+                        remap(extension, "source", &image_of);
+                        extension.contains_key("source")
+                    }
+                    _ => true,
+                });
+                if extensions.is_empty() {
+                    map.shift_remove("extensions");
+                }
+            }
+        }
+        textures.push(texture);
+    }
+
+    let mut found = Vec::new();
+    for value in looks.materials.iter().chain(&textures).chain(&looks.samplers).chain(&images) {
+        find_extensions(value, &mut found);
+    }
+    let mut used: Vec<String> = looks.extensions_used.iter().filter(|name| found.contains(name)).cloned().collect();
+    for name in found {
+        if !used.contains(&name) {
+            used.push(name);
+        }
+    }
+    let required = looks.extensions_required.iter().filter(|name| used.contains(name)).cloned().collect();
+    Written {
+        materials: looks.materials.clone(),
+        textures,
+        samplers: looks.samplers.clone(),
+        images,
+        files,
+        extensions_used: used,
+        extensions_required: required,
+    }
+}
+
+/// A file name for an image: its own if it is plain and not taken, else one made of the stem and its number.
+fn file_name(image: &Image, stem: &str, index: usize, taken: &mut BTreeSet<String>) -> String {
+    let extension = match image.mime.as_str() {
+        "image/jpeg" => "jpg",
+        "image/webp" => "webp",
+        "image/ktx2" => "ktx2",
+        "image/vnd-ms.dds" => "dds",
+        "image/avif" => "avif",
+        _ => "png",
+    };
+    let own = match image.name.rsplit_once('.') {
+        Some((own, old)) if old.len() <= 5 => own,
+        _ => &image.name,
+    };
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    let own_name = format!("{own}.{extension}");
+    // Names that differ in case only are one file on some systems.
+    if !own.is_empty() && own.len() <= 64 && own.chars().all(plain) && taken.insert(own_name.to_ascii_lowercase()) {
+        return own_name;
+    }
+    let mut name = format!("{stem}_image{index}.{extension}");
+    while !taken.insert(name.to_ascii_lowercase()) {
+        name.insert_str(name.len() - extension.len() - 1, "_");
+    }
+    name
+}

@@ -1,0 +1,253 @@
+//! Which nodes are written, and the skins over them.
+
+use serde_json::{Map, Value};
+
+use super::{
+    GltfWriteSettings,
+    buffer::{Bin, Target},
+    floats, insert_list, insert_name,
+};
+use crate::mesh::{
+    gltf::{GltfError, matrix, skin::settle},
+    model::{Model, Trs, Weights},
+};
+
+/// The name of the node that joins several roots.
+const COMMON_ROOT: &str = "skeleton";
+
+/// The chosen nodes, and influences cut to what is written.
+pub(super) struct Skeleton {
+    /// The glTF node of each of the model's nodes.
+    pub(super) node_of: Vec<Option<usize>>,
+    /// The glTF nodes at the scene's root.
+    pub(super) roots: Vec<usize>,
+    /// Roots of the model's nodes below the common root.
+    joined: Vec<usize>,
+    /// Influences of each point of a skinned object, over the model's nodes.
+    influences: Weights,
+    /// The glTF skin of each of the model's skins.
+    pub(super) skin_of: Vec<Option<usize>>,
+    /// For each skin, the place of each of the model's nodes among the written joints.
+    slots: Vec<Vec<Option<u16>>>,
+    /// The number of written joints of each skin.
+    pub(super) joint_counts: Vec<usize>,
+    /// For each skin the node that points without weights go to.
+    root_joints: Vec<Option<usize>>,
+}
+
+impl Skeleton {
+    pub(super) fn new(model: &Model, settings: &GltfWriteSettings) -> Result<Self, GltfError> {
+        let count = model.nodes.len();
+        let mut needed = vec![settings.all_joints; count];
+        let root_joints: Vec<Option<usize>> = (0..model.skins.len()).map(|skin| root_joint(model, skin)).collect();
+        let skinned = skinned_points(model);
+        let influences = cut(model, &skinned, settings.max_influences.clamp(1, 8));
+        for joint in &influences.joints {
+            needed[*joint as usize] = true;
+        }
+        for (object, points) in model.objects.iter().zip(&skinned) {
+            let bare = points.iter().filter(|point| influences.of(**point as usize).len() == 0).count();
+            let Some(skin) = object.skin.filter(|_| bare > 0) else {
+                continue;
+            };
+            match root_joints[skin].filter(|_| settings.bind_unweighted) {
+                Some(root) => needed[root] = true,
+                None => return Err(GltfError::Unweighted { object: object.name.clone(), points: bare }),
+            }
+        }
+        for part in model.parts.iter().filter(|part| !part.triangles.is_empty()) {
+            let object = &model.objects[part.object];
+            if let (None, Some(node)) = (object.skin, object.node) {
+                needed[node] = true;
+            }
+        }
+        for node in (0..count).rev() {
+            if let (true, Some(parent)) = (needed[node], model.nodes[node].parent) {
+                needed[parent] = true;
+            }
+        }
+
+        let mut slots = Vec::new();
+        let mut joint_counts = Vec::new();
+        let mut skin_of = Vec::new();
+        let mut skins = 0;
+        for skin in &model.skins {
+            let mut of_node = vec![None; count];
+            let mut next = 0;
+            for joint in skin.joints.iter().filter(|joint| needed[**joint]) {
+                let slot = u16::try_from(next).map_err(|_| GltfError::model("a skin has more than 65536 joints"))?;
+                of_node[*joint] = Some(slot);
+                next += 1;
+            }
+            slots.push(of_node);
+            joint_counts.push(next);
+            skin_of.push((next > 0).then_some(skins));
+            skins += usize::from(next > 0);
+        }
+
+        let joined = joined_roots(model, &slots);
+        let mut next = usize::from(!joined.is_empty());
+        let mut node_of = vec![None; count];
+        let mut roots: Vec<usize> = (0..next).collect();
+        for node in (0..count).filter(|node| needed[*node]) {
+            node_of[node] = Some(next);
+            if model.nodes[node].parent.is_none() && !joined.contains(&node) {
+                roots.push(next);
+            }
+            next += 1;
+        }
+        Ok(Self { node_of, roots, joined, influences, skin_of, slots, joint_counts, root_joints })
+    }
+
+    /// The chosen nodes as glTF objects.
+    pub(super) fn nodes(&self, model: &Model) -> Vec<Map<String, Value>> {
+        let chosen = || model.nodes.iter().zip(&self.node_of).filter_map(|(node, at)| Some((node, (*at)?)));
+        let mut children = vec![Vec::new(); chosen().last().map_or(0, |(_, at)| at + 1)];
+        let mut nodes = Vec::new();
+        if !self.joined.is_empty() {
+            let mut root = Map::new();
+            insert_name(&mut root, COMMON_ROOT);
+            nodes.push(root);
+            children[0] = self.joined.iter().filter_map(|node| self.node_of[*node]).collect();
+        }
+        for (node, at) in chosen() {
+            if let Some(parent) = node.parent.and_then(|parent| self.node_of[parent]) {
+                children[parent].push(at);
+            }
+            let mut map = Map::new();
+            insert_name(&mut map, &node.name);
+            insert_transform(&mut map, &node.rest);
+            if let Some(extras) = &node.extras {
+                map.insert("extras".to_owned(), extras.clone());
+            }
+            nodes.push(map);
+        }
+        for (node, children) in nodes.iter_mut().zip(children) {
+            insert_list(node, "children", children);
+        }
+        nodes
+    }
+
+    /// The skins over written joints.
+    pub(super) fn skins(&self, model: &Model, bin: &mut Bin) -> Vec<Value> {
+        let mut skins = Vec::new();
+        for (skin, slots) in model.skins.iter().zip(&self.slots) {
+            let (mut joints, mut matrices) = (Vec::new(), Vec::new());
+            for (joint, matrix) in skin.joints.iter().zip(&skin.inverse_binds) {
+                if let (Some(node), Some(_)) = (self.node_of[*joint], slots[*joint]) {
+                    let mut columns = matrix.to_cols_array();
+                    for (i, last) in [(3, 0.0), (7, 0.0), (11, 0.0), (15, 1.0)] {
+                        columns[i] = last;
+                    }
+                    joints.push(node);
+                    matrices.push(columns);
+                }
+            }
+            if joints.is_empty() {
+                continue;
+            }
+            let mut map = Map::new();
+            insert_name(&mut map, &skin.name);
+            map.insert("inverseBindMatrices".to_owned(), bin.floats(&matrices, Target::Other).into());
+            insert_list(&mut map, "joints", joints);
+            skins.push(map.into());
+        }
+        skins
+    }
+
+    /// The influences of a point over the written joints of a skin.
+    pub(super) fn influences(&self, skin: usize, point: u32) -> Result<Vec<(u16, f32)>, GltfError> {
+        let slot = |node: usize| {
+            let outside = || GltfError::model(format!("point {point} has weights on node {node}, which its skin does not list"));
+            self.slots[skin][node].ok_or_else(outside)
+        };
+        let list = self.influences.of(point as usize);
+        if list.len() == 0 {
+            return self.root_joints[skin].map(|root| Ok((slot(root)?, 1.0))).into_iter().collect();
+        }
+        list.map(|(node, weight)| Ok((slot(node as usize)?, weight))).collect()
+    }
+}
+
+/// A transform, without what is identity.
+pub(super) fn insert_transform(map: &mut Map<String, Value>, trs: &Trs) {
+    if trs.translation != Trs::IDENTITY.translation {
+        map.insert("translation".to_owned(), floats(&trs.translation.to_array()));
+    }
+    let rotation = matrix::unit(trs.rotation).unwrap_or_default();
+    if rotation != Trs::IDENTITY.rotation {
+        map.insert("rotation".to_owned(), floats(&rotation.to_array()));
+    }
+    if trs.scale != Trs::IDENTITY.scale {
+        map.insert("scale".to_owned(), floats(&trs.scale.to_array()));
+    }
+}
+
+/// The first joint of a skin that has no joint of the skin above it.
+fn root_joint(model: &Model, skin: usize) -> Option<usize> {
+    let joints = &model.skins[skin].joints;
+    let mut listed = vec![false; model.nodes.len()];
+    joints.iter().for_each(|joint| listed[*joint] = true);
+    // Parents come first, so one pass tells what has a joint above.
+    let mut below = vec![false; model.nodes.len()];
+    for (node, entry) in model.nodes.iter().enumerate() {
+        below[node] = entry.parent.is_some_and(|parent| below[parent] || listed[parent]);
+    }
+    joints.iter().copied().find(|joint| !below[*joint])
+}
+
+/// The points that triangles of each skinned object use, each once.
+fn skinned_points(model: &Model) -> Vec<Vec<u32>> {
+    let mut points = vec![Vec::new(); model.objects.len()];
+    for part in model.parts.iter().filter(|part| model.objects[part.object].skin.is_some()) {
+        let used = part.triangles.iter().flatten().map(|vertex| part.vertices[*vertex as usize]);
+        points[part.object].extend(used);
+    }
+    for list in &mut points {
+        list.sort_unstable();
+        list.dedup();
+    }
+    points
+}
+
+/// The strongest `most` influences of the given points, summing to one.
+fn cut(model: &Model, skinned: &[Vec<u32>], most: usize) -> Weights {
+    let mut wanted = vec![false; model.points.len()];
+    skinned.iter().flatten().for_each(|point| wanted[*point as usize] = true);
+    let mut out = Weights { starts: vec![0], ..Default::default() };
+    let mut list = Vec::new();
+    for (point, wanted) in wanted.into_iter().enumerate() {
+        list.clear();
+        if let Some(weights) = model.weights.as_ref().filter(|_| wanted) {
+            list.extend(weights.of(point));
+            settle(&mut list);
+            if list.len() > most {
+                list.truncate(most);
+                settle(&mut list);
+            }
+        }
+        out.push(list.iter().copied());
+    }
+    out
+}
+
+/// Roots that need a common parent: those above the joints of a skin that has several.
+fn joined_roots(model: &Model, slots: &[Vec<Option<u16>>]) -> Vec<usize> {
+    let mut root_of: Vec<usize> = Vec::with_capacity(model.nodes.len());
+    for (node, entry) in model.nodes.iter().enumerate() {
+        root_of.push(entry.parent.map_or(node, |parent| root_of[parent]));
+    }
+    let mut joined = Vec::new();
+    for slots in slots {
+        let joints = slots.iter().enumerate().filter(|(_, slot)| slot.is_some());
+        let mut roots: Vec<usize> = joints.map(|(node, _)| root_of[node]).collect();
+        roots.sort_unstable();
+        roots.dedup();
+        if roots.len() > 1 {
+            joined.extend(roots);
+        }
+    }
+    joined.sort_unstable();
+    joined.dedup();
+    joined
+}

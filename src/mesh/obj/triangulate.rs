@@ -1,0 +1,365 @@
+//! Polygons cut into triangles, concave ones along diagonals that lie inside.
+//!
+//! Ear clipping (Meisters 1975; Eberly, "Triangulation by Ear Clipping") on the polygon's shadow along the axis closest
+//! to its best-fit normal (Newell). Coordinates are floats and differences and products are doubles, so the signs of
+//! areas are those of the true ones but for extreme ranges. Only corners that are reflex or straight can lie in an
+//! ear, and a grid finds those near it. A polygon that touches or crosses itself still gets corners minus two
+//! triangles.
+
+use glam::{DVec2, DVec3};
+
+use super::NONE;
+
+/// Room for work, used again from polygon to polygon.
+#[derive(Debug, Default)]
+pub(super) struct Triangulator {
+    flat: Vec<DVec2>,
+    previous: Vec<u32>,
+    next: Vec<u32>,
+    /// True for corners that may lie in an ear: not cut off yet, and reflex or straight.
+    inner: Vec<bool>,
+    grid: Grid,
+    /// Comparisons made on all polygons so far.
+    work: u64,
+    /// Polygons that were too tangled to be cut well within the limit of work.
+    pub fans: usize,
+}
+
+/// Comparisons after which large polygons are cut into fans: seconds, and far more than real meshes need.
+const MOST_WORK: u64 = 1 << 29;
+
+/// A vector at right angles to a polygon, as long as twice its area (Newell's method): the normal of the plane that fits
+/// it best.
+pub(super) fn newell(corners: impl ExactSizeIterator<Item = DVec3> + Clone) -> DVec3 {
+    let Some(origin) = corners.clone().next() else { return DVec3::ZERO };
+    let mut sum = DVec3::ZERO;
+    let mut last = DVec3::ZERO;
+    for corner in corners.skip(1) {
+        let corner = corner - origin;
+        sum += last.cross(corner);
+        last = corner;
+    }
+    sum
+}
+
+impl Triangulator {
+    /// Cuts the polygon `points` into triangles over their numbers, in the polygon's own turning direction. Less than
+    /// three points give nothing.
+    pub fn polygon(&mut self, points: &[DVec3], triangles: &mut Vec<[u32; 3]>) {
+        match points.len() {
+            0..3 => {}
+            3 => triangles.push([0, 1, 2]),
+            4 => triangles.extend(quad(points)),
+            count => {
+                self.flatten(points);
+                if self.convex() || self.work > MOST_WORK {
+                    triangles.extend((2..count as u32).map(|corner| [0, corner - 1, corner]));
+                    self.fans += usize::from(self.work > MOST_WORK);
+                } else {
+                    self.clip(triangles);
+                }
+            }
+        }
+    }
+
+    /// Projects along the axis closest to the normal, so that the shadow turns counter-clockwise.
+    fn flatten(&mut self, points: &[DVec3]) {
+        let normal = newell(points.iter().copied());
+        let size = normal.abs();
+        let shadow = |point: &DVec3| match size {
+            _ if size.z >= size.x && size.z >= size.y => (point.x, point.y, normal.z),
+            _ if size.x >= size.y => (point.y, point.z, normal.x),
+            _ => (point.z, point.x, normal.y),
+        };
+        self.flat.clear();
+        self.flat.extend(points.iter().map(|point| {
+            let (x, y, facing) = shadow(point);
+            if facing < 0.0 { DVec2::new(y, x) } else { DVec2::new(x, y) }
+        }));
+    }
+
+    /// True if every corner turns left, or goes straight on, and the turns add up to one round.
+    fn convex(&self) -> bool {
+        let count = self.flat.len();
+        let edge = |corner: usize| self.flat[(corner + 1) % count] - self.flat[corner % count];
+        let mut changes = 0;
+        for corner in 0..count {
+            let (here, after) = (edge(corner), edge(corner + 1));
+            let turn = here.perp_dot(after);
+            // Straight corners are left to ear clipping: a fan from one would be flat.
+            if turn <= 0.0 {
+                return false;
+            }
+            // A convex polygon's edges change between going right and left twice.
+            changes += usize::from((here.x < 0.0) != (after.x < 0.0));
+        }
+        changes <= 2
+    }
+
+    fn clip(&mut self, triangles: &mut Vec<[u32; 3]>) {
+        let count = self.flat.len();
+        self.previous.clear();
+        self.previous.extend((0..count as u32).map(|corner| corner.checked_sub(1).unwrap_or(count as u32 - 1)));
+        self.next.clear();
+        self.next.extend((0..count as u32).map(|corner| (corner + 1) % count as u32));
+        self.inner.clear();
+        self.inner.resize(count, false);
+        for corner in 0..count {
+            self.inner[corner] = self.turn(corner) <= 0.0;
+        }
+        self.grid.build(&self.flat, &self.inner);
+        let mut left = count;
+        let mut corner = 0;
+        // Corners looked at since the last cut, and how much is forgiven: nothing; then touching and flat ears; then
+        // all, for a polygon that crosses itself.
+        let mut looked = 0;
+        let mut lenience = Lenience::Strict;
+        while left > 3 {
+            self.work += 1;
+            if self.work > MOST_WORK {
+                self.fans += 1;
+                lenience = Lenience::Anything;
+            }
+            if self.is_ear(corner, lenience) {
+                let (before, after) = (self.previous[corner], self.next[corner]);
+                triangles.push([before, corner as u32, after]);
+                self.next[before as usize] = after;
+                self.previous[after as usize] = before;
+                self.inner[corner] = false;
+                for neighbour in [before as usize, after as usize] {
+                    self.inner[neighbour] = self.inner[neighbour] && self.turn(neighbour) <= 0.0;
+                }
+                left -= 1;
+                // Going on past the neighbour spreads the cuts around, which makes better triangles than a fan.
+                corner = self.next[after as usize] as usize;
+                looked = 0;
+                lenience = Lenience::Strict;
+            } else {
+                corner = self.next[corner] as usize;
+                looked += 1;
+                if looked >= left {
+                    looked = 0;
+                    lenience = lenience.more();
+                }
+            }
+        }
+        triangles.push([self.previous[corner], corner as u32, self.next[corner]]);
+    }
+
+    /// Twice the area of the triangle at a corner; positive if it turns left.
+    fn turn(&self, corner: usize) -> f64 {
+        let [a, b, c] = [self.previous[corner], corner as u32, self.next[corner]].map(|at| self.flat[at as usize]);
+        area(a, b, c)
+    }
+
+    fn is_ear(&mut self, corner: usize, lenience: Lenience) -> bool {
+        let ids = [self.previous[corner], corner as u32, self.next[corner]];
+        let [a, b, c] = ids.map(|at| self.flat[at as usize]);
+        let turn = area(a, b, c);
+        match lenience {
+            Lenience::Strict if turn <= 0.0 => return false,
+            Lenience::Touching if turn < 0.0 => return false,
+            Lenience::Touching if turn == 0.0 => return true,
+            Lenience::Anything => return true,
+            _ => {}
+        }
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let Self { flat, previous, next, inner, grid, work, .. } = self;
+        !grid.any(low, high, |other| {
+            *work += 1;
+            if !inner[other as usize] || ids.contains(&other) {
+                return false;
+            }
+            let point = flat[other as usize];
+            let sides = [area(a, b, point), area(b, c, point), area(c, a, point)];
+            if let Some(at) = [a, b, c].iter().position(|corner| *corner == point) {
+                // The polygon touches itself at a corner of the ear (a hole joined by a slit, for example). It is in
+                // the way if it goes on into the ear from there.
+                let [tip, to, from] = [[a, b, c], [b, c, a], [c, a, b]][at];
+                let into = |neighbour: u32| {
+                    let goal = flat[neighbour as usize];
+                    area(tip, to, goal) > 0.0 && area(from, tip, goal) > 0.0
+                };
+                return into(previous[other as usize]) || into(next[other as usize]);
+            }
+            match lenience {
+                Lenience::Strict => sides.iter().all(|side| *side >= 0.0),
+                _ => sides.iter().all(|side| *side > 0.0),
+            }
+        })
+    }
+}
+
+/// What an ear may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Lenience {
+    Strict,
+    Touching,
+    Anything,
+}
+
+impl Lenience {
+    fn more(self) -> Self {
+        match self {
+            Self::Strict => Self::Touching,
+            _ => Self::Anything,
+        }
+    }
+}
+
+/// Twice the signed area of a triangle.
+fn area(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+    (b - a).perp_dot(c - a)
+}
+
+/// The two triangles of a quad: cut from its first corner if both halves face as the whole does, else the other way.
+fn quad(points: &[DVec3]) -> [[u32; 3]; 2] {
+    let normal = newell(points.iter().copied());
+    let facing = |[a, b, c]: [usize; 3]| (points[b] - points[a]).cross(points[c] - points[a]).dot(normal);
+    let first = facing([0, 1, 2]).min(facing([0, 2, 3]));
+    if first > 0.0 || first >= facing([1, 2, 3]).min(facing([1, 3, 0])) {
+        [[0, 1, 2], [0, 2, 3]]
+    } else {
+        [[0, 1, 3], [1, 2, 3]]
+    }
+}
+
+/// Points in square cells.
+#[derive(Debug, Default)]
+struct Grid {
+    low: DVec2,
+    /// Cells a unit.
+    scale: DVec2,
+    side: usize,
+    starts: Vec<u32>,
+    members: Vec<u32>,
+}
+
+impl Grid {
+    fn build(&mut self, points: &[DVec2], wanted: &[bool]) {
+        let inside = || points.iter().zip(wanted).filter(|(_, wanted)| **wanted).map(|(point, _)| *point);
+        let count = inside().count();
+        // One or two points a cell, in a row of cells at least.
+        self.side = 1;
+        while self.side * self.side * 4 < count && self.side < 1024 {
+            self.side *= 2;
+        }
+        self.low = inside().fold(DVec2::INFINITY, DVec2::min);
+        let extent = inside().fold(DVec2::NEG_INFINITY, DVec2::max) - self.low;
+        let cells = |extent: f64| if extent > 0.0 && extent.is_finite() { self.side as f64 / extent } else { 0.0 };
+        self.scale = DVec2::new(cells(extent.x), cells(extent.y));
+        self.starts.clear();
+        self.starts.resize(self.side * self.side + 1, 0);
+        for point in inside() {
+            let cell = self.cell(point);
+            self.starts[cell + 1] += 1;
+        }
+        for cell in 1..self.starts.len() {
+            self.starts[cell] += self.starts[cell - 1];
+        }
+        self.members.clear();
+        self.members.resize(count, NONE);
+        for (id, (point, _)) in points.iter().zip(wanted).enumerate().filter(|(_, (_, wanted))| **wanted) {
+            let mut slot = self.starts[self.cell(*point)] as usize;
+            while self.members[slot] != NONE {
+                slot += 1;
+            }
+            self.members[slot] = id as u32;
+        }
+    }
+
+    fn coordinates(&self, point: DVec2) -> [usize; 2] {
+        let place = (point - self.low) * self.scale;
+        [place.x, place.y].map(|place| (place.max(0.0) as usize).min(self.side - 1))
+    }
+
+    fn cell(&self, point: DVec2) -> usize {
+        let [x, y] = self.coordinates(point);
+        y * self.side + x
+    }
+
+    /// True if `test` holds for any point in the cells that the box touches.
+    fn any(&self, low: DVec2, high: DVec2, mut test: impl FnMut(u32) -> bool) -> bool {
+        let ([left, bottom], [right, top]) = (self.coordinates(low), self.coordinates(high));
+        (bottom..=top).any(|row| {
+            let start = self.starts[row * self.side + left] as usize;
+            let end = self.starts[row * self.side + right + 1] as usize;
+            self.members[start..end].iter().any(|id| test(*id))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangulates a flat polygon and returns the sum of the areas and of their absolute values, doubled.
+    fn areas(points: &[DVec3]) -> (usize, f64, f64) {
+        let mut triangles = Vec::new();
+        Triangulator::default().polygon(points, &mut triangles);
+        let doubled = |[a, b, c]: [u32; 3]| {
+            let [a, b, c] = [a, b, c].map(|at| points[at as usize].truncate());
+            area(a, b, c)
+        };
+        (triangles.len(), triangles.iter().map(|t| doubled(*t)).sum(), triangles.iter().map(|t| doubled(*t).abs()).sum())
+    }
+
+    fn flat(points: &[[f64; 2]]) -> Vec<DVec3> {
+        points.iter().map(|[x, y]| DVec3::new(*x, *y, 0.0)).collect()
+    }
+
+    #[test]
+    fn triangles_cover_the_polygon_once() {
+        let comb = (0..400).map(|i| [f64::from(i), if i % 2 == 0 { 0.0 } else { 10.0 + f64::from(i % 7) }]);
+        let comb: Vec<[f64; 2]> = comb.chain([[399.0, -5.0], [0.0, -5.0]]).collect();
+        let keyhole = [
+            [0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 0.0], [1.0, 1.0], [1.0, 3.0], [3.0, 3.0], [3.0, 1.0],
+            [1.0, 1.0],
+        ];
+        let cases: [(&str, &[[f64; 2]], f64); 6] = [
+            ("arrow", &[[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [0.5, 1.0]], 3.0),
+            ("arrow from its notch", &[[0.5, 1.0], [0.0, 0.0], [2.0, 1.0], [0.0, 2.0]], 3.0),
+            ("letter L", &[[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]], 10.0),
+            ("straight corners", &[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 2.0], [0.0, 2.0]], 8.0),
+            ("square with a hole", &keyhole, 24.0),
+            ("comb", &comb, {
+                let n = comb.len();
+                (0..n).map(|i| DVec2::from(comb[i]).perp_dot(DVec2::from(comb[(i + 1) % n]))).sum::<f64>().abs()
+            }),
+        ];
+        for (name, points, wanted) in cases {
+            for reversed in [false, true] {
+                let mut points = flat(points);
+                if reversed {
+                    points.reverse();
+                }
+                for start in 0..points.len().min(12) {
+                    points.rotate_left(start.min(1));
+                    let (count, sum, covered) = areas(&points);
+                    assert_eq!(count, points.len() - 2, "{name}");
+                    assert!((sum.abs() - wanted).abs() < 1e-9 * wanted, "{name}: {sum}, not {wanted}");
+                    assert!((covered - wanted).abs() < 1e-9 * wanted, "{name}: covers {covered}, not {wanted}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tangled_polygons_end() {
+        let mut state = 1_u32;
+        let mut random = move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 24)
+        };
+        for count in [3, 4, 5, 6, 9, 30, 300, 3000] {
+            for _ in 0..5 {
+                let points: Vec<DVec3> = (0..count).map(|_| DVec3::new(random(), random(), random())).collect();
+                let mut triangles = Vec::new();
+                Triangulator::default().polygon(&points, &mut triangles);
+                assert_eq!(triangles.len(), count - 2);
+                assert!(triangles.iter().flatten().all(|corner| (*corner as usize) < count));
+            }
+        }
+        assert_eq!(areas(&[DVec3::ONE; 50]).0, 48, "all corners at one point");
+    }
+}

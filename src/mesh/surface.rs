@@ -1,0 +1,143 @@
+//! The surface that rays meet: closest, furthest and all hits on the posed mesh, and the closest point.
+//!
+//! A hit is found once however many triangles share the place, no ray slips between neighbours, and a closed mesh is
+//! entered exactly as often as it is left, at any unit scale.
+
+mod build;
+mod closest;
+mod crossing;
+mod pending;
+mod traverse;
+mod tree;
+mod volumes;
+
+use glam::Vec3;
+
+pub use pending::{PendingSurface, hits_brute};
+pub use volumes::{Volume, volumes};
+
+use crate::mesh::ray::{Hit, Ray};
+use crossing::{Frame, resolve, usable};
+use tree::{BoxRay, Tree};
+
+/// A bounding volume hierarchy over triangles.
+///
+/// Distances and positions are in the space and unit of the points it was built from. It owns a compact copy of the
+/// triangles, so that the mesh need not stay around. Equal input gives equal answers on every machine and for any
+/// number of threads.
+#[derive(Debug, Clone, Default)]
+pub struct Surface {
+    tree: Tree,
+    points: usize,
+    triangles: usize,
+}
+
+/// The point of a surface closest to a given one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Where it is.
+    pub point: Vec3,
+    /// The triangle it lies on, as an index into the triangles the surface was built from.
+    pub triangle: u32,
+    /// Its weights over the triangle's three corners; they sum to one.
+    pub barycentric: Vec3,
+    /// How far it is from the given point.
+    pub distance: f32,
+}
+
+/// Why a surface could not take other positions.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SurfaceError {
+    /// Not the mesh it was built from.
+    #[error("the surface was built from {expected} points but is refitted with {found}: build it again")]
+    PointCount {
+        /// How many points it was built from.
+        expected: usize,
+        /// How many were given.
+        found: usize,
+    },
+    /// A position that no box can hold.
+    #[error("point {point} is not finite or further than 1e18 from the origin: repair the pose, or build the surface again to leave out its triangles")]
+    Point {
+        /// Index of the first such point.
+        point: usize,
+    },
+}
+
+impl Surface {
+    /// Builds the hierarchy over `triangles`, whose corners index `points`.
+    ///
+    /// Triangles with a corner out of range, not finite or further than 1e18 from the origin are left out. O(n log n),
+    /// in parallel.
+    pub fn build(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let (tree, count) = Tree::build(points, triangles);
+        Self { tree, points: points.len(), triangles: count }
+    }
+
+    /// Moves the surface to other positions of the same points: much cheaper than building, and as good while the
+    /// shape changes little.
+    ///
+    /// # Errors
+    /// The number of points differs, or one of them is not finite; the surface then stays as it was.
+    pub fn refit(&mut self, points: &[Vec3]) -> Result<(), SurfaceError> {
+        if points.len() != self.points {
+            return Err(SurfaceError::PointCount { expected: self.points, found: points.len() });
+        }
+        if let Some(point) = points.iter().position(|&point| !usable(point)) {
+            return Err(SurfaceError::Point { point });
+        }
+        self.tree.refit(points);
+        Ok(())
+    }
+
+    /// The first hit along `ray`.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        let (frame, boxes) = self.prepare(ray)?;
+        self.tree.nearest(&frame, &boxes).map(|crossing| crossing.hit())
+    }
+
+    /// The first and the last hit along `ray`; the same one twice if there is only one.
+    pub fn near_far(&self, ray: &Ray) -> Option<(Hit, Hit)> {
+        let (frame, boxes) = self.prepare(ray)?;
+        let near = self.tree.nearest(&frame, &boxes)?;
+        let far = self.tree.farthest(&frame, &boxes).unwrap_or(near);
+        Some((near.hit(), far.hit()))
+    }
+
+    /// All hits along `ray`, sorted by distance; `out` is overwritten.
+    ///
+    /// A crossing at an edge or corner that several triangles share counts once. A closed mesh of consistent winding
+    /// is entered as often as it is left.
+    pub fn hits(&self, ray: &Ray, out: &mut Vec<Hit>) {
+        let mut crossings = Vec::new();
+        if let Some((frame, boxes)) = self.prepare(ray) {
+            self.tree.all(&frame, &boxes, &mut crossings);
+        }
+        resolve(&mut crossings, |slot| self.tree.corners(slot), out);
+    }
+
+    /// The point of the surface closest to `point`; `None` if the surface is empty or `point` is not finite. Of
+    /// several triangles equally close, the one with the lowest index.
+    pub fn closest_point(&self, point: Vec3) -> Option<SurfacePoint> {
+        let (squared, slot, barycentric) = if usable(point) { self.tree.nearest_point(point) } else { None }?;
+        let triangle = self.tree.packets[slot as usize / tree::LANES].triangles[slot as usize % tree::LANES];
+        let closest = closest::at(barycentric, self.tree.corners(slot));
+        Some(SurfacePoint { point: closest, triangle, barycentric, distance: squared.sqrt() })
+    }
+
+    /// The lowest and highest coordinates; `None` if the surface is empty.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let bounds = self.tree.bounds();
+        (!bounds.is_empty()).then_some((bounds.low, bounds.high))
+    }
+
+    /// How many triangles the surface has; those left out are not counted.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles
+    }
+
+    fn prepare(&self, ray: &Ray) -> Option<(Frame, BoxRay)> {
+        let frame = Frame::new(ray)?;
+        Some((frame, BoxRay::new(&frame, &self.tree.bounds())))
+    }
+}

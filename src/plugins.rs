@@ -1,0 +1,74 @@
+//! The engine as Bevy plugins: one plugin a file, each public, replaceable and usable alone where that makes sense.
+
+pub mod document;
+pub mod gesture;
+pub mod history;
+pub mod picking;
+pub mod placement;
+pub mod skinning;
+pub mod stroke;
+pub mod surface;
+
+use bevy::{app::PluginGroupBuilder, prelude::*};
+
+/// Everything a rig needs, head-less.
+///
+/// | plugin | gives |
+/// | --- | --- |
+/// | [`document::DocumentPlugin`] | rigs, their joint entities, the one edit path, undo and redo |
+/// | [`surface::SurfacePlugin`] | the posed surface that rays meet |
+/// | [`picking::PickingPlugin`] | selecting joints |
+/// | [`placement::PlacementPlugin`] | placing joints with rays |
+/// | [`stroke::StrokePlugin`] | chains from strokes |
+/// | [`gesture::GesturePlugin`] | lists of gestures that drive all of the above |
+/// | [`skinning::SkinningPlugin`] | automatic weights in the background |
+pub struct RigPlugins;
+
+impl PluginGroup for RigPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        PluginGroupBuilder::start::<Self>()
+            .add(document::DocumentPlugin)
+            .add(surface::SurfacePlugin)
+            .add(picking::PickingPlugin)
+            .add(placement::PlacementPlugin)
+            .add(stroke::StrokePlugin)
+            .add(gesture::GesturePlugin)
+            .add(skinning::SkinningPlugin)
+    }
+}
+
+/// When the systems of rigs run. The first five are in `Update`, in this order; the last is in `PostUpdate`.
+#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RigSystems {
+    /// Scripted gestures become requests.
+    Script,
+    /// Pick requests change selections.
+    Pick,
+    /// Place and stroke requests become edit requests.
+    Gesture,
+    /// Edit, undo and redo requests change rigs: the only place where rigs change.
+    Edits,
+    /// Joint entities follow their rig.
+    Build,
+    /// Meshes follow their weights; background skinning starts and lands.
+    Bind,
+    /// In `PostUpdate`, after transforms have propagated: surfaces follow the pose.
+    Surface,
+}
+
+/// Orders [`RigSystems`]; added by every plugin of [`RigPlugins`], harmless when repeated.
+pub(crate) fn configure_sets(app: &mut App) {
+    app.configure_sets(
+        Update,
+        (
+            RigSystems::Script,
+            RigSystems::Pick,
+            RigSystems::Gesture,
+            RigSystems::Edits,
+            RigSystems::Build,
+            RigSystems::Bind,
+        )
+            .chain(),
+    )
+    .configure_sets(PostUpdate, RigSystems::Surface.after(TransformSystems::Propagate));
+}

@@ -1,0 +1,64 @@
+//! Placing joints with rays (Pencil Rigger, section 3.2).
+//!
+//! The joint goes to the midpoint of the closest and the furthest hit of a ray through the posed mesh, becomes a child
+//! of the selected joint or a root, and is selected. Where the ray meets nothing, nothing happens, and [`Placed`] says so.
+
+use bevy::prelude::*;
+
+use super::{
+    RigSystems, configure_sets,
+    document::{EditRequest, Selection},
+    surface::RigSurface,
+};
+use crate::{
+    algo::placement::{PlaceSettings, Placement, place_hits},
+    mesh::ray::Ray,
+    rig::operations::Operation,
+};
+
+/// Adds placing.
+pub struct PlacementPlugin;
+
+impl Plugin for PlacementPlugin {
+    fn build(&self, app: &mut App) {
+        configure_sets(app);
+        app.add_message::<PlaceRequest>().add_message::<Placed>().add_systems(Update, place.in_set(RigSystems::Gesture));
+    }
+}
+
+/// Asks to place a joint.
+#[derive(Message, Debug, Clone)]
+pub struct PlaceRequest {
+    /// The rig.
+    pub rig: Entity,
+    /// The ray, in the rig's space.
+    pub ray: Ray,
+    /// Depth and volume.
+    pub settings: PlaceSettings,
+}
+
+/// The answer to a [`PlaceRequest`].
+#[derive(Message, Debug, Clone)]
+pub struct Placed {
+    /// The rig.
+    pub rig: Entity,
+    /// What the ray met, and where the joint goes.
+    pub placement: Placement,
+}
+
+fn place(
+    mut requests: MessageReader<PlaceRequest>,
+    rigs: Query<(&Selection, Option<&RigSurface>)>,
+    mut edits: MessageWriter<EditRequest>,
+    mut placed: MessageWriter<Placed>,
+) {
+    for PlaceRequest { rig, ray, settings } in requests.read() {
+        let Ok((selection, surface)) = rigs.get(*rig) else { continue };
+        let hits = surface.map(|surface| surface.hits(ray)).unwrap_or_default();
+        let placement = place_hits(ray, &hits, *settings);
+        if let Some(position) = placement.position() {
+            edits.write(EditRequest::operation(*rig, Operation::Place { position, parent: selection.active() }));
+        }
+        placed.write(Placed { rig: *rig, placement });
+    }
+}

@@ -1,0 +1,199 @@
+//! Strokes: freehand lines that become chains, insert joints, or erase them (Pencil Rigger, section 5.3).
+
+use bevy::prelude::*;
+
+use super::{
+    RigSystems, configure_sets,
+    document::{EditRequest, JointEntities, Selection},
+    picking::posed_joints,
+    surface::RigSurface,
+};
+use crate::{
+    algo::{
+        placement::{PlaceSettings, place_hits},
+        stroke::{ChainChoice, StrokeChain, StrokeKind, StrokeSamples, StrokeSettings, classify, joint_at},
+        view::ViewPlane,
+    },
+    rig::{Rig, Uid, operations::Operation},
+};
+
+/// Adds strokes.
+pub struct StrokePlugin;
+
+impl Plugin for StrokePlugin {
+    fn build(&self, app: &mut App) {
+        configure_sets(app);
+        app.init_resource::<WaitingStrokes>()
+            .add_message::<StrokeRequest>()
+            .add_message::<StrokeDone>()
+            .add_systems(Update, stroke.in_set(RigSystems::Gesture));
+    }
+}
+
+/// Asks to turn a stroke into what it means.
+#[derive(Message, Debug, Clone)]
+pub struct StrokeRequest {
+    /// The rig.
+    pub rig: Entity,
+    /// The view it was drawn in, in the rig's space.
+    pub plane: ViewPlane,
+    /// Its points on the view plane.
+    pub points: Vec<Vec2>,
+    /// Where joints go along it.
+    pub choice: ChainChoice,
+    /// Depth, volume and recentring.
+    pub settings: StrokeSettings,
+    /// True if the stroke must become a chain, whatever it crosses.
+    pub chain_only: bool,
+    /// How near, in model units, a stroke must come to a joint to mean it.
+    pub reach: f32,
+}
+
+/// What became of a stroke.
+#[derive(Message, Debug, Clone)]
+pub struct StrokeDone {
+    /// The rig.
+    pub rig: Entity,
+    /// What it meant.
+    pub result: StrokeResult,
+}
+
+/// What a stroke meant.
+#[derive(Debug, Clone)]
+pub enum StrokeResult {
+    /// A chain was added; `parent` is the joint it hangs on.
+    Chain {
+        /// The joints and what to tell the user.
+        chain: StrokeChain,
+        /// The joint that the chain continues or hangs on.
+        parent: Option<Uid>,
+    },
+    /// A joint was put into the bone above this joint.
+    Inserted {
+        /// The joint at the bone's end.
+        child: Uid,
+    },
+    /// These joints were deleted.
+    Erased(Vec<Uid>),
+    /// Nothing happened, for this reason.
+    Nothing(String),
+}
+
+/// Strokes that came while the surface was still being built: they are worth the wait of a fraction of a second.
+#[derive(Resource, Default)]
+struct WaitingStrokes(Vec<StrokeRequest>);
+
+fn stroke(
+    mut requests: MessageReader<StrokeRequest>,
+    mut waiting: ResMut<WaitingStrokes>,
+    rigs: Query<(&Rig, &Selection, &JointEntities, &GlobalTransform, Option<&RigSurface>)>,
+    joints: Query<&GlobalTransform>,
+    mut edits: MessageWriter<EditRequest>,
+    mut done: MessageWriter<StrokeDone>,
+) {
+    let mut queue = std::mem::take(&mut waiting.0);
+    queue.extend(requests.read().cloned());
+    for request in queue {
+        let Ok((rig, selection, entities, place, surface)) = rigs.get(request.rig) else { continue };
+        let Some(surface) = surface else {
+            let result = StrokeResult::Nothing("the rig has no mesh to draw on; open one first".to_owned());
+            done.write(StrokeDone { rig: request.rig, result });
+            continue;
+        };
+        if surface.ready().is_none() {
+            waiting.0.push(request);
+            continue;
+        }
+        let posed = posed_joints(rig, entities, place, &joints);
+        let result = act(&request, rig, selection, &posed, surface, &mut edits);
+        done.write(StrokeDone { rig: request.rig, result });
+    }
+}
+
+fn act(
+    request: &StrokeRequest,
+    rig: &Rig,
+    selection: &Selection,
+    posed: &[(Uid, Vec3)],
+    surface: &RigSurface,
+    edits: &mut MessageWriter<EditRequest>,
+) -> StrokeResult {
+    let mut send = |operation| {
+        edits.write(EditRequest::operation(request.rig, operation));
+    };
+    let flat = projected(rig, posed, &request.plane);
+    let kind = if request.chain_only {
+        let start = request.points.first().and_then(|point| joint_at(*point, &flat, request.reach));
+        StrokeKind::Chain { start, end: None }
+    } else {
+        classify(&request.points, &flat, request.reach)
+    };
+    match kind {
+        StrokeKind::Erase { joints } => {
+            let joints: Vec<Uid> = joints.into_iter().map(|number| posed[number].0).collect();
+            send(Operation::Delete { joints: joints.clone(), keep_children: true });
+            StrokeResult::Erased(joints)
+        }
+        StrokeKind::Insert { bone, t } => {
+            let (child, end) = posed[bone];
+            let parent = rig.joint(child).and_then(|joint| joint.parent);
+            let start = parent.and_then(|parent| posed.iter().find(|(uid, _)| *uid == parent)).map(|(_, place)| *place);
+            let Some(start) = start else {
+                return StrokeResult::Nothing("the stroke crosses no bone".to_owned());
+            };
+            // The crossing tells where along the bone; in depth the joint is placed like a click there, but only if
+            // the bone itself runs through what the ray meets.
+            let along = start.lerp(end, t);
+            let position = match request.plane.project(along) {
+                Some(point) if request.settings.recentre => {
+                    let ray = request.plane.ray(point);
+                    let hits = surface.hits(&ray);
+                    let settings = PlaceSettings { volume: volume_at(&ray, &hits, along), ..request.settings.place };
+                    place_hits(&ray, &hits, settings).position().unwrap_or(along)
+                }
+                _ => along,
+            };
+            send(Operation::Insert { child, position });
+            StrokeResult::Inserted { child }
+        }
+        StrokeKind::Chain { start, .. } => {
+            let Some(hierarchy) = surface.ready() else {
+                return StrokeResult::Nothing("the surface is not ready; draw the stroke again".to_owned());
+            };
+            let samples = match StrokeSamples::new(hierarchy, &request.plane, &request.points, request.settings) {
+                Ok(samples) => samples,
+                Err(error) => return StrokeResult::Nothing(error.to_string()),
+            };
+            let chain = samples.chain(hierarchy, request.choice);
+            let from = start.map(|number| posed[number].0);
+            // A stroke that starts on a joint continues from it: that joint is the chain's first.
+            let skip = usize::from(from.is_some());
+            let positions: Vec<Vec3> = chain.joints.iter().skip(skip).map(|joint| joint.position).collect();
+            if positions.is_empty() {
+                return StrokeResult::Nothing("the stroke ends where it starts; draw it further".to_owned());
+            }
+            let parent = from.or(selection.active());
+            send(Operation::Chain { positions, parent });
+            StrokeResult::Chain { chain, parent }
+        }
+    }
+}
+
+/// Joints on the view plane, each with its parent's number; those behind the camera are nowhere.
+fn projected(rig: &Rig, posed: &[(Uid, Vec3)], plane: &ViewPlane) -> Vec<(Vec2, Option<usize>)> {
+    let numbers: std::collections::HashMap<Uid, usize> = posed.iter().enumerate().map(|(n, (uid, _))| (*uid, n)).collect();
+    let project = |(uid, position): &(Uid, Vec3)| {
+        let parent = rig.joint(*uid).and_then(|joint| joint.parent).and_then(|parent| numbers.get(&parent).copied());
+        (plane.project(*position).unwrap_or(Vec2::NAN), parent)
+    };
+    posed.iter().map(project).collect()
+}
+
+/// Which entry/exit pair of a ray holds a point (or comes nearest to it), counted from one.
+fn volume_at(ray: &crate::mesh::ray::Ray, hits: &[crate::mesh::ray::Hit], point: Vec3) -> Option<u32> {
+    let depth = (point - ray.origin).dot(ray.direction);
+    let apart = |volume: &crate::mesh::surface::Volume| (volume.near - depth).max(depth - volume.far).max(0.0);
+    let volumes = crate::mesh::surface::volumes(hits);
+    let nearest = volumes.iter().enumerate().min_by(|(_, a), (_, b)| apart(a).total_cmp(&apart(b)));
+    nearest.map(|(number, _)| number as u32 + 1)
+}

@@ -1,0 +1,26 @@
+//! What a rig is: plain data and rules. No systems, no rendering, no files.
+//!
+//! [`Rig`] is the whole document; [`RigEdit`] is the only way it changes, each edit with its exact inverse.
+
+pub mod character;
+mod document;
+pub mod edit;
+mod group;
+mod joint;
+pub mod label;
+pub mod operations;
+mod source;
+// pub mod skin;
+mod tag;
+pub mod template;
+pub mod text;
+mod uid;
+
+pub use document::{Rig, RigAbout, SkinData};
+pub use edit::{EditError, RigEdit};
+pub use group::GroupData;
+pub use joint::{JointData, NodeKind, RestTransform, RigJoint};
+pub use source::SourceError;
+pub(crate) use source::{parse_ron, utf8};
+pub use tag::{Tag, TagKind};
+pub use uid::{Uid, UidError, UidSource};

@@ -1,0 +1,203 @@
+//! Between models and rigs: a skeleton that came with a mesh, and a mesh that leaves with a skeleton.
+
+use std::{collections::HashMap, sync::Arc};
+
+use bevy::math::{Affine3, Mat4};
+
+use crate::{
+    mesh::model::{Channel, ChannelTarget, Clip, Model, Node, SkinBinding, Weights},
+    rig::{JointData, NodeKind, Rig, RigEdit, SkinData, Uid, UidSource, text::RigText},
+};
+
+/// A mesh file's skeleton as edits, and its weights.
+#[derive(Debug, Clone, Default)]
+pub struct ImportedSkeleton {
+    /// Edits that add the joints to a rig.
+    pub edits: Vec<RigEdit>,
+    /// The joint that each node of the model becomes.
+    pub nodes: Vec<Uid>,
+    /// The model's weights, if it has any.
+    pub skin: Option<Arc<SkinData>>,
+}
+
+/// Turns a model's nodes and weights into joints: names become labels, rest transforms stay as they are.
+pub fn import_skeleton(model: &Model, uids: &mut UidSource) -> ImportedSkeleton {
+    let nodes: Vec<Uid> = model.nodes.iter().map(|_| uids.next_uid()).collect();
+    let edits = model.nodes.iter().zip(&nodes).map(|(node, uid)| {
+        let joint = JointData {
+            uid: *uid,
+            label: Some(node.name.clone()).filter(|name| !name.is_empty()),
+            kind: if node.joint { NodeKind::Joint } else { NodeKind::Null },
+            rest: node.rest.into(),
+            ..Default::default()
+        };
+        RigEdit::AddJoint { joint: Box::new(joint), parent: node.parent.map(|parent| nodes[parent]), index: usize::MAX }
+    });
+    let edits = edits.collect();
+    let skin = model.weights.clone().map(|weights| Arc::new(SkinData { joints: nodes.clone(), weights, at_rest: false }));
+    ImportedSkeleton { edits, nodes, skin }
+}
+
+/// Turns a `.rig` text into edits that add its joints, parents before children, and returns their uids in its order.
+pub fn import_rig_text(text: &RigText, uids: &mut UidSource) -> (Vec<RigEdit>, Vec<Uid>) {
+    let ids: Vec<Uid> = text.joints.iter().map(|_| uids.next_uid()).collect();
+    let mut children: Vec<Vec<usize>> = vec![Vec::new(); text.joints.len()];
+    let mut stack = Vec::new();
+    for (number, joint) in text.joints.iter().enumerate() {
+        match joint.parent {
+            Some(parent) => children[parent].push(number),
+            None => stack.push(number),
+        }
+    }
+    stack.reverse();
+    let mut edits = Vec::with_capacity(text.joints.len());
+    while let Some(number) = stack.pop() {
+        let joint = &text.joints[number];
+        let parent = joint.parent.map(|parent| text.joints[parent].position).unwrap_or_default();
+        let data = JointData {
+            uid: ids[number],
+            label: joint.label.clone(),
+            rest: crate::rig::RestTransform::from_translation(joint.position - parent),
+            ..Default::default()
+        };
+        edits.push(RigEdit::AddJoint {
+            joint: Box::new(data),
+            parent: joint.parent.map(|parent| ids[parent]),
+            index: usize::MAX,
+        });
+        stack.extend(children[number].iter().rev());
+    }
+    (edits, ids)
+}
+
+/// The `.rig` text of a rig: positions in the rig's space and topology, parents first.
+pub fn rig_text(rig: &Rig) -> RigText {
+    let globals = rig.rest_globals();
+    let numbers: HashMap<Uid, usize> = globals.iter().enumerate().map(|(number, (uid, _))| (*uid, number)).collect();
+    let joints = rig.walk().zip(&globals).map(|(joint, (_, global))| super::text::RigTextJoint {
+        parent: joint.parent.and_then(|parent| numbers.get(&parent).copied()),
+        position: global.translation,
+        label: joint.data.label.clone(),
+    });
+    RigText { joints: joints.collect() }
+}
+
+/// What [`character`] puts together.
+pub struct Character<'a> {
+    /// The rig.
+    pub rig: &'a Rig,
+    /// The mesh as its file has it.
+    pub file: &'a Model,
+    /// The mesh where its file's joints hold it at rest.
+    pub rest: &'a Model,
+    /// The joint that each node of the file became.
+    pub nodes: &'a [Uid],
+    /// The mesh's weights.
+    pub skin: Option<&'a SkinData>,
+}
+
+/// A model of the mesh with the rig's joints, weights and what remains of the file's clips.
+///
+/// Joints stand in the order of [`Rig::walk`]; labels become names. Without weights the mesh stays unskinned.
+pub fn character(parts: &Character) -> Model {
+    let Character { rig, file, rest, nodes: file_nodes, skin } = parts;
+    let globals = rig.rest_globals();
+    let place: HashMap<Uid, usize> = globals.iter().enumerate().map(|(number, (uid, _))| (*uid, number)).collect();
+    let node_of: Vec<Option<usize>> = file_nodes.iter().map(|uid| place.get(uid).copied()).collect();
+    let from_file = skin.is_some_and(|skin| !skin.at_rest);
+    let mut model = if from_file { (*file).clone() } else { (*rest).clone() };
+    model.nodes = rig.walk().map(|joint| {
+        let source = file_nodes.iter().position(|uid| *uid == joint.data.uid).and_then(|number| file.nodes.get(number));
+        Node {
+            name: joint.data.label.clone().unwrap_or_default(),
+            parent: joint.parent.and_then(|parent| place.get(&parent).copied()),
+            rest: joint.data.rest.into(),
+            joint: joint.data.kind == NodeKind::Joint,
+            extras: source.and_then(|source| source.extras.clone()),
+        }
+    }).collect();
+    model.clips = file.clips.iter().filter_map(|clip| remaining_clip(clip, &node_of)).collect();
+    model.weights = skin.map(|skin| remapped(skin, &place));
+    for object in &mut model.objects {
+        object.node = object.node.and_then(|node| node_of.get(node).copied().flatten());
+    }
+    match skin {
+        Some(skin) if skin.at_rest => {
+            let joints: Vec<usize> = (0..model.nodes.len()).filter(|node| model.nodes[*node].joint).collect();
+            let inverse_binds = joints.iter().map(|joint| inverse_bind(&globals[*joint].1)).collect();
+            model.skins = vec![SkinBinding { name: rig.about().name.clone(), joints, inverse_binds }];
+            for object in &mut model.objects {
+                object.skin = Some(0);
+                object.node = None;
+            }
+        }
+        Some(_) => model.skins = rebound(file, &node_of, &globals),
+        None => {}
+    }
+    model
+}
+
+fn inverse_bind(global: &Affine3) -> Mat4 {
+    let inverse = Mat4::from(*global).inverse();
+    // The last row of an affine matrix is exact, which the glTF validator insists on; a flat joint has no inverse.
+    let mut columns = if inverse.is_finite() { inverse.to_cols_array() } else { Mat4::IDENTITY.to_cols_array() };
+    (columns[3], columns[7], columns[11], columns[15]) = (0.0, 0.0, 0.0, 1.0);
+    Mat4::from_cols_array(&columns)
+}
+
+/// The file's bind poses over the rig's joints. A joint that was moved at rest since takes its part of the mesh along
+/// unmoved: what its matrix did to the mesh at rest stays the same.
+fn rebound(file: &Model, node_of: &[Option<usize>], globals: &[(Uid, Affine3)]) -> Vec<SkinBinding> {
+    let file_globals = file.rest_globals();
+    let bind = |skin: &SkinBinding| {
+        let pairs = skin.joints.iter().zip(&skin.inverse_binds).filter_map(|(joint, inverse)| {
+            let node = node_of.get(*joint).copied().flatten()?;
+            let before = Mat4::from(file_globals[*joint]);
+            let now = Mat4::from(globals[node].1);
+            let close = before.abs_diff_eq(now, 1e-6 * before.w_axis.length().max(1.0));
+            let inverse = if close { *inverse } else { inverse_bind(&globals[node].1) * before * *inverse };
+            Some((node, inverse))
+        });
+        let (joints, inverse_binds) = pairs.unzip();
+        SkinBinding { name: skin.name.clone(), joints, inverse_binds }
+    };
+    file.skins.iter().map(bind).collect()
+}
+
+/// Weights over the nodes of the exported model. Influences of joints that were deleted since go to the others.
+fn remapped(skin: &SkinData, place: &HashMap<Uid, usize>) -> Weights {
+    let node_of: Vec<Option<usize>> = skin.joints.iter().map(|uid| place.get(uid).copied()).collect();
+    if node_of.iter().enumerate().all(|(number, node)| *node == Some(number)) {
+        return skin.weights.clone();
+    }
+    let mut weights = Weights::default();
+    for point in 0..skin.weights.len() {
+        let kept: Vec<(u32, f32)> = skin
+            .weights
+            .of(point)
+            .filter_map(|(joint, value)| Some((node_of.get(joint as usize).copied().flatten()? as u32, value)))
+            .collect();
+        let complete = kept.len() == skin.weights.of(point).len();
+        let sum: f32 = kept.iter().map(|(_, value)| value).sum();
+        weights.push(kept.into_iter().map(|(joint, value)| (joint, if complete { value } else { value / sum })));
+    }
+    weights
+}
+
+fn remaining_clip(clip: &Clip, node_of: &[Option<usize>]) -> Option<Clip> {
+    let moved = |node: usize| node_of.get(node).copied().flatten();
+    let channels: Vec<Channel> = clip
+        .channels
+        .iter()
+        .filter_map(|channel| {
+            let target = match channel.target {
+                ChannelTarget::Translation(node) => ChannelTarget::Translation(moved(node)?),
+                ChannelTarget::Rotation(node) => ChannelTarget::Rotation(moved(node)?),
+                ChannelTarget::Scale(node) => ChannelTarget::Scale(moved(node)?),
+                ChannelTarget::MorphWeights(object) => ChannelTarget::MorphWeights(object),
+            };
+            Some(Channel { target, ..channel.clone() })
+        })
+        .collect();
+    (!channels.is_empty()).then(|| Clip { channels, ..clip.clone() })
+}

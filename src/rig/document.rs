@@ -1,0 +1,191 @@
+//! The rig as one document: joints in a hierarchy, groups, tags and weights.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    sync::Arc,
+};
+
+use bevy::{math::Affine3, prelude::*};
+
+use crate::{
+    mesh::model::Weights,
+    rig::{GroupData, RestTransform, RigJoint, Uid},
+};
+
+/// A rig (= global group). Reading is free; changing goes through [`Rig::apply`](crate::rig::edit) only.
+#[derive(Component, Debug, Clone, PartialEq, Default)]
+pub struct Rig {
+    pub(super) uid: Uid,
+    pub(super) about: RigAbout,
+    pub(super) groups: Vec<GroupData>,
+    pub(super) joints: HashMap<Uid, RigJoint>,
+    pub(super) roots: Vec<Uid>,
+    pub(super) skins: BTreeMap<Uid, Arc<SkinData>>,
+}
+
+/// What a template's header tells people.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct RigAbout {
+    /// The rig's name.
+    pub name: String,
+    /// The version of the template's content, as its author counts.
+    pub version: String,
+    /// For example `character`, `part`, `prop`.
+    pub kind: String,
+    /// Who made it.
+    pub author: String,
+    /// A few sentences.
+    pub description: String,
+    /// File name of a picture beside the template.
+    pub preview: Option<String>,
+}
+
+/// Weights of one mesh over joints of the rig.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SkinData {
+    /// The joint that each joint index of the weights means.
+    pub joints: Vec<Uid>,
+    /// Influences of every point of the mesh.
+    pub weights: Weights,
+    /// True if the weights hold the mesh as it stands at rest; false if they came with the mesh file and hold its
+    /// points in the file's bind pose.
+    pub at_rest: bool,
+}
+
+impl Rig {
+    /// An empty rig.
+    pub fn new(uid: Uid, name: impl Into<String>) -> Self {
+        Self { uid, about: RigAbout { name: name.into(), ..default() }, ..default() }
+    }
+
+    /// Identity.
+    pub fn uid(&self) -> Uid {
+        self.uid
+    }
+
+    /// Name, version, author and the like.
+    pub fn about(&self) -> &RigAbout {
+        &self.about
+    }
+
+    /// Local groups in order.
+    pub fn groups(&self) -> &[GroupData] {
+        &self.groups
+    }
+
+    /// The local group with that uid.
+    pub fn group(&self, uid: Uid) -> Option<&GroupData> {
+        self.groups.iter().find(|group| group.uid == uid)
+    }
+
+    /// Root joints in authored order.
+    pub fn roots(&self) -> &[Uid] {
+        &self.roots
+    }
+
+    /// The joint with that uid.
+    pub fn joint(&self, uid: Uid) -> Option<&RigJoint> {
+        self.joints.get(&uid)
+    }
+
+    /// The number of joints.
+    pub fn len(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// True if there is no joint.
+    pub fn is_empty(&self) -> bool {
+        self.joints.is_empty()
+    }
+
+    /// Children of a joint, or the roots for `None`; empty for an unknown joint.
+    pub fn children(&self, parent: Option<Uid>) -> &[Uid] {
+        match parent {
+            None => &self.roots,
+            Some(uid) => self.joints.get(&uid).map_or(&[], |joint| &joint.children),
+        }
+    }
+
+    /// All joints, parents before children, siblings in authored order.
+    pub fn walk(&self) -> impl Iterator<Item = &RigJoint> {
+        self.walk_from(self.roots.iter().rev().copied().collect())
+    }
+
+    /// A joint and everything below it, parents first; nothing for an unknown joint.
+    pub fn hierarchy(&self, top: Uid) -> impl Iterator<Item = &RigJoint> {
+        self.walk_from(vec![top])
+    }
+
+    fn walk_from(&self, mut stack: Vec<Uid>) -> impl Iterator<Item = &RigJoint> {
+        std::iter::from_fn(move || {
+            loop {
+                let joint = self.joints.get(&stack.pop()?);
+                if let Some(joint) = joint {
+                    stack.extend(joint.children.iter().rev());
+                    return Some(joint);
+                }
+            }
+        })
+    }
+
+    /// Joints from the parent of `uid` up to its root.
+    pub fn ancestors(&self, uid: Uid) -> impl Iterator<Item = &RigJoint> {
+        let mut next = self.joints.get(&uid).and_then(|joint| joint.parent);
+        std::iter::from_fn(move || {
+            let joint = self.joints.get(&next?)?;
+            next = joint.parent;
+            Some(joint)
+        })
+    }
+
+    /// The first joint with that label in the order of [`Rig::walk`].
+    pub fn find_label(&self, label: &str) -> Option<Uid> {
+        self.walk().find(|joint| joint.data.label.as_deref() == Some(label)).map(|joint| joint.data.uid)
+    }
+
+    /// Transform of a joint from its own space to the rig's, at rest. Identity for an unknown joint.
+    pub fn rest_global(&self, uid: Uid) -> Affine3 {
+        let Some(joint) = self.joints.get(&uid) else { return Affine3::IDENTITY };
+        let own = joint.data.rest.affine();
+        self.ancestors(uid).fold(own, |global, ancestor| ancestor.data.rest.affine() * global)
+    }
+
+    /// Position of a joint in the rig's space, at rest.
+    pub fn position(&self, uid: Uid) -> Vec3 {
+        self.rest_global(uid).translation
+    }
+
+    /// Rest transforms of all joints to the rig's space, in the order of [`Rig::walk`].
+    pub fn rest_globals(&self) -> Vec<(Uid, Affine3)> {
+        let mut known: HashMap<Uid, Affine3> = HashMap::with_capacity(self.joints.len());
+        let mut list = Vec::with_capacity(self.joints.len());
+        for joint in self.walk() {
+            let parent = joint.parent.and_then(|parent| known.get(&parent)).copied().unwrap_or(Affine3::IDENTITY);
+            let global = parent * joint.data.rest.affine();
+            known.insert(joint.data.uid, global);
+            list.push((joint.data.uid, global));
+        }
+        list
+    }
+
+    /// The rest transform that puts a joint at `global` (rig space) below `parent`. A parent that is flat in one
+    /// direction has no inverse; then the transform is taken as it is.
+    pub fn local_rest(&self, parent: Option<Uid>, global: &Affine3) -> RestTransform {
+        let parent = parent.map_or(Affine3::IDENTITY, |parent| self.rest_global(parent));
+        if parent == Affine3::IDENTITY {
+            return RestTransform::from_affine(global);
+        }
+        let local = parent.inverse() * *global;
+        RestTransform::from_affine(if local.is_finite() { &local } else { global })
+    }
+
+    /// The weights of a bound mesh.
+    pub fn skin(&self, mesh: Uid) -> Option<&Arc<SkinData>> {
+        self.skins.get(&mesh)
+    }
+
+    /// All bound meshes with weights.
+    pub fn skins(&self) -> impl Iterator<Item = (Uid, &Arc<SkinData>)> {
+        self.skins.iter().map(|(mesh, skin)| (*mesh, skin))
+    }
+}

@@ -1,0 +1,285 @@
+//! The one way a rig changes: edits with exact inverses.
+//!
+//! [`Rig::apply`] either changes the rig and returns the edit that takes it back, or changes nothing and says why.
+//! Everything bigger (placing, mirroring, deleting a joint but keeping its children) is a list of these.
+
+use std::sync::Arc;
+
+use crate::rig::{
+    GroupData, JointData, RestTransform, Rig, RigJoint, Tag, Uid,
+    document::{RigAbout, SkinData},
+};
+
+/// One change of a rig.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RigEdit {
+    /// Adds a joint as the `index`-th child of `parent` (the `index`-th root for `None`; past the end: last).
+    AddJoint {
+        /// The joint.
+        joint: Box<JointData>,
+        /// Its parent.
+        parent: Option<Uid>,
+        /// Its place among the siblings.
+        index: usize,
+    },
+    /// Removes a joint that has no children.
+    RemoveJoint(Uid),
+    /// Gives a joint another rest transform, relative to its parent.
+    SetRest(Uid, RestTransform),
+    /// Moves a joint with all below it to another parent; its rest transform stays as it is, relative to the parent.
+    SetParent {
+        /// The joint.
+        joint: Uid,
+        /// Its next parent.
+        parent: Option<Uid>,
+        /// Its place among the siblings there.
+        index: usize,
+    },
+    /// Renames a joint.
+    SetLabel(Uid, Option<String>),
+    /// Puts a joint into a local group.
+    SetGroup(Uid, Option<Uid>),
+    /// Names the joint on the other side, one way; pair both.
+    SetMirror(Uid, Option<Uid>),
+    /// Protects a joint's weights from automatic skinning, or no longer.
+    SetLocked(Uid, bool),
+    /// Adds a tag as the `index`-th of a joint.
+    AddTag {
+        /// The joint.
+        joint: Uid,
+        /// The tag.
+        tag: Box<Tag>,
+        /// Its place.
+        index: usize,
+    },
+    /// Removes a tag of a joint.
+    RemoveTag(Uid, Uid),
+    /// Replaces the tag of a joint that has the same uid.
+    SetTag(Uid, Box<Tag>),
+    /// Adds a local group.
+    AddLocalGroup(GroupData, usize),
+    /// Removes a local group that no joint is in.
+    RemoveLocalGroup(Uid),
+    /// Replaces the local group that has the same uid.
+    SetLocalGroup(GroupData),
+    /// Changes name, version, author and the like.
+    SetAbout(Box<RigAbout>),
+    /// Binds a mesh with weights, replaces them, or lets the mesh go.
+    SetSkin(Uid, Option<Arc<SkinData>>),
+    /// Several edits as one: all or none.
+    Batch(Vec<RigEdit>),
+}
+
+/// Why an edit was refused. The rig is as it was.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EditError {
+    /// No such joint.
+    #[error("there is no joint {0} in the rig; it may have been deleted: select another")]
+    NoJoint(Uid),
+    /// No such group.
+    #[error("there is no local group {0} in the rig; create it first")]
+    NoGroup(Uid),
+    /// No such tag.
+    #[error("joint {0} has no tag {1}; it may have been deleted")]
+    NoTag(Uid, Uid),
+    /// The uid is taken.
+    #[error("uid {0} is already used in the rig; give the added thing another uid")]
+    Taken(Uid),
+    /// The joint has children.
+    #[error("joint {0} has children; delete or reparent them first")]
+    HasChildren(Uid),
+    /// The group has joints.
+    #[error("local group {0} still has joints; take them out first")]
+    GroupInUse(Uid),
+    /// The parent lies below the joint.
+    #[error("joint {joint} cannot hang below {parent}, which hangs below it; choose a parent outside its hierarchy")]
+    Cycle {
+        /// The joint to move.
+        joint: Uid,
+        /// The parent that was asked for.
+        parent: Uid,
+    },
+    /// A number is not finite or a rotation is not of unit length.
+    #[error("joint {0} would get a rest transform that is not finite or not a rotation; check the numbers")]
+    BadTransform(Uid),
+    /// Weights do not fit.
+    #[error("the weights name {0} joints that the rig does not have; skin the mesh again")]
+    BadSkin(usize),
+}
+
+impl Rig {
+    /// Applies an edit and returns the one that takes it back exactly, order of siblings included.
+    pub fn apply(&mut self, edit: &RigEdit) -> Result<RigEdit, EditError> {
+        Ok(match edit {
+            RigEdit::AddJoint { joint, parent, index } => self.add_joint(joint, *parent, *index)?,
+            RigEdit::RemoveJoint(uid) => self.remove_joint(*uid)?,
+            RigEdit::SetRest(uid, rest) => {
+                if !rest.is_valid() {
+                    return Err(EditError::BadTransform(*uid));
+                }
+                let joint = self.joint_mut(*uid)?;
+                RigEdit::SetRest(*uid, std::mem::replace(&mut joint.data.rest, *rest))
+            }
+            RigEdit::SetParent { joint, parent, index } => self.set_parent(*joint, *parent, *index)?,
+            RigEdit::SetLabel(uid, label) => {
+                let joint = self.joint_mut(*uid)?;
+                RigEdit::SetLabel(*uid, std::mem::replace(&mut joint.data.label, label.clone()))
+            }
+            RigEdit::SetGroup(uid, group) => {
+                self.check_group(*group)?;
+                let joint = self.joint_mut(*uid)?;
+                RigEdit::SetGroup(*uid, std::mem::replace(&mut joint.data.group, *group))
+            }
+            RigEdit::SetMirror(uid, mirror) => {
+                let joint = self.joint_mut(*uid)?;
+                RigEdit::SetMirror(*uid, std::mem::replace(&mut joint.data.mirror, *mirror))
+            }
+            RigEdit::SetLocked(uid, locked) => {
+                let joint = self.joint_mut(*uid)?;
+                RigEdit::SetLocked(*uid, std::mem::replace(&mut joint.data.locked, *locked))
+            }
+            RigEdit::AddTag { joint, tag, index } => {
+                let taken = self.joints.values().any(|j| j.data.tags.iter().any(|t| t.uid == tag.uid));
+                if taken {
+                    return Err(EditError::Taken(tag.uid));
+                }
+                let tags = &mut self.joint_mut(*joint)?.data.tags;
+                tags.insert((*index).min(tags.len()), (**tag).clone());
+                RigEdit::RemoveTag(*joint, tag.uid)
+            }
+            RigEdit::RemoveTag(joint, tag) => {
+                let tags = &mut self.joint_mut(*joint)?.data.tags;
+                let index = tags.iter().position(|t| t.uid == *tag).ok_or(EditError::NoTag(*joint, *tag))?;
+                RigEdit::AddTag { joint: *joint, tag: Box::new(tags.remove(index)), index }
+            }
+            RigEdit::SetTag(joint, tag) => {
+                let tags = &mut self.joint_mut(*joint)?.data.tags;
+                let old = tags.iter_mut().find(|t| t.uid == tag.uid).ok_or(EditError::NoTag(*joint, tag.uid))?;
+                RigEdit::SetTag(*joint, Box::new(std::mem::replace(old, (**tag).clone())))
+            }
+            RigEdit::AddLocalGroup(group, index) => {
+                if self.group(group.uid).is_some() {
+                    return Err(EditError::Taken(group.uid));
+                }
+                self.groups.insert((*index).min(self.groups.len()), group.clone());
+                RigEdit::RemoveLocalGroup(group.uid)
+            }
+            RigEdit::RemoveLocalGroup(uid) => {
+                let index = self.groups.iter().position(|g| g.uid == *uid).ok_or(EditError::NoGroup(*uid))?;
+                if self.joints.values().any(|joint| joint.data.group == Some(*uid)) {
+                    return Err(EditError::GroupInUse(*uid));
+                }
+                RigEdit::AddLocalGroup(self.groups.remove(index), index)
+            }
+            RigEdit::SetLocalGroup(group) => {
+                let old = self.groups.iter_mut().find(|g| g.uid == group.uid).ok_or(EditError::NoGroup(group.uid))?;
+                RigEdit::SetLocalGroup(std::mem::replace(old, group.clone()))
+            }
+            RigEdit::SetAbout(about) => {
+                RigEdit::SetAbout(Box::new(std::mem::replace(&mut self.about, (**about).clone())))
+            }
+            RigEdit::SetSkin(mesh, skin) => self.set_skin(*mesh, skin.as_ref())?,
+            RigEdit::Batch(edits) => self.apply_batch(edits)?,
+        })
+    }
+
+    fn apply_batch(&mut self, edits: &[RigEdit]) -> Result<RigEdit, EditError> {
+        let mut inverses = Vec::with_capacity(edits.len());
+        for edit in edits {
+            match self.apply(edit) {
+                Ok(inverse) => inverses.push(inverse),
+                Err(error) => {
+                    // What was done so far is taken back; inverses of applied edits cannot be refused.
+                    for inverse in inverses.iter().rev() {
+                        let undone = self.apply(inverse);
+                        debug_assert!(undone.is_ok(), "an inverse was refused: {undone:?}");
+                    }
+                    return Err(error);
+                }
+            }
+        }
+        inverses.reverse();
+        Ok(RigEdit::Batch(inverses))
+    }
+
+    fn joint_mut(&mut self, uid: Uid) -> Result<&mut RigJoint, EditError> {
+        self.joints.get_mut(&uid).ok_or(EditError::NoJoint(uid))
+    }
+
+    fn check_group(&self, group: Option<Uid>) -> Result<(), EditError> {
+        match group {
+            Some(uid) if self.group(uid).is_none() => Err(EditError::NoGroup(uid)),
+            _ => Ok(()),
+        }
+    }
+
+    fn siblings_mut(&mut self, parent: Option<Uid>) -> Result<&mut Vec<Uid>, EditError> {
+        match parent {
+            None => Ok(&mut self.roots),
+            Some(uid) => Ok(&mut self.joint_mut(uid)?.children),
+        }
+    }
+
+    /// Takes a joint out of its parent's list; returns its former place.
+    fn detach(&mut self, uid: Uid) -> Result<(Option<Uid>, usize), EditError> {
+        let parent = self.joints.get(&uid).ok_or(EditError::NoJoint(uid))?.parent;
+        let siblings = self.siblings_mut(parent)?;
+        let index = siblings.iter().position(|s| *s == uid).ok_or(EditError::NoJoint(uid))?;
+        siblings.remove(index);
+        Ok((parent, index))
+    }
+
+    fn add_joint(&mut self, data: &JointData, parent: Option<Uid>, index: usize) -> Result<RigEdit, EditError> {
+        if self.joints.contains_key(&data.uid) {
+            return Err(EditError::Taken(data.uid));
+        }
+        if !data.rest.is_valid() {
+            return Err(EditError::BadTransform(data.uid));
+        }
+        self.check_group(data.group)?;
+        let siblings = self.siblings_mut(parent)?;
+        siblings.insert(index.min(siblings.len()), data.uid);
+        self.joints.insert(data.uid, RigJoint { data: data.clone(), parent, children: Vec::new() });
+        Ok(RigEdit::RemoveJoint(data.uid))
+    }
+
+    fn remove_joint(&mut self, uid: Uid) -> Result<RigEdit, EditError> {
+        if !self.joints.get(&uid).ok_or(EditError::NoJoint(uid))?.children.is_empty() {
+            return Err(EditError::HasChildren(uid));
+        }
+        let (parent, index) = self.detach(uid)?;
+        let joint = self.joints.remove(&uid).ok_or(EditError::NoJoint(uid))?;
+        Ok(RigEdit::AddJoint { joint: Box::new(joint.data), parent, index })
+    }
+
+    fn set_parent(&mut self, uid: Uid, parent: Option<Uid>, index: usize) -> Result<RigEdit, EditError> {
+        if let Some(above) = parent {
+            if !self.joints.contains_key(&above) {
+                return Err(EditError::NoJoint(above));
+            }
+            if above == uid || self.ancestors(above).any(|ancestor| ancestor.data.uid == uid) {
+                return Err(EditError::Cycle { joint: uid, parent: above });
+            }
+        }
+        let (old_parent, old_index) = self.detach(uid)?;
+        let siblings = self.siblings_mut(parent)?;
+        siblings.insert(index.min(siblings.len()), uid);
+        self.joint_mut(uid)?.parent = parent;
+        Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
+    }
+
+    fn set_skin(&mut self, mesh: Uid, skin: Option<&Arc<SkinData>>) -> Result<RigEdit, EditError> {
+        if let Some(skin) = skin {
+            // Joints that were deleted after skinning stay named: undoing the deletion brings their weights back.
+            let beyond = skin.weights.joints.iter().filter(|j| **j as usize >= skin.joints.len()).count();
+            if beyond > 0 {
+                return Err(EditError::BadSkin(beyond));
+            }
+        }
+        let old = match skin {
+            Some(skin) => self.skins.insert(mesh, skin.clone()),
+            None => self.skins.remove(&mesh),
+        };
+        Ok(RigEdit::SetSkin(mesh, old))
+    }
+}

@@ -1,0 +1,113 @@
+//! Joints: what a skeleton is made of.
+
+use bevy::{math::Affine3, prelude::*};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    mesh::model::Trs,
+    rig::{Tag, Uid},
+};
+
+/// Where a joint stands at rest, relative to its parent (or to the rig for a root).
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[reflect(Component)]
+pub struct RestTransform {
+    /// Translation in the parent's space.
+    pub translation: Vec3,
+    /// Rotation, a unit quaternion.
+    pub rotation: Quat,
+    /// Scale along the joint's own axes.
+    pub scale: Vec3,
+}
+
+impl Default for RestTransform {
+    fn default() -> Self {
+        Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE }
+    }
+}
+
+impl RestTransform {
+    /// A transform that only moves.
+    pub fn from_translation(translation: Vec3) -> Self {
+        Self { translation, ..default() }
+    }
+
+    /// As an affine matrix.
+    pub fn affine(&self) -> Affine3 {
+        Affine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+    }
+
+    /// The nearest translation, rotation and scale to a matrix (shear is lost).
+    pub fn from_affine(affine: &Affine3) -> Self {
+        let (scale, rotation, translation) = affine.to_scale_rotation_translation();
+        Self { translation, rotation, scale }
+    }
+
+    /// True if every number is finite and the rotation has a length.
+    pub fn is_valid(&self) -> bool {
+        self.translation.is_finite()
+            && self.scale.is_finite()
+            && self.rotation.is_finite()
+            && (self.rotation.length_squared() - 1.0).abs() < 1e-3
+    }
+}
+
+impl From<RestTransform> for Transform {
+    fn from(rest: RestTransform) -> Self {
+        Self { translation: rest.translation, rotation: rest.rotation, scale: rest.scale }
+    }
+}
+
+impl From<RestTransform> for Trs {
+    fn from(rest: RestTransform) -> Self {
+        Self { translation: rest.translation, rotation: rest.rotation, scale: rest.scale }
+    }
+}
+
+impl From<Trs> for RestTransform {
+    fn from(trs: Trs) -> Self {
+        Self { translation: trs.translation, rotation: trs.rotation, scale: trs.scale }
+    }
+}
+
+/// What a node of the skeleton is for.
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum NodeKind {
+    /// Moves the mesh.
+    #[default]
+    Joint,
+    /// Only carries other nodes; never gets weights (an imported armature node, for example).
+    Null,
+}
+
+/// Everything a joint is, without its place in the hierarchy.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct JointData {
+    /// Identity.
+    pub uid: Uid,
+    /// The name people see; unique or not, with any characters.
+    pub label: Option<String>,
+    /// The local group the joint belongs to.
+    pub group: Option<Uid>,
+    /// Joint or null.
+    pub kind: NodeKind,
+    /// Rest pose.
+    pub rest: RestTransform,
+    /// The joint on the other side. Pairs are known by uid, never by name; both name each other.
+    pub mirror: Option<Uid>,
+    /// True if automatic skinning must leave this joint's weights alone.
+    pub locked: bool,
+    /// Tags in order.
+    pub tags: Vec<Tag>,
+}
+
+/// A joint in a [`crate::rig::Rig`]: its data and its place.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RigJoint {
+    /// What it is.
+    pub data: JointData,
+    /// The parent joint; `None` for a root.
+    pub parent: Option<Uid>,
+    /// Children in authored order.
+    pub children: Vec<Uid>,
+}

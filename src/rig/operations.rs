@@ -1,0 +1,260 @@
+//! What people do to a rig, in terms of edits.
+//!
+//! An [`Operation`] is one thing a person asked for: place a joint, move three, delete one and keep its children. It
+//! runs in a [`Draft`], which applies edits one after another through [`Rig::apply`] and takes them all back if one is
+//! refused. With symmetry on, an operation does the same to the joints on the other side; pairs are known by uid.
+
+mod draft;
+mod hierarchy;
+mod orient;
+mod place;
+mod symmetry;
+mod transform;
+
+use bevy::math::{Affine3, Quat, Vec3};
+
+pub use draft::{Draft, Outcome};
+pub use orient::Axis;
+pub use symmetry::MirrorPlane;
+
+use crate::rig::{EditError, GroupData, Rig, RigEdit, Uid, UidSource};
+
+/// One thing a person asks of a rig. Positions and transforms are in the rig's space.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Operation {
+    /// Adds a joint at a position as a child of `parent`, or as a root, and selects it.
+    Place {
+        /// Where.
+        position: Vec3,
+        /// Below which joint.
+        parent: Option<Uid>,
+    },
+    /// Adds a chain of joints, the first as a child of `parent`, and selects the last.
+    Chain {
+        /// Where, in order.
+        positions: Vec<Vec3>,
+        /// Below which joint.
+        parent: Option<Uid>,
+    },
+    /// Puts a joint into the bone that ends at `child`, and selects it.
+    Insert {
+        /// The joint at the bone's end.
+        child: Uid,
+        /// Where.
+        position: Vec3,
+    },
+    /// Deletes joints; what hangs below them goes too, or moves up to their parent.
+    Delete {
+        /// Which.
+        joints: Vec<Uid>,
+        /// True to keep what hangs below.
+        keep_children: bool,
+    },
+    /// Puts each joint at a position.
+    Move {
+        /// Which, and where to.
+        to: Vec<(Uid, Vec3)>,
+        /// True to take along what hangs below; else it stays in place.
+        with_children: bool,
+    },
+    /// Turns joints about a pivot.
+    Rotate {
+        /// Which.
+        joints: Vec<Uid>,
+        /// The turn.
+        rotation: Quat,
+        /// About which point; each joint about itself for `None`.
+        pivot: Option<Vec3>,
+        /// True to take along what hangs below; else it stays in place.
+        with_children: bool,
+    },
+    /// Scales joints about a pivot: their distances from it and, where it is the joint itself, their rest scale.
+    Scale {
+        /// Which.
+        joints: Vec<Uid>,
+        /// Factors along the rig's axes, none zero.
+        scale: Vec3,
+        /// About which point; each joint about itself for `None`.
+        pivot: Option<Vec3>,
+        /// True to take along what hangs below; else it stays in place.
+        with_children: bool,
+    },
+    /// Hangs joints below another (or makes them roots) without moving them.
+    Reparent {
+        /// Which.
+        joints: Vec<Uid>,
+        /// Below which joint.
+        parent: Option<Uid>,
+    },
+    /// Renames a joint; an empty name takes the label away.
+    Label(Uid, String),
+    /// Turns joints so that an axis of theirs points along their bone; nothing else moves.
+    Orient {
+        /// Which.
+        joints: Vec<Uid>,
+        /// The axis that points along the bone.
+        along: Axis,
+    },
+    /// Makes or renews the other side of joints and all that hangs below them.
+    Mirror {
+        /// Which.
+        joints: Vec<Uid>,
+    },
+    /// Puts joints into the local group with that name, which is created with the colour if there is none.
+    Group {
+        /// Which.
+        joints: Vec<Uid>,
+        /// The group's name; empty takes the joints out of their groups.
+        name: String,
+        /// Colour for a group that has to be created, or to be recoloured.
+        color: Option<[f32; 3]>,
+    },
+    /// Protects joints from automatic skinning, or no longer.
+    Lock(Vec<Uid>, bool),
+    /// Edits as they are.
+    Edits(Vec<RigEdit>),
+}
+
+/// Why an operation did nothing.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OperationError {
+    /// An edit was refused.
+    #[error(transparent)]
+    Edit(#[from] EditError),
+    /// A number makes no sense.
+    #[error("{0}")]
+    BadNumber(&'static str),
+    /// The bone to insert into does not exist.
+    #[error("joint {0} is a root: there is no bone above it to insert into")]
+    NoBone(Uid),
+}
+
+impl Operation {
+    /// A few words for the history panel.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Place { .. } => "Place joint",
+            Self::Chain { .. } => "Draw chain",
+            Self::Insert { .. } => "Insert joint",
+            Self::Delete { .. } => "Delete joints",
+            Self::Move { .. } => "Move joints",
+            Self::Rotate { .. } => "Rotate joints",
+            Self::Scale { .. } => "Scale joints",
+            Self::Reparent { .. } => "Reparent joints",
+            Self::Label(..) => "Rename joint",
+            Self::Orient { .. } => "Orient joints",
+            Self::Mirror { .. } => "Mirror joints",
+            Self::Group { .. } => "Assign group",
+            Self::Lock(..) => "Lock joints",
+            Self::Edits(..) => "Edit rig",
+        }
+    }
+
+    /// Runs the operation on a rig: all of it, or none of it and an error. `symmetry` is the plane of live mirroring.
+    pub fn run(
+        &self,
+        rig: &mut Rig,
+        uids: &mut UidSource,
+        symmetry: Option<MirrorPlane>,
+    ) -> Result<Outcome, OperationError> {
+        let mut draft = Draft::new(rig, uids, symmetry);
+        match self.run_in(&mut draft) {
+            Ok(()) => Ok(draft.finish()),
+            Err(error) => {
+                draft.take_back();
+                Err(error)
+            }
+        }
+    }
+
+    fn run_in(&self, draft: &mut Draft) -> Result<(), OperationError> {
+        match self {
+            Self::Place { position, parent } => place::chain(draft, std::slice::from_ref(position), *parent),
+            Self::Chain { positions, parent } => place::chain(draft, positions, *parent),
+            Self::Insert { child, position } => place::insert(draft, *child, *position),
+            Self::Delete { joints, keep_children } => hierarchy::delete(draft, joints, *keep_children),
+            Self::Reparent { joints, parent } => hierarchy::reparent(draft, joints, *parent),
+            Self::Move { to, with_children } => transform::place_at(draft, to, *with_children),
+            Self::Rotate { joints, rotation, pivot, with_children } => {
+                if !rotation.is_finite() || (rotation.length_squared() - 1.0).abs() > 1e-3 {
+                    return Err(OperationError::BadNumber("the rotation is no unit quaternion; normalise it first"));
+                }
+                transform::about(draft, joints, Affine3::from_quat(*rotation), *pivot, *with_children)
+            }
+            Self::Scale { joints, scale, pivot, with_children } => {
+                if !scale.is_finite() || scale.min_element() <= 0.0 && scale.max_element() >= 0.0 {
+                    return Err(OperationError::BadNumber("a scale of zero or of mixed signs cannot be undone by hand"));
+                }
+                transform::about(draft, joints, Affine3::from_scale(*scale), *pivot, *with_children)
+            }
+            Self::Label(joint, label) => label_joint(draft, *joint, label),
+            Self::Orient { joints, along } => orient::orient(draft, joints, *along),
+            Self::Mirror { joints } => symmetry::mirror(draft, joints),
+            Self::Group { joints, name, color } => group(draft, joints, name, *color),
+            Self::Lock(joints, locked) => {
+                for joint in draft.with_partners(joints) {
+                    draft.apply(RigEdit::SetLocked(joint, *locked))?;
+                }
+                Ok(())
+            }
+            Self::Edits(edits) => edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?)),
+        }
+    }
+}
+
+fn label_joint(draft: &mut Draft, joint: Uid, label: &str) -> Result<(), OperationError> {
+    let label = Some(label.to_owned()).filter(|label| !label.is_empty());
+    draft.apply(RigEdit::SetLabel(joint, label.clone()))?;
+    if let Some(partner) = draft.partner(joint) {
+        let other = label.map(|label| crate::rig::label::mirrored_label(&label).unwrap_or(label));
+        draft.apply(RigEdit::SetLabel(partner, other))?;
+    }
+    Ok(())
+}
+
+fn group(draft: &mut Draft, joints: &[Uid], name: &str, color: Option<[f32; 3]>) -> Result<(), OperationError> {
+    let group = named_group(draft, name, color)?;
+    let other_name = crate::rig::label::mirrored_label(name).unwrap_or_else(|| name.to_owned());
+    for &joint in joints {
+        draft.apply(RigEdit::SetGroup(joint, group))?;
+        if let Some(partner) = draft.partner(joint).filter(|partner| !joints.contains(partner)) {
+            let other = named_group(draft, &other_name, color)?;
+            draft.apply(RigEdit::SetGroup(partner, other))?;
+        }
+    }
+    Ok(())
+}
+
+fn named_group(draft: &mut Draft, name: &str, color: Option<[f32; 3]>) -> Result<Option<Uid>, OperationError> {
+    if name.is_empty() {
+        return Ok(None);
+    }
+    let known = draft.rig().groups().iter().find(|group| group.name == name).cloned();
+    let group = match (known, color) {
+        (Some(group), Some(color)) if group.color != color => {
+            draft.apply(RigEdit::SetLocalGroup(GroupData { color, ..group.clone() }))?;
+            group
+        }
+        (Some(group), _) => group,
+        (None, color) => {
+            let number = draft.rig().groups().len();
+            let color = color.unwrap_or(GROUP_COLORS[number % GROUP_COLORS.len()]);
+            let group = GroupData { uid: draft.next_uid(), name: name.to_owned(), color, enabled: true };
+            draft.apply(RigEdit::AddLocalGroup(group.clone(), number))?;
+            group
+        }
+    };
+    Ok(Some(group.uid))
+}
+
+/// Colours of groups whose colour nobody chose; told apart also by people with a colour vision deficiency
+/// (the palette of Okabe and Ito 2008, without black).
+const GROUP_COLORS: [[f32; 3]; 7] = [
+    [0.90, 0.62, 0.00],
+    [0.34, 0.71, 0.91],
+    [0.00, 0.62, 0.45],
+    [0.94, 0.89, 0.26],
+    [0.00, 0.45, 0.70],
+    [0.84, 0.37, 0.00],
+    [0.80, 0.47, 0.65],
+];

@@ -1,0 +1,131 @@
+//! A run of edits that is kept or taken back as a whole.
+
+use bevy::math::{Affine3, Vec3};
+
+use super::MirrorPlane;
+use crate::rig::{EditError, Rig, RigEdit, Uid, UidSource};
+
+/// A rig under change: edits are applied at once and remembered with their inverses.
+pub struct Draft<'a> {
+    rig: &'a mut Rig,
+    uids: &'a mut UidSource,
+    symmetry: Option<MirrorPlane>,
+    done: Vec<RigEdit>,
+    inverses: Vec<RigEdit>,
+    selected: Option<Vec<Uid>>,
+}
+
+/// What an operation did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Outcome {
+    /// The edits, in the order they were applied.
+    pub edits: Vec<RigEdit>,
+    /// The edits that take them back, in the order to apply them.
+    pub inverses: Vec<RigEdit>,
+    /// The joints that should be selected afterwards; `None` to leave the selection.
+    pub selected: Option<Vec<Uid>>,
+}
+
+impl<'a> Draft<'a> {
+    /// Begins on a rig; uids of added things come from `uids`.
+    pub fn new(rig: &'a mut Rig, uids: &'a mut UidSource, symmetry: Option<MirrorPlane>) -> Self {
+        Self { rig, uids, symmetry, done: Vec::new(), inverses: Vec::new(), selected: None }
+    }
+
+    /// The rig as it stands now.
+    pub fn rig(&self) -> &Rig {
+        self.rig
+    }
+
+    /// The plane of live mirroring.
+    pub fn symmetry(&self) -> Option<MirrorPlane> {
+        self.symmetry
+    }
+
+    /// A uid that nothing in the rig has.
+    pub fn next_uid(&mut self) -> Uid {
+        loop {
+            let uid = self.uids.next_uid();
+            if self.rig.joint(uid).is_none() && self.rig.group(uid).is_none() {
+                return uid;
+            }
+        }
+    }
+
+    /// Applies one edit.
+    pub fn apply(&mut self, edit: RigEdit) -> Result<(), EditError> {
+        let inverse = self.rig.apply(&edit)?;
+        self.done.push(edit);
+        self.inverses.push(inverse);
+        Ok(())
+    }
+
+    /// Says what should be selected afterwards.
+    pub fn select(&mut self, joints: Vec<Uid>) {
+        self.selected = Some(joints);
+    }
+
+    /// The joint on the other side, if live mirroring is on and there is one.
+    pub fn partner(&self, joint: Uid) -> Option<Uid> {
+        self.symmetry?;
+        let partner = self.rig.joint(joint)?.data.mirror?;
+        self.rig.joint(partner).map(|_| partner)
+    }
+
+    /// Joints and, if live mirroring is on, their partners; each once, in order. Unknown joints stay in the list, so
+    /// that editing them is refused.
+    pub fn with_partners(&self, joints: &[Uid]) -> Vec<Uid> {
+        let mut list = Vec::with_capacity(joints.len() * 2);
+        let mut seen = std::collections::HashSet::new();
+        for &joint in joints {
+            if seen.insert(joint) {
+                list.push(joint);
+            }
+        }
+        for &joint in joints {
+            if let Some(partner) = self.partner(joint).filter(|partner| seen.insert(*partner)) {
+                list.push(partner);
+            }
+        }
+        list
+    }
+
+    /// Puts a joint at a transform in the rig's space; what hangs below keeps its own rest transform.
+    pub fn set_global(&mut self, joint: Uid, global: &Affine3) -> Result<(), EditError> {
+        let parent = self.rig.joint(joint).ok_or(EditError::NoJoint(joint))?.parent;
+        let rest = self.rig.local_rest(parent, global);
+        self.apply(RigEdit::SetRest(joint, rest))
+    }
+
+    /// Runs `change` on a joint and puts its children back where they were before.
+    pub fn keeping_children(
+        &mut self,
+        joint: Uid,
+        change: impl FnOnce(&mut Self) -> Result<(), EditError>,
+    ) -> Result<(), EditError> {
+        let children: Vec<(Uid, Affine3)> =
+            self.rig.children(Some(joint)).iter().map(|child| (*child, self.rig.rest_global(*child))).collect();
+        change(self)?;
+        children.iter().try_for_each(|(child, global)| self.set_global(*child, global))
+    }
+
+    /// Position of a joint, or an error.
+    pub fn position(&self, joint: Uid) -> Result<Vec3, EditError> {
+        self.rig.joint(joint).ok_or(EditError::NoJoint(joint))?;
+        Ok(self.rig.position(joint))
+    }
+
+    /// Ends the draft and keeps what was done.
+    pub fn finish(mut self) -> Outcome {
+        self.inverses.reverse();
+        Outcome { edits: self.done, inverses: self.inverses, selected: self.selected }
+    }
+
+    /// Ends the draft and takes everything back.
+    pub fn take_back(self) {
+        for inverse in self.inverses.iter().rev() {
+            let undone = self.rig.apply(inverse);
+            debug_assert!(undone.is_ok(), "an inverse was refused: {undone:?}");
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Turning joints along their bones.
+
+use bevy::math::{Affine3, Mat3, Quat, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::{Draft, OperationError};
+use crate::rig::{EditError, Uid};
+
+/// An axis of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Axis {
+    /// Along the bone, as Maya and Unreal have it.
+    X,
+    /// Along the bone, as Blender has it.
+    #[default]
+    Y,
+    /// Along the bone.
+    Z,
+}
+
+/// Turns joints so that `along` points at the child that continues the chain: the only child, or the one that turns
+/// least from the bone above. A joint without children takes its parent's rotation. Partners get the mirrored one.
+pub(super) fn orient(draft: &mut Draft, joints: &[Uid], along: Axis) -> Result<(), OperationError> {
+    let mut order: Vec<(usize, Uid)> = Vec::with_capacity(joints.len());
+    for &joint in joints {
+        draft.rig().joint(joint).ok_or(EditError::NoJoint(joint))?;
+        order.push((draft.rig().ancestors(joint).count(), joint));
+    }
+    order.sort_by_key(|(depth, _)| *depth);
+    for (_, joint) in order {
+        let global = draft.rig().rest_global(joint);
+        let Some(rotation) = rotation_for(draft, joint, along) else { continue };
+        let (scale, _, translation) = global.to_scale_rotation_translation();
+        let turned = Affine3::from_scale_rotation_translation(scale, rotation, translation);
+        draft.keeping_children(joint, |draft| draft.set_global(joint, &turned))?;
+        let partner = draft.partner(joint).filter(|partner| !joints.contains(partner));
+        if let (Some(partner), Some(plane)) = (partner, draft.symmetry()) {
+            let mirrored = plane.mirrored_affine(&turned);
+            draft.keeping_children(partner, |draft| draft.set_global(partner, &mirrored))?;
+        }
+    }
+    Ok(())
+}
+
+fn rotation_for(draft: &Draft, joint: Uid, along: Axis) -> Option<Quat> {
+    let rig = draft.rig();
+    let here = rig.position(joint);
+    let parent = rig.joint(joint)?.parent;
+    let incoming = parent.map(|parent| here - rig.position(parent)).and_then(Vec3::try_normalize);
+    let bones = rig.children(Some(joint)).iter().filter_map(|child| (rig.position(*child) - here).try_normalize());
+    let direction = match incoming {
+        Some(incoming) => bones.max_by(|a, b| a.dot(incoming).total_cmp(&b.dot(incoming))),
+        None => bones.max_by(|a, b| a.y.abs().total_cmp(&b.y.abs())),
+    };
+    match direction {
+        Some(direction) => Some(frame(direction, along)),
+        None => parent.map(|parent| rig.rest_global(parent).to_scale_rotation_translation().1),
+    }
+}
+
+/// The rotation that takes `along` to `direction` and the next axis as near as possible to the character's front
+/// (+Z), or to up where the bone itself points to the front.
+fn frame(direction: Vec3, along: Axis) -> Quat {
+    let hint = if direction.z.abs() < 0.9 { Vec3::Z } else { Vec3::Y };
+    let side = hint.cross(direction).normalize();
+    let front = direction.cross(side);
+    let columns = match along {
+        Axis::X => Mat3::from_cols(direction, side, front),
+        Axis::Y => Mat3::from_cols(side, direction, -front),
+        Axis::Z => Mat3::from_cols(-side, front, direction),
+    };
+    let columns = if columns.determinant() < 0.0 {
+        match along {
+            Axis::X => Mat3::from_cols(direction, -side, front),
+            Axis::Y => Mat3::from_cols(side, direction, front),
+            Axis::Z => Mat3::from_cols(side, front, direction),
+        }
+    } else {
+        columns
+    };
+    Quat::from_mat3(&columns).normalize()
+}

@@ -1,0 +1,80 @@
+//! Adding joints.
+
+use bevy::math::Vec3;
+
+use super::{Draft, OperationError};
+use crate::rig::{EditError, JointData, NodeKind, RestTransform, RigEdit, Uid};
+
+/// Adds a chain below `parent`. With symmetry on, the other side gets its chain too; joints near the plane are put on
+/// it and shared by both sides.
+pub(super) fn chain(draft: &mut Draft, positions: &[Vec3], parent: Option<Uid>) -> Result<(), OperationError> {
+    if let Some(parent) = parent.filter(|parent| draft.rig().joint(*parent).is_none()) {
+        return Err(EditError::NoJoint(parent).into());
+    }
+    // A chain that keeps near the plane as a whole (a spine, drawn by hand) lies on it as a whole.
+    let plane = draft.symmetry();
+    let central = plane.is_some_and(|plane| positions.iter().all(|p| plane.distance(*p).abs() <= 2.0 * plane.tolerance));
+    let mut parent = parent;
+    let mut other_parent = parent.map(|p| draft.partner(p).unwrap_or(p));
+    for &position in positions {
+        if !position.is_finite() {
+            return Err(OperationError::BadNumber("a joint's position is not finite; place it on the mesh"));
+        }
+        let on_plane = central || plane.is_some_and(|plane| plane.distance(position).abs() <= plane.tolerance);
+        let position = plane.filter(|_| on_plane).map_or(position, |plane| plane.onto(position));
+        let joint = add(draft, position, parent)?;
+        match plane {
+            Some(plane) if !on_plane => {
+                let partner = add(draft, plane.mirrored(position), other_parent)?;
+                draft.apply(RigEdit::SetMirror(joint, Some(partner)))?;
+                draft.apply(RigEdit::SetMirror(partner, Some(joint)))?;
+                other_parent = Some(partner);
+            }
+            _ => other_parent = Some(joint),
+        }
+        parent = Some(joint);
+    }
+    if let Some(last) = parent {
+        draft.select(vec![last]);
+    }
+    Ok(())
+}
+
+/// Puts a joint into the bone above `child`, on the other side too.
+pub(super) fn insert(draft: &mut Draft, child: Uid, position: Vec3) -> Result<(), OperationError> {
+    let partner = draft.partner(child);
+    let joint = insert_one(draft, child, position)?;
+    if let (Some(partner), Some(plane)) = (partner, draft.symmetry()) {
+        let other = insert_one(draft, partner, plane.mirrored(position))?;
+        draft.apply(RigEdit::SetMirror(joint, Some(other)))?;
+        draft.apply(RigEdit::SetMirror(other, Some(joint)))?;
+    }
+    draft.select(vec![joint]);
+    Ok(())
+}
+
+fn insert_one(draft: &mut Draft, child: Uid, position: Vec3) -> Result<Uid, OperationError> {
+    let parent = draft.rig().joint(child).ok_or(EditError::NoJoint(child))?.parent;
+    let Some(parent) = parent else { return Err(OperationError::NoBone(child)) };
+    let index = draft.rig().children(Some(parent)).iter().position(|c| *c == child).unwrap_or(usize::MAX);
+    let global = draft.rig().rest_global(child);
+    let joint = add_at(draft, position, Some(parent), index)?;
+    draft.apply(RigEdit::SetParent { joint: child, parent: Some(joint), index: 0 })?;
+    draft.set_global(child, &global)?;
+    Ok(joint)
+}
+
+fn add(draft: &mut Draft, position: Vec3, parent: Option<Uid>) -> Result<Uid, OperationError> {
+    add_at(draft, position, parent, usize::MAX)
+}
+
+fn add_at(draft: &mut Draft, position: Vec3, parent: Option<Uid>, index: usize) -> Result<Uid, OperationError> {
+    let uid = draft.next_uid();
+    let global = RestTransform::from_translation(position).affine();
+    let rest = draft.rig().local_rest(parent, &global);
+    // A joint drawn onto an imported joint belongs to the same group.
+    let group = parent.and_then(|parent| draft.rig().joint(parent)).and_then(|parent| parent.data.group);
+    let joint = JointData { uid, rest, group, kind: NodeKind::Joint, ..Default::default() };
+    draft.apply(RigEdit::AddJoint { joint: Box::new(joint), parent, index })?;
+    Ok(uid)
+}

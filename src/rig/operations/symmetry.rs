@@ -1,0 +1,138 @@
+//! The other side: mirror planes, live and afterwards.
+
+use std::collections::HashMap;
+
+use bevy::math::{Affine3, Mat3, Vec3};
+
+use super::{Draft, OperationError};
+use crate::rig::{EditError, JointData, RigEdit, Uid, label::mirrored_label};
+
+/// A plane to mirror across, in the rig's space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MirrorPlane {
+    /// A point of the plane.
+    pub point: Vec3,
+    /// Its normal, unit length.
+    pub normal: Vec3,
+    /// Joints at most this far from the plane are on it, belong to both sides and are put exactly there.
+    pub tolerance: f32,
+}
+
+impl MirrorPlane {
+    /// The plane between the character's left and right, x = 0, with a tolerance that fits a mesh of that height.
+    pub fn sagittal(height: f32) -> Self {
+        Self { point: Vec3::ZERO, normal: Vec3::X, tolerance: height.abs() * 0.01 }
+    }
+
+    /// Signed distance of a point.
+    pub fn distance(&self, point: Vec3) -> f32 {
+        (point - self.point).dot(self.normal)
+    }
+
+    /// The nearest point of the plane.
+    pub fn onto(&self, point: Vec3) -> Vec3 {
+        point - self.normal * self.distance(point)
+    }
+
+    /// The point on the other side.
+    pub fn mirrored(&self, point: Vec3) -> Vec3 {
+        point - self.normal * (2.0 * self.distance(point))
+    }
+
+    /// The transform on the other side: positions mirrored and every local axis mirrored too, with the local axis
+    /// across the plane turned over, so that it stays a proper rotation.
+    pub fn mirrored_affine(&self, global: &Affine3) -> Affine3 {
+        let n = self.normal;
+        let reflect = Mat3::from_cols(
+            Vec3::X - n * (2.0 * n.x),
+            Vec3::Y - n * (2.0 * n.y),
+            Vec3::Z - n * (2.0 * n.z),
+        );
+        Affine3 { matrix3: (reflect * Mat3::from(global.matrix3) * reflect).into(), translation: self.mirrored(global.translation) }
+    }
+}
+
+/// Makes or renews the other side of `joints` and all below them, across the draft's plane (or x = 0).
+///
+/// A joint on the plane is its own other side. Labels, local groups with a side in their name, locks and pairs are
+/// mirrored; tags stay with the side they were put on.
+pub(super) fn mirror(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationError> {
+    let plane = draft.symmetry().unwrap_or_else(|| MirrorPlane::sagittal(height(draft)));
+    let mut sources: Vec<Uid> = Vec::new();
+    let mut seen = std::collections::HashSet::new();
+    for &joint in joints {
+        draft.rig().joint(joint).ok_or(EditError::NoJoint(joint))?;
+        sources.extend(draft.rig().hierarchy(joint).map(|j| j.data.uid).filter(|uid| seen.insert(*uid)));
+    }
+    // A hierarchy may hold both sides already (the hips and all below): then the first of a pair is the source.
+    let mut target_of: HashMap<Uid, Uid> = HashMap::new();
+    let mut is_target = std::collections::HashSet::new();
+    for joint in sources {
+        if is_target.contains(&joint) {
+            continue;
+        }
+        let Some(source) = draft.rig().joint(joint).cloned() else { continue };
+        let global = draft.rig().rest_global(joint);
+        if plane.distance(global.translation).abs() <= plane.tolerance {
+            target_of.insert(joint, joint);
+            let mut centered = global;
+            centered.translation = plane.onto(global.translation);
+            if centered.translation != global.translation {
+                draft.keeping_children(joint, |draft| draft.set_global(joint, &centered))?;
+            }
+            continue;
+        }
+        let parent = source.parent.map(|parent| {
+            let partner = draft.rig().joint(parent).and_then(|parent| parent.data.mirror);
+            target_of.get(&parent).copied().or(partner).unwrap_or(parent)
+        });
+        let label = source.data.label.as_ref().map(|label| mirrored_label(label).unwrap_or_else(|| label.clone()));
+        let known = source.data.mirror.filter(|partner| draft.rig().joint(*partner).is_some());
+        let mirrored = plane.mirrored_affine(&global);
+        let partner = match known {
+            Some(partner) => {
+                draft.keeping_children(partner, |draft| draft.set_global(partner, &mirrored))?;
+                draft.apply(RigEdit::SetLabel(partner, label))?;
+                partner
+            }
+            None => {
+                let uid = draft.next_uid();
+                let rest = draft.rig().local_rest(parent, &mirrored);
+                let data = JointData {
+                    uid,
+                    label,
+                    rest,
+                    group: source.data.group,
+                    kind: source.data.kind,
+                    mirror: Some(joint),
+                    locked: source.data.locked,
+                    tags: Vec::new(),
+                };
+                draft.apply(RigEdit::AddJoint { joint: Box::new(data), parent, index: usize::MAX })?;
+                draft.apply(RigEdit::SetMirror(joint, Some(uid)))?;
+                uid
+            }
+        };
+        if let Some(group) = other_group(draft, source.data.group)? {
+            draft.apply(RigEdit::SetGroup(partner, Some(group)))?;
+        }
+        is_target.insert(partner);
+        target_of.insert(joint, partner);
+    }
+    Ok(())
+}
+
+/// The group with the mirrored name of a group whose name has a side, created if needed.
+fn other_group(draft: &mut Draft, group: Option<Uid>) -> Result<Option<Uid>, OperationError> {
+    let Some(group) = group.and_then(|group| draft.rig().group(group)) else { return Ok(None) };
+    let Some(name) = mirrored_label(&group.name) else { return Ok(None) };
+    super::named_group(draft, &name, None)
+}
+
+fn height(draft: &Draft) -> f32 {
+    let heights = draft.rig().rest_globals();
+    let (low, high) = heights.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), (_, global)| {
+        (low.min(global.translation.y), high.max(global.translation.y))
+    });
+    if low < high { high - low } else { 1.0 }
+}

@@ -1,0 +1,79 @@
+//! Moving, turning and scaling the rest pose.
+
+use std::collections::HashSet;
+
+use bevy::math::{Affine3, Vec3};
+
+use super::{Draft, OperationError};
+use crate::rig::Uid;
+
+/// Puts joints at positions.
+pub(super) fn place_at(draft: &mut Draft, to: &[(Uid, Vec3)], with_children: bool) -> Result<(), OperationError> {
+    if to.iter().any(|(_, position)| !position.is_finite()) {
+        return Err(OperationError::BadNumber("a joint's position is not finite; drag it back onto the mesh"));
+    }
+    let mut targets = Vec::with_capacity(to.len());
+    for &(joint, position) in to {
+        draft.position(joint)?;
+        let mut global = draft.rig().rest_global(joint);
+        global.translation = position;
+        targets.push((joint, global));
+    }
+    set_globals(draft, targets, with_children)
+}
+
+/// Applies `change` about a pivot (or each joint's own position).
+pub(super) fn about(
+    draft: &mut Draft,
+    joints: &[Uid],
+    change: Affine3,
+    pivot: Option<Vec3>,
+    with_children: bool,
+) -> Result<(), OperationError> {
+    let listed: HashSet<Uid> = joints.iter().copied().collect();
+    let mut targets = Vec::with_capacity(joints.len());
+    for &joint in joints {
+        draft.position(joint)?;
+        let carried = with_children && draft.rig().ancestors(joint).any(|above| listed.contains(&above.data.uid));
+        if carried {
+            continue;
+        }
+        let global = draft.rig().rest_global(joint);
+        let center = pivot.unwrap_or(global.translation);
+        let turned = Affine3::from_translation(center) * change * Affine3::from_translation(-center) * global;
+        targets.push((joint, turned));
+    }
+    set_globals(draft, targets, with_children)
+}
+
+/// Sets transforms in the rig's space, parents first, and mirrors them to partners that are not in the list.
+fn set_globals(
+    draft: &mut Draft,
+    mut targets: Vec<(Uid, Affine3)>,
+    with_children: bool,
+) -> Result<(), OperationError> {
+    if let Some(plane) = draft.symmetry() {
+        let listed: HashSet<Uid> = targets.iter().map(|(joint, _)| *joint).collect();
+        for number in 0..targets.len() {
+            let (joint, global) = targets[number];
+            match draft.partner(joint) {
+                Some(partner) if !listed.contains(&partner) => targets.push((partner, plane.mirrored_affine(&global))),
+                Some(_) => {}
+                // A joint on the plane belongs to both sides and stays on it.
+                None if plane.distance(draft.rig().position(joint)).abs() <= plane.tolerance => {
+                    targets[number].1.translation = plane.onto(global.translation);
+                }
+                None => {}
+            }
+        }
+    }
+    targets.sort_by_key(|(joint, _)| draft.rig().ancestors(*joint).count());
+    for (joint, global) in &targets {
+        if with_children {
+            draft.set_global(*joint, global)?;
+        } else {
+            draft.keeping_children(*joint, |draft| draft.set_global(*joint, global))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,85 @@
+//! RON texts and the places of what is wrong in them.
+
+use ron::{Options, extensions::Extensions};
+use serde::de::DeserializeOwned;
+
+/// Something wrong in a text file, and where.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("line {line}, column {column}: {message}")]
+pub struct SourceError {
+    /// 1-based line.
+    pub line: usize,
+    /// 1-based column, in characters.
+    pub column: usize,
+    /// Byte offset, for reports that show the source.
+    pub offset: usize,
+    /// What is wrong and what to do.
+    pub message: String,
+}
+
+impl SourceError {
+    /// An error at a byte offset of `text`.
+    pub fn at(text: &str, offset: usize, message: impl Into<String>) -> Self {
+        let offset = (0..=offset.min(text.len())).rev().find(|o| text.is_char_boundary(*o)).unwrap_or(0);
+        let before = &text[..offset];
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        Self {
+            line: before.matches('\n').count() + 1,
+            column: before[line_start..].chars().count() + 1,
+            offset,
+            message: message.into(),
+        }
+    }
+
+    /// An error of the RON reader, with what to do about it.
+    pub(crate) fn from_ron(text: &str, error: &ron::error::SpannedError) -> Self {
+        let hint = match &error.code {
+            ron::Error::NoSuchStructField { .. } | ron::Error::NoSuchEnumVariant { .. } => {
+                "; remove it or correct its name"
+            }
+            ron::Error::MissingStructField { .. } => "; add it",
+            ron::Error::DuplicateStructField { .. } => "; keep one of the two",
+            ron::Error::Eof => "; the file is cut short: take a backup",
+            _ => "",
+        };
+        Self::at(text, byte_offset(text, error.span.start), format!("{}{hint}", error.code))
+    }
+}
+
+/// How all our RON files are read: `Some(...)` need not be written.
+pub(crate) fn ron_options() -> Options {
+    Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
+}
+
+/// The text of a file that must be UTF-8, not empty and not longer than `limit` bytes; `what` names it in errors.
+pub(crate) fn utf8<'a>(bytes: &'a [u8], limit: usize, what: &str) -> Result<&'a str, SourceError> {
+    if bytes.len() > limit {
+        let message = format!(
+            "the file has {} MiB, more than the {} MiB that are read: is it a {what} at all?",
+            bytes.len() >> 20,
+            limit >> 20
+        );
+        return Err(SourceError::at("", 0, message));
+    }
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let before = std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default();
+        SourceError::at(before, before.len(), format!("the {what} is not UTF-8 text; save it as UTF-8"))
+    })?;
+    if text.trim().is_empty() {
+        return Err(SourceError::at(text, 0, format!("the {what} is empty; save it again or take a backup")));
+    }
+    Ok(text)
+}
+
+/// Reads a value from RON text.
+pub(crate) fn parse_ron<T: DeserializeOwned>(text: &str) -> Result<T, SourceError> {
+    ron_options().from_str(text).map_err(|error| SourceError::from_ron(text, &error))
+}
+
+/// The byte offset of a place that the RON reader names by line and column.
+pub(crate) fn byte_offset(text: &str, place: ron::error::Position) -> usize {
+    let line_start: usize = text.split_inclusive('\n').take(place.line.saturating_sub(1)).map(str::len).sum();
+    let line = text[line_start.min(text.len())..].chars();
+    line_start + line.take(place.col.saturating_sub(1)).map(char::len_utf8).sum::<usize>()
+}

@@ -1,0 +1,45 @@
+//! Tags: what a joint is told to do.
+//!
+//! A command tag names a module and its parameters; a feature tag names a switch that turns commands on and off. The
+//! parameters stay text here: only the module that owns them knows their types, so tags of modules that are not
+//! installed travel through unharmed.
+
+use serde::{Deserialize, Serialize};
+
+use crate::rig::Uid;
+
+/// One tag on a joint.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tag {
+    /// Identity.
+    pub uid: Uid,
+    /// A disabled tag is skipped by a build.
+    pub enabled: bool,
+    /// A note for people.
+    pub comment: String,
+    /// What the tag is.
+    pub kind: TagKind,
+}
+
+/// The kinds of tag that are entities of their own (identifier tags become fields of the joint).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TagKind {
+    /// Runs a module when the rig is built.
+    Command {
+        /// The module's name.
+        module: String,
+        /// The module's parameters as RON text, exactly as written in the file.
+        params: String,
+        /// The feature tag that turns this command on and off.
+        feature: Option<Uid>,
+    },
+    /// Turns commands on and off.
+    Feature {
+        /// The kind of feature, from the registry.
+        kind: String,
+        /// The name animators see; empty if the feature only organises.
+        name: String,
+        /// A secondary name that turns a part of the feature on and off.
+        switch: String,
+    },
+}

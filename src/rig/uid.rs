@@ -1,0 +1,84 @@
+//! Identity that survives renaming, reparenting and new versions.
+
+use std::{fmt, str::FromStr};
+
+use bevy::prelude::*;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
+
+/// A 64-bit random number that identifies a rig, group, joint or tag for good; written as 16 hexadecimal digits.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[reflect(Component)]
+pub struct Uid(pub u64);
+
+impl fmt::Display for Uid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
+/// A text that is not a [`Uid`].
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("\"{0}\" is no uid: write 16 hexadecimal digits, such as 00c0ffee00c0ffee")]
+pub struct UidError(pub String);
+
+impl FromStr for Uid {
+    type Err = UidError;
+
+    fn from_str(text: &str) -> Result<Self, UidError> {
+        let hexadecimal = text.len() == 16 && text.bytes().all(|b| b.is_ascii_hexdigit());
+        let number = hexadecimal.then(|| u64::from_str_radix(text, 16).ok()).flatten();
+        number.map(Self).ok_or_else(|| UidError(text.to_owned()))
+    }
+}
+
+impl Serialize for Uid {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Uid {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = std::borrow::Cow::<'de, str>::deserialize(deserializer)?;
+        text.parse().map_err(D::Error::custom)
+    }
+}
+
+/// Makes uids; the same seed makes the same ones (SplitMix64).
+#[derive(Resource, Debug, Clone, PartialEq, Eq)]
+pub struct UidSource {
+    state: u64,
+}
+
+impl UidSource {
+    /// A source that repeats itself for the same seed.
+    pub fn seeded(seed: u64) -> Self {
+        Self { state: seed }
+    }
+
+    /// A source that differs from run to run, for interactive work.
+    pub fn random() -> Self {
+        use std::hash::{BuildHasher, RandomState};
+        Self::seeded(RandomState::new().hash_one(std::time::SystemTime::now()))
+    }
+
+    /// The next uid; never zero.
+    pub fn next_uid(&mut self) -> Uid {
+        loop {
+            self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            let mut z = self.state;
+            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            z ^= z >> 31;
+            if z != 0 {
+                return Uid(z);
+            }
+        }
+    }
+}
+
+impl Default for UidSource {
+    fn default() -> Self {
+        Self::random()
+    }
+}

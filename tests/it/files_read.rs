@@ -1,0 +1,226 @@
+//! Reading: limits, errors that say what to do, and models that reach only their own folder.
+
+use std::{
+    ffi::OsString,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use rigsmith::files::{
+    Disk, DiskFile, Entry, Fault, FaultPlan, FaultyDisk, ModelFolder, ReadError, RealDisk, UriError, open, read_capped,
+};
+use tempfile::{TempDir, tempdir};
+
+fn fresh() -> TempDir {
+    tempdir().unwrap()
+}
+
+fn large() -> Vec<u8> {
+    (0..100_000u32).flat_map(u32::to_le_bytes).collect()
+}
+
+#[test]
+fn what_cannot_be_read_is_said_with_a_remedy() {
+    let folder = fresh();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("character.obj"), b"v 0 0 0").unwrap();
+    fs::write(at("empty.obj"), b"").unwrap();
+    for (path, expected) in [
+        (at("charakter.obj"), "did you mean `character.obj`?"),
+        (at("Character.OBJ.x"), "did you mean `character.obj`?"),
+        (at("quite_different.glb"), "check the path"),
+        (at("nowhere/a.obj"), "either; check the path"),
+        (at("empty.obj/a.obj"), "is a file, not a folder"),
+        (at("empty.obj"), "is empty; export or copy it again"),
+        (
+            folder.path().to_path_buf(),
+            "is a folder; give the name of a file in it",
+        ),
+    ] {
+        for error in [
+            read_capped(&RealDisk, &path, 1 << 20).unwrap_err().to_string(),
+            open(&RealDisk, &path).map(|_| ()).unwrap_err().to_string(),
+        ] {
+            assert!(error.contains(expected), "{}: {error}", path.display());
+        }
+    }
+    assert_eq!(read_capped(&RealDisk, &at("character.obj"), 7).unwrap(), b"v 0 0 0");
+    let error = read_capped(&RealDisk, &at("character.obj"), 6).unwrap_err();
+    assert!(matches!(error, ReadError::TooLarge { limit: 6, .. }), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_are_not_read() {
+    let error = read_capped(&RealDisk, Path::new("/dev/null"), 10).unwrap_err();
+    assert!(matches!(error, ReadError::NotAFile { .. }), "{error}");
+}
+
+/// A disk on which every file claims a length of its own; it can only be read.
+struct Lying(u64);
+
+impl Disk for Lying {
+    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
+        RealDisk.entry(path, follow).map(|entry| Entry { len: self.0, ..entry })
+    }
+    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
+        RealDisk.list(folder, limit)
+    }
+    fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
+        RealDisk.open(path)
+    }
+    fn read_link(&self, _: &Path) -> io::Result<PathBuf> {
+        unreachable!()
+    }
+    fn canonical(&self, _: &Path) -> io::Result<PathBuf> {
+        unreachable!()
+    }
+    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskFile>> {
+        unreachable!()
+    }
+    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+    fn hard_link(&self, _: &Path, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+    fn sync_folder(&self, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+    fn remove(&self, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+    fn create_folder(&self, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+}
+
+#[test]
+fn a_false_length_neither_reserves_nor_truncates() {
+    let folder = fresh();
+    let path = folder.path().join("a");
+    fs::write(&path, large()).unwrap();
+    for claimed in [0, 1, 1 << 40] {
+        let read = read_capped(&Lying(claimed), &path, u64::MAX).unwrap();
+        assert_eq!(read, large());
+        assert!(read.capacity() <= 16 << 20);
+    }
+    let error = read_capped(&Lying(1), &path, 100).unwrap_err();
+    assert!(matches!(error, ReadError::TooLarge { .. }), "{error}");
+}
+
+#[test]
+fn every_failing_read_is_an_error() {
+    let folder = fresh();
+    let path = folder.path().join("a");
+    fs::write(&path, large()).unwrap();
+    let counted = FaultyDisk::new(RealDisk, None);
+    read_capped(&counted, &path, 1 << 20).unwrap();
+    let operations = counted.operations();
+    for plan in (0..operations).flat_map(|at| {
+        Fault::ALL.map(|fault| FaultPlan {
+            at,
+            fault,
+            lasting: false,
+        })
+    }) {
+        let disk = FaultyDisk::new(RealDisk, Some(plan));
+        match read_capped(&disk, &path, 1 << 20) {
+            Ok(bytes) => assert!(plan.fault == Fault::Short && bytes == large(), "{plan:?}"),
+            Err(error) => assert!(
+                error.to_string().contains('a') && plan.fault != Fault::Short,
+                "{plan:?} {error}"
+            ),
+        }
+    }
+}
+
+#[test]
+fn a_model_reaches_only_its_own_folder() {
+    let outer = fresh();
+    let at = |name: &str| outer.path().join(name);
+    fs::create_dir_all(at("model/Textures")).unwrap();
+    fs::create_dir_all(at("model_2")).unwrap();
+    fs::write(at("secret.png"), b"secret").unwrap();
+    fs::write(at("model_2/b.png"), b"secret").unwrap();
+    fs::write(at("model/m.gltf"), b"{}").unwrap();
+    fs::write(at("model/Textures/Skin 1.PNG"), b"skin").unwrap();
+    let folder = ModelFolder::of(&RealDisk, &at("model/m.gltf")).unwrap();
+    for uri in [
+        "Textures/Skin 1.PNG",
+        "textures/skin 1.png",
+        r"textures\SKIN 1.png",
+        "./Textures//Skin 1.PNG",
+        r".\Textures\..\Textures\Skin 1.PNG",
+    ] {
+        assert_eq!(folder.read(uri, 100).unwrap(), b"skin", "{uri}");
+        assert!(folder.has(uri), "{uri}");
+    }
+    let long = "a/".repeat(5000);
+    let secret = at("secret.png");
+    for (uri, expected) in [
+        ("../secret.png", "outside its folder"),
+        ("Textures/../../secret.png", "outside its folder"),
+        (r"..\secret.png", "outside its folder"),
+        ("../model_2/b.png", "outside its folder"),
+        ("..", "outside its folder"),
+        (secret.to_str().unwrap(), "absolute path"),
+        (r"\\server\share\a.png", "absolute path"),
+        (r"\\?\C:\a.png", "absolute path"),
+        (r"C:\textures\a.png", "absolute path"),
+        ("c:a.png", "absolute path"),
+        ("file:///etc/passwd", "URL"),
+        ("https://example.org/a.png", "URL"),
+        ("data:image/png;base64,AAAA", "URL"),
+        ("", "names no file"),
+        (".", "names no file"),
+        ("a\0.png", "control characters"),
+        ("a\n.png", "control characters"),
+        (&long, "too long"),
+        ("Textures", "is a folder"),
+        ("Textures/skin 2.png", "did you mean `Skin 1.PNG`?"),
+        ("m.gltf/a.png", "is a file, not a folder"),
+        ("nowhere/a.png", "there is no folder"),
+    ] {
+        let error = folder.read(uri, 100).unwrap_err().to_string();
+        assert!(error.contains(expected), "{uri}: {error}");
+        assert!(error.len() < 600 && !error.contains('\0'), "{error}");
+        assert!(!folder.has(uri), "{uri}");
+    }
+    assert!(matches!(
+        folder.read("m.gltf", 1),
+        Err(UriError::Read {
+            source: ReadError::TooLarge { .. },
+            ..
+        })
+    ));
+    assert!(ModelFolder::of(&RealDisk, &at("nowhere/m.gltf")).is_err());
+}
+
+#[cfg(unix)]
+#[test]
+fn links_out_of_a_model_folder_are_refused() {
+    use std::os::unix::fs::symlink;
+
+    let outer = fresh();
+    let at = |name: &str| outer.path().join(name);
+    fs::create_dir_all(at("model/textures")).unwrap();
+    fs::write(at("secret.png"), b"secret").unwrap();
+    fs::write(at("model/a.png"), b"a").unwrap();
+    symlink("../secret.png", at("model/link.png")).unwrap();
+    symlink("..", at("model/up")).unwrap();
+    symlink("../a.png", at("model/textures/inside.png")).unwrap();
+    let folder = ModelFolder::of(&RealDisk, &at("model/m.gltf")).unwrap();
+    for uri in [
+        "link.png",
+        "LINK.png",
+        "up/secret.png",
+        "up/SECRET.png",
+        "up/model/a.png",
+        "up",
+    ] {
+        let result = folder.read(uri, 100);
+        assert!(matches!(result, Err(UriError::Outside { .. })), "{uri}: {result:?}");
+    }
+    assert_eq!(folder.read("textures/inside.png", 100).unwrap(), b"a");
+}

@@ -1,0 +1,202 @@
+//! The loop around the mutator: replays, runs until the time is up, and keeps what it finds.
+
+use std::{
+    fs,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::{Path, PathBuf},
+    sync::mpsc,
+    time::{Duration, Instant},
+};
+
+use super::{Mutator, Random};
+
+/// One input that takes longer than this counts as a hang.
+const HANG: Duration = Duration::from_secs(10);
+/// Inputs grow by splicing and repeating, up to this many bytes or four times the largest seed.
+const MAX_LEN: usize = 64 << 10;
+/// How many mutants are kept as further seeds.
+const POOL: usize = 256;
+
+/// The folder of the findings of one target.
+pub fn findings(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fuzz_findings")
+        .join(name)
+}
+
+/// Replays what was found before, then calls `check` with mutants of `seeds` until the time is up.
+///
+/// `check` panics where something is wrong: a reader that must not panic, or a promise about what was read. Such an input, and
+/// one that takes longer than ten seconds, is written to `tests/fuzz_findings/NAME/`, and the test fails naming it.
+pub fn run_fuzz(name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
+    run_fuzz_for(
+        number_from("RIGSMITH_FUZZ_SECONDS").unwrap_or(2.0),
+        name,
+        seeds,
+        dictionary,
+        check,
+    );
+}
+
+fn run_fuzz_for(seconds: f64, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
+    assert!(!seeds.is_empty(), "{name}: no seeds");
+    let keep = findings(name);
+    let mut replayed: Vec<PathBuf> = fs::read_dir(&keep)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .collect();
+    replayed.sort();
+    let watch = Watch::new(name);
+    let attempt = |bytes: &[u8], origin: &dyn std::fmt::Display| {
+        watch.begin(bytes);
+        let outcome = try_one(bytes, &check);
+        watch.end();
+        if let Err(problem) = outcome {
+            let path = save_finding(name, bytes);
+            panic!("{name}: {origin} fails: {problem}; kept as {}", path.display());
+        }
+    };
+    for path in &replayed {
+        attempt(
+            &fs::read(path).unwrap(),
+            &format_args!("the finding {}", path.display()),
+        );
+    }
+    for (i, seed) in seeds.iter().enumerate() {
+        attempt(seed, &format_args!("seed {i}"));
+    }
+
+    let start = number_from("RIGSMITH_FUZZ_SEED").unwrap_or(1.0) as u64;
+    let longest = seeds.iter().map(Vec::len).max().unwrap_or(0);
+    let mut mutator = Mutator::new(start, dictionary, MAX_LEN.max(4 * longest));
+    let mut pool: Vec<Vec<u8>> = Vec::new();
+    let (started, mut runs) = (Instant::now(), 0u64);
+    while started.elapsed().as_secs_f64() < seconds {
+        let source = |random: &mut Random, pool: &[Vec<u8>]| -> Vec<u8> {
+            // Mutants of mutants reach further, but most of the time goes to what is nearly right.
+            if pool.is_empty() || !random.chance(4) {
+                random.pick(seeds)
+            } else {
+                random.pick(pool)
+            }
+        };
+        let input = source(&mut mutator.random, &pool);
+        let other = source(&mut mutator.random, &pool);
+        let mutant = mutator.mutate(&input, &other);
+        attempt(&mutant, &format_args!("run {runs}"));
+        if mutator.random.chance(16) {
+            match pool.len() {
+                POOL => {
+                    let old = mutator.random.below(POOL);
+                    pool[old] = mutant;
+                }
+                _ => pool.push(mutant),
+            }
+        }
+        runs += 1;
+    }
+    println!(
+        "{name}: {} findings replayed, {runs} mutants in {:.1} s",
+        replayed.len(),
+        started.elapsed().as_secs_f64()
+    );
+}
+
+fn number_from(variable: &str) -> Option<f64> {
+    let text = std::env::var(variable).ok()?;
+    Some(
+        text.parse()
+            .unwrap_or_else(|_| panic!("{variable} is `{text}`; give a number")),
+    )
+}
+
+/// Calls `check`, and says what went wrong.
+fn try_one(bytes: &[u8], check: impl Fn(&[u8])) -> Result<(), String> {
+    let started = Instant::now();
+    catch_unwind(AssertUnwindSafe(|| check(bytes))).map_err(|panic| {
+        let text = panic.downcast_ref::<String>().cloned();
+        text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.to_owned()))
+            .unwrap_or_else(|| "a panic".to_owned())
+    })?;
+    match started.elapsed() {
+        took if took > HANG => Err(format!("it took {took:?}")),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a finding under a name made from its content, so that the same one is not kept twice.
+fn save_finding(name: &str, bytes: &[u8]) -> PathBuf {
+    let hash = bytes.iter().fold(0xCBF2_9CE4_8422_2325u64, |h, &b| {
+        (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01B3)
+    });
+    let folder = findings(name);
+    let path = folder.join(format!("{hash:016x}"));
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(&path, bytes).unwrap();
+    path
+}
+
+/// Keeps the input of a run that never comes back, which nothing in its own thread could.
+struct Watch {
+    inputs: mpsc::Sender<Option<Vec<u8>>>,
+}
+
+impl Watch {
+    fn new(name: &str) -> Self {
+        let (inputs, received) = mpsc::channel::<Option<Vec<u8>>>();
+        let name = name.to_owned();
+        std::thread::spawn(move || {
+            let mut current = None;
+            loop {
+                match received.recv_timeout(HANG) {
+                    Ok(input) => current = input,
+                    Err(mpsc::RecvTimeoutError::Timeout) => {
+                        if let Some(input) = &current {
+                            let path = save_finding(&name, input);
+                            eprintln!(
+                                "{name}: no answer for {HANG:?}; the input is kept as {}",
+                                path.display()
+                            );
+                            // A thread cannot be stopped from outside, and the test would never end.
+                            std::process::exit(101);
+                        }
+                    }
+                    Err(mpsc::RecvTimeoutError::Disconnected) => return,
+                }
+            }
+        });
+        Self { inputs }
+    }
+
+    fn begin(&self, input: &[u8]) {
+        let _ = self.inputs.send(Some(input.to_vec()));
+    }
+
+    fn end(&self) {
+        let _ = self.inputs.send(None);
+    }
+}
+
+#[test]
+fn a_panic_is_found_and_kept_as_a_file() {
+    let name = format!("self_test_{}", std::process::id());
+    let outcome = catch_unwind(|| {
+        run_fuzz_for(60.0, &name, &[b"value 17".to_vec()], &[], |bytes| {
+            assert!(!bytes.ends_with(b"18446744073709551616"), "too large");
+        });
+    });
+    let kept: Vec<_> = fs::read_dir(findings(&name))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    let content = fs::read(&kept[0]).unwrap();
+    fs::remove_dir_all(findings(&name)).unwrap();
+    let message = *outcome.unwrap_err().downcast::<String>().unwrap();
+    assert_eq!(kept.len(), 1);
+    assert!(content.ends_with(b"18446744073709551616"));
+    assert!(
+        message.contains("too large") && message.contains(kept[0].to_str().unwrap()),
+        "{message}"
+    );
+}
