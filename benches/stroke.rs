@@ -30,6 +30,7 @@ const BODIES: [&str; 7] = [
 ];
 const SEEDS: u64 = 8;
 
+
 fn main() {
     let Some(data) = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from) else {
         println!("skipped: RIGSMITH_DATA is not set");
@@ -47,7 +48,7 @@ fn main() {
             centring(&body, detail, &mut table);
             bending(&body, detail, &mut table);
         }
-        if name == "male_young" {
+        if name == "male_young" && !quick() {
             timing(&body);
         }
     }
@@ -84,7 +85,7 @@ impl Body {
         }
         let joints: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("joints.json")).ok()?).ok()?;
         let bounds = points.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[l, h], &p| [l.min(p), h.max(p)]);
-        let surface = Surface::new(points.clone(), triangles.clone());
+        let surface = Surface::build(&points, &triangles);
         Some(Self { name, bones: joints["default163"].clone(), points, triangles, surface, bounds })
     }
 
@@ -270,6 +271,19 @@ fn jittered(line: &[Vec2], count: usize, reach: f32, jitter: Jitter, seed: u64) 
         .collect()
 }
 
+fn quick() -> bool {
+    std::env::args().any(|a| a == "quick")
+}
+
+fn seeds() -> u64 {
+    if quick() { 2 } else { SEEDS }
+}
+
+fn jitters() -> Vec<(Jitter, &'static str)> {
+    let all = [(Jitter::White, "white"), (Jitter::Waver, "waver"), (Jitter::Shift, "shift")];
+    all[..if quick() { 1 } else { 3 }].to_vec()
+}
+
 /// Means by row.
 #[derive(Default)]
 struct Table(BTreeMap<String, Vec<f32>>);
@@ -319,10 +333,10 @@ fn centring(body: &Body, detail: bool, table: &mut Table) {
                     continue;
                 }
                 let arm_from_side = limb.contains("arm") && view_name != "front" && view_name != "back" && view_name != "top";
-                for (jitter, jitter_name) in [(Jitter::White, "white"), (Jitter::Waver, "waver"), (Jitter::Shift, "shift")] {
+                for (jitter, jitter_name) in jitters() {
                     for (low, high, extent) in [(0.1, 0.9, "inner"), (0.0, 1.0, "whole")] {
                         let mut seen = Vec::new();
-                        for seed in 0..SEEDS {
+                        for seed in 0..seeds() {
                             // The middle of the limb as seen: what a user traces.
                             let aim: Vec<Vec2> =
                                 [low, high].iter().map(|&t| project(a.lerp(b, t))).collect();
@@ -340,11 +354,21 @@ fn centring(body: &Body, detail: bool, table: &mut Table) {
                                 if !extended {
                                     seen.push(distance);
                                 }
+                                if extended {
+                                    let distance = from_bone(joint.position, a, b) / line.radius();
+                                    table.add(format!("{extent} extended from bone {limb} {view_name}"), distance);
+                                    if detail {
+                                        println!("  {} {limb} {side} {view_name} {extent}: from bone {distance:.2} {joint:.3?}", body.name);
+                                    }
+                                }
                                 table.add(
                                     format!("{extent}{} {limb} {view_name}", if extended { " extended" } else { "" }),
                                     distance,
                                 );
                             }
+                        }
+                        if seen.is_empty() {
+                            continue;
                         }
                         let mean = seen.iter().sum::<f32>() / seen.len() as f32;
                         table.add(format!("all {extent} {}", if limb.contains("arm") { "arms" } else { "legs" }), mean);
@@ -374,9 +398,9 @@ fn bending(body: &Body, detail: bool, table: &mut Table) {
                     continue;
                 }
                 let arm_from_side = limb == "elbow" && view_name != "front" && view_name != "back" && view_name != "top";
-                for (jitter, jitter_name) in [(Jitter::White, "white"), (Jitter::Waver, "waver"), (Jitter::Shift, "shift")] {
+                for (jitter, jitter_name) in jitters() {
                     let mut seen = Vec::new();
-                    for seed in 0..SEEDS {
+                    for seed in 0..seeds() {
                         let mut random = Random(seed + 99);
                         let ends = [0.06 * random.next(), 0.06 * random.next()];
                         let aim = [project(a.lerp(b, ends[0].max(0.0))), project(b), project(c.lerp(b, ends[1]))];
@@ -419,6 +443,11 @@ fn bending(body: &Body, detail: bool, table: &mut Table) {
     }
 }
 
+/// Distance from the line through two joints.
+fn from_bone(p: Vec3, a: Vec3, b: Vec3) -> f32 {
+    (p - a).reject_from(b - a).length()
+}
+
 /// How far along a polyline the nearest point to `p` lies, and its distance.
 fn along(line: &[Vec3], p: Vec3) -> (f32, f32) {
     let mut best = (0.0, f32::INFINITY);
@@ -458,7 +487,7 @@ fn timing(body: &Body) {
         }
         triangles = finer;
     }
-    let surface = Surface::new(points, triangles.clone());
+    let surface = Surface::build(&points, &triangles);
     let plane = body.plane(View::Front);
     let aim: Vec<Vec2> = ["upperarm01.L", "lowerarm01.L", "wrist.L"]
         .iter()

@@ -3,5 +3,6 @@
 pub mod picking;
 pub mod placement;
 pub mod stroke;
+pub mod transfer;
 pub mod view;
 pub mod weights;

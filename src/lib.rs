@@ -1,9 +1,13 @@
 #![doc = include_str!("../README.md")]
-#![forbid(unsafe_code)]
-#![deny(missing_docs)]
 
 pub mod algo;
 pub mod files;
+pub mod headless;
 pub mod mesh;
 pub mod plugins;
+pub mod prelude;
 pub mod rig;
+pub mod test_app;
+
+#[cfg(feature = "cli")]
+pub mod cli;

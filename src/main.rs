@@ -1,1 +1,5 @@
-fn main() { println!("rigsmith"); }
+//! The `rigsmith` command.
+
+fn main() -> std::process::ExitCode {
+    rigsmith::cli::main()
+}

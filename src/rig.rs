@@ -10,7 +10,7 @@ mod joint;
 pub mod label;
 pub mod operations;
 mod source;
-// pub mod skin;
+pub mod skin;
 mod tag;
 pub mod template;
 pub mod text;

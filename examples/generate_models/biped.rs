@@ -7,7 +7,7 @@
 use glam::{DVec3, dvec3};
 
 use crate::{
-    field::{Frame, Loft, cone, ease, ellipsoid, ellipsoid_in, intersect, path, section, turn_x, turn_y, turn_z, union},
+    field::{Frame, Loft, cone, ease, ellipsoid, ellipsoid_in, intersect, lens, path, section, turn_x, turn_y, turn_z, union},
     hand::{Hand, HandPose, OPEN, RELAXED},
     head::Head,
     rig::Rig,
@@ -119,6 +119,7 @@ impl Biped {
                 section(0.275, [-0.036, 0.036], [-0.038, 0.035]),
                 section(0.350, [-0.036, 0.036], [-0.038, 0.036]),
             ],
+            0.08,
         );
         let forearm = Loft::new(
             &[
@@ -308,10 +309,11 @@ impl Biped {
 /// Where a node of the grid lies: small cells around the head, the hands and the feet.
 pub fn warp(u: DVec3) -> DVec3 {
     // Along the arm, up the neck and down the shin the cross-section shrinks about the limb's axis.
-    let arm = 1.0 - 0.30 * ease(0.24, 0.40, u.x) - 0.41 * ease(0.56, 0.69, u.x);
+    let arm = 1.0 - 0.30 * ease(0.24, 0.40, u.x) - 0.43 * ease(0.56, 0.69, u.x);
     let head = 1.0 - 0.50 * ease(1.44, 1.56, u.y) * ease(0.26, 0.17, u.x);
     let foot = 1.0 - 0.42 * ease(0.17, 0.07, u.y);
     let x = ANKLE.x + (u.x * head - ANKLE.x) * foot;
     let z = HEAD.z + (u.z - HEAD.z) * head;
-    dvec3(x, SHOULDER.y + (u.y - SHOULDER.y) * arm, SHOULDER.z + (z - SHOULDER.z) * arm)
+    let p = dvec3(x, SHOULDER.y + (u.y - SHOULDER.y) * arm, SHOULDER.z + (z - SHOULDER.z) * arm);
+    lens(p, HEAD + dvec3(0.0, 0.080, 0.085), 0.090, 0.200, 0.58)
 }

@@ -135,10 +135,11 @@ pub fn path(p: DVec3, nodes: &[(DVec3, f64)]) -> f64 {
     least
 }
 
-/// Draws space together around a point: at `center` lengths shrink to `scale`, from `radius` on nothing changes.
-pub fn lens(p: DVec3, center: DVec3, radius: f64, scale: f64) -> DVec3 {
+/// Draws space together around a point: within `core` of `center` lengths shrink to `scale`; from `radius` on nothing
+/// changes.
+pub fn lens(p: DVec3, center: DVec3, core: f64, radius: f64, scale: f64) -> DVec3 {
     let r = p - center;
-    center + r * (scale + (1.0 - scale) * ease(0.0, radius, r.length()))
+    center + r * (scale + (1.0 - scale) * ease(core, radius, r.length()))
 }
 
 /// A cross-section of a [`Loft`]: how far it reaches along both axes.

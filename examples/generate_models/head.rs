@@ -5,7 +5,7 @@
 use glam::{DVec3, dvec3};
 
 use crate::{
-    field::{Frame, Loft, cone, cut, ease, ellipsoid, ellipsoid_in, intersect, path, section, turn_x, turn_y, turn_z, union},
+    field::{Frame, Loft, cone, cut, ease, ellipsoid, ellipsoid_in, intersect, lens, path, section, turn_x, turn_y, turn_z, union},
     surface_nets::Quads,
 };
 
@@ -86,36 +86,27 @@ impl Head {
         d = self.nose(q, d);
         d = self.mouth(q, d);
         d = self.ears(q, d);
-        union(d, self.throat(q), 0.034)
+        union(d, self.throat(q), 0.044)
     }
 
     fn eyes(&self, q: DVec3, d: f64) -> f64 {
         let r = q - EYE;
-        let lids = union(d, ellipsoid(q, EYE, dvec3(0.0152, 0.0146, 0.0146)), 0.007);
+        let lids = union(d, ellipsoid(q, EYE, dvec3(0.0160, 0.0152, 0.0150)), 0.010);
         if !self.detailed {
             return lids;
         }
         // The opening is a lens of two circles; behind it the surface follows the eyeball from inside.
         let tilt = turn_z(4.0).transpose() * r;
         let arc = |center: f64, radius: f64| {
-            let (x, y) = (tilt.x - 0.0005, tilt.y - center);
+            let (x, y) = (tilt.x - 0.0012, tilt.y - center);
             (x * x + y * y).sqrt() - radius
         };
         let upper = arc(-0.0135, 0.0201);
         let lower = arc(0.0180, 0.0232);
         let lens = intersect(upper, lower, 0.002).max(-r.z);
-        let behind = (EYE_RADIUS - 0.0018 - r.length()).max(0.0040 - r.z);
+        let behind = (EYE_RADIUS - 0.0018 - r.length()).max(0.0060 - r.z);
         let opening = intersect(lens, behind, 0.0004);
-        let crease = path(
-            q,
-            &[
-                (EYE + dvec3(-0.0120, 0.0055, 0.0105), 0.0008),
-                (EYE + dvec3(-0.0030, 0.0100, 0.0125), 0.0010),
-                (EYE + dvec3(0.0060, 0.0097, 0.0112), 0.0010),
-                (EYE + dvec3(0.0138, 0.0055, 0.0070), 0.0008),
-            ],
-        );
-        cut(cut(lids, crease, 0.003), opening, 0.0016)
+        cut(lids, opening, 0.0038)
     }
 
     fn nose(&self, q: DVec3, d: f64) -> f64 {
@@ -126,7 +117,7 @@ impl Head {
         d = union(d, ellipsoid(q, at(0.0108, 0.0775, 0.0985), at(0.0068, 0.0066, 0.0090)), 0.009);
         if self.detailed {
             let nostril = Frame { at: at(0.0062, 0.0712, 0.1025), axes: turn_y(-18.0) * turn_x(-20.0) };
-            d = cut(d, ellipsoid_in(q, &nostril, at(0.0030, 0.0044, 0.0058)), 0.003);
+            d = cut(d, ellipsoid_in(q, &nostril, at(0.0034, 0.0044, 0.0056)), 0.0045);
         }
         d
     }
@@ -134,25 +125,18 @@ impl Head {
     fn mouth(&self, q: DVec3, d: f64) -> f64 {
         let at = |x: f64, y: f64, z: f64| dvec3(x, y, z);
         let mut d = union(d, ellipsoid(q, at(0.0, 0.0480, 0.0770), at(0.0300, 0.0270, 0.0195)), 0.016);
+        let corner = at(0.0248, 0.0467, 0.0866);
         let upper = path(
             q,
-            &[(at(0.0, 0.0510, 0.0980), 0.0044), (at(0.0065, 0.0520, 0.0976), 0.0047), (at(0.0160, 0.0495, 0.0922), 0.0040), (at(0.0240, 0.0468, 0.0840), 0.0022)],
-            0.003,
+            &[(at(0.0, 0.0510, 0.0982), 0.0043), (at(0.0065, 0.0519, 0.0979), 0.0047), (at(0.0165, 0.0503, 0.0925), 0.0039), (corner, 0.0022)],
         );
         let lower = path(
             q,
-            &[(at(0.0, 0.0405, 0.0960), 0.0056), (at(0.0085, 0.0410, 0.0940), 0.0054), (at(0.0165, 0.0432, 0.0895), 0.0042), (at(0.0235, 0.0458, 0.0838), 0.0022)],
-            0.003,
+            &[(at(0.0, 0.0408, 0.0966), 0.0057), (at(0.0085, 0.0413, 0.0948), 0.0054), (at(0.0172, 0.0431, 0.0898), 0.0040), (corner, 0.0022)],
         );
-        d = union(d, upper.min(lower), 0.0045);
-        let line = path(
-            q,
-            &[(at(0.0, 0.0460, 0.1030), 0.0016), (at(0.0080, 0.0466, 0.1015), 0.0016), (at(0.0165, 0.0463, 0.0965), 0.0014), (at(0.0250, 0.0465, 0.0880), 0.0012)],
-            0.002,
-        );
-        d = cut(d, line, 0.004);
+        d = union(d, union(upper, lower, 0.0008), 0.0042);
         // The groove from nose to lip.
-        cut(d, cone(q, at(0.0, 0.0690, 0.1010), at(0.0, 0.0580, 0.1010), 0.0022, 0.0026), 0.004)
+        cut(d, cone(q, at(0.0, 0.0690, 0.1010), at(0.0, 0.0580, 0.1025), 0.0030, 0.0036), 0.006)
     }
 
     fn ears(&self, q: DVec3, d: f64) -> f64 {
@@ -179,9 +163,7 @@ impl Head {
         );
         ear = union(ear, rim, 0.005);
         let bowl = ellipsoid(e, dvec3(0.0085, -0.0020, 0.0030), dvec3(0.0070, 0.0125, 0.0085));
-        ear = cut(ear, bowl, 0.004);
-        let scapha = path(e, &[(dvec3(0.0080, 0.0230, 0.0030), 0.0022), (dvec3(0.0082, 0.0180, -0.0070), 0.0024), (dvec3(0.0075, 0.0020, -0.0100), 0.0020)]);
-        ear = cut(ear, scapha, 0.004);
+        ear = cut(ear, bowl, 0.006);
         ear = union(ear, ellipsoid(e, dvec3(0.0030, -0.0050, 0.0120), dvec3(0.0032, 0.0055, 0.0040)), 0.004);
         union(d, ear, 0.006)
     }
@@ -191,9 +173,18 @@ impl Head {
         let at = |x: f64, y: f64, z: f64| dvec3(x, y, z);
         let mut d = self.neck.distance(q.y, q.x, q.z);
         let strap = path(q, &[(at(0.044, 0.060, -0.026), 0.012), (at(0.038, -0.020, -0.004), 0.011), (at(0.013, -0.090, 0.016), 0.009)]);
-        d = union(d, strap, 0.014);
-        union(d, ellipsoid(q, at(0.0, -0.028, 0.0180), at(0.0080, 0.0110, 0.0085)), 0.014)
+        d = union(d, strap, 0.026);
+        union(d, ellipsoid(q, at(0.0, -0.028, 0.0180), at(0.0080, 0.0110, 0.0080)), 0.024)
     }
+}
+
+/// Draws a grid together where the face and the ears have their details. Even in X.
+pub fn focus(p: DVec3) -> DVec3 {
+    let side = if p.x < 0.0 { -1.0 } else { 1.0 };
+    let mut q = dvec3(p.x.abs(), p.y, p.z);
+    q = lens(q, dvec3(0.0, 0.0850, 0.0900), 0.110, 0.290, 0.42);
+    q = lens(q, dvec3(0.0760, 0.1050, -0.0130), 0.035, 0.0755, 0.42);
+    dvec3(q.x * side, q.y, q.z)
 }
 
 /// The head with its neck as a model of its own, standing on its cut neck at `y = -FOOT`.
@@ -224,7 +215,7 @@ impl HeadModel {
     pub fn distance(&self, p: DVec3) -> f64 {
         let q = dvec3(p.x.abs(), p.y, p.z);
         let d = union(self.head.distance(p), self.shoulders.distance(q.y, q.x, q.z), 0.03);
-        intersect(d, -(p.y + FOOT), 0.020)
+        intersect(d, -(p.y + FOOT), 0.035)
     }
 }
 

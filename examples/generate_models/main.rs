@@ -68,11 +68,11 @@ fn make_hand(folder: &Path) -> Result<(), Box<dyn Error>> {
     let grid = Grid { nodes, warp: &|p| p, symmetric: false };
     let mut mesh = extract(&grid, &|p| sampled.distance(p));
     largest_shell(&mut mesh);
-    settle(&mut mesh, &|p| sampled.distance(p), Settle { rounds: 6, spread: 0.5, reach: 0.002, step: 0.0002 });
+    settle(&mut mesh, &|p| sampled.distance(p), Settle { rounds: 6, spread: 0.5, reach: 0.002, step: 0.0002, polish: 0 });
     for p in &mut mesh.points {
         *p = sampled.hand.carry(&shown.hand, *p);
     }
-    settle(&mut mesh, &|p| shown.distance(p), Settle { rounds: 12, spread: 0.4, reach: 0.002, step: 0.0002 });
+    settle(&mut mesh, &|p| shown.distance(p), Settle { rounds: 10, spread: 0.4, reach: 0.002, step: 0.0002, polish: 1 });
     checked("hand", &mesh)?;
     // Fingers up, palm forward, standing on the cut forearm.
     let stand = Frame { at: DVec3::Y * hand::STUB, axes: DMat3::from_cols(DVec3::Y, -DVec3::Z, -DVec3::X) };
@@ -96,15 +96,15 @@ const STUB_ROOT: f64 = 0.085;
 fn make_head(folder: &Path) -> Result<(), Box<dyn Error>> {
     let model = HeadModel::new();
     let nodes = [
-        graded_symmetric(&[(0.0, 0.0034), (0.016, 0.0030), (0.022, 0.0029), (0.046, 0.0029), (0.055, 0.0046), (0.066, 0.0040), (0.09, 0.0036), (0.11, 0.007)]),
-        graded(&[(-0.13, 0.006), (-0.10, 0.007), (-0.03, 0.0075), (0.0, 0.0055), (0.03, 0.0034), (0.06, 0.0032), (0.09, 0.0036), (0.105, 0.0026), (0.127, 0.0026), (0.145, 0.0055), (0.24, 0.0085)]),
-        graded(&[(-0.14, 0.0085), (-0.05, 0.0065), (-0.035, 0.0032), (0.002, 0.0034), (0.03, 0.0062), (0.065, 0.0038), (0.125, 0.0034)]),
+        graded_symmetric(&[(0.0, 0.0058), (0.19, 0.0058)]),
+        graded(&[(-0.22, 0.0058), (0.34, 0.0058)]),
+        graded(&[(-0.25, 0.0058), (0.22, 0.0058)]),
     ];
-    let grid = Grid { nodes, warp: &|p| p, symmetric: true };
+    let grid = Grid { nodes, warp: &head::focus, symmetric: true };
     let field = |p: DVec3| model.distance(p);
     let mut half = extract(&grid, &field);
     largest_shell(&mut half);
-    settle(&mut half, &field, Settle { rounds: 14, spread: 0.4, reach: 0.003, step: 0.0002 });
+    settle(&mut half, &field, Settle { rounds: 12, spread: 0.4, reach: 0.002, step: 0.0002, polish: 5 });
     let lift = DVec3::Y * head::FOOT;
     for p in &mut half.points {
         *p += lift;
@@ -121,18 +121,18 @@ fn make_head(folder: &Path) -> Result<(), Box<dyn Error>> {
 fn make_biped(folder: &Path) -> Result<(), Box<dyn Error>> {
     let (sampled, rest) = (Biped::new(&biped::SAMPLED), Biped::new(&biped::REST));
     let nodes = [
-        graded_symmetric(&[(0.0, 0.0158), (0.20, 0.0165), (0.35, 0.0180), (0.55, 0.0160), (0.68, 0.0062), (0.80, 0.0054), (0.95, 0.0054)]),
-        graded(&[(-0.03, 0.0075), (0.05, 0.0080), (0.12, 0.0140), (0.30, 0.0190), (1.0, 0.0185), (1.30, 0.0165), (1.42, 0.0150), (1.54, 0.0080), (1.62, 0.0066), (1.68, 0.0066), (1.80, 0.0100)]),
-        graded(&[(-0.32, 0.0155), (0.11, 0.0150), (0.16, 0.0110), (0.20, 0.0110), (0.25, 0.0150), (0.42, 0.0150)]),
+        graded_symmetric(&[(0.0, 0.0170), (0.20, 0.0175), (0.35, 0.0200), (0.55, 0.0170), (0.68, 0.0064), (0.80, 0.0056), (0.95, 0.0056)]),
+        graded(&[(-0.03, 0.0080), (0.05, 0.0085), (0.12, 0.0140), (0.30, 0.0205), (1.0, 0.0205), (1.30, 0.0175), (1.42, 0.0150), (1.54, 0.0095), (1.68, 0.0090), (1.84, 0.0110)]),
+        graded(&[(-0.34, 0.0165), (0.11, 0.0160), (0.16, 0.0115), (0.22, 0.0115), (0.26, 0.0160), (0.46, 0.0160)]),
     ];
     let grid = Grid { nodes, warp: &biped::warp, symmetric: true };
     let mut half = extract(&grid, &|p| sampled.distance(p));
     println!("drop {}", largest_shell(&mut half));
-    settle(&mut half, &|p| sampled.distance(p), Settle { rounds: 4, spread: 0.4, reach: 0.006, step: 0.0004 });
+    settle(&mut half, &|p| sampled.distance(p), Settle { rounds: 4, spread: 0.4, reach: 0.006, step: 0.0004, polish: 0 });
     for p in &mut half.points {
         *p = sampled.carry(&rest, *p);
     }
-    settle(&mut half, &|p| rest.distance(p), Settle { rounds: 12, spread: 0.4, reach: 0.004, step: 0.0004 });
+    settle(&mut half, &|p| rest.distance(p), Settle { rounds: 12, spread: 0.4, reach: 0.004, step: 0.0004, polish: 1 });
     let body = Piece::symmetric("body", &half);
     checked("body", body.mesh())?;
     fs::write(folder.join("biped.obj"), obj(&format!("{ABOUT}\nFeet at Y = 0, facing +Z."), &[body]))?;

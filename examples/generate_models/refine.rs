@@ -18,20 +18,22 @@ pub struct Settle {
     pub reach: f64,
     /// Step of the numeric gradient, metres.
     pub step: f64,
+    /// Rounds of smoothing at the end.
+    pub polish: usize,
 }
 
-/// Spreads vertices evenly along the surface and puts them on the field's zero with Newton steps.
+/// Spreads vertices along the surface, as densely as they are in each region, and puts them on the field's zero with
+/// Newton steps; then takes out what is finer than the mesh can show.
 pub fn settle(quads: &mut Quads, field: &(impl Fn(DVec3) -> f64 + Sync), how: Settle) {
-    let neighbours = neighbours(quads);
+    let ring = Ring::new(quads);
     for _ in 0..how.rounds {
         let before = quads.points.clone();
         quads.points = (0..before.len())
             .into_par_iter()
             .map(|i| {
                 let mut p = before[i];
-                let mean = neighbours[i].iter().map(|&j| before[j as usize]).sum::<DVec3>() / neighbours[i].len() as f64;
                 let normal = gradient(field, p, how.step).normalize_or_zero();
-                let to = mean - p;
+                let to = ring.mean(&before, i) - p;
                 p += (to - normal * to.dot(normal)) * how.spread;
                 for _ in 0..3 {
                     let value = field(p);
@@ -45,6 +47,58 @@ pub fn settle(quads: &mut Quads, field: &(impl Fn(DVec3) -> f64 + Sync), how: Se
                 p
             })
             .collect();
+    }
+    // Taubin's filter: in by a third, out by a little more, so that nothing shrinks.
+    for factor in [0.33, -0.34].repeat(how.polish) {
+        let before = quads.points.clone();
+        for i in 0..before.len() {
+            let mut p = before[i] + (ring.mean(&before, i) - before[i]) * factor;
+            if quads.on_plane[i] {
+                p.x = 0.0;
+            }
+            quads.points[i] = p;
+        }
+    }
+}
+
+/// Neighbours of every vertex with weights that keep the density of the mesh as it is.
+struct Ring {
+    lists: Vec<Vec<u32>>,
+    /// The usual edge length around each vertex.
+    size: Vec<f64>,
+    /// Vertices on the plane of symmetry, and whether a vertex is one.
+    on_plane: Vec<bool>,
+}
+
+impl Ring {
+    fn new(quads: &Quads) -> Self {
+        let lists = neighbours(quads);
+        let at = |i: u32| quads.points[i as usize];
+        let mut size: Vec<f64> = (0..lists.len())
+            .map(|i| lists[i].iter().map(|&j| at(j).distance(at(i as u32))).sum::<f64>() / lists[i].len().max(1) as f64)
+            .collect();
+        for _ in 0..4 {
+            let before = size.clone();
+            for (i, list) in lists.iter().enumerate() {
+                let sum: f64 = list.iter().map(|&j| before[j as usize]).sum();
+                size[i] = (before[i] + sum) / (1.0 + list.len() as f64);
+            }
+        }
+        Self { lists, size, on_plane: quads.on_plane.clone() }
+    }
+
+    /// Where the neighbours of a vertex pull it.
+    fn mean(&self, points: &[DVec3], i: usize) -> DVec3 {
+        let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+        for &j in &self.lists[i] {
+            let j = j as usize;
+            // A neighbour off the plane stands for its mirror image too.
+            let twice = if self.on_plane[i] && !self.on_plane[j] { 2.0 } else { 1.0 };
+            let weight = twice / (self.size[i] + self.size[j]);
+            sum += points[j] * weight;
+            total += weight;
+        }
+        sum / total
     }
 }
 

@@ -87,7 +87,7 @@ pub fn place_hits(ray: &Ray, hits: &[Hit], settings: PlaceSettings) -> Placement
         [only] => return Placement::Single { position: ray.at(only.distance) },
         [first, .., last] => (first.distance, last.distance),
     };
-    let pairs = volumes(hits);
+    let pairs: Vec<Volume> = volumes(hits).into_iter().filter(|pair| pair.far > pair.near).collect();
     let chosen = settings.volume.and_then(|n| nth_volume(&pairs, n));
     let span = chosen.map_or(Volume { near: first, far: last }, |(_, span)| span);
     Placement::Between {

@@ -27,7 +27,7 @@ use self::{
     axis::Axis,
     path::Path,
     section::Fan,
-    track::{Span, Track},
+    track::Track,
 };
 use super::{placement::PlaceSettings, view::ViewPlane};
 use crate::mesh::{ray::Hit, surface::Surface};
@@ -197,20 +197,17 @@ impl StrokeSamples {
         let span = self.track.span_at(&ray, hits, at)?;
         let count = hits.len();
         let depth = self.settings.place.depth();
-        let middle = ray.at(span.middle());
-        let section = self.settings.recentre.then_some(self.axis.as_ref()).flatten().and_then(|axis| {
-            axis.recentre(surface, &self.fan, at, middle, hits)
-        });
+        let section = self.axis.as_ref().map(|axis| axis.recentre(surface, &self.fan, at, &ray, hits));
         let position = match section {
-            Some((centroid, _)) if depth == 0.5 => centroid,
+            Some((centroid, _)) if self.settings.recentre && depth == 0.5 => centroid,
             // The chosen depth, at the place across the view that the section asks for.
-            Some((centroid, _)) => {
+            Some((centroid, _)) if self.settings.recentre => {
                 let ray = self.plane.project(centroid).map_or(ray, |point| self.plane.ray(point));
                 surface.hits(&ray, hits);
                 let span = self.track.span_at(&ray, hits, at).unwrap_or(span);
                 ray.at(span.at(depth))
             }
-            None => ray.at(span.at(depth)),
+            _ => ray.at(span.at(depth)),
         };
         Some(PlacedJoint { position, radius: section.map(|(_, radius)| radius), source, hits: count })
     }

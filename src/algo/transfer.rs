@@ -7,7 +7,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::weights::fill::{Graph, Links, Nearest, Sparse, complete, prune};
+use super::weights::fill::{Graph, Links, Nearest, Sparse, Unit, complete, prune};
 use crate::mesh::{model::Weights, surface::Surface};
 
 /// A mesh to transfer from or to; both in the same space.
@@ -86,6 +86,10 @@ pub fn transfer_weights(
     if weights.len() != source.points.len() {
         return Err(TransferError::WeightCount { points: source.points.len(), weights: weights.len() });
     }
+    let unit = Unit::of(source.points.iter().copied());
+    let (from, to) = (unit.all(source.points), unit.all(target.points));
+    let source = TransferMesh { points: &from, ..source };
+    let target = TransferMesh { points: &to, ..target };
     let origin = Source::new(source, weights, settings.influences.max(1))?;
     let limit = settings.distance.max(0.0) * origin.size;
     let graph = Graph::new(target.points, target.triangles);

@@ -10,6 +10,7 @@ mod bind;
 mod bones;
 mod check;
 mod claim;
+mod coarse;
 pub mod fill;
 mod finish;
 mod heat;
@@ -71,6 +72,13 @@ pub struct WeightSettings {
 impl Default for WeightSettings {
     fn default() -> Self {
         Self { max_influences: 8, smoothing: 1.0, method: Method::Auto, voxel_resolution: 256, prune: 0.002 }
+    }
+}
+
+impl WeightSettings {
+    /// The smoothing as a usable factor.
+    pub(crate) fn blend(&self) -> f32 {
+        if self.smoothing.is_finite() { self.smoothing.clamp(0.01, 100.0) } else { 1.0 }
     }
 }
 

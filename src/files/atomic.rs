@@ -10,7 +10,7 @@ use std::{
     ffi::OsStr,
     hash::{BuildHasher, Hasher},
     io::{self, ErrorKind},
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
     time::{Duration, SystemTime},
 };
 
@@ -35,53 +35,40 @@ pub fn save_atomic(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), Sav
     let temp = target.stage(disk, bytes)?;
     if let Err(source) = disk.rename(&temp, &target.file) {
         let _ = disk.remove(&temp);
-        return Err(SaveError::new(
-            path,
-            &target.folder,
-            bytes.len(),
-            SaveStep::Replace,
-            source,
-        ));
+        return Err(SaveError::new(path, &target.folder, bytes.len(), SaveStep::Replace, source));
     }
-    disk.sync_folder(&target.folder)
-        .map_err(|source| SaveError::Unconfirmed {
-            path: path.to_path_buf(),
-            source,
-        })
+    disk.sync_folder(&target.folder).map_err(|source| SaveError::Unconfirmed { path: path.to_path_buf(), source })
 }
 
 /// Saves files that belong together, such as a `.gltf` with its `.bin` and images; **the last one is the main file**.
 ///
 /// All are written and synced under temporary names first, so that a full disk or a refused folder changes nothing; then they
-/// are renamed in the order given, the main file last, and put back if one of the renames fails. Missing folders below the
-/// main file's folder are created. A crash between two renames leaves each file whole, but companions may be newer than the
+/// are renamed in the order given, the main file last, and put back if one of the renames fails. Names often come from the
+/// model itself, so none may lead out of the main file's folder; missing folders below that are created. A crash between two renames leaves each file whole, but companions may be newer than the
 /// main file. Costs what [`save_atomic`] costs for each file.
 ///
 /// # Errors
 /// See [`SaveError`]. After [`SaveError::Unconfirmed`] all files are in place; after [`SaveError::Mixed`] some are.
 pub fn save_all_atomic(disk: &dyn Disk, files: &[(PathBuf, Vec<u8>)]) -> Result<(), SaveError> {
     let Some((main, _)) = files.last() else { return Ok(()) };
-    let mut set = Staged {
-        disk,
-        members: Vec::with_capacity(files.len()),
-    };
-    let main_folder = Target::find(disk, main)?.folder;
+    let mut set = Staged { disk, members: Vec::with_capacity(files.len()) };
+    let main_folder = folder_of(main);
+    if disk.entry(main_folder, true).is_err_and(|error| error.kind() == ErrorKind::NotFound) {
+        return Err(SaveError::NoFolder { path: main.clone(), folder: main_folder.to_path_buf() });
+    }
     for (path, _) in files {
         let folder = folder_of(path);
-        if folder != folder_of(main) && folder.starts_with(folder_of(main)) && disk.entry(folder, true).is_err() {
-            disk.create_folder(folder)
-                .map_err(|source| SaveError::new(path, folder, 0, SaveStep::Create, source))?;
+        if !is_beside_or_below(path, main) {
+            return Err(SaveError::Outside { path: path.clone(), folder: main_folder.to_path_buf() });
+        }
+        if disk.entry(folder, true).is_err_and(|error| error.kind() == ErrorKind::NotFound) {
+            disk.create_folder(folder).map_err(|source| SaveError::new(path, folder, 0, SaveStep::Create, source))?;
         }
         let target = Target::find(disk, path)?;
         if set.members.iter().any(|member| member.target.file == target.file) {
             return Err(SaveError::SameTarget { path: path.clone() });
         }
-        set.members.push(Member {
-            target,
-            temp: None,
-            backup: None,
-            replaced: false,
-        });
+        set.members.push(Member { target, temp: None, backup: None, replaced: false });
     }
     for (member, (_, bytes)) in set.members.iter_mut().zip(files) {
         member.temp = Some(member.target.stage(disk, bytes)?);
@@ -94,34 +81,17 @@ pub fn save_all_atomic(disk: &dyn Disk, files: &[(PathBuf, Vec<u8>)]) -> Result<
     for (i, (path, bytes)) in files.iter().enumerate() {
         if let Err(source) = set.members[i].replace(disk) {
             return Err(if set.put_back() {
-                SaveError::new(
-                    path,
-                    &set.members[i].target.folder,
-                    bytes.len(),
-                    SaveStep::Replace,
-                    source,
-                )
+                SaveError::new(path, &set.members[i].target.folder, bytes.len(), SaveStep::Replace, source)
             } else {
-                SaveError::Mixed {
-                    path: main.clone(),
-                    source,
-                }
+                SaveError::Mixed { path: main.clone(), source }
             });
         }
     }
-    let mut folders: Vec<&Path> = set
-        .members
-        .iter()
-        .map(|member| member.target.folder.as_path())
-        .collect();
-    folders.push(&main_folder);
+    let mut folders: Vec<&Path> = set.members.iter().map(|member| member.target.folder.as_path()).collect();
     folders.sort_unstable();
     folders.dedup();
     for folder in folders {
-        disk.sync_folder(folder).map_err(|source| SaveError::Unconfirmed {
-            path: main.clone(),
-            source,
-        })?;
+        disk.sync_folder(folder).map_err(|source| SaveError::Unconfirmed { path: main.clone(), source })?;
     }
     Ok(())
 }
@@ -144,10 +114,7 @@ pub fn remove_stale_temps(disk: &dyn Disk, folder: &Path, age: Duration) -> io::
         let path = folder.join(name);
         let stale = disk.entry(&path, false).is_ok_and(|entry| {
             entry.kind == EntryKind::File
-                && entry
-                    .modified
-                    .and_then(|then| now.duration_since(then).ok())
-                    .is_some_and(|old| old >= age)
+                && entry.modified.and_then(|then| now.duration_since(then).ok()).is_some_and(|old| old >= age)
         });
         if stale && disk.remove(&path).is_ok() {
             removed += 1;
@@ -172,27 +139,16 @@ impl Target {
         let mut file = path.to_path_buf();
         for _ in 0..=MAX_LINKS {
             if file.file_name().is_none() || ends_in_separator(&file) {
-                let is_folder = disk
-                    .entry(&file, true)
-                    .is_ok_and(|entry| entry.kind == EntryKind::Folder);
+                let is_folder = disk.entry(&file, true).is_ok_and(|entry| entry.kind == EntryKind::Folder);
                 let path = path.to_path_buf();
-                return Err(if is_folder {
-                    SaveError::IsFolder { path }
-                } else {
-                    named(path)
-                });
+                return Err(if is_folder { SaveError::IsFolder { path } } else { named(path) });
             }
             let folder = folder_of(&file).to_path_buf();
             let path = path.to_path_buf();
             let entry = match disk.entry(&file, false) {
                 Ok(entry) => entry,
                 Err(error) if error.kind() == ErrorKind::NotFound => {
-                    return Ok(Self {
-                        path,
-                        file,
-                        folder,
-                        exists: false,
-                    });
+                    return Ok(Self { path, file, folder, exists: false });
                 }
                 Err(error) if error.kind() == ErrorKind::NotADirectory => {
                     return Err(SaveError::NoFolder { path, folder });
@@ -205,12 +161,7 @@ impl Target {
                 // Renaming would replace a protected file without asking.
                 EntryKind::File if entry.read_only => return Err(SaveError::WriteProtected { path }),
                 EntryKind::File => {
-                    return Ok(Self {
-                        path,
-                        file,
-                        folder,
-                        exists: true,
-                    });
+                    return Ok(Self { path, file, folder, exists: true });
                 }
                 EntryKind::Link => {
                     let link = disk
@@ -220,9 +171,7 @@ impl Target {
                 }
             }
         }
-        Err(SaveError::LinkLoop {
-            path: path.to_path_buf(),
-        })
+        Err(SaveError::LinkLoop { path: path.to_path_buf() })
     }
 
     /// Writes `bytes` to a temporary file beside the target, with its permissions, and syncs it.
@@ -239,8 +188,7 @@ impl Target {
         };
         let mut fill = || {
             if self.exists {
-                file.keep_permissions(&self.file)
-                    .map_err(|e| (SaveStep::Permissions, e))?;
+                file.keep_permissions(&self.file).map_err(|e| (SaveStep::Permissions, e))?;
             }
             let mut rest = bytes;
             while !rest.is_empty() {
@@ -344,12 +292,15 @@ pub(super) fn folder_of(path: &Path) -> &Path {
     }
 }
 
+/// Tells whether `path` lies in the folder of `main` or below it, by name alone.
+fn is_beside_or_below(path: &Path, main: &Path) -> bool {
+    path.strip_prefix(main.parent().unwrap_or(Path::new("")))
+        .is_ok_and(|rest| rest.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir)))
+}
+
 /// `Path` drops a trailing separator, but whoever writes one means a folder.
 fn ends_in_separator(path: &Path) -> bool {
-    path.as_os_str()
-        .as_encoded_bytes()
-        .last()
-        .is_some_and(|&byte| std::path::is_separator(char::from(byte)))
+    path.as_os_str().as_encoded_bytes().last().is_some_and(|&byte| std::path::is_separator(char::from(byte)))
 }
 
 /// A name that no other process or thread uses at the same time.

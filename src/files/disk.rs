@@ -87,23 +87,14 @@ pub struct RealDisk;
 
 impl Disk for RealDisk {
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
-        let facts = if follow {
-            fs::metadata(path)?
-        } else {
-            fs::symlink_metadata(path)?
-        };
+        let facts = if follow { fs::metadata(path)? } else { fs::symlink_metadata(path)? };
         let kind = match facts.file_type() {
             t if t.is_symlink() => EntryKind::Link,
             t if t.is_dir() => EntryKind::Folder,
             t if t.is_file() => EntryKind::File,
             _ => EntryKind::Other,
         };
-        Ok(Entry {
-            kind,
-            len: facts.len(),
-            read_only: facts.permissions().readonly(),
-            modified: facts.modified().ok(),
-        })
+        Ok(Entry { kind, len: facts.len(), read_only: facts.permissions().readonly(), modified: facts.modified().ok() })
     }
 
     fn read_link(&self, path: &Path) -> io::Result<PathBuf> {

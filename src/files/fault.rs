@@ -31,14 +31,7 @@ pub enum Fault {
 
 impl Fault {
     /// Every manner, for loops over all of them.
-    pub const ALL: [Self; 6] = [
-        Self::NoSpace,
-        Self::Io,
-        Self::NoAccess,
-        Self::Short,
-        Self::Crash,
-        Self::PowerLoss,
-    ];
+    pub const ALL: [Self; 6] = [Self::NoSpace, Self::Io, Self::NoAccess, Self::Short, Self::Crash, Self::PowerLoss];
 
     /// True if nothing runs after the fault, so that temporary files may stay behind.
     pub fn is_crash(self) -> bool {
@@ -87,13 +80,7 @@ struct State {
 impl FaultyDisk {
     /// Wraps `disk`. Without a plan nothing fails, and operations are only counted.
     pub fn new(disk: impl Disk + 'static, plan: Option<FaultPlan>) -> Self {
-        Self {
-            inner: Arc::new(Inner {
-                disk: Box::new(disk),
-                plan,
-                state: Mutex::default(),
-            }),
-        }
+        Self { inner: Arc::new(Inner { disk: Box::new(disk), plan, state: Mutex::default() }) }
     }
 
     /// Returns how many operations were asked for so far, the failed ones included.
@@ -175,11 +162,7 @@ impl Disk for FaultyDisk {
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
         let file = self.inner.run("create", |disk| disk.create(path))?;
         self.inner.state().unsynced.push(path.to_path_buf());
-        Ok(Box::new(FaultyFile {
-            file,
-            path: path.to_path_buf(),
-            inner: Arc::clone(&self.inner),
-        }))
+        Ok(Box::new(FaultyFile { file, path: path.to_path_buf(), inner: Arc::clone(&self.inner) }))
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
@@ -209,10 +192,7 @@ impl Disk for FaultyDisk {
 
     fn open(&self, path: &Path) -> io::Result<Box<dyn Read + Send>> {
         let reader = self.inner.run("open", |disk| disk.open(path))?;
-        Ok(Box::new(FaultyReader {
-            reader,
-            inner: Arc::clone(&self.inner),
-        }))
+        Ok(Box::new(FaultyReader { reader, inner: Arc::clone(&self.inner) }))
     }
 }
 
@@ -226,10 +206,8 @@ impl DiskFile for FaultyFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let half = bytes.get(..bytes.len().div_ceil(2)).unwrap_or_default();
         // Past a crash nothing reaches the disk any more; at the crash itself half of the bytes do.
-        let crashed = self
-            .inner
-            .plan
-            .is_some_and(|plan| plan.fault.is_crash() && self.inner.state().log.len() > plan.at);
+        let crashed =
+            self.inner.plan.is_some_and(|plan| plan.fault.is_crash() && self.inner.state().log.len() > plan.at);
         match self.inner.step("write") {
             None => self.file.write(bytes),
             Some(Fault::Short) => self.file.write(half),

@@ -87,9 +87,7 @@ impl<'d> ModelFolder<'d> {
     /// # Errors
     /// When it does not exist or cannot be reached.
     pub fn at(disk: &'d dyn Disk, folder: &Path) -> Result<Self, ReadError> {
-        let root = disk
-            .canonical(folder)
-            .map_err(|error| ReadError::new(disk, folder, error))?;
+        let root = disk.canonical(folder).map_err(|error| ReadError::new(disk, folder, error))?;
         Ok(Self { disk, root })
     }
 
@@ -121,10 +119,7 @@ impl<'d> ModelFolder<'d> {
                 }
                 Err(error) => {
                     let source = ReadError::new(self.disk, &exact, error);
-                    return Err(UriError::Read {
-                        uri: shown(uri),
-                        source,
-                    });
+                    return Err(UriError::Read { uri: shown(uri), source });
                 }
             };
             // Checked at every step, so that nothing outside is so much as listed.
@@ -141,10 +136,7 @@ impl<'d> ModelFolder<'d> {
     /// As `resolve`, and as [`read_capped`].
     pub fn read(&self, uri: &str, limit: u64) -> Result<Vec<u8>, UriError> {
         let path = self.resolve(uri)?;
-        read_capped(self.disk, &path, limit).map_err(|source| UriError::Read {
-            uri: shown(uri),
-            source,
-        })
+        read_capped(self.disk, &path, limit).map_err(|source| UriError::Read { uri: shown(uri), source })
     }
 
     /// Opens the file that `uri` names for reading in blocks; see [`resolve`](Self::resolve).
@@ -153,20 +145,12 @@ impl<'d> ModelFolder<'d> {
     /// As `resolve`, and as [`open`].
     pub fn open(&self, uri: &str) -> Result<OpenFile, UriError> {
         let path = self.resolve(uri)?;
-        open(self.disk, &path).map_err(|source| UriError::Read {
-            uri: shown(uri),
-            source,
-        })
+        open(self.disk, &path).map_err(|source| UriError::Read { uri: shown(uri), source })
     }
 
     /// Splits a reference into names below the folder, `.` and `..` worked out.
     fn split(&self, uri: &str) -> Result<Vec<String>, UriError> {
-        let unusable = |reason| {
-            Err(UriError::Unusable {
-                uri: shown(uri),
-                reason,
-            })
-        };
+        let unusable = |reason| Err(UriError::Unusable { uri: shown(uri), reason });
         if uri.len() > MAX_LENGTH {
             return unusable("it is too long");
         }
@@ -180,11 +164,7 @@ impl<'d> ModelFolder<'d> {
         {
             let uri = shown(uri);
             // A single letter is a drive of Windows.
-            return Err(if scheme.len() == 1 {
-                UriError::Absolute { uri }
-            } else {
-                UriError::Url { uri }
-            });
+            return Err(if scheme.len() == 1 { UriError::Absolute { uri } } else { UriError::Url { uri } });
         }
         if uri_slashed.starts_with('/') {
             return Err(UriError::Absolute { uri: shown(uri) });
@@ -214,17 +194,12 @@ impl<'d> ModelFolder<'d> {
     fn other_case(&self, folder: &Path, name: &str) -> Option<PathBuf> {
         let wanted = name.to_lowercase();
         let names = self.disk.list(folder, MAX_NAMES).ok()?;
-        let found = names
-            .iter()
-            .find(|found| found.to_str().is_some_and(|found| found.to_lowercase() == wanted))?;
+        let found = names.iter().find(|found| found.to_str().is_some_and(|found| found.to_lowercase() == wanted))?;
         self.disk.canonical(&folder.join(found)).ok()
     }
 
     fn outside(&self, uri: &str) -> UriError {
-        UriError::Outside {
-            uri: shown(uri),
-            folder: self.root.clone(),
-        }
+        UriError::Outside { uri: shown(uri), folder: self.root.clone() }
     }
 
     fn missing(&self, uri: &str, folder: &Path, rest: &[String]) -> UriError {
@@ -233,34 +208,21 @@ impl<'d> ModelFolder<'d> {
         // Asking for it once more finds the names that are like it.
         let source = match open(self.disk, &path) {
             Err(error) => error,
-            Ok(_) => ReadError::Missing {
-                path,
-                hint: "try again".to_owned(),
-            },
+            Ok(_) => ReadError::Missing { path, hint: "try again".to_owned() },
         };
-        UriError::Read {
-            uri: shown(uri),
-            source,
-        }
+        UriError::Read { uri: shown(uri), source }
     }
 
     /// Tells whether `uri` names an existing regular file below the folder.
     pub fn has(&self, uri: &str) -> bool {
-        self.resolve(uri).is_ok_and(|path| {
-            self.disk
-                .entry(&path, true)
-                .is_ok_and(|entry| entry.kind == EntryKind::File)
-        })
+        self.resolve(uri)
+            .is_ok_and(|path| self.disk.entry(&path, true).is_ok_and(|entry| entry.kind == EntryKind::File))
     }
 }
 
 /// A reference as a message shows it: one line, and not the megabytes of an embedded picture.
 fn shown(uri: &str) -> String {
-    let mut text: String = uri
-        .chars()
-        .take(SHOWN)
-        .map(|c| if c.is_control() { '\u{FFFD}' } else { c })
-        .collect();
+    let mut text: String = uri.chars().take(SHOWN).map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect();
     if uri.chars().nth(SHOWN).is_some() {
         text.push_str("...");
     }

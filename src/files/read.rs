@@ -110,9 +110,7 @@ impl Read for OpenFile {
 pub fn open(disk: &dyn Disk, path: &Path) -> Result<OpenFile, ReadError> {
     let entry = regular(disk, path)?;
     if entry.len == 0 {
-        return Err(ReadError::Empty {
-            path: path.to_path_buf(),
-        });
+        return Err(ReadError::Empty { path: path.to_path_buf() });
     }
     let reader = disk.open(path).map_err(|error| ReadError::new(disk, path, error))?;
     Ok(OpenFile { reader, len: entry.len })
@@ -125,42 +123,28 @@ pub fn open(disk: &dyn Disk, path: &Path) -> Result<OpenFile, ReadError> {
 /// # Errors
 /// See [`ReadError`].
 pub fn read_capped(disk: &dyn Disk, path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
-    let too_large = || ReadError::TooLarge {
-        path: path.to_path_buf(),
-        limit,
-    };
+    let too_large = || ReadError::TooLarge { path: path.to_path_buf(), limit };
     let entry = regular(disk, path)?;
     if entry.len > limit {
         return Err(too_large());
     }
     let reader = disk.open(path).map_err(|error| ReadError::new(disk, path, error))?;
     let mut bytes = Vec::with_capacity(usize::try_from(entry.len.min(FIRST_RESERVE)).unwrap_or(0));
-    reader
-        .take(limit.saturating_add(1))
-        .read_to_end(&mut bytes)
-        .map_err(|error| ReadError::new(disk, path, error))?;
+    reader.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(|error| ReadError::new(disk, path, error))?;
     match bytes.len() as u64 {
-        0 => Err(ReadError::Empty {
-            path: path.to_path_buf(),
-        }),
+        0 => Err(ReadError::Empty { path: path.to_path_buf() }),
         read if read > limit => Err(too_large()),
         _ => Ok(bytes),
     }
 }
 
 fn regular(disk: &dyn Disk, path: &Path) -> Result<Entry, ReadError> {
-    let entry = disk
-        .entry(path, true)
-        .map_err(|error| ReadError::new(disk, path, error))?;
+    let entry = disk.entry(path, true).map_err(|error| ReadError::new(disk, path, error))?;
     match entry.kind {
         EntryKind::File => Ok(entry),
-        EntryKind::Folder => Err(ReadError::IsFolder {
-            path: path.to_path_buf(),
-        }),
+        EntryKind::Folder => Err(ReadError::IsFolder { path: path.to_path_buf() }),
         // Opening a pipe that nobody writes to would wait for ever.
-        EntryKind::Link | EntryKind::Other => Err(ReadError::NotAFile {
-            path: path.to_path_buf(),
-        }),
+        EntryKind::Link | EntryKind::Other => Err(ReadError::NotAFile { path: path.to_path_buf() }),
     }
 }
 

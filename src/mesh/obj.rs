@@ -11,17 +11,33 @@
 
 mod block;
 mod collect;
+mod color;
+mod corner_table;
 mod error;
+mod looks;
+mod mtl;
 mod names;
+mod normals;
 mod number;
+mod paths;
 mod pipeline;
 mod statement;
+mod triangulate;
+mod weld;
+mod write;
+mod write_mtl;
 
 use std::{io::Read, ops::Range};
 
+use crate::mesh::model::Model;
+
 pub use self::{
     error::{LineProblem, ObjError},
+    looks::Sidecar,
+    mtl::{ObjMaterial, ObjTexture, read_mtl},
     names::ObjNames,
+    paths::{library_names, safe_relative_path},
+    write::{ObjFiles, write_obj},
 };
 
 /// No index, no name: a corner without texture coordinate or normal, a face outside any object.
@@ -55,7 +71,7 @@ pub struct ObjArrays {
     pub runs: Vec<ObjRun>,
     /// The names that the runs refer to.
     pub names: ObjNames,
-    /// What follows `mtllib`, one entry a statement: often one file name, but see [`ObjArrays::library_names`].
+    /// What follows `mtllib`, one entry a statement: often one file name, but see [`library_names`].
     pub material_libraries: Vec<String>,
     /// What the file holds and these arrays do not, a sentence each.
     pub notes: Vec<String>,
@@ -110,6 +126,28 @@ impl ObjArrays {
         self.runs[run].first_face as usize..end
     }
 
+    /// True if all lists fit together and all indices are in range, as after a successful read.
+    pub fn is_consistent(&self) -> bool {
+        let corners = self.corners.len();
+        let [points, texcoords, normals] = [self.positions.len(), self.texcoords.len(), self.normals.len()];
+        let optional = |list: &[u32], count: usize| {
+            (list.is_empty() || list.len() == corners) && list.iter().all(|&at| at == NONE || (at as usize) < count)
+        };
+        let faces = self.face_count();
+        let starts = &self.face_starts;
+        points.max(texcoords).max(normals).max(corners) <= MAX_ELEMENTS
+            && (self.colors.is_empty() || self.colors.len() == points)
+            && starts.first().is_none_or(|first| *first == 0)
+            && starts.last().map_or(0, |last| *last as usize) == corners
+            && starts.windows(2).all(|pair| pair[1].checked_sub(pair[0]).is_some_and(|corners| corners >= 3))
+            && self.corners.iter().all(|&at| (at as usize) < points)
+            && optional(&self.corner_texcoords, texcoords)
+            && optional(&self.corner_normals, normals)
+            && self.runs.first().map_or(faces == 0, |run| run.first_face == 0)
+            && self.runs.windows(2).all(|pair| pair[0].first_face < pair[1].first_face)
+            && self.runs.last().is_none_or(|run| (run.first_face as usize) < faces)
+    }
+
     /// Bytes in use by all lists.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.positions)
@@ -152,4 +190,54 @@ impl Default for ObjSettings {
 /// a list of more than [`MAX_ELEMENTS`]. The arrays are empty then. A file without any statement is no error here.
 pub fn read_obj(reader: impl Read + Send, arrays: &mut ObjArrays, settings: &ObjSettings) -> Result<(), ObjError> {
     pipeline::read(reader, arrays, settings)
+}
+
+/// Makes a model of what was read.
+///
+/// - [`Model::points`] are all positions in the order of the file, used or not.
+/// - Objects are those of `o`, or of `g` where the file has no `o`, in the order of their first faces; faces before the
+///   first are in an object without name. Names that come again go on with the same object.
+/// - Parts are the faces of one object with one material. Their vertices are the different corners in the order of
+///   their first use; [`Part::faces`](crate::mesh::model::Part::faces) are kept if any face is not a triangle.
+///   Polygons, concave ones too, are cut into triangles along diagonals inside them.
+/// - Normals are the file's, made to have length 1. Corners without, and with one of length 0, get smooth normals by
+///   smoothing group, or flat ones after `s off`.
+/// - Texture coordinates are turned upside down, to have their origin at the top left. Vertex colours are taken as sRGB
+///   and made linear.
+/// - Materials in use are translated to glTF's, `sidecar` being asked for their libraries and their PNG and JPEG
+///   textures by safe paths ([`safe_relative_path`]). What it does not find is left out with a note.
+///
+/// Time and memory are linear in the arrays but for large concave polygons, whose triangulation takes `n log n` as a
+/// rule and is cut short at a few seconds for all of them.
+///
+/// # Errors
+/// [`ObjError::Inconsistent`] if the arrays are not as a successful read leaves them.
+pub fn to_model(arrays: &ObjArrays, name: &str, sidecar: &mut Sidecar) -> Result<Model, ObjError> {
+    if !arrays.is_consistent() {
+        return Err(ObjError::Inconsistent);
+    }
+    Ok(weld::model(arrays, name, sidecar))
+}
+
+/// Reads an OBJ file into a model: [`read_obj`], then [`to_model`].
+///
+/// # Errors
+/// Those of [`read_obj`], and [`ObjError::NoGeometry`] for a file without any vertex. A file with vertices and without
+/// faces is a model of points, with a note.
+pub fn read_model(
+    reader: impl Read + Send,
+    name: &str,
+    settings: &ObjSettings,
+    sidecar: &mut Sidecar,
+) -> Result<Model, ObjError> {
+    let mut arrays = ObjArrays::default();
+    read_obj(reader, &mut arrays, settings)?;
+    if arrays.positions.is_empty() {
+        return Err(ObjError::NoGeometry);
+    }
+    let mut model = to_model(&arrays, name, sidecar)?;
+    if model.parts.is_empty() {
+        model.notes.push("the file has no faces, only vertices".into());
+    }
+    Ok(model)
 }

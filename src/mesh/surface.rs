@@ -6,6 +6,8 @@
 mod build;
 mod closest;
 mod crossing;
+mod node;
+mod packet;
 mod pending;
 mod traverse;
 mod tree;
@@ -18,7 +20,8 @@ pub use volumes::{Volume, volumes};
 
 use crate::mesh::ray::{Hit, Ray};
 use crossing::{Frame, resolve, usable};
-use tree::{BoxRay, Tree};
+use node::BoxRay;
+use tree::Tree;
 
 /// A bounding volume hierarchy over triangles.
 ///
@@ -113,21 +116,21 @@ impl Surface {
         if let Some((frame, boxes)) = self.prepare(ray) {
             self.tree.all(&frame, &boxes, &mut crossings);
         }
-        resolve(&mut crossings, |slot| self.tree.corners(slot), out);
+        resolve(&mut crossings, |slot| self.tree.slot(slot).1, out);
     }
 
     /// The point of the surface closest to `point`; `None` if the surface is empty or `point` is not finite. Of
     /// several triangles equally close, the one with the lowest index.
     pub fn closest_point(&self, point: Vec3) -> Option<SurfacePoint> {
         let (squared, slot, barycentric) = if usable(point) { self.tree.nearest_point(point) } else { None }?;
-        let triangle = self.tree.packets[slot as usize / tree::LANES].triangles[slot as usize % tree::LANES];
-        let closest = closest::at(barycentric, self.tree.corners(slot));
+        let (triangle, corners) = self.tree.slot(slot);
+        let closest = closest::at(barycentric, corners);
         Some(SurfacePoint { point: closest, triangle, barycentric, distance: squared.sqrt() })
     }
 
     /// The lowest and highest coordinates; `None` if the surface is empty.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        let bounds = self.tree.bounds();
+        let bounds = self.tree.bounds;
         (!bounds.is_empty()).then_some((bounds.low, bounds.high))
     }
 
@@ -136,8 +139,11 @@ impl Surface {
         self.triangles
     }
 
+    /// DEV
+    pub fn stats(&self) -> String { format!("nodes {} packets {}", self.tree.nodes.len(), self.tree.packets.len()) }
+
     fn prepare(&self, ray: &Ray) -> Option<(Frame, BoxRay)> {
         let frame = Frame::new(ray)?;
-        Some((frame, BoxRay::new(&frame, &self.tree.bounds())))
+        Some((frame, BoxRay::new(&frame, &self.tree.bounds)))
     }
 }

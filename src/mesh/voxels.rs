@@ -194,6 +194,39 @@ impl Voxels {
             && self.core[self.word(y, z) + x / 64] >> (x % 64) & 1 != 0
     }
 
+    /// Calls `visit` for the up to 26 solid neighbours of a solid cell, in x, y, z order, with the dense index of each, how
+    /// many axes less one the step to it moves along (0 over a face, 1 over an edge, 2 over a corner), and whether it is
+    /// a core cell.
+    #[inline]
+    pub fn neighbours(&self, [x, y, z]: [usize; 3], mut visit: impl FnMut(usize, usize, bool)) {
+        // Solid cells lie inside the empty margin, so all neighbours are in the grid.
+        let (low, shift) = ((x - 1) / 64, (x - 1) % 64);
+        for row in 0..9 {
+            let (dy, dz) = (row % 3, row / 3);
+            let word = self.word(y + dy - 1, z + dz - 1) + low;
+            let three = |bits: &[u64]| {
+                // Three bits of a row, which may lie in two words.
+                let next = if shift > 61 { bits[word + 1] << (64 - shift) } else { 0 };
+                (bits[word] >> shift | next) & 7
+            };
+            let mut solid = three(&self.solid);
+            if solid == 0 {
+                continue;
+            }
+            let core = three(&self.core);
+            let mut index = (self.ranks[word] + (self.solid[word] & ((1u64 << shift) - 1)).count_ones()) as usize;
+            let moved = usize::from(dy != 1) + usize::from(dz != 1);
+            while solid != 0 {
+                let dx = solid.trailing_zeros();
+                solid &= solid - 1;
+                if let Some(kind) = (moved + usize::from(dx != 1)).checked_sub(1) {
+                    visit(index, kind, core >> dx & 1 != 0);
+                }
+                index += 1;
+            }
+        }
+    }
+
     /// Calls `visit` with the dense index of the solid cells along a straight line between two points, in order; the
     /// same cell may come twice.
     pub fn along(&self, from: Vec3, to: Vec3, mut visit: impl FnMut(usize)) {

@@ -65,17 +65,11 @@ pub fn parse(bytes: &[u8]) -> Result<RigText, RigTextError> {
                 has_header = true;
             }
             _ if !has_header => {
-                return Err(RigTextError::NoHeader {
-                    line,
-                    found: quoted(keyword),
-                });
+                return Err(RigTextError::NoHeader { line, found: quoted(keyword) });
             }
             "joint" => rows.push(row(line, fields)?),
             _ => {
-                return Err(RigTextError::UnknownKeyword {
-                    line,
-                    found: quoted(keyword),
-                });
+                return Err(RigTextError::UnknownKeyword { line, found: quoted(keyword) });
             }
         }
     }
@@ -92,9 +86,7 @@ fn decode(bytes: &[u8]) -> Result<&str, RigTextError> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let valid = bytes.get(..error.valid_up_to()).unwrap_or_default();
         let text = std::str::from_utf8(valid).unwrap_or_default();
-        RigTextError::NotUtf8 {
-            line: lines(text).last().map_or(1, |(line, _)| line),
-        }
+        RigTextError::NotUtf8 { line: lines(text).last().map_or(1, |(line, _)| line) }
     })?;
     Ok(text.strip_prefix('\u{FEFF}').unwrap_or(text))
 }
@@ -124,18 +116,10 @@ fn header<'a>(line: usize, mut fields: impl Iterator<Item = &'a str>) -> Result<
             return Err(RigTextError::NewerVersion { line, found: version });
         }
         _ => {
-            return Err(RigTextError::BadVersion {
-                line,
-                found: quoted(found),
-            });
+            return Err(RigTextError::BadVersion { line, found: quoted(found) });
         }
     }
-    fields.next().map_or(Ok(()), |extra| {
-        Err(RigTextError::ExtraInHeader {
-            line,
-            found: quoted(extra),
-        })
-    })
+    fields.next().map_or(Ok(()), |extra| Err(RigTextError::ExtraInHeader { line, found: quoted(extra) }))
 }
 
 /// A joint as written, its numbers not yet looked up.
@@ -150,11 +134,7 @@ struct Row {
 fn row<'a>(line: usize, mut fields: impl Iterator<Item = &'a str>) -> Result<Row, RigTextError> {
     let mut next = |field| fields.next().ok_or(RigTextError::MissingField { line, field });
     let whole = |field, text: &str| {
-        text.parse::<i64>().map_err(|_| RigTextError::NotWhole {
-            line,
-            field,
-            found: quoted(text),
-        })
+        text.parse::<i64>().map_err(|_| RigTextError::NotWhole { line, field, found: quoted(text) })
     };
     let index_text = next(JointField::Index)?;
     let index = u64::try_from(whole(JointField::Index, index_text)?).map_err(|_| RigTextError::NotWhole {
@@ -173,46 +153,18 @@ fn row<'a>(line: usize, mut fields: impl Iterator<Item = &'a str>) -> Result<Row
     };
     let mut coordinate = |field| {
         let text = next(field)?;
-        let value: f32 = text.parse().map_err(|_| RigTextError::NotNumber {
-            line,
-            field,
-            found: quoted(text),
-        })?;
-        if value.is_finite() {
-            Ok(value)
-        } else {
-            Err(RigTextError::NotFinite {
-                line,
-                field,
-                found: quoted(text),
-            })
-        }
+        let value: f32 = text.parse().map_err(|_| RigTextError::NotNumber { line, field, found: quoted(text) })?;
+        if value.is_finite() { Ok(value) } else { Err(RigTextError::NotFinite { line, field, found: quoted(text) }) }
     };
-    let position = Vec3::new(
-        coordinate(JointField::X)?,
-        coordinate(JointField::Y)?,
-        coordinate(JointField::Z)?,
-    );
+    let position = Vec3::new(coordinate(JointField::X)?, coordinate(JointField::Y)?, coordinate(JointField::Z)?);
     let label = fields.next();
     if let Some(label) = label.filter(|label| label.chars().any(char::is_control)) {
-        return Err(RigTextError::ControlCharacter {
-            line,
-            found: quoted(label),
-        });
+        return Err(RigTextError::ControlCharacter { line, found: quoted(label) });
     }
     if let Some(extra) = fields.next() {
-        return Err(RigTextError::ExtraField {
-            line,
-            found: quoted(extra),
-        });
+        return Err(RigTextError::ExtraField { line, found: quoted(extra) });
     }
-    Ok(Row {
-        line,
-        index,
-        parent,
-        position,
-        label: label.map(str::to_owned),
-    })
+    Ok(Row { line, index, parent, position, label: label.map(str::to_owned) })
 }
 
 /// Puts joints in ascending order and looks up their parents.
@@ -221,16 +173,9 @@ fn connect(mut rows: Vec<Row>) -> Result<RigText, RigTextError> {
         rows.sort_by_key(|row| row.index);
     }
     // Rows of equal number keep the order of their lines, so the second of a pair is the one to name.
-    let twice = rows
-        .windows(2)
-        .filter(|pair| pair[0].index == pair[1].index)
-        .min_by_key(|pair| pair[1].line);
+    let twice = rows.windows(2).filter(|pair| pair[0].index == pair[1].index).min_by_key(|pair| pair[1].line);
     if let Some([first, second]) = twice {
-        return Err(RigTextError::Duplicate {
-            line: second.line,
-            index: second.index,
-            first: first.line,
-        });
+        return Err(RigTextError::Duplicate { line: second.line, index: second.index, first: first.line });
     }
     let has_gaps = rows.last().is_some_and(|last| last.index != rows.len() as u64 - 1);
     let position_of = |index: u64| {
@@ -257,19 +202,12 @@ fn connect(mut rows: Vec<Row>) -> Result<RigText, RigTextError> {
     if let Some(cycle) = find_cycle(&parents) {
         let line = cycle.iter().map(|&i| rows[i].line).min().unwrap_or(0);
         let indices: Vec<u64> = cycle.iter().map(|&i| rows[i].index).collect();
-        return Err(RigTextError::Cycle {
-            line,
-            joints: error::chain(&indices),
-        });
+        return Err(RigTextError::Cycle { line, joints: error::chain(&indices) });
     }
     let joints = rows
         .into_iter()
         .zip(parents)
-        .map(|(row, parent)| RigTextJoint {
-            parent,
-            position: row.position,
-            label: row.label,
-        })
+        .map(|(row, parent)| RigTextJoint { parent, position: row.position, label: row.label })
         .collect();
     Ok(RigText { joints })
 }

@@ -23,17 +23,12 @@ fn finished() -> Vec<u8> {
 }
 
 fn temps(folder: &Path) -> usize {
-    fs::read_dir(folder)
-        .unwrap()
-        .filter(|entry| is_temp_name(&entry.as_ref().unwrap().file_name()))
-        .count()
+    fs::read_dir(folder).unwrap().filter(|entry| is_temp_name(&entry.as_ref().unwrap().file_name())).count()
 }
 
 fn plans(operations: usize) -> impl Iterator<Item = FaultPlan> {
     (0..operations).flat_map(|at| {
-        Fault::ALL
-            .into_iter()
-            .flat_map(move |fault| [false, true].map(|lasting| FaultPlan { at, fault, lasting }))
+        Fault::ALL.into_iter().flat_map(move |fault| [false, true].map(|lasting| FaultPlan { at, fault, lasting }))
     })
 }
 
@@ -65,11 +60,7 @@ fn saving_over_a_file_leaves_the_old_or_the_finished_one_whatever_fails() {
                 Err(SaveError::Unconfirmed { .. }) => assert!(now.as_deref() == Some(&finished()), "{context}"),
                 Err(_) => assert!(now.as_deref() == existed.then_some(OLD), "{context}"),
             }
-            assert_eq!(
-                result.is_ok(),
-                !disk.has_failed() || plan.fault == Fault::Short,
-                "{context}"
-            );
+            assert_eq!(result.is_ok(), !disk.has_failed() || plan.fault == Fault::Short, "{context}");
             let names = fs::read_dir(folder.path()).unwrap().count();
             assert!(names - temps(folder.path()) <= 1, "{context}");
             if !plan.lasting && !plan.fault.is_crash() {
@@ -109,12 +100,7 @@ fn killed_while_saving_the_file_is_whole() {
     let mut left = 0;
     for round in 0..30u64 {
         let mut child = Command::new(std::env::current_exe().unwrap())
-            .args([
-                &format!("{module}::child_that_saves_until_killed"),
-                "--exact",
-                "--nocapture",
-                "--test-threads=1",
-            ])
+            .args([&format!("{module}::child_that_saves_until_killed"), "--exact", "--nocapture", "--test-threads=1"])
             .env(SAVE_LOOP, &path)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -124,10 +110,7 @@ fn killed_while_saving_the_file_is_whole() {
         let mut line = String::new();
         while !line.contains("saving") {
             line.clear();
-            assert!(
-                std::io::BufRead::read_line(&mut started, &mut line).unwrap() > 0,
-                "the child saves"
-            );
+            assert!(std::io::BufRead::read_line(&mut started, &mut line).unwrap() > 0, "the child saves");
         }
         // Spread over the few milliseconds that one save takes.
         std::thread::sleep(Duration::from_micros(round * 7919 % 23_000));
@@ -180,19 +163,9 @@ fn what_cannot_be_saved_is_said_with_a_remedy() {
         let counted = FaultyDisk::new(RealDisk, None);
         save_atomic(&counted, &at("file"), OLD).unwrap();
         let step = counted.log().iter().position(|name| *name == at_step).unwrap();
-        let disk = FaultyDisk::new(
-            RealDisk,
-            Some(FaultPlan {
-                at: step,
-                fault,
-                lasting: false,
-            }),
-        );
+        let disk = FaultyDisk::new(RealDisk, Some(FaultPlan { at: step, fault, lasting: false }));
         let error = save_atomic(&disk, &at("file"), b"replacement").unwrap_err().to_string();
-        assert!(
-            error.contains(expected) && error.contains("unchanged") && error.contains("file"),
-            "{error}"
-        );
+        assert!(error.contains(expected) && error.contains("unchanged") && error.contains("file"), "{error}");
     }
 }
 
@@ -246,14 +219,8 @@ mod on_unix {
         for link in ["link", "link_to_link", "dangling", "folder_link"] {
             assert!(fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link}");
         }
-        assert!(matches!(
-            save_atomic(&RealDisk, &at("circle_a"), b"x"),
-            Err(SaveError::LinkLoop { .. })
-        ));
-        assert!(matches!(
-            save_atomic(&RealDisk, &at("folder_link"), b"x"),
-            Err(SaveError::IsFolder { .. })
-        ));
+        assert!(matches!(save_atomic(&RealDisk, &at("circle_a"), b"x"), Err(SaveError::LinkLoop { .. })));
+        assert!(matches!(save_atomic(&RealDisk, &at("folder_link"), b"x"), Err(SaveError::IsFolder { .. })));
     }
 
     #[test]
@@ -310,36 +277,14 @@ mod on_unix {
 #[test]
 fn temporary_names_are_told_from_others() {
     let folder = fresh();
-    let plan = FaultPlan {
-        at: 3,
-        fault: Fault::Crash,
-        lasting: true,
-    };
-    save_atomic(
-        &FaultyDisk::new(RealDisk, Some(plan)),
-        &folder.path().join("rig"),
-        &finished(),
-    )
-    .unwrap_err();
-    assert_eq!(
-        temps(folder.path()),
-        1,
-        "a crash leaves one behind, and its name is recognised"
-    );
+    let plan = FaultPlan { at: 3, fault: Fault::Crash, lasting: true };
+    save_atomic(&FaultyDisk::new(RealDisk, Some(plan)), &folder.path().join("rig"), &finished()).unwrap_err();
+    assert_eq!(temps(folder.path()), 1, "a crash leaves one behind, and its name is recognised");
     fs::write(folder.path().join("mine.tmp"), b"").unwrap();
-    assert_eq!(
-        remove_stale_temps(&RealDisk, folder.path(), Duration::from_secs(3600)).unwrap(),
-        0
-    );
+    assert_eq!(remove_stale_temps(&RealDisk, folder.path(), Duration::from_secs(3600)).unwrap(), 0);
     assert_eq!(remove_stale_temps(&RealDisk, folder.path(), Duration::ZERO).unwrap(), 1);
     assert!(folder.path().join("mine.tmp").exists());
-    for name in [
-        ".rigsmith-.tmp",
-        ".rigsmith-0123456789abcdeg.tmp",
-        "rigsmith-0123456789abcdef.tmp",
-        "a.tmp",
-        "",
-    ] {
+    for name in [".rigsmith-.tmp", ".rigsmith-0123456789abcdeg.tmp", "rigsmith-0123456789abcdef.tmp", "a.tmp", ""] {
         assert!(!is_temp_name(name.as_ref()), "{name}");
     }
     assert!(is_temp_name(".rigsmith-0123456789abcdef.tmp".as_ref()));
@@ -361,10 +306,6 @@ fn saves_from_many_threads_do_not_meet() {
         }
     });
     let bytes = fs::read(&path).unwrap();
-    assert!(
-        bytes.len() == 10_000 && bytes.iter().all(|&b| b == bytes[0]),
-        "{:?}",
-        started.elapsed()
-    );
+    assert!(bytes.len() == 10_000 && bytes.iter().all(|&b| b == bytes[0]), "{:?}", started.elapsed());
     assert_eq!(temps(folder.path()), 0);
 }

@@ -32,10 +32,7 @@ fn what_cannot_be_read_is_said_with_a_remedy() {
         (at("nowhere/a.obj"), "either; check the path"),
         (at("empty.obj/a.obj"), "is a file, not a folder"),
         (at("empty.obj"), "is empty; export or copy it again"),
-        (
-            folder.path().to_path_buf(),
-            "is a folder; give the name of a file in it",
-        ),
+        (folder.path().to_path_buf(), "is a folder; give the name of a file in it"),
     ] {
         for error in [
             read_capped(&RealDisk, &path, 1 << 20).unwrap_err().to_string(),
@@ -59,6 +56,9 @@ fn devices_are_not_read() {
 /// A disk on which every file claims a length of its own; it can only be read.
 struct Lying(u64);
 
+/// The name of a file whose content never ends.
+const ENDLESS: &str = "endless";
+
 impl Disk for Lying {
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
         RealDisk.entry(path, follow).map(|entry| Entry { len: self.0, ..entry })
@@ -67,7 +67,10 @@ impl Disk for Lying {
         RealDisk.list(folder, limit)
     }
     fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
-        RealDisk.open(path)
+        match path.ends_with(ENDLESS) {
+            true => Ok(Box::new(io::repeat(7))),
+            false => RealDisk.open(path),
+        }
     }
     fn read_link(&self, _: &Path) -> io::Result<PathBuf> {
         unreachable!()
@@ -107,6 +110,10 @@ fn a_false_length_neither_reserves_nor_truncates() {
     }
     let error = read_capped(&Lying(1), &path, 100).unwrap_err();
     assert!(matches!(error, ReadError::TooLarge { .. }), "{error}");
+    let endless = folder.path().join(ENDLESS);
+    fs::write(&endless, b"x").unwrap();
+    let error = read_capped(&Lying(1), &endless, 1 << 20).unwrap_err();
+    assert!(matches!(error, ReadError::TooLarge { .. }), "{error}");
 }
 
 #[test]
@@ -117,20 +124,11 @@ fn every_failing_read_is_an_error() {
     let counted = FaultyDisk::new(RealDisk, None);
     read_capped(&counted, &path, 1 << 20).unwrap();
     let operations = counted.operations();
-    for plan in (0..operations).flat_map(|at| {
-        Fault::ALL.map(|fault| FaultPlan {
-            at,
-            fault,
-            lasting: false,
-        })
-    }) {
+    for plan in (0..operations).flat_map(|at| Fault::ALL.map(|fault| FaultPlan { at, fault, lasting: false })) {
         let disk = FaultyDisk::new(RealDisk, Some(plan));
         match read_capped(&disk, &path, 1 << 20) {
             Ok(bytes) => assert!(plan.fault == Fault::Short && bytes == large(), "{plan:?}"),
-            Err(error) => assert!(
-                error.to_string().contains('a') && plan.fault != Fault::Short,
-                "{plan:?} {error}"
-            ),
+            Err(error) => assert!(error.to_string().contains('a') && plan.fault != Fault::Short, "{plan:?} {error}"),
         }
     }
 }
@@ -187,13 +185,7 @@ fn a_model_reaches_only_its_own_folder() {
         assert!(error.len() < 600 && !error.contains('\0'), "{error}");
         assert!(!folder.has(uri), "{uri}");
     }
-    assert!(matches!(
-        folder.read("m.gltf", 1),
-        Err(UriError::Read {
-            source: ReadError::TooLarge { .. },
-            ..
-        })
-    ));
+    assert!(matches!(folder.read("m.gltf", 1), Err(UriError::Read { source: ReadError::TooLarge { .. }, .. })));
     assert!(ModelFolder::of(&RealDisk, &at("nowhere/m.gltf")).is_err());
 }
 
@@ -211,14 +203,7 @@ fn links_out_of_a_model_folder_are_refused() {
     symlink("..", at("model/up")).unwrap();
     symlink("../a.png", at("model/textures/inside.png")).unwrap();
     let folder = ModelFolder::of(&RealDisk, &at("model/m.gltf")).unwrap();
-    for uri in [
-        "link.png",
-        "LINK.png",
-        "up/secret.png",
-        "up/SECRET.png",
-        "up/model/a.png",
-        "up",
-    ] {
+    for uri in ["link.png", "LINK.png", "up/secret.png", "up/SECRET.png", "up/model/a.png", "up"] {
         let result = folder.read(uri, 100);
         assert!(matches!(result, Err(UriError::Outside { .. })), "{uri}: {result:?}");
     }

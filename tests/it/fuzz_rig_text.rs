@@ -15,15 +15,7 @@ fn no_text_breaks_the_rig_reader() {
     ]
     .map(|text| text.as_bytes().to_vec())
     .to_vec();
-    let dictionary: &[&[u8]] = &[
-        b"rig",
-        b"joint",
-        b"rig 1\n",
-        b"joint 0 -1 0 0 0\n",
-        b" -1 ",
-        b"#",
-        b"rig 2",
-    ];
+    let dictionary: &[&[u8]] = &[b"rig", b"joint", b"rig 1\n", b"joint 0 -1 0 0 0\n", b" -1 ", b"#", b"rig 2"];
     run_fuzz("rig", &seeds, dictionary, |bytes| match parse(bytes) {
         Ok(rig) => {
             for (i, joint) in rig.joints.iter().enumerate() {

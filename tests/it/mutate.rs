@@ -27,11 +27,7 @@ impl Random {
 
     /// A number below `end`; 0 if `end` is 0.
     pub fn below(&mut self, end: usize) -> usize {
-        if end == 0 {
-            0
-        } else {
-            (self.next() % end as u64) as usize
-        }
+        if end == 0 { 0 } else { (self.next() % end as u64) as usize }
     }
 
     pub fn chance(&mut self, one_in: usize) -> bool {
@@ -91,10 +87,7 @@ impl<'a> Mutator<'a> {
             random: Random::new(seed),
             dictionary,
             numbers: TEXT_NUMBERS.split(' ').collect(),
-            patterns: BINARY_NUMBERS
-                .split(' ')
-                .map(|digits| u64::from_str_radix(digits, 16).unwrap())
-                .collect(),
+            patterns: BINARY_NUMBERS.split(' ').map(|digits| u64::from_str_radix(digits, 16).unwrap()).collect(),
             pieces: TEXT_PIECES.split(' ').map(str::as_bytes).chain(BROKEN_TEXT).collect(),
             max_len,
         }
@@ -218,10 +211,7 @@ impl<'a> Mutator<'a> {
                 // One kind of byte becomes another everywhere: line ends, separators, brackets.
                 if let Some(from) = at(random, bytes).copied() {
                     let to = random.pick(&self.pieces)[0];
-                    bytes
-                        .iter_mut()
-                        .filter(|byte| **byte == from)
-                        .for_each(|byte| *byte = to);
+                    bytes.iter_mut().filter(|byte| **byte == from).for_each(|byte| *byte = to);
                 }
             }
             _ if self.dictionary.is_empty() => {}
@@ -286,9 +276,7 @@ fn tokens(bytes: &[u8], belongs: impl Fn(u8) -> bool) -> Vec<std::ops::Range<usi
 fn the_same_seed_gives_the_same_mutants() {
     let run = |seed| {
         let mut mutator = Mutator::new(seed, &[b"joint"], 1000);
-        (0..500)
-            .map(|_| mutator.mutate(b"rig 1\njoint 0 -1 0 0 0\n", b"other 2\n"))
-            .collect::<Vec<_>>()
+        (0..500).map(|_| mutator.mutate(b"rig 1\njoint 0 -1 0 0 0\n", b"other 2\n")).collect::<Vec<_>>()
     };
     assert_eq!(run(1), run(1));
     assert_ne!(run(1), run(2));

@@ -62,7 +62,7 @@ fn the_bytes_of_format_1_stay_readable() {
 #[test]
 fn fits_only_the_same_mesh() {
     let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    let skin = SkinFile::new(joints(1), weights(&[&[(0, 1.0)]; 3]), &points, &[[0, 1, 2]], false).unwrap();
+    let skin = SkinFile::new(joints(1), weights(&[&[(0, 1.0)][..]; 3]), &points, &[[0, 1, 2]], false).unwrap();
     assert!(skin.fits(&points, &[[0, 1, 2]]));
     assert!(skin.fits(&[Vec3::new(-0.0, 0.0, 0.0), Vec3::X, Vec3::Y], &[[0, 1, 2]]), "the sign of zero is no change");
     assert!(!skin.fits(&points, &[[0, 2, 1]]), "a flipped triangle is a change");

@@ -10,7 +10,7 @@ use super::{axis::Axis, path::Path, track::Track};
 
 /// How strongly even pieces are preferred: what pieces twice too long or nil would cost, in squared deviations of one
 /// radius of the limb.
-const EVENNESS: f32 = 0.3;
+const EVENNESS: f32 = 1.0;
 
 /// Arc lengths of exactly `count` joints, ends included, rising.
 pub(super) fn choose(path: &Path, track: &Track, axis: Option<&Axis>, count: usize) -> Vec<f32> {
@@ -18,13 +18,13 @@ pub(super) fn choose(path: &Path, track: &Track, axis: Option<&Axis>, count: usi
     let [first, last] = track.covered();
     let even = || (0..count).map(|i| first + (last - first) * (i as f32 / (count - 1) as f32)).collect();
     let Some(axis) = axis else { return even() };
-    let points = &axis.centres;
+    let points: Vec<Vec3> = axis.stations.iter().map(|s| s.centre).collect();
     if count == 2 || count > points.len() / 2 {
         return even();
     }
     let evenness = std::env::var("EVEN").ok().and_then(|v| v.parse().ok()).unwrap_or(EVENNESS);
-    let chosen = fit(points, axis.radius, evenness, count);
-    chosen.into_iter().map(|i| axis.at[i]).collect()
+    let chosen = fit(&points, axis.radius, evenness, count);
+    chosen.into_iter().map(|i| axis.stations[i].at).collect()
 }
 
 /// Indices of `count` points, the first and last among them, whose polyline has the least mean squared distance from all

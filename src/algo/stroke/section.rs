@@ -16,14 +16,15 @@ pub(super) struct Fan {
 
 const FINE: usize = 48;
 
+/// More of the circle than this without a wall near: not a section of a limb.
+const OPEN: f32 = 0.4;
+
 /// A cross-section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Section {
     pub(super) centroid: Vec3,
     /// Radius of the circle with the same area.
     pub(super) radius: f32,
-    /// The part of the rays that were cut at the limit, 0 to 1.
-    pub(super) open: f32,
 }
 
 impl Fan {
@@ -33,47 +34,63 @@ impl Fan {
         Self { fine }
     }
 
-    /// The section through `from` square to `normal`: the region that rays from `from` reach before they meet the surface
-    /// or `limit`. Its centroid is that of the polygon of the rays' ends. `None` if the region has no area.
+    /// The section through `from` square to `normal`: the polygon of the ends of every `stride`-th ray. A ray that meets no
+    /// wall within `limit` (a hole, or the way into the torso) ends there if `clip`, and takes its length from its
+    /// neighbours otherwise. `None` if too many take it, or the polygon has no area.
     pub(super) fn section(
         &self,
         surface: &Surface,
         from: Vec3,
         normal: Vec3,
         limit: f32,
+        clip: bool,
         stride: usize,
         hits: &mut Vec<Hit>,
     ) -> Option<Section> {
         let (u, v) = normal.any_orthonormal_pair();
-        let mut cut = 0;
-        let mut ends: [Vec2; FINE] = [Vec2::ZERO; FINE];
-        let mut count = 0;
-        for circle in self.fine.iter().step_by(stride) {
-            let ray = Ray { origin: from, direction: u * circle.x + v * circle.y };
-            surface.hits(&ray, hits);
-            let reach = hits.first().map_or(f32::INFINITY, |hit| hit.distance);
-            if reach > limit {
-                cut += 1;
+        let circle: Vec<Vec2> = self.fine.iter().copied().step_by(stride).collect();
+        let mut reach: Vec<Option<f32>> = circle
+            .iter()
+            .map(|c| {
+                surface.hits(&Ray { origin: from, direction: u * c.x + v * c.y }, hits);
+                hits.first().map(|hit| hit.distance).filter(|&distance| distance <= limit)
+            })
+            .collect();
+        let open = reach.iter().filter(|r| r.is_none()).count();
+        if !clip {
+            if open as f32 > OPEN * circle.len() as f32 {
+                return None;
             }
-            ends[count] = *circle * reach.min(limit);
-            count += 1;
+            close(&mut reach);
         }
+        let ends: Vec<Vec2> = circle.iter().zip(&reach).map(|(c, r)| *c * r.unwrap_or(limit)).collect();
         let mut area = 0.0;
         let mut moment = Vec2::ZERO;
-        for i in 0..count {
-            let (a, b) = (ends[i], ends[(i + 1) % count]);
+        for i in 0..ends.len() {
+            let (a, b) = (ends[i], ends[(i + 1) % ends.len()]);
             let cross = a.perp_dot(b);
             area += cross;
             moment += (a + b) * cross;
         }
-        if !(area > 0.0 && area.is_finite()) {
-            return None;
-        }
         let centre = moment / (3.0 * area);
-        Some(Section {
+        (area > 0.0 && centre.is_finite()).then(|| Section {
             centroid: from + u * centre.x + v * centre.y,
             radius: (0.5 * area / core::f32::consts::PI).sqrt(),
-            open: cut as f32 / count as f32,
         })
+    }
+}
+
+/// Fills the gaps of a circle in proportion between their ends.
+fn close(reach: &mut [Option<f32>]) {
+    let n = reach.len();
+    let Some(first) = reach.iter().position(|r| r.is_some()) else { return };
+    let mut before = (0, reach[first].unwrap_or(0.0));
+    for k in 1..=n {
+        let Some(here) = reach[(first + k) % n] else { continue };
+        for gap in before.0 + 1..k {
+            let t = (gap - before.0) as f32 / (k - before.0) as f32;
+            reach[(first + gap) % n] = Some(before.1 + (here - before.1) * t);
+        }
+        before = (k, here);
     }
 }

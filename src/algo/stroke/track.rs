@@ -42,6 +42,7 @@ pub(super) struct Sample {
     pub(super) at: f32,
     /// The point on the view plane.
     pub(super) source: Vec2,
+    pub(super) ray: Ray,
     /// Entry and exit of the volume.
     pub(super) span: Span,
     /// Midway between.
@@ -82,7 +83,7 @@ impl Track {
                     None => continue,
                 },
             };
-            samples.push(Sample { at, source, span, middle: ray.at(span.middle()) });
+            samples.push(Sample { at, source, ray, span, middle: ray.at(span.middle()) });
         }
         (!samples.is_empty()).then_some(Self { samples, volume_at_start, volumes_at_start, volume })
     }
@@ -100,13 +101,14 @@ impl Track {
     }
 }
 
-/// The volumes of a ray; a single hit, and hits that make no pair, count as one.
+/// The volumes of a ray. A sheet without thickness counts only where there is nothing else; several of them make one span.
 fn spans(hits: &[Hit]) -> Vec<Span> {
-    let pairs: Vec<Span> = volumes(hits).into_iter().map(|v| Span { near: v.near, far: v.far }).collect();
-    match (pairs.is_empty(), hits) {
+    let all: Vec<Span> = volumes(hits).into_iter().map(|v| Span { near: v.near, far: v.far }).collect();
+    let solid: Vec<Span> = all.iter().copied().filter(|s| s.far > s.near).collect();
+    match (solid.is_empty(), hits) {
         (true, [first, .., last]) => vec![Span { near: first.distance, far: last.distance }],
-        (true, [only]) => vec![Span { near: only.distance, far: only.distance }],
-        _ => pairs,
+        (true, _) => all,
+        _ => solid,
     }
 }
 

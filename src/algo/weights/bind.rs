@@ -7,6 +7,7 @@ use super::{
     bone::BoneSegment,
     bones::{self, Bones},
     claim::{self, Claim},
+    coarse::{self, Coarse},
     fill::fill_unweighted,
     finish::shape,
     heat,
@@ -59,36 +60,65 @@ pub(crate) fn bind(
         .map(|t| t.map(|p| place[p as usize]))
         .filter(|[a, b, c]| a != b && b != c && c != a)
         .collect();
-    step(0.05)?;
-    let sight = Sight::new(&places, &triangles);
     let graph = Graph::new(&places, &triangles);
+    step(0.1)?;
+    if count <= coarse::LIMIT {
+        let (weights, sources, _) = bind_places(&places, &triangles, &graph, &joints, settings, tuning, progress)?;
+        return Ok(Bound { place, weights, sources });
+    }
+    let coarse = Coarse::new(&places, &triangles, &graph);
+    let coarse_graph = Graph::new(&coarse.points, &coarse.triangles);
+    let (weights, sources, claims) = bind_places(&coarse.points, &coarse.triangles, &coarse_graph, &joints, settings, tuning, progress)?;
+    let weights = coarse.spread(&weights, &claims, &graph, settings.blend());
+    let sources = coarse.cluster.iter().map(|&c| sources[c as usize]).collect();
+    Ok(Bound { place, weights, sources })
+}
+
+/// Binds a surface without duplicate points, of unit size. Returns the claims too; without heat where other methods bound.
+fn bind_places(
+    places: &[Vec3],
+    triangles: &[[u32; 3]],
+    graph: &Graph,
+    joints: &[WeightJoint],
+    settings: &WeightSettings,
+    tuning: &Tuning,
+    progress: &(dyn Fn(f32) -> bool + Sync),
+) -> Result<(Weights, Vec<Source>, Vec<Claim>), WeightError> {
+    let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
+    let sight = Sight::new(places, triangles);
     step(0.2)?;
-    let bones = bones::build(&joints, &places, &graph.areas, &sight, tuning);
+    let bones = bones::build(joints, places, &graph.areas, &sight, tuning);
     step(0.25)?;
-    let mut weights = empty(count);
-    let mut sources = vec![Source::Nearest; count];
-    let mut left = count;
+    let mut weights = empty(places.len());
+    let mut claims = vec![Claim::default(); places.len()];
+    let mut sources = vec![Source::Nearest; places.len()];
+    let mut left = places.len();
     if settings.method != Method::Voxel {
-        let claims = claim::claims(&places, &bones, &sight, tuning);
+        claims = claim::claims(places, &bones, graph, &sight, tuning);
         step(0.5)?;
-        let trusted = trusted(&triangles, &graph, &claims, settings.method);
-        if let Some(found) = by_heat(&graph, &claims, &trusted, settings) {
+        let trusted = trusted(triangles, graph, &claims, settings.method);
+        if let Some(found) = by_heat(graph, &claims, &trusted, settings) {
             left = note(&found, &weights, &mut sources, Source::Surface);
             weights = found;
+        }
+        for (v, claim) in claims.iter_mut().enumerate() {
+            if weights.of(v).len() == 0 {
+                claim.heat = 0.0;
+            }
         }
         step(0.7)?;
     }
     if left > 0 && settings.method != Method::Heat {
-        let found = by_voxels(&places, &triangles, &bones, settings, &|share| progress(0.7 + 0.2 * share))?;
+        let found = by_voxels(places, triangles, &bones, settings, &|share| progress(0.7 + 0.2 * share))?;
         let merged = merge(&weights, &found);
         left = note(&merged, &weights, &mut sources, Source::Voxels);
         weights = merged;
     }
     step(0.9)?;
     if left > 0 {
-        weights = fill(&places, &triangles, &weights, &bones.segments, &mut sources);
+        weights = fill(places, triangles, &weights, &bones.segments, &mut sources);
     }
-    Ok(Bound { place, weights, sources })
+    Ok((weights, sources, claims))
 }
 
 /// Moves everything to the origin and to unit size, so that no tolerance depends on the unit. Joints that are not free do
@@ -139,7 +169,7 @@ fn by_heat(graph: &Graph, claims: &[Claim], trusted: &[bool], settings: &WeightS
     if !trusted.iter().any(|&t| t) {
         return None;
     }
-    let dense = heat::solve(graph, claims, settings.smoothing)?;
+    let dense = heat::solve(graph, claims, settings.blend())?;
     let mut weights = Weights { starts: vec![0], ..Weights::default() };
     let mut row = Vec::new();
     for (v, &trusted) in trusted.iter().enumerate() {

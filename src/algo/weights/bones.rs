@@ -13,20 +13,6 @@ use super::{WeightJoint, bone::BoneSegment, sight::Sight, tuning::Tuning};
 pub(crate) struct Bones {
     pub segments: Vec<BoneSegment>,
     pub radii: Vec<f32>,
-    /// Whether each of [`STATIONS`] equal pieces of each bone lies inside the surface.
-    pub inside: Vec<[bool; STATIONS]>,
-}
-
-const STATIONS: usize = 8;
-
-impl Bones {
-    /// True if `target`, a point of the bone, lies inside the surface.
-    pub fn is_inside(&self, bone: usize, target: Vec3) -> bool {
-        let segment = &self.segments[bone];
-        let length = segment.head.distance(segment.tail);
-        let share = if length > 0.0 { segment.head.distance(target) / length } else { 0.0 };
-        self.inside[bone][((share * STATIONS as f32) as usize).min(STATIONS - 1)]
-    }
 }
 
 /// Which joint carries the flesh of each: itself, or the nearest ancestor that deforms. All deform if none does.
@@ -102,11 +88,7 @@ pub(crate) fn build(joints: &[WeightJoint], points: &[Vec3], areas: &[f32], sigh
     let typical = known.get(known.len() / 2).copied().unwrap_or(1.0).max(tiny).max(f32::MIN_POSITIVE);
     let radii: Vec<f32> = radii.into_iter().map(|r| if r.is_finite() { r.max(0.05 * typical) } else { typical }).collect();
     let radii = if tuning.region > 0.0 { region_radii(&segments, points, areas, sight, &radii, tuning) } else { radii };
-    let inside = segments
-        .par_iter()
-        .map(|s| std::array::from_fn(|i| sight.winding(s.head.lerp(s.tail, (i as f32 + 0.5) / STATIONS as f32)) > 0.33))
-        .collect();
-    Bones { segments, radii, inside }
+    Bones { segments, radii }
 }
 
 /// Of bones at the same place the first one stays: nothing tells them apart.

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     bones::{Bones, closest_on},
+    laplacian::Graph,
     sight::Sight,
     tuning::Tuning,
 };
@@ -23,29 +24,86 @@ pub(crate) struct Claim {
     pub shares: [(u32, f32); SHARES],
 }
 
-/// Finds the claims of all points.
-pub(crate) fn claims(points: &[Vec3], bones: &Bones, sight: &Sight, tuning: &Tuning) -> Vec<Claim> {
-    points
-        .par_chunks(256)
-        .flat_map_iter(|chunk| {
-            let mut near: Vec<(f32, u32)> = Vec::new();
-            let (mut found, mut crossings) = (Vec::new(), Vec::new());
-            chunk
-                .iter()
-                .map(|&point| {
-                    near.clear();
-                    near.extend(bones.segments.iter().enumerate().map(|(i, s)| (reach(closest_on(s, point).distance(point), bones.radii[i], tuning), i as u32)));
-                    let tries = tuning.tries.min(near.len());
-                    if tries < near.len() {
-                        near.select_nth_unstable_by(tries, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                    }
-                    near.truncate(tries);
-                    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                    claim(point, &near, bones, sight, tuning, &mut found, &mut crossings)
-                })
-                .collect::<Vec<_>>()
-        })
-        .collect()
+/// Finds the claims of all points of a welded surface with the given neighbours.
+///
+/// Each point is claimed by the bone with the shortest [`reach`]; bones almost as near share it. A line of sight alone
+/// misjudges faces, where nostrils and the mouth lie between skin and skull, so sight is asked of whole patches: a bone
+/// loses a patch of which it sees less than half, as a hand loses the thigh beside it.
+pub(crate) fn claims(points: &[Vec3], bones: &Bones, graph: &Graph, sight: &Sight, tuning: &Tuning) -> Vec<Claim> {
+    let mut claims = vec![Claim::default(); points.len()];
+    let mut banned = vec![[NONE; ROUNDS]; points.len()];
+    let mut open: Vec<u32> = (0..points.len() as u32).collect();
+    for round in 0..=tuning.rounds {
+        let found: Vec<Claim> = open
+            .par_chunks(CHUNK)
+            .flat_map_iter(|chunk| {
+                let mut near = Vec::new();
+                chunk
+                    .iter()
+                    .map(|&v| claim(points[v as usize], &banned[v as usize], bones, sight, tuning, &mut near))
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        for (&v, claim) in open.iter().zip(found) {
+            claims[v as usize] = claim;
+        }
+        let leaks = leaks(&claims, graph, tuning.leak);
+        if round == tuning.rounds || leaks.is_empty() {
+            // What still leaks takes its warmth from its neighbours.
+            for v in leaks {
+                claims[v as usize].heat = 0.0;
+            }
+            break;
+        }
+        for &v in &leaks {
+            banned[v as usize][round] = claims[v as usize].shares[0].0;
+        }
+        open = leaks;
+    }
+    claims
+}
+
+/// How often a patch may change hands.
+const ROUNDS: usize = 3;
+/// Points handled at a time by one thread.
+const CHUNK: usize = 256;
+const NONE: u32 = u32::MAX;
+
+/// Points of patches that their joint sees less than half of. A patch is a connected set of points with one joint.
+fn leaks(claims: &[Claim], graph: &Graph, share: f32) -> Vec<u32> {
+    let mut patch = vec![NONE; claims.len()];
+    let mut leaks = Vec::new();
+    let mut members = Vec::new();
+    for start in 0..claims.len() {
+        if patch[start] != NONE || claims[start].heat == 0.0 {
+            continue;
+        }
+        let joint = claims[start].shares[0].0;
+        let (mut area, mut seen) = (0f32, 0f32);
+        members.clear();
+        members.push(start as u32);
+        patch[start] = start as u32;
+        let mut next = 0;
+        while let Some(&v) = members.get(next) {
+            next += 1;
+            let v = v as usize;
+            area += graph.areas[v];
+            if claims[v].seen {
+                seen += graph.areas[v];
+            }
+            for (n, _) in graph.of(v) {
+                if patch[n] == NONE && claims[n].heat > 0.0 && claims[n].shares[0].0 == joint {
+                    patch[n] = start as u32;
+                    members.push(n as u32);
+                }
+            }
+        }
+        if seen < share * area {
+            leaks.extend_from_slice(&members);
+        }
+    }
+    leaks.sort_unstable();
+    leaks
 }
 
 /// How far a bone of this radius has to reach for a point: the distance, and more beyond its own tube, where another
@@ -54,47 +112,41 @@ fn reach(distance: f32, radius: f32, tuning: &Tuning) -> f32 {
     distance * (1.0 + tuning.beyond * (distance / (radius * tuning.tube) - 1.0).max(0.0))
 }
 
-/// Metric, joint, distance, and whether the bone is in sight.
-type Found = (f32, u32, f32, bool);
-
-fn claim(point: Vec3, near: &[(f32, u32)], bones: &Bones, sight: &Sight, tuning: &Tuning, found: &mut Vec<Found>, crossings: &mut Vec<f32>) -> Claim {
+/// The claim on one point; `near` is scratch space.
+fn claim(point: Vec3, banned: &[u32], bones: &Bones, sight: &Sight, tuning: &Tuning, near: &mut Vec<(f32, u32)>) -> Claim {
     let mut result = Claim::default();
-    found.clear();
-    let mut limit = f32::INFINITY;
-    for &(metric, index) in near {
-        if metric > limit {
-            break;
+    near.clear();
+    let mut best = f32::INFINITY;
+    for (index, segment) in bones.segments.iter().enumerate() {
+        let reach = reach(closest_on(segment, point).distance(point), bones.radii[index], tuning);
+        if reach <= best * (1.0 + tuning.share_band) && !banned.contains(&segment.joint) {
+            best = best.min(reach);
+            near.push((reach, index as u32));
         }
-        let segment = &bones.segments[index as usize];
-        let target = closest_on(segment, point);
-        let distance = point.distance(target).max(1e-6);
-        let air = sight.air(point, target, tuning.sight_margin, bones.is_inside(index as usize, target), crossings);
-        let factor = 1.0 + air * tuning.air;
-        let metric = metric * factor;
-        limit = limit.min(metric * (1.0 + tuning.share_band));
-        found.push((metric, segment.joint, distance * factor, air == 0.0));
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let Some(&(first, _, distance, seen)) = found.first() else { return result };
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let Some(&(_, first)) = near.first() else { return result };
+    let target = closest_on(&bones.segments[first as usize], point);
+    let distance = point.distance(target).max(1e-6);
     result.heat = tuning.heat / (distance * distance);
-    result.seen = seen;
+    result.seen = sight.clear(point, target, tuning.sight_margin);
+    let limit = best * (1.0 + tuning.share_band);
     let mut used = 0;
-    for &(metric, joint, ..) in found.iter() {
-        if metric > limit || used == SHARES {
+    for &(reach, index) in near.iter() {
+        let joint = bones.segments[index as usize].joint;
+        if reach > limit || used == SHARES {
             break;
         }
         if result.shares[..used].iter().any(|s| s.0 == joint) {
             continue;
         }
-        let share = if limit > first { (1.0 - (metric - first) / (limit - first)).clamp(0.0, 1.0).max(1e-3) } else { 1.0 };
+        let share = if limit > best { ((limit - reach) / (limit - best)).max(1e-3) } else { 1.0 };
         result.shares[used] = (joint, share);
         used += 1;
     }
     let sum: f32 = result.shares.iter().map(|s| s.1).sum();
-    if sum > 0.0 {
-        for share in &mut result.shares {
-            share.1 /= sum;
-        }
+    for share in &mut result.shares {
+        share.1 /= sum;
     }
     result
 }

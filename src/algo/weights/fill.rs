@@ -8,6 +8,7 @@
 mod graph;
 mod nearest;
 mod solve;
+mod unit;
 
 use glam::Vec3;
 
@@ -16,6 +17,7 @@ use crate::mesh::model::Weights;
 pub(crate) use graph::Graph;
 pub(crate) use nearest::Nearest;
 pub(crate) use solve::{Links, Sparse, complete, prune};
+pub(crate) use unit::Unit;
 
 /// Islands whose box has a diagonal up to this share of the weighted points' box move rigidly.
 const SMALL: f32 = 0.05;
@@ -53,6 +55,9 @@ pub fn fill_unweighted(
         return (weights.clone(), report);
     }
     let most = (0..weights.len()).map(|p| weights.of(p).len()).max().unwrap_or(0).clamp(4, 8);
+    let unit = Unit::of((0..points.len()).filter(|&p| !empty(p)).map(|p| points[p]).chain(ends(bones)));
+    let points = &unit.all(points);
+    let bones = &bones.iter().map(|b| BoneSegment { head: unit.to(b.head), tail: unit.to(b.tail), ..*b }).collect::<Vec<_>>();
     let graph = Graph::new(points, triangles);
     // A place is known if a vertex there is; the first one speaks for it.
     let mut known: Vec<Option<Sparse>> = vec![None; graph.len()];
@@ -64,23 +69,23 @@ pub fn fill_unweighted(
             known[node] = given(p).map(Iterator::collect);
         }
     }
-    let filled = fill_nodes(&graph, known, bones, most);
+    let filled = fill_nodes(&graph, &known, bones, most);
     let mut result = Weights { starts: vec![0], ..Weights::default() };
     for p in 0..points.len() {
         if let (false, Some(given)) = (empty(p), given(p)) {
             result.push(given);
             continue;
         }
-        match graph.node(p).and_then(|node| filled[node].as_ref()) {
-            Some((influences, solved)) => {
-                report.by_solve += usize::from(*solved);
-                report.by_nearest += usize::from(!solved);
-                result.push(influences.iter().copied());
-            }
-            None => {
-                report.by_nearest += usize::from(!bones.is_empty());
-                result.push(bones.first().map(|b| (b.joint, 1.0)));
-            }
+        // A vertex at the same place may have weights; then they count.
+        let shared = graph.node(p).and_then(|node| known[node].as_ref()).map(|influences| (influences, true));
+        let found = shared.or_else(|| graph.node(p).and_then(|node| filled[node].as_ref()).map(|f| (&f.0, f.1)));
+        if let Some((influences, solved)) = found {
+            report.by_solve += usize::from(solved);
+            report.by_nearest += usize::from(!solved);
+            result.push(influences.iter().copied());
+        } else {
+            report.by_nearest += usize::from(!bones.is_empty());
+            result.push(bones.first().map(|b| (b.joint, 1.0)));
         }
     }
     (result, report)
@@ -89,7 +94,7 @@ pub fn fill_unweighted(
 /// Weights of every node, and whether they came from weighted nodes. `None` only if there is nothing to take.
 fn fill_nodes(
     graph: &Graph,
-    known: Vec<Option<Sparse>>,
+    known: &[Option<Sparse>],
     bones: &[BoneSegment],
     most: usize,
 ) -> Vec<Option<(Sparse, bool)>> {
@@ -149,13 +154,18 @@ fn fill_nodes(
         }
     }
     let settled: Vec<bool> = filled.iter().map(Option::is_some).collect();
-    let solved = complete(graph, &known, &settled, &links, most);
+    let solved = complete(graph, known, &settled, &links, most);
     for (node, influences) in solved.into_iter().enumerate() {
         if let (None, Some(influences)) = (&filled[node], influences) {
             filled[node] = Some((influences, true));
         }
     }
     filled
+}
+
+/// Both ends of all bones.
+fn ends(bones: &[BoneSegment]) -> impl Iterator<Item = Vec3> + '_ {
+    bones.iter().flat_map(|b| [b.head, b.tail])
 }
 
 /// At most a few dozen nodes of an island, evenly spread.

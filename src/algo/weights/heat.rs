@@ -25,7 +25,7 @@ pub(crate) fn solve(graph: &Graph, claims: &[Claim], smoothing: f32) -> Option<D
     let mean = graph.areas.iter().map(|&a| f64::from(a)).sum::<f64>() / n.max(1) as f64;
     let floor = mean * 1e-6;
     let area = |v: usize| f64::from(graph.areas[v]).max(floor);
-    let sharpness = 1.0 / if smoothing.is_finite() { f64::from(smoothing).clamp(0.01, 100.0) } else { 1.0 };
+    let sharpness = 1.0 / f64::from(smoothing);
     let warmth = |v: usize| area(v) * f64::from(claims[v].heat) * sharpness;
     let diagonal = (0..n)
         .map(|v| {

@@ -23,52 +23,56 @@ impl Graph {
     /// corners are skipped.
     pub fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let n = points.len();
-        let mut areas = vec![0f32; n];
-        let mut half_edges: Vec<(u64, f32)> = Vec::with_capacity(triangles.len() * 3);
-        for &[a, b, c] in triangles {
-            if a == b || b == c || c == a {
-                continue;
+        let whole = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+        let mut room = vec![0u32; n + 1];
+        for t in triangles.iter().filter(|t| whole(t)) {
+            for &v in t {
+                room[v as usize + 1] += 2;
             }
-            let corner = [a, b, c].map(|i| points[i as usize]);
+        }
+        for i in 0..n {
+            room[i + 1] += room[i];
+        }
+        let mut next = room.clone();
+        let mut half_edges = vec![(0u32, 0f32); room[n] as usize];
+        let mut areas = vec![0f32; n];
+        for t in triangles.iter().filter(|t| whole(t)) {
+            let corner = t.map(|i| points[i as usize]);
             let double_area = (corner[1] - corner[0]).cross(corner[2] - corner[0]).length();
             for i in 0..3 {
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
                 let dot = (corner[j] - corner[i]).dot(corner[k] - corner[i]);
                 let cotangent = if double_area > 0.0 { (dot / double_area).clamp(-MAX_COTANGENT, MAX_COTANGENT) } else { 0.0 };
-                let (from, to) = ([a, b, c][j], [a, b, c][k]);
-                let key = (u64::from(from.min(to)) << 32) | u64::from(from.max(to));
-                half_edges.push((key, 0.5 * cotangent));
-                areas[[a, b, c][i] as usize] += double_area / 6.0;
+                for (from, to) in [(t[j], t[k]), (t[k], t[j])] {
+                    half_edges[next[from as usize] as usize] = (to, 0.5 * cotangent);
+                    next[from as usize] += 1;
+                }
+                areas[t[i] as usize] += double_area / 6.0;
             }
         }
-        // A stable sort, so that sums are taken in the order of the triangles.
-        half_edges.sort_by_key(|e| e.0);
-        let mut edges: Vec<(u32, u32, f32)> = Vec::with_capacity(half_edges.len() / 2);
-        for (key, weight) in half_edges {
-            let (low, high) = ((key >> 32) as u32, key as u32);
-            match edges.last_mut() {
-                Some(last) if (last.0, last.1) == (low, high) => last.2 += weight,
-                _ => edges.push((low, high, weight)),
+        // Rows come out in the order of the triangles, so both halves of an edge are the same sum.
+        let mut starts = Vec::with_capacity(n + 1);
+        let mut columns = Vec::with_capacity(half_edges.len() / 2 + n);
+        let mut values: Vec<f32> = Vec::with_capacity(half_edges.len() / 2 + n);
+        starts.push(0);
+        for v in 0..n {
+            let row = &mut half_edges[room[v] as usize..room[v + 1] as usize];
+            row.sort_by_key(|e| e.0);
+            let first = columns.len();
+            for &(to, weight) in row.iter() {
+                if columns.len() > first && columns.last() == Some(&to) {
+                    if let Some(value) = values.last_mut() {
+                        *value += weight;
+                    }
+                } else {
+                    columns.push(to);
+                    values.push(weight);
+                }
             }
-        }
-        let mut starts = vec![0u32; n + 1];
-        for &(low, high, _) in &edges {
-            starts[low as usize + 1] += 1;
-            starts[high as usize + 1] += 1;
-        }
-        for i in 0..n {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let mut columns = vec![0u32; edges.len() * 2];
-        let mut values = vec![0f32; edges.len() * 2];
-        for (low, high, weight) in edges {
-            for (from, to) in [(low, high), (high, low)] {
-                let slot = next[from as usize] as usize;
-                next[from as usize] += 1;
-                columns[slot] = to;
-                values[slot] = weight.max(MIN_WEIGHT);
+            for value in &mut values[first..] {
+                *value = value.max(MIN_WEIGHT);
             }
+            starts.push(columns.len() as u32);
         }
         Self { starts, columns, values, areas }
     }

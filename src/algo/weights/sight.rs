@@ -48,27 +48,6 @@ impl Sight {
         bvh.ray_traverse_miss(ray, |ray, index| self.triangles[index].intersect(ray))
     }
 
-    /// How much of the segment runs outside the flesh, as a share of its length, if `to` lies inside.
-    ///
-    /// Going back from `to`, the segment leaves the flesh at every other crossing. A cavity inside the body costs little
-    /// that way, and the gap between an arm and the trunk much.
-    pub fn air(&self, from: Vec3, to: Vec3, margin: f32, inside: bool, crossings: &mut Vec<f32>) -> f32 {
-        let Some(bvh) = &self.bvh else { return 0.0 };
-        let direction = Vec3A::from(from - to);
-        if direction.length_squared() <= 0.0 {
-            return 0.0;
-        }
-        crossings.clear();
-        bvh.ray_traverse_anyhit(Ray::new(to.into(), direction, 0.0, 1.0 - margin), |ray, index| {
-            let t = self.triangles[index].intersect(ray);
-            if t < f32::INFINITY {
-                crossings.push(t);
-            }
-        });
-        crossings.sort_by(f32::total_cmp);
-        crossings.get(usize::from(!inside)..).unwrap_or(&[]).chunks(2).map(|pair| pair.get(1).copied().unwrap_or(1.0) - pair[0]).sum()
-    }
-
     /// The distance along the unit vector `direction` to the first surface further away than `from`.
     pub fn first(&self, origin: Vec3, direction: Vec3, from: f32) -> Option<f32> {
         let bvh = self.bvh.as_ref()?;

@@ -10,15 +10,17 @@ mod labels;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::bone::BoneSegment;
+use super::{bone::BoneSegment, fill::Unit};
 use crate::mesh::{
     model::Weights,
-    voxels::{Voxels, VoxelizeError},
+    voxels::{MAX_RESOLUTION, Voxels, VoxelizeError},
 };
-use labels::{Field, Joints};
+use labels::{Field, Joints, Limits};
 
 /// Points handled at a time by one thread.
 const CHUNK: usize = 1024;
+/// More solid cells than this are made fewer and larger, for time and memory.
+const MOST_SOLID: usize = 400_000;
 /// How far from a point, in cells, a solid cell is looked for when none of the eight around it is solid.
 const SEARCH: isize = 3;
 /// What a cell of the surface layer whose centre lies outside counts, against one inside: it may belong to a
@@ -47,6 +49,22 @@ pub struct VoxelSettings {
 impl Default for VoxelSettings {
     fn default() -> Self {
         Self { resolution: 192, labels: 5, falloff: 1.0, sharpness: 3, influences: 8 }
+    }
+}
+
+impl VoxelSettings {
+    /// The weight of a bone before normalising, by its distance over that of the nearest bone.
+    fn weight(&self, ratio: f32) -> f32 {
+        let softness = 1.0 - if self.falloff.is_nan() { 1.0 } else { self.falloff.clamp(0.0, 1.0) };
+        // Whole powers by multiplication round the same everywhere.
+        let d = (1..self.sharpness.clamp(1, 8)).fold(ratio, |d, _| d * ratio);
+        let fall = softness * d + (1.0 - softness) * d * d;
+        1.0 / (fall * fall)
+    }
+
+    /// The ratio beyond which weights are too small to count, within an eighth.
+    fn reach(&self) -> f32 {
+        (9..320).map(|i| i as f32 / 8.0).find(|&ratio| self.weight(ratio) < LEAST).unwrap_or(40.0)
     }
 }
 
@@ -81,20 +99,31 @@ pub fn geodesic_voxel_weights(
     settings: &VoxelSettings,
     progress: &(dyn Fn(f32) -> bool + Sync),
 ) -> Result<Weights, VoxelError> {
-    let joints = Joints::new(bones);
+    let unit = Unit::of(bones.iter().flat_map(|b| [b.head, b.tail]));
+    let points = &unit.all(points);
+    let bones: Vec<_> = bones.iter().map(|b| BoneSegment { head: unit.to(b.head), tail: unit.to(b.tail), ..*b }).collect();
+    let joints = Joints::new(&bones);
     let (low, high) = joints.bounds().ok_or(VoxelError::NoBones)?;
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(VoxelError::Cancelled) };
     step(0.0)?;
     // What lies a skeleton's size away from the skeleton is no part of the body and must not cost resolution.
-    let reach = (high - low).length().min(f32::MAX / 4.0);
+    let reach = (high - low).length();
     let clip = (reach > 0.0).then(|| (low - reach, high + reach));
-    let resolution = settings.resolution.max(8);
-    let voxels = Voxels::new(points, triangles, resolution, clip)?;
+    let make = |resolution: usize| match Voxels::new(points, triangles, resolution, clip) {
+        // Nothing near the skeleton: all there is will do.
+        Err(VoxelizeError::NoSurface) => Voxels::new(points, triangles, resolution, None),
+        other => other,
+    };
+    let resolution = settings.resolution.clamp(8, MAX_RESOLUTION);
+    let mut voxels = make(resolution)?;
+    if voxels.len() > MOST_SOLID {
+        // A stout body has far more cells inside than a limb, and needs fewer.
+        let share = (MOST_SOLID as f64 / voxels.len() as f64).cbrt();
+        voxels = make(((resolution as f64 * share) as usize).max(8))?;
+    }
     step(0.2)?;
-    let field = Field::new(&voxels, &joints, settings.labels.clamp(1, labels::MOST), &|share| {
-        progress(0.2 + 0.6 * share)
-    })
-    .ok_or(VoxelError::Cancelled)?;
+    let limits = Limits { labels: settings.labels.clamp(1, labels::MOST), ratio: settings.reach() };
+    let field = Field::new(&voxels, &joints, limits, &|share| progress(0.2 + 0.6 * share)).ok_or(VoxelError::Cancelled)?;
     step(0.8)?;
     let chunks: Vec<Weights> = points
         .par_chunks(CHUNK)
@@ -156,13 +185,8 @@ impl Sampler<'_> {
             found.value = self.joints.distance(found.joint, point).max(floor) * detour;
             nearest = nearest.min(found.value);
         }
-        let softness = self.settings.falloff.clamp(0.0, 1.0);
         for found in &mut self.found {
-            // Whole powers by multiplication round the same everywhere.
-            let ratio = found.value / nearest;
-            let d = (1..self.settings.sharpness.clamp(1, 8)).fold(ratio, |d, _| d * ratio);
-            let fall = (1.0 - softness) * d + softness * d * d;
-            found.value = found.share / total / (fall * fall);
+            found.value = found.share / total * self.settings.weight(found.value / nearest);
         }
         self.found.sort_by(|a, b| b.value.total_cmp(&a.value).then(a.joint.cmp(&b.joint)));
         self.found.truncate(self.settings.influences.max(1));
@@ -193,9 +217,12 @@ impl Sampler<'_> {
                 let high = (at[a] - 0.5 - base[a]) as f32;
                 share *= if step[a] == 1 { high } else { 1.0 - high };
             }
-            total += self.add(cell, share);
+            // A cell that the point only just touches would divide by zero below.
+            if share > 1e-6 {
+                total += self.add(cell, share);
+            }
         }
-        if total > 1e-6 {
+        if total > 0.0 {
             return total;
         }
         self.found.clear();

@@ -78,6 +78,14 @@ pub enum SaveError {
         /// The path as given.
         path: PathBuf,
     },
+    /// A file that belongs to another is named outside that one's folder.
+    #[error("cannot save `{}`: it is outside the folder `{}` of the file it belongs to; give it a plain file name", path.display(), folder.display())]
+    Outside {
+        /// The path as given.
+        path: PathBuf,
+        /// The folder of the main file.
+        folder: PathBuf,
+    },
     /// Two files of one call aim at the same place.
     #[error("cannot save `{}` twice in one go: give the files different names", path.display())]
     SameTarget {
@@ -136,20 +144,15 @@ impl SaveError {
     pub(super) fn new(path: &Path, folder: &Path, bytes: usize, step: SaveStep, source: io::Error) -> Self {
         let path = path.to_path_buf();
         match source.kind() {
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Self::NoSpace {
-                path,
-                bytes: bytes as u64,
-                source,
-            },
-            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => Self::NoAccess {
-                path,
-                folder: folder.to_path_buf(),
-                source,
-            },
-            ErrorKind::NotFound | ErrorKind::NotADirectory if step == SaveStep::Create => Self::NoFolder {
-                path,
-                folder: folder.to_path_buf(),
-            },
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+                Self::NoSpace { path, bytes: bytes as u64, source }
+            }
+            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+                Self::NoAccess { path, folder: folder.to_path_buf(), source }
+            }
+            ErrorKind::NotFound | ErrorKind::NotADirectory if step == SaveStep::Create => {
+                Self::NoFolder { path, folder: folder.to_path_buf() }
+            }
             _ => Self::Io { path, step, source },
         }
     }

@@ -70,6 +70,14 @@ impl Component {
     }
 }
 
+/// How many elements there are, their size, and how far apart they are if the view does not say.
+#[derive(Clone, Copy)]
+struct Layout {
+    count: usize,
+    size: usize,
+    packed: usize,
+}
+
 /// Where elements lie: in a view, `offset` bytes from its start, `stride` apart.
 struct Place {
     view: usize,
@@ -112,37 +120,32 @@ impl Accessor {
             _ => 0,
         };
         // Columns of matrices begin at multiples of four bytes.
-        let size = match (kind, component.map_or(0, Component::size)) {
-            ("MAT2", 1) => 8,
-            ("MAT3", 1) => 12,
-            ("MAT3", 2) => 24,
-            (_, size) => size * width,
+        let (size, packed) = match (kind, component.map_or(0, Component::size)) {
+            ("MAT2", 1) => (6, 8),
+            ("MAT3", 1) => (11, 12),
+            ("MAT3", 2) => (22, 24),
+            (_, size) => (size * width, size * width),
         };
+        let layout = Layout { count, size, packed };
         let view = at.index("bufferView", views.len(), "buffer view")?;
         let offset = at.uint("byteOffset")?.unwrap_or(0);
-        let place = view.map(|view| place(at, "byteOffset", view, offset, count, size, views)).transpose()?;
+        let place = view.map(|view| place(at, view, offset, layout, views)).transpose()?;
         let sparse = match at.object("sparse")? {
             None => None,
-            Some(at) => Some(Box::new(sparse(&at, count, size, views)?)),
+            Some(at) => Some(Box::new(sparse(&at, layout, views)?)),
         };
         Ok(Self { count, component, width, normalized: at.flag("normalized")?, place, sparse })
     }
 }
 
 /// Checks that `count` elements of `size` bytes fit into the view.
-fn place(
-    at: &At,
-    key: &str,
-    view: usize,
-    offset: usize,
-    count: usize,
-    size: usize,
-    views: &[View],
-) -> Result<Place, GltfError> {
+fn place(at: &At, view: usize, offset: usize, layout: Layout, views: &[View]) -> Result<Place, GltfError> {
+    let Layout { count, size, packed } = layout;
     let View { length, stride, .. } = views[view];
-    let stride = stride.unwrap_or(size);
+    let stride = stride.unwrap_or(packed);
     if stride < size {
-        return Err(at.fail(key, format!("elements of {size} bytes every {stride} bytes of buffer view {view}")));
+        let what = format!("elements of {size} bytes every {stride} bytes of buffer view {view}");
+        return Err(at.fail("byteOffset", what));
     }
     let end = match count {
         0 => Some(offset),
@@ -153,35 +156,32 @@ fn place(
             "{count} elements of {size} bytes, {stride} apart, from byte {offset} reach beyond buffer view {view}, \
              which has {length} bytes"
         );
-        return Err(at.fail(key, what));
+        return Err(at.fail("byteOffset", what));
     }
     Ok(Place { view, offset, stride })
 }
 
-fn sparse(at: &At, total: usize, size: usize, views: &[View]) -> Result<Sparse, GltfError> {
+fn sparse(at: &At, layout: Layout, views: &[View]) -> Result<Sparse, GltfError> {
     let count = at.need("count", at.uint("count")?)?;
-    if count > total {
-        return Err(at.fail("count", format!("{count} of {total} elements are replaced")));
+    if count > layout.count {
+        return Err(at.fail("count", format!("{count} of {} elements are replaced", layout.count)));
     }
-    let part = |key: &str, size: &dyn Fn(&At) -> Result<usize, GltfError>| {
-        let at = at.need(key, at.object(key)?)?;
+    // Sparse data is packed, whatever the view says.
+    let part = |at: &At, size: usize, packed: usize| {
         let view = at.need("bufferView", at.index("bufferView", views.len(), "buffer view")?)?;
         let offset = at.uint("byteOffset")?.unwrap_or(0);
-        // Sparse data is packed, whatever the view says.
-        let packed = |view: &View| View { stride: None, ..*view };
-        let views: Vec<View> = views[view..=view].iter().map(packed).collect();
-        let found = place(&at, "byteOffset", 0, offset, count, size(&at)?, &views)?;
+        let unstrided = [View { stride: None, ..views[view] }];
+        let found = place(at, 0, offset, Layout { count, size, packed }, &unstrided)?;
         Ok::<_, GltfError>(Place { view, ..found })
     };
-    let component = |at: &At| {
-        match Component::from_code(at.need("componentType", at.uint("componentType")?)?) {
-            Some(kind @ (Component::U8 | Component::U16 | Component::U32)) => Ok(kind),
-            _ => Err(at.fail("componentType", "must be 5121, 5123 or 5125 (unsigned)")),
-        }
+    let of_indices = at.need("indices", at.object("indices")?)?;
+    let code = of_indices.need("componentType", of_indices.uint("componentType")?)?;
+    let index_component = match Component::from_code(code) {
+        Some(kind @ (Component::U8 | Component::U16 | Component::U32)) => kind,
+        _ => return Err(of_indices.fail("componentType", "must be 5121, 5123 or 5125 (unsigned)")),
     };
-    let indices = part("indices", &|at| Ok(component(at)?.size()))?;
-    let index_component = component(&at.need("indices", at.object("indices")?)?)?;
-    let values = part("values", &|_| Ok(size))?;
+    let indices = part(&of_indices, index_component.size(), index_component.size())?;
+    let values = part(&at.need("values", at.object("values")?)?, layout.size, layout.packed)?;
     Ok(Sparse { count, indices, index_component, values })
 }
 

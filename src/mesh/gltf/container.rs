@@ -60,6 +60,7 @@ fn split_glb(bytes: &[u8]) -> Result<Container<'_>, GltfError> {
             return Err(GltfError::container(offset, what));
         };
         match kind {
+            JSON if data.is_empty() => return Err(GltfError::container(offset, "the JSON chunk is empty")),
             JSON if json.is_none() => json = Some(data),
             JSON => return Err(GltfError::container(offset, "a second JSON chunk")),
             _ if json.is_none() => return Err(GltfError::container(offset, "the first chunk is not the JSON chunk")),
@@ -70,7 +71,6 @@ fn split_glb(bytes: &[u8]) -> Result<Container<'_>, GltfError> {
         offset = start + data.len();
     }
     match json {
-        Some([]) => Err(GltfError::container(12, "the JSON chunk is empty")),
         Some(json) => Ok(Container { json, bin }),
         None => Err(GltfError::container(12, "there is no JSON chunk")),
     }

@@ -80,7 +80,8 @@ impl Hierarchy {
             rest[node] = trs;
             let local = if needed[node] { matrix::affine(&trs) } else { exact };
             world[node] = parents[node].map_or(local, |parent| world[parent] * local);
-            if !world[node].is_finite() {
+            // Also as the `f32` that others compute with.
+            if !world[node].as_affine3a().is_finite() {
                 return Err(GltfError::at(&*entry.at.place, "the transform in model space is not finite"));
             }
         }

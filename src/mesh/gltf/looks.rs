@@ -152,7 +152,7 @@ fn images(
                 },
             }
         } else {
-            return Err(at.fail("", "an image needs a uri or a bufferView"));
+            return Err(GltfError::at(at.place, "an image needs a uri or a bufferView"));
         }
         total = total.saturating_add(image.bytes.len() as u64);
         if total > MAX_IMAGE_BYTES {

@@ -133,7 +133,10 @@ impl<'a> Collector<'a> {
                 EventKind::Library => continue,
             };
             self.current.names[slot].clear();
-            self.current.names[slot].push_str(&text);
+            // Exporters write `(null)` for faces without material.
+            if !(event.what == EventKind::Material && text == "(null)") {
+                self.current.names[slot].push_str(&text);
+            }
         }
         Ok(())
     }

@@ -61,7 +61,7 @@ mod tests {
             let wanted = if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) };
             assert!((to_linear(value) - wanted).abs() < 1e-14, "{value}");
             assert!((to_srgb(to_linear(value)) - value).abs() < 2e-8, "{value}");
-            let linear = to_linear(value) as f32;
+            let linear = to_linear(f64::from(value as f32)) as f32;
             assert_eq!(to_linear(f64::from(srgb_text(linear).parse::<f32>().unwrap())) as f32, linear, "{value}");
         }
         assert_eq!(srgb_text(0.0), "0");

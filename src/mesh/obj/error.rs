@@ -27,6 +27,9 @@ pub enum ObjError {
     /// There is neither a vertex nor a face.
     #[error("no vertices and no faces found; check that this is a Wavefront OBJ file and that it is complete")]
     NoGeometry,
+    /// Arrays that were changed since they were read do not fit together any more.
+    #[error("the arrays do not fit together: a list has the wrong length or an index is out of range; read the file again")]
+    Inconsistent,
 }
 
 /// What is wrong with a line.

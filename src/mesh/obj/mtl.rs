@@ -34,9 +34,9 @@ pub struct ObjMaterial {
     /// `norm`, or else `map_Bump` or `bump`, which exporters use for normal maps as well.
     pub normal_map: Option<ObjTexture>,
     /// True if `d` was given, which `Tr` then does not change.
-    has_dissolve: bool,
+    pub(super) has_dissolve: bool,
     /// True if `norm` was given, which `bump` then does not change.
-    has_norm: bool,
+    pub(super) has_norm: bool,
 }
 
 /// A texture file and how it is laid on.
@@ -116,17 +116,18 @@ fn texture(text: &str) -> Option<ObjTexture> {
     let mut texture =
         ObjTexture { path: String::new(), scale: [1.0; 2], offset: [0.0; 2], strength: 1.0, clamp: false };
     let mut rest = texture.options(text);
-    if let Some(end) = rest.match_indices(char::is_whitespace).map(|(at, _)| at).find(|at| is_option(&rest[*at..])) {
-        texture.options(&rest[end..]);
-        rest = &rest[..end];
+    let mut words = rest.match_indices(char::is_whitespace).map(|(at, blank)| at + blank.len());
+    if let Some(start) = words.find(|start| is_option(&rest[*start..])) {
+        texture.options(&rest[start..]);
+        rest = &rest[..start];
     }
     texture.path = rest.trim().trim_matches('"').into();
     (!texture.path.is_empty()).then_some(texture)
 }
 
-/// True if the first word is an option of a texture.
+/// True if the text starts with an option of a texture.
 fn is_option(text: &str) -> bool {
-    text.split_whitespace().next().is_some_and(|word| arguments(word).is_some())
+    text.starts_with('-') && arguments(split_word(text).0).is_some()
 }
 
 /// How many arguments an option takes, at least and at most.

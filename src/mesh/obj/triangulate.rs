@@ -25,8 +25,8 @@ pub(super) struct Triangulator {
     pub fans: usize,
 }
 
-/// Comparisons after which large polygons are cut into fans: seconds, and far more than real meshes need.
-const MOST_WORK: u64 = 1 << 29;
+/// Comparisons after which large polygons are cut into fans: about a second, and far more than real meshes need.
+const MOST_WORK: u64 = 1 << 26;
 
 /// A vector at right angles to a polygon, as long as twice its area (Newell's method): the normal of the plane that fits
 /// it best.

@@ -11,12 +11,15 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::crossing::usable;
-use super::tree::{Bounds, LANES, WIDTH};
+use super::node::{Bounds, WIDTH};
+use super::packet::{LANES, Quad};
 
 /// Candidate planes along an axis, plus one.
 const BINS: usize = 16;
-/// Levels after which ranges are halved instead, so that the depth stays below [`super::tree::DEPTH`].
+/// Levels after which ranges are halved instead, so that the depth stays below `tree::DEPTH`.
 const PATIENCE: usize = 20;
+/// Triangles of the largest leaf.
+const MOST: usize = 2 * LANES;
 /// Primitives in a unit of parallel work.
 const CHUNK: usize = 1 << 14;
 
@@ -81,8 +84,9 @@ impl Box4 {
 pub(super) struct Part {
     /// Indices of the primitives.
     pub range: Range<usize>,
-    /// How many triangles they have.
-    pub triangles: usize,
+    /// If they are a leaf, how many packets it has (one or two), else zero.
+    pub packets: usize,
+    triangles: usize,
     bounds: Box4,
     /// Around twice the centres of their boxes.
     centers: Box4,
@@ -90,7 +94,7 @@ pub(super) struct Part {
 
 impl Part {
     fn new(start: usize, primitives: &[Primitive]) -> Self {
-        let empty = Self { range: start..start, triangles: 0, bounds: Box4::EMPTY, centers: Box4::EMPTY };
+        let empty = Self { range: start..start, packets: 0, triangles: 0, bounds: Box4::EMPTY, centers: Box4::EMPTY };
         let mut part = primitives
             .par_chunks(CHUNK)
             .map(|chunk| {
@@ -114,16 +118,80 @@ impl Part {
     fn union(self, other: Self) -> Self {
         Self {
             range: self.range,
+            packets: 0,
             triangles: self.triangles + other.triangles,
             bounds: self.bounds.union(other.bounds),
             centers: self.centers.union(other.centers),
         }
     }
 
-    /// True if it fits a packet.
-    pub fn is_leaf(&self) -> bool {
-        self.triangles <= LANES
+    /// Counts the packets it needs, if these are few enough for a leaf.
+    fn settle(mut self, primitives: &[Primitive], triangles: &[[u32; 3]]) -> Self {
+        if self.triangles <= MOST {
+            let packets = quads(primitives, triangles).len.div_ceil(2);
+            self.packets = if packets <= 2 { packets } else { 0 };
+        }
+        self
     }
+}
+
+/// Quads of a leaf.
+#[derive(Debug)]
+pub(super) struct Quads {
+    quads: [Quad; MOST],
+    len: usize,
+}
+
+impl Quads {
+    pub fn as_slice(&self) -> &[Quad] {
+        &self.quads[..self.len]
+    }
+
+    fn push(&mut self, quad: Quad) {
+        if let Some(place) = self.quads.get_mut(self.len) {
+            *place = quad;
+            self.len += 1;
+        }
+    }
+}
+
+/// Pairs triangles that share an edge, as many as come along; at most [`MOST`] triangles.
+pub(super) fn quads(primitives: &[Primitive], triangles: &[[u32; 3]]) -> Quads {
+    let mut quads = Quads { quads: [Quad::one(0, [0; 3]); MOST], len: 0 };
+    let mut alone = [0; MOST];
+    let mut count = 0;
+    for primitive in primitives {
+        let own = primitive.triangles();
+        let pair = [own.start, own.start + 1];
+        if own.len() == 2
+            && let Some(quad) = Quad::two(pair, triangles[pair[0] as usize], triangles[pair[1] as usize])
+        {
+            quads.push(quad);
+            continue;
+        }
+        for triangle in own {
+            if count < MOST {
+                alone[count] = triangle;
+                count += 1;
+            }
+        }
+    }
+    let mut alone = &mut alone[..count];
+    while let Some((&mut first, rest)) = std::mem::take(&mut alone).split_first_mut() {
+        let found = rest.iter().enumerate().find_map(|(i, &second)| {
+            Some((i, Quad::two([first, second], triangles[first as usize], triangles[second as usize])?))
+        });
+        alone = rest;
+        match found {
+            Some((i, quad)) => {
+                quads.push(quad);
+                alone.swap(0, i);
+                alone = &mut std::mem::take(&mut alone)[1..];
+            }
+            None => quads.push(Quad::one(first, triangles[first as usize])),
+        }
+    }
+    quads
 }
 
 /// The boxes and counts of one bin.
@@ -213,31 +281,41 @@ pub(super) fn primitives(points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Primit
     (out, count)
 }
 
-/// All primitives as one part.
+/// All primitives as one part, which is not a leaf.
 pub(super) fn whole(primitives: &[Primitive]) -> Part {
     Part::new(0, primitives)
 }
 
 /// Splits a part into as many children as a node has, at `level` below the root; reorders its `primitives`.
-pub(super) fn children(primitives: &mut [Primitive], part: &Part, level: usize) -> Vec<Part> {
+pub(super) fn children(
+    primitives: &mut [Primitive],
+    part: &Part,
+    triangles: &[[u32; 3]],
+    level: usize,
+) -> Vec<Part> {
     let mut parts = Vec::with_capacity(WIDTH);
     let offset = part.range.start;
-    parts.push(part.clone());
-    while parts.len() < WIDTH {
-        // The largest box is the likeliest to be met.
-        let mut widest: Option<(usize, f32)> = None;
-        for (i, part) in parts.iter().enumerate().filter(|(_, part)| !part.is_leaf()) {
-            let area = if level < PATIENCE { part.bounds.half_area() } else { part.triangles as f32 };
-            if widest.is_none_or(|(_, widest)| area > widest) {
-                widest = Some((i, area));
+    // Only a root may fit a leaf itself.
+    parts.push(part.clone().settle(primitives, triangles));
+    // What is too large for a leaf, then what is too large for a packet.
+    for packets in [0, 2] {
+        while parts.len() < WIDTH {
+            // The largest box is the likeliest to be met.
+            let mut widest: Option<(usize, f32)> = None;
+            for (i, part) in parts.iter().enumerate().filter(|(_, part)| part.packets == packets) {
+                let area = if level < PATIENCE { part.bounds.half_area() } else { part.triangles as f32 };
+                if widest.is_none_or(|(_, widest)| area > widest) {
+                    widest = Some((i, area));
+                }
             }
+            let Some((i, _)) = widest else { break };
+            let range = parts[i].range.clone();
+            let own = &mut primitives[range.start - offset..range.end - offset];
+            let (left, right) = split(own, &parts[i], level < PATIENCE);
+            let (own, other) = own.split_at(left.range.len());
+            parts[i] = left.settle(own, triangles);
+            parts.insert(i + 1, right.settle(other, triangles));
         }
-        let Some((i, _)) = widest else { break };
-        let range = parts[i].range.clone();
-        let own = &mut primitives[range.start - offset..range.end - offset];
-        let (left, right) = split(own, &parts[i], level < PATIENCE);
-        parts[i] = left;
-        parts.insert(i + 1, right);
     }
     parts
 }
@@ -292,7 +370,7 @@ fn partition(
     start: usize,
     is_left: impl Fn(&Primitive) -> bool,
 ) -> (Part, Part) {
-    let empty = Part { range: start..start, triangles: 0, bounds: Box4::EMPTY, centers: Box4::EMPTY };
+    let empty = Part { range: start..start, packets: 0, triangles: 0, bounds: Box4::EMPTY, centers: Box4::EMPTY };
     let (mut left, mut right) = (empty.clone(), empty);
     let (mut low, mut high) = (0, primitives.len());
     while low < high {

@@ -14,7 +14,7 @@ use crate::mesh::ray::{Hit, Ray};
 pub(super) const LIMIT: f32 = 1e18;
 
 /// Relative size of the errors of a sheared vertex, with a margin: boxes are met with this much slack.
-pub(super) const SLACK: f32 = 1.0 / (1 << 20) as f32;
+pub(super) const SLACK: f32 = 1.0 / (1 << 19) as f32;
 
 /// True if a coordinate can take part.
 pub(super) fn usable(point: Vec3) -> bool {
@@ -67,7 +67,7 @@ impl Frame {
     pub fn new(ray: &Ray) -> Option<Self> {
         let size = ray.direction.abs();
         let z = size.max_position();
-        if !usable(ray.origin) || !usable(ray.direction) || size[z] < f32::MIN_POSITIVE {
+        if !usable(ray.origin) || ray.direction.is_nan() || !(1e-9..=1e9).contains(&size[z]) {
             return None;
         }
         let axes = [(z + 1) % 3, (z + 2) % 3, z];

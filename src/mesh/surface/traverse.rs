@@ -1,12 +1,58 @@
 //! Queries on the hierarchy.
 
+use std::hint::black_box;
+
 use glam::Vec3;
+use wide::f32x4;
 
-use super::crossing::{Crossing, Frame};
-use super::tree::{Bounds, BoxRay, Child, DEPTH, LANES, NONE, Target, Tree, WIDTH};
+use super::closest;
+use super::crossing::{Crossing, Frame, SLACK};
+use super::node::{BoxRay, Child, Target, WIDTH};
+use super::packet::LANES;
+use super::tree::{DEPTH, Tree};
 
-/// Room for the children that wait: seven a level, and the tree is never deeper than [`super::tree::DEPTH`].
+/// Room for the children that wait: seven a level.
 const STACK: usize = (WIDTH - 1) * DEPTH + 1;
+
+/// Children that wait, the best on top, each with what it may hold at best (less is better).
+struct Waiting {
+    children: [(f32, Child); STACK],
+    len: usize,
+}
+
+impl Waiting {
+    fn new(tree: &Tree) -> Self {
+        Self { children: [(f32::NEG_INFINITY, Child::ROOT); STACK], len: usize::from(!tree.nodes.is_empty()) }
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<(f32, Child)> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.children[self.len])
+    }
+
+    /// Adds a child; those from `start` on are kept in order.
+    #[inline(always)]
+    fn push(&mut self, start: usize, bound: f32, child: Child) {
+        let mut at = self.len;
+        while at > start && self.children[at - 1].0 < bound {
+            self.children[at] = self.children[at - 1];
+            at -= 1;
+        }
+        self.children[at] = (bound, child);
+        self.len += 1;
+    }
+}
+
+/// The set bits of `mask`.
+#[inline(always)]
+fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize)?;
+        mask &= mask - 1;
+        Some(bit)
+    })
+}
 
 impl Tree {
     /// The nearest crossing.
@@ -19,39 +65,31 @@ impl Tree {
         self.extreme::<true>(frame, boxes)
     }
 
+    #[inline(always)]
     fn extreme<const FAR: bool>(&self, frame: &Frame, boxes: &BoxRay) -> Option<Crossing> {
         let mut best: Option<Crossing> = None;
         let (mut from, mut to) = (0.0_f32, f32::INFINITY);
-        let mut stack = [(0.0_f32, Child::node(0)); STACK];
-        let mut waiting = usize::from(!self.nodes.is_empty());
-        while waiting > 0 {
-            waiting -= 1;
-            let (bound, child) = stack[waiting];
+        let mut waiting = Waiting::new(self);
+        let mut touched = 0;
+        while let Some((bound, child)) = waiting.pop() {
             if if FAR { -bound < from } else { bound > to } {
                 continue;
             }
             match child.target() {
                 Target::Node(index) => {
                     let node = &self.nodes[index];
-                    let (enter, leave, mut mask) = boxes.meet(node, from, to);
-                    let bounds = if FAR { -leave } else { enter };
-                    let bounds = bounds.as_array_ref();
-                    let start = waiting;
-                    while mask != 0 {
-                        let i = mask.trailing_zeros() as usize;
-                        mask &= mask - 1;
-                        // Best last, where it is taken first.
-                        let mut at = waiting;
-                        waiting += 1;
-                        while at > start && stack[at - 1].0 < bounds[i] {
-                            stack[at] = stack[at - 1];
-                            at -= 1;
-                        }
-                        stack[at] = (bounds[i], node.child(i));
+                    let (enter, leave, mask) = boxes.meet(node, from, to);
+                    let bounds = if FAR { leave.map(|leave| -leave) } else { enter };
+                    let bounds = bounds.map(f32x4::to_array);
+                    let start = waiting.len;
+                    for i in bits(mask) {
+                        let child = node.child(i);
+                        waiting.push(start, bounds[i / 4][i % 4], child);
+                        touched ^= self.touch(child);
                     }
                 }
-                Target::Packet(index) => {
-                    self.test(index, frame, |crossing| {
+                Target::Leaf(index, two) => {
+                    self.test(index, two, frame, |crossing| {
                         let better = best.is_none_or(|best| {
                             if FAR { crossing.key() > best.key() } else { crossing.key() < best.key() }
                         });
@@ -67,91 +105,89 @@ impl Tree {
                 }
             }
         }
+        black_box(touched);
         best
+    }
+
+    /// Reads from what a child refers to, so that it is on its way from memory while others are tested.
+    #[inline(always)]
+    fn touch(&self, child: Child) -> u32 {
+        match child.target() {
+            Target::Node(index) => self.nodes[index].touch(),
+            Target::Leaf(index, _) => self.packets[index].touch(),
+        }
     }
 
     /// Every crossing, in no order.
     pub fn all(&self, frame: &Frame, boxes: &BoxRay, out: &mut Vec<Crossing>) {
-        let mut stack = [Child::node(0); STACK];
-        let mut waiting = usize::from(!self.nodes.is_empty());
-        while waiting > 0 {
-            waiting -= 1;
-            match stack[waiting].target() {
+        let mut waiting = Waiting::new(self);
+        let mut touched = 0;
+        while let Some((_, child)) = waiting.pop() {
+            match child.target() {
                 Target::Node(index) => {
                     let node = &self.nodes[index];
-                    let (_, _, mut mask) = boxes.meet(node, 0.0, f32::INFINITY);
-                    while mask != 0 {
-                        stack[waiting] = node.child(mask.trailing_zeros() as usize);
-                        waiting += 1;
-                        mask &= mask - 1;
+                    let (_, _, mask) = boxes.meet(node, 0.0, f32::INFINITY);
+                    for i in bits(mask) {
+                        let child = node.child(i);
+                        waiting.push(waiting.len, 0.0, child);
+                        touched ^= self.touch(child);
                     }
                 }
-                Target::Packet(index) => self.test(index, frame, |crossing| out.push(crossing)),
+                Target::Leaf(index, two) => self.test(index, two, frame, |crossing| out.push(crossing)),
             }
         }
+        black_box(touched);
     }
 
-    /// Calls `found` for each triangle of a packet that the ray crosses.
+    /// Calls `found` for each triangle of a leaf that the ray crosses.
     #[inline(always)]
-    fn test(&self, index: usize, frame: &Frame, mut found: impl FnMut(Crossing)) {
-        let packet = &self.packets[index];
-        let mut mask = packet.candidates(frame);
-        while mask != 0 {
-            let lane = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            let triangle = packet.triangles[lane];
-            if triangle == NONE {
-                return;
-            }
-            if let Some((distance, entering, tolerance)) = frame.cross(packet.corners(lane)) {
-                found(Crossing { distance, triangle, slot: (index * LANES + lane) as u32, entering, tolerance });
+    fn test(&self, index: usize, two: bool, frame: &Frame, mut found: impl FnMut(Crossing)) {
+        for index in index..=index + usize::from(two) {
+            let packet = &self.packets[index];
+            for lane in bits(packet.candidates(frame)) {
+                if let Some((distance, entering, tolerance)) = frame.cross(packet.corners(lane)) {
+                    let (triangle, slot) = (packet.triangle(lane), (index * LANES + lane) as u32);
+                    found(Crossing { distance, triangle, slot, entering, tolerance });
+                }
             }
         }
     }
 
-    /// The corners in a slot of [`Crossing`].
-    pub fn corners(&self, slot: u32) -> [Vec3; 3] {
-        self.packets[slot as usize / LANES].corners(slot as usize % LANES)
+    /// The triangle in a slot of [`Crossing`] and its corners.
+    pub fn slot(&self, slot: u32) -> (u32, [Vec3; 3]) {
+        let (packet, lane) = (&self.packets[slot as usize / LANES], slot as usize % LANES);
+        (packet.triangle(lane), packet.corners(lane))
     }
 
     /// The point of the surface nearest to `point`: squared distance, slot and barycentric coordinates.
     pub fn nearest_point(&self, point: Vec3) -> Option<(f32, u32, Vec3)> {
         let mut best: Option<(f32, u32, u32, Vec3)> = None;
-        let mut stack = [(0.0_f32, Child::node(0)); STACK];
-        let mut waiting = usize::from(!self.nodes.is_empty());
-        while waiting > 0 {
-            waiting -= 1;
-            let (bound, child) = stack[waiting];
+        let reach = self.bounds.low.abs().max(self.bounds.high.abs()).max(point.abs()).max_element();
+        let mut waiting = Waiting::new(self);
+        while let Some((bound, child)) = waiting.pop() {
             if best.is_some_and(|best| bound > best.0) {
                 continue;
             }
             match child.target() {
                 Target::Node(index) => {
-                    let start = waiting;
-                    for (bounds, child) in self.nodes[index].iter() {
-                        // Rounding may not hide a box that holds a point at the same distance.
-                        let bound = box_distance(&bounds, point) * (1.0 - 1e-6);
-                        let mut at = waiting;
-                        waiting += 1;
-                        while at > start && stack[at - 1].0 < bound {
-                            stack[at] = stack[at - 1];
-                            at -= 1;
-                        }
-                        stack[at] = (bound, child);
+                    let node = &self.nodes[index];
+                    let (bounds, mask) = node.distances(point, SLACK * reach);
+                    let bounds = bounds.map(f32x4::to_array);
+                    let start = waiting.len;
+                    for i in bits(mask) {
+                        waiting.push(start, bounds[i / 4][i % 4], node.child(i));
                     }
                 }
-                Target::Packet(index) => {
-                    let packet = &self.packets[index];
-                    for lane in 0..LANES {
-                        let triangle = packet.triangles[lane];
-                        if triangle == NONE {
-                            break;
-                        }
-                        let corners = packet.corners(lane);
-                        let weights = super::closest::barycentric(point, corners);
-                        let distance = super::closest::at(weights, corners).distance_squared(point);
-                        if best.is_none_or(|best| (distance, triangle) < (best.0, best.1)) {
-                            best = Some((distance, triangle, (index * LANES + lane) as u32, weights));
+                Target::Leaf(index, two) => {
+                    for index in index..=index + usize::from(two) {
+                        let packet = &self.packets[index];
+                        for lane in bits(packet.lanes()) {
+                            let (triangle, corners) = (packet.triangle(lane), packet.corners(lane));
+                            let weights = closest::barycentric(point, corners);
+                            let distance = closest::at(weights, corners).distance_squared(point);
+                            if best.is_none_or(|best| (distance, triangle) < (best.0, best.1)) {
+                                best = Some((distance, triangle, (index * LANES + lane) as u32, weights));
+                            }
                         }
                     }
                 }
@@ -159,14 +195,4 @@ impl Tree {
         }
         best.map(|(distance, _, slot, weights)| (distance, slot, weights))
     }
-
-    /// The box around everything.
-    pub fn bounds(&self) -> Bounds {
-        self.nodes.first().map_or(Bounds::EMPTY, super::tree::Node::bounds)
-    }
-}
-
-/// Squared distance from a box.
-fn box_distance(bounds: &Bounds, point: Vec3) -> f32 {
-    (bounds.low - point).max(point - bounds.high).max(Vec3::ZERO).length_squared()
 }

@@ -233,11 +233,7 @@ impl RigTextError {
 
 /// A field as a message shows it: short, and without anything that would move a terminal's cursor.
 pub(super) fn quoted(field: &str) -> String {
-    let mut text: String = field
-        .chars()
-        .take(SHOWN)
-        .map(|c| if c.is_control() { '\u{FFFD}' } else { c })
-        .collect();
+    let mut text: String = field.chars().take(SHOWN).map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect();
     if field.chars().nth(SHOWN).is_some() {
         text.push_str("...");
     }

@@ -1,8 +1,12 @@
 //! Writing `.rig` text.
 
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 
-use super::{RigText, RigTextError, VERSION, error::chain, find_cycle};
+use super::{
+    RigText, RigTextError, VERSION,
+    error::{chain, quoted},
+    find_cycle,
+};
 
 /// A written skeleton.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,6 +26,16 @@ pub struct Relabelled {
     pub from: String,
     /// The label as written; empty if the joint was written without one.
     pub to: String,
+}
+
+impl fmt::Display for Relabelled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { joint, from, to } = self;
+        match to.as_str() {
+            "" => write!(f, "joint {joint} was written without a label: its own is empty"),
+            _ => write!(f, "joint {joint} was labelled `{to}`: the format has no room for `{}`", quoted(from)),
+        }
+    }
 }
 
 /// Writes a skeleton as `.rig` text that [`parse`](super::parse) reads back as the same, bit for bit in its positions.
@@ -68,11 +82,7 @@ pub fn write(rig: &RigText) -> Result<Written, RigTextError> {
                 text.push_str(&safe);
             }
             if safe != *label || label.is_empty() {
-                relabelled.push(Relabelled {
-                    joint: i,
-                    from: label.clone(),
-                    to: safe,
-                });
+                relabelled.push(Relabelled { joint: i, from: label.clone(), to: safe });
             }
         }
         text.push('\n');
@@ -84,12 +94,6 @@ fn writable(label: &str) -> String {
     label
         .chars()
         .enumerate()
-        .map(|(i, c)| {
-            if c.is_whitespace() || c.is_control() || (i == 0 && c == '#') {
-                '_'
-            } else {
-                c
-            }
-        })
+        .map(|(i, c)| if c.is_whitespace() || c.is_control() || (i == 0 && c == '#') { '_' } else { c })
         .collect()
 }

@@ -19,9 +19,7 @@ const POOL: usize = 256;
 
 /// The folder of the findings of one target.
 pub fn findings(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/fuzz_findings")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz_findings").join(name)
 }
 
 /// Replays what was found before, then calls `check` with mutants of `seeds` until the time is up.
@@ -29,23 +27,14 @@ pub fn findings(name: &str) -> PathBuf {
 /// `check` panics where something is wrong: a reader that must not panic, or a promise about what was read. Such an input, and
 /// one that takes longer than ten seconds, is written to `tests/fuzz_findings/NAME/`, and the test fails naming it.
 pub fn run_fuzz(name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
-    run_fuzz_for(
-        number_from("RIGSMITH_FUZZ_SECONDS").unwrap_or(2.0),
-        name,
-        seeds,
-        dictionary,
-        check,
-    );
+    run_fuzz_for(number_from("RIGSMITH_FUZZ_SECONDS").unwrap_or(2.0), name, seeds, dictionary, check);
 }
 
 fn run_fuzz_for(seconds: f64, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
     assert!(!seeds.is_empty(), "{name}: no seeds");
     let keep = findings(name);
-    let mut replayed: Vec<PathBuf> = fs::read_dir(&keep)
-        .into_iter()
-        .flatten()
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .collect();
+    let mut replayed: Vec<PathBuf> =
+        fs::read_dir(&keep).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect();
     replayed.sort();
     let watch = Watch::new(name);
     let attempt = |bytes: &[u8], origin: &dyn std::fmt::Display| {
@@ -58,10 +47,7 @@ fn run_fuzz_for(seconds: f64, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]
         }
     };
     for path in &replayed {
-        attempt(
-            &fs::read(path).unwrap(),
-            &format_args!("the finding {}", path.display()),
-        );
+        attempt(&fs::read(path).unwrap(), &format_args!("the finding {}", path.display()));
     }
     for (i, seed) in seeds.iter().enumerate() {
         attempt(seed, &format_args!("seed {i}"));
@@ -75,11 +61,7 @@ fn run_fuzz_for(seconds: f64, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]
     while started.elapsed().as_secs_f64() < seconds {
         let source = |random: &mut Random, pool: &[Vec<u8>]| -> Vec<u8> {
             // Mutants of mutants reach further, but most of the time goes to what is nearly right.
-            if pool.is_empty() || !random.chance(4) {
-                random.pick(seeds)
-            } else {
-                random.pick(pool)
-            }
+            if pool.is_empty() || !random.chance(4) { random.pick(seeds) } else { random.pick(pool) }
         };
         let input = source(&mut mutator.random, &pool);
         let other = source(&mut mutator.random, &pool);
@@ -105,10 +87,7 @@ fn run_fuzz_for(seconds: f64, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]
 
 fn number_from(variable: &str) -> Option<f64> {
     let text = std::env::var(variable).ok()?;
-    Some(
-        text.parse()
-            .unwrap_or_else(|_| panic!("{variable} is `{text}`; give a number")),
-    )
+    Some(text.parse().unwrap_or_else(|_| panic!("{variable} is `{text}`; give a number")))
 }
 
 /// Calls `check`, and says what went wrong.
@@ -127,9 +106,7 @@ fn try_one(bytes: &[u8], check: impl Fn(&[u8])) -> Result<(), String> {
 
 /// Writes a finding under a name made from its content, so that the same one is not kept twice.
 fn save_finding(name: &str, bytes: &[u8]) -> PathBuf {
-    let hash = bytes.iter().fold(0xCBF2_9CE4_8422_2325u64, |h, &b| {
-        (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01B3)
-    });
+    let hash = bytes.iter().fold(0xCBF2_9CE4_8422_2325u64, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01B3));
     let folder = findings(name);
     let path = folder.join(format!("{hash:016x}"));
     fs::create_dir_all(&folder).unwrap();
@@ -154,10 +131,7 @@ impl Watch {
                     Err(mpsc::RecvTimeoutError::Timeout) => {
                         if let Some(input) = &current {
                             let path = save_finding(&name, input);
-                            eprintln!(
-                                "{name}: no answer for {HANG:?}; the input is kept as {}",
-                                path.display()
-                            );
+                            eprintln!("{name}: no answer for {HANG:?}; the input is kept as {}", path.display());
                             // A thread cannot be stopped from outside, and the test would never end.
                             std::process::exit(101);
                         }
@@ -186,17 +160,11 @@ fn a_panic_is_found_and_kept_as_a_file() {
             assert!(!bytes.ends_with(b"18446744073709551616"), "too large");
         });
     });
-    let kept: Vec<_> = fs::read_dir(findings(&name))
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
+    let kept: Vec<_> = fs::read_dir(findings(&name)).unwrap().map(|entry| entry.unwrap().path()).collect();
     let content = fs::read(&kept[0]).unwrap();
     fs::remove_dir_all(findings(&name)).unwrap();
     let message = *outcome.unwrap_err().downcast::<String>().unwrap();
     assert_eq!(kept.len(), 1);
     assert!(content.ends_with(b"18446744073709551616"));
-    assert!(
-        message.contains("too large") && message.contains(kept[0].to_str().unwrap()),
-        "{message}"
-    );
+    assert!(message.contains("too large") && message.contains(kept[0].to_str().unwrap()), "{message}");
 }

@@ -11,6 +11,8 @@ pub(super) const MOST: usize = 16;
 const STEP: [u32; 3] = [10, 14, 17];
 /// How much longer a step counts inside the outer half of the surface layer, which may bridge a narrow gap.
 const SHELL_STEP: u32 = 2;
+/// Length beyond the ratio of [`Limits`] that a path may have before it is given up, in tenths of a cell.
+const SLACK: f32 = 100.0;
 /// Segments of a joint whose distances are measured exactly; a joint with more is a mistake in the input.
 const MOST_SEGMENTS: usize = 64;
 /// Joints outside the solid for which the nearest solid cell is searched, each over all cells.
@@ -87,6 +89,15 @@ impl Joints {
     }
 }
 
+/// What of all joints is kept.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// How many joints a voxel keeps, at most [`MOST`].
+    pub(super) labels: usize,
+    /// Joints further than this multiple of the nearest one's distance have no weight.
+    pub(super) ratio: f32,
+}
+
 /// The nearest joints of all solid voxels.
 pub(super) struct Field {
     labels: usize,
@@ -101,19 +112,20 @@ impl Field {
     pub(super) fn new(
         voxels: &Voxels,
         joints: &Joints,
-        labels: usize,
+        limits: Limits,
         progress: &dyn Fn(f32) -> bool,
     ) -> Option<Self> {
         let cells = voxels.cells();
+        let labels = limits.labels;
         let mut field = Self { labels, entries: vec![(u32::MAX, u32::MAX); cells.len() * labels] };
         let mut seeds = seeds(voxels, joints, &cells);
-        seeds.sort_unstable_by_key(|&(cost, joint, cell)| (cost, joint, cell));
+        seeds.sort_unstable();
         let mut seeds = seeds.into_iter().peekable();
 
         let longest = (STEP[2] * SHELL_STEP) as usize;
         let mut buckets: Vec<Vec<(u32, u32)>> = vec![Vec::new(); longest + 1];
         let (mut cost, mut waiting) = (0u32, 0usize);
-        let (mut settled, all) = (0usize, cells.len() * labels);
+        let mut first = 0usize;
         loop {
             if waiting == 0 {
                 match seeds.peek() {
@@ -123,7 +135,7 @@ impl Field {
             }
             let slot = cost as usize % buckets.len();
             while let Some((_, joint, cell)) = seeds.next_if(|&(at, ..)| at <= cost) {
-                if field.improve(cell, joint, cost) {
+                if field.improve(cell as usize, joint, cost) {
                     buckets[slot].push((cell, joint));
                     waiting += 1;
                 }
@@ -131,28 +143,31 @@ impl Field {
             let mut bucket = std::mem::take(&mut buckets[slot]);
             waiting -= bucket.len();
             for &(cell, joint) in &bucket {
-                if !field.holds(cell, joint, cost) {
+                if !field.holds(cell as usize, joint, cost) {
                     continue;
                 }
-                settled += 1;
+                // The nearest joint of a voxel settles first. Others count only while they are not much further;
+                // beyond the slack no path of theirs leads to a place where they matter.
+                let nearest = field.entries[cell as usize * labels].1;
+                first += usize::from(nearest == cost);
+                if (cost - nearest) as f32 > (limits.ratio - 1.0) * nearest as f32 + SLACK {
+                    continue;
+                }
                 let at = cells[cell as usize].map(usize::from);
                 let core = voxels.is_core(at);
-                for (step, length) in NEIGHBOURS {
-                    let next = [0, 1, 2].map(|a| at[a].wrapping_add_signed(step[a]));
-                    let Some(index) = voxels.solid_index(next) else { continue };
-                    let length = if core || voxels.is_core(next) { length } else { length * SHELL_STEP };
+                voxels.neighbours(at, |index, kind, inside| {
+                    let length = if core || inside { STEP[kind] } else { STEP[kind] * SHELL_STEP };
                     let reached = cost + length;
-                    if field.improve(index as u32, joint, reached) {
-                        let slot = reached as usize % buckets.len();
-                        buckets[slot].push((index as u32, joint));
+                    if field.improve(index, joint, reached) {
+                        buckets[reached as usize % (longest + 1)].push((index as u32, joint));
                         waiting += 1;
                     }
-                }
+                });
             }
             bucket.clear();
             buckets[slot] = bucket;
             cost += 1;
-            if cost.is_multiple_of(64) && !progress(settled as f32 / all as f32) {
+            if cost.is_multiple_of(64) && !progress((first as f32 / cells.len() as f32).min(1.0)) {
                 return None;
             }
         }
@@ -169,14 +184,13 @@ impl Field {
         self.entries[cell * self.labels..(cell + 1) * self.labels].iter().copied().take_while(|e| e.1 != u32::MAX)
     }
 
-    fn holds(&self, cell: u32, joint: u32, cost: u32) -> bool {
-        self.of(cell as usize).any(|entry| entry == (joint, cost))
+    fn holds(&self, cell: usize, joint: u32, cost: u32) -> bool {
+        self.of(cell).any(|entry| entry == (joint, cost))
     }
 
     /// Enters a path if it is among the shortest; a joint appears once. Lengths only fall, so a joint that is pushed
     /// out by nearer ones could never have come back.
-    fn improve(&mut self, cell: u32, joint: u32, cost: u32) -> bool {
-        let cell = cell as usize;
+    fn improve(&mut self, cell: usize, joint: u32, cost: u32) -> bool {
         let entries = &mut self.entries[cell * self.labels..(cell + 1) * self.labels];
         if entries[entries.len() - 1].1 <= cost {
             return false;
@@ -233,19 +247,3 @@ fn seeds(voxels: &Voxels, joints: &Joints, cells: &[[u16; 3]]) -> Vec<(u32, u32,
     }
     seeds
 }
-
-/// The 26 neighbours of a cell with the length of the step to each.
-const NEIGHBOURS: [([isize; 3], u32); 26] = {
-    let mut all = [([0; 3], 0); 26];
-    let (mut i, mut n) = (0, 0);
-    while i < 27 {
-        let step = [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1];
-        let moved = (step[0] != 0) as usize + (step[1] != 0) as usize + (step[2] != 0) as usize;
-        if moved > 0 {
-            all[n] = (step, STEP[moved - 1]);
-            n += 1;
-        }
-        i += 1;
-    }
-    all
-};

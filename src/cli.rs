@@ -1,0 +1,135 @@
+//! The command line: one subcommand a file.
+//!
+//! Exit codes: 0 done, 1 the input is at fault, 2 the command was used wrongly. With `--json` the answer is one JSON
+//! object on standard output, errors included.
+
+mod check;
+mod convert;
+mod demo;
+mod info;
+mod progress;
+mod report;
+mod sketch;
+mod skin;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::{
+    algo::weights::{Method, WeightSettings},
+    mesh::gltf::GltfWriteSettings,
+};
+use report::{Failure, Report};
+
+/// Rig characters in minutes: sketch a skeleton into a mesh, skin it, export it.
+#[derive(Parser, Debug)]
+#[command(name = "rigsmith", version, about, long_about = None, arg_required_else_help = false)]
+struct Cli {
+    /// Answer in JSON, for programs
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Make gestures (clicks, strokes) on a mesh and save the skeleton, or the skinned character
+    Sketch(sketch::SketchArgs),
+    /// Bind a mesh to a skeleton and save the character
+    Skin(skin::SkinArgs),
+    /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where that makes sense
+    Convert(convert::ConvertArgs),
+    /// Say what is in a file
+    Info(info::InfoArgs),
+    /// Look for problems in files
+    Check(check::CheckArgs),
+}
+
+/// How weights are computed.
+#[derive(Args, Debug, Clone)]
+struct WeightArgs {
+    /// How the mesh is bound to the joints
+    #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
+    method: MethodArg,
+    /// Width of the blend between joints: 1 is usual, less is harder, more is softer
+    #[arg(long, default_value_t = 1.0, value_parser = positive)]
+    smoothing: f32,
+    /// Influences kept for each vertex while working
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..=8))]
+    stored_influences: u8,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy)]
+enum MethodArg {
+    /// Heat on the surface where it can be trusted, voxels elsewhere
+    Auto,
+    /// Heat on the surface
+    Heat,
+    /// Distances through the volume
+    Voxel,
+}
+
+impl WeightArgs {
+    fn settings(&self) -> WeightSettings {
+        WeightSettings {
+            max_influences: usize::from(self.stored_influences),
+            smoothing: self.smoothing,
+            method: match self.method {
+                MethodArg::Auto => Method::Auto,
+                MethodArg::Heat => Method::Heat,
+                MethodArg::Voxel => Method::Voxel,
+            },
+            ..Default::default()
+        }
+    }
+}
+
+/// How characters are written.
+#[derive(Args, Debug, Clone)]
+struct ExportArgs {
+    /// Influences written for each vertex; more than 4 need a second set that not every program reads
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
+    influences: u8,
+    /// Write all joints, not only those with weights and their ancestors
+    #[arg(long)]
+    all_joints: bool,
+}
+
+impl ExportArgs {
+    fn settings(&self) -> GltfWriteSettings {
+        GltfWriteSettings {
+            max_influences: usize::from(self.influences),
+            all_joints: self.all_joints,
+            ..Default::default()
+        }
+    }
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("write a number above zero".to_owned()),
+    }
+}
+
+/// The seed of uids, so that the same command writes the same bytes.
+const SEED: u64 = 0x5249_4753_4D49_5448;
+
+/// A file to write.
+type Output = PathBuf;
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        None => demo::run(),
+        Some(Command::Sketch(args)) => sketch::run(&args),
+        Some(Command::Skin(args)) => skin::run(&args),
+        Some(Command::Convert(args)) => convert::run(&args),
+        Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Check(args)) => check::run(&args),
+    };
+    report::finish(result, cli.json)
+}

@@ -1,0 +1,135 @@
+//! `rigsmith check`: problems in files.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{Failure, Report, skin::load_rig};
+use crate::{
+    files::{FileKind, LoadError, RealDisk, load_gestures, load_model, load_skin},
+    mesh::{
+        adjacency::{edges, islands, weld},
+        model::Model,
+    },
+    rig::Rig,
+};
+
+/// Arguments of `rigsmith check`.
+#[derive(Args, Debug)]
+pub(super) struct CheckArgs {
+    /// The files
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+}
+
+/// What was found in one file.
+#[derive(Default)]
+struct Findings {
+    error: Option<String>,
+    remarks: Vec<String>,
+}
+
+pub(super) fn run(args: &CheckArgs) -> Result<Report, Failure> {
+    let mut report = Report::default();
+    let mut list = Vec::new();
+    for path in &args.files {
+        let found = check(path)?;
+        match &found.error {
+            Some(error) => report.line(format!("{}: error: {error}", path.display())),
+            None => report.line(format!("{}: ok", path.display())),
+        }
+        for remark in &found.remarks {
+            report.line(format!("  {remark}"));
+        }
+        report.at_fault |= found.error.is_some();
+        list.push(json!({ "file": path.display().to_string(), "error": found.error, "remarks": found.remarks }));
+    }
+    report.set("files", Value::Array(list));
+    Ok(report)
+}
+
+fn check(path: &Path) -> Result<Findings, Failure> {
+    let mut found = Findings::default();
+    let loaded: Result<(), LoadError> = match FileKind::of(path) {
+        Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb) => {
+            load_model(&RealDisk, path).map(|model| found.remarks = remarks_on_model(&model))
+        }
+        Some(FileKind::Template | FileKind::RigText) => {
+            let mut told = Report::default();
+            match load_rig(path, &mut told) {
+                Ok(rig) => {
+                    found.remarks = told.notes;
+                    found.remarks.extend(remarks_on_rig(&rig));
+                }
+                Err(Failure::Input(error)) => found.error = Some(error.to_string()),
+                Err(usage) => return Err(usage),
+            }
+            Ok(())
+        }
+        Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
+        Some(FileKind::Gestures) => load_gestures(&RealDisk, path).map(drop),
+        None => {
+            found.error = Some("Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .skin and .ron".to_owned());
+            Ok(())
+        }
+    };
+    if let Err(error) = loaded {
+        found.error = Some(error.to_string());
+    }
+    Ok(found)
+}
+
+fn remarks_on_model(model: &Model) -> Vec<String> {
+    let mut remarks = model.notes.clone();
+    let (points, count) = weld(&model.points);
+    let triangles: Vec<[u32; 3]> =
+        model.point_triangles().iter().map(|triangle| triangle.map(|corner| points[corner as usize])).collect();
+    if triangles.is_empty() {
+        remarks.push("there are no triangles: nothing can be drawn on".to_owned());
+        return remarks;
+    }
+    let flat = triangles.iter().filter(|[a, b, c]| a == b || b == c || c == a).count();
+    let edges = edges(&triangles);
+    let open = edges.iter().filter(|edge| edge.triangles == 1).count();
+    let shared = edges.iter().filter(|edge| edge.triangles > 2).count();
+    let (island_of, _) = islands(&triangles, count);
+    let mut used: Vec<u32> = triangles.iter().map(|triangle| island_of[triangle[0] as usize]).collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut say = |number: usize, what: &str| {
+        if number > 0 {
+            remarks.push(format!("{number} {what}"));
+        }
+    };
+    say(model.points.len() - count, "points lie exactly on others (seams, unwelded faces)");
+    say(flat, "triangles have two corners at one place");
+    say(open, "edges have one face only (holes, borders)");
+    say(shared, "edges have more than two faces");
+    say(if used.len() > 1 { used.len() } else { 0 }, "separate islands");
+    if let Some(weights) = &model.weights {
+        let unweighted = (0..weights.len()).filter(|point| weights.of(*point).len() == 0).count();
+        say(unweighted, "points have no weights");
+    }
+    remarks
+}
+
+fn remarks_on_rig(rig: &Rig) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let mut labels: Vec<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
+    let unlabelled = rig.len() - labels.len();
+    labels.sort_unstable();
+    let mut doubled: Vec<&str> = labels.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+    doubled.dedup();
+    if !doubled.is_empty() {
+        remarks.push(format!("labels used more than once: {}", doubled.join(", ")));
+    }
+    if unlabelled > 0 {
+        remarks.push(format!("{unlabelled} joints have no label"));
+    }
+    let short = rig.walk().filter(|joint| joint.parent.is_some() && joint.data.rest.translation.length() == 0.0).count();
+    if short > 0 {
+        remarks.push(format!("{short} joints lie exactly on their parent"));
+    }
+    remarks
+}

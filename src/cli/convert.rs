@@ -1,0 +1,73 @@
+//! `rigsmith convert`: from one format to another.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{ExportArgs, Failure, Output, Report, SEED, progress::spinning, skin::load_rig};
+use crate::{
+    files::{FileKind, RealDisk, load_model, store_model, store_rig, stem},
+    headless::Workbench,
+    mesh::gltf::GltfWriteSettings,
+    rig::{Rig, UidSource, character::import_skeleton},
+};
+
+/// Arguments of `rigsmith convert`.
+#[derive(Args, Debug)]
+pub(super) struct ConvertArgs {
+    /// The file to read
+    input: PathBuf,
+    /// The file to write
+    output: Output,
+    #[command(flatten)]
+    export: ExportArgs,
+}
+
+pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
+    use FileKind::{Glb, Gltf, Obj, RigText, Template};
+    let (from, to) = (FileKind::of(&args.input), FileKind::of(&args.output));
+    let mut report = Report::default();
+    let notes = match (from, to) {
+        (Some(Obj | Gltf | Glb), Some(Obj | Gltf | Glb)) => {
+            let model = spinning("reading", || load_model(&RealDisk, &args.input))?;
+            report.notes(model.notes.iter().cloned());
+            // What a file left unweighted stays so in the only way glTF knows: bound to the root.
+            let settings = GltfWriteSettings { bind_unweighted: true, ..args.export.settings() };
+            spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?
+        }
+        (Some(Gltf | Glb), Some(RigText | Template)) => {
+            let model = load_model(&RealDisk, &args.input)?;
+            if model.nodes.is_empty() {
+                let message = format!("`{}` has no skeleton to convert; sketch one into it first", args.input.display());
+                return Err(Failure::Input(message.into()));
+            }
+            let mut uids = UidSource::seeded(SEED);
+            let mut rig = Rig::new(uids.next_uid(), stem(&args.input));
+            for edit in &import_skeleton(&model, &mut uids).edits {
+                rig.apply(edit).map_err(|error| Failure::Input(Box::new(error)))?;
+            }
+            store_rig(&RealDisk, &args.output, &rig)?
+        }
+        (Some(RigText | Template), Some(RigText | Template)) => {
+            let rig = load_rig(&args.input, &mut report)?;
+            store_rig(&RealDisk, &args.output, &rig)?
+        }
+        (Some(RigText | Template), Some(Gltf | Glb)) => {
+            let bench = Workbench::with_rig(SEED, load_rig(&args.input, &mut report)?);
+            let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
+            store_model(&RealDisk, &args.output, &bench.character(), &settings)?
+        }
+        _ => {
+            return Err(Failure::Usage(format!(
+                "cannot make `{}` of `{}`; meshes (.obj, .gltf, .glb) become meshes, rigs (.rig, .rig.ron) and skeletons \
+                 of .gltf and .glb become rigs, rigs become .gltf and .glb",
+                args.output.display(),
+                args.input.display()
+            )));
+        }
+    };
+    report.notes(notes);
+    report.line(format!("wrote {}", args.output.display()));
+    report.set("output", args.output.display().to_string());
+    Ok(report)
+}

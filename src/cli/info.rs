@@ -1,0 +1,129 @@
+//! `rigsmith info`: what is in a file.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{Failure, Report, progress::spinning, sketch::describe_rig};
+use crate::{
+    files::{FileKind, RealDisk, load_gestures, load_model, load_rig_text, load_skin, load_template},
+    mesh::model::Model,
+    rig::{Rig, Uid, UidSource, character::import_rig_text},
+};
+
+/// Arguments of `rigsmith info`.
+#[derive(Args, Debug)]
+pub(super) struct InfoArgs {
+    /// The file
+    file: PathBuf,
+}
+
+pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
+    let path = &args.file;
+    let mut report = Report::default();
+    match FileKind::of(path) {
+        Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb) => {
+            let model = spinning("reading", || load_model(&RealDisk, path))?;
+            describe_model(&mut report, &model);
+        }
+        Some(FileKind::Template) => {
+            let template = load_template(&RealDisk, path)?;
+            let about = template.rig.about();
+            report.line(format!("template \"{}\" {}", about.name, about.version));
+            if !about.description.is_empty() {
+                report.line(about.description.clone());
+            }
+            report.set("kind", "template");
+            report.set("about", serde_json::to_value(about).unwrap_or(Value::Null));
+            report.notes(template.notes);
+            describe_joints(&mut report, &template.rig);
+        }
+        Some(FileKind::RigText) => {
+            let text = load_rig_text(&RealDisk, path)?;
+            let mut rig = Rig::new(Uid(1), "");
+            for edit in import_rig_text(&text, &mut UidSource::seeded(super::SEED)).0 {
+                rig.apply(&edit).map_err(|error| Failure::Input(Box::new(error)))?;
+            }
+            report.line("skeleton in .rig text");
+            report.set("kind", "rig");
+            describe_joints(&mut report, &rig);
+        }
+        Some(FileKind::Skin) => {
+            let skin = load_skin(&RealDisk, path)?;
+            let (points, joints) = (skin.weights().len(), skin.joints().len());
+            let copy = if skin.mesh().is_some() { "with" } else { "without" };
+            report.line(format!("weights of {points} points over {joints} joints, {copy} a copy of the mesh"));
+            report.set("kind", "skin");
+            report.set("points", points);
+            report.set("joints", joints);
+            report.set("mesh_hash", format!("{:032x}", skin.mesh_hash()));
+        }
+        Some(FileKind::Gestures) => {
+            let gestures = load_gestures(&RealDisk, path)?;
+            report.line(format!("{} gestures", gestures.len()));
+            report.set("kind", "gestures");
+            report.set("gestures", gestures.len());
+        }
+        None => {
+            let message = format!("`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .skin and .ron", path.display());
+            return Err(Failure::Usage(message));
+        }
+    }
+    Ok(report)
+}
+
+fn describe_model(report: &mut Report, model: &Model) {
+    let triangles: usize = model.parts.iter().map(|part| part.triangles.len()).sum();
+    let faces: usize =
+        model.parts.iter().map(|p| if p.faces.is_empty() { p.triangles.len() } else { p.faces.len() }).sum();
+    let vertices: usize = model.parts.iter().map(|part| part.vertices.len()).sum();
+    let joints = model.nodes.iter().filter(|node| node.joint).count();
+    let finite = model.points.iter().filter(|point| point.is_finite());
+    let low = finite.clone().copied().reduce(glam::Vec3::min).unwrap_or_default();
+    let high = finite.copied().reduce(glam::Vec3::max).unwrap_or_default();
+    let unweighted = model.weights.as_ref().map(|weights| (0..weights.len()).filter(|p| weights.of(*p).len() == 0).count());
+    let morphs: usize = model.objects.iter().map(|object| object.morph_names.len()).sum();
+    report.line(format!("{} points, {faces} faces ({triangles} triangles), {vertices} vertices", model.points.len()));
+    report.line(format!("box {:.4} {:.4} {:.4} to {:.4} {:.4} {:.4}", low.x, low.y, low.z, high.x, high.y, high.z));
+    let names: Vec<&str> = model.objects.iter().map(|object| object.name.as_str()).collect();
+    report.line(format!("{} objects: {}", model.objects.len(), names.join(", ")));
+    report.line(format!(
+        "{} materials, {} images, {morphs} morph targets, {joints} joints, {} clips",
+        model.looks.materials.len(),
+        model.looks.images.len(),
+        model.clips.len()
+    ));
+    if let Some(unweighted) = unweighted {
+        report.line(format!("skinned; {unweighted} points without weights"));
+    }
+    report.notes(model.notes.iter().cloned());
+    report.set("kind", "mesh");
+    report.set("points", model.points.len());
+    report.set("vertices", vertices);
+    report.set("faces", faces);
+    report.set("triangles", triangles);
+    report.set("box", json!([low.to_array(), high.to_array()]));
+    report.set("objects", names.iter().map(|name| json!(name)).collect::<Vec<Value>>());
+    report.set("materials", model.looks.materials.len());
+    report.set("images", model.looks.images.len());
+    report.set("morph_targets", morphs);
+    report.set("joints", joints);
+    report.set("clips", model.clips.iter().map(|clip| json!(clip.name)).collect::<Vec<Value>>());
+    report.set("skinned", model.weights.is_some());
+    report.set("unweighted", unweighted);
+}
+
+fn describe_joints(report: &mut Report, rig: &Rig) {
+    report.line(format!("{} joints, {} roots, {} local groups", rig.len(), rig.roots().len(), rig.groups().len()));
+    for joint in rig.walk().take(200) {
+        let depth = rig.ancestors(joint.data.uid).count();
+        let label = joint.data.label.as_deref().unwrap_or("(no label)");
+        let tags = if joint.data.tags.is_empty() { String::new() } else { format!("  {} tags", joint.data.tags.len()) };
+        report.line(format!("  {}{label}{tags}", "  ".repeat(depth.min(40))));
+    }
+    if rig.len() > 200 {
+        report.line(format!("  and {} more", rig.len() - 200));
+    }
+    describe_rig(report, rig);
+}

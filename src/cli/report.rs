@@ -1,0 +1,165 @@
+//! What a command says, to people and to programs.
+
+use std::{io::Write, process::ExitCode};
+
+use miette::{Diagnostic, NamedSource, SourceSpan};
+use serde_json::{Map, Value, json};
+
+use crate::{
+    files::{LoadError, StoreError},
+    headless::WorkbenchError,
+};
+
+/// The answer of a command that was done (or that found fault with its input and still has an answer).
+#[derive(Default)]
+pub(super) struct Report {
+    /// Lines for people.
+    pub lines: Vec<String>,
+    /// Warnings for people, on standard error.
+    pub notes: Vec<String>,
+    /// The answer for programs.
+    pub json: Map<String, Value>,
+    /// True if the answer is that the input is at fault.
+    pub at_fault: bool,
+}
+
+impl Report {
+    /// Adds a line.
+    pub fn line(&mut self, line: impl Into<String>) {
+        self.lines.push(line.into());
+    }
+
+    /// Adds a value for programs.
+    pub fn set(&mut self, key: &str, value: impl Into<Value>) {
+        self.json.insert(key.to_owned(), value.into());
+    }
+
+    /// Adds warnings.
+    pub fn notes(&mut self, notes: impl IntoIterator<Item = String>) {
+        self.notes.extend(notes);
+    }
+}
+
+/// Why a command was not done.
+pub(super) enum Failure {
+    /// The input is at fault: exit code 1.
+    Input(Box<dyn std::error::Error>),
+    /// The command was used wrongly: exit code 2.
+    Usage(String),
+}
+
+impl From<LoadError> for Failure {
+    fn from(error: LoadError) -> Self {
+        match error {
+            LoadError::Kind { .. } => Self::Usage(error.to_string()),
+            error => Self::Input(Box::new(error)),
+        }
+    }
+}
+
+impl From<StoreError> for Failure {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Kind { .. } => Self::Usage(error.to_string()),
+            error => Self::Input(Box::new(error)),
+        }
+    }
+}
+
+impl From<WorkbenchError> for Failure {
+    fn from(error: WorkbenchError) -> Self {
+        Self::Input(Box::new(error))
+    }
+}
+
+/// An error in a text file, shown with the line it is in.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("{message}")]
+struct InSource {
+    message: String,
+    what: String,
+    #[source_code]
+    code: NamedSource<String>,
+    #[label("{what}")]
+    place: SourceSpan,
+}
+
+/// Prints the answer and returns the exit code.
+pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
+    let (code, answer) = match result {
+        Ok(report) => {
+            let code = u8::from(report.at_fault);
+            if !json {
+                print(report.lines.iter().map(String::as_str));
+                for note in &report.notes {
+                    eprintln!("note: {note}");
+                }
+            }
+            let mut answer = Map::from_iter([("ok".to_owned(), Value::from(!report.at_fault))]);
+            answer.extend(report.json);
+            if !report.notes.is_empty() {
+                answer.insert("notes".to_owned(), report.notes.into());
+            }
+            (code, answer)
+        }
+        Err(Failure::Usage(message)) => {
+            if !json {
+                eprintln!("error: {message}\n\nFor more information, try 'rigsmith --help'.");
+            }
+            (2, failed(&message))
+        }
+        Err(Failure::Input(error)) => {
+            if !json {
+                show(error.as_ref());
+            }
+            (1, failed(&chain(error.as_ref())))
+        }
+    };
+    if json {
+        print([Value::Object(answer).to_string().as_str()]);
+    }
+    ExitCode::from(code)
+}
+
+/// Prints lines; a reader that closed the pipe is no error.
+fn print<'a>(lines: impl IntoIterator<Item = &'a str>) {
+    let mut out = std::io::stdout().lock();
+    for line in lines {
+        if writeln!(out, "{line}").is_err() {
+            return;
+        }
+    }
+}
+
+fn failed(message: &str) -> Map<String, Value> {
+    Map::from_iter([("ok".to_owned(), Value::from(false)), ("error".to_owned(), json!(message))])
+}
+
+fn show(error: &(dyn std::error::Error + 'static)) {
+    if let Some(LoadError::Source { path, text, source }) = error.downcast_ref::<LoadError>() {
+        let report = miette::Report::new(InSource {
+            message: error.to_string(),
+            what: source.message.clone(),
+            code: NamedSource::new(path.display().to_string(), text.clone()),
+            place: SourceSpan::from(source.offset.min(text.len())),
+        });
+        eprintln!("{report:?}");
+    } else {
+        eprintln!("error: {}", chain(error));
+    }
+}
+
+/// An error with its causes, as far as their texts say more.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(next) = cause {
+        let more = next.to_string();
+        if !text.contains(&more) {
+            text.push_str(": ");
+            text.push_str(&more);
+        }
+        cause = next.source();
+    }
+    text
+}

@@ -1,0 +1,119 @@
+//! `rigsmith sketch`: gestures on a mesh become a skeleton.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, progress::{Progress, spinning}};
+use crate::{
+    files::{FileKind, RealDisk, load_gestures, load_model, stem, store_model, store_rig},
+    headless::Workbench,
+    mesh::gltf::GltfWriteSettings,
+    rig::Rig,
+};
+
+/// Arguments of `rigsmith sketch`.
+#[derive(Args, Debug)]
+pub(super) struct SketchArgs {
+    /// The mesh: .obj, .gltf or .glb. A skeleton in it is where the sketch begins
+    mesh: PathBuf,
+    /// The gestures, a list in RON such as [Stroke(points: [(0.0, 0.9), (0.0, 1.4)], joints: 3)]
+    gestures: PathBuf,
+    /// What to write: .rig, .rig.ron, or the skinned character as .glb or .gltf
+    #[arg(short, long)]
+    output: Output,
+    /// Leave a skeleton that the mesh brings along aside
+    #[arg(long)]
+    mesh_only: bool,
+    #[command(flatten)]
+    weights: WeightArgs,
+    #[command(flatten)]
+    export: ExportArgs,
+}
+
+pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
+    let kind = output_kind(&args.output)?;
+    let gestures = load_gestures(&RealDisk, &args.gestures)?;
+    let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
+    let mut report = Report::default();
+    report.notes(model.notes.iter().cloned());
+    let mut bench = Workbench::new(SEED, &stem(&args.mesh));
+    bench.open(model, args.mesh_only)?;
+    let answers = spinning("sketching", || bench.gestures(gestures));
+    let missed = answers.iter().filter(|answer| !answer.done).count();
+    for answer in &answers {
+        if !answer.done {
+            report.notes.push(format!("gesture {} ({}): {}", answer.number, answer.gesture, answer.message));
+        } else if !answer.message.is_empty() {
+            report.line(format!("{:>3} {:<8} {}", answer.number, answer.gesture, answer.message));
+        }
+    }
+    let joints = bench.rig().len();
+    report.line(format!("{} gestures, {missed} without effect; {joints} joints", answers.len()));
+    report.set("gestures", serde_json::to_value(&answers).unwrap_or(Value::Null));
+    describe_rig(&mut report, bench.rig());
+    save(&mut bench, &args.output, kind, args, &mut report)?;
+    Ok(report)
+}
+
+fn output_kind(path: &Path) -> Result<FileKind, Failure> {
+    match FileKind::of(path) {
+        Some(kind @ (FileKind::RigText | FileKind::Template | FileKind::Glb | FileKind::Gltf)) => Ok(kind),
+        _ => Err(Failure::Usage(format!(
+            "cannot sketch into `{}`; write .rig, .rig.ron, .glb or .gltf",
+            path.display()
+        ))),
+    }
+}
+
+fn save(
+    bench: &mut Workbench,
+    path: &Path,
+    kind: FileKind,
+    args: &SketchArgs,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    match kind {
+        FileKind::Template | FileKind::RigText => report.notes(store_rig(&RealDisk, path, bench.rig())?),
+        _ => skin_and_store(bench, path, args.weights.settings(), &args.export.settings(), report)?,
+    }
+    report.line(format!("wrote {}", path.display()));
+    report.set("output", path.display().to_string());
+    Ok(())
+}
+
+/// Binds the mesh with automatic weights and writes the character.
+pub(super) fn skin_and_store(
+    bench: &mut Workbench,
+    path: &Path,
+    settings: crate::algo::weights::WeightSettings,
+    export: &GltfWriteSettings,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let mut progress = Progress::new("skinning");
+    let weights = bench.skin(settings, Vec::new(), &mut |part| progress.at(part))?;
+    drop(progress);
+    super::skin::describe_weights(report, &weights);
+    let notes = spinning("writing", || store_model(&RealDisk, path, &bench.character(), export))?;
+    report.notes(notes);
+    Ok(())
+}
+
+/// Says for programs what a rig holds.
+pub(super) fn describe_rig(report: &mut Report, rig: &Rig) {
+    let globals = rig.rest_globals();
+    let joints: Vec<Value> = rig
+        .walk()
+        .zip(&globals)
+        .map(|(joint, (uid, global))| {
+            json!({
+                "uid": uid.to_string(),
+                "parent": joint.parent.map(|parent| parent.to_string()),
+                "label": joint.data.label,
+                "position": global.translation.to_array(),
+            })
+        })
+        .collect();
+    report.set("joints", joints);
+}

@@ -1,0 +1,220 @@
+//! `rigsmith skin`: a skeleton and a mesh become a character.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use clap::Args;
+use serde_json::json;
+
+use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, progress::{Progress, spinning}};
+use crate::{
+    algo::{
+        transfer::{TransferMesh, TransferSettings, transfer_weights},
+        weights::WeightReport,
+    },
+    files::{
+        FileKind, RealDisk, load_model, load_rig_text, load_skin, load_template, stem, store_model, store_skin,
+    },
+    headless::Workbench,
+    rig::{
+        Rig, SkinData, Uid, UidSource,
+        character::{import_rig_text, import_skeleton},
+        skin::{SkinFile, SkinJoint},
+    },
+};
+
+/// Arguments of `rigsmith skin`.
+#[derive(Args, Debug)]
+pub(super) struct SkinArgs {
+    /// The skeleton: .rig.ron, .rig, or a .glb or .gltf that has one
+    rig: PathBuf,
+    /// The mesh: .obj, .gltf or .glb. A skeleton in it is left aside
+    mesh: PathBuf,
+    /// What to write: .glb or .gltf, or only the weights as .skin
+    #[arg(short, long)]
+    output: Output,
+    /// Take the weights from a .skin file: as they are if the mesh is the same, transferred if it has changed
+    #[arg(long, value_name = "FILE")]
+    weights_from: Option<PathBuf>,
+    /// Save the weights to a .skin file, too
+    #[arg(long, value_name = "FILE")]
+    save_weights: Option<PathBuf>,
+    /// Let an object of the mesh move with one joint only, by their names: OBJECT=JOINT
+    #[arg(long, value_name = "OBJECT=JOINT")]
+    rigid: Vec<String>,
+    #[command(flatten)]
+    weights: WeightArgs,
+    #[command(flatten)]
+    export: ExportArgs,
+}
+
+pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
+    if !matches!(FileKind::of(&args.output), Some(FileKind::Glb | FileKind::Gltf | FileKind::Skin)) {
+        let message = format!("cannot skin into `{}`; write .glb, .gltf or .skin", args.output.display());
+        return Err(Failure::Usage(message));
+    }
+    let mut report = Report::default();
+    let rig = load_rig(&args.rig, &mut report)?;
+    let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
+    report.notes(model.notes.iter().cloned());
+    if model.points.is_empty() {
+        return Err(Failure::Input(format!("`{}` has no points to skin; open another mesh", args.mesh.display()).into()));
+    }
+    let mut bench = Workbench::with_rig(SEED, rig);
+    bench.open(model, true)?;
+    let rigid = rigid_parts(args, &bench)?;
+    match &args.weights_from {
+        Some(path) => take_weights(&mut bench, path, &mut report)?,
+        None => {
+            let mut progress = Progress::new("skinning");
+            let weights = bench.skin(args.weights.settings(), rigid, &mut |part| progress.at(part))?;
+            drop(progress);
+            describe_weights(&mut report, &weights);
+        }
+    }
+    let weights_file = if FileKind::of(&args.output) == Some(FileKind::Skin) { Some(&args.output) } else { None };
+    for path in weights_file.into_iter().chain(&args.save_weights) {
+        store_skin(&RealDisk, path, &skin_file(&bench)?)?;
+        report.line(format!("wrote {}", path.display()));
+    }
+    if weights_file.is_none() {
+        let write = || store_model(&RealDisk, &args.output, &bench.character(), &args.export.settings());
+        report.notes(spinning("writing", write)?);
+        report.line(format!("wrote {}", args.output.display()));
+    }
+    report.set("joints", bench.rig().len());
+    report.set("output", args.output.display().to_string());
+    Ok(report)
+}
+
+/// Loads a rig from any file that holds one.
+pub(super) fn load_rig(path: &Path, report: &mut Report) -> Result<Rig, Failure> {
+    let mut uids = UidSource::seeded(SEED);
+    let mut rig = Rig::new(uids.next_uid(), stem(path));
+    let edits = match FileKind::of(path) {
+        Some(FileKind::Template) => {
+            let template = load_template(&RealDisk, path)?;
+            report.notes(template.notes);
+            return Ok(template.rig);
+        }
+        Some(FileKind::RigText) => import_rig_text(&load_rig_text(&RealDisk, path)?, &mut uids).0,
+        Some(FileKind::Glb | FileKind::Gltf) => {
+            let model = load_model(&RealDisk, path)?;
+            report.notes(model.notes.iter().cloned());
+            import_skeleton(&model, &mut uids).edits
+        }
+        _ => {
+            let message = format!("`{}` holds no rig; give .rig.ron, .rig, .glb or .gltf", path.display());
+            return Err(Failure::Usage(message));
+        }
+    };
+    for edit in &edits {
+        rig.apply(edit).map_err(|error| Failure::Input(format!("`{}`: {error}", path.display()).into()))?;
+    }
+    Ok(rig)
+}
+
+fn rigid_parts(args: &SkinArgs, bench: &Workbench) -> Result<Vec<(usize, Uid)>, Failure> {
+    let Some(mesh) = bench.mesh() else { return Ok(Vec::new()) };
+    let pair = |text: &String| {
+        let (object, joint) = text
+            .split_once('=')
+            .ok_or_else(|| Failure::Usage(format!("--rigid {text}: write OBJECT=JOINT, both by name")))?;
+        let number = mesh.rest.objects.iter().position(|o| o.name == object).ok_or_else(|| {
+            let names: Vec<&str> = mesh.rest.objects.iter().map(|object| object.name.as_str()).collect();
+            Failure::Input(format!("--rigid {text}: the mesh has no object \"{object}\"; it has: {}", names.join(", ")).into())
+        })?;
+        let joint = bench.rig().find_label(joint).ok_or_else(|| {
+            Failure::Input(format!("--rigid {text}: the rig has no joint with the label \"{joint}\"").into())
+        })?;
+        Ok((number, joint))
+    };
+    args.rigid.iter().map(pair).collect()
+}
+
+/// The weights of the bench's mesh, to be saved.
+pub(super) fn skin_file(bench: &Workbench) -> Result<SkinFile, Failure> {
+    let (Some(mesh), Some(skin)) = (bench.mesh(), bench.weights()) else {
+        return Err(Failure::Input("there are no weights to save; skin the mesh first".into()));
+    };
+    let joint = |uid: &Uid| {
+        let label = bench.rig().joint(*uid).and_then(|joint| joint.data.label.clone()).unwrap_or_default();
+        SkinJoint { uid: uid.0, label }
+    };
+    let joints = skin.joints.iter().map(joint).collect();
+    SkinFile::new(joints, skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true)
+        .map_err(|error| Failure::Input(Box::new(error)))
+}
+
+/// Binds the weights of a `.skin` file. Joints are found by uid, or by label where the rig has other uids.
+fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Result<(), Failure> {
+    let file = load_skin(&RealDisk, path)?;
+    let rig = bench.rig();
+    let mut joints = Vec::with_capacity(file.joints().len());
+    for joint in file.joints() {
+        let by_label = || rig.find_label(&joint.label).filter(|_| !joint.label.is_empty());
+        let uid = Some(Uid(joint.uid)).filter(|uid| rig.joint(*uid).is_some()).or_else(by_label);
+        let uid = uid.ok_or_else(|| Failure::Input(format!(
+            "`{}`: the rig has no joint {} (\"{}\"); skin with the rig that the weights were made for",
+            path.display(),
+            Uid(joint.uid),
+            joint.label
+        ).into()))?;
+        joints.push(uid);
+    }
+    let mesh = bench.mesh().ok_or_else(|| Failure::Input("no mesh is open".into()))?;
+    let (points, triangles): (Arc<_>, _) = (mesh.rest.clone(), mesh.triangles.clone());
+    let weights = if file.fits(&points.points, &triangles) {
+        report.line(format!("took the weights of {} as they are", path.display()));
+        report.set("weights", json!({ "exact": true }));
+        file.weights().clone()
+    } else {
+        let source = file.mesh().ok_or_else(|| Failure::Input(format!(
+            "`{}`: the weights are of another mesh, and the file has no copy of it to transfer them from",
+            path.display()
+        ).into()))?;
+        let source = TransferMesh { points: &source.points, triangles: &source.triangles };
+        let target = TransferMesh { points: &points.points, triangles: &triangles };
+        let settings = TransferSettings::default();
+        let (weights, told) = spinning("transferring", || transfer_weights(source, file.weights(), target, &settings))
+            .map_err(|error| Failure::Input(Box::new(error)))?;
+        report.line(format!(
+            "the mesh has changed: transferred the weights of {} ({} copied, {} matched, {} inpainted, {} nearest)",
+            path.display(),
+            told.copied,
+            told.matched,
+            told.inpainted,
+            told.nearest
+        ));
+        report.set("weights", json!({
+            "exact": false, "copied": told.copied, "matched": told.matched,
+            "inpainted": told.inpainted, "nearest": told.nearest,
+        }));
+        weights
+    };
+    bench.bind(SkinData { joints, weights, at_rest: true })?;
+    Ok(())
+}
+
+/// Says how points got their weights.
+pub(super) fn describe_weights(report: &mut Report, weights: &WeightReport) {
+    report.line(format!(
+        "{} points weighted: {} over the surface, {} through voxels, {} filled, {} by the nearest bone, {} given",
+        weights.points,
+        weights.by_surface,
+        weights.by_voxels,
+        weights.by_fill,
+        weights.by_nearest,
+        weights.given
+    ));
+    report.set("weights", json!({
+        "points": weights.points,
+        "by_surface": weights.by_surface,
+        "by_voxels": weights.by_voxels,
+        "by_fill": weights.by_fill,
+        "by_nearest": weights.by_nearest,
+        "given": weights.given,
+    }));
+}

@@ -1,0 +1,180 @@
+//! One rig and its mesh without a window: what the command line, pipelines and tests work with.
+//!
+//! A [`Workbench`] is an app with [`RigPlugins`](crate::plugins::RigPlugins) and a rig in it. It drives the very
+//! plugins that a window drives, and waits for their background work.
+
+use std::{sync::Arc, time::Duration};
+
+use bevy::prelude::*;
+
+use crate::{
+    algo::weights::{WeightReport, WeightSettings},
+    mesh::model::Model,
+    plugins::{
+        RigPlugins,
+        document::{EditRefused, EditRequest, RigBundle},
+        gesture::{Gesture, GestureAnswer, GestureScript},
+        skinning::{BindRequest, Bound, SkinningJob},
+        surface::{RigMesh, SkinOf},
+    },
+    rig::{
+        Rig, RigEdit, SkinData, Uid, UidSource,
+        character::{Character, character, import_skeleton},
+        operations::Operation,
+    },
+};
+
+/// One rig, at most one mesh, and the plugins that work on them.
+pub struct Workbench {
+    app: App,
+    rig: Entity,
+    mesh: Option<Entity>,
+}
+
+/// Why the workbench did not do what it was asked for.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WorkbenchError {
+    /// An edit was refused.
+    #[error("{0}")]
+    Refused(String),
+    /// There is no mesh.
+    #[error("no mesh is open; open one first")]
+    NoMesh,
+}
+
+impl Workbench {
+    /// An empty rig. The same seed gives the same uids.
+    pub fn new(seed: u64, name: &str) -> Self {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, TransformPlugin, RigPlugins)).insert_resource(UidSource::seeded(seed));
+        app.finish();
+        app.cleanup();
+        let uid = app.world_mut().resource_mut::<UidSource>().next_uid();
+        let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(uid, name), ..default() }).id();
+        Self { app, rig, mesh: None }
+    }
+
+    /// A rig that was loaded.
+    pub fn with_rig(seed: u64, rig: Rig) -> Self {
+        let mut bench = Self::new(seed, "");
+        let entity = bench.rig;
+        bench.app.world_mut().entity_mut(entity).insert(rig);
+        bench
+    }
+
+    /// Opens a mesh below the rig. Its own skeleton and weights come in as joints, unless `mesh_only`.
+    pub fn open(&mut self, model: Model, mesh_only: bool) -> Result<(), WorkbenchError> {
+        let world = self.app.world_mut();
+        let mut uids = world.resource_mut::<UidSource>();
+        let uid = uids.next_uid();
+        let mut nodes = Vec::new();
+        let mut edits = Vec::new();
+        if !mesh_only {
+            let skeleton = import_skeleton(&model, &mut uids);
+            edits = skeleton.edits;
+            nodes = skeleton.nodes;
+            edits.extend(skeleton.skin.map(|skin| RigEdit::SetSkin(uid, Some(skin))));
+        }
+        let mesh = world.spawn((RigMesh::new(uid, model, nodes), SkinOf(self.rig))).id();
+        self.mesh = Some(mesh);
+        if edits.is_empty() { Ok(()) } else { self.operate(Operation::Edits(edits)) }
+    }
+
+    /// Runs one operation, one step of the history.
+    pub fn operate(&mut self, operation: Operation) -> Result<(), WorkbenchError> {
+        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
+        self.app.update();
+        let refused = self.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().last();
+        refused.map_or(Ok(()), |refused| Err(WorkbenchError::Refused(refused.reason)))
+    }
+
+    /// Makes gestures and returns an answer for each.
+    pub fn gestures(&mut self, gestures: Vec<Gesture>) -> Vec<GestureAnswer> {
+        self.app.world_mut().entity_mut(self.rig).insert(GestureScript::new(gestures));
+        loop {
+            self.app.update();
+            let Some(script) = self.app.world().get::<GestureScript>(self.rig) else { return Vec::new() };
+            if script.is_done() {
+                return script.answers.clone();
+            }
+        }
+    }
+
+    /// Computes weights for the mesh. `progress` is told how much is done, 0 to 1, now and then.
+    pub fn skin(
+        &mut self,
+        settings: WeightSettings,
+        rigid: Vec<(usize, Uid)>,
+        progress: &mut dyn FnMut(f32),
+    ) -> Result<WeightReport, WorkbenchError> {
+        let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
+        self.app.world_mut().write_message(BindRequest { mesh, settings, rigid });
+        loop {
+            self.app.update();
+            let bound = self.app.world_mut().resource_mut::<Messages<Bound>>().drain().last();
+            if let Some(bound) = bound {
+                // The edit that binds the weights is carried out in the next frame.
+                self.app.update();
+                let refused = self.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().last();
+                return match (bound.result, refused) {
+                    (Ok(_), Some(refused)) => Err(WorkbenchError::Refused(refused.reason)),
+                    (Ok(report), None) => Ok(report),
+                    (Err(reason), _) => Err(WorkbenchError::Refused(reason)),
+                };
+            }
+            if let Some(job) = self.app.world().get::<SkinningJob>(mesh) {
+                progress(job.progress());
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Binds given weights.
+    pub fn bind(&mut self, skin: SkinData) -> Result<(), WorkbenchError> {
+        let uid = self.mesh().ok_or(WorkbenchError::NoMesh)?.uid;
+        self.operate(Operation::Edits(vec![RigEdit::SetSkin(uid, Some(Arc::new(skin)))]))
+    }
+
+    /// The rig as it stands.
+    pub fn rig(&self) -> &Rig {
+        static EMPTY: std::sync::LazyLock<Rig> = std::sync::LazyLock::new(Rig::default);
+        self.app.world().get::<Rig>(self.rig).unwrap_or(&EMPTY)
+    }
+
+    /// The mesh.
+    pub fn mesh(&self) -> Option<&RigMesh> {
+        self.app.world().get::<RigMesh>(self.mesh?)
+    }
+
+    /// The mesh's weights.
+    pub fn weights(&self) -> Option<&SkinData> {
+        self.rig().skin(self.mesh()?.uid).map(Arc::as_ref)
+    }
+
+    /// The mesh with the rig's joints and weights, to be written.
+    pub fn character(&self) -> Model {
+        match self.mesh() {
+            Some(mesh) => character(&Character {
+                rig: self.rig(),
+                file: &mesh.file,
+                rest: &mesh.rest,
+                nodes: &mesh.nodes,
+                skin: self.weights(),
+            }),
+            None => {
+                let empty = Model { name: self.rig().about().name.clone(), ..default() };
+                character(&Character { rig: self.rig(), file: &empty, rest: &empty, nodes: &[], skin: None })
+            }
+        }
+    }
+
+    /// The app, for what is not offered here.
+    pub fn app_mut(&mut self) -> &mut App {
+        &mut self.app
+    }
+
+    /// The rig's entity.
+    pub fn rig_entity(&self) -> Entity {
+        self.rig
+    }
+}

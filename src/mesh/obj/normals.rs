@@ -1,0 +1,127 @@
+//! Normals where a file has none: smooth within smoothing groups, flat where it says `s off`.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, Vec3};
+
+use super::{NONE, ObjArrays, corner_table::CornerTable, triangulate::newell};
+
+/// Smooth normals at points, one for each smoothing group that meets there.
+pub(super) struct SmoothNormals {
+    /// Sums of face normals, by point if there is one group only, else by number in `table`.
+    sums: Vec<Vec3>,
+    table: Option<CornerTable>,
+}
+
+/// The normal with length 1, unless it has none. One that is as good as that long is kept to the bit.
+pub(super) fn unit(normal: [f32; 3]) -> Option<Vec3> {
+    let long = DVec3::from(normal.map(f64::from));
+    let square = long.length_squared();
+    if (square - 1.0).abs() < 2e-6 {
+        return Some(Vec3::from(normal));
+    }
+    (square > 0.0).then(|| (long / square.sqrt()).as_vec3())
+}
+
+/// The normal that the file gives a corner, if it is any good.
+pub(super) fn given(arrays: &ObjArrays, corner: usize) -> Option<(u32, Vec3)> {
+    let index = *arrays.corner_normals.get(corner)?;
+    if index == NONE {
+        return None;
+    }
+    Some((index, unit(arrays.normals[index as usize])?))
+}
+
+/// True if faces with this value of `s` are flat. Files without any `s` mean smooth faces, as all readers take it.
+pub(super) fn is_flat(smoothing: u32) -> bool {
+    smoothing == 0
+}
+
+/// The position of a point.
+pub(super) fn position(arrays: &ObjArrays, point: u32) -> DVec3 {
+    DVec3::from(arrays.positions[point as usize].map(f64::from))
+}
+
+/// The unit normal of a face, or zero for one without area.
+pub(super) fn face_normal(arrays: &ObjArrays, face: usize) -> DVec3 {
+    let corners = arrays.corners[arrays.face(face)].iter();
+    newell(corners.map(|point| position(arrays, *point))).normalize_or_zero()
+}
+
+impl SmoothNormals {
+    /// Sums the normals of all smooth faces that have a corner without normal at each of their corners, weighted by the
+    /// angle there (Thürmer and Wüthrich 1998), so that how a surface is cut into faces does not matter.
+    pub fn new(arrays: &ObjArrays) -> Self {
+        let smooth = |run: &usize| !is_flat(arrays.runs[*run].smoothing);
+        let lacking = |face: &usize| arrays.face(*face).any(|corner| given(arrays, corner).is_none());
+        let mut groups = arrays.runs.iter().filter(|run| !is_flat(run.smoothing)).map(|run| run.smoothing);
+        let first = groups.next().unwrap_or(NONE);
+        let several = groups.any(|group| group != first);
+        let mut table = several.then(|| CornerTable::new(arrays.positions.len()));
+        let mut sums: Vec<Vec3> = Vec::new();
+        for run in (0..arrays.runs.len()).filter(smooth) {
+            for face in arrays.run_faces(run).filter(lacking) {
+                let corners = &arrays.corners[arrays.face(face)];
+                let normal = face_normal(arrays, face);
+                if normal == DVec3::ZERO {
+                    continue;
+                }
+                if !several && sums.is_empty() {
+                    sums.resize(arrays.positions.len(), Vec3::ZERO);
+                }
+                let mut before = position(arrays, corners[corners.len() - 1]);
+                let mut here = position(arrays, corners[0]);
+                for (at, point) in corners.iter().enumerate() {
+                    let after = position(arrays, corners[(at + 1) % corners.len()]);
+                    let weight = angle(before - here, after - here);
+                    let slot = match &mut table {
+                        Some(table) => table.vertex(*point, u64::from(arrays.runs[run].smoothing)).0 as usize,
+                        None => *point as usize,
+                    };
+                    if slot == sums.len() {
+                        sums.push(Vec3::ZERO);
+                    }
+                    sums[slot] += (normal * weight).as_vec3();
+                    (before, here) = (here, after);
+                }
+            }
+        }
+        Self { sums, table }
+    }
+
+    /// The normal at a point for a face of this smoothing group; `None` where the faces around have no area or cancel
+    /// out.
+    pub fn at(&mut self, point: u32, smoothing: u32) -> Option<Vec3> {
+        let slot = match &mut self.table {
+            Some(table) => table.vertex(point, u64::from(smoothing)).0 as usize,
+            None => point as usize,
+        };
+        unit(self.sums.get(slot)?.to_array())
+    }
+}
+
+/// The angle between two vectors in radians to within 1e-4; 0 if one is zero.
+///
+/// A polynomial (Abramowitz and Stegun 4.4.45), so that it is the same on every machine.
+fn angle(a: DVec3, b: DVec3) -> f64 {
+    let lengths = (a.length_squared() * b.length_squared()).sqrt();
+    if lengths == 0.0 {
+        return 0.0;
+    }
+    let cosine = (a.dot(b) / lengths).clamp(-1.0, 1.0);
+    let x = cosine.abs();
+    let polynomial = ((-0.018_729_3 * x + 0.074_261) * x - 0.212_114_4) * x + 1.570_728_8;
+    let angle = (1.0 - x).sqrt() * polynomial;
+    if cosine < 0.0 { std::f64::consts::PI - angle } else { angle }
+}
+
+/// Maps smoothing groups to small numbers in the order of their first use.
+#[derive(Debug, Default)]
+pub(super) struct Groups(HashMap<u32, u32>);
+
+impl Groups {
+    pub fn number(&mut self, smoothing: u32) -> u32 {
+        let next = self.0.len() as u32;
+        *self.0.entry(smoothing).or_insert(next)
+    }
+}

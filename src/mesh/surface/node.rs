@@ -1,0 +1,271 @@
+//! Eight boxes in 128 bytes: what a ray waits for is memory, so nodes are small.
+//!
+//! Bounds are kept as 16-bit steps from the node's own lower corner, after Ylitie, Karras and Laine, "Efficient
+//! Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs" (HPG 2017), always rounded outwards.
+
+use bytemuck::cast;
+use glam::Vec3;
+use wide::{CmpLe, f32x4, i32x4, u32x4};
+
+use super::crossing::{Frame, SLACK};
+
+/// Children of a node.
+pub(super) const WIDTH: usize = 8;
+/// Marks a child that is a leaf.
+const LEAF: u32 = 1 << 31;
+/// Marks a leaf of two packets.
+const TWO: u32 = 1 << 30;
+/// Steps along each axis of a node.
+const STEPS: f32 = 65535.0;
+
+/// Four values for the first four children and four for the others.
+pub(super) type Eight = [f32x4; 2];
+
+/// Up to eight children: first those that are nodes, then leaves. Both kinds lie one after the other.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(128))]
+pub(super) struct Node {
+    /// Lower and upper bounds along each axis, in steps from `base`. A word holds those of child `i` in its lower half
+    /// and of child `i + 4` in its upper half.
+    planes: [[[u32; 4]; 3]; 2],
+    /// The lower corner of everything in the node.
+    base: [f32; 3],
+    /// Binary exponents of the steps, as in an `f32`.
+    exponents: [u8; 3],
+    /// How many children are nodes.
+    nodes: u8,
+    /// How many children there are.
+    count: u8,
+    /// A bit for each child that is a leaf of two packets.
+    twos: u8,
+    /// The first child that is a node.
+    pub first_node: u32,
+    /// The first packet of the first leaf.
+    pub first_packet: u32,
+}
+
+/// A node or a leaf.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Child(u32);
+
+/// What a [`Child`] refers to.
+pub(super) enum Target {
+    /// A node.
+    Node(usize),
+    /// The first packet of a leaf, and whether there is a second.
+    Leaf(usize, bool),
+}
+
+impl Child {
+    pub const ROOT: Self = Self(0);
+
+    #[inline(always)]
+    pub fn target(self) -> Target {
+        if self.0 & LEAF != 0 {
+            Target::Leaf((self.0 & !(LEAF | TWO)) as usize, self.0 & TWO != 0)
+        } else {
+            Target::Node(self.0 as usize)
+        }
+    }
+}
+
+/// An axis-aligned box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bounds {
+    pub low: Vec3,
+    pub high: Vec3,
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
+impl Bounds {
+    /// Holds nothing.
+    pub const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+
+    #[inline(always)]
+    pub fn union(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    #[inline(always)]
+    pub fn of(corners: [Vec3; 3]) -> Self {
+        Self { low: corners[0].min(corners[1]).min(corners[2]), high: corners[0].max(corners[1]).max(corners[2]) }
+    }
+
+    /// Half the area of the box.
+    pub fn half_area(&self) -> f32 {
+        let size = self.high - self.low;
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.low.x > self.high.x
+    }
+}
+
+/// A ray prepared for boxes: they are grown by what rounding can do to the triangles in them and to the boxes, so that
+/// no crossing that the triangle test sees is lost.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BoxRay {
+    /// The origin, moved back for near planes and ahead for far ones.
+    origins: [Vec3; 2],
+    /// One over the direction.
+    inverse: Vec3,
+    /// Which bound is near, per axis.
+    near: [usize; 3],
+}
+
+impl BoxRay {
+    pub fn new(frame: &Frame, bounds: &Bounds) -> Self {
+        let reach = (bounds.low - frame.origin).abs().max((bounds.high - frame.origin).abs()).max_element();
+        let slack = SLACK * (reach + frame.origin.abs().max_element());
+        // Far below the slack, and far from overflow.
+        let least = frame.direction.abs().max_element() * 1e-9;
+        let direction = frame.direction.map(|d| if d.abs() < least { least.copysign(d) } else { d });
+        let shift = direction.map(|d| slack.copysign(d));
+        Self {
+            origins: [frame.origin + shift, frame.origin - shift],
+            inverse: 1.0 / direction,
+            near: direction.to_array().map(|d| usize::from(d < 0.0)),
+        }
+    }
+
+    /// Distances at which the ray enters and leaves each box, and a bit for each that it meets within the range.
+    #[inline(always)]
+    pub fn meet(&self, node: &Node, from: f32, to: f32) -> (Eight, Eight, u32) {
+        let (mut enter, mut leave) = ([f32x4::splat(from); 2], [f32x4::splat(to); 2]);
+        for axis in 0..3 {
+            let scale = f32x4::splat(node.step(axis) * self.inverse[axis]);
+            let plane = |side: usize| {
+                let start = f32x4::splat((node.base[axis] - self.origins[side][axis]) * self.inverse[axis]);
+                node.steps(self.near[axis] ^ side, axis).map(|steps| steps * scale + start)
+            };
+            let (near, far) = (plane(0), plane(1));
+            for half in 0..2 {
+                enter[half] = enter[half].fast_max(near[half]);
+                leave[half] = leave[half].fast_min(far[half]);
+            }
+        }
+        let mask = |half: usize| enter[half].cmp_le(leave[half]).move_mask() as u32;
+        (enter, leave, (mask(0) | mask(1) << 4) & ((1 << node.count) - 1))
+    }
+}
+
+impl Node {
+    pub const EMPTY: Self = Self {
+        planes: [[[0; 4]; 3]; 2],
+        base: [0.0; 3],
+        exponents: [1; 3],
+        nodes: 0,
+        count: 0,
+        twos: 0,
+        first_node: 0,
+        first_packet: 0,
+    };
+
+    /// A node without boxes: how many of its children are nodes, and how many packets each leaf has (one or two).
+    pub fn new(nodes: usize, leaves: impl Iterator<Item = usize>) -> Self {
+        let mut node = Self { nodes: nodes as u8, count: nodes as u8, ..Self::EMPTY };
+        for packets in leaves {
+            node.twos |= u8::from(packets == 2) << node.count;
+            node.count += 1;
+        }
+        node
+    }
+
+    /// How many children there are.
+    pub fn len(&self) -> usize {
+        self.count as usize
+    }
+
+    /// How many of them are nodes.
+    pub fn inner(&self) -> usize {
+        self.nodes as usize
+    }
+
+    /// How many packets its leaves have.
+    pub fn packets(&self) -> usize {
+        self.len() - self.inner() + self.twos.count_ones() as usize
+    }
+
+    /// How many packets the leaf at `i` has.
+    pub fn packets_of(&self, i: usize) -> usize {
+        1 + usize::from(self.twos >> i & 1)
+    }
+
+    /// The child at `i`.
+    #[inline(always)]
+    pub fn child(&self, i: usize) -> Child {
+        let i = i as u32;
+        let nodes = u32::from(self.nodes);
+        if i < nodes {
+            return Child(self.first_node + i);
+        }
+        let twos = u32::from(self.twos);
+        let before = (twos & ((1 << i) - 1)).count_ones();
+        let two = if twos >> i & 1 == 1 { TWO } else { 0 };
+        Child(LEAF | two | (self.first_packet + i - nodes + before))
+    }
+
+    #[inline(always)]
+    fn step(&self, axis: usize) -> f32 {
+        f32::from_bits(u32::from(self.exponents[axis]) << 23)
+    }
+
+    #[inline(always)]
+    fn steps(&self, side: usize, axis: usize) -> Eight {
+        let words: u32x4 = cast(self.planes[side][axis]);
+        let float = |words: u32x4| f32x4::from_i32x4(cast::<u32x4, i32x4>(words));
+        [float(words & u32x4::splat(0xffff)), float(words >> 16)]
+    }
+
+    /// Squared distances of `point` from the boxes, and a bit for each child; boxes are grown by `slack`.
+    pub fn distances(&self, point: Vec3, slack: f32) -> (Eight, u32) {
+        let mut squared = [f32x4::ZERO; 2];
+        for axis in 0..3 {
+            let (step, base) = (f32x4::splat(self.step(axis)), f32x4::splat(self.base[axis] - point[axis]));
+            let (low, high) = (self.steps(0, axis), self.steps(1, axis));
+            for half in 0..2 {
+                let outside = (low[half] * step + base).fast_max(-(high[half] * step + base)) - f32x4::splat(slack);
+                let outside = outside.fast_max(f32x4::ZERO);
+                squared[half] += outside * outside;
+            }
+        }
+        (squared, (1 << self.count) - 1)
+    }
+
+    /// Takes the boxes of its children; returns the box around all.
+    pub fn fit(&mut self, boxes: &[Bounds]) -> Bounds {
+        let whole = boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union);
+        let size = whole.high - whole.low;
+        self.base = whole.low.to_array();
+        for axis in 0..3 {
+            // The next power of two: one more than the exponent of a number that is not below the wanted step.
+            let wanted = size[axis] * (1.001 / STEPS);
+            self.exponents[axis] = (wanted.to_bits() >> 23) as u8 + 1;
+            let scale = 1.0 / self.step(axis);
+            for (i, bounds) in boxes.iter().enumerate().take(WIDTH) {
+                let low = (bounds.low[axis] - whole.low[axis]) * scale;
+                let high = (bounds.high[axis] - whole.low[axis]) * scale;
+                // Casts round down and stay in range; the one more also covers what rounding took.
+                let (low, high) = (low as u16, (high as u16).saturating_add(1));
+                let shift = i / 4 * 16;
+                for (side, value) in [low, high].into_iter().enumerate() {
+                    let word = &mut self.planes[side][axis][i % 4];
+                    *word = *word & !(0xffff << shift) | u32::from(value) << shift;
+                }
+            }
+        }
+        whole
+    }
+
+    /// Reads from both halves of the node.
+    #[inline(always)]
+    pub fn touch(&self) -> u32 {
+        self.planes[0][0][0] ^ self.first_packet
+    }
+}

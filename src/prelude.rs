@@ -1,0 +1,21 @@
+//! What a game or tool that uses Rigsmith needs most.
+
+pub use crate::{
+    algo::{
+        placement::PlaceSettings,
+        stroke::{ChainChoice, StrokeSettings},
+        view::{View, ViewPlane},
+        weights::WeightSettings,
+    },
+    plugins::{
+        RigPlugins, RigSystems,
+        document::{Change, EditRefused, EditRequest, Edited, Joint, JointOf, RigBundle, Selection, Symmetry},
+        gesture::{Gesture, GestureScript},
+        picking::{Pick, PickRequest, Picked},
+        placement::{PlaceRequest, Placed},
+        skinning::{BindRequest, Bound},
+        stroke::{StrokeDone, StrokeRequest, StrokeResult},
+        surface::{RigMesh, RigSurface, SkinOf},
+    },
+    rig::{Rig, RigEdit, Uid, UidSource, operations::Operation},
+};

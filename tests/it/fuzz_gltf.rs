@@ -1,0 +1,152 @@
+//! Fuzzing of the glTF reader and writer: bent JSON, bent containers, bent bytes. Nothing panics or hangs, what is read keeps
+//! the promises of `Model`, and what is read can be written.
+
+use super::{
+    gltf::{compose, data},
+    mutate::run_fuzz,
+};
+use glam::Vec3;
+use rigsmith::mesh::{
+    gltf::{GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
+    model::{ChannelTarget, Interpolation, Model},
+};
+
+/// What a mutator should try inside JSON.
+const WORDS: &str = r#""bufferView":0 "byteOffset":4 "byteStride":4 "byteStride":255 "byteLength":0 "count":0 "count":1 "count":4294967295
+"componentType":5120 "componentType":5121 "componentType":5122 "componentType":5123 "componentType":5125 "componentType":5126
+"normalized":true "type":"SCALAR" "type":"VEC2" "type":"VEC3" "type":"VEC4" "type":"MAT4" "sparse":{ "mode":5 "mode":6 "mode":0
+"children":[0] "children":[1] "children":[2,3] "mesh":0 "mesh":1 "skin":0 "skin":null "joints":[0] "joints":[] "skeleton":9
+"matrix":[ "translation":[1e38,0,0] "scale":[0,0,0] "scale":[-1,1,1] "rotation":[0,0,0,0] "weights":[] "targets":[] "targets":[{}]
+"extensions":{"KHR_texture_transform":{}} "extensionsRequired":["x"] "interpolation":"CUBICSPLINE" "path":"weights" "path":"scale"
+"node":0 "node":1 "index":7 "source":0 "uri":"../x" "uri":"data:;base64,AAAA" "uri":"%FF" "scene":0 "scenes":[] "extras":{} {} [] null true
+1e308 -1 1.5 0 2 255 65535 4294967296 9007199254740993 1e-45 -0.0"#;
+
+/// Fails unless everything that `Model` documents holds.
+fn check_promises(model: &Model) {
+    let (points, nodes) = (model.points.len(), model.nodes.len());
+    assert!(model.points.iter().all(|point| point.is_finite()));
+    for (i, node) in model.nodes.iter().enumerate() {
+        assert!(node.parent.is_none_or(|parent| parent < i));
+        assert!(node.rest.affine().is_finite() && (node.rest.rotation.length() - 1.0).abs() < 1e-4);
+    }
+    assert!(model.rest_globals().iter().all(|global| global.is_finite()));
+    for skin in &model.skins {
+        assert_eq!(skin.joints.len(), skin.inverse_binds.len());
+        assert!(skin.joints.iter().all(|joint| *joint < nodes && model.nodes[*joint].joint));
+        assert!(skin.inverse_binds.iter().all(|matrix| matrix.is_finite()));
+    }
+    for object in &model.objects {
+        assert!(object.skin.is_none_or(|skin| skin < model.skins.len()));
+        assert!(object.node.is_none_or(|node| node < nodes) && (object.skin.is_none() || object.node.is_none()));
+        assert!(object.morph_weights.is_empty() || object.morph_weights.len() == object.morph_names.len());
+    }
+    for part in &model.parts {
+        let count = part.vertices.len();
+        let fits = |length: usize| length == 0 || length == count;
+        let object = &model.objects[part.object];
+        assert!(part.material.is_none_or(|material| material < model.looks.materials.len()));
+        assert!(part.vertices.iter().all(|point| (*point as usize) < points));
+        assert!(!part.triangles.is_empty() && part.triangles.iter().flatten().all(|vertex| (*vertex as usize) < count));
+        assert!(part.normals.len() == count && part.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-3));
+        assert!(fits(part.tangents.len()) && fits(part.colors.len()) && part.uvs.iter().all(|set| fits(set.len())));
+        assert!(part.tangents.iter().all(|tangent| (tangent.truncate().length() - 1.0).abs() < 1e-3 && tangent.w.abs() == 1.0));
+        assert!(part.colors.iter().all(|color| color.cmpge(glam::Vec4::ZERO).all() && color.cmple(glam::Vec4::ONE).all()));
+        assert!(part.uvs.iter().flatten().all(|uv| uv.is_finite()));
+        assert_eq!(part.morphs.len(), object.morph_names.len());
+        for morph in &part.morphs {
+            for list in [&morph.positions, &morph.normals, &morph.tangents] {
+                assert!(fits(list.len()) && list.iter().all(|offset: &Vec3| offset.is_finite()));
+            }
+        }
+    }
+    let skinned = model.objects.iter().any(|object| object.skin.is_some());
+    assert_eq!(model.weights.is_some(), skinned);
+    if let Some(weights) = &model.weights {
+        assert_eq!(weights.len(), points);
+        for point in 0..points {
+            let list: Vec<_> = weights.of(point).collect();
+            assert!(list.iter().all(|(joint, weight)| (*joint as usize) < nodes && *weight > 0.0));
+            assert!(list.windows(2).all(|pair| pair[0].1 >= pair[1].1));
+            let sum: f64 = list.iter().map(|(_, weight)| f64::from(*weight)).sum();
+            assert!(list.is_empty() || (sum - 1.0).abs() <= 1e-7 * list.len() as f64, "{list:?}");
+        }
+    }
+    for channel in model.clips.iter().flat_map(|clip| &clip.channels) {
+        let width = match channel.target {
+            ChannelTarget::Translation(node) | ChannelTarget::Scale(node) if node < nodes => 3,
+            ChannelTarget::Rotation(node) if node < nodes => 4,
+            ChannelTarget::MorphWeights(object) => model.objects[object].morph_names.len(),
+            ref target => panic!("{target:?}"),
+        };
+        let per_key = width * if channel.interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+        assert_eq!(channel.values.len(), channel.times.len() * per_key);
+        assert!(!channel.times.is_empty() && channel.times.windows(2).all(|pair| pair[0] < pair[1]));
+        assert!(channel.times.iter().chain(&channel.values).all(|value| value.is_finite()));
+    }
+}
+
+fn check(bytes: &[u8], bins: &[Vec<u8>]) {
+    // JSON refers to the binary part of a seed by number, so that bent JSON still finds bytes.
+    let mut load = |uri: &str| {
+        let number: usize = uri.trim_end_matches(".bin").parse().map_err(|_| format!("there is no {uri}"))?;
+        bins.get(number).cloned().ok_or_else(|| format!("there is no {uri}"))
+    };
+    match read_gltf(bytes, "fuzz.glb", &mut load) {
+        Err(error) => assert!(error.to_string().starts_with("fuzz.glb: "), "{error}"),
+        Ok(model) => {
+            check_promises(&model);
+            for (all_joints, max_influences) in [(true, 8), (false, 2)] {
+                let settings = GltfWriteSettings { all_joints, max_influences, bind_unweighted: true, ..Default::default() };
+                match write_glb(&model, &settings) {
+                    // Far points may leave the numbers there are on the way to their node.
+                    Err(GltfError::Model { .. } | GltfError::Unweighted { .. }) => {}
+                    Err(error) => panic!("{error}"),
+                    Ok(glb) => {
+                        let mut none = |uri: &str| Err(format!("{uri} is outside"));
+                        match read_gltf(&glb, "again.glb", &mut none) {
+                            Ok(again) => check_promises(&again),
+                            Err(GltfError::TooLarge { limit, .. }) => assert_eq!(limit, memory_limit(glb.len() as u64)),
+                            Err(error) => panic!("written, but: {error}"),
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The JSON and the binary part of a GLB, found by their marks rather than by lengths.
+fn pieces(glb: &[u8]) -> Option<(&[u8], &[u8])> {
+    let rest = glb.strip_prefix(b"glTF")?.get(16..)?;
+    let mark = rest.windows(4).position(|bytes| bytes == b"BIN\0")?;
+    Some((&rest[..mark.saturating_sub(4)], &rest[mark + 4..]))
+}
+
+#[test]
+fn fuzz_gltf() {
+    let files = [compose::character(), compose::triangle(), compose::extremes()];
+    let mut bins: Vec<Vec<u8>> = files.iter().map(|file| file.bin.clone()).collect();
+    let mut seeds: Vec<Vec<u8>> = files.iter().enumerate().map(|(i, file)| file.gltf(&format!("{i}.bin"))).collect();
+    seeds.extend(files.iter().map(|file| file.glb()));
+    for path in data::skinned_files().into_iter().flatten() {
+        let bytes = std::fs::read(&path).unwrap();
+        if bytes.len() > 80_000 {
+            continue;
+        }
+        if let Some((json, bin)) = pieces(&bytes) {
+            let json = String::from_utf8(json.to_vec()).unwrap();
+            let uri = format!("\"buffers\":[{{\"uri\":\"{}.bin\",", bins.len());
+            seeds.push(json.replace("\"buffers\":[{", &uri).into_bytes());
+            bins.push(bin.to_vec());
+        }
+        seeds.push(bytes);
+    }
+    let words: Vec<&[u8]> = WORDS.split_ascii_whitespace().map(str::as_bytes).collect();
+    run_fuzz("gltf", &seeds, &words, |bytes| {
+        check(bytes, &bins);
+        // Most changes to a GLB break its lengths; with those put right the rest is tried, too.
+        if let Some((json, bin)) = pieces(bytes) {
+            check(&compose::glb(json, bin), &bins);
+        }
+    });
+}
