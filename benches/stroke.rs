@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, path::PathBuf, time::Instant};
 use glam::{Vec2, Vec3};
 use rigsmith::{
     algo::{
-        placement::PlaceSettings,
+
         stroke::{ChainChoice, StrokeSamples, StrokeSettings},
         view::{View, ViewPlane},
     },
@@ -332,7 +332,7 @@ fn centring(body: &Body, detail: bool, table: &mut Table) {
                 if project(a).distance(project(b)) < 0.5 * a.distance(b) {
                     continue;
                 }
-                let arm_from_side = limb.contains("arm") && view_name != "front" && view_name != "back" && view_name != "top";
+
                 for (jitter, jitter_name) in jitters() {
                     for (low, high, extent) in [(0.1, 0.9, "inner"), (0.0, 1.0, "whole")] {
                         let mut seen = Vec::new();
@@ -342,7 +342,7 @@ fn centring(body: &Body, detail: bool, table: &mut Table) {
                                 [low, high].iter().map(|&t| project(a.lerp(b, t))).collect();
                             let stroke = jittered(&aim, 60, 0.3 * line.radius(), jitter, seed);
                             let settings = StrokeSettings {
-                                place: PlaceSettings { volume: arm_from_side.then_some(1), ..Default::default() },
+                                
                                 ..Default::default()
                             };
                             let Ok(samples) = StrokeSamples::new(&body.surface, &plane, &stroke, settings) else {
@@ -397,7 +397,7 @@ fn bending(body: &Body, detail: bool, table: &mut Table) {
                 if project(a).distance(project(b)) + project(b).distance(project(c)) < 0.5 * length {
                     continue;
                 }
-                let arm_from_side = limb == "elbow" && view_name != "front" && view_name != "back" && view_name != "top";
+
                 for (jitter, jitter_name) in jitters() {
                     let mut seen = Vec::new();
                     for seed in 0..seeds() {
@@ -406,7 +406,7 @@ fn bending(body: &Body, detail: bool, table: &mut Table) {
                         let aim = [project(a.lerp(b, ends[0].max(0.0))), project(b), project(c.lerp(b, ends[1]))];
                         let stroke = jittered(&aim, 90, 0.3 * radius, jitter, seed);
                         let settings = StrokeSettings {
-                            place: PlaceSettings { volume: arm_from_side.then_some(1), ..Default::default() },
+                            
                             ..Default::default()
                         };
                         let Ok(samples) = StrokeSamples::new(&body.surface, &plane, &stroke, settings) else {
@@ -425,7 +425,7 @@ fn bending(body: &Body, detail: bool, table: &mut Table) {
                     let mean = seen.iter().map(|e| e.abs()).sum::<f32>() / seen.len() as f32;
                     let worst = seen.iter().map(|e| e.abs()).fold(0.0, f32::max);
                     let kind = if bend > 25.0 { "bent" } else { "straight" };
-                    let _ = jitter_name;
+
                     for e in &seen {
                         table.add(format!("{kind} {limb} {view_name}"), e.abs());
                         table.add(format!("{kind} {limb} all"), e.abs());

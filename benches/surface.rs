@@ -1,7 +1,7 @@
 //! Rays against a million triangles: build, refit, closest hit, near and far, and skinning.
 //!
-//! Prints one JSON line with the fields of the peer script `rays.py` (embreex and trimesh). To compare both on the same
-//! mesh and the same rays:
+//! Prints one JSON line with the fields of the peer script `rays.py` (embreex and trimesh), and the crate obvhs in the
+//! same run (which is neither watertight nor finds the furthest hit). To compare all on the same mesh and rays:
 //!
 //! ```text
 //! cargo bench --bench surface -- --write-mesh /tmp/torus.obj
@@ -13,9 +13,14 @@
 //! `np.hstack([origins, directions]).astype('<f4').tofile('/tmp/rays.f32')`. Without `--rays`, rays of the same
 //! distribution are made here. `--only NAME` runs one part, for a profiler.
 
-use std::{hint::black_box, io::Write, time::Instant};
+use std::{
+    hint::black_box,
+    io::Write,
+    time::{Duration, Instant},
+};
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Vec3, Vec3A};
+use obvhs::{BvhBuildParams, cwbvh::builder::build_cwbvh_from_tris, ray::RayHit, triangle::Triangle};
 use rayon::prelude::*;
 use rigsmith::mesh::{model::Weights, ray::Ray, skinning::skin_points, surface::Surface};
 
@@ -56,7 +61,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mray = |seconds: f64| rays.len() as f64 / seconds / 1e6;
     if wanted("closest") {
         let mut found = 0;
-        let seconds = best(5, || found = rays.iter().filter(|ray| surface.closest(ray).is_some()).count());
+        let seconds = best(9, || found = rays.iter().filter(|ray| surface.closest(ray).is_some()).count());
         note("closest_mray_s_one_core", mray(seconds));
         note("closest_hit_share", found as f64 / rays.len() as f64);
     }
@@ -68,12 +73,34 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         });
         note("near_far_mray_s_one_core", mray(seconds));
         let mut found = Vec::new();
-        note("near_far_mray_s", mray(best(5, || found = rays.par_iter().with_min_len(256).map(|ray| surface.near_far(ray)).collect())));
+        note(
+            "near_far_mray_s",
+            mray(best(5, || found = rays.par_iter().with_min_len(256).map(|ray| surface.near_far(ray)).collect())),
+        );
         let few = rays.len().min(50_000);
         let ends: Vec<_> = found[..few].iter().flatten().collect();
         let mean = |sum: f64| sum / ends.len() as f64;
         note("near_mean", mean(ends.iter().map(|(near, _)| f64::from(near.distance)).sum()));
         note("far_mean", mean(ends.iter().map(|(_, far)| f64::from(far.distance)).sum()));
+    }
+    if wanted("obvhs") {
+        let corners: Vec<Triangle> = triangles
+            .iter()
+            .map(|t| t.map(|i| Vec3A::from(points[i as usize])))
+            .map(|[v0, v1, v2]| Triangle { v0, v1, v2 })
+            .collect();
+        let build = || build_cwbvh_from_tris(&corners, BvhBuildParams::fast_build(), &mut Duration::default());
+        note("obvhs_build_s", best(5, || drop(black_box(build()))));
+        let bvh = build();
+        let ordered: Vec<Triangle> = bvh.primitive_indices.iter().map(|&i| corners[i as usize]).collect();
+        let seconds = best(5, || {
+            for ray in &rays {
+                let mut hit = RayHit::none();
+                let ray = obvhs::ray::Ray::new_inf(ray.origin.into(), ray.direction.into());
+                black_box(bvh.ray_traverse(ray, &mut hit, |ray, i| ordered[i].intersect(ray)));
+            }
+        });
+        note("obvhs_closest_mray_s_one_core", mray(seconds));
     }
     if wanted("all") {
         let mut hits = Vec::new();

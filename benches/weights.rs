@@ -160,10 +160,10 @@ fn bent_volume(triangles: &[[u32; 3]], mesh: &Mesh, skeleton: &Skeleton, weights
     let axis = (skeleton.joints[end].head - pivot).cross(towards).normalize();
     let turn = Quat::from_axis_angle(axis, std::f32::consts::FRAC_PI_2);
     let mut moves = vec![false; skeleton.joints.len()];
-    for joint in 0..moves.len() {
+    for (joint, moves) in moves.iter_mut().enumerate() {
         let mut at = Some(joint);
         while let Some(j) = at {
-            moves[joint] |= j == lower;
+            *moves |= j == lower;
             at = skeleton.joints[j].parent;
         }
     }

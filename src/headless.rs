@@ -56,6 +56,9 @@ impl Workbench {
 
     /// A rig that was loaded.
     pub fn with_rig(seed: u64, rig: Rig) -> Self {
+        // A rig made with the same seed has its first uids already.
+        let known = rig.walk().map(|joint| joint.data.uid).chain([rig.uid()]);
+        let seed = known.fold(seed, |seed, uid| seed.rotate_left(1) ^ uid.0);
         let mut bench = Self::new(seed, "");
         let entity = bench.rig;
         bench.app.world_mut().entity_mut(entity).insert(rig);

@@ -7,7 +7,9 @@
 use glam::{DVec3, dvec3};
 
 use crate::{
-    field::{Frame, Loft, cone, ease, ellipsoid, ellipsoid_in, intersect, lens, path, section, turn_x, turn_y, turn_z, union},
+    field::{
+        Frame, Loft, cone, ease, ellipsoid, ellipsoid_in, intersect, lens, path, section, turn_x, turn_y, turn_z, union,
+    },
     hand::{Hand, HandPose, OPEN, RELAXED},
     head::Head,
     rig::Rig,
@@ -17,7 +19,7 @@ use crate::{
 pub const HEAD: DVec3 = dvec3(0.0, 1.5225, 0.022);
 
 /// Centre of the shoulder joint of the T-pose and the A-pose.
-const SHOULDER: DVec3 = dvec3(0.172, 1.412, -0.016);
+const SHOULDER: DVec3 = dvec3(0.171, 1.402, -0.016);
 
 /// Lengths of upper arm and forearm.
 const UPPER: f64 = 0.282;
@@ -170,7 +172,11 @@ impl Biped {
         let q = dvec3(p.x.abs(), p.y, p.z);
         let mut d = self.trunk(q);
         if q.y < 1.1 {
-            d = union(d, self.legs(q), 0.035);
+            let mut legs = self.legs(q);
+            if q.x < 0.06 && q.y > 0.6 {
+                legs = union(legs, self.legs(dvec3(-q.x, q.y, q.z)), 0.020);
+            }
+            d = union(d, legs, 0.035);
             d = union(d, ellipsoid(q, dvec3(0.076, 0.893, -0.052), dvec3(0.078, 0.083, 0.066)), 0.030);
         }
         if q.y > 0.55 && q.x > 0.05 {
@@ -194,22 +200,55 @@ impl Biped {
         d = union(d, ellipsoid_in(q, &pec, at(0.078, 0.056, 0.040)), 0.028);
         d = union(d, cone(q, at(0.110, 1.345, 0.058), arm(0.045, -0.005, 0.018), 0.032, 0.026), 0.030);
         d = union(d, ellipsoid(q, at(0.034, 1.110, 0.066), at(0.032, 0.130, 0.034)), 0.030);
-        d = union(d, ellipsoid(q, at(0.102, 1.045, 0.016), at(0.040, 0.085, 0.062)), 0.045);
+        d = union(d, ellipsoid(q, at(0.095, 1.040, 0.012), at(0.042, 0.095, 0.066)), 0.060);
         d = union(d, ellipsoid(q, at(0.0, 0.930, 0.060), at(0.090, 0.060, 0.040)), 0.040);
         // Shoulder girdle, filled between collar bone and shoulder blade.
         d = union(d, cone(q, at(0.060, 1.395, -0.016), arm(0.010, 0.000, 0.0), 0.058, 0.046), 0.030);
+        d = union(d, cone(q, at(0.070, 1.400, 0.014), arm(0.015, 0.002, 0.016), 0.046, 0.040), 0.030);
         // Back: latissimus, shoulder blade, the long muscles beside the spine.
-        let lat = path(q, &[(at(0.085, 1.120, -0.026), 0.030), (at(0.116, 1.260, -0.040), 0.042), (arm(0.012, -0.030, -0.016), 0.034)]);
+        let lat = path(
+            q,
+            &[
+                (at(0.085, 1.120, -0.026), 0.030),
+                (at(0.116, 1.260, -0.040), 0.042),
+                (arm(0.012, -0.030, -0.016), 0.034),
+            ],
+        );
         d = union(d, lat, 0.045);
         let blade = Frame { at: at(0.088, 1.350, -0.082), axes: turn_z(-14.0) };
         d = union(d, ellipsoid_in(q, &blade, at(0.050, 0.068, 0.028)), 0.025);
         d = union(d, cone(q, at(0.088, 1.372, -0.088), arm(0.020, 0.010, -0.026), 0.024, 0.028), 0.030);
-        d = union(d, path(q, &[(at(0.034, 0.990, -0.058), 0.024), (at(0.031, 1.110, -0.038), 0.028), (at(0.034, 1.280, -0.066), 0.026)]), 0.030);
+        d = union(
+            d,
+            path(
+                q,
+                &[
+                    (at(0.034, 0.990, -0.058), 0.024),
+                    (at(0.031, 1.110, -0.038), 0.028),
+                    (at(0.034, 1.280, -0.066), 0.026),
+                ],
+            ),
+            0.030,
+        );
         // Trapezius and collar bone.
-        let trapezius = path(q, &[(at(0.022, 1.545, -0.026), 0.026), (at(0.060, 1.468, -0.032), 0.032), (at(0.150, 1.440, -0.026), 0.024)]);
+        let trapezius = path(
+            q,
+            &[(at(0.022, 1.545, -0.026), 0.026), (at(0.060, 1.468, -0.032), 0.032), (at(0.150, 1.428, -0.024), 0.024)],
+        );
         d = union(d, trapezius, 0.035);
         d = union(d, cone(q, at(0.030, 1.420, -0.055), at(0.060, 1.330, -0.075), 0.030, 0.026), 0.030);
-        union(d, path(q, &[(at(0.014, 1.428, 0.040), 0.009), (at(0.080, 1.440, 0.030), 0.007), (at(0.155, 1.450, -0.004), 0.009)]), 0.016)
+        union(
+            d,
+            path(
+                q,
+                &[
+                    (at(0.014, 1.428, 0.040), 0.009),
+                    (at(0.080, 1.440, 0.030), 0.007),
+                    (at(0.155, 1.438, -0.004), 0.009),
+                ],
+            ),
+            0.016,
+        )
     }
 
     fn arm(&self, p: DVec3) -> f64 {
@@ -264,7 +303,9 @@ impl Biped {
         let mut d = self.foot.distance(f.z, f.x, f.y);
         d = union(d, ellipsoid(f, at(0.0, 0.030, -0.032), at(0.0310, 0.0340, 0.0320)), 0.016);
         let mut toes = path(f, &[(at(-0.027, 0.016, 0.135), 0.0165), (at(-0.023, 0.0145, 0.190), 0.0140)]);
-        for (x, z, r) in [(-0.0035, 0.186, 0.0108), (0.0130, 0.176, 0.0104), (0.0275, 0.164, 0.0100), (0.0400, 0.149, 0.0096)] {
+        for (x, z, r) in
+            [(-0.0035, 0.186, 0.0108), (0.0130, 0.176, 0.0104), (0.0275, 0.164, 0.0100), (0.0400, 0.149, 0.0096)]
+        {
             toes = union(toes, path(f, &[(at(x + 0.002, 0.016, z - 0.040), r * 1.1), (at(x, 0.0105, z), r)]), 0.005);
         }
         union(d, toes, 0.014)
@@ -310,10 +351,10 @@ impl Biped {
 pub fn warp(u: DVec3) -> DVec3 {
     // Along the arm, up the neck and down the shin the cross-section shrinks about the limb's axis.
     let arm = 1.0 - 0.30 * ease(0.24, 0.40, u.x) - 0.43 * ease(0.56, 0.69, u.x);
-    let head = 1.0 - 0.50 * ease(1.44, 1.56, u.y) * ease(0.26, 0.17, u.x);
-    let foot = 1.0 - 0.42 * ease(0.17, 0.07, u.y);
+    let head = 1.0 - 0.42 * ease(1.42, 1.56, u.y) * ease(0.26, 0.17, u.x);
+    let foot = 1.0 - 0.34 * ease(0.17, 0.07, u.y);
     let x = ANKLE.x + (u.x * head - ANKLE.x) * foot;
     let z = HEAD.z + (u.z - HEAD.z) * head;
     let p = dvec3(x, SHOULDER.y + (u.y - SHOULDER.y) * arm, SHOULDER.z + (z - SHOULDER.z) * arm);
-    lens(p, HEAD + dvec3(0.0, 0.080, 0.085), 0.090, 0.200, 0.58)
+    lens(p, HEAD + dvec3(0.0, 0.080, 0.085), 0.085, 0.250, 0.53)
 }

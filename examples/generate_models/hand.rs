@@ -70,7 +70,11 @@ impl Hand {
     pub fn new(pose: &HandPose, detailed: bool) -> Self {
         let fingers = std::array::from_fn(|f| {
             let lean = turn_y(-pose.spread[f]);
-            let mut axes = if f == 0 { lean * turn_z(-15.0) * turn_x(52.0) } else { lean * turn_x([0.0, 2.0, 0.0, -4.0, -8.0][f]) };
+            let mut axes = if f == 0 {
+                lean * turn_z(-15.0) * turn_x(52.0)
+            } else {
+                lean * turn_x([0.0, 2.0, 0.0, -4.0, -8.0][f])
+            };
             let mut at = ROOTS[f];
             let mut frames = [Frame::WORLD; 4];
             for j in 0..3 {
@@ -85,8 +89,8 @@ impl Hand {
             &[
                 section(-0.080, [-0.0275, 0.0290], [-0.0205, 0.0205]),
                 section(-0.030, [-0.0275, 0.0287], [-0.0198, 0.0198]),
-                section(-0.005, [-0.0280, 0.0290], [-0.0185, 0.0185]),
-                section(0.018, [-0.0330, 0.0330], [-0.0185, 0.0170]),
+                section(-0.005, [-0.0300, 0.0312], [-0.0187, 0.0187]),
+                section(0.018, [-0.0348, 0.0345], [-0.0185, 0.0170]),
                 section(0.050, [-0.0405, 0.0370], [-0.0160, 0.0155]),
                 section(0.074, [-0.0430, 0.0385], [-0.0130, 0.0140]),
                 section(0.084, [-0.0425, 0.0378], [-0.0110, 0.0120]),
@@ -142,10 +146,9 @@ impl Hand {
             let nail = frames[2].child(dvec3(LENGTHS[f][2] * 0.86, r[3] * 0.70, 0.0), turn_z(-7.0));
             let q = nail.local(p);
             let outline = ellipsoid(q, DVec3::ZERO, dvec3(0.0078, 0.0060, 0.0058) * size);
-            let plate = ellipsoid(q, dvec3(-0.001, -0.0060, 0.0) * size, dvec3(0.018, 0.0075, 0.0072) * size);
+            let plate = ellipsoid(q, dvec3(-0.001, -0.0048, 0.0) * size, dvec3(0.018, 0.0075, 0.0072) * size);
             d = cut(d, intersect(outline, -plate - 0.0003, 0.0006), 0.0008);
-            let rim = (outline.abs() - 0.0005).max((plate - 0.0005).abs() - 0.0012);
-            d = cut(d, rim, 0.0009);
+            d = union(d, intersect(outline, plate, 0.0008), 0.0008);
         }
         d
     }
@@ -175,7 +178,8 @@ impl Hand {
                 under = rig.add(under as i64, space.out(CARPALS[f - 1]), format!("{}_00{side}", FINGERS[f]));
             }
             for j in 0..3 {
-                under = rig.add(under as i64, space.out(self.fingers[f][j].at), format!("{}_0{}{side}", FINGERS[f], j + 1));
+                under =
+                    rig.add(under as i64, space.out(self.fingers[f][j].at), format!("{}_0{}{side}", FINGERS[f], j + 1));
             }
         }
     }
@@ -216,7 +220,7 @@ impl HandModel {
                 section(-0.110, [-0.0365, 0.0400], [-0.0320, 0.0325]),
                 section(-0.065, [-0.0315, 0.0340], [-0.0262, 0.0262]),
                 section(-0.035, [-0.0290, 0.0305], [-0.0220, 0.0220]),
-                section(0.000, [-0.0282, 0.0292], [-0.0190, 0.0190]),
+                section(0.000, [-0.0294, 0.0306], [-0.0190, 0.0190]),
                 section(0.050, [-0.0282, 0.0292], [-0.0190, 0.0190]),
             ],
             0.25,

@@ -5,7 +5,10 @@
 use glam::{DVec3, dvec3};
 
 use crate::{
-    field::{Frame, Loft, cone, cut, ease, ellipsoid, ellipsoid_in, intersect, lens, path, section, turn_x, turn_y, turn_z, union},
+    field::{
+        Frame, Loft, cone, cut, ease, ellipsoid, ellipsoid_in, intersect, lens, path, section, turn_x, turn_y, turn_z,
+        union,
+    },
     surface_nets::Quads,
 };
 
@@ -71,13 +74,23 @@ impl Head {
         );
         let mut d = union(skull, self.face.distance(q.y, q.x, q.z), 0.022);
         // Jaw, chin, cheeks, brow.
-        let jaw = path(q, &[(at(0.0490, 0.070, 0.010), 0.011), (at(0.0430, 0.036, 0.022), 0.012), (at(0.015, 0.0145, 0.074), 0.013)]);
+        let jaw = path(
+            q,
+            &[(at(0.0490, 0.070, 0.010), 0.011), (at(0.0430, 0.036, 0.022), 0.012), (at(0.015, 0.0145, 0.074), 0.013)],
+        );
         d = union(d, jaw, 0.030);
         d = union(d, ellipsoid(q, at(0.0, 0.0135, 0.0850), at(0.0170, 0.0140, 0.0125)), 0.016);
         let cheek = Frame { at: at(0.0455, 0.0900, 0.0600), axes: turn_y(38.0) * turn_z(-14.0) };
         d = union(d, ellipsoid_in(q, &cheek, at(0.0240, 0.0140, 0.0160)), 0.030);
         d = union(d, ellipsoid(q, at(0.0310, 0.0660, 0.0700), at(0.0260, 0.0280, 0.0200)), 0.028);
-        let brow = path(q, &[(at(0.0, 0.1330, 0.0860), 0.0070), (at(0.022, 0.1360, 0.0835), 0.0078), (at(0.046, 0.1320, 0.0660), 0.0070)]);
+        let brow = path(
+            q,
+            &[
+                (at(0.0, 0.1330, 0.0860), 0.0070),
+                (at(0.022, 0.1360, 0.0835), 0.0078),
+                (at(0.046, 0.1320, 0.0660), 0.0070),
+            ],
+        );
         d = union(d, brow, 0.020);
         // Eye sockets, then lids over the eyeballs.
         let socket = Frame { at: at(0.0330, 0.1160, 0.0960), axes: turn_y(18.0) };
@@ -106,12 +119,15 @@ impl Head {
         let lens = intersect(upper, lower, 0.002).max(-r.z);
         let behind = (EYE_RADIUS - 0.0018 - r.length()).max(0.0060 - r.z);
         let opening = intersect(lens, behind, 0.0004);
-        cut(lids, opening, 0.0038)
+        cut(lids, opening, 0.0050)
     }
 
     fn nose(&self, q: DVec3, d: f64) -> f64 {
         let at = |x: f64, y: f64, z: f64| dvec3(x, y, z);
-        let bridge = path(q, &[(at(0.0, 0.1270, 0.0865), 0.0070), (at(0.0, 0.1060, 0.0960), 0.0072), (at(0.0, 0.0850, 0.1060), 0.0085)]);
+        let bridge = path(
+            q,
+            &[(at(0.0, 0.1270, 0.0865), 0.0070), (at(0.0, 0.1060, 0.0960), 0.0072), (at(0.0, 0.0850, 0.1060), 0.0085)],
+        );
         let mut d = union(d, bridge, 0.014);
         d = union(d, ellipsoid(q, at(0.0, 0.0815, 0.1080), at(0.0100, 0.0088, 0.0098)), 0.010);
         d = union(d, ellipsoid(q, at(0.0108, 0.0775, 0.0985), at(0.0068, 0.0066, 0.0090)), 0.009);
@@ -128,13 +144,44 @@ impl Head {
         let corner = at(0.0248, 0.0467, 0.0866);
         let upper = path(
             q,
-            &[(at(0.0, 0.0510, 0.0982), 0.0043), (at(0.0065, 0.0519, 0.0979), 0.0047), (at(0.0165, 0.0503, 0.0925), 0.0039), (corner, 0.0022)],
+            &[
+                (at(0.0, 0.0508, 0.0982), 0.0043),
+                (at(0.0065, 0.0519, 0.0979), 0.0047),
+                (at(0.0165, 0.0503, 0.0925), 0.0039),
+                (corner, 0.0022),
+            ],
         );
         let lower = path(
             q,
-            &[(at(0.0, 0.0408, 0.0966), 0.0057), (at(0.0085, 0.0413, 0.0948), 0.0054), (at(0.0172, 0.0431, 0.0898), 0.0040), (corner, 0.0022)],
+            &[
+                (at(0.0, 0.0411, 0.0966), 0.0057),
+                (at(0.0085, 0.0413, 0.0948), 0.0054),
+                (at(0.0172, 0.0431, 0.0898), 0.0040),
+                (corner, 0.0022),
+            ],
         );
         d = union(d, union(upper, lower, 0.0008), 0.0042);
+        if !self.detailed {
+            let line = path(
+                q,
+                &[
+                    (at(0.0, 0.0464, 0.1020), 0.0022),
+                    (at(0.0100, 0.0468, 0.1000), 0.0022),
+                    (at(0.0190, 0.0467, 0.0955), 0.0014),
+                ],
+            );
+            return cut(d, line, 0.004);
+        }
+        let line = path(
+            q,
+            &[
+                (at(0.0, 0.0464, 0.1012), 0.0010),
+                (at(0.0080, 0.0470, 0.0998), 0.0010),
+                (at(0.0145, 0.0468, 0.0974), 0.0008),
+                (at(0.0195, 0.0467, 0.0953), 0.0004),
+            ],
+        );
+        d = cut(d, line, 0.004);
         // The groove from nose to lip.
         cut(d, cone(q, at(0.0, 0.0690, 0.1010), at(0.0, 0.0580, 0.1025), 0.0030, 0.0036), 0.006)
     }
@@ -145,6 +192,9 @@ impl Head {
             return d;
         }
         // In ear space X points out, Y up and Z forward.
+        if !self.detailed {
+            return union(d, ellipsoid(e, dvec3(0.001, 0.001, -0.001), dvec3(0.0100, 0.0310, 0.0185)), 0.006);
+        }
         let disc = ellipsoid(e, dvec3(0.0, 0.004, 0.0), dvec3(0.0062, 0.0300, 0.0175));
         let lobe = ellipsoid(e, dvec3(-0.001, -0.0220, 0.0055), dvec3(0.0052, 0.0105, 0.0085));
         let mut ear = union(disc, lobe, 0.008);
@@ -172,9 +222,15 @@ impl Head {
     pub fn throat(&self, q: DVec3) -> f64 {
         let at = |x: f64, y: f64, z: f64| dvec3(x, y, z);
         let mut d = self.neck.distance(q.y, q.x, q.z);
-        let strap = path(q, &[(at(0.044, 0.060, -0.026), 0.012), (at(0.038, -0.020, -0.004), 0.011), (at(0.013, -0.090, 0.016), 0.009)]);
+        let strap = path(
+            q,
+            &[(at(0.044, 0.060, -0.026), 0.012), (at(0.038, -0.020, -0.004), 0.011), (at(0.013, -0.090, 0.016), 0.009)],
+        );
         d = union(d, strap, 0.026);
-        union(d, ellipsoid(q, at(0.0, -0.028, 0.0180), at(0.0080, 0.0110, 0.0080)), 0.024)
+        if self.detailed {
+            d = union(d, ellipsoid(q, at(0.0, -0.028, 0.0180), at(0.0080, 0.0110, 0.0080)), 0.024);
+        }
+        d
     }
 }
 
@@ -182,7 +238,7 @@ impl Head {
 pub fn focus(p: DVec3) -> DVec3 {
     let side = if p.x < 0.0 { -1.0 } else { 1.0 };
     let mut q = dvec3(p.x.abs(), p.y, p.z);
-    q = lens(q, dvec3(0.0, 0.0850, 0.0900), 0.110, 0.290, 0.42);
+    q = lens(q, dvec3(0.0, 0.0850, 0.0900), 0.112, 0.365, 0.40);
     q = lens(q, dvec3(0.0760, 0.1050, -0.0130), 0.035, 0.0755, 0.42);
     dvec3(q.x * side, q.y, q.z)
 }
@@ -258,4 +314,3 @@ pub fn eyeball(center: DVec3, cells: usize) -> Quads {
     }
     quads
 }
-

@@ -23,9 +23,8 @@ pub struct Settle {
 }
 
 /// Spreads vertices along the surface, as densely as they are in each region, and puts them on the field's zero with
-/// Newton steps; then takes out what is finer than the mesh can show.
-pub fn settle(quads: &mut Quads, field: &(impl Fn(DVec3) -> f64 + Sync), how: Settle) {
-    let ring = Ring::new(quads);
+/// Newton steps; then takes out what is finer than the mesh can show. `ring` says how dense the mesh wants to be.
+pub fn settle(quads: &mut Quads, ring: &Ring, field: &(impl Fn(DVec3) -> f64 + Sync), how: Settle) {
     for _ in 0..how.rounds {
         let before = quads.points.clone();
         quads.points = (0..before.len())
@@ -35,7 +34,7 @@ pub fn settle(quads: &mut Quads, field: &(impl Fn(DVec3) -> f64 + Sync), how: Se
                 let normal = gradient(field, p, how.step).normalize_or_zero();
                 let to = ring.mean(&before, i) - p;
                 p += (to - normal * to.dot(normal)) * how.spread;
-                for _ in 0..3 {
+                for _ in 0..2 {
                     let value = field(p);
                     let slope = gradient(field, p, how.step);
                     let move_by = slope * (-value / slope.length_squared().max(0.05));
@@ -62,7 +61,7 @@ pub fn settle(quads: &mut Quads, field: &(impl Fn(DVec3) -> f64 + Sync), how: Se
 }
 
 /// Neighbours of every vertex with weights that keep the density of the mesh as it is.
-struct Ring {
+pub struct Ring {
     lists: Vec<Vec<u32>>,
     /// The usual edge length around each vertex.
     size: Vec<f64>,
@@ -71,7 +70,8 @@ struct Ring {
 }
 
 impl Ring {
-    fn new(quads: &Quads) -> Self {
+    /// The neighbours in a mesh, and its edge lengths as the wanted density.
+    pub fn new(quads: &Quads) -> Self {
         let lists = neighbours(quads);
         let at = |i: u32| quads.points[i as usize];
         let mut size: Vec<f64> = (0..lists.len())

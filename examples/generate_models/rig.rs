@@ -38,7 +38,13 @@ impl Rig {
             let _ = writeln!(text, "# {line}");
         }
         for (i, (parent, p, label)) in self.joints.iter().enumerate() {
-            let _ = writeln!(text, "joint {i} {parent} {} {} {} {label}", decimals(p.x, 5), decimals(p.y, 5), decimals(p.z, 5));
+            let _ = writeln!(
+                text,
+                "joint {i} {parent} {} {} {} {label}",
+                decimals(p.x, 5),
+                decimals(p.y, 5),
+                decimals(p.z, 5)
+            );
         }
         text
     }

@@ -169,9 +169,8 @@ pub fn extract(grid: &Grid, field: &(impl Fn(DVec3) -> f64 + Sync)) -> Quads {
     clear_saddles(&mut values, n, grid.symmetric);
     let table = sheets();
     let corner = |c: [usize; 3], k: usize| [c[0] + (k & 1), c[1] + (k >> 1 & 1), c[2] + (k >> 2)];
-    let pattern = |c: [usize; 3]| {
-        (0..8).filter(|&k| values[index(corner(c, k))] < 0.0).fold(0usize, |bits, k| bits | 1 << k)
-    };
+    let pattern =
+        |c: [usize; 3]| (0..8).filter(|&k| values[index(corner(c, k))] < 0.0).fold(0usize, |bits, k| bits | 1 << k);
     let mut quads = Quads::default();
     let mut first = vec![u32::MAX; total];
     for z in 0..n[2] - 1 {

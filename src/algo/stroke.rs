@@ -144,9 +144,18 @@ impl StrokeSamples {
         settings: StrokeSettings,
     ) -> Result<Self, StrokeError> {
         let path = Path::new(points)?;
-        let track = Track::follow(surface, plane, &path, settings.place.volume).ok_or(StrokeError::Misses)?;
         let fan = Fan::new();
-        let axis = Axis::find(surface, &fan, &track);
+        let follow = |volume| {
+            let track = Track::follow(surface, plane, &path, volume)?;
+            let axis = Axis::find(surface, &fan, &track);
+            Some((track, axis))
+        };
+        let (mut track, mut axis) = follow(settings.place.volume).ok_or(StrokeError::Misses)?;
+        if settings.place.volume.is_none() && track.ambiguous {
+            if let Some(near) = follow(Some(1)).filter(|near| is_meant(near, &(&track, &axis))) {
+                (track, axis) = near;
+            }
+        }
         Ok(Self { plane: *plane, settings, path, track, axis, fan })
     }
 
@@ -211,6 +220,17 @@ impl StrokeSamples {
         };
         Some(PlacedJoint { position, radius: section.map(|(_, radius)| radius), source, hits: count })
     }
+}
+
+/// Whether a stroke means the volumes nearest to the camera rather than those that a click would take: it runs along their
+/// middle much more closely, an arm before the torso, or stays over them much longer.
+fn is_meant(near: &(Track, Option<Axis>), usual: &(&Track, &Option<Axis>)) -> bool {
+    let (near_length, usual_length) = (near.0.samples.len() as f32, usual.0.samples.len() as f32);
+    let closer = match (&near.1, usual.1) {
+        (Some(near), Some(usual)) => near.aside() < 0.4 * near.radius && near.aside() < 0.5 * usual.aside(),
+        (near, usual) => near.is_some() && usual.is_none(),
+    };
+    near_length >= 0.9 * usual_length && (closer || usual_length < 0.8 * near_length)
 }
 
 /// Samples and chooses in one call; see [`StrokeSamples`] for previews.

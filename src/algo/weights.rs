@@ -7,6 +7,7 @@
 
 pub mod bone;
 mod bind;
+mod bone_tree;
 mod bones;
 mod check;
 mod claim;
@@ -17,7 +18,6 @@ mod heat;
 mod laplacian;
 mod ldl;
 mod sight;
-mod tuning;
 pub mod voxel_bind;
 
 use std::ops::Range;
@@ -27,7 +27,6 @@ use glam::Vec3;
 use crate::mesh::model::Weights;
 use bind::{Bound, Source};
 use finish::Shaping;
-pub use tuning::Tuning;
 
 /// A joint as the binding sees it, in the space of the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -181,20 +180,6 @@ pub fn skin_weights(
     settings: &WeightSettings,
     progress: &(dyn Fn(f32) -> bool + Sync),
 ) -> Result<(Weights, WeightReport), WeightError> {
-    skin_weights_tuned(points, triangles, joints, rigid, locks, settings, &Tuning::default(), progress)
-}
-
-#[expect(clippy::too_many_arguments, reason = "the public entry's, plus the constants of the method")]
-pub fn skin_weights_tuned(
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    joints: &[WeightJoint],
-    rigid: &[(Range<u32>, u32)],
-    locks: Option<Locks>,
-    settings: &WeightSettings,
-    tuning: &Tuning,
-    progress: &(dyn Fn(f32) -> bool + Sync),
-) -> Result<(Weights, WeightReport), WeightError> {
     check::input(points, triangles, joints, rigid, locks.as_ref())?;
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
     step(0.0)?;
@@ -207,14 +192,14 @@ pub fn skin_weights_tuned(
     }
     // Rigid parts neither spread heat nor hide bones.
     let soft: Vec<[u32; 3]> = triangles.iter().copied().filter(|t| !t.iter().any(|&p| shaping.is_given(p as usize))).collect();
-    let Bound { place, weights, sources } = bind::bind(points, &soft, joints, &free, settings, tuning, progress)?;
+    let Bound { place, weights, sources } = bind::bind(points, &soft, joints, &free, settings, progress)?;
     for (point, &place) in place.iter().enumerate() {
         let count = match sources[place as usize] {
             _ if shaping.is_given(point) => &mut report.given,
             Source::Surface => &mut report.by_surface,
             Source::Voxels => &mut report.by_voxels,
             Source::Fill => &mut report.by_fill,
-            Source::Nearest => &mut report.by_nearest,
+            Source::Nearest | Source::None => &mut report.by_nearest,
         };
         *count += 1;
     }

@@ -20,7 +20,7 @@ pub(super) fn run() -> Result<Report, Failure> {
     report.line("Rigging the bundled character; give a command to rig yours (see below).");
     let model = read_model(MESH, "biped", &ObjSettings::default(), &mut |_| None)
         .map_err(|error| Failure::Input(Box::new(error)))?;
-    let faces: usize = model.parts.iter().map(|part| part.faces.len().max(part.triangles.len())).sum();
+    let faces = model.face_count();
     let gestures = read_gestures(GESTURES).map_err(|error| Failure::Input(Box::new(error)))?;
     let strokes = gestures.len();
     let mut bench = Workbench::new(SEED, "biped");

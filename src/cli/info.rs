@@ -75,8 +75,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
 
 fn describe_model(report: &mut Report, model: &Model) {
     let triangles: usize = model.parts.iter().map(|part| part.triangles.len()).sum();
-    let faces: usize =
-        model.parts.iter().map(|p| if p.faces.is_empty() { p.triangles.len() } else { p.faces.len() }).sum();
+    let faces = model.face_count();
     let vertices: usize = model.parts.iter().map(|part| part.vertices.len()).sum();
     let joints = model.nodes.iter().filter(|node| node.joint).count();
     let finite = model.points.iter().filter(|point| point.is_finite());

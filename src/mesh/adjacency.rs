@@ -13,10 +13,11 @@ use glam::Vec3;
 /// in which positions first occur. `-0.0` equals `0.0`, and coordinates that are not numbers equal those with the same
 /// bits. Linear time.
 pub fn weld(points: &[Vec3]) -> (Vec<u32>, usize) {
-    let mut numbers = std::collections::HashMap::<[u32; 3], u32, BuildHasherDefault<PositionHasher>>::with_capacity_and_hasher(
-        points.len(),
-        BuildHasherDefault::default(),
-    );
+    let mut numbers =
+        std::collections::HashMap::<[u32; 3], u32, BuildHasherDefault<PositionHasher>>::with_capacity_and_hasher(
+            points.len(),
+            BuildHasherDefault::default(),
+        );
     let welded = points
         .iter()
         .map(|point| {

@@ -75,7 +75,9 @@ pub enum GltfError {
         what: String,
     },
     /// The file cannot be read without an extension that is not supported.
-    #[error("{file}: /extensionsRequired: needs the extension {name}, which is not supported; export the file without it")]
+    #[error(
+        "{file}: /extensionsRequired: needs the extension {name}, which is not supported; export the file without it"
+    )]
     Extension {
         /// The file's name as given to the reader.
         file: String,
@@ -111,7 +113,9 @@ pub enum GltfError {
         what: String,
     },
     /// Points of a skinned object have no influence.
-    #[error("object \"{object}\": {points} points have no weights; skin them, or write them bound to the skin's root joint")]
+    #[error(
+        "object \"{object}\": {points} points have no weights; skin them, or write them bound to the skin's root joint"
+    )]
     Unweighted {
         /// The object's name.
         object: String,
@@ -152,8 +156,9 @@ impl GltfError {
 ///
 /// `name` is the file's name or path; errors begin with it and [`Model::name`] is its stem. `external` loads what the
 /// file refers to: it is called with a path that has been percent-decoded and checked to be relative, with `/` between
-/// its parts, and below the file's folder; its error text ends up in ours. A buffer that cannot be loaded is an error,
-/// an image that cannot be loaded a note.
+/// its parts, and below the file's folder; its error text ends up in ours. What it returns counts as part of the file,
+/// so how much it reads is for it to limit. A buffer that cannot be loaded is an error, an image that cannot be loaded
+/// a note.
 ///
 /// * Nodes kept: joints, nodes moved by a clip, and the ancestors of both, depth first. A matrix becomes a [`Trs`](crate::mesh::model::Trs).
 /// * A mesh placed twice becomes two objects. Points of skinned objects keep their bits; others are moved to model

@@ -303,6 +303,12 @@ impl Model {
         triangles
     }
 
+    /// The number of faces of all parts: polygons where the file has them, else triangles.
+    pub fn face_count(&self) -> usize {
+        let faces = |part: &Part| if part.faces.is_empty() { part.triangles.len() } else { part.faces.len() };
+        self.parts.iter().map(faces).sum()
+    }
+
     /// Transforms of all nodes to model space at rest.
     pub fn rest_globals(&self) -> Vec<Affine3A> {
         let mut globals: Vec<Affine3A> = Vec::with_capacity(self.nodes.len());

@@ -21,6 +21,7 @@ mod normals;
 mod number;
 mod paths;
 mod pipeline;
+mod scan;
 mod statement;
 mod triangulate;
 mod weld;

@@ -13,9 +13,12 @@ use glam::Vec3;
 /// The largest number of cells along one axis.
 pub const MAX_RESOLUTION: usize = 1024;
 /// The largest number of cells of a grid; a finer wish is coarsened.
-const MAX_CELLS: f64 = 48.0e6;
-/// The largest number of cell columns visited while triangles are drawn; a finer wish is coarsened.
-const MAX_WORK: f64 = 4.0e8;
+const MAX_CELLS: f64 = 8.0e6;
+/// The largest number of cell columns visited while triangles are drawn, besides those that many small triangles
+/// need at any resolution; a finer wish is coarsened.
+const MAX_WORK: f64 = 2.0e7;
+/// Columns that every triangle may visit: a few along each axis.
+const WORK_EACH: f64 = 12.0;
 /// Empty cells around the mesh, so that the outside is connected and samples near the border have neighbours.
 const MARGIN: usize = 2;
 
@@ -77,9 +80,10 @@ impl Voxels {
         let (low, high) = bounds(points, triangles, clip).ok_or(VoxelizeError::NoSurface)?;
         let mut grid = Self::layout(low, high, resolution);
         let work = raster::work(&grid, points, triangles);
-        if work > MAX_WORK {
-            let coarser = (resolution.min(MAX_RESOLUTION) as f64 * (MAX_WORK / work).sqrt()).max(8.0);
-            grid = Self::layout(low, high, coarser as usize);
+        let allowed = MAX_WORK + WORK_EACH * triangles.len() as f64;
+        if work > allowed {
+            let cells = grid.dims.iter().max().map_or(1, |&n| n - 2 * MARGIN) as f64;
+            grid = Self::layout(low, high, (cells * (allowed / work).sqrt()).max(8.0) as usize);
         }
         let surface = raster::surface(&grid, points, triangles);
         enclose::enclose(&mut grid, surface, points, triangles);

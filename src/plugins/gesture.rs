@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{RigSystems, configure_sets};
 use crate::{
     algo::view::View,
-    rig::{SourceError, operations::Axis, parse_ron, utf8},
+    rig::{SourceError, elements, operations::Axis, parse_ron, utf8},
 };
 
 pub use script::{GestureAnswer, GestureScript};
@@ -77,6 +77,8 @@ pub enum Gesture {
     Deselect,
     /// Names the active joint.
     Label(String),
+    /// Names the joints of the chain that ends at the active joint, first to last.
+    Labels(Vec<String>),
     /// Moves the active joint along the view plane, keeping its depth; what hangs below stays.
     Move((f32, f32)),
     /// Moves the active joint to a point of the rig's space; what hangs below stays.
@@ -116,7 +118,7 @@ pub fn read_gestures(bytes: &[u8]) -> Result<Vec<Gesture>, SourceError> {
     match gestures.iter().position(|gesture| !gesture.is_finite()) {
         Some(number) => Err(SourceError::at(
             text,
-            0,
+            elements(text).get(number).copied().unwrap_or(0),
             format!("gesture {} has a number that is not finite; write an ordinary number", number + 1),
         )),
         None => Ok(gestures),

@@ -1,7 +1,7 @@
 //! The rig as one document: joints in a hierarchy, groups, tags and weights.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, HashMap, HashSet},
     sync::Arc,
 };
 
@@ -20,6 +20,8 @@ pub struct Rig {
     pub(super) groups: Vec<GroupData>,
     pub(super) joints: HashMap<Uid, RigJoint>,
     pub(super) roots: Vec<Uid>,
+    /// Uids of all tags, so that adding one needs no search.
+    pub(super) tags: HashSet<Uid>,
     pub(super) skins: BTreeMap<Uid, Arc<SkinData>>,
 }
 
@@ -86,6 +88,11 @@ impl Rig {
     /// The joint with that uid.
     pub fn joint(&self, uid: Uid) -> Option<&RigJoint> {
         self.joints.get(&uid)
+    }
+
+    /// True if a joint, group or tag has that uid.
+    pub fn is_taken(&self, uid: Uid) -> bool {
+        self.joints.contains_key(&uid) || self.tags.contains(&uid) || self.group(uid).is_some()
     }
 
     /// The number of joints.

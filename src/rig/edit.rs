@@ -3,11 +3,17 @@
 //! [`Rig::apply`] either changes the rig and returns the edit that takes it back, or changes nothing and says why.
 //! Everything bigger (placing, mirroring, deleting a joint but keeping its children) is a list of these.
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
-use crate::rig::{
-    GroupData, JointData, RestTransform, Rig, RigJoint, Tag, Uid,
-    document::{RigAbout, SkinData},
+use ron::value::RawValue;
+
+use crate::{
+    mesh::model::Weights,
+    rig::{
+        GroupData, JointData, RestTransform, Rig, RigJoint, Tag, TagKind, Uid,
+        document::{RigAbout, SkinData},
+        source::ron_options,
+    },
 };
 
 /// One change of a rig.
@@ -105,6 +111,15 @@ pub enum EditError {
     /// Weights do not fit.
     #[error("the weights name {0} joints that the rig does not have; skin the mesh again")]
     BadSkin(usize),
+    /// Weights contradict themselves.
+    #[error("the weights are not finite or their lists do not fit together; skin the mesh again")]
+    BadWeights,
+    /// A colour is not finite.
+    #[error("the colour of local group {0} is not finite; use numbers from 0 to 1")]
+    BadColor(Uid),
+    /// The parameters of a tag are no RON.
+    #[error("the parameters of tag {0} are not RON text: {1}; correct them, or write () for none")]
+    BadParams(Uid, String),
 }
 
 impl Rig {
@@ -139,28 +154,29 @@ impl Rig {
                 RigEdit::SetLocked(*uid, std::mem::replace(&mut joint.data.locked, *locked))
             }
             RigEdit::AddTag { joint, tag, index } => {
-                let taken = self.joints.values().any(|j| j.data.tags.iter().any(|t| t.uid == tag.uid));
-                if taken {
-                    return Err(EditError::Taken(tag.uid));
-                }
+                self.check_free(tag.uid)?;
+                let added = checked(tag)?;
                 let tags = &mut self.joint_mut(*joint)?.data.tags;
-                tags.insert((*index).min(tags.len()), (**tag).clone());
+                tags.insert((*index).min(tags.len()), added);
+                self.tags.insert(tag.uid);
                 RigEdit::RemoveTag(*joint, tag.uid)
             }
             RigEdit::RemoveTag(joint, tag) => {
                 let tags = &mut self.joint_mut(*joint)?.data.tags;
                 let index = tags.iter().position(|t| t.uid == *tag).ok_or(EditError::NoTag(*joint, *tag))?;
-                RigEdit::AddTag { joint: *joint, tag: Box::new(tags.remove(index)), index }
+                let removed = Box::new(tags.remove(index));
+                self.tags.remove(tag);
+                RigEdit::AddTag { joint: *joint, tag: removed, index }
             }
             RigEdit::SetTag(joint, tag) => {
+                let next = checked(tag)?;
                 let tags = &mut self.joint_mut(*joint)?.data.tags;
                 let old = tags.iter_mut().find(|t| t.uid == tag.uid).ok_or(EditError::NoTag(*joint, tag.uid))?;
-                RigEdit::SetTag(*joint, Box::new(std::mem::replace(old, (**tag).clone())))
+                RigEdit::SetTag(*joint, Box::new(std::mem::replace(old, next)))
             }
             RigEdit::AddLocalGroup(group, index) => {
-                if self.group(group.uid).is_some() {
-                    return Err(EditError::Taken(group.uid));
-                }
+                self.check_free(group.uid)?;
+                check_color(group)?;
                 self.groups.insert((*index).min(self.groups.len()), group.clone());
                 RigEdit::RemoveLocalGroup(group.uid)
             }
@@ -172,6 +188,7 @@ impl Rig {
                 RigEdit::AddLocalGroup(self.groups.remove(index), index)
             }
             RigEdit::SetLocalGroup(group) => {
+                check_color(group)?;
                 let old = self.groups.iter_mut().find(|g| g.uid == group.uid).ok_or(EditError::NoGroup(group.uid))?;
                 RigEdit::SetLocalGroup(std::mem::replace(old, group.clone()))
             }
@@ -206,6 +223,10 @@ impl Rig {
         self.joints.get_mut(&uid).ok_or(EditError::NoJoint(uid))
     }
 
+    fn check_free(&self, uid: Uid) -> Result<(), EditError> {
+        if self.is_taken(uid) { Err(EditError::Taken(uid)) } else { Ok(()) }
+    }
+
     fn check_group(&self, group: Option<Uid>) -> Result<(), EditError> {
         match group {
             Some(uid) if self.group(uid).is_none() => Err(EditError::NoGroup(uid)),
@@ -230,17 +251,26 @@ impl Rig {
     }
 
     fn add_joint(&mut self, data: &JointData, parent: Option<Uid>, index: usize) -> Result<RigEdit, EditError> {
-        if self.joints.contains_key(&data.uid) {
-            return Err(EditError::Taken(data.uid));
+        self.check_free(data.uid)?;
+        let mut own = HashSet::from([data.uid]);
+        for tag in &data.tags {
+            self.check_free(tag.uid)?;
+            if !own.insert(tag.uid) {
+                return Err(EditError::Taken(tag.uid));
+            }
         }
+        let tags = data.tags.iter().map(checked).collect::<Result<_, _>>()?;
         if !data.rest.is_valid() {
             return Err(EditError::BadTransform(data.uid));
         }
         self.check_group(data.group)?;
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), data.uid);
-        self.joints.insert(data.uid, RigJoint { data: data.clone(), parent, children: Vec::new() });
-        Ok(RigEdit::RemoveJoint(data.uid))
+        self.tags.extend(data.tags.iter().map(|tag| tag.uid));
+        let data = JointData { tags, ..data.clone() };
+        let uid = data.uid;
+        self.joints.insert(uid, RigJoint { data, parent, children: Vec::new() });
+        Ok(RigEdit::RemoveJoint(uid))
     }
 
     fn remove_joint(&mut self, uid: Uid) -> Result<RigEdit, EditError> {
@@ -249,6 +279,9 @@ impl Rig {
         }
         let (parent, index) = self.detach(uid)?;
         let joint = self.joints.remove(&uid).ok_or(EditError::NoJoint(uid))?;
+        for tag in &joint.data.tags {
+            self.tags.remove(&tag.uid);
+        }
         Ok(RigEdit::AddJoint { joint: Box::new(joint.data), parent, index })
     }
 
@@ -275,6 +308,9 @@ impl Rig {
             if beyond > 0 {
                 return Err(EditError::BadSkin(beyond));
             }
+            if !is_whole(&skin.weights) {
+                return Err(EditError::BadWeights);
+            }
         }
         let old = match skin {
             Some(skin) => self.skins.insert(mesh, skin.clone()),
@@ -282,4 +318,29 @@ impl Rig {
         };
         Ok(RigEdit::SetSkin(mesh, old))
     }
+}
+
+/// How deep brackets may nest in a tag's parameters, so that the template around them can still be read.
+const PARAMS_DEPTH: usize = 100;
+
+/// The tag as the rig keeps it: parameters without white space and comments around them.
+fn checked(tag: &Tag) -> Result<Tag, EditError> {
+    let mut tag = tag.clone();
+    if let TagKind::Command { params, .. } = &mut tag.kind {
+        let options = ron_options().with_recursion_limit(PARAMS_DEPTH);
+        let raw: Box<RawValue> =
+            options.from_str(params).map_err(|error| EditError::BadParams(tag.uid, error.code.to_string()))?;
+        *params = raw.trim().get_ron().to_owned();
+    }
+    Ok(tag)
+}
+
+fn check_color(group: &GroupData) -> Result<(), EditError> {
+    if group.color.iter().all(|part| part.is_finite()) { Ok(()) } else { Err(EditError::BadColor(group.uid)) }
+}
+
+fn is_whole(weights: &Weights) -> bool {
+    let rising = weights.starts.is_sorted() && weights.starts.first().is_none_or(|first| *first == 0);
+    let ends = weights.starts.last().map_or(0, |last| *last as usize);
+    rising && ends == weights.joints.len() && ends == weights.values.len() && weights.values.iter().all(|w| w.is_finite())
 }

@@ -86,8 +86,8 @@ pub enum Operation {
         /// Below which joint.
         parent: Option<Uid>,
     },
-    /// Renames a joint; an empty name takes the label away.
-    Label(Uid, String),
+    /// Renames joints; an empty name takes the label away.
+    Labels(Vec<(Uid, String)>),
     /// Turns joints so that an axis of theirs points along their bone; nothing else moves.
     Orient {
         /// Which.
@@ -141,7 +141,7 @@ impl Operation {
             Self::Rotate { .. } => "Rotate joints",
             Self::Scale { .. } => "Scale joints",
             Self::Reparent { .. } => "Reparent joints",
-            Self::Label(..) => "Rename joint",
+            Self::Labels(..) => "Rename joints",
             Self::Orient { .. } => "Orient joints",
             Self::Mirror { .. } => "Mirror joints",
             Self::Group { .. } => "Assign group",
@@ -187,7 +187,9 @@ impl Operation {
                 }
                 transform::about(draft, joints, Affine3::from_scale(*scale), *pivot, *with_children)
             }
-            Self::Label(joint, label) => label_joint(draft, *joint, label),
+            Self::Labels(labels) => {
+                labels.iter().try_for_each(|(joint, label)| label_joint(draft, *joint, label))
+            }
             Self::Orient { joints, along } => orient::orient(draft, joints, *along),
             Self::Mirror { joints } => symmetry::mirror(draft, joints),
             Self::Group { joints, name, color } => group(draft, joints, name, *color),

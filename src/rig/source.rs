@@ -78,7 +78,7 @@ pub(crate) fn parse_ron<T: DeserializeOwned>(text: &str) -> Result<T, SourceErro
 }
 
 /// The byte offset of a place that the RON reader names by line and column.
-pub(crate) fn byte_offset(text: &str, place: ron::error::Position) -> usize {
+fn byte_offset(text: &str, place: ron::error::Position) -> usize {
     let line_start: usize = text.split_inclusive('\n').take(place.line.saturating_sub(1)).map(str::len).sum();
     let line = text[line_start.min(text.len())..].chars();
     line_start + line.take(place.col.saturating_sub(1)).map(char::len_utf8).sum::<usize>()

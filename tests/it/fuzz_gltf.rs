@@ -49,8 +49,14 @@ fn check_promises(model: &Model) {
         assert!(!part.triangles.is_empty() && part.triangles.iter().flatten().all(|vertex| (*vertex as usize) < count));
         assert!(part.normals.len() == count && part.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-3));
         assert!(fits(part.tangents.len()) && fits(part.colors.len()) && part.uvs.iter().all(|set| fits(set.len())));
-        assert!(part.tangents.iter().all(|tangent| (tangent.truncate().length() - 1.0).abs() < 1e-3 && tangent.w.abs() == 1.0));
-        assert!(part.colors.iter().all(|color| color.cmpge(glam::Vec4::ZERO).all() && color.cmple(glam::Vec4::ONE).all()));
+        assert!(
+            part.tangents
+                .iter()
+                .all(|tangent| (tangent.truncate().length() - 1.0).abs() < 1e-3 && tangent.w.abs() == 1.0)
+        );
+        assert!(
+            part.colors.iter().all(|color| color.cmpge(glam::Vec4::ZERO).all() && color.cmple(glam::Vec4::ONE).all())
+        );
         assert!(part.uvs.iter().flatten().all(|uv| uv.is_finite()));
         assert_eq!(part.morphs.len(), object.morph_names.len());
         for morph in &part.morphs {
@@ -96,7 +102,8 @@ fn check(bytes: &[u8], bins: &[Vec<u8>]) {
         Ok(model) => {
             check_promises(&model);
             for (all_joints, max_influences) in [(true, 8), (false, 2)] {
-                let settings = GltfWriteSettings { all_joints, max_influences, bind_unweighted: true, ..Default::default() };
+                let settings =
+                    GltfWriteSettings { all_joints, max_influences, bind_unweighted: true, ..Default::default() };
                 match write_glb(&model, &settings) {
                     // Far points may leave the numbers there are on the way to their node.
                     Err(GltfError::Model { .. } | GltfError::Unweighted { .. }) => {}
@@ -125,6 +132,7 @@ fn pieces(glb: &[u8]) -> Option<(&[u8], &[u8])> {
 #[test]
 fn fuzz_gltf() {
     let files = [compose::character(), compose::triangle(), compose::extremes()];
+    assert!(files.iter().all(|file| file.read().is_ok()));
     let mut bins: Vec<Vec<u8>> = files.iter().map(|file| file.bin.clone()).collect();
     let mut seeds: Vec<Vec<u8>> = files.iter().enumerate().map(|(i, file)| file.gltf(&format!("{i}.bin"))).collect();
     seeds.extend(files.iter().map(|file| file.glb()));

@@ -9,7 +9,7 @@ use compose::{Composed, PNG, character, triangle};
 use glam::{Vec2, Vec3, Vec4};
 use rigsmith::mesh::{
     gltf::{GltfWriteSettings, read_gltf, write_glb, write_gltf},
-    model::{ChannelTarget, Interpolation, Model},
+    model::{ChannelTarget, Image, Interpolation, Model},
 };
 use serde_json::{Value, json};
 
@@ -48,7 +48,10 @@ fn skeleton() {
 fn geometry() {
     let model = character().read().unwrap();
     let object = |i: usize| &model.objects[i];
-    assert_eq!(model.objects.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(), ["body", "the hat", "stone"]);
+    assert_eq!(
+        model.objects.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(),
+        ["body", "the hat", "stone"]
+    );
     assert_eq!((object(0).skin, object(0).node), (Some(0), None));
     assert_eq!((object(1).skin, object(1).node), (None, Some(2)));
     assert_eq!((object(2).skin, object(2).node), (None, None));
@@ -98,12 +101,15 @@ fn clips() {
     let walk = &model.clips[0];
     assert_eq!((walk.name.as_str(), &walk.extras), ("walk", &Some(json!("left, right"))));
     let kinds: Vec<_> = walk.channels.iter().map(|channel| (channel.target, channel.interpolation)).collect();
-    assert_eq!(kinds, [
-        (ChannelTarget::Translation(1), Interpolation::Linear),
-        (ChannelTarget::Rotation(2), Interpolation::Step),
-        (ChannelTarget::Scale(2), Interpolation::CubicSpline),
-        (ChannelTarget::MorphWeights(0), Interpolation::Linear),
-    ]);
+    assert_eq!(
+        kinds,
+        [
+            (ChannelTarget::Translation(1), Interpolation::Linear),
+            (ChannelTarget::Rotation(2), Interpolation::Step),
+            (ChannelTarget::Scale(2), Interpolation::CubicSpline),
+            (ChannelTarget::MorphWeights(0), Interpolation::Linear),
+        ]
+    );
     assert_eq!(walk.channels[0].times, [0.0, 0.5, 1.25]);
     assert_eq!(walk.channels[0].values[3..6], [0.1, 0.5, 0.0]);
     assert_eq!(walk.channels[2].values.len(), 27);
@@ -166,7 +172,8 @@ fn component_types() {
 fn strides_and_sparse_accessors() {
     // Positions every 16 bytes.
     let mut file = triangle();
-    let bytes: Vec<u8> = (0..12).flat_map(|i| (i as f32 * if i % 4 == 3 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
+    let bytes: Vec<u8> =
+        (0..12).flat_map(|i| (i as f32 * if i % 4 == 3 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
     let position = file.accessor(&bytes[..44], 5126, "VEC3", 3);
     file.json["bufferViews"][1]["byteStride"] = 16.into();
     file.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = position.into();
@@ -229,12 +236,18 @@ fn careless_files_are_put_right() {
     check("NORMAL", &[0.0, 0.0, 2.0].repeat(3), "VEC3", "", &up);
     check("NORMAL", &[0.0; 9], "VEC3", "A normal without direction", &up);
     check("NORMAL", &[nan; 9], "VEC3", "A normal without direction", &up);
-    let across = |model: &Model| model.parts[0].tangents.iter().all(|t| t.z == 0.0 && t.w == 1.0 && t.truncate().is_normalized());
+    let across = |model: &Model| {
+        model.parts[0].tangents.iter().all(|t| t.z == 0.0 && t.w == 1.0 && t.truncate().is_normalized())
+    };
     check("TANGENT", &[0.0; 12], "VEC4", "A tangent without direction", &across);
     check("TANGENT", &[nan; 12], "VEC4", "A tangent without direction", &across);
     check("TEXCOORD_0", &[nan; 6], "VEC2", "texture coordinate", &|model| model.parts[0].uvs[0] == [Vec2::ZERO; 3]);
-    check("TEXCOORD_1", &[1.0; 6], "VEC2", "A gap", &|model| model.parts[0].uvs == [[Vec2::ZERO; 3].to_vec(), [Vec2::ONE; 3].to_vec()]);
-    check("COLOR_0", &[2.0, -1.0, nan].repeat(3), "VEC3", "colour", &|model| model.parts[0].colors == [Vec4::new(1.0, 0.0, 0.0, 1.0); 3]);
+    check("TEXCOORD_1", &[1.0; 6], "VEC2", "A gap", &|model| {
+        model.parts[0].uvs == [[Vec2::ZERO; 3].to_vec(), [Vec2::ONE; 3].to_vec()]
+    });
+    check("COLOR_0", &[2.0, -1.0, nan].repeat(3), "VEC3", "colour", &|model| {
+        model.parts[0].colors == [Vec4::new(1.0, 0.0, 0.0, 1.0); 3]
+    });
     check("COLOR_1", &[1.0; 9], "VEC3", "Only the first set", &|model| model.parts[0].colors.is_empty());
     check("_HEAT", &[1.0; 3], "SCALAR", "unknown kind", &up);
 }
@@ -357,6 +370,32 @@ fn outside_buffers_and_images() {
 }
 
 #[test]
+fn extremes() {
+    let model = compose::extremes().read().unwrap();
+    assert_eq!(names(&model), ["", ""]);
+    let skins: Vec<_> =
+        model.objects.iter().map(|object| (object.skin, object.node, object.morph_weights.clone())).collect();
+    let none = Vec::new;
+    assert_eq!(
+        skins,
+        [(Some(0), None, none()), (Some(1), None, vec![0.5]), (None, Some(1), none()), (None, None, none())]
+    );
+    assert_eq!(model.parts.iter().map(|part| part.triangles.len()).collect::<Vec<_>>(), [6, 2, 6, 2, 6, 6]);
+    // Both primitives of the first mesh use the same eight vertices; the second has triangles of the first six only.
+    assert_eq!((model.points.len(), model.parts[1].vertices.len()), (4 * 8, 6));
+    let weights = model.weights.as_ref().unwrap();
+    let of =
+        |point: usize| weights.of(point).map(|(joint, weight)| (joint, (weight * 1020.0).round())).collect::<Vec<_>>();
+    assert_eq!(of(0), [(0, 536.0), (1, 484.0)]);
+    assert_eq!(of(8), [(1, 536.0), (0, 484.0)]);
+    assert_eq!(model.parts[0].uvs[1][0], Vec2::new(0.0, 128.0 / 255.0));
+    assert_eq!(model.parts[0].morphs[0].positions[5], Vec3::ZERO);
+    for words in ["2 scenes", "A gap", "Points or lines"] {
+        assert!(has_note(&model, words), "{words}: {:?}", model.notes);
+    }
+}
+
+#[test]
 fn several_files() {
     let settings = GltfWriteSettings::default();
     let model = character().read().unwrap();
@@ -370,4 +409,13 @@ fn several_files() {
     };
     let again = read_gltf(&files.json, "test.glb", &mut load).unwrap();
     assert_eq!(again, compose::read(&write_glb(&model, &settings).unwrap()).unwrap());
+
+    // Images that cannot have their own name as a file get one.
+    let mut model = model;
+    let image = model.looks.images[0].clone();
+    let names = ["skin", "SKIN.png", "../skin", "", "hat.tga", "m_image3"];
+    model.looks.images = names.map(|name| Image { name: name.into(), ..image.clone() }).to_vec();
+    let files = write_gltf(&model, &settings, "m").unwrap();
+    let found: Vec<_> = files.images.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(found, ["skin.png", "m_image1.png", "m_image2.png", "m_image3.png", "hat.png", "m_image5.png"]);
 }

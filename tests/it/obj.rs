@@ -108,8 +108,8 @@ fn errors_name_the_line() {
         ("v 0 0 0\nf 1 1 2\n", 2, "vertex 2, but there are 1"),
         ("v 0 0 0\nf 1 1 99999999999999999999\n", 2, "vertex 4294967295"),
         ("v 0 0 0\nf 1 1 123456789\n", 2, "vertex 123456789"),
-        ("v 0 0 0\nf 1/1 1/1 1/1\n", 2, "texture coordinate 1, but there are 0"),
-        ("v 0 0 0\nf 1//1 1//1 1//1\n", 2, "normal 1, but there are 0"),
+        ("v 0 0 0\nvt 0 0\nf 1/1 1/1 1/2\n", 3, "texture coordinate 2, but there are 1"),
+        ("v 0 0 0\nvn 0 0 1\nf 1//1 1//1 1//2\n", 3, "normal 2, but there are 1"),
         ("v 0 0 0\nf 1 1 -2\n", 2, "1 before the first vertex"),
         ("f 1 1 -1\nv 0 0 0\n", 1, "before the first vertex"),
         ("v 0 0 0\nf 1 1 -99999999999999999999\n", 2, "before the first vertex"),
@@ -154,6 +154,13 @@ fn statements_left_out_are_noted() {
         assert!(notes.iter().any(|note| note.contains(wanted)), "{wanted}: {notes:?}");
     }
     assert_eq!(notes.len(), 4);
+}
+
+#[test]
+fn absent_lists_are_no_indices() {
+    let read = arrays(&format!("{TRIANGLE}vt 0 0\nf 1/1/1 2/1/2 3/1/3\n")).unwrap();
+    assert_eq!((read.corner_texcoords.len(), read.corner_normals.len()), (3, 0));
+    assert!(read.notes[0].contains("normals, from line 5"), "{:?}", read.notes);
 }
 
 /// A mesh with everything that can be cut in two by the end of a block.

@@ -22,15 +22,13 @@ const FINE: usize = 2;
 /// A fan reaches so many radii: sections of hands, feet and flat limbs fit in.
 const REACH: f32 = 2.2;
 
-fn trim() -> f32 {
-    std::env::var("TRIM").ok().and_then(|v| v.parse().ok()).unwrap_or(0.5)
-}
-fn ext() -> f32 {
-    std::env::var("EXT").ok().and_then(|v| v.parse().ok()).unwrap_or(3.0)
-}
-fn border() -> f32 {
-    std::env::var("BORDER").ok().and_then(|v| v.parse().ok()).unwrap_or(1.4)
-}
+/// So much more open than the median section is not the limb any more.
+const OPENER: f32 = 0.1;
+
+/// How many radii before such a border sections lean that way already.
+const TRIM: f32 = 0.25;
+/// Over how many radii the direction is taken in which the line goes on.
+const STRAIGHT: f32 = 3.0;
 
 /// One place along the centre line.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +41,8 @@ pub(super) struct Station {
     pub(super) tangent: Vec3,
     /// Whether the section here is the limb's own; otherwise centre and radius are carried on from those that are.
     pub(super) own: bool,
+    /// From the stroke to the line, across the view.
+    aside: Vec3,
 }
 
 /// A centre line.
@@ -62,27 +62,29 @@ impl Axis {
         let middles: Vec<Vec3> = coarse.iter().map(|s| s.middle).collect();
         let starts = directed(&smooth(&middles, half), half)?;
         let mut hits = Vec::new();
+        let starts: Vec<Vec3> = starts.into_iter().map(|(_, tangent)| tangent).collect();
         let sections: Vec<Option<Section>> = coarse
             .iter()
             .zip(&starts)
-            .map(|(s, &(_, tangent))| fan.section(surface, s.middle, tangent, 3.0 * half, false, 3, &mut hits))
+            .map(|(s, &tangent)| fan.section(surface, s.middle, tangent, 3.0 * half, 3, &mut hits))
             .collect();
-        let rough = Self::assemble(surface, fan, &coarse, &sections, half)?;
+        let rough = Self::assemble(&coarse, &sections, &starts, half)?;
 
         let fine = every(&track.samples, FINE);
-        let sections: Vec<Option<Section>> = fine
+        let places: Vec<Station> = fine.iter().map(|s| rough.station(s.at, &s.ray)).collect();
+        let normals: Vec<Vec3> = places.iter().map(|s| s.tangent).collect();
+        let sections: Vec<Option<Section>> = places
             .iter()
-            .map(|s| {
-                let station = rough.station(s.at, &s.ray);
-                fan.section(surface, station.centre, station.tangent, REACH * station.radius, false, 3, &mut hits)
+            .map(|station| {
+                fan.section(surface, station.centre, station.tangent, REACH * station.radius, 3, &mut hits)
             })
             .collect();
-        Self::assemble(surface, fan, &fine, &sections, rough.radius)
+        Self::assemble(&fine, &sections, &normals, rough.radius)
     }
 
     /// Joins sections to a line: finds those that are the limb's own, carries the line on over the others.
-    fn assemble(surface: &Surface, fan: &Fan, samples: &[Sample], sections: &[Option<Section>], radius: f32) -> Option<Self> {
-        let own = own(samples, sections)?;
+    fn assemble(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3], radius: f32) -> Option<Self> {
+        let own = own(sections, normals)?;
         let measured = |i: usize| sections[i].filter(|_| own[i]);
         let radius = median((0..samples.len()).filter_map(|i| measured(i).map(|s| s.radius))).unwrap_or(radius);
         let known: Vec<usize> = (0..samples.len()).filter(|&i| measured(i).is_some()).collect();
@@ -97,46 +99,30 @@ impl Axis {
                 smoothed.iter().map(|&centre| (centre, across)).collect()
             }
         };
-        let mut stations: Vec<Station> = samples
+        let stations: Vec<Station> = samples
             .iter()
             .enumerate()
             .map(|(i, sample)| {
                 let next = known.partition_point(|&k| k < i);
-                if known.get(next) == Some(&i) {
-                    let (centre, tangent) = line[next];
-                    return Station { at: sample.at, centre, radius: radii[next], tangent, own: true };
-                }
-                let (a, b) = (line[next.saturating_sub(1)], line[next.min(line.len() - 1)]);
-                let tangent = (b.0 - a.0).try_normalize().unwrap_or(a.1);
-                let radius = 0.5 * (radii[next.saturating_sub(1)] + radii[next.min(line.len() - 1)]);
-                Station { at: sample.at, centre: under(a.0, tangent, &sample.ray), radius, tangent, own: false }
+                let (centre, tangent, radius, own) = if known.get(next) == Some(&i) {
+                    (line[next].0, line[next].1, radii[next], true)
+                } else if next == 0 || next == known.len() {
+                    let end = next.saturating_sub(1);
+                    let (from, tangent) = end_line(&line, radii[end], next == 0);
+                    let on_line = under(from, tangent, &sample.ray);
+                    // Far beyond the limb its line says nothing any more; the volume's middle does.
+                    let trust = (0.5 * (5.0 - on_line.distance(from) / radii[end])).clamp(0.0, 1.0);
+                    (sample.middle.lerp(on_line, trust), tangent, radii[end], false)
+                } else {
+                    let (a, b) = (line[next - 1], line[next]);
+                    let tangent = (b.0 - a.0).try_normalize().unwrap_or(a.1);
+                    (under(a.0, tangent, &sample.ray), tangent, 0.5 * (radii[next - 1] + radii[next]), false)
+                };
+                let to = centre - sample.ray.origin;
+                let aside = to.reject_from_normalized(sample.ray.direction);
+                Station { at: sample.at, centre, radius, tangent, own, aside }
             })
             .collect();
-        let mut hits = Vec::new();
-        let (first, last) = (known[0], known[known.len() - 1]);
-        let ways: [(usize, bool, Vec<usize>); 2] =
-            [(first, true, (0..first).rev().collect()), (last, false, (last + 1..samples.len()).collect())];
-        for (end, at_start, way) in ways {
-            let radius = stations[end].radius;
-            let (from, tangent) = end_line(&line, radius, at_start);
-            let mut centre = from;
-            for &i in &way {
-                let guess = under(centre, tangent, &samples[i].ray);
-                let section = fan.section(surface, guess, tangent, border() * radius, true, 3, &mut hits);
-                centre = section.map_or(guess, |s| s.centroid);
-                // Far beyond the limb its line says nothing any more; the volume's middle does.
-                let trust = (0.5 * (5.0 - centre.distance(from) / radius)).clamp(0.0, 1.0);
-                stations[i].centre = samples[i].middle.lerp(centre, trust);
-                stations[i].radius = radius;
-                stations[i].tangent = tangent;
-            }
-        }
-        if std::env::var("DUMP").is_ok() {
-            for (i, s) in stations.iter().enumerate() {
-                eprintln!("{:.3} {:.3} own {} r {:.4} sec {:.4} c {:.4} sc {:.4} m {:.4} t {:.2}", s.at, samples[i].source, s.own, s.radius, sections[i].map_or(0.0, |s| s.radius), s.centre, sections[i].map_or(Vec3::ZERO, |s| s.centroid), samples[i].middle, s.tangent);
-            }
-            eprintln!();
-        }
         (stations.len() > 1).then_some(Self { stations, radius })
     }
 
@@ -149,56 +135,72 @@ impl Axis {
         let radius = a.radius + (b.radius - a.radius) * t;
         let centre = a.centre.lerp(b.centre, t);
         let slid = under(centre, tangent, ray) - centre;
-        Station { at, centre: centre + slid.clamp_length_max(radius), radius, tangent, own: if t < 0.5 { a.own } else { b.own } }
+        let nearer = if t < 0.5 { a } else { b };
+        Station { at, centre: centre + slid.clamp_length_max(radius), radius, tangent, ..nearer }
+    }
+
+    /// How far the stroke runs beside the line, on average; what a hand trembles does not count.
+    pub(super) fn aside(&self) -> f32 {
+        let pieces: Vec<f32> = self
+            .stations
+            .chunks(8)
+            .map(|piece| (piece.iter().map(|s| s.aside).sum::<Vec3>() / piece.len() as f32).length())
+            .collect();
+        pieces.iter().sum::<f32>() / pieces.len() as f32
     }
 
     /// The centroid of the limb's section under `ray`, which stands at the arc length `at` of the stroke, and its radius.
     pub(super) fn recentre(&self, surface: &Surface, fan: &Fan, at: f32, ray: &Ray, hits: &mut Vec<Hit>) -> (Vec3, f32) {
         let station = self.station(at, ray);
-        let reach = if station.own { REACH } else { border() };
-        let section =
-            fan.section(surface, station.centre, station.tangent, reach * station.radius, !station.own, 1, hits);
+        let section = if station.own {
+            fan.section(surface, station.centre, station.tangent, REACH * station.radius, 1, hits)
+        } else {
+            None
+        };
         section.map_or((station.centre, station.radius), |s| (s.centroid, s.radius))
     }
 }
 
 /// Which sections are the limb's own.
 ///
-/// Starts at the section of median size and walks both ways. A section is not the limb's where its centre jumps aside from
-/// the line of those before, or jumps less but the section grows as well. `None` if there is no section at all.
-fn own(samples: &[Sample], sections: &[Option<Section>]) -> Option<Vec<bool>> {
+/// Starts at the section of median size and walks both ways. Not the limb's is a section that is open although those of
+/// the limb are closed, whose centre jumps aside, or that grows and at the same time leaves the line of those a radius back.
+/// `None` if there is no section at all.
+fn own(sections: &[Option<Section>], normals: &[Vec3]) -> Option<Vec<bool>> {
     let mut by_size: Vec<(f32, usize)> =
         sections.iter().enumerate().filter_map(|(i, s)| s.map(|s| (s.radius, i))).collect();
     by_size.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let seed = by_size.get(by_size.len() / 2)?.1;
-    let mut own = vec![false; samples.len()];
+    let open = median(sections.iter().flatten().map(|s| s.open))? + OPENER;
+    let mut own = vec![false; sections.len()];
     own[seed] = true;
-    let ways: [Vec<usize>; 2] = [(seed + 1..samples.len()).collect(), (0..seed).rev().collect()];
+    let ways: [Vec<usize>; 2] = [(seed + 1..sections.len()).collect(), (0..seed).rev().collect()];
     for way in ways {
-        let mut line: Vec<Section> = sections[seed].into_iter().collect();
+        let mut line: Vec<(Section, Vec3)> = sections[seed].map(|s| (s, normals[seed])).into_iter().collect();
+        let mut before = line.last().copied();
         for &i in &way {
-            let (Some(section), Some(&last)) = (sections[i], line.last()) else { continue };
-            // The direction of the last few own sections; one radius back is far enough to be steady.
-            let back = line.iter().rev().find(|s| s.centroid.distance(last.centroid) >= last.radius);
+            let (Some(section), Some((last, normal))) = (sections[i], before) else { continue };
+            before = Some((section, normals[i]));
             let step = section.centroid - last.centroid;
-            let gap = (samples[i].source - samples[if i > seed { i - 1 } else { i + 1 }].source).length();
-            let aside = match back.and_then(|b| (last.centroid - b.centroid).try_normalize()) {
-                Some(direction) => step.reject_from_normalized(direction).length(),
-                None => 0.5 * step.length(),
-            };
-            let jump = (aside - 0.3 * gap) / last.radius;
-            let growth = (section.radius - 0.2 * gap) / last.radius;
-            if jump > 0.6 || (jump > 0.2 && growth > 1.2) || growth > 1.6 {
+            let jump = (step.reject_from_normalized(normal).length() - 0.3 * step.length()) / last.radius;
+            let end = line[line.len() - 1].0.centroid;
+            let back = line.iter().rev().find(|(s, _)| s.centroid.distance(end) >= s.radius);
+            let (back, normal) = back.copied().unwrap_or(line[0]);
+            let way = section.centroid - back.centroid;
+            let aside = (way.reject_from_normalized(normal).length() - 0.1 * way.length()) / back.radius;
+            // A pinch in the limb is no measure for what comes after it.
+            let growth = section.radius / back.radius.max(0.8 * line[0].0.radius);
+            if section.open > open || jump > 0.6 || growth > 1.8 || (growth > 1.2 && aside > 0.1) {
                 continue;
             }
             own[i] = true;
-            line.push(section);
+            line.push((section, normals[i]));
         }
         // Just before the limb ends in something bigger its sections already lean that way.
         let Some(border) = way.iter().position(|&i| !own[i]) else { continue };
         for &i in way[..border].iter().rev() {
             let (Some(here), Some(section)) = (sections[i], sections[way[border.saturating_sub(1)]]) else { continue };
-            if here.centroid.distance(section.centroid) > trim() * section.radius {
+            if here.centroid.distance(section.centroid) > TRIM * section.radius {
                 break;
             }
             own[i] = false;
@@ -214,7 +216,7 @@ fn end_line(line: &[(Vec3, Vec3)], radius: f32, at_start: bool) -> (Vec3, Vec3) 
     let mut sum = Vec3::ZERO;
     for &(centre, tangent) in line {
         let far = centre.distance(from) / radius;
-        if far < ext() {
+        if far < STRAIGHT {
             sum += tangent;
         }
     }

@@ -25,6 +25,8 @@ pub(super) struct Section {
     pub(super) centroid: Vec3,
     /// Radius of the circle with the same area.
     pub(super) radius: f32,
+    /// The part of the rays that met no wall within the limit, 0 to 1.
+    pub(super) open: f32,
 }
 
 impl Fan {
@@ -35,15 +37,14 @@ impl Fan {
     }
 
     /// The section through `from` square to `normal`: the polygon of the ends of every `stride`-th ray. A ray that meets no
-    /// wall within `limit` (a hole, or the way into the torso) ends there if `clip`, and takes its length from its
-    /// neighbours otherwise. `None` if too many take it, or the polygon has no area.
+    /// wall within `limit` (a hole, or the way into the torso) takes its length from its neighbours. `None` if too
+    /// many do, or the polygon has no area.
     pub(super) fn section(
         &self,
         surface: &Surface,
         from: Vec3,
         normal: Vec3,
         limit: f32,
-        clip: bool,
         stride: usize,
         hits: &mut Vec<Hit>,
     ) -> Option<Section> {
@@ -57,12 +58,10 @@ impl Fan {
             })
             .collect();
         let open = reach.iter().filter(|r| r.is_none()).count();
-        if !clip {
-            if open as f32 > OPEN * circle.len() as f32 {
-                return None;
-            }
-            close(&mut reach);
+        if open as f32 > OPEN * circle.len() as f32 {
+            return None;
         }
+        close(&mut reach);
         let ends: Vec<Vec2> = circle.iter().zip(&reach).map(|(c, r)| *c * r.unwrap_or(limit)).collect();
         let mut area = 0.0;
         let mut moment = Vec2::ZERO;
@@ -76,6 +75,7 @@ impl Fan {
         (area > 0.0 && centre.is_finite()).then(|| Section {
             centroid: from + u * centre.x + v * centre.y,
             radius: (0.5 * area / core::f32::consts::PI).sqrt(),
+            open: open as f32 / circle.len() as f32,
         })
     }
 }

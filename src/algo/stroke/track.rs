@@ -56,6 +56,8 @@ pub(super) struct Track {
     pub(super) samples: Vec<Sample>,
     pub(super) volume_at_start: u32,
     pub(super) volumes_at_start: u32,
+    /// Whether other volumes could have been followed.
+    pub(super) ambiguous: bool,
     volume: Option<u32>,
 }
 
@@ -65,12 +67,14 @@ impl Track {
         let mut hits = Vec::new();
         let mut samples: Vec<Sample> = Vec::with_capacity(SAMPLES);
         let (mut volume_at_start, mut volumes_at_start) = (1, 1);
+        let mut ambiguous = false;
         for i in 0..SAMPLES {
             let at = path.length() * (i as f32 / (SAMPLES - 1) as f32);
             let source = path.at(at);
             let ray = plane.ray(source);
             surface.hits(&ray, &mut hits);
             let spans = spans(&hits);
+            ambiguous |= spans.len() > 1;
             let span = match samples.last() {
                 None if spans.is_empty() => continue,
                 None => {
@@ -85,7 +89,7 @@ impl Track {
             };
             samples.push(Sample { at, source, ray, span, middle: ray.at(span.middle()) });
         }
-        (!samples.is_empty()).then_some(Self { samples, volume_at_start, volumes_at_start, volume })
+        (!samples.is_empty()).then_some(Self { samples, volume_at_start, volumes_at_start, ambiguous, volume })
     }
 
     /// Arc lengths of the first and last sample.

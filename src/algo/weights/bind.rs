@@ -3,16 +3,13 @@
 use glam::Vec3;
 
 use super::{
-    Method, Tuning, WeightError, WeightJoint, WeightSettings,
-    bone::BoneSegment,
+    Method, WeightError, WeightJoint, WeightSettings,
     bones::{self, Bones},
     claim::{self, Claim},
     coarse::{self, Coarse},
     fill::fill_unweighted,
-    finish::shape,
     heat,
     laplacian::Graph,
-    ldl::LANES,
     sight::Sight,
     voxel_bind::{VoxelError, VoxelSettings, geodesic_voxel_weights},
 };
@@ -25,6 +22,8 @@ pub(crate) enum Source {
     Voxels,
     Fill,
     Nearest,
+    /// Not bound yet.
+    None,
 }
 
 /// Weights of all places.
@@ -37,10 +36,10 @@ pub(crate) struct Bound {
     pub sources: Vec<Source>,
 }
 
-/// The most influences kept before the caller's limit applies.
-const KEPT: usize = 12;
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
 const SEEN: f32 = 0.15;
+/// Islands up to this size beside a mesh of size 2 are specks.
+const SPECK: f32 = 0.06;
 
 /// Binds checked input to the joints in `free`.
 pub(crate) fn bind(
@@ -49,12 +48,16 @@ pub(crate) fn bind(
     joints: &[WeightJoint],
     free: &[u32],
     settings: &WeightSettings,
-    tuning: &Tuning,
     progress: &(dyn Fn(f32) -> bool + Sync),
 ) -> Result<Bound, WeightError> {
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
     let (place, count) = adjacency::weld(points);
-    let (places, joints) = unit_frame(points, &place, count, joints, free);
+    let (places, joints) = unit_frame(points, &place, count, joints);
+    let mut takes_part = vec![false; joints.len()];
+    for &joint in free {
+        takes_part[joint as usize] = true;
+    }
+    let job = Job { joints: &joints, takes_part: &takes_part, settings, progress };
     let triangles: Vec<[u32; 3]> = triangles
         .iter()
         .map(|t| t.map(|p| place[p as usize]))
@@ -63,67 +66,122 @@ pub(crate) fn bind(
     let graph = Graph::new(&places, &triangles);
     step(0.1)?;
     if count <= coarse::LIMIT {
-        let (weights, sources, _) = bind_places(&places, &triangles, &graph, &joints, settings, tuning, progress)?;
+        let (weights, sources, _) = job.run(&places, &triangles, &graph)?;
         return Ok(Bound { place, weights, sources });
     }
     let coarse = Coarse::new(&places, &triangles, &graph);
     let coarse_graph = Graph::new(&coarse.points, &coarse.triangles);
-    let (weights, sources, claims) = bind_places(&coarse.points, &coarse.triangles, &coarse_graph, &joints, settings, tuning, progress)?;
-    let weights = coarse.spread(&weights, &claims, &graph, settings.blend());
+    let (weights, sources, claims) = job.run(&coarse.points, &coarse.triangles, &coarse_graph)?;
+    let bound = |c: usize| Some(&claims[c]).filter(|_| sources[c] == Source::Surface);
+    let weights = coarse.spread(&weights, &graph, settings.blend(), bound);
     let sources = coarse.cluster.iter().map(|&c| sources[c as usize]).collect();
     Ok(Bound { place, weights, sources })
 }
 
-/// Binds a surface without duplicate points, of unit size. Returns the claims too; without heat where other methods bound.
-fn bind_places(
-    places: &[Vec3],
-    triangles: &[[u32; 3]],
-    graph: &Graph,
-    joints: &[WeightJoint],
-    settings: &WeightSettings,
-    tuning: &Tuning,
-    progress: &(dyn Fn(f32) -> bool + Sync),
-) -> Result<(Weights, Vec<Source>, Vec<Claim>), WeightError> {
-    let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
-    let sight = Sight::new(places, triangles);
-    step(0.2)?;
-    let bones = bones::build(joints, places, &graph.areas, &sight, tuning);
-    step(0.25)?;
-    let mut weights = empty(places.len());
-    let mut claims = vec![Claim::default(); places.len()];
-    let mut sources = vec![Source::Nearest; places.len()];
-    let mut left = places.len();
-    if settings.method != Method::Voxel {
-        claims = claim::claims(places, &bones, graph, &sight, tuning);
-        step(0.5)?;
-        let trusted = trusted(triangles, graph, &claims, settings.method);
-        if let Some(found) = by_heat(graph, &claims, &trusted, settings) {
-            left = note(&found, &weights, &mut sources, Source::Surface);
-            weights = found;
-        }
-        for (v, claim) in claims.iter_mut().enumerate() {
-            if weights.of(v).len() == 0 {
-                claim.heat = 0.0;
-            }
-        }
-        step(0.7)?;
-    }
-    if left > 0 && settings.method != Method::Heat {
-        let found = by_voxels(places, triangles, &bones, settings, &|share| progress(0.7 + 0.2 * share))?;
-        let merged = merge(&weights, &found);
-        left = note(&merged, &weights, &mut sources, Source::Voxels);
-        weights = merged;
-    }
-    step(0.9)?;
-    if left > 0 {
-        weights = fill(places, triangles, &weights, &bones.segments, &mut sources);
-    }
-    Ok((weights, sources, claims))
+/// What is the same for a mesh and its coarse stand-in.
+struct Job<'a> {
+    joints: &'a [WeightJoint],
+    takes_part: &'a [bool],
+    settings: &'a WeightSettings,
+    progress: &'a (dyn Fn(f32) -> bool + Sync),
 }
 
-/// Moves everything to the origin and to unit size, so that no tolerance depends on the unit. Joints that are not free do
-/// not deform there.
-fn unit_frame(points: &[Vec3], place: &[u32], count: usize, joints: &[WeightJoint], free: &[u32]) -> (Vec<Vec3>, Vec<WeightJoint>) {
+impl Job<'_> {
+    fn step(&self, share: f32) -> Result<(), WeightError> {
+        if (self.progress)(share) { Ok(()) } else { Err(WeightError::Cancelled) }
+    }
+
+    /// Binds a surface without duplicate points, of unit size: weights, where they come from, and the claims.
+    fn run(&self, places: &[Vec3], triangles: &[[u32; 3]], graph: &Graph) -> Result<(Weights, Vec<Source>, Vec<Claim>), WeightError> {
+        let method = self.settings.method;
+        let sight = Sight::new(places, triangles);
+        self.step(0.2)?;
+        let bones = bones::build(self.joints, self.takes_part, places, &graph.areas, &sight);
+        self.step(0.25)?;
+        let mut weights = empty(places.len());
+        let mut sources = vec![Source::None; places.len()];
+        let mut claims = Vec::new();
+        let islands = Islands::new(places, triangles);
+        if method != Method::Voxel {
+            claims = claim::claims(places, &bones, graph, &sight);
+            self.step(0.5)?;
+            let trusted = islands.trusted(graph, &claims, method);
+            if trusted.contains(&true) {
+                weights = heat::solve(graph, &claims, &trusted, self.settings.blend());
+            }
+            mark(&weights, &mut sources, Source::Surface);
+            self.step(0.7)?;
+        }
+        // Specks, buttons and loose points are better moved by what is around them than by voxels of their own size.
+        let large = |v: usize| method == Method::Voxel || !islands.is_small(v);
+        if method != Method::Heat && (0..places.len()).any(|v| weights.of(v).len() == 0 && large(v)) {
+            let found = self.by_voxels(places, triangles, &bones)?;
+            weights = merge(&weights, &found, large);
+            mark(&weights, &mut sources, Source::Voxels);
+        }
+        self.step(0.9)?;
+        // Without bones only neighbours count, so that the two can be told apart.
+        for (bones, source) in [(&[][..], Source::Fill), (&bones.segments[..], Source::Nearest)] {
+            if (0..places.len()).any(|v| weights.of(v).len() == 0) {
+                weights = fill_unweighted(places, triangles, &weights, bones).0;
+                mark(&weights, &mut sources, source);
+            }
+        }
+        Ok((weights, sources, claims))
+    }
+
+    /// Weights of all places by voxels; none if the mesh has no volume to speak of.
+    fn by_voxels(&self, places: &[Vec3], triangles: &[[u32; 3]], bones: &Bones) -> Result<Weights, WeightError> {
+        let settings = VoxelSettings { resolution: self.settings.voxel_resolution, ..VoxelSettings::default() };
+        match geodesic_voxel_weights(places, triangles, &bones.segments, &settings, &|share| (self.progress)(0.7 + 0.2 * share)) {
+            Ok(weights) => Ok(weights),
+            Err(VoxelError::Cancelled) => Err(WeightError::Cancelled),
+            Err(_) => Ok(empty(places.len())),
+        }
+    }
+}
+
+/// The connected pieces of a surface.
+struct Islands {
+    /// The island of each place.
+    of: Vec<u32>,
+    /// The longest side of each island's box.
+    extents: Vec<f32>,
+}
+
+impl Islands {
+    fn new(places: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let (of, count) = adjacency::islands(triangles, places.len());
+        let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); count];
+        for (&island, &place) in of.iter().zip(places) {
+            let (low, high) = &mut boxes[island as usize];
+            (*low, *high) = (low.min(place), high.max(place));
+        }
+        Self { of, extents: boxes.into_iter().map(|(low, high)| (high - low).max_element()).collect() }
+    }
+
+    /// True if the island of a place is a speck beside the whole mesh.
+    fn is_small(&self, place: usize) -> bool {
+        self.extents[self.of[place] as usize] < SPECK
+    }
+
+    /// For each place whether its island can be bound by heat.
+    fn trusted(&self, graph: &Graph, claims: &[Claim], method: Method) -> Vec<bool> {
+        let mut area = vec![0f64; self.extents.len()];
+        let mut seen = vec![0f64; self.extents.len()];
+        for (v, claim) in claims.iter().enumerate().filter(|c| c.1.heat > 0.0) {
+            area[self.of[v] as usize] += f64::from(graph.areas[v]);
+            if claim.seen {
+                seen[self.of[v] as usize] += f64::from(graph.areas[v]);
+            }
+        }
+        let share = if method == Method::Heat { 0.0 } else { f64::from(SEEN) };
+        self.of.iter().map(|&i| area[i as usize] > 0.0 && seen[i as usize] >= share * area[i as usize]).collect()
+    }
+}
+
+/// Moves everything to the origin and the longest side to length 2, so that no tolerance depends on the unit.
+fn unit_frame(points: &[Vec3], place: &[u32], count: usize, joints: &[WeightJoint]) -> (Vec<Vec3>, Vec<WeightJoint>) {
     let low = points.iter().fold(Vec3::INFINITY, |m, &p| m.min(p * 0.5));
     let high = points.iter().fold(Vec3::NEG_INFINITY, |m, &p| m.max(p * 0.5));
     let center = if points.is_empty() { Vec3::ZERO } else { low + high };
@@ -135,109 +193,29 @@ fn unit_frame(points: &[Vec3], place: &[u32], count: usize, joints: &[WeightJoin
     for (&point, &place) in points.iter().zip(place) {
         places[place as usize] = fit(point);
     }
-    let mut deforms = vec![false; joints.len()];
-    for &joint in free {
-        deforms[joint as usize] = true;
-    }
-    let joints = joints
-        .iter()
-        .zip(deforms)
-        .map(|(j, deforms)| WeightJoint { head: fit(j.head), parent: j.parent, tail: j.tail.map(fit), deforms })
-        .collect();
+    let joints = joints.iter().map(|j| WeightJoint { head: fit(j.head), tail: j.tail.map(fit), ..*j }).collect();
     (places, joints)
-}
-
-/// For each place whether its island can be bound by heat.
-fn trusted(triangles: &[[u32; 3]], graph: &Graph, claims: &[Claim], method: Method) -> Vec<bool> {
-    let count = claims.len();
-    let (island, islands) = adjacency::islands(triangles, count);
-    let mut area = vec![0f64; islands];
-    let mut seen = vec![0f64; islands];
-    for v in 0..count {
-        let i = island[v] as usize;
-        area[i] += f64::from(graph.areas[v]);
-        if claims[v].seen {
-            seen[i] += f64::from(graph.areas[v]);
-        }
-    }
-    let share = if method == Method::Heat { 0.0 } else { f64::from(SEEN) };
-    island.iter().map(|&i| area[i as usize] > 0.0 && seen[i as usize] >= share * area[i as usize]).collect()
-}
-
-/// Weights of the trusted places by heat; the others stay empty. `None` if there are none or the solve failed.
-fn by_heat(graph: &Graph, claims: &[Claim], trusted: &[bool], settings: &WeightSettings) -> Option<Weights> {
-    if !trusted.iter().any(|&t| t) {
-        return None;
-    }
-    let dense = heat::solve(graph, claims, settings.blend())?;
-    let mut weights = Weights { starts: vec![0], ..Weights::default() };
-    let mut row = Vec::new();
-    for (v, &trusted) in trusted.iter().enumerate() {
-        row.clear();
-        if trusted {
-            for (slot, &joint) in dense.joints.iter().enumerate() {
-                let value = dense.blocks[slot / LANES][v][slot % LANES] as f32;
-                if value > 1e-4 {
-                    row.push((joint, value));
-                }
-            }
-            shape(&mut row, KEPT, 0.0);
-        }
-        weights.push(row.iter().copied());
-    }
-    Some(weights)
-}
-
-/// Weights of all places by voxels; none if the mesh has no volume to speak of.
-fn by_voxels(
-    places: &[Vec3],
-    triangles: &[[u32; 3]],
-    bones: &Bones,
-    settings: &WeightSettings,
-    progress: &(dyn Fn(f32) -> bool + Sync),
-) -> Result<Weights, WeightError> {
-    let voxel_settings = VoxelSettings { resolution: settings.voxel_resolution, ..VoxelSettings::default() };
-    match geodesic_voxel_weights(places, triangles, &bones.segments, &voxel_settings, progress) {
-        Ok(weights) => Ok(weights),
-        Err(VoxelError::Cancelled) => Err(WeightError::Cancelled),
-        Err(_) => Ok(empty(places.len())),
-    }
-}
-
-/// Fills what is empty.
-fn fill(places: &[Vec3], triangles: &[[u32; 3]], weights: &Weights, bones: &[BoneSegment], sources: &mut [Source]) -> Weights {
-    let (filled, _) = fill_unweighted(places, triangles, weights, bones);
-    for (v, source) in sources.iter_mut().enumerate() {
-        if weights.of(v).len() == 0 {
-            *source = Source::Fill;
-        }
-    }
-    filled
 }
 
 fn empty(count: usize) -> Weights {
     Weights { starts: vec![0; count + 1], ..Weights::default() }
 }
 
-/// `first`, with the rows of `second` where it is empty.
-fn merge(first: &Weights, second: &Weights) -> Weights {
+/// `first`, with the rows of `second` where it is empty and they are wanted.
+fn merge(first: &Weights, second: &Weights, wanted: impl Fn(usize) -> bool) -> Weights {
     let mut merged = Weights { starts: vec![0], ..Weights::default() };
     for v in 0..first.len() {
-        let from = if first.of(v).len() > 0 { first } else { second };
+        let from = if first.of(v).len() == 0 && wanted(v) { second } else { first };
         merged.push(from.of(v));
     }
     merged
 }
 
-/// Notes where the rows that `found` has over `before` come from; returns how many are still empty.
-fn note(found: &Weights, before: &Weights, sources: &mut [Source], source: Source) -> usize {
-    let mut empty = 0;
+/// Notes where rows come from that were empty so far.
+fn mark(weights: &Weights, sources: &mut [Source], source: Source) {
     for (v, slot) in sources.iter_mut().enumerate() {
-        if found.of(v).len() == 0 {
-            empty += 1;
-        } else if before.of(v).len() == 0 {
+        if *slot == Source::None && weights.of(v).len() > 0 {
             *slot = source;
         }
     }
-    empty
 }

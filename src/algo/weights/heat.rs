@@ -7,57 +7,167 @@ use rayon::prelude::*;
 
 use super::{
     claim::Claim,
+    finish::shape,
     laplacian::Graph,
     ldl::{LANES, Ldl, Symmetric},
 };
+use crate::mesh::model::Weights;
 
-/// Joint weights of every vertex, dense by joint: `weights[slot][vertex]` for the joint `joints[slot]`.
-pub(crate) struct Dense {
-    pub joints: Vec<u32>,
-    /// One block of [`LANES`] joints after another, a row a vertex.
-    pub blocks: Vec<Vec<[f64; LANES]>>,
+/// More joints than this are not solved for one by one.
+const MANY_JOINTS: usize = 1024;
+/// Steps towards the equilibrium where there are too many joints, or the matrix defies factorisation.
+const STEPS: usize = 64;
+/// The most influences a vertex keeps.
+pub(crate) const KEPT: usize = 12;
+/// Weights below this are no influence.
+const LEAST: f32 = 1e-4;
+/// Vertices handled at a time by one thread.
+const CHUNK: usize = 1024;
+
+/// The weights of all vertices in `wanted`; the others, and components without any claim, stay empty. `smoothing` widens
+/// blends. Independent of the number of threads.
+///
+/// Cost: one sparse factorisation and a solve for each joint that has a claim.
+pub(crate) fn solve(graph: &Graph, claims: &[Claim], wanted: &[bool], smoothing: f32) -> Weights {
+    let mut joints: Vec<u32> = claims.iter().filter(|c| c.heat > 0.0).flat_map(|c| c.shares).filter(|s| s.1 > 0.0).map(|s| s.0).collect();
+    joints.sort_unstable();
+    joints.dedup();
+    let factor = if joints.len() > MANY_JOINTS { None } else { Ldl::new(&matrix(graph, claims, smoothing)) };
+    let mut rows: Vec<Vec<(u32, f32)>> = vec![Vec::new(); claims.len()];
+    if let Some(factor) = factor {
+        let floor = floor(graph);
+        let solved: Vec<Vec<(u32, u32, f32)>> = joints
+            .par_chunks(LANES)
+            .map(|group| {
+                let mut block = vec![[0f64; LANES]; claims.len()];
+                for (v, claim) in claims.iter().enumerate() {
+                    for &(joint, share) in claim.shares.iter().filter(|s| s.1 > 0.0) {
+                        if let Ok(lane) = group.binary_search(&joint) {
+                            block[v][lane] += warmth(graph, claims, v, smoothing, floor) * f64::from(share);
+                        }
+                    }
+                }
+                factor.solve(&mut block);
+                let mut found = Vec::new();
+                for (v, row) in block.iter().enumerate() {
+                    for (&joint, &value) in group.iter().zip(row) {
+                        if wanted[v] && value as f32 > LEAST {
+                            found.push((v as u32, joint, value as f32));
+                        }
+                    }
+                }
+                found
+            })
+            .collect();
+        for (v, joint, value) in solved.into_iter().flatten() {
+            rows[v as usize].push((joint, value));
+        }
+    } else {
+        let mut weights = Weights { starts: vec![0], ..Weights::default() };
+        for claim in claims {
+            weights.push(claim.shares.into_iter().filter(|s| s.1 > 0.0 && claim.heat > 0.0));
+        }
+        for _ in 0..STEPS {
+            weights = step(&weights, graph, smoothing, |v| Some(&claims[v]));
+        }
+        for (v, row) in rows.iter_mut().enumerate().filter(|(v, _)| wanted[*v]) {
+            row.extend(weights.of(v));
+        }
+    }
+    let mut weights = Weights { starts: vec![0], ..Weights::default() };
+    for mut row in rows {
+        shape(&mut row, KEPT, 0.0);
+        weights.push(row);
+    }
+    weights
 }
 
-/// Solves for all joints that any claim names. Vertices of components without a claim come out with zero everywhere.
-/// `None` if the matrix cannot be factorised.
-pub(crate) fn solve(graph: &Graph, claims: &[Claim], smoothing: f32) -> Option<Dense> {
-    let n = claims.len();
-    let mean = graph.areas.iter().map(|&a| f64::from(a)).sum::<f64>() / n.max(1) as f64;
-    let floor = mean * 1e-6;
-    let area = |v: usize| f64::from(graph.areas[v]).max(floor);
-    let sharpness = 1.0 / f64::from(smoothing);
-    let warmth = |v: usize| area(v) * f64::from(claims[v].heat) * sharpness;
-    let diagonal = (0..n)
+fn matrix(graph: &Graph, claims: &[Claim], smoothing: f32) -> Symmetric {
+    let floor = floor(graph);
+    let diagonal = (0..claims.len())
         .map(|v| {
-            let couple: f64 = graph.of(v).map(|(_, w)| f64::from(w)).sum();
+            let exchange: f64 = graph.of(v).map(|(_, w)| f64::from(w)).sum();
             // A trace of loss keeps components without any claim solvable.
-            couple * (1.0 + 1e-12) + warmth(v) + 1e-12
+            exchange * (1.0 + 1e-12) + warmth(graph, claims, v, smoothing, floor) + 1e-12
         })
         .collect();
-    let matrix = Symmetric {
+    Symmetric {
         starts: graph.starts.clone(),
         columns: graph.columns.clone(),
         values: graph.values.iter().map(|&v| -f64::from(v)).collect(),
         diagonal,
-    };
-    let factor = Ldl::new(&matrix)?;
-    let mut joints: Vec<u32> = claims.iter().flat_map(|c| c.shares).filter(|s| s.1 > 0.0).map(|s| s.0).collect();
-    joints.sort_unstable();
-    joints.dedup();
-    let blocks = joints
-        .par_chunks(LANES)
-        .map(|group| {
-            let mut block = vec![[0f64; LANES]; n];
-            for (v, claim) in claims.iter().enumerate() {
-                for &(joint, share) in claim.shares.iter().filter(|s| s.1 > 0.0) {
-                    if let Ok(lane) = group.binary_search(&joint) {
-                        block[v][lane] += warmth(v) * f64::from(share);
-                    }
+    }
+}
+
+/// The least area of a vertex: those of degenerate triangles have none.
+fn floor(graph: &Graph) -> f64 {
+    1e-6 * graph.areas.iter().map(|&a| f64::from(a)).sum::<f64>() / graph.areas.len().max(1) as f64
+}
+
+fn warmth(graph: &Graph, claims: &[Claim], v: usize, smoothing: f32, floor: f64) -> f64 {
+    f64::from(graph.areas[v]).max(floor) * f64::from(claims[v].heat) / f64::from(smoothing)
+}
+
+/// One damped step towards the equilibrium on sparse rows. Vertices without a claim to their name (`None`) stay as they are.
+pub(crate) fn step<'a>(weights: &Weights, graph: &Graph, smoothing: f32, claim: impl Fn(usize) -> Option<&'a Claim> + Sync) -> Weights {
+    let vertices: Vec<usize> = (0..weights.len()).collect();
+    let parts: Vec<Weights> = vertices
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            let mut part = Weights { starts: vec![0], ..Weights::default() };
+            let mut row: Vec<(u32, f32)> = Vec::new();
+            for &v in chunk {
+                let Some(claim) = claim(v) else {
+                    part.push(weights.of(v));
+                    continue;
+                };
+                // Deep inside one joint's flesh nothing changes.
+                if let Some(only) = sole(weights, v)
+                    && (claim.heat <= 0.0 || claim.shares[0] == (only, 1.0))
+                    && graph.of(v).all(|(n, _)| sole(weights, n) == Some(only))
+                {
+                    part.push([(only, 1.0)]);
+                    continue;
                 }
+                row.clear();
+                let mut total = 0.0;
+                for (n, w) in graph.of(v) {
+                    total += w;
+                    add(&mut row, weights.of(n), w);
+                }
+                // Half of the old value keeps the steps from swinging.
+                add(&mut row, weights.of(v), total);
+                let warmth = graph.areas[v] * claim.heat / smoothing;
+                add(&mut row, claim.shares.iter().copied().filter(|s| s.1 > 0.0), warmth);
+                shape(&mut row, KEPT, 1e-3);
+                part.push(row.iter().copied());
             }
-            factor.solve(&mut block);
-            block
+            part
         })
         .collect();
-    Some(Dense { joints, blocks })
+    let mut all = Weights { starts: Vec::with_capacity(weights.len() + 1), ..Weights::default() };
+    all.starts.push(0);
+    for part in &parts {
+        let base = all.joints.len() as u32;
+        all.joints.extend_from_slice(&part.joints);
+        all.values.extend_from_slice(&part.values);
+        all.starts.extend(part.starts[1..].iter().map(|s| s + base));
+    }
+    all
+}
+
+/// The joint of a vertex that has only one.
+fn sole(weights: &Weights, v: usize) -> Option<u32> {
+    let start = weights.starts[v];
+    (weights.starts[v + 1] == start + 1).then(|| weights.joints[start as usize])
+}
+
+/// Adds `more` times `factor` to a sparse row.
+fn add(row: &mut Vec<(u32, f32)>, more: impl Iterator<Item = (u32, f32)>, factor: f32) {
+    for (joint, value) in more {
+        match row.iter_mut().find(|e| e.0 == joint) {
+            Some(entry) => entry.1 += value * factor,
+            None => row.push((joint, value * factor)),
+        }
+    }
 }

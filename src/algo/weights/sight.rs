@@ -10,8 +10,10 @@ use obvhs::{
     triangle::Triangle,
 };
 
-/// Directions for the winding estimate: a spherical Fibonacci lattice with this many points.
-const WINDING_RAYS: usize = 32;
+/// Directions in which [`Sight::encloses`] looks.
+const DIRECTIONS: usize = 32;
+/// The share of a segment at either end in which nothing blocks it: the surface the point lies on.
+const MARGIN: f32 = 1e-3;
 
 /// A hierarchy over triangles that answers lines of sight.
 pub(crate) struct Sight {
@@ -37,54 +39,60 @@ impl Sight {
         Self { triangles, bvh: Some(bvh) }
     }
 
-    /// True if no triangle crosses the segment strictly between its ends (`margin` is the share left out at either end).
-    pub fn clear(&self, from: Vec3, to: Vec3, margin: f32) -> bool {
+    /// True if no triangle crosses the segment strictly between its ends.
+    pub fn clear(&self, from: Vec3, to: Vec3) -> bool {
         let Some(bvh) = &self.bvh else { return true };
         let direction = Vec3A::from(to - from);
         if direction.length_squared() <= 0.0 {
             return true;
         }
-        let ray = Ray::new(from.into(), direction, margin, 1.0 - margin);
+        let ray = Ray::new(from.into(), direction, MARGIN, 1.0 - MARGIN);
         bvh.ray_traverse_miss(ray, |ray, index| self.triangles[index].intersect(ray))
     }
 
-    /// The distance along the unit vector `direction` to the first surface further away than `from`.
-    pub fn first(&self, origin: Vec3, direction: Vec3, from: f32) -> Option<f32> {
+    /// The distance along the unit vector `direction` to the first surface.
+    pub fn first(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
         let bvh = self.bvh.as_ref()?;
         let mut hit = RayHit::none();
-        let ray = Ray::new(origin.into(), direction.into(), from, f32::INFINITY);
+        let ray = Ray::new_inf(origin.into(), direction.into());
         bvh.ray_traverse(ray, &mut hit, |ray, index| self.triangles[index].intersect(ray)).then_some(hit.t)
     }
 
-    /// An estimate of the generalised winding number of `point`: 1 inside, 0 outside, in between near holes. Its sign
-    /// is dropped. The mean of signed crossings over evenly spread rays is that number (Jacobson et al. 2013).
-    pub fn winding(&self, point: Vec3) -> f32 {
-        let Some(bvh) = &self.bvh else { return 0.0 };
-        let mut sum = 0i32;
-        for direction in fibonacci_sphere() {
+    /// True if the surface is around `point`, by two measures over evenly spread rays, each of which some damage spoils.
+    ///
+    /// The mean of signed crossings is the generalised winding number (Jacobson et al. 2013), which holes weaken and
+    /// shells inside each other strengthen, but which needs triangles of one orientation. The share of rays with an odd
+    /// number of crossings does not.
+    pub fn encloses(&self, point: Vec3) -> bool {
+        let Some(bvh) = &self.bvh else { return false };
+        let (mut winding, mut odd) = (0i32, 0usize);
+        for direction in evenly_spread() {
             let direction = Vec3A::from(direction);
+            let mut crossings = 0;
             bvh.ray_traverse_anyhit(Ray::new_inf(point.into(), direction), |ray, index| {
                 let triangle = &self.triangles[index];
                 if triangle.intersect(ray) < f32::INFINITY {
                     let normal = (triangle.v1 - triangle.v0).cross(triangle.v2 - triangle.v0);
-                    sum += if normal.dot(direction) > 0.0 { 1 } else { -1 };
+                    winding += if normal.dot(direction) > 0.0 { 1 } else { -1 };
+                    crossings += 1;
                 }
             });
+            odd += crossings % 2;
         }
-        sum.unsigned_abs() as f32 / WINDING_RAYS as f32
+        winding.unsigned_abs() as usize * 3 > DIRECTIONS || odd * 8 > DIRECTIONS * 5
     }
 }
 
-/// Evenly spread unit vectors. The golden angle is turned by repeated complex multiplication, so no sine is needed.
-fn fibonacci_sphere() -> impl Iterator<Item = Vec3> {
+/// Unit vectors on a spherical Fibonacci lattice. The golden angle is turned by repeated complex multiplication, so no
+/// sine is needed.
+fn evenly_spread() -> impl Iterator<Item = Vec3> {
     const COS: f32 = -0.737_368_9;
     const SIN: f32 = 0.675_490_3;
     let mut turn = (1.0f32, 0.0f32);
-    (0..WINDING_RAYS).map(move |i| {
-        let y = 1.0 - (2 * i + 1) as f32 / WINDING_RAYS as f32;
+    (0..DIRECTIONS).map(move |i| {
+        let y = 1.0 - (2 * i + 1) as f32 / DIRECTIONS as f32;
         let radius = (1.0 - y * y).max(0.0).sqrt();
         turn = (turn.0 * COS - turn.1 * SIN, turn.0 * SIN + turn.1 * COS);
-        // Off the axes, so that rays do not run along the edges of boxy models.
         Vec3::new(radius * turn.0, y, radius * turn.1)
     })
 }

@@ -48,7 +48,7 @@ pub struct VoxelSettings {
 
 impl Default for VoxelSettings {
     fn default() -> Self {
-        Self { resolution: 192, labels: 5, falloff: 1.0, sharpness: 3, influences: 8 }
+        Self { resolution: 160, labels: 4, falloff: 1.0, sharpness: 3, influences: 8 }
     }
 }
 

@@ -138,6 +138,13 @@ impl Accessor {
     }
 }
 
+impl Accessor {
+    /// True if no bytes belong to the accessor, so that all its elements are zero.
+    pub(super) fn is_empty(&self) -> bool {
+        self.place.is_none() && self.sparse.is_none()
+    }
+}
+
 /// Checks that `count` elements of `size` bytes fit into the view.
 fn place(at: &At, view: usize, offset: usize, layout: Layout, views: &[View]) -> Result<Place, GltfError> {
     let Layout { count, size, packed } = layout;
@@ -193,11 +200,7 @@ pub(super) struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    pub(super) fn new(
-        document: &'a Document<'a>,
-        buffers: &'a [Option<Cow<'a, [u8]>>],
-        budget: &'a Budget,
-    ) -> Self {
+    pub(super) fn new(document: &'a Document<'a>, buffers: &'a [Option<Cow<'a, [u8]>>], budget: &'a Budget) -> Self {
         Self { document, buffers, budget }
     }
 
@@ -278,7 +281,9 @@ impl<'a> Source<'a> {
         let floats = self.floats(index, width)?;
         match floats.iter().position(|value| !value.is_finite()) {
             None => Ok(floats),
-            Some(at) => Err(GltfError::at(format!("/accessors/{index}"), format!("element {} is not finite", at / width))),
+            Some(at) => {
+                Err(GltfError::at(format!("/accessors/{index}"), format!("element {} is not finite", at / width)))
+            }
         }
     }
 

@@ -36,7 +36,10 @@ pub(super) fn read_clips(
             notes.add("An animation without channels was not kept");
             continue;
         }
-        let (name, extras) = (animation.name.to_owned(), animation.extras.map(|extras| copy(extras, source.budget, "/animations")).transpose()?);
+        let (name, extras) = (
+            animation.name.to_owned(),
+            animation.extras.map(|extras| copy(extras, source.budget, "/animations")).transpose()?,
+        );
         model.clips.push(Clip { name, channels, extras });
     }
     Ok(())
@@ -121,7 +124,10 @@ fn keep_rising(times: &mut Vec<f32>, values: &mut Vec<f32>, per_key: usize, note
             kept += 1;
         }
     }
-    notes.add_times("A key was not kept, since its time was before zero or not after the key before it", times.len() - kept);
+    notes.add_times(
+        "A key was not kept, since its time was before zero or not after the key before it",
+        times.len() - kept,
+    );
     times.truncate(kept);
     values.truncate(kept * per_key);
 }

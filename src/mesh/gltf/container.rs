@@ -26,7 +26,10 @@ pub(super) fn split(bytes: &[u8]) -> Result<Container<'_>, GltfError> {
     let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     match text.iter().find(|byte| !byte.is_ascii_whitespace()) {
         Some(b'{' | b'[') => Ok(Container { json: text, bin: None }),
-        _ => Err(GltfError::container(0, "neither a GLB (begins with \"glTF\") nor a glTF JSON file (begins with \"{\")")),
+        _ => Err(GltfError::container(
+            0,
+            "neither a GLB (begins with \"glTF\") nor a glTF JSON file (begins with \"{\")",
+        )),
     }
 }
 

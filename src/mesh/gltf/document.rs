@@ -197,10 +197,9 @@ impl<'a> Document<'a> {
 fn check_version(root: &At) -> Result<(), GltfError> {
     let asset = root.need("asset", root.object("asset")?)?;
     let version = asset.need("version", asset.text("version")?)?;
-    let needed = asset.text("minVersion")?.unwrap_or(version);
-    let major = |version: &str| version.split('.').next().and_then(|major| major.parse::<u32>().ok());
-    if major(version) != Some(2) || major(needed) != Some(2) || (needed != version && needed != "2.0") {
-        let what = format!("glTF {version} (at least {needed}); only 2.0 can be read");
+    let needed = asset.text("minVersion")?.unwrap_or("2.0");
+    if version.split('.').next() != Some("2") || needed != "2.0" {
+        let what = format!("glTF {version} that needs a reader of {needed} at least; only 2.0 can be read");
         return Err(asset.fail("version", what));
     }
     Ok(())
@@ -246,12 +245,7 @@ fn skin<'a>(at: &At<'a>, nodes: usize, accessors: &[Accessor]) -> Result<SkinEnt
     Ok(SkinEntry { place: at.place.clone(), name: at.name(), joints, inverse_binds })
 }
 
-fn animation<'a>(
-    at: &At<'a>,
-    nodes: usize,
-    accessors: usize,
-    notes: &Notes,
-) -> Result<AnimationEntry<'a>, GltfError> {
+fn animation<'a>(at: &At<'a>, nodes: usize, accessors: usize, notes: &Notes) -> Result<AnimationEntry<'a>, GltfError> {
     let mut samplers = Vec::new();
     for sampler in at.objects("samplers")? {
         let sampler = sampler?;

@@ -19,7 +19,7 @@ use super::{
 use crate::mesh::model::{Model, Morph, Object, Part, Weights};
 
 /// Texture coordinate sets read at most; the specification asks for two.
-const MAX_UV_SETS: usize = 16;
+pub(super) const MAX_UV_SETS: usize = 16;
 
 /// Reads the meshes of all nodes of the scene, in the order of the file's nodes. Returns the object of each node.
 pub(super) fn read_objects(
@@ -49,7 +49,7 @@ pub(super) fn read_objects(
         let object = Object {
             name: if entry.name.is_empty() { mesh.name } else { entry.name }.to_owned(),
             skin,
-            node: if skin.is_some() { None } else { hierarchy.carrier(node) },
+            node: if skin.is_some() { None } else { hierarchy.carrier[node] },
             morph_names,
             morph_weights: morph_weights(&entry.at, mesh.targets)?.unwrap_or_else(|| mesh.weights.clone()),
             extras,
@@ -60,7 +60,8 @@ pub(super) fn read_objects(
         }
         let before = model.parts.len();
         let points = BTreeMap::new();
-        let mut reader = ObjectReader { decoder: &decoder, hierarchy, node, skin, points, model, weights: &mut weights };
+        let mut reader =
+            ObjectReader { decoder: &decoder, hierarchy, node, skin, points, model, weights: &mut weights };
         for primitive in &mesh.primitives {
             let shared = uses.get(&vertex_key(&primitive.attributes)) > Some(&1);
             reader.part(primitive, shared)?;
@@ -147,7 +148,13 @@ impl<'a> ObjectReader<'a> {
             None => (base..base + count as u32).collect(),
             Some(pick) => pick.iter().map(|vertex| base + vertex).collect(),
         };
-        let mut part = Part { object: self.model.objects.len(), material: primitive.material, vertices, triangles, ..Default::default() };
+        let mut part = Part {
+            object: self.model.objects.len(),
+            material: primitive.material,
+            vertices,
+            triangles,
+            ..Default::default()
+        };
         self.attributes(primitive, pick.as_deref(), &bake, &mut part)?;
         self.model.parts.push(part);
         Ok(())
@@ -172,10 +179,15 @@ impl<'a> ObjectReader<'a> {
         if base + positions.len() > u32::MAX as usize {
             return Err(GltfError::at(&*primitive.place, "the file has more than four billion vertices"));
         }
+        self.model.points.reserve(positions.len());
+        self.weights.starts.reserve(positions.len());
         for (i, position) in positions.iter().enumerate() {
             let point = bake.point(Vec3::from_array(*position));
             if !point.is_finite() {
-                return Err(GltfError::at(format!("/accessors/{accessor}"), format!("position {i} is not finite in model space")));
+                return Err(GltfError::at(
+                    format!("/accessors/{accessor}"),
+                    format!("position {i} is not finite in model space"),
+                ));
             }
             self.model.points.push(point);
         }
@@ -229,7 +241,10 @@ impl<'a> ObjectReader<'a> {
             }
             _ => {
                 let (triangles, left) = indices.as_chunks::<3>();
-                notes.add_times("Indices at the end that make no whole triangle were not kept", usize::from(!left.is_empty()));
+                notes.add_times(
+                    "Indices at the end that make no whole triangle were not kept",
+                    usize::from(!left.is_empty()),
+                );
                 triangles.to_vec()
             }
         })
@@ -249,7 +264,8 @@ impl<'a> ObjectReader<'a> {
         let mut own_normals = match normals {
             Some(accessor) => self.decoder.normals(accessor, pick)?,
             None => {
-                source.budget.take(count, size_of::<Vec3>(), &primitive.place)?;
+                // Also for the sums of double precision that the normals are computed from.
+                source.budget.take(count, 4 * size_of::<Vec3>(), &primitive.place)?;
                 vec![Vec3::ZERO; count]
             }
         };

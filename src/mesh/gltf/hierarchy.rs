@@ -23,8 +23,8 @@ pub(super) struct Hierarchy {
     pub(super) visible: Vec<bool>,
     /// True if a skin lists it.
     joint: Vec<bool>,
-    /// True if it or an ancestor is a joint or moved by a clip.
-    moves: Vec<bool>,
+    /// The nearest kept node at or above a node that a joint or clip moves.
+    pub(super) carrier: Vec<Option<usize>>,
     /// Index in the model's nodes.
     pub(super) kept: Vec<Option<usize>>,
     rest: Vec<Trs>,
@@ -59,7 +59,7 @@ impl Hierarchy {
                 needed[parent] = true;
             }
         }
-        let mut kept = vec![None; count];
+        let (mut kept, mut carrier) = (vec![None; count], vec![None; count]);
         let mut next = 0;
         for &node in &order {
             if let Some(parent) = parents[node] {
@@ -69,6 +69,9 @@ impl Hierarchy {
             if needed[node] {
                 kept[node] = Some(next);
                 next += 1;
+            }
+            if moves[node] {
+                carrier[node] = kept[node].or(parents[node].and_then(|parent| carrier[parent]));
             }
         }
 
@@ -85,24 +88,9 @@ impl Hierarchy {
                 return Err(GltfError::at(&*entry.at.place, "the transform in model space is not finite"));
             }
         }
-        let hierarchy = Self { parents, order, visible, joint, moves, kept, rest, world };
+        let hierarchy = Self { parents, order, visible, joint, carrier, kept, rest, world };
         hierarchy.note_dropped(document, notes);
         Ok(hierarchy)
-    }
-
-    /// The nearest kept node at or above a node that a joint or clip moves.
-    pub(super) fn carrier(&self, node: usize) -> Option<usize> {
-        if !self.moves[node] {
-            return None;
-        }
-        let mut node = Some(node);
-        while let Some(at) = node {
-            if let Some(kept) = self.kept[at] {
-                return Some(kept);
-            }
-            node = self.parents[at];
-        }
-        None
     }
 
     /// The model's nodes.
@@ -136,9 +124,11 @@ impl Hierarchy {
         notes.add_times("A light was not kept", count(&|entry| extension(entry, "KHR_lights_punctual")));
         let instanced = count(&|entry| extension(entry, "EXT_mesh_gpu_instancing"));
         notes.add_times("Instances of a mesh by EXT_mesh_gpu_instancing were not made", instanced);
-        let carries = |entry: &NodeEntry| entry.mesh.is_some() || entry.camera || extension(entry, "KHR_lights_punctual");
+        let carries =
+            |entry: &NodeEntry| entry.mesh.is_some() || entry.camera || extension(entry, "KHR_lights_punctual");
         let plain = document.nodes.iter().enumerate().filter(of_scene);
-        let plain = plain.filter(|(node, entry)| self.kept[*node].is_none() && !carries(entry) && entry.children.is_empty());
+        let plain =
+            plain.filter(|(node, entry)| self.kept[*node].is_none() && !carries(entry) && entry.children.is_empty());
         notes.add_times("A node without mesh, joint or animation was not kept", plain.count());
     }
 }
@@ -178,7 +168,9 @@ fn depth_first(document: &Document, parents: &[Option<usize>], scene: &[usize]) 
     }
     match seen.iter().position(|seen| !seen) {
         None => Ok(order),
-        Some(node) => Err(GltfError::at(format!("/nodes/{node}"), "the node is its own ancestor, or below one that is")),
+        Some(node) => {
+            Err(GltfError::at(format!("/nodes/{node}"), "the node is its own ancestor, or below one that is"))
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Materials, textures and samplers, carried unread; images, loaded. Only references and extensions are looked at.
 
+use std::collections::BTreeSet;
+
 use serde_json::{Map, Value};
 
 use super::{
@@ -10,6 +12,9 @@ use super::{
     uri,
 };
 use crate::mesh::model::{Image, Looks};
+
+/// Fields of a glTF image that [`Image`] has fields for.
+pub(super) const OWN_FIELDS: [&str; 4] = ["name", "uri", "mimeType", "bufferView"];
 
 /// Reads everything that is about looks.
 pub(super) fn read(
@@ -45,7 +50,7 @@ pub(super) fn read(
         looks.samplers.push(carried(&at?, source.budget, notes)?);
     }
 
-    let mut found = Vec::new();
+    let mut found = BTreeSet::new();
     for value in looks.materials.iter().chain(&looks.textures).chain(&looks.samplers) {
         find_extensions(value, &mut found);
     }
@@ -53,17 +58,25 @@ pub(super) fn read(
         image.rest.values().for_each(|value| find_extensions(value, &mut found));
         find_extension_names(image.rest.get("extensions"), &mut found);
     }
-    // In the order of the file's own list, undeclared ones last.
-    let used = document.extensions_used.iter().map(|name| (*name).to_owned());
-    looks.extensions_used = used.filter(|name| found.contains(name)).collect();
-    for name in found {
-        if !looks.extensions_used.contains(&name) {
-            looks.extensions_used.push(name);
-        }
-    }
-    let required = document.extensions_required.iter().map(|name| (*name).to_owned());
-    looks.extensions_required = required.filter(|name| looks.extensions_used.contains(name)).collect();
+    let (used, required) = (&document.extensions_used, &document.extensions_required);
+    (looks.extensions_used, looks.extensions_required) = declare(found, used, required);
     Ok(looks)
+}
+
+/// The extensions to declare when `found` are there: in the order of the lists given, undeclared ones last.
+pub(super) fn declare(
+    found: BTreeSet<&str>,
+    used: &[impl AsRef<str>],
+    required: &[impl AsRef<str>],
+) -> (Vec<String>, Vec<String>) {
+    let required = required.iter().map(AsRef::as_ref).filter(|name| found.contains(name)).map(str::to_owned).collect();
+    let mut rest = found;
+    let mut list = Vec::new();
+    for name in used.iter().map(AsRef::as_ref) {
+        list.extend(rest.take(name).map(str::to_owned));
+    }
+    list.extend(rest.into_iter().map(str::to_owned));
+    (list, required)
 }
 
 /// A copy of an object, without references to packets of metadata that are not carried.
@@ -95,8 +108,8 @@ fn check_textures(map: &Map<String, Value>, place: &str, textures: usize, depth:
     Ok(())
 }
 
-/// Names of the extensions anywhere in a value, each once.
-pub(super) fn find_extensions(value: &Value, found: &mut Vec<String>) {
+/// Names of the extensions anywhere in a value.
+pub(super) fn find_extensions<'a>(value: &'a Value, found: &mut BTreeSet<&'a str>) {
     match value {
         Value::Object(map) => {
             find_extension_names(map.get("extensions"), found);
@@ -108,12 +121,8 @@ pub(super) fn find_extensions(value: &Value, found: &mut Vec<String>) {
     }
 }
 
-fn find_extension_names(extensions: Option<&Value>, found: &mut Vec<String>) {
-    for name in extensions.and_then(Value::as_object).into_iter().flat_map(Map::keys) {
-        if !found.contains(name) {
-            found.push(name.clone());
-        }
-    }
+fn find_extension_names<'a>(extensions: Option<&'a Value>, found: &mut BTreeSet<&'a str>) {
+    found.extend(extensions.and_then(Value::as_object).into_iter().flat_map(Map::keys).map(String::as_str));
 }
 
 fn images(
@@ -159,8 +168,7 @@ fn images(
             return Err(too_large(at.place));
         }
         image.mime = sniff(&image.bytes).map_or(mime, str::to_owned);
-        let known = |key: &str| ["name", "uri", "mimeType", "bufferView"].contains(&key);
-        for (key, value) in at.map.iter().filter(|(key, _)| !known(key)) {
+        for (key, value) in at.map.iter().filter(|(key, _)| !OWN_FIELDS.contains(&key.as_str())) {
             image.rest.insert(key.clone(), copy(value, source.budget, &at.place)?);
         }
         images.push(image);

@@ -12,6 +12,9 @@ use super::{
 /// Attribute names and their accessors, in the file's order.
 pub(super) type Attributes<'a> = Vec<(&'a str, usize)>;
 
+/// Compressed geometry, beside which a file may or may not have plain geometry.
+const DRACO: &str = "KHR_draco_mesh_compression";
+
 /// A mesh as declared.
 pub(super) struct Mesh<'a> {
     pub(super) name: &'a str,
@@ -107,9 +110,14 @@ impl<'a> Primitive<'a> {
             check_counts(&target, &list, count, accessors)?;
             targets.push(list);
         }
+        let extension = |name: &str| at.map.get("extensions").is_some_and(|extensions| extensions.get(name).is_some());
+        let empty = find(&attributes, "POSITION").is_some_and(|accessor| accessors[accessor].is_empty());
+        if extension(DRACO) && empty {
+            return Err(GltfError::Extension { file: String::new(), name: DRACO.to_owned() });
+        }
         let indices = at.index("indices", accessors.len(), "accessor")?;
         let material = at.index("material", materials, "material")?;
-        if at.map.get("extensions").and_then(|value| value.get("KHR_materials_variants")).is_some() {
+        if extension("KHR_materials_variants") {
             notes.add("Material variants were not kept");
         }
         Ok(Self { place: at.place.clone(), attributes, count, indices, material, mode, targets })

@@ -13,6 +13,9 @@ use super::{
 };
 use crate::mesh::model::SkinBinding;
 
+/// Sets of four influences read at most; what comes after is weaker than anything that shows.
+const MAX_SETS: usize = 32;
+
 /// The bind pose of every skin.
 pub(super) fn read_bindings(
     source: &Source,
@@ -49,7 +52,7 @@ impl Influences {
     /// Reads the sets `JOINTS_0`/`WEIGHTS_0` and on.
     pub(super) fn read(source: &Source, primitive: &Primitive) -> Result<Self, GltfError> {
         let mut sets = Vec::new();
-        for set in 0.. {
+        for set in 0..MAX_SETS {
             let joints = primitive.attribute(&format!("JOINTS_{set}"));
             let weights = primitive.attribute(&format!("WEIGHTS_{set}"));
             match (joints, weights) {

@@ -61,8 +61,8 @@ pub struct GltfFiles {
 /// [`GltfError::Model`] if the model's indices or lists do not fit together or something is not finite,
 /// [`GltfError::Unweighted`] as the settings say. Costs time and memory linear in the model.
 pub fn write_glb(model: &Model, settings: &GltfWriteSettings) -> Result<Vec<u8>, GltfError> {
-    let (root, bin, _) = document(model, settings, None)?;
-    let mut json = to_bytes(&root, false)?;
+    let Document { json, bin, .. } = document(model, settings, None)?;
+    let mut json = to_bytes(&json, false)?;
     json.resize(json.len().next_multiple_of(4), b' ');
     let bin_chunk = if bin.is_empty() { 0 } else { 8 + bin.len() };
     let length = 12 + 8 + json.len() + bin_chunk;
@@ -89,8 +89,8 @@ pub fn write_glb(model: &Model, settings: &GltfWriteSettings) -> Result<Vec<u8>,
 /// # Errors
 /// As [`write_glb`].
 pub fn write_gltf(model: &Model, settings: &GltfWriteSettings, stem: &str) -> Result<GltfFiles, GltfError> {
-    let (root, bin, images) = document(model, settings, Some(stem))?;
-    Ok(GltfFiles { json: to_bytes(&root, true)?, bin_name: format!("{stem}.bin"), bin, images })
+    let Document { json, bin, images } = document(model, settings, Some(stem))?;
+    Ok(GltfFiles { json: to_bytes(&json, true)?, bin_name: format!("{stem}.bin"), bin, images })
 }
 
 fn to_bytes(root: &Map<String, Value>, pretty: bool) -> Result<Vec<u8>, GltfError> {
@@ -98,14 +98,16 @@ fn to_bytes(root: &Map<String, Value>, pretty: bool) -> Result<Vec<u8>, GltfErro
     bytes.map_err(|error| GltfError::model(error.to_string()))
 }
 
-type Files = Vec<(String, Vec<u8>)>;
+/// A document in its parts.
+struct Document {
+    json: Map<String, Value>,
+    bin: Vec<u8>,
+    /// Image files, if images are not in the buffer.
+    images: Vec<(String, Vec<u8>)>,
+}
 
-/// The whole document, its buffer, and, with a stem, its image files.
-fn document(
-    model: &Model,
-    settings: &GltfWriteSettings,
-    stem: Option<&str>,
-) -> Result<(Map<String, Value>, Vec<u8>, Files), GltfError> {
+/// The whole document; with a stem, its buffer and images are files.
+fn document(model: &Model, settings: &GltfWriteSettings, stem: Option<&str>) -> Result<Document, GltfError> {
     check::check(model)?;
     let mut bin = Bin::default();
     let skeleton = Skeleton::new(model, settings)?;
@@ -149,7 +151,7 @@ fn document(
         buffer.insert("byteLength".to_owned(), bytes.len().into());
         root.insert("buffers".to_owned(), vec![Value::from(buffer)].into());
     }
-    Ok((root, bytes, looks.files))
+    Ok(Document { json: root, bin: bytes, images: looks.files })
 }
 
 /// Inserts a list unless it is empty, which glTF forbids.

@@ -7,13 +7,16 @@
 use super::{
     NONE,
     error::{BlockError, LineProblem},
-    number::{decimal, index},
+    scan::{Scan, WINDOW},
 };
+
+/// Line ends after the text, so that plain lines need no care near its end.
+pub(super) const MARGIN: usize = WINDOW + 8;
 
 /// Text and what was read from it. Blocks are used again, so that nothing is allocated per block.
 #[derive(Debug, Default)]
 pub(super) struct Block {
-    /// Bytes of whole lines, up to `filled`.
+    /// Bytes of whole lines, up to `filled`, and at least [`MARGIN`] line ends after them.
     pub text: Vec<u8>,
     pub filled: usize,
     /// Why the text could not be read.
@@ -107,15 +110,14 @@ impl Block {
         if self.failure.is_some() {
             return;
         }
-        let text = &self.text[..self.filled];
         let mut at = 0;
-        while at < text.len() {
-            match self.parsed.plain(&text[at..]) {
-                Some(length) => {
-                    at += length;
+        while at < self.filled {
+            match self.parsed.plain(&self.text, at) {
+                Some(next) => {
+                    at = next;
                     self.parsed.lines += 1;
                 }
-                None => match self.parsed.statement(&text[at..]) {
+                None => match self.parsed.statement(&self.text[at..self.filled]) {
                     Ok(length) => at += length,
                     Err(problem) => {
                         self.parsed.error = Some(BlockError { line: self.parsed.lines, problem });
@@ -164,43 +166,49 @@ impl Parsed {
         }
     }
 
-    /// Reads one plain line and says how long it is with its end; `None`, and nothing kept, if it is not plain.
+    /// Reads the plain line that starts at `at` and returns where the next one does; `None`, and nothing kept, if it is
+    /// not plain.
     #[inline(always)]
-    fn plain(&mut self, line: &[u8]) -> Option<usize> {
-        match *line.first_chunk::<3>()? {
-            [b'v', b' ', _] => self.plain_position(line),
+    fn plain(&mut self, text: &[u8], at: usize) -> Option<usize> {
+        match *text.get(at..)?.first_chunk::<3>()? {
+            [b'v', b' ', _] => {
+                let mut scan = Scan::new(text, at, 2)?;
+                let (position, end) = scan.decimals::<3>(at + 2)?;
+                if let Some(next) = scan.line_end(end) {
+                    self.positions.push(position);
+                    return Some(next);
+                }
+                let start = scan.separated(end)?;
+                let (color, end) = scan.decimals::<3>(start)?;
+                let next = scan.line_end(end)?;
+                self.push_colored(position, color);
+                Some(next)
+            }
             [b'v', b't', b' '] => {
-                let (texcoord, end) = numbers::<2>(line, 3)?;
-                let end = match line_end(line, end) {
-                    Some(end) => end,
-                    None => line_end(line, numbers::<1>(line, end)?.1)?,
+                let mut scan = Scan::new(text, at, 3)?;
+                let (texcoord, end) = scan.decimals::<2>(at + 3)?;
+                let next = match scan.line_end(end) {
+                    Some(next) => next,
+                    None => {
+                        let start = scan.separated(end)?;
+                        let (_, end) = scan.decimal(start)?;
+                        scan.line_end(end)?
+                    }
                 };
                 self.texcoords.push(texcoord);
-                Some(end)
+                Some(next)
             }
             [b'v', b'n', b' '] => {
-                let (normal, end) = numbers::<3>(line, 3)?;
-                let end = line_end(line, end)?;
+                let mut scan = Scan::new(text, at, 3)?;
+                let (normal, end) = scan.decimals::<3>(at + 3)?;
+                let next = scan.line_end(end)?;
                 self.normals.push(normal);
-                Some(end)
+                Some(next)
             }
-            [b'f', b' ', _] => self.plain_face(line),
-            [b'\n', ..] => Some(1),
+            [b'f', b' ', _] => self.plain_face(text, at),
+            [b'\n', ..] => Some(at + 1),
             _ => None,
         }
-    }
-
-    #[inline(always)]
-    fn plain_position(&mut self, line: &[u8]) -> Option<usize> {
-        let (position, end) = numbers::<3>(line, 2)?;
-        if let Some(end) = line_end(line, end) {
-            self.positions.push(position);
-            return Some(end);
-        }
-        let (color, end) = numbers::<3>(line, end)?;
-        let end = line_end(line, end)?;
-        self.push_colored(position, color);
-        Some(end)
     }
 
     pub fn push_colored(&mut self, position: [f32; 3], color: [f32; 3]) {
@@ -210,13 +218,12 @@ impl Parsed {
     }
 
     #[inline(always)]
-    fn plain_face(&mut self, line: &[u8]) -> Option<usize> {
+    fn plain_face(&mut self, text: &[u8], at: usize) -> Option<usize> {
         let start = self.corners[0].len();
-        let read = self.plain_corners(line, start);
-        match read {
-            Some(end) if self.corners[0].len() >= start + 3 => {
+        match self.plain_corners(text, at, start) {
+            Some(next) if self.corners[0].len() >= start + 3 => {
                 self.close_face();
-                Some(end)
+                Some(next)
             }
             _ => {
                 self.drop_face(start);
@@ -238,41 +245,42 @@ impl Parsed {
 
     /// The corners of one face, all of the same form.
     #[inline(always)]
-    fn plain_corners(&mut self, line: &[u8], start: usize) -> Option<usize> {
-        let mut at = spaces(line, 2)?;
-        let (_, after) = index(line, at)?;
-        let (with_texcoord, with_normal) = match (line.get(after)?, line.get(after + 1)?) {
-            (b'/', b'/') => (false, true),
-            (b'/', _) => (true, *line.get(index(line, after + 1)?.1)? == b'/'),
-            _ => (false, false),
-        };
-        if with_texcoord {
-            self.corners[1].resize(start, NONE);
-        }
-        if with_normal {
-            self.corners[2].resize(start, NONE);
-        }
+    fn plain_corners(&mut self, text: &[u8], at: usize, start: usize) -> Option<usize> {
+        let mut scan = Scan::new(text, at, 2)?;
+        let mut at = scan.blanks(at + 2)?;
         let [points, texcoords, normals] = &mut self.corners;
         let mut largest = self.largest;
+        at = push_index(&mut scan, at, points, &mut largest[0])?;
+        let (with_texcoord, with_normal) = match (text.get(at)?, text.get(at + 1)?) {
+            (b'/', b'/') => (false, true),
+            (b'/', _) => {
+                texcoords.resize(start, NONE);
+                at = scan.slash(at)?;
+                at = push_index(&mut scan, at, texcoords, &mut largest[1])?;
+                (true, *text.get(at)? == b'/')
+            }
+            _ => (false, false),
+        };
+        if with_normal {
+            normals.resize(start, NONE);
+            at = if with_texcoord { scan.slash(at)? } else { scan.slashes(at)? };
+            at = push_index(&mut scan, at, normals, &mut largest[2])?;
+        }
         loop {
-            at = push_index(line, at, points, &mut largest[0])?;
+            if let Some(next) = scan.line_end(at) {
+                self.largest = largest;
+                return Some(next);
+            }
+            at = scan.separated(at)?;
+            at = push_index(&mut scan, at, points, &mut largest[0])?;
             if with_texcoord {
-                at = push_index(line, slash(line, at)?, texcoords, &mut largest[1])?;
-            } else if with_normal {
-                at = slash(line, at)?;
+                at = scan.slash(at)?;
+                at = push_index(&mut scan, at, texcoords, &mut largest[1])?;
             }
             if with_normal {
-                at = push_index(line, slash(line, at)?, normals, &mut largest[2])?;
+                at = if with_texcoord { scan.slash(at)? } else { scan.slashes(at)? };
+                at = push_index(&mut scan, at, normals, &mut largest[2])?;
             }
-            if let Some(end) = line_end(line, at) {
-                self.largest = largest;
-                return Some(end);
-            }
-            let next = spaces(line, at)?;
-            if next == at {
-                return None;
-            }
-            at = next;
         }
     }
 }
@@ -280,54 +288,11 @@ impl Parsed {
 /// The colour of vertices that have none in a file where others have.
 pub(super) const WHITE: [f32; 3] = [1.0; 3];
 
+/// Reads an index and appends it, counted from 0.
 #[inline(always)]
-fn push_index(line: &[u8], at: usize, list: &mut Vec<u32>, largest: &mut u32) -> Option<usize> {
-    let (value, end) = index(line, at)?;
+fn push_index(scan: &mut Scan, at: usize, list: &mut Vec<u32>, largest: &mut u32) -> Option<usize> {
+    let (value, end) = scan.index(at)?;
     list.push(value.wrapping_sub(1));
     *largest = (*largest).max(value);
     (value != 0).then_some(end)
 }
-
-#[inline(always)]
-fn slash(line: &[u8], at: usize) -> Option<usize> {
-    (*line.get(at)? == b'/').then_some(at + 1)
-}
-
-/// The first place from `at` on that is neither space nor tab.
-#[inline(always)]
-fn spaces(line: &[u8], mut at: usize) -> Option<usize> {
-    while matches!(line.get(at)?, b' ' | b'\t') {
-        at += 1;
-    }
-    Some(at)
-}
-
-/// Where the next line starts, if nothing but blanks comes before the end of this one.
-#[inline(always)]
-fn line_end(line: &[u8], at: usize) -> Option<usize> {
-    if *line.get(at)? == b'\n' {
-        return Some(at + 1);
-    }
-    let at = spaces(line, at)?;
-    match (line[at], line.get(at + 1)) {
-        (b'\n', _) => Some(at + 1),
-        (b'\r', Some(b'\n')) => Some(at + 2),
-        (b'\r', Some(_)) => Some(at + 1),
-        _ => None,
-    }
-}
-
-/// The next `N` numbers, with blanks before each.
-#[inline(always)]
-fn numbers<const N: usize>(line: &[u8], mut at: usize) -> Option<([f32; N], usize)> {
-    let mut values = [0.0; N];
-    for value in &mut values {
-        // The byte before must be a blank, or `1.5.5` would be two numbers.
-        if !matches!(line[at - 1], b' ' | b'\t') && !matches!(line.get(at)?, b' ' | b'\t') {
-            return None;
-        }
-        (*value, at) = decimal(line, spaces(line, at)?)?;
-    }
-    Some((values, at))
-}
-

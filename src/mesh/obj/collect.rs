@@ -236,6 +236,10 @@ impl<'a> Collector<'a> {
         self.commit(faces)?;
         let mut first: Option<(u64, LineProblem)> = None;
         for (list, count) in self.counts().into_iter().enumerate() {
+            if list > 0 && count == 0 {
+                self.drop_absent(list);
+                continue;
+            }
             let outside = self.ahead[list].iter().find(|(index, _)| *index as usize > count);
             if let Some((index, line)) = outside.filter(|(_, line)| first.as_ref().is_none_or(|(l, _)| line < l)) {
                 let (index, count) = (u64::from(*index), count as u64);
@@ -247,6 +251,16 @@ impl<'a> Collector<'a> {
         }
         self.write_notes();
         Ok(())
+    }
+
+    /// Some exporters number normals or texture coordinates that they do not write: the corners have none then.
+    fn drop_absent(&mut self, list: usize) {
+        if let Some((_, line)) = self.ahead[list].first() {
+            let what = LISTS[list];
+            self.arrays.notes.push(format!("faces name {what}s, from line {line} on, but the file has none"));
+            let arrays = &mut *self.arrays;
+            if list == 1 { &mut arrays.corner_texcoords } else { &mut arrays.corner_normals }.clear();
+        }
     }
 
     fn write_notes(&mut self) {

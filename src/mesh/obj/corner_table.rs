@@ -1,6 +1,6 @@
 //! Which vertex a corner is: a list of the vertices at each point.
 
-use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hasher};
 
 use super::NONE;
 
@@ -11,12 +11,20 @@ pub(super) struct CornerTable {
     heads: Vec<u32>,
     keys: Vec<u64>,
     next: Vec<u32>,
-    /// Vertices of points that have too many for a list.
-    overflow: HashMap<(u32, u64), u32>,
+    crowd: Crowd,
 }
 
 /// The longest list.
 const LONGEST: usize = 32;
+
+/// Vertices of points that have too many for a list, by hash: open addressing with linear steps.
+#[derive(Debug, Default)]
+struct Crowd {
+    /// Points and vertices.
+    members: Vec<[u32; 2]>,
+    /// Indices of members; [`NONE`] is free.
+    slots: Vec<u32>,
+}
 
 impl CornerTable {
     pub fn new(points: usize) -> Self {
@@ -39,7 +47,23 @@ impl CornerTable {
         }
         self.keys.clear();
         self.next.clear();
-        self.overflow.clear();
+        self.crowd.members.clear();
+        self.crowd.slots.clear();
+    }
+
+    /// The vertex of this point and key, if there is one.
+    pub fn find(&self, point: u32, key: u64) -> Option<u32> {
+        let mut vertex = self.heads[point as usize];
+        for _ in 0..LONGEST {
+            if vertex == NONE {
+                return None;
+            }
+            if self.keys[vertex as usize] == key {
+                return Some(vertex);
+            }
+            vertex = self.next[vertex as usize];
+        }
+        self.crowd.find(point, key, &self.keys)
     }
 
     /// The vertex of this point and key, and whether it was there.
@@ -57,11 +81,11 @@ impl CornerTable {
             }
             vertex = self.next[vertex as usize];
         }
-        if let Some(vertex) = self.overflow.get(&(point, key)) {
-            return (*vertex, true);
+        if let Some(vertex) = self.crowd.find(point, key, &self.keys) {
+            return (vertex, true);
         }
         let vertex = self.push(key, NONE);
-        self.overflow.insert((point, key), vertex);
+        self.crowd.insert(point, vertex, &self.keys);
         (vertex, false)
     }
 
@@ -70,5 +94,48 @@ impl CornerTable {
         self.keys.push(key);
         self.next.push(next);
         self.keys.len() as u32 - 1
+    }
+}
+
+impl Crowd {
+    fn find(&self, point: u32, key: u64, keys: &[u64]) -> Option<u32> {
+        if self.slots.is_empty() {
+            return None;
+        }
+        let member = *self.slots.get(self.slot(point, key, keys))?;
+        self.members.get(member as usize).map(|[_, vertex]| *vertex)
+    }
+
+    /// Adds a vertex that is not in yet.
+    fn insert(&mut self, point: u32, vertex: u32, keys: &[u64]) {
+        self.members.push([point, vertex]);
+        if self.members.len() * 2 > self.slots.len() {
+            self.slots = vec![NONE; (self.slots.len() * 2).max(64)];
+            for member in 0..self.members.len() as u32 {
+                let [point, vertex] = self.members[member as usize];
+                let slot = self.slot(point, keys[vertex as usize], keys);
+                self.slots[slot] = member;
+            }
+        } else {
+            let slot = self.slot(point, keys[vertex as usize], keys);
+            self.slots[slot] = self.members.len() as u32 - 1;
+        }
+    }
+
+    /// Where the member is, or where it would go.
+    fn slot(&self, point: u32, key: u64, keys: &[u64]) -> usize {
+        // The standard hasher with its fixed key: the same on every run, and not easily made to collide.
+        let mut hasher = DefaultHasher::new();
+        hasher.write_u32(point);
+        hasher.write_u64(key);
+        let mask = self.slots.len() - 1;
+        let mut slot = hasher.finish() as usize & mask;
+        while let Some([other, vertex]) = self.members.get(self.slots[slot] as usize) {
+            if *other == point && keys[*vertex as usize] == key {
+                break;
+            }
+            slot = (slot + 1) & mask;
+        }
+        slot
     }
 }

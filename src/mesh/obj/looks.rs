@@ -18,6 +18,8 @@ pub type Sidecar<'a> = dyn FnMut(&str) -> Option<Vec<u8>> + 'a;
 const MOST_IMAGE_BYTES: usize = 256 << 20;
 /// One material library may.
 const MOST_LIBRARY_BYTES: usize = 64 << 20;
+/// Materials of one model.
+const MOST_MATERIALS: usize = 1 << 14;
 /// Notes of one kind before they are cut short.
 const MOST_NOTES: usize = 20;
 
@@ -34,6 +36,10 @@ pub(super) fn looks(
     for run in &arrays.runs {
         if run.material == NONE || numbers.contains_key(&run.material) {
             continue;
+        }
+        if numbers.len() == MOST_MATERIALS {
+            builder.note(format!("more than {MOST_MATERIALS} materials: the others were left out"));
+            break;
         }
         let name = arrays.names.get(run.material);
         let found = libraries.get(name);

@@ -54,7 +54,11 @@ pub struct ObjTexture {
     pub clamp: bool,
 }
 
-/// Reads a material library. Unknown and malformed statements are passed over.
+/// More materials than this are no library.
+const MOST_MATERIALS: usize = 1 << 14;
+
+/// Reads a material library. Unknown and malformed statements are passed over, and so is what follows the 16,384th
+/// material.
 pub fn read_mtl(bytes: &[u8]) -> Vec<ObjMaterial> {
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let mut materials: Vec<ObjMaterial> = Vec::new();
@@ -62,6 +66,9 @@ pub fn read_mtl(bytes: &[u8]) -> Vec<ObjMaterial> {
         let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
         if keyword == "newmtl" {
+            if materials.len() == MOST_MATERIALS {
+                break;
+            }
             materials.push(ObjMaterial { name: rest.into(), ..ObjMaterial::default() });
         } else if let Some(material) = materials.last_mut() {
             material.set(keyword, rest);

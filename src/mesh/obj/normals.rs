@@ -91,9 +91,9 @@ impl SmoothNormals {
 
     /// The normal at a point for a face of this smoothing group; `None` where the faces around have no area or cancel
     /// out.
-    pub fn at(&mut self, point: u32, smoothing: u32) -> Option<Vec3> {
-        let slot = match &mut self.table {
-            Some(table) => table.vertex(point, u64::from(smoothing)).0 as usize,
+    pub fn at(&self, point: u32, smoothing: u32) -> Option<Vec3> {
+        let slot = match &self.table {
+            Some(table) => table.find(point, u64::from(smoothing))? as usize,
             None => point as usize,
         };
         unit(self.sums.get(slot)?.to_array())

@@ -16,7 +16,7 @@ use memchr::memrchr2;
 
 use super::{
     ObjArrays, ObjSettings,
-    block::{Block, Failure},
+    block::{Block, Failure, MARGIN},
     collect::Collector,
     error::{LineProblem, ObjError},
 };
@@ -132,14 +132,14 @@ impl<R: Read> Input<R> {
     fn try_fill(&mut self, block: &mut Block) -> Result<(), Failure> {
         let text = &mut block.text;
         let wanted = self.block.max(2 * self.carry.len());
-        if text.len() < wanted {
-            text.resize(wanted, 0);
+        if text.len() < wanted + MARGIN {
+            text.resize(wanted + MARGIN, 0);
         }
         text[..self.carry.len()].copy_from_slice(&self.carry);
         let mut filled = self.carry.len();
         self.carry.clear();
         loop {
-            let end = text.len();
+            let end = text.len() - MARGIN;
             while filled < end && !self.done {
                 match self.reader.read(&mut text[filled..end]) {
                     Ok(0) => self.done = true,
@@ -157,8 +157,9 @@ impl<R: Read> Input<R> {
             if filled >= LONGEST_LINE {
                 return Err(Failure::Line(LineProblem::TooLong { limit: LONGEST_LINE }));
             }
-            text.resize(filled * 2, 0);
+            text.resize(filled * 2 + MARGIN, 0);
         }
+        block.text[block.filled..][..MARGIN].fill(b'\n');
         match &mut block.text[..block.filled] {
             _ if self.taken > 0 => Ok(()),
             [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Err(Failure::Line(LineProblem::Utf16)),

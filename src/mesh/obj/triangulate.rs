@@ -117,7 +117,6 @@ impl Triangulator {
         while left > 3 {
             self.work += 1;
             if self.work > MOST_WORK {
-                self.fans += 1;
                 lenience = Lenience::Anything;
             }
             if self.is_ear(corner, lenience) {
@@ -144,6 +143,7 @@ impl Triangulator {
             }
         }
         triangles.push([self.previous[corner], corner as u32, self.next[corner]]);
+        self.fans += usize::from(self.work > MOST_WORK);
     }
 
     /// Twice the area of the triangle at a corner; positive if it turns left.
@@ -351,8 +351,8 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             f64::from(state >> 24)
         };
-        for count in [3, 4, 5, 6, 9, 30, 300, 3000] {
-            for _ in 0..5 {
+        for (count, rounds) in [(3, 9), (4, 99), (5, 99), (6, 99), (9, 99), (30, 50), (300, 5), (3000, 1)] {
+            for _ in 0..rounds {
                 let points: Vec<DVec3> = (0..count).map(|_| DVec3::new(random(), random(), random())).collect();
                 let mut triangles = Vec::new();
                 Triangulator::default().polygon(&points, &mut triangles);

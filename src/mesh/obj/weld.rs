@@ -17,6 +17,9 @@ use crate::mesh::model::{Faces, Model, Object, Part};
 /// More parts than this are no character but noise, and each costs memory.
 const MOST_PARTS: usize = 1 << 16;
 
+/// Faces with more corners are cut into plain fans, which take no memory.
+const LARGEST_POLYGON: usize = 1 << 20;
+
 /// What becomes one [`Part`].
 struct Plan {
     object: usize,
@@ -41,7 +44,7 @@ pub(super) fn model(arrays: &ObjArrays, name: &str, sidecar: &mut Sidecar) -> Mo
     let parts = plans.iter().map(|plan| welder.part(plan)).collect();
     let fans = welder.triangulator.fans;
     if fans > 0 {
-        notes.push(format!("{fans} very large concave polygon(s) were cut into plain fans"));
+        notes.push(format!("{fans} very large or tangled polygon(s) were cut into plain fans"));
     }
     let points = arrays.positions.iter().copied().map(Vec3::from).collect();
     Model { name: name.into(), points, objects, parts, looks, notes, ..Model::default() }
@@ -209,6 +212,11 @@ impl Welder<'_> {
         let mut triangles = Vec::with_capacity(count);
         let mut points = Vec::new();
         for face in faces.iter() {
+            if face.len() > LARGEST_POLYGON {
+                triangles.extend((2..face.len()).map(|corner| [face[0], face[corner - 1], face[corner]]));
+                self.triangulator.fans += 1;
+                continue;
+            }
             points.clear();
             points.extend(face.iter().map(|vertex| position(self.arrays, part.vertices[*vertex as usize])));
             let start = triangles.len();

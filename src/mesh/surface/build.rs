@@ -14,8 +14,12 @@ use super::crossing::usable;
 use super::node::{Bounds, WIDTH};
 use super::packet::{LANES, Quad};
 
-/// Candidate planes along an axis, plus one.
+/// Bins along an axis; planes between them are candidates.
 const BINS: usize = 16;
+/// Bins for parts of few primitives.
+const FEW_BINS: usize = 8;
+/// What few primitives are.
+const FEW: usize = 24;
 /// Levels after which ranges are halved instead, so that the depth stays below `tree::DEPTH`.
 const PATIENCE: usize = 20;
 /// Triangles of the largest leaf.
@@ -201,8 +205,6 @@ struct Bin {
     triangles: usize,
 }
 
-const EMPTY_BINS: [Bin; BINS] = [Bin { bounds: Box4::EMPTY, triangles: 0 }; BINS];
-
 /// Where a plane along an axis puts primitives.
 #[derive(Debug, Clone, Copy)]
 struct Binning {
@@ -215,22 +217,22 @@ impl Binning {
     #[inline(always)]
     fn bin(&self, primitive: &Primitive) -> usize {
         let center = (primitive.low + primitive.high)[self.axis];
-        (((center - self.base) * self.scale) as usize).min(BINS - 1)
+        ((center - self.base) * self.scale) as usize
     }
 
-    fn fill(&self, primitives: &[Primitive]) -> [Bin; BINS] {
+    fn fill<const N: usize>(&self, primitives: &[Primitive]) -> [Bin; N] {
         if primitives.len() > 4 * CHUNK {
             let (left, right) = primitives.split_at(primitives.len() / 2);
-            let (mut bins, others) = rayon::join(|| self.fill(left), || self.fill(right));
+            let (mut bins, others) = rayon::join(|| self.fill::<N>(left), || self.fill::<N>(right));
             for (bin, other) in bins.iter_mut().zip(others) {
                 bin.bounds = bin.bounds.union(other.bounds);
                 bin.triangles += other.triangles;
             }
             return bins;
         }
-        let mut bins = EMPTY_BINS;
+        let mut bins = [Bin { bounds: Box4::EMPTY, triangles: 0 }; N];
         for primitive in primitives {
-            let bin = &mut bins[self.bin(primitive)];
+            let bin = &mut bins[self.bin(primitive).min(N - 1)];
             bin.bounds.add(primitive.low, primitive.high);
             bin.triangles += primitive.count() as usize;
         }
@@ -287,12 +289,7 @@ pub(super) fn whole(primitives: &[Primitive]) -> Part {
 }
 
 /// Splits a part into as many children as a node has, at `level` below the root; reorders its `primitives`.
-pub(super) fn children(
-    primitives: &mut [Primitive],
-    part: &Part,
-    triangles: &[[u32; 3]],
-    level: usize,
-) -> Vec<Part> {
+pub(super) fn children(primitives: &mut [Primitive], part: &Part, triangles: &[[u32; 3]], level: usize) -> Vec<Part> {
     let mut parts = Vec::with_capacity(WIDTH);
     let offset = part.range.start;
     // Only a root may fit a leaf itself.
@@ -322,7 +319,11 @@ pub(super) fn children(
 
 /// Splits a part in two, neither empty.
 fn split(primitives: &mut [Primitive], part: &Part, by_area: bool) -> (Part, Part) {
-    let plane = if by_area { best_plane(primitives, part) } else { None };
+    let plane = match primitives.len() {
+        _ if !by_area => None,
+        ..FEW => best_plane::<FEW_BINS>(primitives, part),
+        _ => best_plane::<BINS>(primitives, part),
+    };
     if let Some((binning, plane)) = plane {
         let (left, right) = partition(primitives, part.range.start, |primitive| binning.bin(primitive) < plane);
         if !left.range.is_empty() && !right.range.is_empty() {
@@ -335,25 +336,25 @@ fn split(primitives: &mut [Primitive], part: &Part, by_area: bool) -> (Part, Par
 }
 
 /// The plane with the least expected cost: area times packets on both sides.
-fn best_plane(primitives: &[Primitive], part: &Part) -> Option<(Binning, usize)> {
+fn best_plane<const N: usize>(primitives: &[Primitive], part: &Part) -> Option<(Binning, usize)> {
     let size = (part.centers.high - part.centers.low).truncate();
     let axis = size.max_position();
     if size[axis] <= 0.0 {
         return None;
     }
-    let binning = Binning { axis, base: part.centers.low[axis], scale: BINS as f32 * 0.999_99 / size[axis] };
-    let bins = binning.fill(primitives);
+    let binning = Binning { axis, base: part.centers.low[axis], scale: N as f32 * 0.999_99 / size[axis] };
+    let bins = binning.fill::<N>(primitives);
     let cost = |bounds: &Box4, triangles: usize| bounds.half_area() * triangles.div_ceil(LANES) as f32;
-    let mut right = [0.0; BINS];
+    let mut right = [0.0; N];
     let (mut bounds, mut count) = (Box4::EMPTY, 0);
-    for i in (1..BINS).rev() {
+    for i in (1..N).rev() {
         bounds = bounds.union(bins[i].bounds);
         count += bins[i].triangles;
         right[i] = cost(&bounds, count);
     }
     let mut best: Option<(usize, f32)> = None;
     (bounds, count) = (Box4::EMPTY, 0);
-    for i in 1..BINS {
+    for i in 1..N {
         bounds = bounds.union(bins[i - 1].bounds);
         count += bins[i - 1].triangles;
         let total = cost(&bounds, count) + right[i];
@@ -365,11 +366,7 @@ fn best_plane(primitives: &[Primitive], part: &Part) -> Option<(Binning, usize)>
 }
 
 /// Reorders `primitives` so that those on the left come first.
-fn partition(
-    primitives: &mut [Primitive],
-    start: usize,
-    is_left: impl Fn(&Primitive) -> bool,
-) -> (Part, Part) {
+fn partition(primitives: &mut [Primitive], start: usize, is_left: impl Fn(&Primitive) -> bool) -> (Part, Part) {
     let empty = Part { range: start..start, packets: 0, triangles: 0, bounds: Box4::EMPTY, centers: Box4::EMPTY };
     let (mut left, mut right) = (empty.clone(), empty);
     let (mut low, mut high) = (0, primitives.len());

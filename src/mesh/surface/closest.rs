@@ -28,11 +28,7 @@ pub(super) fn barycentric(point: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
     if u > 0.0 && v > 0.0 && w > 0.0 && total.is_finite() {
         return Vec3::new(u, v, w) / total;
     }
-    let edges = [
-        (fraction(to_a, ab), [0, 1]),
-        (fraction(to_a, ac), [0, 2]),
-        (fraction(to_b, bc), [1, 2]),
-    ];
+    let edges = [(fraction(to_a, ab), [0, 1]), (fraction(to_a, ac), [0, 2]), (fraction(to_b, bc), [1, 2])];
     let mut best = (f32::INFINITY, Vec3::X);
     for (t, [from, to]) in edges {
         let mut weights = Vec3::ZERO;

@@ -126,7 +126,8 @@ pub(super) fn resolve(crossings: &mut [Crossing], corners: impl Fn(u32) -> [Vec3
     while let Some(first) = rest.first() {
         let mut len = 1;
         while len < rest.len()
-            && rest[len].distance - rest[len - 1].distance <= f64::from(rest[len].tolerance.min(rest[len - 1].tolerance))
+            && rest[len].distance - rest[len - 1].distance
+                <= f64::from(rest[len].tolerance.min(rest[len - 1].tolerance))
             && rest[..len].iter().any(|other| touch(&corners(other.slot), &corners(rest[len].slot)))
         {
             len += 1;

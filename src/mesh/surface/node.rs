@@ -107,6 +107,25 @@ impl Bounds {
     }
 }
 
+/// The exact boxes of a node's children, side by side.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Boxes {
+    /// Lower and upper bounds along each axis.
+    planes: [[[f32; WIDTH]; 3]; 2],
+}
+
+impl Boxes {
+    pub const EMPTY: Self = Self { planes: [[[f32::INFINITY; WIDTH]; 3], [[f32::NEG_INFINITY; WIDTH]; 3]] };
+
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, bounds: &Bounds) {
+        for axis in 0..3 {
+            self.planes[0][axis][i] = bounds.low[axis];
+            self.planes[1][axis][i] = bounds.high[axis];
+        }
+    }
+}
+
 /// A ray prepared for boxes: they are grown by what rounding can do to the triangles in them and to the boxes, so that
 /// no crossing that the triangle test sees is lost.
 #[derive(Debug, Clone, Copy)]
@@ -156,20 +175,18 @@ impl BoxRay {
 }
 
 impl Node {
-    pub const EMPTY: Self = Self {
-        planes: [[[0; 4]; 3]; 2],
-        base: [0.0; 3],
-        exponents: [1; 3],
-        nodes: 0,
-        count: 0,
-        twos: 0,
-        first_node: 0,
-        first_packet: 0,
-    };
-
     /// A node without boxes: how many of its children are nodes, and how many packets each leaf has (one or two).
     pub fn new(nodes: usize, leaves: impl Iterator<Item = usize>) -> Self {
-        let mut node = Self { nodes: nodes as u8, count: nodes as u8, ..Self::EMPTY };
+        let mut node = Self {
+            planes: [[[0; 4]; 3]; 2],
+            base: [0.0; 3],
+            exponents: [1; 3],
+            nodes: nodes as u8,
+            count: nodes as u8,
+            twos: 0,
+            first_node: 0,
+            first_packet: 0,
+        };
         for packets in leaves {
             node.twos |= u8::from(packets == 2) << node.count;
             node.count += 1;
@@ -239,25 +256,26 @@ impl Node {
     }
 
     /// Takes the boxes of its children; returns the box around all.
-    pub fn fit(&mut self, boxes: &[Bounds]) -> Bounds {
-        let whole = boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union);
-        let size = whole.high - whole.low;
-        self.base = whole.low.to_array();
+    pub fn fit(&mut self, boxes: &Boxes) -> Bounds {
+        let mut whole = Bounds::EMPTY;
         for axis in 0..3 {
+            let [low, high] = [0, 1].map(|side| boxes.planes[side][axis]);
+            whole.low[axis] = low.iter().copied().fold(f32::INFINITY, |a, b| if b < a { b } else { a });
+            whole.high[axis] = high.iter().copied().fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
+            self.base[axis] = whole.low[axis];
             // The next power of two: one more than the exponent of a number that is not below the wanted step.
-            let wanted = size[axis] * (1.001 / STEPS);
+            let wanted = (whole.high[axis] - whole.low[axis]) * (1.001 / STEPS);
             self.exponents[axis] = (wanted.to_bits() >> 23) as u8 + 1;
-            let scale = 1.0 / self.step(axis);
-            for (i, bounds) in boxes.iter().enumerate().take(WIDTH) {
-                let low = (bounds.low[axis] - whole.low[axis]) * scale;
-                let high = (bounds.high[axis] - whole.low[axis]) * scale;
-                // Casts round down and stay in range; the one more also covers what rounding took.
-                let (low, high) = (low as u16, (high as u16).saturating_add(1));
-                let shift = i / 4 * 16;
-                for (side, value) in [low, high].into_iter().enumerate() {
-                    let word = &mut self.planes[side][axis][i % 4];
-                    *word = *word & !(0xffff << shift) | u32::from(value) << shift;
-                }
+            let (base, scale) = (f32x4::splat(self.base[axis]), f32x4::splat(1.0 / self.step(axis)));
+            // Casts round down; the one more above also covers what rounding took. Absent children stay in range too.
+            for (planes, side, more) in [(low, 0, 0.0), (high, 1, 1.0)] {
+                let steps = |half: usize| {
+                    let four: [f32; 4] = std::array::from_fn(|i| planes[4 * half + i]);
+                    let steps = (f32x4::new(four) - base) * scale + f32x4::splat(more);
+                    cast::<i32x4, u32x4>(steps.fast_max(f32x4::ZERO).fast_min(f32x4::splat(STEPS)).fast_trunc_int())
+                };
+                let words: u32x4 = steps(0) | (steps(1) << 16_i32);
+                self.planes[side][axis] = words.to_array();
             }
         }
         whole

@@ -82,15 +82,16 @@ impl Packet {
     /// Takes the positions of its points; returns the box around them.
     #[inline(always)]
     pub fn place(&mut self, points: &[Vec3], sources: &[u32; 8]) -> Bounds {
-        let at = sources.map(|point| points[point as usize]);
+        let at = sources.map(|point| points[point as usize].to_array());
         let mut bounds = Bounds::EMPTY;
-        for point in at {
-            bounds.low = bounds.low.min(point);
-            bounds.high = bounds.high.max(point);
-        }
-        for axis in 0..3 {
+        for (axis, corners) in self.corners.iter_mut().enumerate() {
             let of = |i: usize| at[i][axis];
-            self.corners[axis] = [f32x4::new([of(0), of(1), of(2), of(3)]), f32x4::new([of(4), of(5), of(6), of(7)])];
+            let [p, q] = [0, 4].map(|i| f32x4::new([of(i), of(i + 1), of(i + 2), of(i + 3)]));
+            *corners = [p, q];
+            let [a, b, c, d] = p.fast_min(q).to_array();
+            bounds.low[axis] = least(least(a, b), least(c, d));
+            let [a, b, c, d] = p.fast_max(q).to_array();
+            bounds.high[axis] = -least(least(-a, -b), least(-c, -d));
         }
         bounds
     }
@@ -103,7 +104,7 @@ impl Packet {
     /// The corners of the triangle in a lane, in its own order.
     #[inline(always)]
     pub fn corners(&self, lane: usize) -> [Vec3; 3] {
-        let order = if lane % 2 == 0 { [0, 1, 2] } else { [0, 2, 3] };
+        let order = if lane & 1 == 0 { [0, 1, 2] } else { [0, 2, 3] };
         let first = 3 - usize::from(self.rotations[lane]);
         [0, 1, 2].map(|corner| {
             let i = order[(corner + first) % 3];
@@ -149,4 +150,10 @@ impl Packet {
     pub fn touch(&self) -> u32 {
         self.corners[0][0].as_array_ref()[0].to_bits() ^ self.lanes
     }
+}
+
+/// The lesser of two numbers, neither of which is NaN: one instruction.
+#[inline(always)]
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }

@@ -13,7 +13,11 @@ use crate::mesh::ray::{Hit, Ray};
 ///
 /// Parallel over triangles: about as fast as building a hierarchy for a handful of rays.
 pub fn hits_brute(points: &[Vec3], triangles: &[[u32; 3]], ray: &Ray, out: &mut Vec<Hit>) {
-    resolve(&mut crossings(points, triangles, ray), |slot| corners_of(points, &triangles[slot as usize]).unwrap_or_default(), out);
+    resolve(
+        &mut crossings(points, triangles, ray),
+        |slot| corners_of(points, &triangles[slot as usize]).unwrap_or_default(),
+        out,
+    );
 }
 
 fn corners_of(points: &[Vec3], triangle: &[u32; 3]) -> Option<[Vec3; 3]> {
@@ -86,9 +90,8 @@ impl PendingSurface {
             Some(surface) => surface.near_far(ray),
             None => {
                 let crossings = crossings(&self.points, &self.triangles, ray);
-                let order = |a: &&Crossing, b: &&Crossing| {
-                    a.distance.total_cmp(&b.distance).then(a.triangle.cmp(&b.triangle))
-                };
+                let order =
+                    |a: &&Crossing, b: &&Crossing| a.distance.total_cmp(&b.distance).then(a.triangle.cmp(&b.triangle));
                 Some((crossings.iter().min_by(order)?.hit(), crossings.iter().max_by(order)?.hit()))
             }
         }

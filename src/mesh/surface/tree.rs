@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::build::{self, Part, Primitive};
-use super::node::{Bounds, Node, WIDTH};
+use super::node::{Bounds, Boxes, Node, WIDTH};
 use super::packet::Packet;
 
 /// Most levels of nodes there can be: the builder halves ranges long before.
@@ -44,15 +44,11 @@ impl Tree {
             return (tree, 0);
         }
         let mut drafts = draft(&mut primitives, triangles);
-        let order = arrange(&mut drafts);
-        tree.nodes = vec![Node::EMPTY; drafts.len()];
+        tree.nodes = arrange(&mut drafts).into_iter().map(|i| drafts[i].node).collect();
         let [_, packets] = drafts[0].below;
         let (empty, _) = Packet::new(&[]);
         tree.packets = vec![empty; packets as usize];
         tree.sources = vec![[0; 8]; packets as usize];
-        for (place, &i) in order.iter().enumerate() {
-            tree.nodes[place] = drafts[i].node;
-        }
         // Each draft's leaves are packets in a row, and the rows follow each other.
         let (mut packets, mut sources) = (&mut tree.packets[..], &mut tree.sources[..]);
         let mut work = Vec::with_capacity(drafts.len());
@@ -80,11 +76,17 @@ impl Tree {
         (tree, count)
     }
 
+    /// The points that triangles use; some several times.
+    pub fn points(&self) -> impl Iterator<Item = usize> {
+        self.sources.iter().flatten().map(|&point| point as usize)
+    }
+
     /// Takes new positions of the same points.
     pub fn refit(&mut self, points: &[Vec3]) {
         self.bounds = match self.nodes.split_first_mut() {
             Some((root, below)) => {
-                Region { first: 1, nodes: below, packets: &mut self.packets, sources: &self.sources }.refit(root, points)
+                Region { first: 1, nodes: below, packets: &mut self.packets, sources: &self.sources }
+                    .refit(root, points)
             }
             None => Bounds::EMPTY,
         };
@@ -158,15 +160,17 @@ struct Region<'a> {
 impl<'a> Region<'a> {
     /// Refits what is below `node`, and the node itself; returns the box around it.
     fn refit(self, node: &mut Node, points: &[Vec3]) -> Bounds {
-        let mut boxes = [Bounds::EMPTY; WIDTH];
+        let mut boxes = Boxes::EMPTY;
         let inner = node.inner();
         let (leaves, mut packets) = self.packets.split_at_mut(node.packets());
         let (leaf_sources, mut sources) = self.sources.split_at(leaves.len());
         let mut places = leaves.iter_mut().zip(leaf_sources);
-        for (i, bounds) in boxes.iter_mut().enumerate().take(node.len()).skip(inner) {
+        for i in inner..node.len() {
+            let mut bounds = Bounds::EMPTY;
             for (packet, source) in places.by_ref().take(node.packets_of(i)) {
-                *bounds = bounds.union(packet.place(points, source));
+                bounds = bounds.union(packet.place(points, source));
             }
+            boxes.set(i, &bounds);
         }
         let parallel = self.nodes.len() > SEQUENTIAL;
         let (children, mut nodes) = self.nodes.split_at_mut(inner);
@@ -192,19 +196,21 @@ impl<'a> Region<'a> {
             if parallel {
                 regions[i] = Some((child, region));
             } else {
-                boxes[i] = region.refit(child, points);
+                boxes.set(i, &region.refit(child, points));
             }
             first += below;
             packet += own;
         }
         if parallel {
-            boxes.par_iter_mut().zip(regions.par_iter_mut()).for_each(|(bounds, region)| {
-                if let Some((child, region)) = region.take() {
-                    *bounds = region.refit(child, points);
-                }
-            });
+            let refitted: Vec<Option<Bounds>> = regions
+                .into_par_iter()
+                .map(|region| region.map(|(child, region)| region.refit(child, points)))
+                .collect();
+            for (i, bounds) in refitted.iter().enumerate() {
+                bounds.iter().for_each(|bounds| boxes.set(i, bounds));
+            }
         }
-        node.fit(&boxes[..node.len()])
+        node.fit(&boxes)
     }
 }
 

@@ -17,7 +17,7 @@ pub(super) fn enclose(grid: &mut Voxels, surface: Vec<u64>, points: &[Vec3], tri
     let words = grid.words;
     let mut solid: Vec<u64> =
         outside.iter().enumerate().map(|(i, outside)| !outside & valid[i % words]).collect();
-    let (mut odd, mut winding) = votes(grid, points, triangles);
+    let (odd, winding) = votes(grid, points, triangles);
 
     let dims = grid.dims;
     let at = |x: usize, row: usize| row * dims[0] + x;
@@ -32,18 +32,15 @@ pub(super) fn enclose(grid: &mut Voxels, surface: Vec<u64>, points: &[Vec3], tri
         }
     }
     let leaky = leaked * 50 > kept;
-    let mut weight = 1;
-    if leaky {
-        odd = blur(&odd, dims);
-        winding = blur(&winding, dims);
-        weight = (2 * BLUR as i32 + 1).pow(3);
-    }
-    let inside = |index: usize| {
-        // In a leaky body a share of the lines misses a face; winding numbers average to that share of one inside
-        // and to zero outside, parities are the fallback where triangles face at random.
-        let (odd, winding) = (i32::from(odd[index]), i32::from(winding[index]).abs());
-        let full = HALF_LINES * weight;
-        if leaky { winding * 20 > full * 7 || odd * 20 > full * 11 } else { odd * 2 > full }
+    let blurred = leaky.then(|| (blur(&odd, dims), blur(&winding, dims)));
+    let inside = |index: usize| match &blurred {
+        None => i32::from(odd[index]) * 2 > HALF_LINES,
+        // In a leaky body a share of the lines misses a face; winding numbers average to that share of one inside and
+        // to zero outside, parities are the fallback where triangles face at random.
+        Some((odd, winding)) => {
+            let full = HALF_LINES * (2 * BLUR as i32 + 1).pow(3);
+            i32::from(winding[index]).abs() * 20 > full * 7 || i32::from(odd[index]) * 20 > full * 11
+        }
     };
     let mut core = vec![0u64; solid.len()];
     let mut rescued = 0;
@@ -57,6 +54,20 @@ pub(super) fn enclose(grid: &mut Voxels, surface: Vec<u64>, points: &[Vec3], tri
                 rescued += usize::from(solid[word] & bit == 0);
                 core[word] |= bit;
                 solid[word] |= bit;
+            }
+        }
+    }
+    // A mesh that was cut to the grid reaches its border, where cells must be empty: see `Voxels::neighbours`.
+    let last = dims[0] - 1;
+    for (row, (solid, core)) in solid.chunks_mut(words).zip(core.chunks_mut(words)).enumerate() {
+        let (y, z) = (row % dims[1], row / dims[1]);
+        let edge = y == 0 || z == 0 || y + 1 == dims[1] || z + 1 == dims[2];
+        for bits in [solid, core] {
+            if edge {
+                bits.fill(0);
+            } else {
+                bits[0] &= !1;
+                bits[last / 64] &= !(1 << (last % 64));
             }
         }
     }
@@ -156,15 +167,15 @@ fn spread(outside: &mut [u64], surface: &[u64], valid: &[u64]) {
 
 /// For each cell how many of its six half lines cross the surface an odd number of times, and six times the mean of
 /// their winding numbers. Dense, x fastest.
-fn votes(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<i16>, Vec<i16>) {
+fn votes(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<i8>, Vec<i8>) {
     let dims = grid.dims;
     let count = dims[0] * dims[1] * dims[2];
-    let (mut odd, mut winding) = (vec![0i16; count], vec![0i16; count]);
+    let (mut odd, mut winding) = (vec![0i8; count], vec![0i8; count]);
     let strides = [1, dims[0], dims[0] * dims[1]];
     for axis in 0..3 {
         let sums = raster::crossings(grid, points, triangles, axis);
         let plane = dims[0] * dims[1];
-        let tally = |start: usize, odd: &mut [i16], winding: &mut [i16], offset: usize| {
+        let tally = |start: usize, odd: &mut [i8], winding: &mut [i8], offset: usize| {
             let stride = strides[axis];
             let total: i32 = (0..dims[axis]).map(|i| i32::from(sums[start + i * stride])).sum();
             let mut before = 0;
@@ -172,9 +183,9 @@ fn votes(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<i16>, V
                 let cell = start + i * stride;
                 before += i32::from(sums[cell]);
                 let after = total - before;
-                odd[cell - offset] += ((before & 1) + (after & 1)) as i16;
+                odd[cell - offset] += ((before & 1) + (after & 1)) as i8;
                 // Clamped, so that a heap of overlapping shells counts as one.
-                winding[cell - offset] += (before.clamp(-1, 1) - after.clamp(-1, 1)) as i16;
+                winding[cell - offset] += (before.clamp(-1, 1) - after.clamp(-1, 1)) as i8;
             }
         };
         if axis == 2 {
@@ -197,9 +208,9 @@ fn votes(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<i16>, V
 }
 
 /// Sums over a cube of cells, one axis after the other. The largest sum is 6 * 5^3, far below the limits of `i16`.
-fn blur(values: &[i16], dims: [usize; 3]) -> Vec<i16> {
+fn blur(values: &[i8], dims: [usize; 3]) -> Vec<i16> {
     let strides = [1, dims[0], dims[0] * dims[1]];
-    let mut from = values.to_vec();
+    let mut from: Vec<i16> = values.iter().map(|&v| i16::from(v)).collect();
     for axis in 0..3 {
         let (stride, count) = (strides[axis], dims[axis]);
         let source = &from;

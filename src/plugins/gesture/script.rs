@@ -349,7 +349,17 @@ impl Act<'_, '_> {
             here + plane.right * delta.x + plane.up * delta.y
         };
         Ok(match gesture {
-            Gesture::Label(label) => Operation::Label(active, label),
+            Gesture::Label(label) => Operation::Labels(vec![(active, label)]),
+            Gesture::Labels(labels) => {
+                let chain: Vec<Uid> = std::iter::once(active)
+                    .chain(self.rig.ancestors(active).map(|joint| joint.data.uid))
+                    .take(labels.len())
+                    .collect();
+                if chain.len() < labels.len() {
+                    return Err(format!("there are {} names for a chain of {} joints", labels.len(), chain.len()));
+                }
+                Operation::Labels(chain.into_iter().rev().zip(labels).collect())
+            }
             Gesture::Move(at) => Operation::Move { to: vec![(active, at_depth_of_active(at))], with_children: false },
             Gesture::MoveTo(to) => {
                 Operation::Move { to: vec![(active, <[f32; 3]>::from(to).into())], with_children: false }

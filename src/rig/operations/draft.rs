@@ -46,7 +46,7 @@ impl<'a> Draft<'a> {
     pub fn next_uid(&mut self) -> Uid {
         loop {
             let uid = self.uids.next_uid();
-            if self.rig.joint(uid).is_none() && self.rig.group(uid).is_none() {
+            if !self.rig.is_taken(uid) {
                 return uid;
             }
         }

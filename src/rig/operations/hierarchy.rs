@@ -31,7 +31,8 @@ pub(super) fn delete(draft: &mut Draft, joints: &[Uid], keep_children: bool) -> 
             lift_children(draft, joint)?;
         }
         let partner = draft.rig().joint(joint).and_then(|joint| joint.data.mirror);
-        if let Some(partner) = partner.filter(|partner| draft.rig().joint(*partner).is_some()) {
+        let names_it = |partner: &Uid| draft.rig().joint(*partner).is_some_and(|p| p.data.mirror == Some(joint));
+        if let Some(partner) = partner.filter(names_it) {
             draft.apply(RigEdit::SetMirror(partner, None))?;
         }
         draft.apply(RigEdit::RemoveJoint(joint))?;

@@ -62,21 +62,12 @@ fn rotation_for(draft: &Draft, joint: Uid, along: Axis) -> Option<Quat> {
 /// (+Z), or to up where the bone itself points to the front.
 fn frame(direction: Vec3, along: Axis) -> Quat {
     let hint = if direction.z.abs() < 0.9 { Vec3::Z } else { Vec3::Y };
-    let side = hint.cross(direction).normalize();
-    let front = direction.cross(side);
+    let side = direction.cross(hint).normalize();
+    let front = side.cross(direction);
     let columns = match along {
-        Axis::X => Mat3::from_cols(direction, side, front),
-        Axis::Y => Mat3::from_cols(side, direction, -front),
+        Axis::X => Mat3::from_cols(direction, -side, front),
+        Axis::Y => Mat3::from_cols(side, direction, front),
         Axis::Z => Mat3::from_cols(-side, front, direction),
-    };
-    let columns = if columns.determinant() < 0.0 {
-        match along {
-            Axis::X => Mat3::from_cols(direction, -side, front),
-            Axis::Y => Mat3::from_cols(side, direction, front),
-            Axis::Z => Mat3::from_cols(side, front, direction),
-        }
-    } else {
-        columns
     };
     Quat::from_mat3(&columns).normalize()
 }

@@ -43,6 +43,9 @@ pub(super) fn chain(draft: &mut Draft, positions: &[Vec3], parent: Option<Uid>) 
 /// Puts a joint into the bone above `child`, on the other side too.
 pub(super) fn insert(draft: &mut Draft, child: Uid, position: Vec3) -> Result<(), OperationError> {
     let partner = draft.partner(child);
+    // A bone of the middle stays in the middle.
+    let plane = draft.symmetry().filter(|plane| partner.is_none() && plane.distance(position).abs() <= plane.tolerance);
+    let position = plane.map_or(position, |plane| plane.onto(position));
     let joint = insert_one(draft, child, position)?;
     if let (Some(partner), Some(plane)) = (partner, draft.symmetry()) {
         let other = insert_one(draft, partner, plane.mirrored(position))?;

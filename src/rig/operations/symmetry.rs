@@ -54,7 +54,7 @@ impl MirrorPlane {
 
 /// Makes or renews the other side of `joints` and all below them, across the draft's plane (or x = 0).
 ///
-/// A joint on the plane is its own other side. Labels, local groups with a side in their name, locks and pairs are
+/// A joint on the plane is its own other side; an unpaired joint that stands at the mirrored place is the other side. Labels, local groups with a side in their name, locks and pairs are
 /// mirrored; tags stay with the side they were put on.
 pub(super) fn mirror(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationError> {
     let plane = draft.symmetry().unwrap_or_else(|| MirrorPlane::sagittal(height(draft)));
@@ -87,10 +87,24 @@ pub(super) fn mirror(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationE
             target_of.get(&parent).copied().or(partner).unwrap_or(parent)
         });
         let label = source.data.label.as_ref().map(|label| mirrored_label(label).unwrap_or_else(|| label.clone()));
-        let known = source.data.mirror.filter(|partner| draft.rig().joint(*partner).is_some());
         let mirrored = plane.mirrored_affine(&global);
+        let known = source.data.mirror.filter(|partner| draft.rig().joint(*partner).is_some());
+        let known = known.or_else(|| standing_at(draft, parent, &plane, mirrored.translation));
         let partner = match known {
             Some(partner) => {
+                let now = draft.rig().joint(partner).cloned().unwrap_or_default();
+                if now.parent != parent {
+                    draft.apply(RigEdit::SetParent { joint: partner, parent, index: usize::MAX })?;
+                }
+                if source.data.mirror != Some(partner) {
+                    draft.apply(RigEdit::SetMirror(joint, Some(partner)))?;
+                }
+                if now.data.mirror != Some(joint) {
+                    draft.apply(RigEdit::SetMirror(partner, Some(joint)))?;
+                }
+                if now.data.locked != source.data.locked {
+                    draft.apply(RigEdit::SetLocked(partner, source.data.locked))?;
+                }
                 draft.keeping_children(partner, |draft| draft.set_global(partner, &mirrored))?;
                 draft.apply(RigEdit::SetLabel(partner, label))?;
                 partner
@@ -113,13 +127,23 @@ pub(super) fn mirror(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationE
                 uid
             }
         };
-        if let Some(group) = other_group(draft, source.data.group)? {
-            draft.apply(RigEdit::SetGroup(partner, Some(group)))?;
+        let group = other_group(draft, source.data.group)?.or(source.data.group);
+        if draft.rig().joint(partner).is_some_and(|partner| partner.data.group != group) {
+            draft.apply(RigEdit::SetGroup(partner, group))?;
         }
         is_target.insert(partner);
         target_of.insert(joint, partner);
     }
     Ok(())
+}
+
+/// A joint below `parent` that stands where the other side is wanted and is in no pair yet: the other side of a
+/// skeleton that was not made by mirroring.
+fn standing_at(draft: &Draft, parent: Option<Uid>, plane: &MirrorPlane, place: Vec3) -> Option<Uid> {
+    let unpaired = |uid: &&Uid| draft.rig().joint(**uid).is_some_and(|joint| joint.data.mirror.is_none());
+    let near = draft.rig().children(parent).iter().filter(unpaired).map(|uid| (draft.rig().position(*uid).distance(place), *uid));
+    let near = near.filter(|(distance, _)| *distance <= plane.tolerance);
+    near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, uid)| uid)
 }
 
 /// The group with the mirrored name of a group whose name has a side, created if needed.

@@ -9,7 +9,8 @@ use serde::Deserialize;
 use super::{FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader, write::feature_summaries};
 use crate::rig::{
     GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError, Tag, TagKind, Uid,
-    source::{byte_offset, parse_ron, ron_options, utf8},
+    scan::{self, Field},
+    source::{parse_ron, ron_options, utf8},
 };
 
 #[derive(Deserialize)]
@@ -116,170 +117,98 @@ fn no_scale() -> (f32, f32, f32) {
 pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
     let text = utf8(bytes, MAX_BYTES, "template")?;
     let mut notes = Vec::new();
-    let file = parse(text, &mut notes)?;
-    let rig = build(text, file, &mut notes)?;
+    let fields = scan::fields(text);
+    let file = parse(text, &fields, &mut notes)?;
+    let rig = build(&Places { text, fields: &fields }, file, &mut notes)?;
     Ok(Template { rig, notes })
 }
 
 /// Reads the header alone; what follows may be missing or wrong. `bytes` may be the first part of a file.
 pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
-    let valid = match std::str::from_utf8(bytes) {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let text = match std::str::from_utf8(bytes) {
         Ok(text) => text,
         Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
     };
-    let end = scan_fields(valid).find(|field| field.depth == 1 && matches!(field.name, "groups" | "joints"));
-    let header = match end {
-        Some(field) => format!("{})", &valid[..field.start]),
-        None => valid.to_owned(),
-    };
-    parse_ron(&header)
+    let fields = scan::fields(text);
+    let lists: Vec<&Field> =
+        fields.iter().filter(|field| field.depth == 1 && matches!(field.name, "groups" | "joints")).collect();
+    let Some(first) = lists.first() else { return parse_ron(text) };
+    let whole = parse_ron(&blanked(text, &lists));
+    // Where the lists are cut short or wrong, what stands before them is enough.
+    whole.or_else(|_| parse_ron(&format!("{})", &text[..first.start])))
 }
 
-/// Parses the text; fields that only a newer format has are blanked out one by one and named in `notes`.
-fn parse(text: &str, notes: &mut Vec<String>) -> Result<TemplateFile, SourceError> {
-    let format = scan_fields(text)
-        .find(|field| field.depth == 1 && field.name == "format")
-        .and_then(|field| {
-            let rest = text[field.value..].trim_start();
-            let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
-            rest[..digits].parse::<u32>().ok()
-        });
-    if format == Some(0) {
-        return Err(SourceError::at(text, 0, "format 0 was never released; the first is format: 1"));
-    }
-    let newer = format.is_some_and(|format| format > FORMAT);
-    let mut text = std::borrow::Cow::Borrowed(text);
-    for _ in 0..1000 {
-        let error = match ron_options().from_str::<TemplateFile>(&text) {
-            Ok(file) => {
-                if newer {
-                    notes.insert(0, format!(
-                        "the template has format {}, newer than {FORMAT}: update Rigsmith, or save under another name to keep what it does not know",
-                        file.format
-                    ));
-                }
-                return Ok(file);
-            }
-            Err(error) => error,
-        };
-        let unknown = match &error.code {
-            ron::Error::NoSuchStructField { found, .. } if newer => found.clone(),
-            _ => return Err(SourceError::from_ron(&text, &error)),
-        };
-        let place = byte_offset(&text, error.span.end);
-        let field = scan_fields(&text).filter(|field| field.name == unknown && field.start <= place).last();
-        let Some(field) = field else { return Err(SourceError::from_ron(&text, &error)) };
-        let (start, end) = (field.start, field.end);
-        let line = text[..start].matches('\n').count() + 1;
-        notes.push(format!("line {line}: the field `{unknown}` is of a newer format and is not kept"));
-        let blank: String = text[start..end].chars().map(|c| if c == '\n' { '\n' } else { ' ' }).collect();
-        text = format!("{}{blank}{}", &text[..start], &text[end..]).into();
-    }
-    Err(SourceError::at(&text, 0, "the template has over a thousand fields of a newer format; update Rigsmith"))
-}
-
-/// A field in RON text: where its name starts, where its value starts and ends (with the comma, if any).
-struct Field<'a> {
-    name: &'a str,
-    depth: usize,
-    start: usize,
-    value: usize,
-    end: usize,
-}
-
-/// All `name: value` pairs of a RON text in the order of their names, whatever they mean.
-fn scan_fields(text: &str) -> impl Iterator<Item = Field<'_>> {
-    let tokens = tokens(text);
-    let mut fields = Vec::new();
-    let mut depth = 0_usize;
-    for (number, token) in tokens.iter().enumerate() {
-        match token.text.as_bytes()[0] {
-            b'(' | b'[' | b'{' => depth += 1,
-            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
-            b':' if number > 0 && token.text == ":" => {
-                let name = &tokens[number - 1];
-                let starts = name.text.starts_with(|c: char| c.is_alphabetic() || c == '_');
-                if starts {
-                    let end = value_end(&tokens[number + 1..]).unwrap_or(text.len());
-                    fields.push(Field {
-                        name: name.text,
-                        depth,
-                        start: name.start,
-                        value: token.start + 1,
-                        end,
-                    });
-                }
-            }
-            _ => {}
-        }
-    }
-    fields.into_iter()
-}
-
-fn value_end(tokens: &[Token]) -> Option<usize> {
-    let mut depth = 0_usize;
-    for token in tokens {
-        match token.text {
-            "(" | "[" | "{" => depth += 1,
-            ")" | "]" | "}" if depth == 0 => return Some(token.start),
-            ")" | "]" | "}" => depth -= 1,
-            "," if depth == 0 => return Some(token.start + 1),
-            _ => {}
-        }
-    }
-    None
-}
-
-struct Token<'a> {
-    text: &'a str,
-    start: usize,
-}
-
-/// Strings, words and single punctuation marks; comments are passed over.
-fn tokens(text: &str) -> Vec<Token<'_>> {
-    let bytes = text.as_bytes();
-    let mut tokens = Vec::new();
+/// The text without these fields: blanks in their place, so that lines and columns stay.
+fn blanked(text: &str, without: &[&Field]) -> String {
+    let mut out = String::with_capacity(text.len());
     let mut at = 0;
-    while at < bytes.len() {
-        let start = at;
-        match bytes[at] {
-            b'/' if bytes.get(at + 1) == Some(&b'/') => {
-                at = text[at..].find('\n').map_or(text.len(), |n| at + n);
-                continue;
-            }
-            b'/' if bytes.get(at + 1) == Some(&b'*') => {
-                at = text[at + 2..].find("*/").map_or(text.len(), |n| at + n + 4);
-                continue;
-            }
-            b'"' => {
-                at += 1;
-                while at < bytes.len() && bytes[at] != b'"' {
-                    at += if bytes[at] == b'\\' { 2 } else { 1 };
-                }
-                at = (at + 1).min(bytes.len());
-                while !text.is_char_boundary(at) {
-                    at += 1;
-                }
-            }
-            b'\'' if bytes.get(at + 2) == Some(&b'\'') => at += 3,
-            c if c.is_ascii_alphanumeric() || c == b'_' || c >= 0x80 => {
-                while at < bytes.len() && (bytes[at].is_ascii_alphanumeric() || bytes[at] == b'_' || bytes[at] >= 0x80) {
-                    at += 1;
-                }
-            }
-            c if c.is_ascii_whitespace() => {
-                at += 1;
-                continue;
-            }
-            _ => at += 1,
-        }
-        tokens.push(Token { text: &text[start..at], start });
+    for field in without.iter().filter(|field| field.start < field.end) {
+        let from = field.start.max(at);
+        out.push_str(&text[at..from]);
+        out.extend(text[from..field.end.max(from)].chars().map(|c| if c == '\n' { '\n' } else { ' ' }));
+        at = field.end.max(from);
     }
-    tokens
+    out.push_str(&text[at..]);
+    out
 }
 
-fn build(text: &str, file: TemplateFile, notes: &mut Vec<String>) -> Result<Rig, SourceError> {
-    let places = Places::new(text);
+/// Parses the text; fields that only a newer format has are passed over and named in `notes`.
+fn parse(text: &str, fields: &[Field], notes: &mut Vec<String>) -> Result<TemplateFile, SourceError> {
+    let format = fields.iter().find(|field| field.depth == 1 && field.name == "format");
+    let number = format.and_then(|field| {
+        let rest = text[field.value..field.end].trim_start();
+        let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+        rest[..digits].parse::<u32>().ok()
+    });
+    match (number, format) {
+        (Some(0), Some(field)) => {
+            return Err(SourceError::at(text, field.start, "format 0 was never released; the first is format: 1"));
+        }
+        (Some(newer), _) if newer > FORMAT => {
+            notes.push(format!(
+                "the template has format {newer}, newer than {FORMAT}: update Rigsmith, or save under another name to keep what it does not know"
+            ));
+        }
+        _ => return parse_ron(text),
+    }
+    let unknown: Vec<&Field> = fields
+        .iter()
+        .filter(|field| known_names(fields, field).is_some_and(|known| !known.contains(&field.name)))
+        .collect();
+    let (mut line, mut counted) = (1, 0);
+    for field in &unknown {
+        line += text[counted..field.start].matches('\n').count();
+        counted = field.start;
+        notes.push(format!("line {line}: the field `{}` is of a newer format and is not kept", field.name));
+    }
+    // Places stay the same without these fields, so errors are shown in the text as it is.
+    let known = blanked(text, &unknown);
+    ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))
+}
+
+/// The names that a field may have where it stands; `None` where anything may stand (parameters of modules).
+fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
+    let parent = field.parent.map(|parent| &fields[parent]);
+    let above = parent.and_then(|parent| parent.parent).map(|above| fields[above].name);
+    match (field.depth, parent.map(|parent| parent.name)) {
+        (1, None) => Some(&[
+            "format", "uid", "name", "version", "kind", "author", "description", "preview", "joint_count", "features",
+            "groups", "joints",
+        ]),
+        (3, Some("features")) => Some(&["kind", "name", "switches"]),
+        (3, Some("groups")) => Some(&["uid", "name", "color", "enabled"]),
+        (3, Some("joints")) => Some(&[
+            "uid", "parent", "label", "group", "mirror", "kind", "locked", "translation", "rotation", "scale", "tags",
+        ]),
+        (5, Some("tags")) if above == Some("joints") => Some(&[
+            "uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch",
+        ]),
+        _ => None,
+    }
+}
+
+fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result<Rig, SourceError> {
     let mut rig = Rig::new(file.uid, file.name.clone());
     rig.about = RigAbout {
         name: file.name,
@@ -292,13 +221,13 @@ fn build(text: &str, file: TemplateFile, notes: &mut Vec<String>) -> Result<Rig,
     let mut seen = HashSet::new();
     let mut unique = |uid: Uid| match seen.insert(uid) {
         true => Ok(()),
-        false => Err(places.error(uid, 1, format!("uid {uid} is used twice; give the second a uid of its own"))),
+        false => Err(places.error(uid, 1, "uid", format!("uid {uid} is used twice; give the second a uid of its own"))),
     };
     for group in file.groups {
         unique(group.uid)?;
         let color: [f32; 3] = group.color.into();
         if color.iter().any(|part| !part.is_finite()) {
-            return Err(places.error(group.uid, 0, "the colour is not finite; use numbers from 0 to 1".into()));
+            return Err(places.error(group.uid, 0, "color", "the colour is not finite; use numbers from 0 to 1".into()));
         }
         rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
@@ -306,7 +235,7 @@ fn build(text: &str, file: TemplateFile, notes: &mut Vec<String>) -> Result<Rig,
     if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count) {
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
-    add_joints(&mut rig, file.joints, &places, unique)?;
+    add_joints(&mut rig, file.joints, places, unique)?;
     if feature_summaries(&rig) != sorted(file.features) {
         notes.push("the header lists other features than the tags; saving corrects it".to_owned());
     }
@@ -335,13 +264,13 @@ fn add_joints(
         unique(uid)?;
         for (what, other) in [("parent", joint.parent), ("mirror", joint.mirror)] {
             if let Some(other) = other.filter(|other| !known.contains(other)) {
-                return Err(places.error(uid, 0, format!(
+                return Err(places.error(uid, 0, what, format!(
                     "joint {uid} names the {what} {other}, which is not in the file; correct it or leave the field out"
                 )));
             }
         }
         if let Some(group) = joint.group.filter(|group| rig.group(*group).is_none()) {
-            return Err(places.error(uid, 0, format!(
+            return Err(places.error(uid, 0, "group", format!(
                 "joint {uid} is in the local group {group}, which is not in the file; add it under `groups`"
             )));
         }
@@ -352,7 +281,13 @@ fn add_joints(
             scale: Vec3::from(<[f32; 3]>::from(joint.scale)),
         };
         if !rest.is_valid() {
-            return Err(places.error(uid, 0, format!(
+            let finite = |v: Vec3| v.is_finite();
+            let wrong = match (finite(rest.translation), finite(rest.scale)) {
+                (false, _) => "translation",
+                (true, false) => "scale",
+                (true, true) => "rotation",
+            };
+            return Err(places.error(uid, 0, wrong, format!(
                 "joint {uid} has a transform that is not finite or whose rotation is not of length 1; correct the numbers"
             )));
         }
@@ -363,7 +298,7 @@ fn add_joints(
             if let TagKind::Command { feature: Some(feature), .. } = &tag.kind
                 && !features.contains(feature)
             {
-                return Err(places.error(tag.uid, 0, format!(
+                return Err(places.error(tag.uid, 0, "feature", format!(
                     "tag {} is in the feature {feature}, which is not in the file; add it or leave the field out",
                     tag.uid
                 )));
@@ -392,11 +327,11 @@ fn add_joints(
     while let Some((parent, uid)) = stack.pop() {
         let Some(joint) = data.remove(&uid) else { continue };
         let edit = RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX };
-        rig.apply(&edit).map_err(|error| places.error(uid, 0, error.to_string()))?;
+        rig.apply(&edit).map_err(|error| places.error(uid, 0, "uid", error.to_string()))?;
         push(&mut stack, Some(uid));
     }
     match order.into_iter().find(|uid| data.contains_key(uid)) {
-        Some(uid) => Err(places.error(uid, 0, format!(
+        Some(uid) => Err(places.error(uid, 0, "parent", format!(
             "joint {uid} is its own ancestor; give one joint of the cycle another parent"
         ))),
         None => Ok(()),
@@ -424,28 +359,27 @@ fn tag_from(tag: TagFile) -> Tag {
     }
 }
 
-/// Finds the lines where things are declared.
+/// Finds the places where things are declared.
 struct Places<'a> {
     text: &'a str,
+    fields: &'a [Field<'a>],
 }
 
-impl<'a> Places<'a> {
-    fn new(text: &'a str) -> Self {
-        Self { text }
-    }
-
-    /// An error at the `nth` field `uid` with that value (or the first).
-    fn error(&self, uid: Uid, nth: usize, message: String) -> SourceError {
-        let name = uid.to_string();
-        let declared: Vec<usize> = scan_fields(self.text)
-            .filter(|field| field.name == "uid")
-            .filter(|field| {
-                let value = self.text[field.value..field.end].trim_start().trim_start_matches('"');
-                value.get(..name.len()).is_some_and(|value| value.eq_ignore_ascii_case(&name))
-            })
-            .map(|field| field.start)
-            .collect();
-        let at = declared.get(nth).or(declared.first()).copied().unwrap_or(0);
+impl Places<'_> {
+    /// An error at the field `name` of the `nth` thing that is declared with that uid (or of the first).
+    fn error(&self, uid: Uid, nth: usize, name: &str, message: String) -> SourceError {
+        let digits = uid.to_string();
+        let declares = |field: &&Field| {
+            let value = self.text[field.value..field.end].trim_start().trim_start_matches('"');
+            field.depth > 1
+                && field.name == "uid"
+                && known_names(self.fields, field).is_some()
+                && value.get(..digits.len()).is_some_and(|value| value.eq_ignore_ascii_case(&digits))
+        };
+        let declared: Vec<&Field> = self.fields.iter().filter(declares).collect();
+        let thing = declared.get(nth).or(declared.first());
+        let field = thing.and_then(|uid| self.fields.iter().find(|f| f.bracket == uid.bracket && f.name == name));
+        let at = field.or(thing.copied()).map_or(0, |field| field.start);
         SourceError::at(self.text, at, message)
     }
 }

@@ -1,6 +1,9 @@
 //! Writing templates.
 
-use std::{collections::BTreeMap, fmt::Write};
+use std::{
+    collections::{BTreeMap, HashSet},
+    fmt::Write,
+};
 
 use bevy::math::{Quat, Vec3};
 
@@ -32,8 +35,9 @@ fn write_into(out: &mut String, rig: &Rig) -> std::fmt::Result {
         writeln!(out, "{}),", if group.enabled { "" } else { ", enabled: false" })?;
     }
     writeln!(out, "    ],\n    joints: [")?;
+    let features: HashSet<Uid> = rig.walk().flat_map(|joint| &joint.data.tags).filter_map(feature_uid).collect();
     for joint in rig.walk() {
-        write_joint(out, joint)?;
+        write_joint(out, rig, joint, &features)?;
     }
     writeln!(out, "    ],\n)")
 }
@@ -81,7 +85,12 @@ pub(super) fn feature_summaries(rig: &Rig) -> Vec<FeatureSummary> {
     features.into_iter().map(summary).collect()
 }
 
-fn write_joint(out: &mut String, joint: &RigJoint) -> std::fmt::Result {
+fn feature_uid(tag: &Tag) -> Option<Uid> {
+    matches!(tag.kind, TagKind::Feature { .. }).then_some(tag.uid)
+}
+
+/// References to things that have been deleted are left out: they mean nothing, and readers refuse them.
+fn write_joint(out: &mut String, rig: &Rig, joint: &RigJoint, features: &HashSet<Uid>) -> std::fmt::Result {
     let data = &joint.data;
     write!(out, "        (\n            uid: \"{}\",", data.uid)?;
     write_uid(out, "parent", joint.parent)?;
@@ -89,7 +98,7 @@ fn write_joint(out: &mut String, joint: &RigJoint) -> std::fmt::Result {
         write!(out, "\n            label: {},", quoted(label))?;
     }
     write_uid(out, "group", data.group)?;
-    write_uid(out, "mirror", data.mirror)?;
+    write_uid(out, "mirror", data.mirror.filter(|mirror| rig.joint(*mirror).is_some()))?;
     if data.kind == NodeKind::Null {
         write!(out, "\n            kind: Null,")?;
     }
@@ -108,14 +117,14 @@ fn write_joint(out: &mut String, joint: &RigJoint) -> std::fmt::Result {
     if !data.tags.is_empty() {
         writeln!(out, "\n            tags: [")?;
         for tag in &data.tags {
-            write_tag(out, tag)?;
+            write_tag(out, tag, features)?;
         }
         write!(out, "            ],")?;
     }
     writeln!(out, "\n        ),")
 }
 
-fn write_tag(out: &mut String, tag: &Tag) -> std::fmt::Result {
+fn write_tag(out: &mut String, tag: &Tag, features: &HashSet<Uid>) -> std::fmt::Result {
     let name = match tag.kind {
         TagKind::Command { .. } => "Command",
         TagKind::Feature { .. } => "Feature",
@@ -130,7 +139,7 @@ fn write_tag(out: &mut String, tag: &Tag) -> std::fmt::Result {
     match &tag.kind {
         TagKind::Command { module, params, feature } => {
             write!(out, "\n                    module: {},", quoted(module))?;
-            if let Some(feature) = feature {
+            if let Some(feature) = feature.filter(|feature| features.contains(feature)) {
                 write!(out, "\n                    feature: \"{feature}\",")?;
             }
             write!(out, "\n                    params: {params},")?;

@@ -121,7 +121,8 @@ pub fn read(bytes: &[u8]) -> Result<Model, GltfError> {
 }
 
 /// The smallest picture: what readers look at is its first bytes.
-pub const PNG: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\x02\0\0\0\x90wS\xde\0\0\0\x0cIDATx\x9cc\xf8\
+pub const PNG: &[u8] =
+    b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\x02\0\0\0\x90wS\xde\0\0\0\x0cIDATx\x9cc\xf8\
 \xcf\xc0\0\0\x03\x01\x01\0\xc9\xfe\x92\xef\0\0\0\0IEND\xaeB`\x82";
 
 /// One triangle at the root.
@@ -147,7 +148,8 @@ pub fn character() -> Composed {
     let uv1 = file.floats(&[0.5, 0.0, 1.0, 0.5, 1.0, 0.25, 0.0, 1.0], "VEC2");
     let color = file.floats(&[1.0, 0.5, 0.25, 1.0].repeat(4), "VEC4");
     let joints = file.bytes(&[1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], "VEC4");
-    let weights = file.floats(&[1.0, 0.0, 0.0, 0.0, 0.75, 0.25, 0.0, 0.0, 0.9, 0.1, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0], "VEC4");
+    let weights =
+        file.floats(&[1.0, 0.0, 0.0, 0.0, 0.75, 0.25, 0.0, 0.0, 0.9, 0.1, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0], "VEC4");
     let indices = file.bytes(&[0, 1, 2, 0, 2, 3], "SCALAR");
     let fat = file.floats(&[0.0, 0.0, 0.5].repeat(4), "VEC3");
     let fat_normal = file.floats(&[0.1, 0.0, 0.0].repeat(4), "VEC3");
@@ -164,11 +166,14 @@ pub fn character() -> Composed {
     file.push("images", json!({"bufferView": picture, "mimeType": "image/png", "name": "skin", "extras": 1}));
     file.push("samplers", json!({"wrapS": 33071}));
     file.push("textures", json!({"sampler": 0, "source": 0}));
-    file.push("materials", json!({
-        "name": "skin", "doubleSided": true, "extras": {"a": [1, 2.5]},
-        "extensions": {"KHR_materials_ior": {"ior": 1.25}},
-        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}}
-    }));
+    file.push(
+        "materials",
+        json!({
+            "name": "skin", "doubleSided": true, "extras": {"a": [1, 2.5]},
+            "extensions": {"KHR_materials_ior": {"ior": 1.25}},
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}}
+        }),
+    );
     file.push("materials", json!({"name": "hat"}));
     file.json["extensionsUsed"] = json!(["KHR_lights_punctual", "KHR_materials_ior"]);
     let body = json!({
@@ -176,15 +181,21 @@ pub fn character() -> Composed {
             "COLOR_0": color, "JOINTS_0": joints, "WEIGHTS_0": weights},
         "indices": indices, "material": 0, "targets": [{"POSITION": fat, "NORMAL": fat_normal}, {"POSITION": thin}]
     });
-    file.push("meshes", json!({"name": "body mesh", "primitives": [body], "weights": [0.25, 0.0],
-        "extras": {"targetNames": ["fat", "thin"], "more": true}}));
+    file.push(
+        "meshes",
+        json!({"name": "body mesh", "primitives": [body], "weights": [0.25, 0.0],
+        "extras": {"targetNames": ["fat", "thin"], "more": true}}),
+    );
     file.push("meshes", json!({"name": "hat", "primitives": [{"attributes": {"POSITION": triangle}, "material": 1}]}));
     file.push("skins", json!({"name": "rig", "joints": [2, 1, 3], "inverseBindMatrices": binds}));
 
     file.root(json!({"name": "armature", "children": [1], "scale": [2.0, 2.0, 2.0]}));
     file.push("nodes", json!({"name": "hip", "children": [2], "translation": [0.0, 0.5, 0.0], "extras": {"id": 7}}));
-    file.push("nodes", json!({"name": "knee", "children": [3, 5], "translation": [0.0, 1.0, 0.0],
-        "rotation": [0.0, 0.6, 0.0, 0.8]}));
+    file.push(
+        "nodes",
+        json!({"name": "knee", "children": [3, 5], "translation": [0.0, 1.0, 0.0],
+        "rotation": [0.0, 0.6, 0.0, 0.8]}),
+    );
     file.push("nodes", json!({"name": "toe", "translation": [0.0, 0.5, 0.0]}));
     file.root(json!({"name": "body", "mesh": 0, "skin": 0}));
     file.push("nodes", json!({"name": "the hat", "mesh": 1, "translation": [0.0, 0.25, 0.0]}));
@@ -194,18 +205,23 @@ pub fn character() -> Composed {
     let moves = file.floats(&[0.0, 0.5, 0.0, 0.1, 0.5, 0.0, 0.0, 0.6, 0.0], "VEC3");
     let half = 0.5_f32.sqrt();
     let turns = file.floats(&[0.0, 0.6, 0.0, 0.8, half, 0.0, 0.0, half, 0.0, 0.0, 0.0, 1.0], "VEC4");
-    let short: Vec<u8> = [0, 19660, 0, 26214, 32767, 0, 0, 0, 0, 0, 0, 32767].into_iter().flat_map(i16::to_le_bytes).collect();
+    let short: Vec<u8> =
+        [0, 19660, 0, 26214, 32767, 0, 0, 0, 0, 0, 0, 32767].into_iter().flat_map(i16::to_le_bytes).collect();
     let short = file.accessor(&short, 5122, "VEC4", 3);
     file.json["accessors"][short]["normalized"] = true.into();
     let cubic = file.floats(&(0..27).map(|i| 1.0 + i as f32 / 64.0).collect::<Vec<_>>(), "VEC3");
     let fats = file.floats(&[0.0, 1.0, 0.5, 0.0, 1.0, 0.25], "SCALAR");
-    let channel = |sampler: usize, node: usize, path: &str| json!({"sampler": sampler, "target": {"node": node, "path": path}});
+    let channel =
+        |sampler: usize, node: usize, path: &str| json!({"sampler": sampler, "target": {"node": node, "path": path}});
     file.push("animations", json!({"name": "walk", "extras": "left, right", "samplers": [
         {"input": times, "output": moves}, {"input": times, "output": turns, "interpolation": "STEP"},
         {"input": times, "output": cubic, "interpolation": "CUBICSPLINE"}, {"input": times, "output": fats}
     ], "channels": [channel(0, 1, "translation"), channel(1, 2, "rotation"), channel(2, 2, "scale"), channel(3, 4, "weights")]}));
-    file.push("animations", json!({"name": "wiggle", "samplers": [{"input": times, "output": short}],
-        "channels": [channel(0, 3, "rotation")]}));
+    file.push(
+        "animations",
+        json!({"name": "wiggle", "samplers": [{"input": times, "output": short}],
+        "channels": [channel(0, 3, "rotation")]}),
+    );
     file
 }
 
@@ -219,8 +235,11 @@ pub fn extremes() -> Composed {
     file.json["bufferViews"][0]["byteStride"] = 16.into();
     let at = file.view(&[1, 0, 5, 0]);
     let values = file.view(&[0; 24]);
-    let morph = file.push("accessors", json!({"componentType": 5126, "count": 8, "type": "VEC3", "sparse": {"count": 2,
-        "indices": {"bufferView": at, "componentType": 5123}, "values": {"bufferView": values}}}));
+    let morph = file.push(
+        "accessors",
+        json!({"componentType": 5126, "count": 8, "type": "VEC3", "sparse": {"count": 2,
+        "indices": {"bufferView": at, "componentType": 5123}, "values": {"bufferView": values}}}),
+    );
     let uv = file.accessor(&[0, 128].repeat(8), 5121, "VEC2", 8);
     file.json["accessors"][uv]["normalized"] = true.into();
     let joints: Vec<u8> = [0_u16, 1, 0, 0].repeat(8).into_iter().flat_map(u16::to_le_bytes).collect();
@@ -233,10 +252,14 @@ pub fn extremes() -> Composed {
     let attributes = json!({"POSITION": position, "TEXCOORD_1": uv, "JOINTS_0": joints, "WEIGHTS_0": weights,
         "JOINTS_1": joints, "WEIGHTS_1": more});
     let strip = json!({"attributes": attributes, "indices": indices, "mode": 5, "targets": [{"POSITION": morph}]});
-    let fan = json!({"attributes": {"POSITION": position}, "indices": indices, "mode": 6, "targets": [{"POSITION": morph}]});
+    let fan =
+        json!({"attributes": {"POSITION": position}, "indices": indices, "mode": 6, "targets": [{"POSITION": morph}]});
     let list = json!({"attributes": attributes, "targets": [{"POSITION": morph, "NORMAL": morph}]});
     file.push("meshes", json!({"primitives": [strip, list]}));
-    file.push("meshes", json!({"primitives": [fan, {"attributes": {"POSITION": position}, "mode": 1, "targets": [{}]}]}));
+    file.push(
+        "meshes",
+        json!({"primitives": [fan, {"attributes": {"POSITION": position}, "mode": 1, "targets": [{}]}]}),
+    );
     file.root(json!({"name": "left", "translation": [1.0, 0.0, 0.0]}));
     file.root(json!({"matrix": [0.0, 2.0, 0.0, 0.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0], "children": [4]}));
     file.root(json!({"mesh": 0, "skin": 0, "children": [5]}));

@@ -19,7 +19,8 @@ pub fn skinned_files() -> Option<Vec<PathBuf>> {
     let mut files = Vec::new();
     let is_gltf = |path: &Path| path.extension().is_some_and(|extension| extension == "glb" || extension == "gltf");
     for folder in ["creatures", "gltf_skinned", "hands"].map(|folder| data.join(folder)) {
-        files.extend(std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| is_gltf(path)));
+        files
+            .extend(std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| is_gltf(path)));
     }
     for body in std::fs::read_dir(data.join("bodies")).unwrap() {
         files.extend(Some(body.unwrap().path().join("body_gt.glb")).filter(|path| path.exists()));
@@ -35,11 +36,19 @@ pub fn read_file(path: &Path) -> Model {
     read_gltf(&std::fs::read(path).unwrap(), &path.display().to_string(), &mut load).unwrap()
 }
 
+/// Folder and file in one word.
+fn name_of(path: &Path) -> String {
+    let folder = path.parent().and_then(Path::file_name).unwrap().to_string_lossy();
+    format!("{folder}_{}", path.file_name().unwrap().to_string_lossy()).replace('.', "_")
+}
+
 /// A channel's value at a time: numbers between keys, or a turned quaternion.
 fn sample(channel: &Channel, time: f32) -> Vec<f32> {
     let cubic = channel.interpolation == Interpolation::CubicSpline;
     let width = channel.values.len() / channel.times.len() / if cubic { 3 } else { 1 };
-    let key = |i: usize| if cubic { &channel.values[(3 * i + 1) * width..][..width] } else { &channel.values[i * width..][..width] };
+    let key = |i: usize| {
+        if cubic { &channel.values[(3 * i + 1) * width..][..width] } else { &channel.values[i * width..][..width] }
+    };
     let next = channel.times.partition_point(|at| *at <= time);
     if next == 0 || next == channel.times.len() {
         return key(next.saturating_sub(1)).to_vec();
@@ -58,8 +67,10 @@ fn sample(channel: &Channel, time: f32) -> Vec<f32> {
             let (out, into) = (&channel.values[(3 * (next - 1) + 2) * width..], &channel.values[3 * next * width..]);
             let (t2, t3) = (t * t, t * t * t);
             let at = |i: usize| {
-                (2.0 * t3 - 3.0 * t2 + 1.0) * a[i] + step * (t3 - 2.0 * t2 + t) * out[i]
-                    + (3.0 * t2 - 2.0 * t3) * b[i] + step * (t3 - t2) * into[i]
+                (2.0 * t3 - 3.0 * t2 + 1.0) * a[i]
+                    + step * (t3 - 2.0 * t2 + t) * out[i]
+                    + (3.0 * t2 - 2.0 * t3) * b[i]
+                    + step * (t3 - t2) * into[i]
             };
             (0..width).map(at).collect()
         }
@@ -74,7 +85,9 @@ fn posed(model: &Model, clip: Option<&Clip>, time: f32) -> Vec<Vec3> {
         let value = sample(channel, time);
         match channel.target {
             ChannelTarget::Translation(node) => rest[node].translation = Vec3::from_slice(&value),
-            ChannelTarget::Rotation(node) => rest[node].rotation = Quat::from_vec4(Vec4::from_slice(&value)).normalize(),
+            ChannelTarget::Rotation(node) => {
+                rest[node].rotation = Quat::from_vec4(Vec4::from_slice(&value)).normalize()
+            }
             ChannelTarget::Scale(node) => rest[node].scale = Vec3::from_slice(&value),
             ChannelTarget::MorphWeights(object) => morphs[object] = value,
         }
@@ -118,7 +131,7 @@ fn characters_pose_the_same() {
     let settings = GltfWriteSettings { max_influences: 8, bind_unweighted: true, ..Default::default() };
     for path in skinned_files().into_iter().flatten() {
         let model = read_file(&path);
-        let name = path.file_name().unwrap().to_str().unwrap().replace('.', "_");
+        let name = name_of(&path);
         let again = there_and_back(&format!("data_{name}"), &model, &settings);
         assert_eq!(again.clips.len(), model.clips.len(), "{name}");
         let clips = model.clips.iter().zip(&again.clips).map(|(before, after)| (Some(before), Some(after)));
@@ -136,10 +149,11 @@ fn characters_pose_the_same() {
 
 #[test]
 fn characters_come_back_whole() {
-    let settings = GltfWriteSettings { max_influences: 8, all_joints: true, bind_unweighted: true, ..Default::default() };
+    let settings =
+        GltfWriteSettings { max_influences: 8, all_joints: true, bind_unweighted: true, ..Default::default() };
     for path in skinned_files().into_iter().flatten() {
         let model = read_file(&path);
-        let name = path.file_name().unwrap().to_str().unwrap().replace('.', "_");
+        let name = name_of(&path);
         let again = there_and_back(&format!("data_all_{name}"), &model, &settings);
         assert_eq!((&again.nodes, &again.skins, &again.clips), (&model.nodes, &model.skins, &model.clips), "{name}");
         assert_eq!(again.looks, model.looks, "{name}");
@@ -147,7 +161,11 @@ fn characters_come_back_whole() {
         assert_eq!(weighted(&again), weighted(&model), "{name}");
         let rigid = model.objects.iter().any(|object| object.node.is_some());
         if !rigid {
-            assert_eq!((&again.points, &again.parts, &again.objects), (&model.points, &model.parts, &model.objects), "{name}");
+            assert_eq!(
+                (&again.points, &again.parts, &again.objects),
+                (&model.points, &model.parts, &model.objects),
+                "{name}"
+            );
         }
     }
 }

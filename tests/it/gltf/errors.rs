@@ -30,6 +30,7 @@ fn fields() {
         assert!(error.contains(text), "{place} = {value}: {error}");
     };
     check("/asset/version", json!("1.0"), "/asset/version", "only 2.0");
+    check("/asset/minVersion", json!("2.1"), "/asset/version", "only 2.0");
     check("/asset", json!(3), "/asset", "must be an object");
     check("/nodes", json!({}), "/nodes", "must be an array");
     check("/accessors/0/bufferView", json!(99), "/accessors/0/bufferView", "refers to buffer view 99, but there are");
@@ -50,9 +51,19 @@ fn fields() {
     check("/meshes/0/primitives/0/indices", json!(0), "/accessors/0/componentType", "unsigned");
     check("/meshes/0/primitives/0/material", json!(2), "/meshes/0/primitives/0/material", "refers to material 2");
     check("/meshes/0/primitives/0/mode", json!(7), "/meshes/0/primitives/0/mode", "at most 6");
-    check("/meshes/0/primitives/0/attributes/NORMAL", json!(8), "/meshes/0/primitives/0/attributes/NORMAL", "6 elements");
+    check(
+        "/meshes/0/primitives/0/attributes/NORMAL",
+        json!(8),
+        "/meshes/0/primitives/0/attributes/NORMAL",
+        "6 elements",
+    );
     check("/meshes/0/primitives/0/attributes/JOINTS_0", json!(0), "/accessors/0/componentType", "unsigned");
-    check("/meshes/0/primitives/0/targets/1/POSITION", json!(8), "/meshes/0/primitives/0/targets/1/POSITION", "vertices");
+    check(
+        "/meshes/0/primitives/0/targets/1/POSITION",
+        json!(8),
+        "/meshes/0/primitives/0/targets/1/POSITION",
+        "vertices",
+    );
     check("/meshes/0/weights", json!([1.0]), "/meshes/0/weights", "1 weights for 2");
     check("/nodes/4/weights", json!([1.0]), "/nodes/4/weights", "1 weights for 2");
     check("/nodes/4/skin", json!(1), "/nodes/4/skin", "refers to skin 1");
@@ -80,10 +91,31 @@ fn fields() {
     check("/animations/0/channels/0/sampler", json!(4), "/animations/0/channels/0/sampler", "refers to sampler 4");
     check("/animations/0/channels/0/target/node", json!(9), "/animations/0/channels/0/target/node", "refers to node 9");
     check("/animations/0/samplers/0/output", json!(2), "/accessors/2/type", "has 4 components");
-    check("/animations/0/samplers/0/output", json!(0), "/animations/0/channels/0", "3 times need 3 values each, there are 12");
+    check(
+        "/animations/0/samplers/0/output",
+        json!(0),
+        "/animations/0/channels/0",
+        "3 times need 3 values each, there are 12",
+    );
     check("/animations/0/samplers/0/input", json!(8), "/animations/0/channels/0", "must be floats");
-    check("/extensionsRequired", json!(["KHR_draco_mesh_compression"]), "/extensionsRequired", "KHR_draco_mesh_compression");
+    check(
+        "/extensionsRequired",
+        json!(["KHR_draco_mesh_compression"]),
+        "/extensionsRequired",
+        "KHR_draco_mesh_compression",
+    );
     check("/extensionsRequired", json!(["EXT_meshopt_compression"]), "/extensionsRequired", "EXT_meshopt_compression");
+}
+
+#[test]
+fn compressed_geometry() {
+    let mut file = triangle();
+    let draco = json!({"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}});
+    file.json["meshes"][0]["primitives"][0]["extensions"] = draco;
+    // Plain geometry beside it is as good.
+    assert_eq!(file.read().unwrap().points.len(), 3);
+    file.json["accessors"][0].as_object_mut().unwrap().shift_remove("bufferView");
+    assert!(error(&file.glb()).contains("needs the extension KHR_draco_mesh_compression"));
 }
 
 #[test]
@@ -134,7 +166,8 @@ fn values_in_buffers() {
 fn uris() {
     let check = |uri: &str, text: &str| {
         let file = triangle();
-        let error = read_gltf(&file.gltf(uri), "m.gltf", &mut |path| panic!("{path} was opened")).unwrap_err().to_string();
+        let error =
+            read_gltf(&file.gltf(uri), "m.gltf", &mut |path| panic!("{path} was opened")).unwrap_err().to_string();
         assert!(error.starts_with("m.gltf: /buffers/0/uri: ") && error.contains(text), "{uri}: {error}");
     };
     check("file:///etc/passwd", "scheme or a drive");
@@ -166,7 +199,8 @@ fn uris() {
 
     let check = |uri: &str, path: &str| {
         let file = triangle();
-        let mut load = |asked: &str| if asked == path { Ok(file.bin.clone()) } else { Err(format!("{asked} was opened")) };
+        let mut load =
+            |asked: &str| if asked == path { Ok(file.bin.clone()) } else { Err(format!("{asked} was opened")) };
         let model = read_gltf(&file.gltf(uri), "m.gltf", &mut load);
         assert!(model.is_ok(), "{uri}: {model:?}");
     };
@@ -176,7 +210,11 @@ fn uris() {
     check("..a/b...bin", "..a/b...bin");
     // A triangle's 36 bytes in the URI itself.
     let zeros = "A".repeat(48);
-    for uri in [format!("data:application/octet-stream;base64,{zeros}"), format!("DATA:;base64,{zeros}=="), format!("data:,{}", "%00".repeat(36))] {
+    for uri in [
+        format!("data:application/octet-stream;base64,{zeros}"),
+        format!("DATA:;base64,{zeros}=="),
+        format!("data:,{}", "%00".repeat(36)),
+    ] {
         assert!(read(&triangle().gltf(&uri)).is_ok() != uri.ends_with('='), "{uri}");
     }
 }

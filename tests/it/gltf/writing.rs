@@ -4,7 +4,7 @@ use super::{
     compose::{PNG, character, read, triangle},
     names,
 };
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 use rigsmith::mesh::{
     gltf::{GltfError, GltfWriteSettings, read_gltf, write_glb},
     model::{ChannelTarget, Model, Node, Object, Part, SkinBinding, Trs, Weights},
@@ -92,7 +92,11 @@ fn rigged(joints: usize, influences: impl Fn(usize) -> Vec<(u32, f32)>) -> Model
         objects: vec![Object { name: "body".into(), skin: Some(0), ..Default::default() }],
         parts: vec![Part { vertices: vec![0, 1, 2], triangles: vec![[0, 1, 2]], ..Default::default() }],
         nodes: (0..joints).map(node).collect(),
-        skins: vec![SkinBinding { joints: (0..joints).collect(), inverse_binds: (0..joints).map(bind).collect(), ..Default::default() }],
+        skins: vec![SkinBinding {
+            joints: (0..joints).collect(),
+            inverse_binds: (0..joints).map(bind).collect(),
+            ..Default::default()
+        }],
         weights: Some(weights),
         ..Default::default()
     }
@@ -152,13 +156,18 @@ fn unweighted_points() {
     let again = there_and_back("unweighted", &model, &settings);
     assert_eq!(names(&again), ["skeleton", "joint0", "joint0"]);
     let weights = again.weights.unwrap();
-    assert_eq!((0..3).map(|point| weights.of(point).next()).collect::<Vec<_>>(), [Some((1, 1.0)), Some((2, 1.0)), Some((1, 1.0))]);
+    assert_eq!(
+        (0..3).map(|point| weights.of(point).next()).collect::<Vec<_>>(),
+        [Some((1, 1.0)), Some((2, 1.0)), Some((1, 1.0))]
+    );
 }
 
 #[test]
 fn rigid_parts_hang_where_they_were() {
     // A carrier whose transform can be undone by a node, and one where only moving the vertices helps.
-    for (name, scale) in [("even", Vec3::splat(4.0)), ("uneven", Vec3::new(1.0, 2.0, 5.0)), ("mirrored", Vec3::new(-1.0, 2.0, 5.0))] {
+    for (name, scale) in
+        [("even", Vec3::splat(4.0)), ("uneven", Vec3::new(1.0, 2.0, 5.0)), ("mirrored", Vec3::new(-1.0, 2.0, 5.0))]
+    {
         let mut model = rigged(2, |_| vec![(1, 1.0)]);
         model.nodes[1].parent = Some(0);
         model.nodes[0].rest.scale = scale;
@@ -178,7 +187,9 @@ fn rigid_parts_hang_where_they_were() {
             assert!(again.points[point].abs_diff_eq(model.points[point], 1e-5), "{name}");
             assert!(again.parts[1].normals[point - 3].abs_diff_eq(Vec3::X, 1e-5), "{name}");
         }
-        there_and_back(&format!("rigid_{name}"), &model, &GltfWriteSettings { bind_unweighted: true, ..all_joints() }).name.clear();
+        there_and_back(&format!("rigid_{name}"), &model, &GltfWriteSettings { bind_unweighted: true, ..all_joints() })
+            .name
+            .clear();
     }
 }
 
@@ -228,7 +239,22 @@ fn required_extensions_stay_required() {
     assert_eq!(json["extensionsRequired"], json!(["KHR_texture_basisu"]));
     assert_eq!(json["textures"][0], json!({"extensions": {"KHR_texture_basisu": {"source": 0}}}));
     assert_eq!(json["images"][0]["mimeType"], "image/png");
-    assert_eq!(PNG.len() as u64, json["bufferViews"][json["images"][0]["bufferView"].as_u64().unwrap() as usize]["byteLength"].as_u64().unwrap());
+    assert_eq!(
+        PNG.len() as u64,
+        json["bufferViews"][json["images"][0]["bufferView"].as_u64().unwrap() as usize]["byteLength"].as_u64().unwrap()
+    );
+}
+
+#[test]
+fn textures_get_the_coordinates_they_need() {
+    let mut model = character().read().unwrap();
+    model.parts[0].uvs = vec![];
+    model.parts[2].uvs = vec![vec![], vec![Vec2::ONE; 3]];
+    let again = there_and_back("uv_sets", &model, &GltfWriteSettings::default());
+    // The skin's texture uses the second set, the hat has none.
+    assert_eq!(again.parts[0].uvs, vec![vec![Vec2::ZERO; 4]; 2]);
+    assert_eq!(again.parts[1].uvs, Vec::<Vec<Vec2>>::new());
+    assert_eq!(again.parts[2].uvs, [vec![Vec2::ZERO; 3], vec![Vec2::ONE; 3]]);
 }
 
 #[test]
@@ -242,6 +268,7 @@ fn models_that_do_not_fit_together() {
     check(&|model| model.nodes[1].parent = Some(1), "node 1 comes before its parent");
     check(&|model| model.nodes[1].rest.scale.x = f32::NAN, "rest transform of node 1");
     check(&|model| model.skins[0].joints[0] = 9, "skin 0 refers to a node");
+    check(&|model| model.skins[0].joints[0] = 1, "skin 0 lists a node twice");
     check(&|model| model.skins[0].joints.truncate(2), "skin 0 has 2 joints, 3 matrices");
     check(&|model| model.skins[0].inverse_binds[0].x_axis.x = f32::INFINITY, "inverse bind matrix of skin 0");
     check(&|model| model.objects[0].skin = Some(1), "object 0 refers to a skin");

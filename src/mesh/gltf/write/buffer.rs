@@ -62,7 +62,7 @@ impl Bin {
             4 => "VEC4",
             _ => "MAT4",
         };
-        let bytes: Vec<u8> = elements.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        let bytes = little_endian(elements.as_flattened(), f32::to_le_bytes);
         self.accessor(&bytes, target, 5126, kind, elements.len())
     }
 
@@ -78,7 +78,7 @@ impl Bin {
 
     /// Key times, rising; the same times are written once.
     pub(super) fn times(&mut self, times: &[f32]) -> usize {
-        let bytes: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
+        let bytes = little_endian(times, f32::to_le_bytes);
         if let Some(known) = self.times.get(&bytes) {
             return *known;
         }
@@ -91,10 +91,10 @@ impl Bin {
     /// Vertex indices below `vertices`, as small as they go; the largest value of each type is reserved.
     pub(super) fn indices(&mut self, indices: &[u32], vertices: usize) -> usize {
         if vertices <= 65535 {
-            let bytes: Vec<u8> = indices.iter().flat_map(|index| (*index as u16).to_le_bytes()).collect();
+            let bytes = little_endian(indices, |index| (index as u16).to_le_bytes());
             self.accessor(&bytes, Target::Indices, 5123, "SCALAR", indices.len())
         } else {
-            let bytes: Vec<u8> = indices.iter().flat_map(|index| index.to_le_bytes()).collect();
+            let bytes = little_endian(indices, u32::to_le_bytes);
             self.accessor(&bytes, Target::Indices, 5125, "SCALAR", indices.len())
         }
     }
@@ -102,10 +102,10 @@ impl Bin {
     /// Joints of vertices, as bytes if the skin has few.
     pub(super) fn joints(&mut self, joints: &[[u16; 4]], of: usize) -> usize {
         if of <= 256 {
-            let bytes: Vec<u8> = joints.iter().flatten().map(|joint| *joint as u8).collect();
+            let bytes = little_endian(joints.as_flattened(), |joint| [joint as u8]);
             self.accessor(&bytes, Target::Vertices, 5121, "VEC4", joints.len())
         } else {
-            let bytes: Vec<u8> = joints.iter().flatten().flat_map(|joint| joint.to_le_bytes()).collect();
+            let bytes = little_endian(joints.as_flattened(), u16::to_le_bytes);
             self.accessor(&bytes, Target::Vertices, 5123, "VEC4", joints.len())
         }
     }
@@ -122,4 +122,12 @@ impl Bin {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         (self.accessors, self.views, self.bytes)
     }
+}
+
+fn little_endian<T: Copy, const N: usize>(values: &[T], bytes_of: impl Fn(T) -> [u8; N]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(values.len() * N);
+    for value in values {
+        bytes.extend_from_slice(&bytes_of(*value));
+    }
+    bytes
 }

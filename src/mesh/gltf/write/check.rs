@@ -23,6 +23,11 @@ pub(super) fn check(model: &Model) -> Result<(), GltfError> {
         if skin.joints.iter().any(|joint| *joint >= model.nodes.len()) {
             return fail(format!("skin {i} refers to a node that is not there"));
         }
+        let mut sorted = skin.joints.clone();
+        sorted.sort_unstable();
+        if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
+            return fail(format!("skin {i} lists a node twice"));
+        }
         if skin.inverse_binds.iter().any(|matrix| !matrix.is_finite()) {
             return fail(format!("an inverse bind matrix of skin {i} is not finite"));
         }
@@ -77,7 +82,8 @@ fn check_part(model: &Model, part: &Part) -> Result<(), &'static str> {
     }
     let fits = |length: usize| length == 0 || length == count;
     let lists = [part.normals.len(), part.tangents.len(), part.colors.len()];
-    let morphs = part.morphs.iter().flat_map(|morph| [morph.positions.len(), morph.normals.len(), morph.tangents.len()]);
+    let morphs =
+        part.morphs.iter().flat_map(|morph| [morph.positions.len(), morph.normals.len(), morph.tangents.len()]);
     if !lists.into_iter().chain(part.uvs.iter().map(Vec::len)).chain(morphs).all(fits) {
         return Err("a list of attributes is not as long as the vertices");
     }

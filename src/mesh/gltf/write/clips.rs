@@ -9,12 +9,7 @@ use super::{
 };
 use crate::mesh::model::{ChannelTarget, Interpolation, Model};
 
-pub(super) fn write(
-    model: &Model,
-    skeleton: &Skeleton,
-    node_of_object: &[Option<usize>],
-    bin: &mut Bin,
-) -> Vec<Value> {
+pub(super) fn write(model: &Model, skeleton: &Skeleton, node_of_object: &[Option<usize>], bin: &mut Bin) -> Vec<Value> {
     let mut animations = Vec::new();
     for clip in &model.clips {
         let (mut channels, mut samplers) = (Vec::new(), Vec::new());

@@ -10,7 +10,9 @@ use super::{
 };
 use crate::mesh::{
     gltf::{
-        looks::{find_extensions, remap},
+        geometry::MAX_UV_SETS,
+        json::whole,
+        looks::{OWN_FIELDS, declare, find_extensions, remap, sniff},
         uri::percent_encode,
     },
     model::{Image, Looks},
@@ -38,7 +40,7 @@ pub(super) fn write(looks: &Looks, stem: Option<&str>, bin: &mut Bin) -> Written
         image_of[index] = Some(images.len());
         let mut map = Map::new();
         insert_name(&mut map, &image.name);
-        let mime = if image.mime.is_empty() { "image/png" } else { &image.mime };
+        let mime = if image.mime.is_empty() { sniff(&image.bytes).unwrap_or("image/png") } else { &image.mime };
         map.insert("mimeType".to_owned(), mime.into());
         match stem {
             None => drop(map.insert("bufferView".to_owned(), bin.view(&image.bytes, Target::Other).into())),
@@ -48,7 +50,9 @@ pub(super) fn write(looks: &Looks, stem: Option<&str>, bin: &mut Bin) -> Written
                 files.push((name, image.bytes.clone()));
             }
         }
-        map.extend(image.rest.iter().map(|(key, value)| (key.clone(), value.clone())));
+        for (key, value) in image.rest.iter().filter(|(key, _)| !OWN_FIELDS.contains(&key.as_str())) {
+            map.insert(key.clone(), value.clone());
+        }
         images.push(map.into());
     }
 
@@ -73,26 +77,40 @@ pub(super) fn write(looks: &Looks, stem: Option<&str>, bin: &mut Bin) -> Written
         textures.push(texture);
     }
 
-    let mut found = Vec::new();
+    let mut found = BTreeSet::new();
     for value in looks.materials.iter().chain(&textures).chain(&looks.samplers).chain(&images) {
         find_extensions(value, &mut found);
     }
-    let mut used: Vec<String> = looks.extensions_used.iter().filter(|name| found.contains(name)).cloned().collect();
-    for name in found {
-        if !used.contains(&name) {
-            used.push(name);
-        }
-    }
-    let required = looks.extensions_required.iter().filter(|name| used.contains(name)).cloned().collect();
+    let (extensions_used, extensions_required) = declare(found, &looks.extensions_used, &looks.extensions_required);
     Written {
         materials: looks.materials.clone(),
-        textures,
         samplers: looks.samplers.clone(),
+        textures,
         images,
         files,
-        extensions_used: used,
-        extensions_required: required,
+        extensions_used,
+        extensions_required,
     }
+}
+
+/// How many sets of texture coordinates a material uses: glTF demands them of each of its meshes.
+pub(super) fn uv_sets(material: &Value) -> usize {
+    let Value::Object(map) = material else {
+        return 0;
+    };
+    let of_field = |(key, value): (&String, &Value)| {
+        let coord = |value: &Value| value.get("texCoord").and_then(whole).unwrap_or(0);
+        match value {
+            _ if key == "extras" => 0,
+            Value::Object(info) if key.ends_with("Texture") => {
+                let transform = value.get("extensions").and_then(|value| value.get("KHR_texture_transform"));
+                let sets = [Some(coord(value)), transform.map(coord), info.contains_key("index").then_some(0)];
+                sets.into_iter().flatten().max().map_or(0, |set| set.saturating_add(1))
+            }
+            value => uv_sets(value),
+        }
+    };
+    map.iter().map(of_field).filter(|sets| *sets <= MAX_UV_SETS).max().unwrap_or(0)
 }
 
 /// A file name for an image: its own if it is plain and not taken, else one made of the stem and its number.
@@ -117,7 +135,7 @@ fn file_name(image: &Image, stem: &str, index: usize, taken: &mut BTreeSet<Strin
     }
     let mut name = format!("{stem}_image{index}.{extension}");
     while !taken.insert(name.to_ascii_lowercase()) {
-        name.insert_str(name.len() - extension.len() - 1, "_");
+        name.insert(name.len() - extension.len() - 1, '_');
     }
     name
 }

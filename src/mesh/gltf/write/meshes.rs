@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 use super::{
     buffer::{Bin, Target},
     floats, insert_list, insert_name,
+    looks::uv_sets,
     skeleton::{Skeleton, insert_transform},
 };
 use crate::mesh::{
@@ -95,10 +96,9 @@ fn mesh(object: &Object, primitives: Vec<Value>) -> Value {
     let mut extras = object.extras.clone();
     if object.morph_names.iter().any(|name| !name.is_empty()) {
         let names: Value = object.morph_names.iter().map(|name| Value::from(name.as_str())).collect();
-        match extras.get_or_insert_with(|| Map::new().into()) {
-            Value::Object(map) => drop(map.insert("targetNames".to_owned(), names)),
-            // Extras that are no object have no room for names.
-            _ => {}
+        // Extras that are no object have no room for names.
+        if let Value::Object(map) = extras.get_or_insert_with(|| Map::new().into()) {
+            map.insert("targetNames".to_owned(), names);
         }
     }
     if let Some(extras) = extras {
@@ -169,8 +169,13 @@ fn primitive(
         let tangents: Vec<[f32; 4]> = pick(&part.tangents, &used).zip(&normals).map(one).collect();
         put("TANGENT", bin.floats(&tangents, Target::Vertices));
     }
-    for (set, uvs) in part.uvs.iter().filter(|uvs| !uvs.is_empty()).enumerate() {
-        let uvs: Vec<[f32; 2]> = pick(uvs, &used).map(|uv| uv.to_array()).collect();
+    // A set that is missing below others, or that the material's textures need, is written as zeros.
+    let own_sets = part.uvs.iter().rposition(|uvs| !uvs.is_empty()).map_or(0, |last| last + 1);
+    let sets = own_sets.max(part.material.map_or(0, |material| uv_sets(&model.looks.materials[material])));
+    for set in 0..sets {
+        let mut uvs: Vec<[f32; 2]> =
+            part.uvs.get(set).map_or(vec![], |uvs| pick(uvs, &used).map(|uv| uv.to_array()).collect());
+        uvs.resize(used.len(), [0.0; 2]);
         put(&format!("TEXCOORD_{set}"), bin.floats(&uvs, Target::Vertices));
     }
     if !part.colors.is_empty() {
@@ -192,7 +197,7 @@ fn primitive(
                     weights[vertex][i] = *weight;
                 }
             }
-            put(&format!("JOINTS_{set}"), bin.joints(&joints, skeleton.joint_counts[skin]));
+            put(&format!("JOINTS_{set}"), bin.joints(&joints, skeleton.joint_count(skin)));
             put(&format!("WEIGHTS_{set}"), bin.floats(&weights, Target::Vertices));
         }
     }
@@ -230,7 +235,8 @@ fn morphs(part: &Part, used: &[u32], normals: &[Vec3], bake: &Bake, bin: &mut Bi
             target.insert("NORMAL".to_owned(), bin.floats(&moved, Target::Vertices).into());
         }
         if !morph.tangents.is_empty() && !part.tangents.is_empty() && !normals.is_empty() {
-            let moved: Vec<[f32; 3]> = pick(&morph.tangents, used).map(|offset| bake.vector(offset).to_array()).collect();
+            let moved: Vec<[f32; 3]> =
+                pick(&morph.tangents, used).map(|offset| bake.vector(offset).to_array()).collect();
             target.insert("TANGENT".to_owned(), bin.floats(&moved, Target::Vertices).into());
         }
         targets.push(target.into());

@@ -27,10 +27,8 @@ pub(super) struct Skeleton {
     influences: Weights,
     /// The glTF skin of each of the model's skins.
     pub(super) skin_of: Vec<Option<usize>>,
-    /// For each skin, the place of each of the model's nodes among the written joints.
-    slots: Vec<Vec<Option<u16>>>,
-    /// The number of written joints of each skin.
-    pub(super) joint_counts: Vec<usize>,
+    /// For each skin, the written joints by node, with their place in the skin.
+    slots: Vec<Vec<(usize, u16)>>,
     /// For each skin the node that points without weights go to.
     root_joints: Vec<Option<usize>>,
 }
@@ -39,7 +37,9 @@ impl Skeleton {
     pub(super) fn new(model: &Model, settings: &GltfWriteSettings) -> Result<Self, GltfError> {
         let count = model.nodes.len();
         let mut needed = vec![settings.all_joints; count];
-        let root_joints: Vec<Option<usize>> = (0..model.skins.len()).map(|skin| root_joint(model, skin)).collect();
+        // Parents come first, so no joint of a skin is above the smallest.
+        let root_joints: Vec<Option<usize>> =
+            model.skins.iter().map(|skin| skin.joints.iter().copied().min()).collect();
         let skinned = skinned_points(model);
         let influences = cut(model, &skinned, settings.max_influences.clamp(1, 8));
         for joint in &influences.joints {
@@ -67,42 +67,36 @@ impl Skeleton {
             }
         }
 
-        let mut slots = Vec::new();
-        let mut joint_counts = Vec::new();
-        let mut skin_of = Vec::new();
+        let (mut slots, mut skin_of) = (Vec::new(), Vec::new());
         let mut skins = 0;
         for skin in &model.skins {
-            let mut of_node = vec![None; count];
-            let mut next = 0;
-            for joint in skin.joints.iter().filter(|joint| needed[**joint]) {
-                let slot = u16::try_from(next).map_err(|_| GltfError::model("a skin has more than 65536 joints"))?;
-                of_node[*joint] = Some(slot);
-                next += 1;
+            let written = skin.joints.iter().filter(|joint| needed[**joint]);
+            let mut list: Vec<(usize, u16)> = written.zip(0..=u16::MAX).map(|(joint, slot)| (*joint, slot)).collect();
+            if list.len() < skin.joints.iter().filter(|joint| needed[**joint]).count() {
+                return Err(GltfError::model("a skin has more than 65536 joints"));
             }
-            slots.push(of_node);
-            joint_counts.push(next);
-            skin_of.push((next > 0).then_some(skins));
-            skins += usize::from(next > 0);
+            list.sort_unstable();
+            skin_of.push((!list.is_empty()).then_some(skins));
+            skins += usize::from(!list.is_empty());
+            slots.push(list);
         }
 
         let joined = joined_roots(model, &slots);
-        let mut next = usize::from(!joined.is_empty());
+        let first = usize::from(!joined.is_empty());
         let mut node_of = vec![None; count];
-        let mut roots: Vec<usize> = (0..next).collect();
-        for node in (0..count).filter(|node| needed[*node]) {
-            node_of[node] = Some(next);
-            if model.nodes[node].parent.is_none() && !joined.contains(&node) {
-                roots.push(next);
+        let mut roots: Vec<usize> = (0..first).collect();
+        for (at, node) in (first..).zip((0..count).filter(|node| needed[*node])) {
+            node_of[node] = Some(at);
+            if model.nodes[node].parent.is_none() && joined.binary_search(&node).is_err() {
+                roots.push(at);
             }
-            next += 1;
         }
-        Ok(Self { node_of, roots, joined, influences, skin_of, slots, joint_counts, root_joints })
+        Ok(Self { node_of, roots, joined, influences, skin_of, slots, root_joints })
     }
 
     /// The chosen nodes as glTF objects.
     pub(super) fn nodes(&self, model: &Model) -> Vec<Map<String, Value>> {
-        let chosen = || model.nodes.iter().zip(&self.node_of).filter_map(|(node, at)| Some((node, (*at)?)));
-        let mut children = vec![Vec::new(); chosen().last().map_or(0, |(_, at)| at + 1)];
+        let mut children = vec![Vec::new(); self.node_of.iter().flatten().max().map_or(0, |last| last + 1)];
         let mut nodes = Vec::new();
         if !self.joined.is_empty() {
             let mut root = Map::new();
@@ -110,7 +104,10 @@ impl Skeleton {
             nodes.push(root);
             children[0] = self.joined.iter().filter_map(|node| self.node_of[*node]).collect();
         }
-        for (node, at) in chosen() {
+        for (node, at) in model.nodes.iter().zip(&self.node_of) {
+            let Some(at) = *at else {
+                continue;
+            };
             if let Some(parent) = node.parent.and_then(|parent| self.node_of[parent]) {
                 children[parent].push(at);
             }
@@ -131,10 +128,10 @@ impl Skeleton {
     /// The skins over written joints.
     pub(super) fn skins(&self, model: &Model, bin: &mut Bin) -> Vec<Value> {
         let mut skins = Vec::new();
-        for (skin, slots) in model.skins.iter().zip(&self.slots) {
+        for skin in &model.skins {
             let (mut joints, mut matrices) = (Vec::new(), Vec::new());
             for (joint, matrix) in skin.joints.iter().zip(&skin.inverse_binds) {
-                if let (Some(node), Some(_)) = (self.node_of[*joint], slots[*joint]) {
+                if let Some(node) = self.node_of[*joint] {
                     let mut columns = matrix.to_cols_array();
                     for (i, last) in [(3, 0.0), (7, 0.0), (11, 0.0), (15, 1.0)] {
                         columns[i] = last;
@@ -155,11 +152,19 @@ impl Skeleton {
         skins
     }
 
+    /// The number of written joints of a skin.
+    pub(super) fn joint_count(&self, skin: usize) -> usize {
+        self.slots[skin].len()
+    }
+
     /// The influences of a point over the written joints of a skin.
     pub(super) fn influences(&self, skin: usize, point: u32) -> Result<Vec<(u16, f32)>, GltfError> {
         let slot = |node: usize| {
-            let outside = || GltfError::model(format!("point {point} has weights on node {node}, which its skin does not list"));
-            self.slots[skin][node].ok_or_else(outside)
+            let outside =
+                || GltfError::model(format!("point {point} has weights on node {node}, which its skin does not list"));
+            let slots = &self.slots[skin];
+            let found = slots.binary_search_by_key(&node, |(node, _)| *node);
+            found.map(|found| slots[found].1).map_err(|_| outside())
         };
         let list = self.influences.of(point as usize);
         if list.len() == 0 {
@@ -183,29 +188,20 @@ pub(super) fn insert_transform(map: &mut Map<String, Value>, trs: &Trs) {
     }
 }
 
-/// The first joint of a skin that has no joint of the skin above it.
-fn root_joint(model: &Model, skin: usize) -> Option<usize> {
-    let joints = &model.skins[skin].joints;
-    let mut listed = vec![false; model.nodes.len()];
-    joints.iter().for_each(|joint| listed[*joint] = true);
-    // Parents come first, so one pass tells what has a joint above.
-    let mut below = vec![false; model.nodes.len()];
-    for (node, entry) in model.nodes.iter().enumerate() {
-        below[node] = entry.parent.is_some_and(|parent| below[parent] || listed[parent]);
-    }
-    joints.iter().copied().find(|joint| !below[*joint])
-}
-
 /// The points that triangles of each skinned object use, each once.
 fn skinned_points(model: &Model) -> Vec<Vec<u32>> {
+    let mut parts: Vec<_> = model.parts.iter().filter(|part| model.objects[part.object].skin.is_some()).collect();
+    parts.sort_by_key(|part| part.object);
     let mut points = vec![Vec::new(); model.objects.len()];
-    for part in model.parts.iter().filter(|part| model.objects[part.object].skin.is_some()) {
-        let used = part.triangles.iter().flatten().map(|vertex| part.vertices[*vertex as usize]);
-        points[part.object].extend(used);
-    }
-    for list in &mut points {
-        list.sort_unstable();
-        list.dedup();
+    // The last object that has used each point, counted from one.
+    let mut user = vec![0; model.points.len()];
+    for part in parts {
+        for vertex in part.triangles.iter().flatten() {
+            let point = part.vertices[*vertex as usize];
+            if std::mem::replace(&mut user[point as usize], part.object + 1) != part.object + 1 {
+                points[part.object].push(point);
+            }
+        }
     }
     points
 }
@@ -232,15 +228,14 @@ fn cut(model: &Model, skinned: &[Vec<u32>], most: usize) -> Weights {
 }
 
 /// Roots that need a common parent: those above the joints of a skin that has several.
-fn joined_roots(model: &Model, slots: &[Vec<Option<u16>>]) -> Vec<usize> {
+fn joined_roots(model: &Model, slots: &[Vec<(usize, u16)>]) -> Vec<usize> {
     let mut root_of: Vec<usize> = Vec::with_capacity(model.nodes.len());
     for (node, entry) in model.nodes.iter().enumerate() {
         root_of.push(entry.parent.map_or(node, |parent| root_of[parent]));
     }
     let mut joined = Vec::new();
     for slots in slots {
-        let joints = slots.iter().enumerate().filter(|(_, slot)| slot.is_some());
-        let mut roots: Vec<usize> = joints.map(|(node, _)| root_of[node]).collect();
+        let mut roots: Vec<usize> = slots.iter().map(|(node, _)| root_of[*node]).collect();
         roots.sort_unstable();
         roots.dedup();
         if roots.len() > 1 {

@@ -1,0 +1,414 @@
+//! Automatic skin weights: what holds of every result, and what bodies, damage, locks and bad input give.
+
+use glam::Vec3;
+use proptest::prelude::*;
+use rigsmith::{
+    algo::weights::{Locks, Method, WeightError, WeightJoint, WeightReport, WeightSettings, skin_weights},
+    mesh::model::Weights,
+};
+
+fn joint(head: [f32; 3], parent: Option<usize>) -> WeightJoint {
+    WeightJoint { head: head.into(), parent, tail: None, deforms: true }
+}
+
+/// A tube along x from 0 to 4 with four sides and a cap at either end.
+fn tube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let rings = 41;
+    let mut points = Vec::new();
+    let mut triangles = Vec::new();
+    for ring in 0..rings {
+        for [y, z] in [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]] {
+            points.push(Vec3::new(ring as f32 * 0.1, y, z));
+        }
+    }
+    for ring in 0..rings - 1 {
+        for side in 0..4 {
+            let (a, b) = (ring * 4 + side, ring * 4 + (side + 1) % 4);
+            triangles.extend([[a, b, b + 4], [a, b + 4, a + 4]]);
+        }
+    }
+    let last = (rings - 1) * 4;
+    triangles.extend([[0, 2, 1], [0, 3, 2], [last, last + 1, last + 2], [last, last + 2, last + 3]]);
+    (points, triangles)
+}
+
+/// Two bones that meet in the middle of the tube.
+fn tube_joints() -> Vec<WeightJoint> {
+    vec![joint([0.1, 0.0, 0.0], None), joint([2.0, 0.0, 0.0], Some(0)), joint([3.8, 0.0, 0.0], Some(1))]
+}
+
+fn bind(points: &[Vec3], triangles: &[[u32; 3]], joints: &[WeightJoint]) -> (Weights, WeightReport) {
+    skin_weights(points, triangles, joints, &[], None, &WeightSettings::default(), &|_| true).unwrap()
+}
+
+/// The weight of a joint at a point.
+fn weight(weights: &Weights, point: usize, joint: u32) -> f32 {
+    weights.of(point).find(|e| e.0 == joint).map_or(0.0, |e| e.1)
+}
+
+/// What every result must be.
+fn check_sound(weights: &Weights, points: usize, joints: &[WeightJoint], most: usize) {
+    assert_eq!(weights.len(), points);
+    let any = joints.iter().any(|j| j.deforms);
+    for point in 0..points {
+        let row: Vec<(u32, f32)> = weights.of(point).collect();
+        assert!(!row.is_empty() && row.len() <= most, "point {point} has {} influences", row.len());
+        assert!(row.iter().all(|e| e.1.is_finite() && e.1 > 0.0), "point {point}: {row:?}");
+        assert!((row.iter().map(|e| e.1).sum::<f32>() - 1.0).abs() < 1e-5, "point {point}: {row:?}");
+        assert!(row.windows(2).all(|w| w[0].1 >= w[1].1), "point {point} is not sorted: {row:?}");
+        assert!(row.iter().all(|e| !any || joints[e.0 as usize].deforms), "point {point} hangs on a joint that must not deform");
+        let mut names: Vec<u32> = row.iter().map(|e| e.0).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), row.len(), "point {point} names a joint twice: {row:?}");
+    }
+}
+
+#[test]
+fn blends_across_a_joint_and_nowhere_else() {
+    let (points, triangles) = tube();
+    let joints = tube_joints();
+    let (weights, report) = bind(&points, &triangles, &joints);
+    check_sound(&weights, points.len(), &joints, 8);
+    assert_eq!((report.by_surface, report.points), (points.len(), points.len()));
+    for (x, low, high) in [(0.0, 0.99, 1.0), (1.0, 0.97, 1.0), (2.0, 0.35, 0.65), (3.0, 0.0, 0.03), (4.0, 0.0, 0.01)] {
+        let ring = (x * 10.0) as usize * 4;
+        for point in ring..ring + 4 {
+            let w = weight(&weights, point, 0);
+            assert!((low..=high).contains(&w), "at x = {x} the first joint has {w}, not {low} to {high}");
+        }
+    }
+    let along: Vec<f32> = (0..41).map(|ring| weight(&weights, ring * 4, 0)).collect();
+    assert!(along.windows(2).all(|w| w[0] >= w[1] - 1e-4), "the blend is not monotone: {along:?}");
+}
+
+#[test]
+fn smoothing_widens_the_blend() {
+    let (points, triangles) = tube();
+    let width = |smoothing: f32| {
+        let settings = WeightSettings { smoothing, ..WeightSettings::default() };
+        let (weights, _) = skin_weights(&points, &triangles, &tube_joints(), &[], None, &settings, &|_| true).unwrap();
+        (0..points.len()).map(|p| (weight(&weights, p, 0) * (1.0 - weight(&weights, p, 0))).min(0.25)).sum::<f32>()
+    };
+    assert!(width(0.25) < width(1.0) && width(1.0) < width(4.0));
+}
+
+#[test]
+fn unit_scale_and_place_do_not_matter() {
+    let (points, triangles) = tube();
+    let joints = tube_joints();
+    let (expected, _) = bind(&points, &triangles, &joints);
+    for scale in [0.001, 1000.0, 1e-20, 1e20] {
+        let moved: Vec<Vec3> = points.iter().map(|&p| p * scale).collect();
+        let joints: Vec<WeightJoint> = joints.iter().map(|&j| WeightJoint { head: j.head * scale, ..j }).collect();
+        let (weights, _) = bind(&moved, &triangles, &joints);
+        for point in 0..points.len() {
+            let (a, b) = (weight(&expected, point, 0), weight(&weights, point, 0));
+            assert!((a - b).abs() < 0.01, "point {point} at scale {scale}: {a} became {b}");
+        }
+    }
+}
+
+#[test]
+fn damage_changes_little() {
+    let (points, triangles) = tube();
+    let joints = tube_joints();
+    let (expected, _) = bind(&points, &triangles, &joints);
+    let unwelded: Vec<Vec3> = triangles.iter().flatten().map(|&p| points[p as usize]).collect();
+    let loose: Vec<[u32; 3]> = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let origin: Vec<usize> = triangles.iter().flatten().map(|&p| p as usize).collect();
+    let same: Vec<usize> = (0..points.len()).collect();
+    let flipped: Vec<[u32; 3]> = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    let holes: Vec<[u32; 3]> = triangles.iter().copied().enumerate().filter(|(i, _)| i % 3 != 1).map(|(_, t)| t).collect();
+    let doubled: Vec<[u32; 3]> = triangles.iter().flat_map(|&t| [t, t, [t[0], t[0], t[1]]]).collect();
+    for (name, points, triangles, origin) in [
+        ("unwelded", &unwelded, &loose, &origin),
+        ("flipped", &points, &flipped, &same),
+        ("holes", &points, &holes, &same),
+        ("doubled faces", &points, &doubled, &same),
+    ] {
+        let (weights, _) = bind(points, triangles, &joints);
+        check_sound(&weights, points.len(), &joints, 8);
+        let error: f32 = origin.iter().enumerate().map(|(p, &o)| (weight(&weights, p, 0) - weight(&expected, o, 0)).abs()).sum();
+        assert!(error / (origin.len() as f32) < 0.03, "{name}: mean change {}", error / origin.len() as f32);
+    }
+}
+
+#[test]
+fn specks_and_loose_points_follow_the_body() {
+    let (mut points, mut triangles) = tube();
+    let joints = tube_joints();
+    let speck = points.len();
+    for corner in [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z] {
+        points.push(Vec3::new(0.5, 0.4, 0.0) + corner * 0.01);
+    }
+    points.push(Vec3::new(3.5, 0.0, 0.5));
+    let base = speck as u32;
+    triangles.extend([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|f: [u32; 3]| f.map(|c| base + c)));
+    let (weights, report) = bind(&points, &triangles, &joints);
+    check_sound(&weights, points.len(), &joints, 8);
+    assert!((speck..speck + 4).all(|p| weight(&weights, p, 0) > 0.9));
+    assert!(weight(&weights, speck + 4, 1) + weight(&weights, speck + 4, 2) > 0.9);
+    assert_eq!(report.by_surface + report.by_voxels + report.by_fill + report.by_nearest + report.given, points.len());
+    assert_eq!(report.by_surface, speck);
+}
+
+#[test]
+fn every_method_covers_everything() {
+    let (points, triangles) = tube();
+    for method in [Method::Auto, Method::Heat, Method::Voxel] {
+        let settings = WeightSettings { method, voxel_resolution: 48, max_influences: 2, ..WeightSettings::default() };
+        let (weights, report) = skin_weights(&points, &triangles, &tube_joints(), &[], None, &settings, &|_| true).unwrap();
+        check_sound(&weights, points.len(), &tube_joints(), 2);
+        assert_eq!(report.by_voxels > 0, method == Method::Voxel);
+        assert!(weight(&weights, 0, 0) > 0.9 && weight(&weights, 160, 0) < 0.1);
+    }
+}
+
+#[test]
+fn a_root_below_the_body_holds_nothing() {
+    let (points, triangles) = tube();
+    let mut joints = vec![joint([-3.0, -1.0, 0.0], None)];
+    joints.extend(tube_joints().iter().map(|j| WeightJoint { parent: Some(j.parent.map_or(0, |p| p + 1)), ..*j }));
+    let (weights, _) = bind(&points, &triangles, &joints);
+    assert!((0..points.len()).all(|p| weight(&weights, p, 0) == 0.0));
+}
+
+#[test]
+fn joints_that_do_not_deform_pass_their_flesh_up() {
+    let (points, triangles) = tube();
+    let mut joints = tube_joints();
+    joints[1].deforms = false;
+    joints[2].deforms = false;
+    joints.push(joint([0.2, 0.0, 0.0], Some(0)));
+    let (weights, _) = bind(&points, &triangles, &joints);
+    check_sound(&weights, points.len(), &joints, 8);
+    assert!(weight(&weights, 160, 0) > 0.9, "the end of the tube belongs to the first joint");
+    for joint in &mut joints {
+        joint.deforms = false;
+    }
+    let (weights, _) = bind(&points, &triangles, &joints);
+    check_sound(&weights, points.len(), &joints, 8);
+}
+
+#[test]
+fn one_joint_takes_all() {
+    let (points, triangles) = tube();
+    let (weights, report) = bind(&points, &triangles, &[joint([9.0, 9.0, 9.0], None)]);
+    assert!((0..points.len()).all(|p| weights.of(p).eq([(0, 1.0)])));
+    assert_eq!(report, WeightReport { given: points.len(), points: points.len(), ..WeightReport::default() });
+}
+
+#[test]
+fn rigid_parts_hang_on_their_joint() {
+    let (points, triangles) = tube();
+    let (weights, report) =
+        skin_weights(&points, &triangles, &tube_joints(), &[(0..40, 2)], None, &WeightSettings::default(), &|_| true).unwrap();
+    assert!((0..40).all(|p| weights.of(p).eq([(2, 1.0)])));
+    assert_eq!(report.given, 40);
+    assert!(weight(&weights, 60, 0) > 0.5);
+}
+
+#[test]
+fn locked_joints_keep_their_weights() {
+    let (points, triangles) = tube();
+    let joints = tube_joints();
+    let mut present = Weights::default();
+    for point in 0..points.len() {
+        // Half of the first quarter, and all of the last point.
+        let held = if point + 1 == points.len() { 1.0 } else if point < 40 { 0.5 } else { 0.0 };
+        present.push([(2, held), (0, 1.0 - held)].into_iter().filter(|e| e.1 > 0.0));
+    }
+    let locks = Locks { weights: &present, joints: &[false, false, true] };
+    let (weights, _) = skin_weights(&points, &triangles, &joints, &[], Some(locks), &WeightSettings::default(), &|_| true).unwrap();
+    check_sound(&weights, points.len(), &joints, 8);
+    for point in 0..points.len() {
+        assert!((weight(&weights, point, 2) - weight(&present, point, 2)).abs() < 1e-5, "point {point}");
+    }
+    let locks = Locks { weights: &present, joints: &[true, true, true] };
+    let (weights, _) = skin_weights(&points, &triangles, &joints, &[], Some(locks), &WeightSettings::default(), &|_| true).unwrap();
+    assert!((0..points.len()).all(|p| (weight(&weights, p, 0) - weight(&present, p, 0)).abs() < 1e-5));
+}
+
+#[test]
+fn bad_input_is_named() {
+    let (points, triangles) = tube();
+    let joints = tube_joints();
+    let settings = WeightSettings::default();
+    let bind = |points: &[Vec3], triangles: &[[u32; 3]], joints: &[WeightJoint]| {
+        skin_weights(points, triangles, joints, &[], None, &settings, &|_| true).map(|_| ())
+    };
+    let mut broken = points.clone();
+    broken[7].y = f32::NAN;
+    assert_eq!(bind(&broken, &triangles, &joints), Err(WeightError::Point { point: 7 }));
+    broken[7].y = f32::INFINITY;
+    assert_eq!(bind(&broken, &triangles, &joints), Err(WeightError::Point { point: 7 }));
+    assert_eq!(bind(&points, &triangles, &[]), Err(WeightError::NoJoints));
+    assert_eq!(bind(&points, &[[0, 1, 999]], &joints), Err(WeightError::Triangle { triangle: 0 }));
+    assert_eq!(bind(&points, &triangles, &[joint([0.0; 3], None), joint([f32::NAN; 3], Some(0))]), Err(WeightError::Joint { joint: 1 }));
+    for parents in [[Some(1), Some(0)], [None, Some(1)], [None, Some(5)]] {
+        let joints = parents.map(|parent| joint([0.0; 3], parent));
+        assert!(matches!(bind(&points, &triangles, &joints), Err(WeightError::Parent { .. })), "{parents:?}");
+    }
+    let rigid = skin_weights(&points, &triangles, &joints, &[(0..9999, 0)], None, &settings, &|_| true);
+    assert_eq!(rigid.map(|_| ()), Err(WeightError::Rigid { part: 0 }));
+    let locks = Locks { weights: &Weights::default(), joints: &[true] };
+    let locked = skin_weights(&points, &triangles, &joints, &[], Some(locks), &settings, &|_| true);
+    assert_eq!(locked.map(|_| ()), Err(WeightError::Locks { points: 0, joints: 1 }));
+    let cancelled = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|share| share < 0.5);
+    assert_eq!(cancelled.map(|_| ()), Err(WeightError::Cancelled));
+}
+
+#[test]
+fn odd_input_gives_weights() {
+    let (points, triangles) = tube();
+    let joints = tube_joints();
+    let all_at_one_point = vec![Vec3::ONE; 30];
+    let fan: Vec<[u32; 3]> = (1..40).map(|i| [0, i, i + 1]).collect();
+    let many_here: Vec<WeightJoint> = (0..100_000).map(|i| joint([1.0, 0.0, 0.0], (i > 0).then_some(0))).collect();
+    let chain_here: Vec<WeightJoint> = (0..100_000usize).map(|i| joint([1.0, 0.0, 0.0], i.checked_sub(1))).collect();
+    let many_apart: Vec<WeightJoint> =
+        (0..5000).map(|i| joint([i as f32 * 8e-4, 0.1, (i % 7) as f32 * 0.01], (i > 0).then(|| i as usize - 1))).collect();
+    for (name, points, triangles, joints) in [
+        ("no points", &[][..], &[][..], &joints[..]),
+        ("no triangles", &points[..], &[][..], &joints[..]),
+        ("one place", &all_at_one_point[..], &[[0, 1, 2]][..], &joints[..]),
+        ("a fin on one edge", &points[..], &fan[..], &joints[..]),
+        ("siblings at one place", &points[..], &triangles[..], &many_here[..]),
+        ("a chain at one place", &points[..], &triangles[..], &chain_here[..]),
+        ("many joints", &points[..], &triangles[..], &many_apart[..]),
+    ] {
+        let (weights, _) = bind(points, triangles, joints);
+        check_sound(&weights, points.len(), joints, 8);
+        println!("{name} is sound");
+    }
+    let far: Vec<WeightJoint> = joints.iter().map(|&j| WeightJoint { head: j.head + Vec3::splat(1e30), ..j }).collect();
+    check_sound(&bind(&points, &triangles, &far).0, points.len(), &far, 8);
+}
+
+#[test]
+fn dense_meshes_are_bound_like_sparse_ones() {
+    // 50,000 points, more than are bound one by one.
+    let (around, along) = (100usize, 500usize);
+    let mut points = Vec::new();
+    let mut triangles = Vec::new();
+    for ring in 0..along {
+        for side in 0..around {
+            // A square section, walked at even steps.
+            let t = side as f32 / around as f32 * 4.0;
+            let (edge, at) = (t as usize, t.fract() * 0.6 - 0.3);
+            let [y, z] = [[at, -0.3], [0.3, at], [-at, 0.3], [-0.3, -at]][edge];
+            points.push(Vec3::new(ring as f32 / (along - 1) as f32 * 4.0, y, z));
+        }
+    }
+    for ring in 0..along - 1 {
+        for side in 0..around {
+            let (a, b) = ((ring * around + side) as u32, (ring * around + (side + 1) % around) as u32);
+            let up = around as u32;
+            triangles.extend([[a, b, b + up], [a, b + up, a + up]]);
+        }
+    }
+    let joints = tube_joints();
+    let (weights, report) = bind(&points, &triangles, &joints);
+    check_sound(&weights, points.len(), &joints, 8);
+    assert_eq!(report.by_surface, points.len());
+    let line: Vec<f32> = (0..along).map(|ring| weight(&weights, ring * around + around / 8, 0)).collect();
+    assert!(line[0] > 0.98 && line[along - 1] < 0.02 && (0.35..0.65).contains(&line[along / 2]), "{}", line[along / 2]);
+    assert!(line.windows(2).all(|w| (w[0] - w[1]).abs() < 0.04), "the blend has steps");
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let (points, triangles) = tube();
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| bind(&points, &triangles, &tube_joints()))
+    };
+    let (one, four) = (run(1), run(4));
+    assert_eq!(one, four);
+}
+
+#[test]
+fn bodies_are_bound_better_than_by_plain_bone_heat() {
+    let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
+        println!("skipped: RIGSMITH_DATA is not set");
+        return;
+    };
+    let bodies = std::path::Path::new(&data).join("bodies");
+    let json = |path: &std::path::Path| -> serde_json::Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
+    for (body, rig, limit) in [("male_young", "game_engine", 0.95 * 0.233), ("male_young", "mixamo", 1.05 * 0.159), ("baby", "game_engine", 0.196)] {
+        let text = std::fs::read_to_string(bodies.join(body).join("body.obj")).unwrap();
+        let mut points = Vec::new();
+        let mut triangles = Vec::new();
+        for line in text.lines() {
+            if let Some(numbers) = line.strip_prefix("v ") {
+                let c: Vec<f32> = numbers.split_ascii_whitespace().map(|n| n.parse().unwrap()).collect();
+                points.push(Vec3::new(c[0], c[1], c[2]));
+            } else if let Some(corners) = line.strip_prefix("f ") {
+                let f: Vec<u32> = corners.split_ascii_whitespace().map(|c| c.split('/').next().unwrap().parse::<u32>().unwrap() - 1).collect();
+                triangles.extend((2..f.len()).map(|i| [f[0], f[i - 1], f[i]]));
+            }
+        }
+        let truth = json(&bodies.join(format!("gt_weights_{rig}.json")));
+        let bones = json(&bodies.join(body).join("joints.json"))[rig].take();
+        let names: Vec<&str> = truth["bone_order"].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect();
+        let joints: Vec<WeightJoint> = names
+            .iter()
+            .map(|&name| {
+                let head = std::array::from_fn(|i| bones[name]["head"][i].as_f64().unwrap() as f32);
+                joint(head, bones[name]["parent"].as_str().and_then(|p| names.iter().position(|&n| n == p)))
+            })
+            .collect();
+        let (weights, report) = bind(&points, &triangles, &joints);
+        check_sound(&weights, points.len(), &joints, 8);
+        assert_eq!(report.by_surface, points.len());
+        let mut error = 0.0;
+        for (point, row) in truth["weights"].as_array().unwrap().iter().enumerate() {
+            let mut difference = vec![0f64; joints.len()];
+            weights.of(point).for_each(|(j, w)| difference[j as usize] += f64::from(w));
+            for entry in row.as_array().unwrap() {
+                difference[entry[0].as_u64().unwrap() as usize] -= entry[1].as_f64().unwrap();
+            }
+            error += difference.iter().map(|d| d.abs()).sum::<f64>() / 2.0;
+        }
+        error /= points.len() as f64;
+        assert!(error <= limit, "{body} with {rig}: error {error:.4}, limit {limit:.4}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Whatever the mesh and the rig, every point is weighted soundly, and again in the same way.
+    #[test]
+    fn junk_is_weighted_soundly(
+        points in prop::collection::vec(prop::array::uniform3(-4i8..5), 0..60),
+        corners in prop::collection::vec(prop::array::uniform3(0usize..1000), 0..120),
+        heads in prop::collection::vec((prop::array::uniform3(-5i8..6), 0usize..100, prop::bool::weighted(0.8), prop::bool::weighted(0.2)), 1..12),
+        method in prop::sample::select(vec![Method::Auto, Method::Heat, Method::Voxel]),
+        most in 1usize..6,
+        exponent in -6i32..7,
+    ) {
+        let scale = 10f32.powi(exponent);
+        let place = |p: &[i8; 3]| Vec3::from(p.map(f32::from)) * scale;
+        let points: Vec<Vec3> = points.iter().map(place).collect();
+        let triangles: Vec<[u32; 3]> =
+            if points.is_empty() { Vec::new() } else { corners.iter().map(|t| t.map(|c| (c % points.len()) as u32)).collect() };
+        let joints: Vec<WeightJoint> = heads
+            .iter()
+            .enumerate()
+            .map(|(i, (head, parent, deforms, tail))| WeightJoint {
+                head: place(head),
+                parent: (i > 0 && parent % 7 != 0).then(|| parent % i),
+                tail: tail.then(|| place(head) + Vec3::X * scale),
+                deforms: *deforms,
+            })
+            .collect();
+        let settings = WeightSettings { max_influences: most, method, voxel_resolution: 16, ..WeightSettings::default() };
+        let run = || skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap();
+        let (weights, report) = run();
+        check_sound(&weights, points.len(), &joints, most);
+        prop_assert_eq!(report.by_surface + report.by_voxels + report.by_fill + report.by_nearest + report.given, points.len());
+        prop_assert_eq!(run(), (weights, report));
+    }
+}
