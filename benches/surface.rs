@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let only = value("--only");
     let wanted = |name: &str| only.is_none_or(|only| only == name);
     let mut report = vec![format!("\"triangles\": {}", triangles.len()), format!("\"rays\": {}", rays.len())];
-    let mut note = |name: &str, value: f64| report.push(format!("\"{name}\": {value:.5}"));
+    let mut note = |name: &str, value: f64| report.push(format!("\"{name}\": {value:.7}"));
 
     let mut surface = Surface::build(&points, &triangles);
     if wanted("build") {

@@ -146,7 +146,7 @@ impl Hand {
             let nail = frames[2].child(dvec3(LENGTHS[f][2] * 0.86, r[3] * 0.70, 0.0), turn_z(-7.0));
             let q = nail.local(p);
             let outline = ellipsoid(q, DVec3::ZERO, dvec3(0.0078, 0.0060, 0.0058) * size);
-            let plate = ellipsoid(q, dvec3(-0.001, -0.0048, 0.0) * size, dvec3(0.018, 0.0075, 0.0072) * size);
+            let plate = ellipsoid(q, dvec3(-0.001, -0.0041, 0.0) * size, dvec3(0.018, 0.0075, 0.0072) * size);
             d = cut(d, intersect(outline, -plate - 0.0003, 0.0006), 0.0008);
             d = union(d, intersect(outline, plate, 0.0008), 0.0008);
         }

@@ -83,7 +83,7 @@ fn make_hand(folder: &Path) -> Result<(), Box<dyn Error>> {
         &mut mesh,
         &ring,
         &|p| shown.distance(p),
-        Settle { rounds: 10, spread: 0.4, reach: 0.002, step: 0.0002, polish: 1 },
+        Settle { rounds: 10, spread: 0.4, reach: 0.002, step: 0.0002, polish: 0 },
     );
     checked("hand", &mesh)?;
     // Fingers up, palm forward, standing on the cut forearm.

@@ -112,8 +112,8 @@ impl Surface {
 
     /// The first and the last hit along `ray`; the same one twice if there is only one.
     ///
-    /// `near` is at the distance of the first of [`Surface::hits`]. Costs two searches, each of which skips what the
-    /// other needs.
+    /// `near` is at the distance of the first of [`Surface::hits`]. Two searches, one from each end, so that little between is
+    /// visited.
     pub fn near_far(&self, ray: &Ray) -> Option<(Hit, Hit)> {
         let (frame, boxes) = self.prepare(ray)?;
         let near = self.tree.nearest(&frame, &boxes)?;

@@ -37,10 +37,13 @@ impl RestTransform {
         Affine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
     }
 
-    /// The nearest translation, rotation and scale to a matrix (shear is lost).
+    /// The nearest translation, rotation and scale to a matrix (shear is lost). A scale that differs from one by
+    /// rounding only is one, so that moving joints about does not make them grow.
     pub fn from_affine(affine: &Affine3) -> Self {
         let (scale, rotation, translation) = affine.to_scale_rotation_translation();
-        Self { translation, rotation, scale }
+        let snapped = |factor: f32| if (factor - 1.0).abs() < 1e-5 { 1.0 } else { factor };
+        let scale = Vec3::new(snapped(scale.x), snapped(scale.y), snapped(scale.z));
+        Self { translation, rotation: rotation.normalize(), scale }
     }
 
     /// True if every number is finite and the rotation has a length.

@@ -27,6 +27,9 @@ const OPENER: f32 = 0.1;
 
 /// How many radii before such a border sections lean that way already.
 const TRIM: f32 = 0.25;
+/// Something bigger is the limb going on if the stroke stays this near to its middle, for this long, in its radii.
+const BESIDE: f32 = 0.4;
+const LASTING: f32 = 1.5;
 /// Over how many radii the direction is taken in which the line goes on.
 const STRAIGHT: f32 = 3.0;
 
@@ -84,7 +87,7 @@ impl Axis {
 
     /// Joins sections to a line: finds those that are the limb's own, carries the line on over the others.
     fn assemble(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3], radius: f32) -> Option<Self> {
-        let own = own(sections, normals)?;
+        let own = own(samples, sections, normals)?;
         let measured = |i: usize| sections[i].filter(|_| own[i]);
         let radius = median((0..samples.len()).filter_map(|i| measured(i).map(|s| s.radius))).unwrap_or(radius);
         let known: Vec<usize> = (0..samples.len()).filter(|&i| measured(i).is_some()).collect();
@@ -110,16 +113,17 @@ impl Axis {
                     let end = next.saturating_sub(1);
                     let (from, tangent) = end_line(&line, radii[end], next == 0);
                     let on_line = under(from, tangent, &sample.ray);
-                    // Far beyond the limb its line says nothing any more; the volume's middle does.
-                    let trust = (0.5 * (5.0 - on_line.distance(from) / radii[end])).clamp(0.0, 1.0);
+                    // Far beyond the limb or beside the stroke its line says nothing any more; the volume's middle does.
+                    let far = on_line.distance(from) / radii[end];
+                    let beside = across(on_line, &sample.ray).length() / radii[end];
+                    let trust = (0.5 * (5.0 - far)).min(2.0 - beside).clamp(0.0, 1.0);
                     (sample.middle.lerp(on_line, trust), tangent, radii[end], false)
                 } else {
                     let (a, b) = (line[next - 1], line[next]);
                     let tangent = (b.0 - a.0).try_normalize().unwrap_or(a.1);
                     (under(a.0, tangent, &sample.ray), tangent, 0.5 * (radii[next - 1] + radii[next]), false)
                 };
-                let to = centre - sample.ray.origin;
-                let aside = to.reject_from_normalized(sample.ray.direction);
+                let aside = across(centre, &sample.ray);
                 Station { at: sample.at, centre, radius, tangent, own, aside }
             })
             .collect();
@@ -166,7 +170,7 @@ impl Axis {
 /// Starts at the section of median size and walks both ways. Not the limb's is a section that is open although those of
 /// the limb are closed, whose centre jumps aside, or that grows and at the same time leaves the line of those a radius back.
 /// `None` if there is no section at all.
-fn own(sections: &[Option<Section>], normals: &[Vec3]) -> Option<Vec<bool>> {
+fn own(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3]) -> Option<Vec<bool>> {
     let mut by_size: Vec<(f32, usize)> =
         sections.iter().enumerate().filter_map(|(i, s)| s.map(|s| (s.radius, i))).collect();
     by_size.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -178,6 +182,7 @@ fn own(sections: &[Option<Section>], normals: &[Vec3]) -> Option<Vec<bool>> {
     for way in ways {
         let mut line: Vec<(Section, Vec3)> = sections[seed].map(|s| (s, normals[seed])).into_iter().collect();
         let mut before = line.last().copied();
+        let mut other: Vec<usize> = Vec::new();
         for &i in &way {
             let (Some(section), Some((last, normal))) = (sections[i], before) else { continue };
             before = Some((section, normals[i]));
@@ -190,11 +195,28 @@ fn own(sections: &[Option<Section>], normals: &[Vec3]) -> Option<Vec<bool>> {
             let aside = (way.reject_from_normalized(normal).length() - 0.1 * way.length()) / back.radius;
             // A pinch in the limb is no measure for what comes after it.
             let growth = section.radius / back.radius.max(0.8 * line[0].0.radius);
-            if section.open > open || jump > 0.6 || growth > 1.8 || (growth > 1.2 && aside > 0.1) {
+            if section.open > open || jump > 0.6 {
+                other.clear();
                 continue;
             }
-            own[i] = true;
-            line.push((section, normals[i]));
+            if growth > 1.8 || (growth > 1.2 && aside > 0.1) {
+                // Something bigger. If the stroke goes on along its middle, that is the limb now: a thigh after the knee.
+                let beside = across(section.centroid, &samples[i].ray).length();
+                if beside > BESIDE * section.radius {
+                    other.clear();
+                    continue;
+                }
+                other.push(i);
+                let far = sections[other[0]].map_or(0.0, |s| s.centroid.distance(section.centroid));
+                if far < LASTING * section.radius {
+                    continue;
+                }
+                line.clear();
+            }
+            for i in other.drain(..).chain([i]) {
+                own[i] = true;
+                line.extend(sections[i].map(|s| (s, normals[i])));
+            }
         }
         // Just before the limb ends in something bigger its sections already lean that way.
         let Some(border) = way.iter().position(|&i| !own[i]) else { continue };
@@ -221,6 +243,11 @@ fn end_line(line: &[(Vec3, Vec3)], radius: f32, at_start: bool) -> (Vec3, Vec3) 
         }
     }
     (from, sum.try_normalize().unwrap_or(tangent))
+}
+
+/// From a ray to a point, square to the ray.
+fn across(point: Vec3, ray: &Ray) -> Vec3 {
+    (point - ray.origin).reject_from_normalized(ray.direction)
 }
 
 /// The point of the line from `from` along the unit vector `direction` that comes closest to `ray`; `from` itself where the

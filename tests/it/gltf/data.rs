@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::writing::there_and_back;
 use glam::{Affine3A, Quat, Vec3, Vec4};
 use rigsmith::mesh::{
-    gltf::{GltfWriteSettings, read_gltf},
+    gltf::{GltfWriteSettings, read_gltf, write_glb},
     model::{Channel, ChannelTarget, Clip, Interpolation, Model},
 };
 
@@ -143,6 +143,77 @@ fn characters_pose_the_same() {
                 let off = expected.iter().zip(&found).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
                 assert!(off <= 3e-6 * size, "{name}, {:?} at {time}: {off} of {size}", before.map(|clip| &clip.name));
             }
+        }
+    }
+}
+
+/// What the crate `gltf` reads from a file that is known to be good.
+fn read_by_other(glb: &[u8]) -> (Vec<Vec3>, Vec<[f32; 4]>, Vec<[[f32; 4]; 4]>, Vec<f32>) {
+    let file = ::gltf::Gltf::from_slice(glb).unwrap();
+    let bytes = |_: ::gltf::Buffer| file.blob.as_deref();
+    let (mut points, mut weights, mut binds, mut times) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for node in file.nodes().filter(|node| node.skin().is_some()) {
+        for primitive in node.mesh().unwrap().primitives() {
+            let reader = primitive.reader(bytes);
+            points.extend(reader.read_positions().unwrap().map(Vec3::from_array));
+            weights.extend(reader.read_weights(0).unwrap().into_f32());
+        }
+    }
+    for skin in file.skins() {
+        binds.extend(skin.reader(bytes).read_inverse_bind_matrices().unwrap());
+    }
+    for channel in file.animations().flat_map(|animation| animation.channels().collect::<Vec<_>>()) {
+        times.extend(channel.reader(bytes).read_inputs().unwrap());
+    }
+    (points, weights, binds, times)
+}
+
+#[test]
+fn another_reader_sees_the_same() {
+    let settings = GltfWriteSettings { all_joints: true, bind_unweighted: true, ..Default::default() };
+    for path in skinned_files().into_iter().flatten().filter(|path| path.extension().is_some_and(|kind| kind == "glb"))
+    {
+        let model = read_file(&path);
+        let (points, weights, binds, times) = read_by_other(&std::fs::read(&path).unwrap());
+        let skinned: Vec<Vec3> = (model.parts.iter().filter(|part| model.objects[part.object].skin.is_some()))
+            .flat_map(|part| part.vertices.iter().map(|point| model.points[*point as usize]))
+            .collect();
+        assert_eq!(points, skinned, "{}", path.display());
+        assert_eq!(
+            binds,
+            model
+                .skins
+                .iter()
+                .flat_map(|skin| &skin.inverse_binds)
+                .map(|bind| bind.to_cols_array_2d())
+                .collect::<Vec<_>>()
+        );
+        assert_eq!(
+            times,
+            model
+                .clips
+                .iter()
+                .flat_map(|clip| &clip.channels)
+                .flat_map(|channel| channel.times.clone())
+                .collect::<Vec<_>>()
+        );
+
+        let glb = write_glb(&model, &settings).unwrap();
+        let (points_after, weights_after, binds_after, times_after) = read_by_other(&glb);
+        assert!(points_after == points && binds_after == binds && times_after == times, "{}", path.display());
+        assert_eq!(weights_after.len(), weights.len());
+        for (after, before) in weights_after.iter().zip(&weights).filter(|_| !path.ends_with("body_gt.glb")) {
+            // The strongest come first, and the sum is one: both orders add up to the same.
+            let sorted = |weights: &[f32; 4]| {
+                let mut weights = weights.to_vec();
+                weights.sort_by(|a, b| b.total_cmp(a));
+                let sum: f32 = weights.iter().sum();
+                weights.iter().map(|weight| weight / sum).collect::<Vec<_>>()
+            };
+            assert!(
+                sorted(after).iter().zip(sorted(before)).all(|(a, b)| (a - b).abs() < 1e-6),
+                "{after:?} {before:?}"
+            );
         }
     }
 }

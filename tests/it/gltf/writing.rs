@@ -22,6 +22,8 @@ pub fn there_and_back(name: &str, model: &Model, settings: &GltfWriteSettings) -
     let first = write_glb(model, settings).unwrap();
     assert_eq!(first, write_glb(model, settings).unwrap());
     assert_eq!(first.len() % 4, 0);
+    let other_reader = ::gltf::Gltf::from_slice(&first);
+    assert!(other_reader.is_ok(), "{name}: {other_reader:?}");
     let again = read_gltf(&first, name, &mut |uri| Err(format!("there is no {uri}"))).unwrap();
     let second = write_glb(&again, settings).unwrap();
     let third = read_gltf(&second, name, &mut |uri| Err(format!("there is no {uri}"))).unwrap();
