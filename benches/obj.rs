@@ -49,6 +49,9 @@ fn main() {
     }
 }
 
+/// A name and what reads the file once and says how many seconds that took.
+type Way<'a> = (&'a str, Box<dyn FnMut() -> f64 + 'a>);
+
 /// Reads `path` in each way by turns and prints the times.
 fn compare(path: &Path, rounds: usize) {
     let size = std::fs::metadata(path).unwrap().len();
@@ -61,7 +64,7 @@ fn compare(path: &Path, rounds: usize) {
         black_box(arrays.corners.len());
     };
     read(&mut reused, &settings);
-    let mut ways: [(&str, Box<dyn FnMut() -> f64>); 5] = [
+    let mut ways: [Way; 5] = [
         ("fresh", {
             let settings = &settings;
             Box::new(move || {

@@ -4,14 +4,14 @@
 //! distance of the joints to the line of the limb's section centroids in parts of the local radius, and, for bent limbs
 //! stroked with `joints: 3`, how far the middle joint lies from the true elbow or knee in parts of the limb's length. The
 //! line is computed here from the mesh itself: planes square to the true bone, the loop of the cut around it, the centroid of
-//! that loop's area. `-- detail` prints every case, `-- time` only the timings.
+//! that loop's area. Where the limb is already part of the torso, joints are compared with that line carried on straight
+//! ("extended") and with the true bone. `-- detail` prints every case, `-- quick` runs a sixth, `-- time` only the timings.
 
 use std::{collections::BTreeMap, path::PathBuf, time::Instant};
 
 use glam::{Vec2, Vec3};
 use rigsmith::{
     algo::{
-
         stroke::{ChainChoice, StrokeSamples, StrokeSettings},
         view::{View, ViewPlane},
     },
@@ -29,7 +29,6 @@ const BODIES: [&str; 7] = [
     "male_young",
 ];
 const SEEDS: u64 = 8;
-
 
 fn main() {
     let Some(data) = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from) else {
@@ -332,7 +331,6 @@ fn centring(body: &Body, detail: bool, table: &mut Table) {
                 if project(a).distance(project(b)) < 0.5 * a.distance(b) {
                     continue;
                 }
-
                 for (jitter, jitter_name) in jitters() {
                     for (low, high, extent) in [(0.1, 0.9, "inner"), (0.0, 1.0, "whole")] {
                         let mut seen = Vec::new();
@@ -341,10 +339,7 @@ fn centring(body: &Body, detail: bool, table: &mut Table) {
                             let aim: Vec<Vec2> =
                                 [low, high].iter().map(|&t| project(a.lerp(b, t))).collect();
                             let stroke = jittered(&aim, 60, 0.3 * line.radius(), jitter, seed);
-                            let settings = StrokeSettings {
-                                
-                                ..Default::default()
-                            };
+                            let settings = StrokeSettings::default();
                             let Ok(samples) = StrokeSamples::new(&body.surface, &plane, &stroke, settings) else {
                                 seen.push(9.0);
                                 continue;
@@ -397,7 +392,6 @@ fn bending(body: &Body, detail: bool, table: &mut Table) {
                 if project(a).distance(project(b)) + project(b).distance(project(c)) < 0.5 * length {
                     continue;
                 }
-
                 for (jitter, jitter_name) in jitters() {
                     let mut seen = Vec::new();
                     for seed in 0..seeds() {
@@ -405,10 +399,7 @@ fn bending(body: &Body, detail: bool, table: &mut Table) {
                         let ends = [0.06 * random.next(), 0.06 * random.next()];
                         let aim = [project(a.lerp(b, ends[0].max(0.0))), project(b), project(c.lerp(b, ends[1]))];
                         let stroke = jittered(&aim, 90, 0.3 * radius, jitter, seed);
-                        let settings = StrokeSettings {
-                            
-                            ..Default::default()
-                        };
+                        let settings = StrokeSettings::default();
                         let Ok(samples) = StrokeSamples::new(&body.surface, &plane, &stroke, settings) else {
                             seen.push(1.0);
                             continue;

@@ -1,8 +1,9 @@
-//! Automatic weights on real bodies: error against hand-made weights, coverage, time, volume at bent joints, damaged meshes.
+//! Automatic weights on real bodies: error against hand-made weights, coverage, time, volume at bent joints, damaged
+//! meshes.
 //!
-//! `RIGSMITH_DATA=../shared/data cargo bench --bench weights [-- body...]`. With `RIGSMITH_BLENDER` set to a Python that
-//! has `bpy` and `RIGSMITH_PEERS` to the folder of `heat_weights.py`, Blender's bone heat runs on the same input in
-//! alternation. Rigs are given as joint heads and parents only; Blender gets the true tails.
+//! `RIGSMITH_DATA=../shared/data cargo bench --bench weights [-- body...]`. With `RIGSMITH_BLENDER` set to a Python
+//! that has `bpy` and `RIGSMITH_PEERS` to the folder of `heat_weights.py`, Blender's bone heat runs on the same input
+//! in alternation. Rigs are given as joint heads and parents only; Blender gets the true tails.
 
 use std::{collections::BTreeMap, fs, path::Path, process::Command, time::Instant};
 
@@ -66,7 +67,10 @@ fn main() {
         settings.smoothing = smoothing;
     }
     for rig in &RIGS {
-        println!("\n{}\n{:24} {:>8} {:>8} {:>8} {:>7}   region volume at 90 degrees (true weights)   Blender", rig.name, "body", "points", "weighted", "error", "ms");
+        println!(
+            "\n{}\n{:24} {:>8} {:>8} {:>8} {:>7}   region volume at 90 degrees (true weights)   Blender",
+            rig.name, "body", "points", "weighted", "error", "ms"
+        );
         for body in BODIES {
             if !chosen.is_empty() && !chosen.iter().any(|c| c == body) {
                 continue;
@@ -148,15 +152,25 @@ fn error(mesh: &Mesh, skeleton: &Skeleton, weights: &Weights) -> f64 {
     met.clone().map(|s| s.0 / f64::from(s.1)).sum::<f64>() / met.count() as f64
 }
 
-/// How much the volume of the limb around a bend changes when the joint below `upper` turns by 90 degrees towards a side.
+/// How much the volume of the limb around a bend changes when the joint below `upper` turns by 90 degrees towards a
+/// side.
 ///
 /// The limb is where the true weights of both joints hold most; its openings are closed with fans.
-fn bent_volume(triangles: &[[u32; 3]], mesh: &Mesh, skeleton: &Skeleton, weights: &Weights, upper: &str, towards: Vec3) -> f64 {
+fn bent_volume(
+    triangles: &[[u32; 3]],
+    mesh: &Mesh,
+    skeleton: &Skeleton,
+    weights: &Weights,
+    upper: &str,
+    towards: Vec3,
+) -> f64 {
     let index = |name: &str| skeleton.names.iter().position(|n| n == name).expect("the rig has the joint");
     let upper = index(upper);
-    let lower = (0..skeleton.joints.len()).find(|&j| skeleton.joints[j].parent == Some(upper)).expect("a limb has two joints");
+    let lower =
+        (0..skeleton.joints.len()).find(|&j| skeleton.joints[j].parent == Some(upper)).expect("a limb has two joints");
     let pivot = skeleton.joints[lower].head;
-    let end = (0..skeleton.joints.len()).find(|&j| skeleton.joints[j].parent == Some(lower)).expect("a limb has an end");
+    let end =
+        (0..skeleton.joints.len()).find(|&j| skeleton.joints[j].parent == Some(lower)).expect("a limb has an end");
     let axis = (skeleton.joints[end].head - pivot).cross(towards).normalize();
     let turn = Quat::from_axis_angle(axis, std::f32::consts::FRAC_PI_2);
     let mut moves = vec![false; skeleton.joints.len()];
@@ -178,7 +192,8 @@ fn bent_volume(triangles: &[[u32; 3]], mesh: &Mesh, skeleton: &Skeleton, weights
         .collect();
     let inside: Vec<bool> = (0..mesh.points.len())
         .map(|p| {
-            let held: f32 = skeleton.truth[p].iter().filter(|e| e.0 as usize == upper || e.0 as usize == lower).map(|e| e.1).sum();
+            let held: f32 =
+                skeleton.truth[p].iter().filter(|e| e.0 as usize == upper || e.0 as usize == lower).map(|e| e.1).sum();
             held > 0.5
         })
         .collect();
@@ -203,8 +218,12 @@ fn volume(points: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
         }
     }
     let reference = points[triangles[0][0] as usize];
-    let tetrahedron = |a: Vec3, b: Vec3, c: Vec3| f64::from((a - reference).dot((b - reference).cross(c - reference))) / 6.0;
-    let mut sum: f64 = triangles.iter().map(|t| tetrahedron(points[t[0] as usize], points[t[1] as usize], points[t[2] as usize])).sum();
+    let tetrahedron =
+        |a: Vec3, b: Vec3, c: Vec3| f64::from((a - reference).dot((b - reference).cross(c - reference))) / 6.0;
+    let mut sum: f64 = triangles
+        .iter()
+        .map(|t| tetrahedron(points[t[0] as usize], points[t[1] as usize], points[t[2] as usize]))
+        .sum();
     while let Some((&start, _)) = next.iter().next() {
         let mut ring = vec![start];
         let mut at = start;
@@ -234,7 +253,9 @@ fn damages(mesh: &Mesh) -> Vec<(&'static str, Mesh)> {
             specks.points.push(center + corner * 0.004);
             specks.origin.push(None);
         }
-        specks.faces.extend([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|f: [u32; 3]| f.map(|c| base + c).to_vec()));
+        specks
+            .faces
+            .extend([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|f: [u32; 3]| f.map(|c| base + c).to_vec()));
     }
     let mut unwelded = Mesh::default();
     for face in &mesh.faces {
@@ -353,7 +374,12 @@ fn read_rig(bodies: &Path, body: &str, rig: &str) -> Skeleton {
     let read = |path: &Path| -> Value { serde_json::from_slice(&fs::read(path).expect("readable")).expect("JSON") };
     let truth = read(&bodies.join(format!("gt_weights_{rig}.json")));
     let bones = read(&bodies.join(body).join("joints.json"))[rig].take();
-    let names: Vec<String> = truth["bone_order"].as_array().expect("a list").iter().map(|n| n.as_str().expect("a name").to_owned()).collect();
+    let names: Vec<String> = truth["bone_order"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|n| n.as_str().expect("a name").to_owned())
+        .collect();
     let vector = |v: &Value| Vec3::from_array(std::array::from_fn(|i| v[i].as_f64().expect("a number") as f32));
     let joints = names
         .iter()
@@ -366,7 +392,12 @@ fn read_rig(bodies: &Path, body: &str, rig: &str) -> Skeleton {
         .collect();
     let tails = names.iter().map(|name| vector(&bones[name]["tail"])).collect();
     let influence = |e: &Value| (e[0].as_u64().expect("an index") as u32, e[1].as_f64().expect("a weight") as f32);
-    let truth = truth["weights"].as_array().expect("a list").iter().map(|l| l.as_array().expect("a list").iter().map(influence).collect()).collect();
+    let truth = truth["weights"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|l| l.as_array().expect("a list").iter().map(influence).collect())
+        .collect();
     Skeleton { names, joints, tails, truth }
 }
 
@@ -395,14 +426,20 @@ fn blender(mesh: &Mesh, skeleton: &Skeleton) -> Option<(f64, f64, f64)> {
         .zip(&skeleton.tails)
         .map(|((j, name), tail)| json!({"name": name, "parent": j.parent.map_or(-1, |p| p as i64), "head": j.head.to_array(), "tail": tail.to_array()}))
         .collect();
-    let weights: Vec<Vec<(u32, f32)>> = mesh.origin.iter().map(|o| o.map_or(Vec::new(), |o| skeleton.truth[o as usize].clone())).collect();
+    let weights: Vec<Vec<(u32, f32)>> =
+        mesh.origin.iter().map(|o| o.map_or(Vec::new(), |o| skeleton.truth[o as usize].clone())).collect();
     fs::write(folder.join("rig.json"), json!({"joints": joints, "weights": weights}).to_string()).ok()?;
-    let output = Command::new(python).arg(script).arg(folder.join("mesh.obj")).arg(folder.join("rig.json")).output().ok()?;
+    let output =
+        Command::new(python).arg(script).arg(folder.join("mesh.obj")).arg(folder.join("rig.json")).output().ok()?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let line = text.lines().find(|l| l.starts_with('{'))?;
     let value: Value = serde_json::from_str(line).ok()?;
     fs::remove_dir_all(&folder).ok();
-    Some((value["seconds"].as_f64()?, value["weighted_share"].as_f64()?, value["error_vs_truth"].as_f64().unwrap_or(f64::NAN)))
+    Some((
+        value["seconds"].as_f64()?,
+        value["weighted_share"].as_f64()?,
+        value["error_vs_truth"].as_f64().unwrap_or(f64::NAN),
+    ))
 }
 
 /// A small generator of repeatable numbers from 0 to 1 (xorshift).

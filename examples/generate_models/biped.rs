@@ -356,5 +356,5 @@ pub fn warp(u: DVec3) -> DVec3 {
     let x = ANKLE.x + (u.x * head - ANKLE.x) * foot;
     let z = HEAD.z + (u.z - HEAD.z) * head;
     let p = dvec3(x, SHOULDER.y + (u.y - SHOULDER.y) * arm, SHOULDER.z + (z - SHOULDER.z) * arm);
-    lens(p, HEAD + dvec3(0.0, 0.080, 0.085), 0.085, 0.250, 0.53)
+    lens(p, HEAD + dvec3(0.0, 0.080, 0.085), 0.090, 0.260, 0.52)
 }

@@ -162,10 +162,10 @@ impl Hand {
         let distances: [f64; 5] = std::array::from_fn(chain);
         let near = (0..5).fold(0, |best, f| if distances[f] < distances[best] { f } else { best });
         let mut moved = p;
-        for j in 0..3 {
-            let local = self.fingers[near][j].local(p);
-            let soft = RADII[near][j] * 0.9;
-            moved = moved.lerp(to.fingers[near][j].out(local), ease(-soft, soft, local.x));
+        for ((from, goal), radius) in self.fingers[near].iter().zip(&to.fingers[near]).zip(RADII[near]).take(3) {
+            let local = from.local(p);
+            let soft = radius * 0.9;
+            moved = moved.lerp(goal.out(local), ease(-soft, soft, local.x));
         }
         moved
     }

@@ -160,17 +160,9 @@ impl Head {
                 (corner, 0.0022),
             ],
         );
-        d = union(d, union(upper, lower, 0.0008), 0.0042);
+        d = union(d, union(upper, lower, if self.detailed { 0.0008 } else { 0.0020 }), 0.0042);
         if !self.detailed {
-            let line = path(
-                q,
-                &[
-                    (at(0.0, 0.0464, 0.1020), 0.0018),
-                    (at(0.0100, 0.0468, 0.1004), 0.0018),
-                    (at(0.0190, 0.0467, 0.0968), 0.0006),
-                ],
-            );
-            return cut(d, line, 0.004);
+            return d;
         }
         let line = path(
             q,

@@ -35,8 +35,10 @@ use crate::mesh::{ray::Hit, surface::Surface};
 /// How a stroke is placed in depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrokeSettings {
-    /// Depth and volume, as for a click. A volume says where the stroke starts; from there it stays in it. A depth other
-    /// than one half is kept: recentring then only moves the joint across the view.
+    /// Depth and volume, as for a click. The volume is chosen where the stroke starts, and again where it divides (a pelvis
+    /// into legs); in between the stroke stays in it. Without a number it is the volume that a click there would hit, or
+    /// the nearest if the stroke runs much more closely along the middle of that one. A depth other than one half
+    /// is kept: recentring then only moves the joint across the view.
     pub place: PlaceSettings,
     /// Whether each joint takes one step to the centroid of the limb's section.
     pub recentre: bool,
@@ -62,7 +64,7 @@ pub enum ChainChoice {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum StrokeError {
     /// Fewer than two different finite points.
-    #[error("the stroke has {finite} usable points of {given}, all at one place: draw at least two different points")]
+    #[error("the stroke has {finite} usable points of {given}, which make no line: draw at least two different points in the view")]
     TooShort {
         /// Points given.
         given: usize,
@@ -132,8 +134,8 @@ pub struct StrokeSamples {
 impl StrokeSamples {
     /// Follows the stroke `points` (on `plane`) through `surface`.
     ///
-    /// Points that are not finite and repetitions are dropped. Costs about a hundred rays and as many fans of section
-    /// rays, whatever the number of points.
+    /// Points that are not finite and repetitions are dropped. Costs about a thousand rays whatever the number of points,
+    /// twice that where a choice between volumes must be made.
     ///
     /// # Errors
     /// [`StrokeError::TooShort`] without two different points, [`StrokeError::Misses`] if nothing lies under the stroke.
@@ -151,10 +153,11 @@ impl StrokeSamples {
             Some((track, axis))
         };
         let (mut track, mut axis) = follow(settings.place.volume).ok_or(StrokeError::Misses)?;
-        if settings.place.volume.is_none() && track.ambiguous {
-            if let Some(near) = follow(Some(1)).filter(|near| is_meant(near, &(&track, &axis))) {
-                (track, axis) = near;
-            }
+        if settings.place.volume.is_none()
+            && track.ambiguous
+            && let Some(near) = follow(Some(1)).filter(|near| is_meant(near, (&track, axis.as_ref())))
+        {
+            (track, axis) = near;
         }
         Ok(Self { plane: *plane, settings, path, track, axis, fan })
     }
@@ -163,7 +166,7 @@ impl StrokeSamples {
     pub fn chain(&self, surface: &Surface, choice: ChainChoice) -> StrokeChain {
         let places = match choice {
             ChainChoice::Threshold(threshold) => split::by_threshold(&self.path, threshold),
-            ChainChoice::Joints(count) => corners::choose(&self.path, &self.track, self.axis.as_ref(), count.max(2)),
+            ChainChoice::Joints(count) => corners::choose(&self.track, self.axis.as_ref(), count.max(2)),
         };
         let [first, last] = self.track.covered();
         let mut notes = Vec::new();
@@ -203,7 +206,7 @@ impl StrokeSamples {
         let source = self.path.at(at);
         let ray = self.plane.ray(source);
         surface.hits(&ray, hits);
-        let span = self.track.span_at(&ray, hits, at)?;
+        let span = self.track.span_at(hits, at)?;
         let count = hits.len();
         let depth = self.settings.place.depth();
         let section = self.axis.as_ref().map(|axis| axis.recentre(surface, &self.fan, at, &ray, hits));
@@ -213,7 +216,7 @@ impl StrokeSamples {
             Some((centroid, _)) if self.settings.recentre => {
                 let ray = self.plane.project(centroid).map_or(ray, |point| self.plane.ray(point));
                 surface.hits(&ray, hits);
-                let span = self.track.span_at(&ray, hits, at).unwrap_or(span);
+                let span = self.track.span_at(hits, at).unwrap_or(span);
                 ray.at(span.at(depth))
             }
             _ => ray.at(span.at(depth)),
@@ -224,10 +227,12 @@ impl StrokeSamples {
 
 /// Whether a stroke means the volumes nearest to the camera rather than those that a click would take: it runs along their
 /// middle much more closely, an arm before the torso, or stays over them much longer.
-fn is_meant(near: &(Track, Option<Axis>), usual: &(&Track, &Option<Axis>)) -> bool {
+fn is_meant(near: &(Track, Option<Axis>), usual: (&Track, Option<&Axis>)) -> bool {
     let (near_length, usual_length) = (near.0.samples.len() as f32, usual.0.samples.len() as f32);
     let closer = match (&near.1, usual.1) {
-        (Some(near), Some(usual)) => near.aside() < 0.4 * near.radius && near.aside() < 0.5 * usual.aside(),
+        (Some(near), Some(usual)) => {
+            near.aside() < 0.4 * near.radius && near.aside() + 0.2 * near.radius < usual.aside()
+        }
         (near, usual) => near.is_some() && usual.is_none(),
     };
     near_length >= 0.9 * usual_length && (closer || usual_length < 0.8 * near_length)

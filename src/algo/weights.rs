@@ -2,11 +2,15 @@
 //!
 //! Where the surface hangs together around its bones, heat spreads on it until it is in equilibrium (Baran and Popović
 //! 2007, "Automatic rigging and animation of 3D characters", section 4). Islands that no bone looks at (clothes over a
-//! body, loose specks) are bound through voxels ([`voxel_bind`]), and what neither reaches is filled from its
-//! neighbours ([`fill`]).
+//! body) are bound through voxels ([`voxel_bind`]); small ones (teeth, buttons, specks) and what neither reaches are
+//! filled from their neighbours ([`fill`]).
+//!
+//! What differs from the paper: a joint has a bone to each child ([`BoneSegment`](bone::BoneSegment)); the bones of
+//! last joints are found from the surface; a bone has a girth, and claims skin beyond it only reluctantly; sight is
+//! asked of patches of skin rather than of single points; large meshes are solved on a coarser surface.
 
-pub mod bone;
 mod bind;
+pub mod bone;
 mod bone_tree;
 mod bones;
 mod check;
@@ -144,7 +148,9 @@ pub enum WeightError {
         part: usize,
     },
     /// Locks that do not fit the mesh or the rig.
-    #[error("the locked weights are for {points} points and {joints} joints, the mesh and rig have others: bind without locks")]
+    #[error(
+        "the locked weights are for {points} points and {joints} joints, the mesh and rig have others: bind without locks"
+    )]
     Locks {
         /// How many points they have.
         points: usize,
@@ -164,9 +170,9 @@ pub enum WeightError {
 /// `points`, `triangles` over them and `joints` share one space, of any unit and size. `rigid` lists ranges of points
 /// that one joint moves alone. `progress` is called with the share of work done, 0 to 1, and cancels with `false`.
 ///
-/// Every point gets at least one joint and at most [`WeightSettings::max_influences`], strongest first, positive, summing
-/// to one. Joints that do not deform get none, unless none does: then all do. The result does not depend on the number of
-/// threads. Cost: near linear in the points; about 0.1 s for 13,000 points and 50 joints.
+/// Every point gets at least one joint and at most [`WeightSettings::max_influences`], strongest first, positive,
+/// summing to one. Joints that do not deform get none, unless none does: then all do. The result does not depend on
+/// the number of threads. Cost: near linear in the points; about 0.1 s for 13,000 points and 50 joints.
 ///
 /// # Errors
 /// [`WeightError`]: no joints, numbers that are not finite, indices that do not exist, or cancelled. A mesh without
@@ -191,7 +197,8 @@ pub fn skin_weights(
         return Ok((shaping.finish(|_| [(only, 1.0)].into_iter(), points.len()), report));
     }
     // Rigid parts neither spread heat nor hide bones.
-    let soft: Vec<[u32; 3]> = triangles.iter().copied().filter(|t| !t.iter().any(|&p| shaping.is_given(p as usize))).collect();
+    let soft: Vec<[u32; 3]> =
+        triangles.iter().copied().filter(|t| !t.iter().any(|&p| shaping.is_given(p as usize))).collect();
     let Bound { place, weights, sources } = bind::bind(points, &soft, joints, &free, settings, progress)?;
     for (point, &place) in place.iter().enumerate() {
         let count = match sources[place as usize] {

@@ -160,7 +160,8 @@ impl GltfError {
 /// so how much it reads is for it to limit. A buffer that cannot be loaded is an error, an image that cannot be loaded
 /// a note.
 ///
-/// * Nodes kept: joints, nodes moved by a clip, and the ancestors of both, depth first. A matrix becomes a [`Trs`](crate::mesh::model::Trs).
+/// * Nodes kept: joints, nodes moved by a clip, and the ancestors of both, depth first. A matrix becomes a
+///   [`Trs`](crate::mesh::model::Trs).
 /// * A mesh placed twice becomes two objects. Points of skinned objects keep their bits; others are moved to model
 ///   space, unless their node's rest transform is the identity to within rounding (then they keep their bits, too).
 /// * A mesh at or below a joint or animated node is a rigid part ([`Object::node`](crate::mesh::model::Object::node));

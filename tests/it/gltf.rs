@@ -1,7 +1,7 @@
 //! glTF in and out: what is read, what is written, and that nothing is lost between.
 
 pub mod compose;
-mod data;
+pub mod data;
 mod errors;
 mod writing;
 

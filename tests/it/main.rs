@@ -1,8 +1,35 @@
 //! All integration tests in one binary: one module a feature, through the public API.
 
+#[cfg(feature = "cli")]
+mod cli;
+mod edits;
+mod exports;
 mod files;
 mod files_read;
 mod files_set;
+mod fill;
+mod fuzz_gestures;
+mod fuzz_gltf;
+mod fuzz_obj;
 mod fuzz_rig_text;
+mod fuzz_template;
+mod gestures;
+mod gltf;
+mod gltf_torture;
+mod layout;
+mod mirror;
+mod models;
 mod mutate;
+mod obj;
+mod obj_torture;
+mod picking;
+mod placement;
+mod plugins;
 mod rig_text;
+mod skin_file;
+mod stroke;
+mod surface;
+mod template;
+mod transfer;
+mod voxels;
+mod weights;

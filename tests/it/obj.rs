@@ -68,8 +68,10 @@ fn spellings_of_the_same_triangle() {
 
 #[test]
 fn corners_of_every_form() {
-    let text = format!("{TRIANGLE}vt 0 0\nvt 1 0 0\nvt 0.5\nvn 0 0 1\nvn 0 0 -1\n\
-        f 1 2 3\nf 1/1 2/2 3/3\nf 1//1 2//1 3//2\nf 1/1/1 2/2/2 3/3/-1\nf 1/-3/-2 2 3//1\n");
+    let text = format!(
+        "{TRIANGLE}vt 0 0\nvt 1 0 0\nvt 0.5\nvn 0 0 1\nvn 0 0 -1\n\
+        f 1 2 3\nf 1/1 2/2 3/3\nf 1//1 2//1 3//2\nf 1/1/1 2/2/2 3/3/-1\nf 1/-3/-2 2 3//1\n"
+    );
     let read = arrays(&text).unwrap();
     let n = NONE;
     assert_eq!(read.corners, [0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2]);
@@ -269,8 +271,10 @@ fn readers_may_be_slow_or_fail() {
 
 #[test]
 fn runs_hold_for_their_faces() {
-    let text = format!("{TRIANGLE}f 1 2 3\no a\ng x y\nusemtl m\nf 1 2 3\nf 1 2 3\ns 4\nusemtl m\ns off\nf 1 2 3\n\
-        usemtl (null)\no b\nf 1 2 3\nusemtl unused\n");
+    let text = format!(
+        "{TRIANGLE}f 1 2 3\no a\ng x y\nusemtl m\nf 1 2 3\nf 1 2 3\ns 4\nusemtl m\ns off\nf 1 2 3\n\
+        usemtl (null)\no b\nf 1 2 3\nusemtl unused\n"
+    );
     let read = arrays(&text).unwrap();
     let name = |name| read.names.get(name);
     let runs: Vec<_> = read
@@ -278,12 +282,10 @@ fn runs_hold_for_their_faces() {
         .iter()
         .map(|run| (run.first_face, name(run.object), name(run.group), name(run.material), run.smoothing))
         .collect();
-    assert_eq!(runs, [
-        (0, "", "", "", NONE),
-        (1, "a", "x y", "m", NONE),
-        (3, "a", "x y", "m", 0),
-        (4, "b", "x y", "", 0),
-    ]);
+    assert_eq!(
+        runs,
+        [(0, "", "", "", NONE), (1, "a", "x y", "m", NONE), (3, "a", "x y", "m", 0), (4, "b", "x y", "", 0),]
+    );
 }
 
 #[test]
@@ -394,9 +396,18 @@ fn normals_where_there_are_none() {
         }
     }
     // However the faces of a cube are cut, the corner's normal is on its diagonal.
-    let cube = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 0\nv 0 1 1\nv 1 0 1\nf 1 3 5\nf 1 5 2\nf 1 4 6 3\nf 1 2 7 4\n";
+    let cube =
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 0\nv 0 1 1\nv 1 0 1\nf 1 3 5\nf 1 5 2\nf 1 4 6 3\nf 1 2 7 4\n";
     let corner = model(cube).parts[0].normals[0];
     assert!(corner.distance(glam::Vec3::splat(-1.0).normalize()) < 1e-4, "{corner}");
+}
+
+#[test]
+fn very_many_smoothing_groups() {
+    let mut text = TRIANGLE.to_owned();
+    (1..50_000).for_each(|i| text += &format!("s {i}\nf 1 2 3\n"));
+    let part = &model(&text).parts[0];
+    assert_eq!((part.triangles.len(), part.vertices.len()), (49_999, 3 * 4096));
 }
 
 #[test]
@@ -415,14 +426,14 @@ const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 #[test]
 fn materials_become_those_of_gltf() {
-    let obj = format!("mtllib sub/looks.mtl\n{TRIANGLE}usemtl skin\nf 1 2 3\nusemtl glass\nf 1 2 3\nusemtl lost\nf 1 2 3\n");
+    let obj =
+        format!("mtllib sub/looks.mtl\n{TRIANGLE}usemtl skin\nf 1 2 3\nusemtl glass\nf 1 2 3\nusemtl lost\nf 1 2 3\n");
     let mtl = "newmtl glass\nKd 0.1 0.2 0.3\nTr 0.75\nNs 1000\nKe 0 2 4\n\
         newmtl skin\nKd 0 0 0\nmap_Kd -s 2 2 -o 0.5 0 C:\\art\\skin color.png\nmap_Bump -bm 0.5 nrm.jpg\nPr 0.3\nPm 0.6\n";
-    let model = model_with(&obj, &[
-        ("sub/looks.mtl", mtl.as_bytes()),
-        ("sub/skin color.png", PNG),
-        ("nrm.jpg", b"\xff\xd8\xff\xe0"),
-    ]);
+    let model = model_with(
+        &obj,
+        &[("sub/looks.mtl", mtl.as_bytes()), ("sub/skin color.png", PNG), ("nrm.jpg", b"\xff\xd8\xff\xe0")],
+    );
     let [skin, glass, lost] = &model.looks.materials[..] else { panic!("{:?}", model.looks.materials) };
     assert_eq!(skin["name"], "skin");
     let surface = &skin["pbrMetallicRoughness"];

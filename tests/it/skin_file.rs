@@ -125,9 +125,9 @@ fn damage_is_named() {
     longer.push(0);
     assert!(matches!(SkinFile::read(&longer), Err(SkinFileError::Length { .. })));
     // Any flipped bit is noticed.
-    for at in 0..good.len() {
+    for (at, byte) in good.iter().enumerate() {
         for bit in 0..8 {
-            assert!(SkinFile::read(&edit(at, good[at] ^ 1 << bit)).is_err(), "byte {at} bit {bit}");
+            assert!(SkinFile::read(&edit(at, byte ^ 1 << bit)).is_err(), "byte {at} bit {bit}");
         }
     }
 }

@@ -265,7 +265,7 @@ fn under(from: Vec3, direction: Vec3, ray: &Ray) -> Vec3 {
 /// Every `step`-th sample and the last.
 fn every(samples: &[Sample], step: usize) -> Vec<Sample> {
     let mut some: Vec<Sample> = samples.iter().copied().step_by(step).collect();
-    if (samples.len() - 1) % step != 0 {
+    if !(samples.len() - 1).is_multiple_of(step) {
         some.push(samples[samples.len() - 1]);
     }
     some

@@ -6,15 +6,14 @@
 
 use glam::Vec3;
 
-use super::{axis::Axis, path::Path, track::Track};
+use super::{axis::Axis, track::Track};
 
 /// How strongly even pieces are preferred: what pieces twice too long or nil would cost, in squared deviations of one
 /// radius of the limb.
 const EVENNESS: f32 = 1.0;
 
 /// Arc lengths of exactly `count` joints, ends included, rising.
-pub(super) fn choose(path: &Path, track: &Track, axis: Option<&Axis>, count: usize) -> Vec<f32> {
-    let _ = path;
+pub(super) fn choose(track: &Track, axis: Option<&Axis>, count: usize) -> Vec<f32> {
     let [first, last] = track.covered();
     let even = || (0..count).map(|i| first + (last - first) * (i as f32 / (count - 1) as f32)).collect();
     let Some(axis) = axis else { return even() };
@@ -22,14 +21,13 @@ pub(super) fn choose(path: &Path, track: &Track, axis: Option<&Axis>, count: usi
     if count == 2 || count > points.len() / 2 {
         return even();
     }
-    let evenness = std::env::var("EVEN").ok().and_then(|v| v.parse().ok()).unwrap_or(EVENNESS);
-    let chosen = fit(&points, axis.radius, evenness, count);
+    let chosen = fit(&points, axis.radius, count);
     chosen.into_iter().map(|i| axis.stations[i].at).collect()
 }
 
 /// Indices of `count` points, the first and last among them, whose polyline has the least mean squared distance from all
 /// points, in squared radii, plus the price of uneven pieces. O(points³ + count · points²).
-fn fit(points: &[Vec3], radius: f32, evenness: f32, count: usize) -> Vec<usize> {
+fn fit(points: &[Vec3], radius: f32, count: usize) -> Vec<usize> {
     let n = points.len();
     let mut along = vec![0.0; n];
     for i in 1..n {
@@ -50,7 +48,7 @@ fn fit(points: &[Vec3], radius: f32, evenness: f32, count: usize) -> Vec<usize> 
             })
             .sum();
         let uneven = (along[j] - along[i]) / total * pieces - 1.0;
-        deviation / (radius * radius) + evenness * uneven * uneven / pieces
+        deviation / (radius * radius) + EVENNESS * uneven * uneven / pieces
     };
     let mut prices = vec![0.0; n * n];
     for i in 0..n {

@@ -56,10 +56,11 @@ pub fn classify(stroke: &[Vec2], joints: &[(Vec2, Option<usize>)], tolerance: f3
     }
     let start = joint_at(first, joints, tolerance);
     let end = joint_at(last, joints, tolerance).filter(|&joint| Some(joint) != start);
-    if start.is_none() && end.is_none() {
-        if let Some((bone, t)) = tick(&points, joints, tolerance) {
-            return StrokeKind::Insert { bone, t };
-        }
+    if start.is_none()
+        && end.is_none()
+        && let Some((bone, t)) = tick(&points, joints, tolerance)
+    {
+        return StrokeKind::Insert { bone, t };
     }
     StrokeKind::Chain { start, end }
 }
@@ -178,7 +179,7 @@ fn tick(points: &[Vec2], joints: &[(Vec2, Option<usize>)], tolerance: f32) -> Op
         let along = (p - first).dot(chord) / length;
         (p - first).perp_dot(chord).abs() <= 0.15 * length * length && along > -0.15 * length && along < 1.15 * length
     });
-    if !(length > 0.0) || !straight {
+    if length.is_nan() || length <= 0.0 || !straight {
         return None;
     }
     let mut found = None;

@@ -38,8 +38,8 @@ pub(crate) struct Bound {
 
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
 const SEEN: f32 = 0.15;
-/// Islands up to this size beside a mesh of size 2 are specks.
-const SPECK: f32 = 0.06;
+/// Islands up to this size beside a mesh of size 2 move with what is around them: specks, buttons, teeth.
+const SPECK: f32 = 0.2;
 
 /// Binds checked input to the joints in `free`.
 pub(crate) fn bind(
@@ -58,11 +58,8 @@ pub(crate) fn bind(
         takes_part[joint as usize] = true;
     }
     let job = Job { joints: &joints, takes_part: &takes_part, settings, progress };
-    let triangles: Vec<[u32; 3]> = triangles
-        .iter()
-        .map(|t| t.map(|p| place[p as usize]))
-        .filter(|[a, b, c]| a != b && b != c && c != a)
-        .collect();
+    let triangles: Vec<[u32; 3]> =
+        triangles.iter().map(|t| t.map(|p| place[p as usize])).filter(|[a, b, c]| a != b && b != c && c != a).collect();
     let graph = Graph::new(&places, &triangles);
     step(0.1)?;
     if count <= coarse::LIMIT {
@@ -72,7 +69,8 @@ pub(crate) fn bind(
     let coarse = Coarse::new(&places, &triangles, &graph);
     let coarse_graph = Graph::new(&coarse.points, &coarse.triangles);
     let (weights, sources, claims) = job.run(&coarse.points, &coarse.triangles, &coarse_graph)?;
-    let bound = |c: usize| Some(&claims[c]).filter(|_| sources[c] == Source::Surface);
+    let none = Claim::default();
+    let bound = |c: usize| if sources[c] == Source::Surface { &claims[c] } else { &none };
     let weights = coarse.spread(&weights, &graph, settings.blend(), bound);
     let sources = coarse.cluster.iter().map(|&c| sources[c as usize]).collect();
     Ok(Bound { place, weights, sources })
@@ -92,7 +90,12 @@ impl Job<'_> {
     }
 
     /// Binds a surface without duplicate points, of unit size: weights, where they come from, and the claims.
-    fn run(&self, places: &[Vec3], triangles: &[[u32; 3]], graph: &Graph) -> Result<(Weights, Vec<Source>, Vec<Claim>), WeightError> {
+    fn run(
+        &self,
+        places: &[Vec3],
+        triangles: &[[u32; 3]],
+        graph: &Graph,
+    ) -> Result<(Weights, Vec<Source>, Vec<Claim>), WeightError> {
         let method = self.settings.method;
         let sight = Sight::new(places, triangles);
         self.step(0.2)?;
@@ -112,7 +115,7 @@ impl Job<'_> {
             mark(&weights, &mut sources, Source::Surface);
             self.step(0.7)?;
         }
-        // Specks, buttons and loose points are better moved by what is around them than by voxels of their own size.
+        // Small and loose things are better moved by what is around them than by voxels of their own size.
         let large = |v: usize| method == Method::Voxel || !islands.is_small(v);
         if method != Method::Heat && (0..places.len()).any(|v| weights.of(v).len() == 0 && large(v)) {
             let found = self.by_voxels(places, triangles, &bones)?;
@@ -133,7 +136,9 @@ impl Job<'_> {
     /// Weights of all places by voxels; none if the mesh has no volume to speak of.
     fn by_voxels(&self, places: &[Vec3], triangles: &[[u32; 3]], bones: &Bones) -> Result<Weights, WeightError> {
         let settings = VoxelSettings { resolution: self.settings.voxel_resolution, ..VoxelSettings::default() };
-        match geodesic_voxel_weights(places, triangles, &bones.segments, &settings, &|share| (self.progress)(0.7 + 0.2 * share)) {
+        match geodesic_voxel_weights(places, triangles, &bones.segments, &settings, &|share| {
+            (self.progress)(0.7 + 0.2 * share)
+        }) {
             Ok(weights) => Ok(weights),
             Err(VoxelError::Cancelled) => Err(WeightError::Cancelled),
             Err(_) => Ok(empty(places.len())),
@@ -160,7 +165,7 @@ impl Islands {
         Self { of, extents: boxes.into_iter().map(|(low, high)| (high - low).max_element()).collect() }
     }
 
-    /// True if the island of a place is a speck beside the whole mesh.
+    /// True if the island of a place is small beside the whole mesh.
     fn is_small(&self, place: usize) -> bool {
         self.extents[self.of[place] as usize] < SPECK
     }

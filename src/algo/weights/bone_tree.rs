@@ -60,7 +60,8 @@ impl BoneTree {
         self.split(bones, from + middle, to);
     }
 
-    /// The bones whose `cost` is at most `1 + band` times the least, cheapest first, as (cost, bone). `out` is overwritten.
+    /// The bones whose `cost` is at most `1 + band` times the least, cheapest first, as (cost, bone). `out` is
+    /// overwritten.
     ///
     /// `cost` of a bone must not be less than its distance; infinity leaves a bone out.
     pub fn nearest(&self, point: Vec3, band: f32, mut cost: impl FnMut(u32) -> f32, out: &mut Vec<(f32, u32)>) {
@@ -87,7 +88,8 @@ impl BoneTree {
                 continue;
             }
             let (left, right) = (index + 1, node.first);
-            let nearer_left = distance_to_box(point, &self.nodes[left as usize]) <= distance_to_box(point, &self.nodes[right as usize]);
+            let nearer_left = distance_to_box(point, &self.nodes[left as usize])
+                <= distance_to_box(point, &self.nodes[right as usize]);
             let (near, far) = if nearer_left { (left, right) } else { (right, left) };
             stack[waiting] = far;
             stack[waiting + 1] = near;

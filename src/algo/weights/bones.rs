@@ -1,7 +1,8 @@
 //! From joints to bones: which straight pieces a joint pulls with, and how far its flesh reaches.
 //!
-//! A joint owns a bone to each of its children, so a hand holds its whole palm and a chest reaches up to both
-//! collarbones. Where a chain ends there is no child: the bone then runs through the flesh beyond the last joint.
+//! A joint owns a bone to each of its children that does not lie behind it, so a hand holds its whole palm and a chest
+//! reaches up to both collarbones. Where a chain ends there is no child: the bone then runs through the flesh beyond
+//! the last joint.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -33,9 +34,15 @@ pub(crate) struct Bones {
     pub tree: BoneTree,
 }
 
-/// Builds the bones of the joints that take part, in a frame where the surface has unit size. `areas` are those around the points of the
-/// welded surface that `sight` sees.
-pub(crate) fn build(joints: &[WeightJoint], takes_part: &[bool], points: &[Vec3], areas: &[f32], sight: &Sight) -> Bones {
+/// Builds the bones of the joints that take part, in a frame where the surface has unit size. `areas` are those around
+/// the points of the welded surface that `sight` sees.
+pub(crate) fn build(
+    joints: &[WeightJoint],
+    takes_part: &[bool],
+    points: &[Vec3],
+    areas: &[f32],
+    sight: &Sight,
+) -> Bones {
     /// Joints closer than this share a place.
     const SAME: f32 = 1e-6;
     let owners: Vec<Option<u32>> = owners(joints).into_iter().map(|o| o.filter(|&j| takes_part[j as usize])).collect();
@@ -43,14 +50,29 @@ pub(crate) fn build(joints: &[WeightJoint], takes_part: &[bool], points: &[Vec3]
     for parent in joints.iter().filter_map(|j| j.parent) {
         children[parent] += 1;
     }
+    // Roots whose bones run through the air.
+    let carries: Vec<bool> = joints
+        .iter()
+        .map(|joint| {
+            let Some(parent) = joint.parent else { return false };
+            let head = joints[parent].head;
+            let is_root = joints[parent].parent.is_none() && children[parent] <= MANY_CHILDREN;
+            head.distance(joint.head) > SAME && !(is_root && mostly_outside(head, joint.head, sight))
+        })
+        .collect();
+    let behind: Vec<bool> = (0..joints.len()).map(|j| carries[j] && is_behind(joints, &carries, j)).collect();
+    let mut leads_on = vec![false; joints.len()];
+    for (index, joint) in joints.iter().enumerate() {
+        if let Some(parent) = joint.parent {
+            leads_on[parent] |= carries[index] && !behind[index];
+        }
+    }
     let mut segments = Vec::new();
-    for joint in joints {
+    for (index, joint) in joints.iter().enumerate() {
         let Some(parent) = joint.parent else { continue };
         let Some(owner) = owners[parent] else { continue };
-        let head = joints[parent].head;
-        let is_root = joints[parent].parent.is_none() && children[parent] <= MANY_CHILDREN;
-        if head.distance(joint.head) > SAME && !(is_root && mostly_outside(head, joint.head, sight)) {
-            segments.push(BoneSegment { joint: owner, head, tail: joint.head });
+        if carries[index] && !(behind[index] && leads_on[parent]) {
+            segments.push(BoneSegment { joint: owner, head: joints[parent].head, tail: joint.head });
         }
     }
     let mut leaves = Vec::new();
@@ -67,13 +89,30 @@ pub(crate) fn build(joints: &[WeightJoint], takes_part: &[bool], points: &[Vec3]
     }
     if segments.is_empty() {
         // All bones lie outside the surface: a rig beside its mesh.
-        segments.extend(joints.iter().zip(&owners).filter_map(|(j, o)| Some(BoneSegment { joint: (*o)?, head: j.head, tail: j.head })));
+        segments.extend(
+            joints
+                .iter()
+                .zip(&owners)
+                .filter_map(|(j, o)| Some(BoneSegment { joint: (*o)?, head: j.head, tail: j.head })),
+        );
     }
     drop_repeats(&mut segments, &mut leaves);
     grow_leaves(joints, &mut segments, &leaves, points, areas, sight);
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, sight);
     Bones { segments, girths, tree }
+}
+
+/// True if the bone to `joint` turns back along the bone by which the chain arrived at its parent: an ear that hangs on
+/// the nose, say. The flesh there is the grandparent's.
+fn is_behind(joints: &[WeightJoint], carries: &[bool], joint: usize) -> bool {
+    /// The cosine of the sharpest turn that a bone takes.
+    const TURN: f32 = -0.25;
+    let Some(parent) = joints[joint].parent else { return false };
+    let Some(grandparent) = joints[parent].parent else { return false };
+    let onwards = (joints[joint].head - joints[parent].head).normalize_or_zero();
+    let arriving = (joints[parent].head - joints[grandparent].head).normalize_or_zero();
+    carries[parent] && onwards.dot(arriving) < TURN
 }
 
 /// Which joint carries the flesh of each: itself, or the nearest ancestor that deforms. All deform if none does.
@@ -142,7 +181,14 @@ fn mostly_outside(a: Vec3, b: Vec3, sight: &Sight) -> bool {
 /// Lets the bones of last joints run through the flesh around the joint: towards the centroid of the surface that is
 /// nearest to the joint, and nearly as far as that surface reaches. The direction in which the chain arrives would miss
 /// the toes of a foot that was entered from above.
-fn grow_leaves(joints: &[WeightJoint], segments: &mut [BoneSegment], leaves: &[(usize, usize)], points: &[Vec3], areas: &[f32], sight: &Sight) {
+fn grow_leaves(
+    joints: &[WeightJoint],
+    segments: &mut [BoneSegment],
+    leaves: &[(usize, usize)],
+    points: &[Vec3],
+    areas: &[f32],
+    sight: &Sight,
+) {
     if leaves.is_empty() {
         return;
     }
@@ -226,7 +272,8 @@ fn girths(segments: &[BoneSegment], tree: &BoneTree, points: &[Vec3], areas: &[f
             around[bone as usize].push((distance, areas[p]));
         }
     }
-    let mut girths: Vec<Option<f32>> = around.iter_mut().map(|list| if list.len() < FEW { None } else { quantile(list) }).collect();
+    let mut girths: Vec<Option<f32>> =
+        around.iter_mut().map(|list| if list.len() < FEW { None } else { quantile(list) }).collect();
     let mut known: Vec<f32> = girths.iter().flatten().copied().collect();
     known.sort_by(f32::total_cmp);
     // Without a single measure no bone has a girth, and plain distance decides.

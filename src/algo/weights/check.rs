@@ -29,7 +29,9 @@ pub(crate) fn input(
     if let Some(triangle) = triangles.iter().position(|t| t.iter().any(|&p| p as usize >= points.len())) {
         return Err(WeightError::Triangle { triangle });
     }
-    if let Some(part) = rigid.iter().position(|(r, j)| r.start > r.end || r.end as usize > points.len() || *j as usize >= joints.len()) {
+    if let Some(part) =
+        rigid.iter().position(|(r, j)| r.start > r.end || r.end as usize > points.len() || *j as usize >= joints.len())
+    {
         return Err(WeightError::Rigid { part });
     }
     if let Some(locks) = locks

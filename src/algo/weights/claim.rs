@@ -93,7 +93,9 @@ fn reach(distance: f32, girth: f32) -> f32 {
 /// The claim on one point; `near` is scratch space.
 fn claim(point: Vec3, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) -> Claim {
     let mut result = Claim::default();
-    let cost = |bone: u32| reach(closest_on(&bones.segments[bone as usize], point).distance(point), bones.girths[bone as usize]);
+    let cost = |bone: u32| {
+        reach(closest_on(&bones.segments[bone as usize], point).distance(point), bones.girths[bone as usize])
+    };
     bones.tree.nearest(point, BAND, cost, near);
     let Some(&(best, first)) = near.first() else { return result };
     let target = closest_on(&bones.segments[first as usize], point);

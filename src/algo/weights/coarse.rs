@@ -1,5 +1,5 @@
-//! A coarser surface for large meshes: weights vary over a limb's width, not from vertex to vertex, so a mesh of a million
-//! points is bound through some ten thousand and the result is spread back.
+//! A coarser surface for large meshes: weights vary over a limb's width, not from vertex to vertex, so a mesh of a
+//! million points is bound through some ten thousand and the result is spread back.
 
 use glam::Vec3;
 
@@ -55,7 +55,11 @@ impl Coarse {
                         }
                     }
                 }
-                let beside = members.iter().flat_map(|&v| graph.of(v as usize)).map(|(n, _)| cluster[n]).find(|&c| c != count && c != FREE);
+                let beside = members
+                    .iter()
+                    .flat_map(|&v| graph.of(v as usize))
+                    .map(|(n, _)| cluster[n])
+                    .find(|&c| c != count && c != FREE);
                 match beside {
                     // A remnant joins its neighbour.
                     Some(other) if members.len() * 3 < size => {
@@ -83,8 +87,14 @@ impl Coarse {
 
     /// Spreads the weights of clusters to the fine vertices, by some steps towards the equilibrium on the fine surface.
     ///
-    /// Clusters without a claim to their name (`None`) keep their weights as they are.
-    pub fn spread<'a>(&self, coarse: &Weights, graph: &Graph, smoothing: f32, claim: impl Fn(usize) -> Option<&'a Claim> + Sync) -> Weights {
+    /// Where `claim` has no heat, as where voxels bound, steps between clusters are only smoothed.
+    pub fn spread<'a>(
+        &self,
+        coarse: &Weights,
+        graph: &Graph,
+        smoothing: f32,
+        claim: impl Fn(usize) -> &'a Claim + Sync,
+    ) -> Weights {
         let mut weights = Weights { starts: Vec::with_capacity(self.cluster.len() + 1), ..Weights::default() };
         weights.starts.push(0);
         for &c in &self.cluster {

@@ -18,7 +18,12 @@ const NONE: u32 = u32::MAX;
 
 impl<'a> Shaping<'a> {
     /// Takes checked input.
-    pub fn new(points: usize, parts: &[(Range<u32>, u32)], locks: Option<Locks<'a>>, settings: &WeightSettings) -> Self {
+    pub fn new(
+        points: usize,
+        parts: &[(Range<u32>, u32)],
+        locks: Option<Locks<'a>>,
+        settings: &WeightSettings,
+    ) -> Self {
         let mut rigid = Vec::new();
         if !parts.is_empty() {
             rigid.resize(points, NONE);
@@ -35,8 +40,8 @@ impl<'a> Shaping<'a> {
         self.rigid.get(point).is_some_and(|&joint| joint != NONE)
     }
 
-    /// The joints that take part: those that deform and are not locked; if none is left, all that are not locked; if none
-    /// is left, all that deform; else all.
+    /// The joints that take part: those that deform (all, if none is marked so) and are not locked; if none is left,
+    /// all that deform.
     pub fn free_joints(&self, joints: &[WeightJoint]) -> Vec<u32> {
         let locked = |j: usize| self.locks.is_some_and(|l| l.joints[j]);
         let any = joints.iter().any(|j| j.deforms);

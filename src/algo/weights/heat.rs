@@ -1,7 +1,7 @@
 //! Heat equilibrium on the surface: every point is warmed by its own bones and cooled by its neighbours.
 //!
-//! Solves `(L + M H) w = M H p` for each joint (Baran and Popović 2007, section 4) with the cotangent Laplacian `L`, lumped
-//! areas `M`, and the claims `H`, `p`.
+//! Solves `(L + M H) w = M H p` for each joint (Baran and Popović 2007, section 4) with the cotangent Laplacian `L`,
+//! lumped areas `M`, and the claims `H`, `p`.
 
 use rayon::prelude::*;
 
@@ -24,12 +24,13 @@ const LEAST: f32 = 1e-4;
 /// Vertices handled at a time by one thread.
 const CHUNK: usize = 1024;
 
-/// The weights of all vertices in `wanted`; the others, and components without any claim, stay empty. `smoothing` widens
-/// blends. Independent of the number of threads.
+/// The weights of all vertices in `wanted`; the others, and components without any claim, stay empty. `smoothing`
+/// widens blends. Independent of the number of threads.
 ///
 /// Cost: one sparse factorisation and a solve for each joint that has a claim.
 pub(crate) fn solve(graph: &Graph, claims: &[Claim], wanted: &[bool], smoothing: f32) -> Weights {
-    let mut joints: Vec<u32> = claims.iter().filter(|c| c.heat > 0.0).flat_map(|c| c.shares).filter(|s| s.1 > 0.0).map(|s| s.0).collect();
+    let mut joints: Vec<u32> =
+        claims.iter().filter(|c| c.heat > 0.0).flat_map(|c| c.shares).filter(|s| s.1 > 0.0).map(|s| s.0).collect();
     joints.sort_unstable();
     joints.dedup();
     let factor = if joints.len() > MANY_JOINTS { None } else { Ldl::new(&matrix(graph, claims, smoothing)) };
@@ -68,7 +69,7 @@ pub(crate) fn solve(graph: &Graph, claims: &[Claim], wanted: &[bool], smoothing:
             weights.push(claim.shares.into_iter().filter(|s| s.1 > 0.0 && claim.heat > 0.0));
         }
         for _ in 0..STEPS {
-            weights = step(&weights, graph, smoothing, |v| Some(&claims[v]));
+            weights = step(&weights, graph, smoothing, |v| &claims[v]);
         }
         for (v, row) in rows.iter_mut().enumerate().filter(|(v, _)| wanted[*v]) {
             row.extend(weights.of(v));
@@ -108,8 +109,13 @@ fn warmth(graph: &Graph, claims: &[Claim], v: usize, smoothing: f32, floor: f64)
     f64::from(graph.areas[v]).max(floor) * f64::from(claims[v].heat) / f64::from(smoothing)
 }
 
-/// One damped step towards the equilibrium on sparse rows. Vertices without a claim to their name (`None`) stay as they are.
-pub(crate) fn step<'a>(weights: &Weights, graph: &Graph, smoothing: f32, claim: impl Fn(usize) -> Option<&'a Claim> + Sync) -> Weights {
+/// One damped step towards the equilibrium on sparse rows. Vertices without neighbours stay as they are.
+pub(crate) fn step<'a>(
+    weights: &Weights,
+    graph: &Graph,
+    smoothing: f32,
+    claim: impl Fn(usize) -> &'a Claim + Sync,
+) -> Weights {
     let vertices: Vec<usize> = (0..weights.len()).collect();
     let parts: Vec<Weights> = vertices
         .par_chunks(CHUNK)
@@ -117,10 +123,11 @@ pub(crate) fn step<'a>(weights: &Weights, graph: &Graph, smoothing: f32, claim: 
             let mut part = Weights { starts: vec![0], ..Weights::default() };
             let mut row: Vec<(u32, f32)> = Vec::new();
             for &v in chunk {
-                let Some(claim) = claim(v) else {
+                let claim = claim(v);
+                if graph.of(v).next().is_none() {
                     part.push(weights.of(v));
                     continue;
-                };
+                }
                 // Deep inside one joint's flesh nothing changes.
                 if let Some(only) = sole(weights, v)
                     && (claim.heat <= 0.0 || claim.shares[0] == (only, 1.0))

@@ -18,8 +18,8 @@ pub(crate) struct Graph {
 impl Graph {
     /// Cotangent weights (Pinkall and Polthier 1993), lumped areas.
     ///
-    /// Cotangents of angles are clamped: a needle would couple its ends without bound, and a negative sum would break the
-    /// maximum principle that keeps weights between zero and one. Edges may have any number of triangles. Repeated
+    /// Cotangents of angles are clamped: a needle would couple its ends without bound, and a negative sum would break
+    /// the maximum principle that keeps weights between zero and one. Edges may have any number of triangles. Repeated
     /// corners are skipped.
     pub fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let n = points.len();
@@ -42,7 +42,8 @@ impl Graph {
             for i in 0..3 {
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
                 let dot = (corner[j] - corner[i]).dot(corner[k] - corner[i]);
-                let cotangent = if double_area > 0.0 { (dot / double_area).clamp(-MAX_COTANGENT, MAX_COTANGENT) } else { 0.0 };
+                let cotangent =
+                    if double_area > 0.0 { (dot / double_area).clamp(-MAX_COTANGENT, MAX_COTANGENT) } else { 0.0 };
                 for (from, to) in [(t[j], t[k]), (t[k], t[j])] {
                     half_edges[next[from as usize] as usize] = (to, 0.5 * cotangent);
                     next[from as usize] += 1;

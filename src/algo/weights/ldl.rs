@@ -1,7 +1,7 @@
 //! Sparse factorisation of a symmetric positive definite matrix, once for many right-hand sides.
 //!
-//! Up-looking `L D Lᵀ` (Davis, *Direct Methods for Sparse Linear Systems*, section 4.8) after approximate minimum degree
-//! ordering by `faer`. Right-hand sides are solved in blocks that share one pass over the factor.
+//! Up-looking `L D Lᵀ` (Davis, *Direct Methods for Sparse Linear Systems*, section 4.8) after approximate minimum
+//! degree ordering by `faer`. Right-hand sides are solved in blocks that share one pass over the factor.
 
 use faer::{
     dyn_stack::{MemBuffer, MemStack},
@@ -174,6 +174,7 @@ fn minimum_degree(matrix: &Symmetric) -> Option<(Vec<u32>, Vec<u32>)> {
     let mut order = vec![0u32; n];
     let mut inverse = vec![0u32; n];
     let mut memory = MemBuffer::try_new(amd::order_maybe_unsorted_scratch::<u32>(n, rows.len())).ok()?;
-    amd::order_maybe_unsorted(&mut order, &mut inverse, symbolic, amd::Control::default(), MemStack::new(&mut memory)).ok()?;
+    amd::order_maybe_unsorted(&mut order, &mut inverse, symbolic, amd::Control::default(), MemStack::new(&mut memory))
+        .ok()?;
     Some((order, inverse))
 }

@@ -1,4 +1,5 @@
-//! Lines of sight through a triangle soup: is a segment clear, where does a ray first meet a surface, is a point inside.
+//! Lines of sight through a triangle soup: is a segment clear, where does a ray first meet a surface, is a point
+//! inside.
 //!
 //! Every answer is the same for either orientation of the triangles, so shells that are inside-out cause no trouble.
 
@@ -58,7 +59,8 @@ impl Sight {
         bvh.ray_traverse(ray, &mut hit, |ray, index| self.triangles[index].intersect(ray)).then_some(hit.t)
     }
 
-    /// True if the surface is around `point`, by two measures over evenly spread rays, each of which some damage spoils.
+    /// True if the surface is around `point`, by two measures over evenly spread rays, each of which some damage
+    /// spoils.
     ///
     /// The mean of signed crossings is the generalised winding number (Jacobson et al. 2013), which holes weaken and
     /// shells inside each other strengthen, but which needs triangles of one orientation. The share of rays with an odd

@@ -88,7 +88,7 @@ pub enum VoxelError {
 /// [`BoneSegment::joint`]; several segments may belong to one joint, whose distance is that of the nearest. A point
 /// that no bone reaches (a loose speck, a point far from the surface or from the skeleton) has no influences; all
 /// others sum to one. `progress` is called with a share of the work done, 0 to 1, and cancels with `false`.
-/// Independent of the number of threads. Cost: voxels times labels, plus points times labels; about 0.3 s for a body.
+/// Independent of the number of threads. Cost: voxels times labels, plus points times labels; about 0.1 s for a body.
 ///
 /// # Errors
 /// [`VoxelError`]: the mesh has triangles out of range or none at all, there are no bones, or it was cancelled.

@@ -131,8 +131,11 @@ fn document(model: &Model, settings: &GltfWriteSettings, stem: Option<&str>) -> 
     root.insert("asset".to_owned(), asset.into());
     insert_list(&mut root, "extensionsUsed", looks.extensions_used);
     insert_list(&mut root, "extensionsRequired", looks.extensions_required);
-    root.insert("scene".to_owned(), 0.into());
-    root.insert("scenes".to_owned(), vec![Value::from(scene)].into());
+    // Some readers take no scene without nodes.
+    if scene.contains_key("nodes") {
+        root.insert("scene".to_owned(), 0.into());
+        root.insert("scenes".to_owned(), vec![Value::from(scene)].into());
+    }
     insert_list(&mut root, "nodes", nodes);
     insert_list(&mut root, "meshes", meshes.meshes);
     insert_list(&mut root, "skins", skins);

@@ -129,9 +129,10 @@ impl Block {
         self.parsed.even_out();
     }
 
-    /// Bytes held.
+    /// Bytes held, but for small lists.
     pub fn bytes(&self) -> usize {
-        self.text.capacity()
+        let corners = self.parsed.corners.iter().map(Vec::capacity).sum::<usize>() + self.parsed.relative.capacity();
+        self.text.capacity() + 4 * corners + self.parsed.joined.capacity() + 24 * self.parsed.positions.capacity()
     }
 }
 
@@ -220,13 +221,14 @@ impl Parsed {
     #[inline(always)]
     fn plain_face(&mut self, text: &[u8], at: usize) -> Option<usize> {
         let start = self.corners[0].len();
+        let lengths = self.lengths();
         match self.plain_corners(text, at, start) {
             Some(next) if self.corners[0].len() >= start + 3 => {
                 self.close_face();
                 Some(next)
             }
             _ => {
-                self.drop_face(start);
+                self.drop_face(lengths);
                 None
             }
         }
@@ -238,9 +240,17 @@ impl Parsed {
         self.face_lines.push(self.lines);
     }
 
-    /// Forgets corners from `start` on.
-    pub fn drop_face(&mut self, start: usize) {
-        self.corners.iter_mut().for_each(|list| list.truncate(start));
+    /// How long the lists of corners are.
+    pub fn lengths(&self) -> [usize; 3] {
+        self.corners.each_ref().map(Vec::len)
+    }
+
+    /// Forgets a face that was begun when the lists of corners had these lengths. Lists that were empty are so again:
+    /// an empty one says that no corner has such an index.
+    pub fn drop_face(&mut self, lengths: [usize; 3]) {
+        for (list, length) in self.corners.iter_mut().zip(lengths) {
+            list.truncate(length);
+        }
     }
 
     /// The corners of one face, all of the same form.

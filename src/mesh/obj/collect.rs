@@ -93,7 +93,10 @@ impl<'a> Collector<'a> {
     fn before_line(&self, parsed: &Parsed, face: usize, list: usize, resolved: i64) -> ObjError {
         // How many there were at that line is not kept; how far before the first it points is.
         let line = self.line(parsed.face_lines.get(face).copied().unwrap_or(parsed.lines));
-        ObjError::Line { line, problem: LineProblem::BeforeFirst { list: LISTS[list], missing: resolved.unsigned_abs() } }
+        ObjError::Line {
+            line,
+            problem: LineProblem::BeforeFirst { list: LISTS[list], missing: resolved.unsigned_abs() },
+        }
     }
 
     fn check_sizes(&self, parsed: &Parsed) -> Result<(), ObjError> {
@@ -197,7 +200,9 @@ impl<'a> Collector<'a> {
         arrays.face_starts.extend(parsed.face_ends.iter().map(|end| before as u32 + end));
         extend(&mut arrays.corners, &parsed.corners[0]);
         let after = arrays.corners.len();
-        for (list, here) in [&mut arrays.corner_texcoords, &mut arrays.corner_normals].into_iter().zip(&parsed.corners[1..]) {
+        for (list, here) in
+            [&mut arrays.corner_texcoords, &mut arrays.corner_normals].into_iter().zip(&parsed.corners[1..])
+        {
             if list.is_empty() && here.is_empty() {
                 continue;
             }

@@ -28,7 +28,9 @@ pub enum ObjError {
     #[error("no vertices and no faces found; check that this is a Wavefront OBJ file and that it is complete")]
     NoGeometry,
     /// Arrays that were changed since they were read do not fit together any more.
-    #[error("the arrays do not fit together: a list has the wrong length or an index is out of range; read the file again")]
+    #[error(
+        "the arrays do not fit together: a list has the wrong length or an index is out of range; read the file again"
+    )]
     Inconsistent,
 }
 

@@ -51,12 +51,13 @@ pub(super) fn face_normal(arrays: &ObjArrays, face: usize) -> DVec3 {
 impl SmoothNormals {
     /// Sums the normals of all smooth faces that have a corner without normal at each of their corners, weighted by the
     /// angle there (Thürmer and Wüthrich 1998), so that how a surface is cut into faces does not matter.
-    pub fn new(arrays: &ObjArrays) -> Self {
+    /// `groups` are the runs' numbers of [`group_numbers`].
+    pub fn new(arrays: &ObjArrays, groups: &[u32]) -> Self {
         let smooth = |run: &usize| !is_flat(arrays.runs[*run].smoothing);
         let lacking = |face: &usize| arrays.face(*face).any(|corner| given(arrays, corner).is_none());
-        let mut groups = arrays.runs.iter().filter(|run| !is_flat(run.smoothing)).map(|run| run.smoothing);
-        let first = groups.next().unwrap_or(NONE);
-        let several = groups.any(|group| group != first);
+        let mut met = (0..arrays.runs.len()).filter(smooth).map(|run| groups[run]);
+        let first = met.next();
+        let several = met.any(|group| Some(group) != first);
         let mut table = several.then(|| CornerTable::new(arrays.positions.len()));
         let mut sums: Vec<Vec3> = Vec::new();
         for run in (0..arrays.runs.len()).filter(smooth) {
@@ -75,7 +76,7 @@ impl SmoothNormals {
                     let after = position(arrays, corners[(at + 1) % corners.len()]);
                     let weight = angle(before - here, after - here);
                     let slot = match &mut table {
-                        Some(table) => table.vertex(*point, u64::from(arrays.runs[run].smoothing)).0 as usize,
+                        Some(table) => table.vertex(*point, u64::from(groups[run])).0 as usize,
                         None => *point as usize,
                     };
                     if slot == sums.len() {
@@ -89,11 +90,11 @@ impl SmoothNormals {
         Self { sums, table }
     }
 
-    /// The normal at a point for a face of this smoothing group; `None` where the faces around have no area or cancel
-    /// out.
-    pub fn at(&self, point: u32, smoothing: u32) -> Option<Vec3> {
+    /// The normal at a point for a face with this number of its smoothing group; `None` where the faces around have no
+    /// area or cancel out.
+    pub fn at(&self, point: u32, group: u32) -> Option<Vec3> {
         let slot = match &self.table {
-            Some(table) => table.find(point, u64::from(smoothing))? as usize,
+            Some(table) => table.find(point, u64::from(group))? as usize,
             None => point as usize,
         };
         unit(self.sums.get(slot)?.to_array())
@@ -115,13 +116,15 @@ fn angle(a: DVec3, b: DVec3) -> f64 {
     if cosine < 0.0 { std::f64::consts::PI - angle } else { angle }
 }
 
-/// Maps smoothing groups to small numbers in the order of their first use.
-#[derive(Debug, Default)]
-pub(super) struct Groups(HashMap<u32, u32>);
+/// Smoothing groups that are told apart.
+const MOST_GROUPS: usize = 4096;
 
-impl Groups {
-    pub fn number(&mut self, smoothing: u32) -> u32 {
-        let next = self.0.len() as u32;
-        *self.0.entry(smoothing).or_insert(next)
-    }
+/// A number for the smoothing group of each run, in the order of their first use. Those after the 4096th share the last.
+pub(super) fn group_numbers(arrays: &ObjArrays) -> Vec<u32> {
+    let mut numbers = HashMap::new();
+    let mut number = |smoothing: u32| {
+        let next = numbers.len().min(MOST_GROUPS - 1) as u32;
+        *numbers.entry(smoothing).or_insert(next)
+    };
+    arrays.runs.iter().map(|run| number(run.smoothing)).collect()
 }

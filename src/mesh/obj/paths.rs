@@ -30,7 +30,8 @@ pub(super) fn candidates(folder: &str, path: &str) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for name in [path, bare] {
         let absolute = name.trim().starts_with(['/', '\\']);
-        let beside = if absolute { None } else { safe_relative_path(&format!("{folder}/{name}").trim_start_matches('/')) };
+        let beside =
+            if absolute { None } else { safe_relative_path(format!("{folder}/{name}").trim_start_matches('/')) };
         for place in [beside, safe_relative_path(name)].into_iter().flatten() {
             if !found.contains(&place) {
                 found.push(place);

@@ -24,13 +24,13 @@ use super::{
 /// The longest line, continuations included.
 const LONGEST_LINE: usize = 256 << 20;
 /// Blocks that had to grow past this are not kept for the next read.
-const KEPT_BLOCK: usize = 4 << 20;
+const KEPT_BLOCK: usize = 8 << 20;
 /// More threads than this wait for the reader and the memory.
 const MOST_THREADS: usize = 8;
 
 /// Blocks kept between reads.
 #[derive(Debug, Default)]
-pub(super) struct Spare(Vec<Box<Block>>);
+pub(super) struct Spare(Vec<Block>);
 
 impl Clone for Spare {
     fn clone(&self) -> Self {
@@ -60,7 +60,7 @@ fn read_with(
     reader: impl Read + Send,
     arrays: &mut ObjArrays,
     settings: &ObjSettings,
-    spare: &mut Vec<Box<Block>>,
+    spare: &mut Vec<Block>,
 ) -> Result<(), ObjError> {
     let mut input = Input { reader, carry: Vec::new(), taken: 0, done: false, block: settings.block_bytes.max(16) };
     let mut collector = Collector::new(arrays);
@@ -200,8 +200,8 @@ struct Order {
     /// The number of the block to append next.
     due: u64,
     /// Parsed blocks that wait for others before them.
-    waiting: Vec<(u64, Box<Block>)>,
-    free: Vec<Box<Block>>,
+    waiting: Vec<(u64, Block)>,
+    free: Vec<Block>,
     appending: bool,
     stop: bool,
     error: Option<ObjError>,
@@ -209,7 +209,7 @@ struct Order {
 
 impl<R: Read> Work<'_, R> {
     /// Takes, parses and hands in blocks until there are none. `first` is a block already taken.
-    fn run(&self, mut first: Option<(u64, Box<Block>)>) {
+    fn run(&self, mut first: Option<(u64, Block)>) {
         // If the caller's reader panics in one thread, the others must not wait for its block.
         let _guard = StopOnUnwind { order: &self.order, change: &self.change };
         while let Some((number, mut block)) = first.take().or_else(|| self.take()) {
@@ -218,7 +218,7 @@ impl<R: Read> Work<'_, R> {
         }
     }
 
-    fn take(&self) -> Option<(u64, Box<Block>)> {
+    fn take(&self) -> Option<(u64, Block)> {
         let mut order = lock(&self.order);
         let mut block = loop {
             if order.stop {
@@ -242,7 +242,7 @@ impl<R: Read> Work<'_, R> {
         Some((number, block))
     }
 
-    fn hand_in(&self, number: u64, block: Box<Block>) {
+    fn hand_in(&self, number: u64, block: Block) {
         let mut order = lock(&self.order);
         order.waiting.push((number, block));
         if order.appending {

@@ -225,7 +225,11 @@ mod tests {
                 // Halfway between two floats, and a little beside it.
                 3 => format!("{}", 16_777_217 + 2 * (random() % 8_000_000)),
                 4 => format!("{}.5", 8_388_608 + random() % 8_388_608),
-                5 => format!("{}.{}", 8_388_608 + random() % 8_388_608, ["50000001", "49999999", "5000000001"][round % 3]),
+                5 => format!(
+                    "{}.{}",
+                    8_388_608 + random() % 8_388_608,
+                    ["50000001", "49999999", "5000000001"][round % 3]
+                ),
                 6 => format!("{}", f64::from(f32::from_bits(random() as u32 >> 2)) * 0.999_999_97),
                 _ => format!("{}.{:016}", random() % 10, random() % 10_u64.pow(16)),
             };

@@ -88,10 +88,10 @@ impl Parsed {
 
     fn face(&mut self, rest: &[u8]) -> Result<(), LineProblem> {
         let start = self.corners[0].len();
-        let relative = self.relative.len();
+        let (lengths, relative) = (self.lengths(), self.relative.len());
         let result = self.corners_of(rest, start);
         if result.is_err() {
-            self.drop_face(start);
+            self.drop_face(lengths);
             self.relative.truncate(relative);
         }
         result
@@ -186,7 +186,16 @@ const CURVES: &[&[u8]] = &[
 
 /// Statements about how things are shown, which no polygon depends on.
 const DISPLAY: &[&[u8]] = &[
-    b"bevel", b"c_interp", b"d_interp", b"lod", b"maplib", b"usemap", b"shadow_obj", b"trace_obj", b"ctech", b"stech",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
+    b"maplib",
+    b"usemap",
+    b"shadow_obj",
+    b"trace_obj",
+    b"ctech",
+    b"stech",
     b"mg",
 ];
 
@@ -246,6 +255,7 @@ fn whole(text: &[u8]) -> Option<i64> {
     if digits.is_empty() || !digits.iter().all(u8::is_ascii_digit) {
         return None;
     }
-    let value = digits.iter().fold(0_i64, |value, digit| value.saturating_mul(10).saturating_add(i64::from(digit - b'0')));
+    let value =
+        digits.iter().fold(0_i64, |value, digit| value.saturating_mul(10).saturating_add(i64::from(digit - b'0')));
     Some(if negative { -value } else { value })
 }

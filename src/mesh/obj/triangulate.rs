@@ -301,7 +301,11 @@ mod tests {
             let [a, b, c] = [a, b, c].map(|at| points[at as usize].truncate());
             area(a, b, c)
         };
-        (triangles.len(), triangles.iter().map(|t| doubled(*t)).sum(), triangles.iter().map(|t| doubled(*t).abs()).sum())
+        (
+            triangles.len(),
+            triangles.iter().map(|t| doubled(*t)).sum(),
+            triangles.iter().map(|t| doubled(*t).abs()).sum(),
+        )
     }
 
     fn flat(points: &[[f64; 2]]) -> Vec<DVec3> {
@@ -313,7 +317,15 @@ mod tests {
         let comb = (0..400).map(|i| [f64::from(i), if i % 2 == 0 { 0.0 } else { 10.0 + f64::from(i % 7) }]);
         let comb: Vec<[f64; 2]> = comb.chain([[399.0, -5.0], [0.0, -5.0]]).collect();
         let keyhole = [
-            [0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 0.0], [1.0, 1.0], [1.0, 3.0], [3.0, 3.0], [3.0, 1.0],
+            [0.0, 0.0],
+            [4.0, 0.0],
+            [4.0, 4.0],
+            [0.0, 4.0],
+            [0.0, 0.0],
+            [1.0, 1.0],
+            [1.0, 3.0],
+            [3.0, 3.0],
+            [3.0, 1.0],
             [1.0, 1.0],
         ];
         let cases: [(&str, &[[f64; 2]], f64); 6] = [

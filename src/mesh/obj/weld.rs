@@ -9,7 +9,7 @@ use super::{
     color::to_linear,
     corner_table::CornerTable,
     looks::{Sidecar, looks},
-    normals::{Groups, SmoothNormals, face_normal, given, is_flat, position},
+    normals::{SmoothNormals, face_normal, given, group_numbers, is_flat, position},
     triangulate::Triangulator,
 };
 use crate::mesh::model::{Faces, Model, Object, Part};
@@ -33,12 +33,13 @@ pub(super) fn model(arrays: &ObjArrays, name: &str, sidecar: &mut Sidecar) -> Mo
     let (looks, materials) = looks(arrays, sidecar, &mut notes);
     let (objects, plans) = plan(arrays, &materials, &mut notes);
     let colors = linear_colors(arrays, &mut notes);
+    let groups = group_numbers(arrays);
     let mut welder = Welder {
         arrays,
         colors,
         table: CornerTable::new(if arrays.corners.is_empty() { 0 } else { arrays.positions.len() }),
-        smooth: SmoothNormals::new(arrays),
-        groups: Groups::default(),
+        smooth: SmoothNormals::new(arrays, &groups),
+        groups,
         triangulator: Triangulator::default(),
     };
     let parts = plans.iter().map(|plan| welder.part(plan)).collect();
@@ -120,7 +121,7 @@ struct Welder<'a> {
     colors: Vec<Vec4>,
     table: CornerTable,
     smooth: SmoothNormals,
-    groups: Groups,
+    groups: Vec<u32>,
     triangulator: Triangulator,
 }
 
@@ -132,15 +133,14 @@ impl Welder<'_> {
         let arrays = self.arrays;
         let ranges = || plan.runs.iter().map(|run| arrays.run_faces(*run));
         let face_count: usize = ranges().map(|faces| faces.len()).sum();
-        let corner_count: usize = ranges()
-            .map(|faces| (arrays.face_starts[faces.end] - arrays.face_starts[faces.start]) as usize)
-            .sum();
+        let corner_count: usize =
+            ranges().map(|faces| (arrays.face_starts[faces.end] - arrays.face_starts[faces.start]) as usize).sum();
         let mut part = Part { object: plan.object, material: plan.material, ..Part::default() };
         let mut faces = Faces { starts: Vec::with_capacity(face_count + 1), corners: Vec::with_capacity(corner_count) };
         faces.starts.push(0);
         for run in &plan.runs {
             let smoothing = arrays.runs[*run].smoothing;
-            let group = MADE | self.groups.number(smoothing);
+            let group = self.groups[*run];
             for face in arrays.run_faces(*run) {
                 self.face(face, smoothing, group, &mut part, &mut faces.corners);
                 faces.starts.push(faces.corners.len() as u32);
@@ -172,8 +172,8 @@ impl Welder<'_> {
                 }
                 None if is_flat(smoothing) => (self.table.push(texcoord | u64::from(NONE), NONE), false, None),
                 None => {
-                    let (vertex, known) = self.table.vertex(point, texcoord | u64::from(group));
-                    let normal = if known { None } else { self.smooth.at(point, smoothing) };
+                    let (vertex, known) = self.table.vertex(point, texcoord | u64::from(MADE | group));
+                    let normal = if known { None } else { self.smooth.at(point, group) };
                     (vertex, known, normal)
                 }
             };

@@ -8,9 +8,13 @@ use super::{
 };
 use crate::mesh::model::Looks;
 
+/// Paths and bytes of image files.
+type Images = Vec<(String, Vec<u8>)>;
+
 /// Names of the materials, the library, and the image files it refers to. No library for no materials.
-pub(super) fn materials(looks: &Looks) -> (Vec<String>, Option<Vec<u8>>, Vec<(String, Vec<u8>)>) {
-    let names = distinct(looks.materials.iter().map(|material| material["name"].as_str().unwrap_or_default()), "material");
+pub(super) fn materials(looks: &Looks) -> (Vec<String>, Option<Vec<u8>>, Images) {
+    let names =
+        distinct(looks.materials.iter().map(|material| material["name"].as_str().unwrap_or_default()), "material");
     let files = image_names(looks);
     let mut used = vec![false; files.len()];
     let mut out = Vec::new();
@@ -87,7 +91,8 @@ fn image_names(looks: &Looks) -> Vec<String> {
     for (at, image) in looks.images.iter().enumerate() {
         let extension = if image.mime == "image/jpeg" { "jpg" } else { "png" };
         let safe = safe_relative_path(&image.name).unwrap_or_else(|| format!("texture_{at}"));
-        let known = safe.rsplit_once('.').is_some_and(|(_, end)| ["png", "jpg", "jpeg"].contains(&&*end.to_ascii_lowercase()));
+        let known =
+            safe.rsplit_once('.').is_some_and(|(_, end)| ["png", "jpg", "jpeg"].contains(&&*end.to_ascii_lowercase()));
         let name = if known { safe } else { format!("{safe}.{extension}") };
         let taken = names.contains(&name);
         names.push(if taken { format!("texture_{at}_{}", name.replace('/', "_")) } else { name });

@@ -180,7 +180,7 @@ pub(super) fn segment(mut from: [f64; 3], mut to: [f64; 3], dims: [usize; 3], mu
     }
     let length = (0..3).map(|a| (to[a] - from[a]).abs()).fold(0.0, f64::max);
     // What lies in the grid is short; anything else was not a number.
-    if !(length <= 2.0 * super::MAX_RESOLUTION as f64) {
+    if length.is_nan() || length > 2.0 * super::MAX_RESOLUTION as f64 {
         return;
     }
     let steps = (length * 2.0).ceil().max(1.0) as usize;

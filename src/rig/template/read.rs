@@ -165,11 +165,7 @@ fn parse(text: &str, fields: &[Field], notes: &mut Vec<String>) -> Result<Templa
         (Some(0), Some(field)) => {
             return Err(SourceError::at(text, field.start, "format 0 was never released; the first is format: 1"));
         }
-        (Some(newer), _) if newer > FORMAT => {
-            notes.push(format!(
-                "the template has format {newer}, newer than {FORMAT}: update Rigsmith, or save under another name to keep what it does not know"
-            ));
-        }
+        (Some(newer), _) if newer > FORMAT => {}
         _ => return parse_ron(text),
     }
     let unknown: Vec<&Field> = fields
@@ -184,7 +180,12 @@ fn parse(text: &str, fields: &[Field], notes: &mut Vec<String>) -> Result<Templa
     }
     // Places stay the same without these fields, so errors are shown in the text as it is.
     let known = blanked(text, &unknown);
-    ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))
+    let file: TemplateFile = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
+    let newer = file.format;
+    notes.insert(0, format!(
+        "the template has format {newer}, newer than {FORMAT}: update Rigsmith, or save under another name to keep what it does not know"
+    ));
+    Ok(file)
 }
 
 /// The names that a field may have where it stands; `None` where anything may stand (parameters of modules).

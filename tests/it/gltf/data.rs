@@ -147,8 +147,11 @@ fn characters_pose_the_same() {
     }
 }
 
+/// Points and weights of skinned meshes, bind matrices, and key times.
+type OtherView = (Vec<Vec3>, Vec<[f32; 4]>, Vec<[[f32; 4]; 4]>, Vec<f32>);
+
 /// What the crate `gltf` reads from a file that is known to be good.
-fn read_by_other(glb: &[u8]) -> (Vec<Vec3>, Vec<[f32; 4]>, Vec<[[f32; 4]; 4]>, Vec<f32>) {
+fn read_by_other(glb: &[u8]) -> OtherView {
     let file = ::gltf::Gltf::from_slice(glb).unwrap();
     let bytes = |_: ::gltf::Buffer| file.blob.as_deref();
     let (mut points, mut weights, mut binds, mut times) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());

@@ -1,0 +1,280 @@
+//! The plugins in an app: joint entities follow the rig, surfaces follow the pose, work in the background can be stopped.
+
+use std::time::{Duration, Instant};
+
+use bevy::prelude::*;
+use rigsmith::{
+    algo::weights::WeightSettings,
+    mesh::{model::Weights, ray::Ray},
+    plugins::{
+        document::{InGroup, JointEntities, NodeLabel},
+        skinning::SkinningJob,
+    },
+    prelude::*,
+    rig::{RestTransform, SkinData},
+    test_app::test_app,
+};
+
+use crate::gestures::boxes;
+
+struct Bench {
+    app: App,
+    rig: Entity,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let mut app = test_app();
+        let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(1), "rig"), ..default() }).id();
+        Self { app, rig }
+    }
+
+    fn edit(&mut self, operation: Operation) {
+        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
+        self.app.update();
+    }
+
+    fn change(&mut self, change: Change) {
+        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
+        self.app.update();
+    }
+
+    fn chain(&mut self, places: &[[f32; 3]]) -> Vec<Uid> {
+        let positions = places.iter().map(|place| Vec3::from(*place)).collect();
+        self.edit(Operation::Chain { positions, parent: None });
+        self.rig().walk().map(|joint| joint.data.uid).collect()
+    }
+
+    fn rig(&self) -> &Rig {
+        self.app.world().get::<Rig>(self.rig).unwrap()
+    }
+
+    fn entity(&self, joint: Uid) -> Option<Entity> {
+        self.app.world().get::<JointEntities>(self.rig).unwrap().get(joint)
+    }
+
+    fn get<C: Component>(&self, joint: Uid) -> Option<&C> {
+        self.app.world().get::<C>(self.entity(joint)?)
+    }
+
+    /// Opens a mesh and waits for its surface.
+    fn open(&mut self, corners: &[[[f32; 3]; 2]]) -> Entity {
+        let mesh = RigMesh::new(Uid(99), boxes(corners), Vec::new());
+        let mesh = self.app.world_mut().spawn((mesh, SkinOf(self.rig))).id();
+        self.wait("the surface", |bench| bench.surface().is_some_and(|surface| surface.ready().is_some()));
+        mesh
+    }
+
+    fn surface(&self) -> Option<&RigSurface> {
+        self.app.world().get::<RigSurface>(self.rig)
+    }
+
+    fn wait(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
+        let started = Instant::now();
+        while !done(self) {
+            assert!(started.elapsed() < Duration::from_secs(20), "{what} does not come");
+            self.app.update();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Distances along a ray from (x, y, 10) to the front.
+    fn hits(&self, x: f32, y: f32) -> Vec<f32> {
+        let ray = Ray { origin: Vec3::new(x, y, 10.0), direction: Vec3::NEG_Z };
+        self.surface().unwrap().hits(&ray).iter().map(|hit| hit.distance).collect()
+    }
+
+    fn messages<M: Message>(&mut self) -> Vec<M> {
+        self.app.world_mut().resource_mut::<Messages<M>>().drain().collect()
+    }
+}
+
+#[test]
+fn joint_entities_follow_the_rig() {
+    let mut bench = Bench::new();
+    let joints = bench.chain(&[[0.0, 1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 2.0, 0.0]]);
+    let entities: Vec<Entity> = joints.iter().map(|joint| bench.entity(*joint).unwrap()).collect();
+    assert_eq!(bench.get::<ChildOf>(joints[0]).unwrap().parent(), bench.rig);
+    assert_eq!(bench.get::<ChildOf>(joints[2]).unwrap().parent(), entities[1]);
+    assert_eq!(bench.get::<Uid>(joints[1]), Some(&joints[1]));
+    assert_eq!(bench.get::<JointOf>(joints[1]).unwrap().0, bench.rig);
+    assert_eq!(bench.get::<GlobalTransform>(joints[2]).unwrap().translation(), Vec3::new(1.0, 2.0, 0.0));
+
+    bench.edit(Operation::Labels(vec![(joints[1], "arm_l".into())]));
+    assert_eq!(bench.get::<NodeLabel>(joints[1]), Some(&NodeLabel("arm_l".into())));
+    assert_eq!(bench.get::<Name>(joints[1]).map(Name::as_str), Some("arm_l"));
+    bench.edit(Operation::Group { joints: vec![joints[1]], name: "g".into(), color: None });
+    assert_eq!(bench.get::<InGroup>(joints[1]), Some(&InGroup(bench.rig().groups()[0].uid)));
+    bench.change(Change::Undo);
+    bench.change(Change::Undo);
+    assert!(bench.get::<NodeLabel>(joints[1]).is_none() && bench.get::<Name>(joints[1]).is_none());
+    assert!(bench.get::<InGroup>(joints[1]).is_none());
+
+    bench.edit(Operation::Reparent { joints: vec![joints[2]], parent: Some(joints[0]) });
+    assert_eq!(bench.get::<ChildOf>(joints[2]).unwrap().parent(), entities[0]);
+    assert_eq!(bench.get::<Transform>(joints[2]).unwrap().translation, Vec3::new(1.0, 1.0, 0.0));
+
+    bench.edit(Operation::Delete { joints: vec![joints[0]], keep_children: true });
+    assert!(bench.app.world().get_entity(entities[0]).is_err(), "its entity is gone");
+    assert_eq!(bench.entity(joints[0]), None);
+    for joint in &joints[1..] {
+        assert_eq!(bench.get::<ChildOf>(*joint).unwrap().parent(), bench.rig, "kept, though its parent's entity is gone");
+    }
+    assert_eq!([1, 2].map(|i| bench.entity(joints[i]).unwrap()), [entities[1], entities[2]], "the same entities");
+    bench.change(Change::Undo);
+    let root = bench.entity(joints[0]).unwrap();
+    assert_eq!(bench.get::<ChildOf>(joints[1]).unwrap().parent(), root);
+    let all = bench.app.world_mut().query::<&Joint>().iter(bench.app.world()).count();
+    assert_eq!(all, 3);
+    bench.edit(Operation::Delete { joints: vec![joints[0]], keep_children: false });
+    let all = bench.app.world_mut().query::<&Joint>().iter(bench.app.world()).count();
+    assert_eq!(all, 0);
+}
+
+#[test]
+fn a_pose_stays_on_top_of_the_rest_pose() {
+    let mut bench = Bench::new();
+    let joints = bench.chain(&[[0.0, 1.0, 0.0], [0.0, 2.0, 0.0]]);
+    let entity = bench.entity(joints[1]).unwrap();
+    let turn = Quat::from_rotation_z(0.5);
+    bench.app.world_mut().get_mut::<Transform>(entity).unwrap().rotation = turn;
+    bench.edit(Operation::Move { to: vec![(joints[1], Vec3::new(0.5, 2.0, 0.0)), (joints[0], Vec3::Y)], with_children: true });
+    let pose = *bench.get::<Transform>(joints[1]).unwrap();
+    assert!(pose.translation.distance(Vec3::new(0.5, 1.0, 0.0)) < 1e-6, "{pose:?}");
+    assert!(pose.rotation.angle_between(turn) < 1e-3, "{pose:?}");
+    assert_eq!(bench.get::<RestTransform>(joints[1]).unwrap().rotation, Quat::IDENTITY);
+    bench.edit(Operation::Labels(vec![(joints[0], "x".into())]));
+    assert_eq!(*bench.get::<Transform>(joints[1]).unwrap(), pose, "what does not move leaves the pose alone");
+}
+
+#[test]
+fn refusals_and_edits_are_told() {
+    let mut bench = Bench::new();
+    let stranger = bench.app.world_mut().spawn_empty().id();
+    bench.app.world_mut().write_message(EditRequest::operation(stranger, Operation::Lock(Vec::new(), true)));
+    bench.app.update();
+    let refused = bench.messages::<EditRefused>();
+    assert!(refused.len() == 1 && refused[0].rig == stranger && refused[0].reason.contains("no rig"), "{refused:?}");
+    bench.change(Change::Undo);
+    assert!(bench.messages::<EditRefused>()[0].reason.contains("nothing to undo"));
+    bench.change(Change::Redo);
+    assert!(bench.messages::<EditRefused>()[0].reason.contains("nothing to redo"));
+    bench.edit(Operation::Lock(vec![Uid(5)], true));
+    assert!(bench.messages::<EditRefused>()[0].reason.contains("no joint"));
+    assert!(bench.messages::<Edited>().is_empty());
+    bench.edit(Operation::Place { position: Vec3::ZERO, parent: None });
+    let edited = bench.messages::<Edited>();
+    assert!(edited.len() == 1 && edited[0].rig == bench.rig && edited[0].name == "Place joint");
+}
+
+#[test]
+fn several_rigs_do_not_meet() {
+    let mut bench = Bench::new();
+    let other = bench.app.world_mut().spawn(RigBundle::default()).id();
+    bench.chain(&[[0.0; 3], [1.0; 3]]);
+    assert!(bench.app.world().get::<Rig>(other).unwrap().is_empty());
+    bench.app.world_mut().entity_mut(other).despawn();
+    bench.app.update();
+    assert_eq!(bench.rig().len(), 2);
+    bench.app.world_mut().entity_mut(bench.rig).despawn();
+    bench.app.update();
+    assert_eq!(bench.app.world_mut().query::<&Joint>().iter(bench.app.world()).count(), 0);
+}
+
+#[test]
+fn the_surface_follows_the_pose() {
+    let mut bench = Bench::new();
+    let joints = bench.chain(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    // Two boxes, one above the other: each held by one joint.
+    bench.open(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]], [[-0.2, 1.0, -0.2], [0.2, 2.0, 0.2]]]);
+    let mut weights = Weights::default();
+    for point in 0..16 {
+        weights.push([(u32::from(point >= 8), 1.0)]);
+    }
+    let skin = SkinData { joints: joints.clone(), weights, at_rest: true };
+    bench.edit(Operation::Edits(vec![RigEdit::SetSkin(Uid(99), Some(skin.into()))]));
+    assert_eq!((bench.hits(0.0, 1.5).len(), bench.hits(0.7, 1.0).len()), (2, 0));
+    let pose = |bench: &mut Bench, rotation: Quat| {
+        let entity = bench.entity(joints[1]).unwrap();
+        bench.app.world_mut().get_mut::<Transform>(entity).unwrap().rotation = rotation;
+        bench.app.update();
+    };
+    // The upper box falls over to the left; at once, while the hierarchy is refitted, and afterwards.
+    pose(&mut bench, Quat::from_rotation_z(-std::f32::consts::FRAC_PI_2));
+    for _ in 0..2 {
+        assert_eq!((bench.hits(0.03, 1.7).len(), bench.hits(0.01, 0.5).len()), (0, 2));
+        let fallen = bench.hits(0.7, 1.03);
+        assert!(fallen.len() == 2 && (fallen[0] - 9.8).abs() < 1e-4 && (fallen[1] - 10.2).abs() < 1e-4, "{fallen:?}");
+        bench.wait("the refit", |bench| bench.surface().unwrap().ready().is_some());
+    }
+    let high = bench.surface().unwrap().bounds()[1];
+    assert!(high.distance(Vec3::new(1.0, 1.2, 0.2)) < 1e-4, "{high}");
+    // Picking means the posed joint's place, placing the posed surface.
+    let rig = bench.rig;
+    let ray = Ray { origin: Vec3::new(0.7, 1.03, 10.0), direction: Vec3::NEG_Z };
+    bench.app.world_mut().write_message(PlaceRequest { rig, ray, settings: PlaceSettings::default() });
+    bench.app.update();
+    let placed = bench.rig().walk().last().unwrap().data.uid;
+    assert!(bench.rig().position(placed).distance(Vec3::new(0.7, 1.03, 0.0)) < 1e-4);
+    pose(&mut bench, Quat::IDENTITY);
+    bench.wait("the refit", |bench| bench.surface().unwrap().ready().is_some());
+    assert_eq!((bench.hits(0.03, 1.7).len(), bench.hits(0.7, 1.03).len()), (2, 0));
+    // A joint moved at rest leaves the mesh where it is.
+    bench.edit(Operation::Move { to: vec![(joints[1], Vec3::new(0.0, 1.1, 0.0))], with_children: false });
+    assert_eq!(bench.hits(0.03, 1.7).len(), 2);
+}
+
+#[test]
+fn a_rig_that_stands_elsewhere_has_the_same_surface() {
+    let mut bench = Bench::new();
+    bench.chain(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    bench.open(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]);
+    *bench.app.world_mut().get_mut::<Transform>(bench.rig).unwrap() =
+        Transform::from_xyz(5.0, -3.0, 2.0).with_rotation(Quat::from_rotation_y(1.0));
+    bench.app.update();
+    bench.app.update();
+    assert_eq!(bench.hits(0.05, 0.5).len(), 2);
+}
+
+#[test]
+fn skinning_runs_in_the_background_and_can_be_stopped() {
+    let mut bench = Bench::new();
+    let joints = bench.chain(&[[0.0, 0.1, 0.0], [0.0, 0.9, 0.0]]);
+    let mesh = bench.open(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]);
+    let request = || BindRequest { mesh, settings: WeightSettings::default(), rigid: Vec::new() };
+    bench.app.world_mut().write_message(request());
+    bench.app.update();
+    if let Some(job) = bench.app.world().get::<SkinningJob>(mesh) {
+        assert!((0.0..=1.0).contains(&job.progress()));
+    }
+    bench.wait("the weights", |bench| bench.rig().skin(Uid(99)).is_some());
+    let skin = bench.rig().skin(Uid(99)).unwrap();
+    assert_eq!((skin.weights.len(), &skin.joints), (8, &joints));
+    let bound = bench.messages::<Bound>();
+    assert!(bound.len() == 1 && bound[0].mesh == mesh && bound[0].result.is_ok(), "{bound:?}");
+    bench.change(Change::Undo);
+    assert!(bench.rig().skin(Uid(99)).is_none(), "one step of the history");
+
+    // Two hundred thousand points are not done before the next line.
+    let grid: Vec<[[f32; 3]; 2]> = (0..25_000)
+        .map(|i| {
+            let (x, y, z) = ((i % 30) as f32, (i / 30 % 30) as f32, (i / 900) as f32);
+            [[x * 0.03, y * 0.03, z * 0.03], [x * 0.03 + 0.029, y * 0.03 + 0.029, z * 0.03 + 0.029]]
+        })
+        .collect();
+    let large = bench.app.world_mut().spawn((RigMesh::new(Uid(100), boxes(&grid), Vec::new()), SkinOf(bench.rig))).id();
+    bench.app.world_mut().write_message(BindRequest { mesh: large, ..request() });
+    bench.app.update();
+    let job = bench.app.world().get::<SkinningJob>(large).expect("the job is under way");
+    job.cancel();
+    bench.messages::<Bound>();
+    bench.wait("the end of the job", |bench| bench.app.world().get::<SkinningJob>(large).is_none());
+    let bound = bench.messages::<Bound>();
+    assert!(bound.len() == 1 && bound[0].mesh == large && bound[0].result.is_err(), "{bound:?}");
+    assert!(bench.rig().skin(Uid(100)).is_none());
+
+    let stranger = bench.app.world_mut().spawn_empty().id();
+    bench.app.world_mut().write_message(BindRequest { mesh: stranger, ..request() });
+    bench.app.update();
+    assert!(bench.messages::<Bound>()[0].result.as_ref().is_err_and(|error| error.contains("no rig")));
+}
