@@ -32,6 +32,9 @@ use self::{
 use super::{placement::PlaceSettings, view::ViewPlane};
 use crate::mesh::{ray::Hit, surface::Surface};
 
+/// The most joints a stroke becomes, whatever is asked for.
+pub const MAX_JOINTS: usize = 1000;
+
 /// How a stroke is placed in depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrokeSettings {
@@ -56,7 +59,8 @@ pub enum ChainChoice {
     /// Joints wherever the stroke strays further than this from the line between two neighbours; model units on the
     /// view plane. Zero, negative or NaN makes a joint of every point of the stroke.
     Threshold(f32),
-    /// Exactly this many joints, where they fit the stroke and the limb best; fewer than two count as two.
+    /// Exactly this many joints, where they fit the stroke and the limb best; fewer than two count as two, more than
+    /// [`MAX_JOINTS`] as that many.
     Joints(usize),
 }
 
@@ -166,7 +170,7 @@ impl StrokeSamples {
     pub fn chain(&self, surface: &Surface, choice: ChainChoice) -> StrokeChain {
         let places = match choice {
             ChainChoice::Threshold(threshold) => split::by_threshold(&self.path, threshold),
-            ChainChoice::Joints(count) => corners::choose(&self.track, self.axis.as_ref(), count.max(2)),
+            ChainChoice::Joints(count) => corners::choose(&self.track, self.axis.as_ref(), count.clamp(2, MAX_JOINTS)),
         };
         let [first, last] = self.track.covered();
         let mut notes = Vec::new();

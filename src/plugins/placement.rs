@@ -46,7 +46,7 @@ pub struct Placed {
     pub placement: Placement,
 }
 
-fn place(
+pub(super) fn place(
     mut requests: MessageReader<PlaceRequest>,
     rigs: Query<(&Selection, Option<&RigSurface>)>,
     mut edits: MessageWriter<EditRequest>,

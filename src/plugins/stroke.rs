@@ -26,7 +26,7 @@ impl Plugin for StrokePlugin {
         app.init_resource::<WaitingStrokes>()
             .add_message::<StrokeRequest>()
             .add_message::<StrokeDone>()
-            .add_systems(Update, stroke.in_set(RigSystems::Gesture));
+            .add_systems(Update, stroke.in_set(RigSystems::Gesture).after(super::placement::place));
     }
 }
 

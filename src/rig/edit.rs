@@ -329,7 +329,7 @@ fn checked(tag: &Tag) -> Result<Tag, EditError> {
     if let TagKind::Command { params, .. } = &mut tag.kind {
         let options = ron_options().with_recursion_limit(PARAMS_DEPTH);
         let raw: Box<RawValue> =
-            options.from_str(params).map_err(|error| EditError::BadParams(tag.uid, error.code.to_string()))?;
+            options.from_str(&format!("{params}\n")).map_err(|error| EditError::BadParams(tag.uid, error.code.to_string()))?;
         *params = raw.trim().get_ron().to_owned();
     }
     Ok(tag)

@@ -46,11 +46,16 @@ pub struct TemplateHeader {
     #[serde(default)]
     pub preview: Option<String>,
     /// The number of joints, for listings.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "count")]
     pub joint_count: usize,
     /// Named features and their switches, for listings.
     #[serde(default)]
     pub features: Vec<FeatureSummary>,
+}
+
+/// A count that may also be written as none.
+fn count<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    Ok(Option::<usize>::deserialize(deserializer)?.unwrap_or_default())
 }
 
 /// A named feature in a template's header.

@@ -319,7 +319,7 @@ fn gestures_are_read_strictly() {
         ("[View(Frnt)]", 1, "Frnt"),
         ("[Volume(-1)]", 1, "integer"),
         ("[Mirror(1)]", 1, "bool"),
-        ("[Undo", 1, "end"),
+        ("[Undo", 1, ""),
         ("(Undo)", 1, ""),
         ("", 1, "empty"),
     ] {

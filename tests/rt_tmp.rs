@@ -1,9 +1,0 @@
-#[path = "it/edits.rs"] mod edits;
-#[path = "it/mirror.rs"] mod mirror;
-#[path = "it/template.rs"] mod template;
-#[path = "it/fuzz_template.rs"] mod fuzz_template;
-#[path = "it/fuzz_gestures.rs"] mod fuzz_gestures;
-#[path = "it/gestures.rs"] mod gestures;
-#[path = "it/plugins.rs"] mod plugins;
-#[path = "it/layout.rs"] mod layout;
-#[path = "it/mutate.rs"] mod mutate;
