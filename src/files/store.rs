@@ -13,7 +13,7 @@ use crate::{
         Rig,
         character::rig_text,
         skin::SkinFile,
-        template::write_template,
+        template::{self, write_template},
         text::{self, RigTextError},
     },
 };
@@ -39,6 +39,18 @@ pub enum StoreError {
         path: PathBuf,
         /// Why not.
         source: RigTextError,
+    },
+    /// The template would be longer than any that is read.
+    #[error(
+        "`{}`: the template would have {mebibytes} MiB, and no more than {} are read; save as .rig, or split the rig",
+        path.display(),
+        template::MAX_BYTES >> 20
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// How long it would be.
+        mebibytes: usize,
     },
     /// Its name has no ending that fits.
     #[error("`{}`: {wanted}", path.display())]
@@ -110,7 +122,11 @@ fn lost_in_obj(model: &Model) -> Vec<String> {
 pub fn store_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>, StoreError> {
     match FileKind::of(path) {
         Some(FileKind::Template) => {
-            save_atomic(disk, path, write_template(rig).as_bytes())?;
+            let text = write_template(rig);
+            if text.len() > template::MAX_BYTES {
+                return Err(StoreError::TooLarge { path: path.into(), mebibytes: text.len() >> 20 });
+            }
+            save_atomic(disk, path, text.as_bytes())?;
             Ok(Vec::new())
         }
         Some(FileKind::RigText) => {

@@ -116,6 +116,10 @@ fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
     std::iter::from_fn(move || {
         loop {
             let mut start = at;
+            if let Some(blank) = text[at..].chars().next().filter(|c| is_blank(*c)) {
+                at += blank.len_utf8();
+                continue;
+            }
             match *bytes.get(at)? {
                 b'/' if bytes.get(at + 1) == Some(&b'/') => {
                     at = text[at..].find('\n').map_or(text.len(), |n| at + n);
@@ -128,24 +132,24 @@ fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
                 b'"' => at = quote_end(bytes, at + 1, b'"'),
                 b'\'' => at = character_end(text, at + 1),
                 c if is_word(c) => {
-                    while bytes.get(at).is_some_and(|c| is_word(*c)) {
-                        at += 1;
-                    }
+                    let word = text[at..].find(|c: char| c.is_ascii() && !is_word(c as u8) || is_blank(c));
+                    at = word.map_or(text.len(), |length| at + length);
                     if matches!(&text[start..at], "r" | "br")
                         && let Some(end) = raw_end(bytes, at)
                     {
                         (start, at) = (at, end);
                     }
                 }
-                c if c.is_ascii_whitespace() => {
-                    at += 1;
-                    continue;
-                }
                 _ => at += 1,
             }
             return Some(Token { text: &text[start..at], start });
         }
     })
+}
+
+/// What RON takes for white space.
+fn is_blank(c: char) -> bool {
+    matches!(c, ' ' | '\t'..='\r' | '\u{85}' | '\u{200E}' | '\u{200F}' | '\u{2028}' | '\u{2029}')
 }
 
 fn is_word(c: u8) -> bool {

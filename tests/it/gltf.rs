@@ -372,7 +372,7 @@ fn outside_buffers_and_images() {
 #[test]
 fn extremes() {
     let model = compose::extremes().read().unwrap();
-    assert_eq!(names(&model), ["", ""]);
+    assert_eq!(names(&model), ["left", ""]);
     let skins: Vec<_> =
         model.objects.iter().map(|object| (object.skin, object.node, object.morph_weights.clone())).collect();
     let none = Vec::new;

@@ -131,10 +131,11 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
         Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
     };
     let fields = scan::fields(text);
-    let lists: Vec<&Field> =
-        fields.iter().filter(|field| field.depth == 1 && matches!(field.name, "groups" | "joints")).collect();
-    let Some(first) = lists.first() else { return parse_ron(text) };
-    let whole = parse_ron(&blanked(text, &lists));
+    let is_list = |field: &&Field| field.depth == 1 && matches!(field.name, "groups" | "joints");
+    let unknown = |field: &&Field| known_names(&fields, field).is_some_and(|known| !known.contains(&field.name));
+    let passed_over: Vec<&Field> = fields.iter().filter(|field| is_list(field) || unknown(field)).collect();
+    let whole = parse_ron(&blanked(text, &passed_over));
+    let Some(first) = fields.iter().find(is_list) else { return whole };
     // Where the lists are cut short or wrong, what stands before them is enough.
     whole.or_else(|_| parse_ron(&format!("{})", &text[..first.start])))
 }
