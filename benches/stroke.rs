@@ -298,7 +298,11 @@ impl Table {
             let mut sorted = values.clone();
             sorted.sort_by(f32::total_cmp);
             let p90 = sorted[(sorted.len() * 9 / 10).min(sorted.len() - 1)];
-            println!("{row:48} mean {mean:7.3}  p90 {p90:7.3}  worst {:7.3}  n {}", sorted[sorted.len() - 1], sorted.len());
+            println!(
+                "{row:48} mean {mean:7.3}  p90 {p90:7.3}  worst {:7.3}  n {}",
+                sorted[sorted.len() - 1],
+                sorted.len()
+            );
         }
     }
 }
@@ -336,8 +340,7 @@ fn centring(body: &Body, detail: bool, table: &mut Table) {
                         let mut seen = Vec::new();
                         for seed in 0..seeds() {
                             // The middle of the limb as seen: what a user traces.
-                            let aim: Vec<Vec2> =
-                                [low, high].iter().map(|&t| project(a.lerp(b, t))).collect();
+                            let aim: Vec<Vec2> = [low, high].iter().map(|&t| project(a.lerp(b, t))).collect();
                             let stroke = jittered(&aim, 60, 0.3 * line.radius(), jitter, seed);
                             let settings = StrokeSettings::default();
                             let Ok(samples) = StrokeSamples::new(&body.surface, &plane, &stroke, settings) else {
@@ -353,7 +356,10 @@ fn centring(body: &Body, detail: bool, table: &mut Table) {
                                     let distance = from_bone(joint.position, a, b) / line.radius();
                                     table.add(format!("{extent} extended from bone {limb} {view_name}"), distance);
                                     if detail {
-                                        println!("  {} {limb} {side} {view_name} {extent}: from bone {distance:.2} {joint:.3?}", body.name);
+                                        println!(
+                                            "  {} {limb} {side} {view_name} {extent}: from bone {distance:.2} {joint:.3?}",
+                                            body.name
+                                        );
                                     }
                                 }
                                 table.add(

@@ -24,6 +24,6 @@ pub use atomic::{SaveError, SaveStep, is_temp_name, remove_stale_temps, save_all
 pub use disk::{Disk, DiskFile, Entry, EntryKind, RealDisk};
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
-pub use read::{OpenFile, ReadError, open, read_capped};
 pub use load::{FileKind, LoadError, load_gestures, load_model, load_rig_text, load_skin, load_template, stem};
+pub use read::{OpenFile, ReadError, open, read_capped};
 pub use store::{StoreError, store_model, store_rig, store_skin};

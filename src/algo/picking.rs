@@ -22,7 +22,13 @@ pub fn candidates(surface: &Surface, plane: &ViewPlane, point: Vec2, joints: &[V
 }
 
 /// As [`candidates`], where the ray's first hit is known.
-pub fn candidates_at(first_hit: Option<Vec3>, plane: &ViewPlane, point: Vec2, joints: &[Vec3], reach: f32) -> Vec<usize> {
+pub fn candidates_at(
+    first_hit: Option<Vec3>,
+    plane: &ViewPlane,
+    point: Vec2,
+    joints: &[Vec3],
+    reach: f32,
+) -> Vec<usize> {
     match first_hit {
         Some(hit) => nearest(joints.iter().map(|joint| joint.distance(hit)), reach),
         None => nearest_on_plane(plane, point, joints, reach),
@@ -44,7 +50,8 @@ pub fn in_box(plane: &ViewPlane, corners: [Vec2; 2], joints: &[Vec3]) -> Vec<usi
 
 /// Indices by rising distance, as far as they are near; equal distances by index.
 fn nearest(distances: impl Iterator<Item = f32>, reach: f32) -> Vec<usize> {
-    let mut order: Vec<(f32, usize)> = distances.enumerate().map(|(i, d)| (d, i)).filter(|(d, _)| d.is_finite()).collect();
+    let mut order: Vec<(f32, usize)> =
+        distances.enumerate().map(|(i, d)| (d, i)).filter(|(d, _)| d.is_finite()).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let limit = order.first().map_or(0.0, |&(least, _)| 2.0 * least + reach.max(0.0));
     // The second nearest always takes part, so that a second click never does nothing.

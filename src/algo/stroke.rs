@@ -23,12 +23,7 @@ use thiserror::Error;
 
 pub use gesture::{StrokeKind, classify, joint_at};
 
-use self::{
-    axis::Axis,
-    path::Path,
-    section::Fan,
-    track::Track,
-};
+use self::{axis::Axis, path::Path, section::Fan, track::Track};
 use super::{placement::PlaceSettings, view::ViewPlane};
 use crate::mesh::{ray::Hit, surface::Surface};
 
@@ -68,7 +63,9 @@ pub enum ChainChoice {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum StrokeError {
     /// Fewer than two different finite points.
-    #[error("the stroke has {finite} usable points of {given}, which make no line: draw at least two different points in the view")]
+    #[error(
+        "the stroke has {finite} usable points of {given}, which make no line: draw at least two different points in the view"
+    )]
     TooShort {
         /// Points given.
         given: usize,
@@ -181,7 +178,8 @@ impl StrokeSamples {
             notes.push(StrokeNote::EndMoved { start: false });
         }
         if self.track.volumes_at_start > 1 {
-            notes.push(StrokeNote::VolumeChosen { volume: self.track.volume_at_start, of: self.track.volumes_at_start });
+            notes
+                .push(StrokeNote::VolumeChosen { volume: self.track.volume_at_start, of: self.track.volumes_at_start });
         }
         let mut chain = StrokeChain { joints: Vec::with_capacity(places.len()), notes };
         let mut left_out = 0;

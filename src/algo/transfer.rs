@@ -94,7 +94,8 @@ pub fn transfer_weights(
     let limit = settings.distance.max(0.0) * origin.size;
     let graph = Graph::new(target.points, target.triangles);
     let normals = node_normals(&graph, target);
-    let closest: Vec<Option<Closest>> = (0..graph.len()).into_par_iter().map(|n| origin.closest(graph.place(n))).collect();
+    let closest: Vec<Option<Closest>> =
+        (0..graph.len()).into_par_iter().map(|n| origin.closest(graph.place(n))).collect();
 
     let mut known: Vec<Option<Sparse>> = vec![None; graph.len()];
     let mut origins = vec![From::Inpainted; graph.len()];
@@ -127,7 +128,9 @@ pub fn transfer_weights(
             (Some(influences), ..) if origins[node] == From::Copied => (influences.clone(), &mut report.copied),
             (Some(influences), ..) => (influences.clone(), &mut report.matched),
             (None, Some(influences), _) => (influences.clone(), &mut report.inpainted),
-            (None, None, Some(found)) if !found.influences.is_empty() => (found.influences.clone(), &mut report.nearest),
+            (None, None, Some(found)) if !found.influences.is_empty() => {
+                (found.influences.clone(), &mut report.nearest)
+            }
             _ => (origin.nearest(graph.place(node)), &mut report.nearest),
         };
         *count += 1;
@@ -244,7 +247,8 @@ fn node_normals(graph: &Graph, mesh: TransferMesh) -> Vec<Vec3> {
     for normal in &mut normals {
         // Through the largest component first: squares of tiny numbers vanish.
         let largest = normal.abs().max_element();
-        *normal = if largest > 0.0 && largest.is_finite() { (*normal / largest).normalize_or_zero() } else { Vec3::ZERO };
+        *normal =
+            if largest > 0.0 && largest.is_finite() { (*normal / largest).normalize_or_zero() } else { Vec3::ZERO };
     }
     normals
 }

@@ -127,7 +127,8 @@ fn remarks_on_rig(rig: &Rig) -> Vec<String> {
     if unlabelled > 0 {
         remarks.push(format!("{unlabelled} joints have no label"));
     }
-    let short = rig.walk().filter(|joint| joint.parent.is_some() && joint.data.rest.translation.length() == 0.0).count();
+    let short =
+        rig.walk().filter(|joint| joint.parent.is_some() && joint.data.rest.translation.length() == 0.0).count();
     if short > 0 {
         remarks.push(format!("{short} joints lie exactly on their parent"));
     }

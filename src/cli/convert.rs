@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{ExportArgs, Failure, Output, Report, SEED, progress::spinning, skin::load_rig};
 use crate::{
-    files::{FileKind, RealDisk, load_model, store_model, store_rig, stem},
+    files::{FileKind, RealDisk, load_model, stem, store_model, store_rig},
     headless::Workbench,
     mesh::gltf::GltfWriteSettings,
     rig::{Rig, UidSource, character::import_skeleton},
@@ -38,7 +38,8 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
         (Some(Gltf | Glb), Some(RigText | Template)) => {
             let model = load_model(&RealDisk, &args.input)?;
             if model.nodes.is_empty() {
-                let message = format!("`{}` has no skeleton to convert; sketch one into it first", args.input.display());
+                let message =
+                    format!("`{}` has no skeleton to convert; sketch one into it first", args.input.display());
                 return Err(Failure::Input(message.into()));
             }
             let mut uids = UidSource::seeded(SEED);

@@ -7,7 +7,10 @@ use crate::{
     algo::weights::WeightSettings,
     files::{RealDisk, read_capped, save_atomic},
     headless::Workbench,
-    mesh::{gltf::GltfWriteSettings, obj::{ObjSettings, read_model}},
+    mesh::{
+        gltf::GltfWriteSettings,
+        obj::{ObjSettings, read_model},
+    },
     plugins::gesture::read_gestures,
     rig::template::write_template,
 };

@@ -66,7 +66,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             report.set("gestures", gestures.len());
         }
         None => {
-            let message = format!("`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .skin and .ron", path.display());
+            let message =
+                format!("`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .skin and .ron", path.display());
             return Err(Failure::Usage(message));
         }
     }
@@ -81,7 +82,8 @@ fn describe_model(report: &mut Report, model: &Model) {
     let finite = model.points.iter().filter(|point| point.is_finite());
     let low = finite.clone().copied().reduce(glam::Vec3::min).unwrap_or_default();
     let high = finite.copied().reduce(glam::Vec3::max).unwrap_or_default();
-    let unweighted = model.weights.as_ref().map(|weights| (0..weights.len()).filter(|p| weights.of(*p).len() == 0).count());
+    let unweighted =
+        model.weights.as_ref().map(|weights| (0..weights.len()).filter(|p| weights.of(*p).len() == 0).count());
     let morphs: usize = model.objects.iter().map(|object| object.morph_names.len()).sum();
     report.line(format!("{} points, {faces} faces ({triangles} triangles), {vertices} vertices", model.points.len()));
     report.line(format!("box {:.4} {:.4} {:.4} to {:.4} {:.4} {:.4}", low.x, low.y, low.z, high.x, high.y, high.z));

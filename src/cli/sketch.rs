@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, progress::{Progress, spinning}};
+use super::{
+    ExportArgs, Failure, Output, Report, SEED, WeightArgs,
+    progress::{Progress, spinning},
+};
 use crate::{
     files::{FileKind, RealDisk, load_gestures, load_model, stem, store_model, store_rig},
     headless::Workbench,
@@ -60,10 +63,9 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
 fn output_kind(path: &Path) -> Result<FileKind, Failure> {
     match FileKind::of(path) {
         Some(kind @ (FileKind::RigText | FileKind::Template | FileKind::Glb | FileKind::Gltf)) => Ok(kind),
-        _ => Err(Failure::Usage(format!(
-            "cannot sketch into `{}`; write .rig, .rig.ron, .glb or .gltf",
-            path.display()
-        ))),
+        _ => {
+            Err(Failure::Usage(format!("cannot sketch into `{}`; write .rig, .rig.ron, .glb or .gltf", path.display())))
+        }
     }
 }
 

@@ -8,15 +8,16 @@ use std::{
 use clap::Args;
 use serde_json::json;
 
-use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, progress::{Progress, spinning}};
+use super::{
+    ExportArgs, Failure, Output, Report, SEED, WeightArgs,
+    progress::{Progress, spinning},
+};
 use crate::{
     algo::{
         transfer::{TransferMesh, TransferSettings, transfer_weights},
         weights::WeightReport,
     },
-    files::{
-        FileKind, RealDisk, load_model, load_rig_text, load_skin, load_template, stem, store_model, store_skin,
-    },
+    files::{FileKind, RealDisk, load_model, load_rig_text, load_skin, load_template, stem, store_model, store_skin},
     headless::Workbench,
     rig::{
         Rig, SkinData, Uid, UidSource,
@@ -60,7 +61,9 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
     let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
     report.notes(model.notes.iter().cloned());
     if model.points.is_empty() {
-        return Err(Failure::Input(format!("`{}` has no points to skin; open another mesh", args.mesh.display()).into()));
+        return Err(Failure::Input(
+            format!("`{}` has no points to skin; open another mesh", args.mesh.display()).into(),
+        ));
     }
     let mut bench = Workbench::with_rig(SEED, rig);
     bench.open(model, true)?;
@@ -124,7 +127,9 @@ fn rigid_parts(args: &SkinArgs, bench: &Workbench) -> Result<Vec<(usize, Uid)>, 
             .ok_or_else(|| Failure::Usage(format!("--rigid {text}: write OBJECT=JOINT, both by name")))?;
         let number = mesh.rest.objects.iter().position(|o| o.name == object).ok_or_else(|| {
             let names: Vec<&str> = mesh.rest.objects.iter().map(|object| object.name.as_str()).collect();
-            Failure::Input(format!("--rigid {text}: the mesh has no object \"{object}\"; it has: {}", names.join(", ")).into())
+            Failure::Input(
+                format!("--rigid {text}: the mesh has no object \"{object}\"; it has: {}", names.join(", ")).into(),
+            )
         })?;
         let joint = bench.rig().find_label(joint).ok_or_else(|| {
             Failure::Input(format!("--rigid {text}: the rig has no joint with the label \"{joint}\"").into())
@@ -156,12 +161,17 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
     for joint in file.joints() {
         let by_label = || rig.find_label(&joint.label).filter(|_| !joint.label.is_empty());
         let uid = Some(Uid(joint.uid)).filter(|uid| rig.joint(*uid).is_some()).or_else(by_label);
-        let uid = uid.ok_or_else(|| Failure::Input(format!(
-            "`{}`: the rig has no joint {} (\"{}\"); skin with the rig that the weights were made for",
-            path.display(),
-            Uid(joint.uid),
-            joint.label
-        ).into()))?;
+        let uid = uid.ok_or_else(|| {
+            Failure::Input(
+                format!(
+                    "`{}`: the rig has no joint {} (\"{}\"); skin with the rig that the weights were made for",
+                    path.display(),
+                    Uid(joint.uid),
+                    joint.label
+                )
+                .into(),
+            )
+        })?;
         joints.push(uid);
     }
     let mesh = bench.mesh().ok_or_else(|| Failure::Input("no mesh is open".into()))?;
@@ -171,10 +181,15 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
         report.set("weights", json!({ "exact": true }));
         file.weights().clone()
     } else {
-        let source = file.mesh().ok_or_else(|| Failure::Input(format!(
-            "`{}`: the weights are of another mesh, and the file has no copy of it to transfer them from",
-            path.display()
-        ).into()))?;
+        let source = file.mesh().ok_or_else(|| {
+            Failure::Input(
+                format!(
+                    "`{}`: the weights are of another mesh, and the file has no copy of it to transfer them from",
+                    path.display()
+                )
+                .into(),
+            )
+        })?;
         let source = TransferMesh { points: &source.points, triangles: &source.triangles };
         let target = TransferMesh { points: &points.points, triangles: &triangles };
         let settings = TransferSettings::default();
@@ -188,10 +203,13 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
             told.inpainted,
             told.nearest
         ));
-        report.set("weights", json!({
-            "exact": false, "copied": told.copied, "matched": told.matched,
-            "inpainted": told.inpainted, "nearest": told.nearest,
-        }));
+        report.set(
+            "weights",
+            json!({
+                "exact": false, "copied": told.copied, "matched": told.matched,
+                "inpainted": told.inpainted, "nearest": told.nearest,
+            }),
+        );
         weights
     };
     bench.bind(SkinData { joints, weights, at_rest: true })?;
@@ -202,19 +220,17 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
 pub(super) fn describe_weights(report: &mut Report, weights: &WeightReport) {
     report.line(format!(
         "{} points weighted: {} over the surface, {} through voxels, {} filled, {} by the nearest bone, {} given",
-        weights.points,
-        weights.by_surface,
-        weights.by_voxels,
-        weights.by_fill,
-        weights.by_nearest,
-        weights.given
+        weights.points, weights.by_surface, weights.by_voxels, weights.by_fill, weights.by_nearest, weights.given
     ));
-    report.set("weights", json!({
-        "points": weights.points,
-        "by_surface": weights.by_surface,
-        "by_voxels": weights.by_voxels,
-        "by_fill": weights.by_fill,
-        "by_nearest": weights.by_nearest,
-        "given": weights.given,
-    }));
+    report.set(
+        "weights",
+        json!({
+            "points": weights.points,
+            "by_surface": weights.by_surface,
+            "by_voxels": weights.by_voxels,
+            "by_fill": weights.by_fill,
+            "by_nearest": weights.by_nearest,
+            "given": weights.given,
+        }),
+    );
 }

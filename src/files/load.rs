@@ -148,7 +148,8 @@ fn load_obj(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
         let limit = if uri.to_ascii_lowercase().ends_with(".mtl") { MAX_MTL_BYTES } else { gltf::MAX_IMAGE_BYTES };
         folder.read(uri, limit).ok()
     };
-    obj::read_model(file, &stem(path), &ObjSettings::default(), &mut sidecar).map_err(|source| LoadError::Obj { path: path.into(), source })
+    obj::read_model(file, &stem(path), &ObjSettings::default(), &mut sidecar)
+        .map_err(|source| LoadError::Obj { path: path.into(), source })
 }
 
 fn load_gltf(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {

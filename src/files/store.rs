@@ -130,13 +130,15 @@ pub fn store_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>,
             Ok(Vec::new())
         }
         Some(FileKind::RigText) => {
-            let written = text::write(&rig_text(rig))
-                .map_err(|source| StoreError::RigText { path: path.into(), source })?;
+            let written =
+                text::write(&rig_text(rig)).map_err(|source| StoreError::RigText { path: path.into(), source })?;
             save_atomic(disk, path, written.text.as_bytes())?;
             Ok(written
                 .relabelled
                 .iter()
-                .map(|label| format!("a .rig label has no white space: \"{}\" was written as \"{}\"", label.from, label.to))
+                .map(|label| {
+                    format!("a .rig label has no white space: \"{}\" was written as \"{}\"", label.from, label.to)
+                })
                 .collect())
         }
         _ => Err(StoreError::Kind { path: path.into(), wanted: "a rig is saved as .rig.ron or .rig" }),

@@ -26,7 +26,9 @@ const MARGIN: usize = 2;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum VoxelizeError {
     /// A triangle refers to a point that does not exist.
-    #[error("triangle {triangle} refers to point {point}, but there are only {points}: the mesh is damaged, export it again")]
+    #[error(
+        "triangle {triangle} refers to point {point}, but there are only {points}: the mesh is damaged, export it again"
+    )]
     PointOutOfRange {
         /// Index of the triangle.
         triangle: usize,
@@ -36,7 +38,9 @@ pub enum VoxelizeError {
         points: usize,
     },
     /// No triangle with finite corners lies in the box.
-    #[error("there is no triangle with finite corners to make voxels of: check that the mesh has faces near the skeleton")]
+    #[error(
+        "there is no triangle with finite corners to make voxels of: check that the mesh has faces near the skeleton"
+    )]
     NoSurface,
 }
 

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 
 use super::{RigSystems, configure_sets, history::RigHistory};
 use crate::rig::{
-    Rig, RestTransform, Uid, UidSource,
+    RestTransform, Rig, Uid, UidSource,
     operations::{MirrorPlane, Operation},
 };
 
@@ -155,12 +155,12 @@ fn apply_edits(
                 Change::Do(operation) => history
                     .edit(&mut rig, &mut selection, &mut uids, symmetry.0, operation)
                     .map_err(|error| error.to_string()),
-                Change::Undo => history
-                    .undo(&mut rig, &mut selection)
-                    .unwrap_or_else(|| Err("there is nothing to undo".to_owned())),
-                Change::Redo => history
-                    .redo(&mut rig, &mut selection)
-                    .unwrap_or_else(|| Err("there is nothing to redo".to_owned())),
+                Change::Undo => {
+                    history.undo(&mut rig, &mut selection).unwrap_or_else(|| Err("there is nothing to undo".to_owned()))
+                }
+                Change::Redo => {
+                    history.redo(&mut rig, &mut selection).unwrap_or_else(|| Err("there is nothing to redo".to_owned()))
+                }
             },
             Err(_) => Err(format!("entity {entity} is no rig; it may have been closed")),
         };
@@ -180,7 +180,10 @@ fn apply_edits(
 fn follow_rigs(
     mut commands: Commands,
     mut rigs: Query<(Entity, &Rig, &mut JointEntities), Changed<Rig>>,
-    mut joints: Query<(&mut Transform, &mut RestTransform, Option<&ChildOf>, Option<&NodeLabel>, Option<&InGroup>), With<Joint>>,
+    mut joints: Query<
+        (&mut Transform, &mut RestTransform, Option<&ChildOf>, Option<&NodeLabel>, Option<&InGroup>),
+        With<Joint>,
+    >,
 ) {
     for (rig_entity, rig, mut known) in &mut rigs {
         let mut gone: Vec<(Uid, Entity)> =

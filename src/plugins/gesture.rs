@@ -133,12 +133,12 @@ impl Gesture {
             Self::Click(point) | Self::Select(point) | Self::Add(point) | Self::Move(point) | Self::Insert(point) => {
                 finite(point)
             }
-            Self::Stroke { points, threshold, .. } => {
-                points.iter().all(finite) && threshold.is_none_or(f32::is_finite)
-            }
+            Self::Stroke { points, threshold, .. } => points.iter().all(finite) && threshold.is_none_or(f32::is_finite),
             Self::Box(a, b) => finite(a) && finite(b),
             Self::MoveTo((x, y, z)) => x.is_finite() && y.is_finite() && z.is_finite(),
-            Self::Depth(number) | Self::Reach(number) | Self::Rotate(number) | Self::Scale(number) => number.is_finite(),
+            Self::Depth(number) | Self::Reach(number) | Self::Rotate(number) | Self::Scale(number) => {
+                number.is_finite()
+            }
             Self::Group(_, Some((r, g, b))) => r.is_finite() && g.is_finite() && b.is_finite(),
             _ => true,
         }

@@ -69,9 +69,9 @@ impl RigHistory {
     ) -> Result<&'static str, OperationError> {
         let before = selection.0.clone();
         let outcome = operation.run(rig, uids, symmetry)?;
-        let after = outcome.selected.unwrap_or_else(|| {
-            before.iter().copied().filter(|joint| rig.joint(*joint).is_some()).collect()
-        });
+        let after = outcome
+            .selected
+            .unwrap_or_else(|| before.iter().copied().filter(|joint| rig.joint(*joint).is_some()).collect());
         let step = Step {
             name: operation.name(),
             forward: outcome.edits,

@@ -22,7 +22,9 @@ pub struct PlacementPlugin;
 impl Plugin for PlacementPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_message::<PlaceRequest>().add_message::<Placed>().add_systems(Update, place.in_set(RigSystems::Gesture));
+        app.add_message::<PlaceRequest>()
+            .add_message::<Placed>()
+            .add_systems(Update, place.in_set(RigSystems::Gesture));
     }
 }
 

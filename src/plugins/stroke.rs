@@ -188,7 +188,8 @@ fn act(
 
 /// Joints on the view plane, each with its parent's number; those behind the camera are nowhere.
 fn projected(rig: &Rig, posed: &[(Uid, Vec3)], plane: &ViewPlane) -> Vec<(Vec2, Option<usize>)> {
-    let numbers: std::collections::HashMap<Uid, usize> = posed.iter().enumerate().map(|(n, (uid, _))| (*uid, n)).collect();
+    let numbers: std::collections::HashMap<Uid, usize> =
+        posed.iter().enumerate().map(|(n, (uid, _))| (*uid, n)).collect();
     let project = |(uid, position): &(Uid, Vec3)| {
         let parent = rig.joint(*uid).and_then(|joint| joint.parent).and_then(|parent| numbers.get(&parent).copied());
         (plane.project(*position).unwrap_or(Vec2::NAN), parent)

@@ -12,7 +12,10 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-use super::{RigSystems, configure_sets, document::{Joint, JointEntities}};
+use super::{
+    RigSystems, configure_sets,
+    document::{Joint, JointEntities},
+};
 use crate::{
     mesh::{
         model::Model,
@@ -195,13 +198,17 @@ pub fn posed_points(
     let Some(skin) = skin else { return mesh.rest.points.clone() };
     // Rest to pose. Weights that came with the file hold its bind pose; as long as nobody moves a joint that is the
     // mesh at rest, and from there on the rest mesh follows its joints.
-    let matrices: Vec<Affine3A> = skin.joints.iter().map(|uid| match pose(*uid) {
-        Some(pose) => {
-            let rest: Affine3A = rig.rest_global(*uid).into();
-            if same(&pose, &rest) { Affine3A::IDENTITY } else { pose * rest.inverse() }
-        }
-        None => Affine3A::IDENTITY,
-    }).collect();
+    let matrices: Vec<Affine3A> = skin
+        .joints
+        .iter()
+        .map(|uid| match pose(*uid) {
+            Some(pose) => {
+                let rest: Affine3A = rig.rest_global(*uid).into();
+                if same(&pose, &rest) { Affine3A::IDENTITY } else { pose * rest.inverse() }
+            }
+            None => Affine3A::IDENTITY,
+        })
+        .collect();
     if matrices.iter().all(|matrix| *matrix == Affine3A::IDENTITY) {
         return mesh.rest.points.clone();
     }

@@ -34,7 +34,8 @@ pub fn import_skeleton(model: &Model, uids: &mut UidSource) -> ImportedSkeleton 
         RigEdit::AddJoint { joint: Box::new(joint), parent: node.parent.map(|parent| nodes[parent]), index: usize::MAX }
     });
     let edits = edits.collect();
-    let skin = model.weights.clone().map(|weights| Arc::new(SkinData { joints: nodes.clone(), weights, at_rest: false }));
+    let skin =
+        model.weights.clone().map(|weights| Arc::new(SkinData { joints: nodes.clone(), weights, at_rest: false }));
     ImportedSkeleton { edits, nodes, skin }
 }
 
@@ -106,16 +107,20 @@ pub fn character(parts: &Character) -> Model {
     let node_of: Vec<Option<usize>> = file_nodes.iter().map(|uid| place.get(uid).copied()).collect();
     let from_file = skin.is_some_and(|skin| !skin.at_rest);
     let mut model = if from_file { (*file).clone() } else { (*rest).clone() };
-    model.nodes = rig.walk().map(|joint| {
-        let source = file_nodes.iter().position(|uid| *uid == joint.data.uid).and_then(|number| file.nodes.get(number));
-        Node {
-            name: joint.data.label.clone().unwrap_or_default(),
-            parent: joint.parent.and_then(|parent| place.get(&parent).copied()),
-            rest: joint.data.rest.into(),
-            joint: joint.data.kind == NodeKind::Joint,
-            extras: source.and_then(|source| source.extras.clone()),
-        }
-    }).collect();
+    model.nodes = rig
+        .walk()
+        .map(|joint| {
+            let source =
+                file_nodes.iter().position(|uid| *uid == joint.data.uid).and_then(|number| file.nodes.get(number));
+            Node {
+                name: joint.data.label.clone().unwrap_or_default(),
+                parent: joint.parent.and_then(|parent| place.get(&parent).copied()),
+                rest: joint.data.rest.into(),
+                joint: joint.data.kind == NodeKind::Joint,
+                extras: source.and_then(|source| source.extras.clone()),
+            }
+        })
+        .collect();
     model.clips = file.clips.iter().filter_map(|clip| remaining_clip(clip, &node_of)).collect();
     model.weights = skin.map(|skin| remapped(skin, &place));
     for object in &mut model.objects {

@@ -328,8 +328,9 @@ fn checked(tag: &Tag) -> Result<Tag, EditError> {
     let mut tag = tag.clone();
     if let TagKind::Command { params, .. } = &mut tag.kind {
         let options = ron_options().with_recursion_limit(PARAMS_DEPTH);
-        let raw: Box<RawValue> =
-            options.from_str(&format!("{params}\n")).map_err(|error| EditError::BadParams(tag.uid, error.code.to_string()))?;
+        let raw: Box<RawValue> = options
+            .from_str(&format!("{params}\n"))
+            .map_err(|error| EditError::BadParams(tag.uid, error.code.to_string()))?;
         *params = raw.trim().get_ron().to_owned();
     }
     Ok(tag)
@@ -342,5 +343,8 @@ fn check_color(group: &GroupData) -> Result<(), EditError> {
 fn is_whole(weights: &Weights) -> bool {
     let rising = weights.starts.is_sorted() && weights.starts.first().is_none_or(|first| *first == 0);
     let ends = weights.starts.last().map_or(0, |last| *last as usize);
-    rising && ends == weights.joints.len() && ends == weights.values.len() && weights.values.iter().all(|w| w.is_finite())
+    rising
+        && ends == weights.joints.len()
+        && ends == weights.values.len()
+        && weights.values.iter().all(|w| w.is_finite())
 }

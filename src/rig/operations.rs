@@ -183,13 +183,13 @@ impl Operation {
             }
             Self::Scale { joints, scale, pivot, with_children } => {
                 if !scale.is_finite() || scale.min_element() <= 0.0 && scale.max_element() >= 0.0 {
-                    return Err(OperationError::BadNumber("a scale of zero or of mixed signs cannot be undone by hand"));
+                    return Err(OperationError::BadNumber(
+                        "a scale of zero or of mixed signs cannot be undone by hand",
+                    ));
                 }
                 transform::about(draft, joints, Affine3::from_scale(*scale), *pivot, *with_children)
             }
-            Self::Labels(labels) => {
-                labels.iter().try_for_each(|(joint, label)| label_joint(draft, *joint, label))
-            }
+            Self::Labels(labels) => labels.iter().try_for_each(|(joint, label)| label_joint(draft, *joint, label)),
             Self::Orient { joints, along } => orient::orient(draft, joints, *along),
             Self::Mirror { joints } => symmetry::mirror(draft, joints),
             Self::Group { joints, name, color } => group(draft, joints, name, *color),

@@ -282,7 +282,11 @@ fn any_unit_gives_the_same_skeleton() {
         assert_eq!(answer.code, 0, "{}", answer.err);
         let json = answer.json();
         let joints = json["joints"].as_array().unwrap().iter();
-        shapes.push(joints.flat_map(|j| j["position"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap() / scale)).collect());
+        shapes.push(
+            joints
+                .flat_map(|j| j["position"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap() / scale))
+                .collect(),
+        );
         assert_eq!(rigsmith(folder.path(), &["--json", "info", "a.glb"]).json()["unweighted"], 0);
     }
     for other in [&shapes[0], &shapes[2]] {

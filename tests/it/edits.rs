@@ -23,14 +23,28 @@ pub fn steps(most: usize) -> impl Strategy<Value = Vec<Step>> {
 
 /// Texts that break careless writers.
 const TEXTS: [&str; 10] = [
-    "", "arm_l", "Hand.R.001", "q\"uo\\te", "line\nbreak\r\ttab", "左手 \u{1F600}", "\u{0}\u{7f}\u{2028}", "// no comment",
-    "None", "joints: [",
+    "",
+    "arm_l",
+    "Hand.R.001",
+    "q\"uo\\te",
+    "line\nbreak\r\ttab",
+    "左手 \u{1F600}",
+    "\u{0}\u{7f}\u{2028}",
+    "// no comment",
+    "None",
+    "joints: [",
 ];
 
 /// Parameters of modules in every shape of RON.
 const PARAMS: [&str; 8] = [
-    "()", "(a: 1, uid: \"0000000000000001\", joints: [(uid: 3)])", "[1,\n    2, // two\n]", "{\"k\": 'c', 'x': '\\''}",
-    "r#\"raw \" string\"#", "Some(Name(-1.5e3))", "\"text, with ) and ]\"", "/* a */ 1 // trailing",
+    "()",
+    "(a: 1, uid: \"0000000000000001\", joints: [(uid: 3)])",
+    "[1,\n    2, // two\n]",
+    "{\"k\": 'c', 'x': '\\''}",
+    "r#\"raw \" string\"#",
+    "Some(Name(-1.5e3))",
+    "\"text, with ) and ]\"",
+    "/* a */ 1 // trailing",
 ];
 
 fn a_joint(rig: &Rig, number: u16) -> Uid {
@@ -60,7 +74,12 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
             pivot: odd.then_some(place),
             with_children: a % 2 == 0,
         },
-        8 => Operation::Scale { joints: vec![x], scale: place.abs() + 0.1, pivot: odd.then_some(place), with_children: a % 2 == 0 },
+        8 => Operation::Scale {
+            joints: vec![x],
+            scale: place.abs() + 0.1,
+            pivot: odd.then_some(place),
+            with_children: a % 2 == 0,
+        },
         9 => Operation::Reparent { joints: vec![x], parent },
         10 => Operation::Labels(vec![(x, text)]),
         11 => Operation::Orient { joints: vec![x, y], along: [Axis::X, Axis::Y, Axis::Z][usize::from(b) % 3] },
@@ -72,7 +91,11 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
                 uid,
                 label: Some(text),
                 kind: NodeKind::Null,
-                rest: RestTransform { translation: place, rotation: Quat::from_rotation_x(place.y), scale: place.abs() + 0.5 },
+                rest: RestTransform {
+                    translation: place,
+                    rotation: Quat::from_rotation_x(place.y),
+                    scale: place.abs() + 0.5,
+                },
                 tags: vec![command(Uid(uid.0 + 7), PARAMS[usize::from(a) % PARAMS.len()], None)],
                 ..Default::default()
             }),
@@ -100,7 +123,9 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
             None => edit(RigEdit::RemoveTag(x, uid)),
         },
         20 => match rig.joint(x).and_then(|joint| joint.data.tags.last()) {
-            Some(tag) => edit(RigEdit::SetTag(x, Box::new(Tag { enabled: !tag.enabled, comment: text, ..tag.clone() }))),
+            Some(tag) => {
+                edit(RigEdit::SetTag(x, Box::new(Tag { enabled: !tag.enabled, comment: text, ..tag.clone() })))
+            }
             None => edit(RigEdit::SetTag(x, Box::new(command(uid, "()", None)))),
         },
         21 => edit(RigEdit::AddLocalGroup(GroupData { uid, name: text, color: [0.1, 0.2, 1e-9], enabled: odd }, 0)),
@@ -125,7 +150,7 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
 
 pub fn command(uid: Uid, params: &str, feature: Option<Uid>) -> Tag {
     let kind = TagKind::Command { module: "a \"module\"".into(), params: params.into(), feature };
-    Tag { uid, enabled: uid.0 % 2 == 0, comment: String::new(), kind }
+    Tag { uid, enabled: uid.0.is_multiple_of(2), comment: String::new(), kind }
 }
 
 /// A rig after random steps; those that are refused are passed over.
@@ -278,7 +303,11 @@ fn inserting_splits_a_bone_and_moves_nothing() {
     assert_at(&bench, inserted, [1.0, 0.5, 0.1]);
     assert_at(&bench, joints[1], [1.0, 1.0, 0.0]);
     assert_at(&bench, joints[3], [1.5, 3.0, 0.0]);
-    assert_eq!(bench.rig.children(Some(joints[0])), &[inserted, joints[4]], "the bone keeps its place among its siblings");
+    assert_eq!(
+        bench.rig.children(Some(joints[0])),
+        &[inserted, joints[4]],
+        "the bone keeps its place among its siblings"
+    );
     assert_eq!(bench.rig.children(Some(inserted)), &[joints[1]]);
     let refused = bench.try_run(Operation::Insert { child: joints[0], position: Vec3::ZERO });
     assert_eq!(refused, Err(OperationError::NoBone(joints[0])));
@@ -323,7 +352,8 @@ fn moving_takes_children_along_or_leaves_them() {
 #[test]
 fn rotating_and_scaling_go_about_the_pivot() {
     let quarter = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
-    let rotate = |joints: Vec<Uid>, pivot, with_children| Operation::Rotate { joints, rotation: quarter, pivot, with_children };
+    let rotate =
+        |joints: Vec<Uid>, pivot, with_children| Operation::Rotate { joints, rotation: quarter, pivot, with_children };
     let mut bench = Bench::new();
     let joints = bench.chain(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], None);
     bench.run(rotate(vec![joints[1]], None, true));
@@ -397,7 +427,8 @@ fn labels_groups_and_locks_are_set_and_taken_away() {
     bench.run(Operation::Labels(vec![(joints[1], String::new())]));
     assert_eq!(bench.rig.joint(joints[1]).unwrap().data.label, None);
 
-    let group = |joints: &[Uid], name: &str, color| Operation::Group { joints: joints.to_vec(), name: name.into(), color };
+    let group =
+        |joints: &[Uid], name: &str, color| Operation::Group { joints: joints.to_vec(), name: name.into(), color };
     bench.run(group(&joints[1..3], "spine", Some([1.0, 0.0, 0.0])));
     bench.run(group(&joints[3..4], "spine", None));
     assert_eq!(bench.rig.groups().len(), 1);
@@ -425,7 +456,8 @@ fn what_could_not_be_saved_is_refused() {
     let unturned = RestTransform { rotation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.5), ..Default::default() };
     let joint = |uid| JointData { uid, ..Default::default() };
     let add = |joint| RigEdit::AddJoint { joint: Box::new(joint), parent: None, index: 0 };
-    let tag = |uid, params: &str| RigEdit::AddTag { joint: joints[1], tag: Box::new(command(uid, params, None)), index: 0 };
+    let tag =
+        |uid, params: &str| RigEdit::AddTag { joint: joints[1], tag: Box::new(command(uid, params, None)), index: 0 };
     let painted = |uid, color| GroupData { uid, name: "p".into(), color, enabled: true };
     let weights = |starts: &[u32], values: &[f32]| {
         let weights = Weights { starts: starts.to_vec(), joints: vec![0; values.len()], values: values.to_vec() };

@@ -126,7 +126,13 @@ fn a_large_loose_island_bends_with_what_it_lies_on() {
     points.extend(body.iter().map(|p| *p + Vec3::new(0.003, 0.0, 0.02)));
     let count = body.len() as u32;
     let triangles: Vec<[u32; 3]> = faces.iter().copied().chain(faces.iter().map(|t| t.map(|c| c + count))).collect();
-    let given = weights(body.len(), |p| vec![(0, 1.001 - body[p].x), (1, body[p].x - 0.001)].into_iter().filter(|w| w.1 > 0.0).map(|w| (w.0, w.1.min(1.0))).collect());
+    let given = weights(body.len(), |p| {
+        vec![(0, 1.001 - body[p].x), (1, body[p].x - 0.001)]
+            .into_iter()
+            .filter(|w| w.1 > 0.0)
+            .map(|w| (w.0, w.1.min(1.0)))
+            .collect()
+    });
     let (filled, report) = fill_unweighted(&points, &triangles, &given, &[]);
     whole(&filled, points.len());
     assert_eq!(report.by_solve, body.len());

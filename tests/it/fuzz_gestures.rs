@@ -11,7 +11,17 @@ fn no_text_breaks_the_gesture_reader() {
         b"[Click((0.0,1.2)), Depth(0.3), Mirror(true), Volume(1), Undo, Redo, Label(\"wrist_l\"), View(Orbit(30, -1e1))]".to_vec(),
         b"[Box((0, 0), (1, 1)), Group(\"g\", Some((1, 0, 0))), MoveTo((0, 1, 2)), Orient(Y), Lock(true), /* c */ Scale(2) // d\n]".to_vec(),
     ];
-    let dictionary: &[&[u8]] = &[b"Click((0,0)),", b"Stroke(points: [", b"joints: ", b"threshold: ", b"View(", b"Orbit(", b"NaN", b"inf", b"None"];
+    let dictionary: &[&[u8]] = &[
+        b"Click((0,0)),",
+        b"Stroke(points: [",
+        b"joints: ",
+        b"threshold: ",
+        b"View(",
+        b"Orbit(",
+        b"NaN",
+        b"inf",
+        b"None",
+    ];
     run_fuzz("gestures", &seeds, dictionary, |bytes| match read_gestures(bytes) {
         Ok(gestures) => {
             let text = ron::to_string(&gestures).expect("gestures can be written");

@@ -16,8 +16,22 @@ fn no_text_breaks_the_template_reader() {
         )])])".to_vec(),
     ];
     let dictionary: &[&[u8]] = &[
-        b"uid: \"0000000000000001\",", b"parent: \"0000000000000001\",", b"joints: [", b"groups: [", b"tags: [", b"params: ",
-        b"format: 2", b"Some(", b"None", b"r#\"", b"/*", b"//", b"'\\''", b"Command(", b"Feature(", b"(0.0, 0.0, 0.0)",
+        b"uid: \"0000000000000001\",",
+        b"parent: \"0000000000000001\",",
+        b"joints: [",
+        b"groups: [",
+        b"tags: [",
+        b"params: ",
+        b"format: 2",
+        b"Some(",
+        b"None",
+        b"r#\"",
+        b"/*",
+        b"//",
+        b"'\\''",
+        b"Command(",
+        b"Feature(",
+        b"(0.0, 0.0, 0.0)",
     ];
     run_fuzz("template", &seeds, dictionary, |bytes| {
         let header = read_header(bytes);

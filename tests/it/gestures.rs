@@ -13,7 +13,11 @@ pub fn boxes(corners: &[[[f32; 3]; 2]]) -> Model {
     let mut model = Model { name: "boxes".into(), ..Default::default() };
     for (object, [low, high]) in corners.iter().enumerate() {
         let first = model.points.len() as u32;
-        model.points.extend((0..8).map(|i| Vec3::from_array([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { low[axis] } else { high[axis] }))));
+        model.points.extend(
+            (0..8).map(|i| {
+                Vec3::from_array([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { low[axis] } else { high[axis] }))
+            }),
+        );
         let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         add_part(&mut model, object, (first..first + 8).collect(), &quads);
     }
@@ -44,10 +48,12 @@ fn limb(radius: f32, low: f32, high: f32) -> Model {
         }
     }
     let quads: Vec<[u32; 4]> = (0..rings)
-        .flat_map(|ring| (0..around).map(move |step| {
-            let (a, b) = (ring * around + step, ring * around + (step + 1) % around);
-            [a, b, b + around, a + around]
-        }))
+        .flat_map(|ring| {
+            (0..around).map(move |step| {
+                let (a, b) = (ring * around + step, ring * around + (step + 1) % around);
+                [a, b, b + around, a + around]
+            })
+        })
         .collect();
     let vertices = (0..model.points.len() as u32).collect();
     add_part(&mut model, 0, vertices, &quads);
@@ -104,7 +110,10 @@ fn a_click_goes_between_the_nearest_and_the_furthest_hit() {
         assert_eq!(answers.last().unwrap().joints_added, 1);
     }
     let mut bench = bench(boxes(&ONE_BOX));
-    let answers = make(&mut bench, "[Click((3.0, 1.0)), View(Left), Click((0.25, 0.5)), Click((0.1, 1.0)), View(Top), Click((0.5, 0.1))]");
+    let answers = make(
+        &mut bench,
+        "[Click((3.0, 1.0)), View(Left), Click((0.25, 0.5)), Click((0.1, 1.0)), View(Top), Click((0.5, 0.1))]",
+    );
     assert!(!answers[0].done && answers[0].joints_added == 0 && answers[0].message.contains("nothing"), "{answers:?}");
     let placed = places(&bench);
     assert_near(placed[0], [0.0, 0.5, -0.25]);
@@ -127,7 +136,10 @@ fn volumes_are_cycled_through() {
         assert_near(places(&bench)[0], [0.0, 0.0, z]);
     }
     let mut bench = bench(boxes(&TWO_BOXES));
-    done(&mut bench, "[Volume(1), Deselect, Click((0, 0)), Volume(0), Deselect, Click((0.5, 0)), View(Back), Volume(1), Deselect, Click((0, 0.5))]");
+    done(
+        &mut bench,
+        "[Volume(1), Deselect, Click((0, 0)), Volume(0), Deselect, Click((0.5, 0)), View(Back), Volume(1), Deselect, Click((0, 0.5))]",
+    );
     assert_eq!(bench.rig().roots().len(), 3);
     assert_near(places(&bench)[1], [0.5, 0.0, 0.0]);
     assert_near(places(&bench)[2], [0.0, 0.5, -1.5]);
@@ -145,15 +157,22 @@ fn strokes_become_chains_of_the_wanted_length() {
     // From an existing joint: that joint is the first of the three.
     let last = bench.rig().walk().last().unwrap().data.uid;
     let at = bench.rig().position(last);
-    let answers = done(&mut bench, &format!("[Deselect, Stroke(points: [({}, {}), (0.0, 1.9)], joints: 3)]", at.x, at.y));
+    let answers =
+        done(&mut bench, &format!("[Deselect, Stroke(points: [({}, {}), (0.0, 1.9)], joints: 3)]", at.x, at.y));
     assert_eq!(answers[1].joints_added, 2);
     assert_eq!(bench.rig().children(Some(last)).len(), 1);
     assert_eq!(bench.rig().roots().len(), 1);
     // Below the selected joint, where it starts in the open.
     done(&mut bench, "[Select((0.0, 0.2)), Stroke(points: [(0.0, 0.5), (0.0, 0.8)], joints: 2)]");
     assert_eq!(bench.rig().children(Some(bench.rig().roots()[0])).len(), 2);
-    let answers = make(&mut bench, "[Stroke(points: [(3.0, 0.5), (4.0, 0.8)], joints: 2), Stroke(points: [(0.0, 0.5)]), Stroke(points: [])]");
-    assert!(answers.iter().all(|answer| !answer.done && !answer.message.is_empty() && answer.joints_added == 0), "{answers:?}");
+    let answers = make(
+        &mut bench,
+        "[Stroke(points: [(3.0, 0.5), (4.0, 0.8)], joints: 2), Stroke(points: [(0.0, 0.5)]), Stroke(points: [])]",
+    );
+    assert!(
+        answers.iter().all(|answer| !answer.done && !answer.message.is_empty() && answer.joints_added == 0),
+        "{answers:?}"
+    );
 }
 
 #[test]
@@ -166,7 +185,10 @@ fn strokes_across_a_bone_insert_and_scribbles_delete() {
     assert_eq!(after.len(), 4);
     assert_near(after[1], [0.0, 0.6, 0.0]);
     assert_eq!([after[0], after[2], after[3]], before[..]);
-    done(&mut bench, "[Stroke(points: [(-0.09, 0.9), (0.09, 0.93), (-0.09, 0.96), (0.09, 1.0), (-0.09, 1.03), (0.09, 1.06), (-0.09, 1.1)])]");
+    done(
+        &mut bench,
+        "[Stroke(points: [(-0.09, 0.9), (0.09, 0.93), (-0.09, 0.96), (0.09, 1.0), (-0.09, 1.03), (0.09, 1.06), (-0.09, 1.1)])]",
+    );
     assert_eq!(bench.rig().len(), 3);
     assert!(places(&bench).iter().all(|p| p.y < 0.7 || p.y > 1.7));
     assert_eq!(bench.rig().walk().filter(|joint| joint.parent.is_none()).count(), 1, "what hung below moved up");
@@ -176,7 +198,10 @@ fn strokes_across_a_bone_insert_and_scribbles_delete() {
 fn absurd_numbers_of_joints_end_soon() {
     let mut bench = bench(limb(0.1, 0.0, 2.0));
     let started = std::time::Instant::now();
-    make(&mut bench, "[Stroke(points: [(0.0, 0.2), (0.0, 1.6)], joints: 4000000000), Stroke(points: [(0.05, 0.2), (0.05, 1.6)], joints: 0), Depth(1e30), Volume(4294967295), Click((0.0, 1.0)), Scale(1e38), Scale(1e38), Scale(0), MoveTo((1e38, 1e38, 1e38)), Reach(-1), Stroke(points: [(0.0, 0.2), (0.0, 1.6)], threshold: -1)]");
+    make(
+        &mut bench,
+        "[Stroke(points: [(0.0, 0.2), (0.0, 1.6)], joints: 4000000000), Stroke(points: [(0.05, 0.2), (0.05, 1.6)], joints: 0), Depth(1e30), Volume(4294967295), Click((0.0, 1.0)), Scale(1e38), Scale(1e38), Scale(0), MoveTo((1e38, 1e38, 1e38)), Reach(-1), Stroke(points: [(0.0, 0.2), (0.0, 1.6)], threshold: -1)]",
+    );
     assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
     assert!(places(&bench).iter().all(|place| place.is_finite()));
 }
@@ -184,7 +209,10 @@ fn absurd_numbers_of_joints_end_soon() {
 #[test]
 fn picking_takes_the_nearest_then_the_next() {
     let mut bench = bench(boxes(&ONE_BOX));
-    done(&mut bench, "[Click((-0.5, 1.0)), Label(\"a\"), Click((0.0, 1.0)), Label(\"b\"), Click((0.7, 1.0)), Label(\"c\")]");
+    done(
+        &mut bench,
+        "[Click((-0.5, 1.0)), Label(\"a\"), Click((0.0, 1.0)), Label(\"b\"), Click((0.7, 1.0)), Label(\"c\")]",
+    );
     let named = |bench: &mut Workbench| {
         let chosen = selected(bench);
         let labels = chosen.iter().map(|joint| bench.rig().joint(*joint).unwrap().data.label.clone().unwrap());
@@ -237,7 +265,10 @@ fn selected_of(rig: &rigsmith::rig::Rig) -> Vec<Uid> {
 #[test]
 fn mirroring_makes_pairs_and_moving_keeps_depth() {
     let mut bench = bench(boxes(&ONE_BOX));
-    done(&mut bench, "[Mirror(true), Click((0.01, 0.5)), Click((0.5, 1.0)), Label(\"wrist_l\"), Mirror(false), Depth(0.1), Click((0.8, 1.5))]");
+    done(
+        &mut bench,
+        "[Mirror(true), Click((0.01, 0.5)), Click((0.5, 1.0)), Label(\"wrist_l\"), Mirror(false), Depth(0.1), Click((0.8, 1.5))]",
+    );
     assert_eq!(bench.rig().len(), 4);
     let (left, right) = (bench.rig().find_label("wrist_l").unwrap(), bench.rig().find_label("wrist_r").unwrap());
     assert_eq!(bench.rig().joint(left).unwrap().data.mirror, Some(right));
@@ -256,14 +287,20 @@ fn mirroring_makes_pairs_and_moving_keeps_depth() {
 #[test]
 fn every_other_gesture_does_what_it_says() {
     let mut bench = bench(boxes(&ONE_BOX));
-    done(&mut bench, "[Click((0, 0.5)), Label(\"root\"), Click((0.5, 0.5)), Label(\"mid\"), Click((0.5, 1.0)), Label(\"tip\"),
-        SelectLabel(\"root\"), Rotate(90)]");
+    done(
+        &mut bench,
+        "[Click((0, 0.5)), Label(\"root\"), Click((0.5, 0.5)), Label(\"mid\"), Click((0.5, 1.0)), Label(\"tip\"),
+        SelectLabel(\"root\"), Rotate(90)]",
+    );
     let at = |bench: &Workbench, label: &str| bench.rig().position(bench.rig().find_label(label).unwrap());
     assert_near(at(&bench, "mid"), [0.0, 1.0, 0.0]);
     assert_near(at(&bench, "tip"), [-0.5, 1.0, 0.0]);
     done(&mut bench, "[Scale(2.0)]");
     assert_near(at(&bench, "mid"), [0.0, 1.5, 0.0]);
-    done(&mut bench, "[SelectLabel(\"tip\"), Insert((-0.5, 1.5)), Label(\"in\"), SelectAll, Orient(Y), Lock(true), Group(\"body\", Some((1, 0, 0)))]");
+    done(
+        &mut bench,
+        "[SelectLabel(\"tip\"), Insert((-0.5, 1.5)), Label(\"in\"), SelectAll, Orient(Y), Lock(true), Group(\"body\", Some((1, 0, 0)))]",
+    );
     assert_near(at(&bench, "in"), [-0.5, 1.5, 0.0]);
     assert_near(at(&bench, "tip"), [-1.0, 1.5, 0.0]);
     assert!(bench.rig().walk().all(|joint| joint.data.locked && joint.data.group == Some(bench.rig().groups()[0].uid)));

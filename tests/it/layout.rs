@@ -46,7 +46,11 @@ fn code(text: &str) -> String {
         } else if rest.starts_with(&['/', '*']) {
             let end = find(at + 2, "*/");
             skip(&mut out, at, end)
-        } else if rest[0] == 'r' && !word_before && matches!(rest.get(1), Some('"' | '#')) && raw_quote(&rest[1..]).is_some() {
+        } else if rest[0] == 'r'
+            && !word_before
+            && matches!(rest.get(1), Some('"' | '#'))
+            && raw_quote(&rest[1..]).is_some()
+        {
             let hashes = raw_quote(&rest[1..]).unwrap_or_default();
             let end = find(at + hashes + 2, &format!("\"{}", "#".repeat(hashes)));
             skip(&mut out, at, end)
@@ -108,7 +112,8 @@ fn mentions(code: &str, path: &str) -> Vec<usize> {
 fn uses(code: &str) -> Vec<(usize, String)> {
     let mut found = Vec::new();
     for (start, _) in code.match_indices("use ") {
-        let fresh = code[..start].trim_end_matches(' ').chars().next_back().is_none_or(|c| matches!(c, '\n' | ')' | '{' | 'b'));
+        let fresh =
+            code[..start].trim_end_matches(' ').chars().next_back().is_none_or(|c| matches!(c, '\n' | ')' | '{' | 'b'));
         let Some(end) = code[start..].find(';').filter(|_| fresh) else { continue };
         let line = code[..start].matches('\n').count() + 1;
         let mut prefixes: Vec<String> = Vec::new();
@@ -135,8 +140,25 @@ fn uses(code: &str) -> Vec<(usize, String)> {
 
 #[test]
 fn parts_depend_in_one_direction() {
-    let pure = ["std::fs", "std::path", "std::env", "bevy::app", "bevy::ecs", "bevy::render", "bevy::window", "bevy::tasks",
-        "crate::plugins", "crate::editor", "crate::cli", "crate::files", "crate::headless", "crate::test_app", "App", "Commands", "ResMut"];
+    let pure = [
+        "std::fs",
+        "std::path",
+        "std::env",
+        "bevy::app",
+        "bevy::ecs",
+        "bevy::render",
+        "bevy::window",
+        "bevy::tasks",
+        "crate::plugins",
+        "crate::editor",
+        "crate::cli",
+        "crate::files",
+        "crate::headless",
+        "crate::test_app",
+        "App",
+        "Commands",
+        "ResMut",
+    ];
     let rules: [(&str, &[&str]); 9] = [
         ("rig", &pure),
         ("mesh", &pure),
@@ -153,7 +175,9 @@ fn parts_depend_in_one_direction() {
         for (path, text) in sources(folder) {
             let code = shipped(&text);
             for name in forbidden {
-                wrong.extend(mentions(&code, name).into_iter().map(|line| format!("{}:{line} uses {name}", path.display())));
+                wrong.extend(
+                    mentions(&code, name).into_iter().map(|line| format!("{}:{line} uses {name}", path.display())),
+                );
             }
         }
     }

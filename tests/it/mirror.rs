@@ -30,16 +30,44 @@ const FLIP: Vec3 = Vec3::new(-1.0, 1.0, 1.0);
 #[test]
 fn labels_swap_their_side_or_have_none() {
     for (left, right) in [
-        ("hand_l", "hand_r"), ("hand_L", "hand_R"), ("hand.L", "hand.R"), ("hand.l", "hand.r"), ("hand-l", "hand-r"),
-        ("hand.L.001", "hand.R.001"), ("thumb_01_l", "thumb_01_r"), ("arm_l_02", "arm_r_02"), ("L_hand", "R_hand"),
-        ("Left", "Right"), ("LeftHand", "RightHand"), ("mixamorig:LeftHandThumb1", "mixamorig:RightHandThumb1"),
-        ("leftArm", "rightArm"), ("handLeft", "handRight"), ("eye_left", "eye_right"), ("LEFT_ARM", "RIGHT_ARM"), ("手.L", "手.R"),
+        ("hand_l", "hand_r"),
+        ("hand_L", "hand_R"),
+        ("hand.L", "hand.R"),
+        ("hand.l", "hand.r"),
+        ("hand-l", "hand-r"),
+        ("hand.L.001", "hand.R.001"),
+        ("thumb_01_l", "thumb_01_r"),
+        ("arm_l_02", "arm_r_02"),
+        ("L_hand", "R_hand"),
+        ("Left", "Right"),
+        ("LeftHand", "RightHand"),
+        ("mixamorig:LeftHandThumb1", "mixamorig:RightHandThumb1"),
+        ("leftArm", "rightArm"),
+        ("handLeft", "handRight"),
+        ("eye_left", "eye_right"),
+        ("LEFT_ARM", "RIGHT_ARM"),
+        ("手.L", "手.R"),
     ] {
         assert_eq!(mirrored_label(left).as_deref(), Some(right));
         assert_eq!(mirrored_label(right).as_deref(), Some(left));
         assert_eq!((label_side(left), label_side(right)), (1, -1), "{left}");
     }
-    for none in ["", "l", "_l", "upright", "shoulder", "bright", "cleft", "copyright_1", "spine", "roll", "Leftover", "tail.001", "l1", "手"] {
+    for none in [
+        "",
+        "l",
+        "_l",
+        "upright",
+        "shoulder",
+        "bright",
+        "cleft",
+        "copyright_1",
+        "spine",
+        "roll",
+        "Leftover",
+        "tail.001",
+        "l1",
+        "手",
+    ] {
         assert_eq!(mirrored_label(none), None, "{none}");
         assert_eq!(label_side(none), 0, "{none}");
     }
@@ -75,7 +103,9 @@ fn chains_grow_on_both_sides_and_share_the_middle() {
     // A spine that wavers about the plane lies on it as a whole.
     let spine = bench.chain(&[[0.03, 1.1, 0.0], [-0.015, 1.2, 0.0], [0.0, 1.3, 0.0]], Some(hips));
     assert_eq!(bench.rig.len(), 10);
-    assert!(spine.iter().all(|joint| bench.at(*joint).x == 0.0 && bench.rig.joint(*joint).unwrap().data.mirror.is_none()));
+    assert!(
+        spine.iter().all(|joint| bench.at(*joint).x == 0.0 && bench.rig.joint(*joint).unwrap().data.mirror.is_none())
+    );
     // Continuing on the right continues the left, too.
     let other_foot = partner(&bench, leg[2]);
     let toe = bench.place([-0.1, 0.0, 0.1], Some(other_foot));

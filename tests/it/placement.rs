@@ -65,7 +65,9 @@ fn rays_go_through_their_points() {
     let eye = Vec3::new(0.3, 1.2, 4.0);
     for view in [View::Front, View::Left, View::Top, View::Orbit(33.0, -21.0), View::Orbit(200.0, 80.0)] {
         let [.., camera] = view.axes();
-        for plane in [ViewPlane::orthographic(view, BOUNDS), ViewPlane::perspective(view, camera * 5.0 + eye * 0.1, eye)] {
+        for plane in
+            [ViewPlane::orthographic(view, BOUNDS), ViewPlane::perspective(view, camera * 5.0 + eye * 0.1, eye)]
+        {
             for point in [Vec2::ZERO, Vec2::new(0.7, -0.4), Vec2::new(-1.5, 1.9)] {
                 let ray = plane.ray(point);
                 assert!((ray.direction.length() - 1.0).abs() < 1e-6);
@@ -83,8 +85,13 @@ fn rays_go_through_their_points() {
 
 #[test]
 fn orthographic_rays_start_outside() {
-    for bounds in [[Vec3::splat(1000.0), Vec3::splat(2000.0)], [Vec3::splat(-3e-3), Vec3::splat(-1e-3)], [Vec3::INFINITY, Vec3::NEG_INFINITY]] {
-        for view in [View::Front, View::Back, View::Left, View::Right, View::Top, View::Bottom, View::Orbit(40.0, 30.0)] {
+    for bounds in [
+        [Vec3::splat(1000.0), Vec3::splat(2000.0)],
+        [Vec3::splat(-3e-3), Vec3::splat(-1e-3)],
+        [Vec3::INFINITY, Vec3::NEG_INFINITY],
+    ] {
+        for view in [View::Front, View::Back, View::Left, View::Right, View::Top, View::Bottom, View::Orbit(40.0, 30.0)]
+        {
             let plane = ViewPlane::orthographic(view, bounds);
             assert!(plane.standoff.is_finite());
             if bounds[0].is_finite() {
@@ -98,7 +105,10 @@ fn orthographic_rays_start_outside() {
 
 /// An arm from z = 2 to 3 before a torso from z = -1 to 1.
 fn arm_and_torso() -> Surface {
-    boxes(&[[Vec3::new(-1.0, -1.0, -1.0), Vec3::new(1.0, 1.0, 1.0)], [Vec3::new(-0.5, -0.5, 2.0), Vec3::new(0.5, 0.5, 3.0)]])
+    boxes(&[
+        [Vec3::new(-1.0, -1.0, -1.0), Vec3::new(1.0, 1.0, 1.0)],
+        [Vec3::new(-0.5, -0.5, 2.0), Vec3::new(0.5, 0.5, 3.0)],
+    ])
 }
 
 #[test]
@@ -145,9 +155,16 @@ fn joints_go_between_hits() {
 
 #[test]
 fn one_hit_is_taken_itself() {
-    let sheet = Surface::build(&[Vec3::new(-1.0, -1.0, 0.5), Vec3::new(1.0, -1.0, 0.5), Vec3::new(0.0, 1.0, 0.5)], &[[0, 1, 2]]);
+    let sheet = Surface::build(
+        &[Vec3::new(-1.0, -1.0, 0.5), Vec3::new(1.0, -1.0, 0.5), Vec3::new(0.0, 1.0, 0.5)],
+        &[[0, 1, 2]],
+    );
     let plane = ViewPlane::orthographic(View::Front, BOUNDS);
-    for settings in [PlaceSettings::default(), PlaceSettings { depth: 0.9, volume: None }, PlaceSettings { depth: 0.1, volume: Some(2) }] {
+    for settings in [
+        PlaceSettings::default(),
+        PlaceSettings { depth: 0.9, volume: None },
+        PlaceSettings { depth: 0.1, volume: Some(2) },
+    ] {
         match place(&sheet, &plane.ray(Vec2::ZERO), settings) {
             Placement::Single { position } => assert!(position.distance(Vec3::new(0.0, 0.0, 0.5)) < 1e-6),
             other => panic!("{other:?}"),

@@ -118,7 +118,11 @@ fn joint_entities_follow_the_rig() {
     assert!(bench.app.world().get_entity(entities[0]).is_err(), "its entity is gone");
     assert_eq!(bench.entity(joints[0]), None);
     for joint in &joints[1..] {
-        assert_eq!(bench.get::<ChildOf>(*joint).unwrap().parent(), bench.rig, "kept, though its parent's entity is gone");
+        assert_eq!(
+            bench.get::<ChildOf>(*joint).unwrap().parent(),
+            bench.rig,
+            "kept, though its parent's entity is gone"
+        );
     }
     assert_eq!([1, 2].map(|i| bench.entity(joints[i]).unwrap()), [entities[1], entities[2]], "the same entities");
     bench.change(Change::Undo);
@@ -138,7 +142,10 @@ fn a_pose_stays_on_top_of_the_rest_pose() {
     let entity = bench.entity(joints[1]).unwrap();
     let turn = Quat::from_rotation_z(0.5);
     bench.app.world_mut().get_mut::<Transform>(entity).unwrap().rotation = turn;
-    bench.edit(Operation::Move { to: vec![(joints[1], Vec3::new(0.5, 2.0, 0.0)), (joints[0], Vec3::Y)], with_children: true });
+    bench.edit(Operation::Move {
+        to: vec![(joints[1], Vec3::new(0.5, 2.0, 0.0)), (joints[0], Vec3::Y)],
+        with_children: true,
+    });
     let pose = *bench.get::<Transform>(joints[1]).unwrap();
     assert!(pose.translation.distance(Vec3::new(0.5, 1.0, 0.0)) < 1e-6, "{pose:?}");
     assert!(pose.rotation.angle_between(turn) < 1e-3, "{pose:?}");

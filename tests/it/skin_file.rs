@@ -87,7 +87,10 @@ fn weights_that_are_not_whole_are_refused() {
     let points = [Vec3::ZERO; 2];
     let make = |weights: Weights, triangles: &[[u32; 3]]| SkinFile::new(joints(1), weights, &points, triangles, false);
     assert!(matches!(make(weights(&[&[(0, 1.0)]]), &[]), Err(SkinError::PointCount { points: 2, weights: 1 })));
-    assert!(matches!(make(weights(&[&[(0, 1.0)], &[(1, 1.0)]]), &[]), Err(SkinError::Joint { point: 1, joint: 1, .. })));
+    assert!(matches!(
+        make(weights(&[&[(0, 1.0)], &[(1, 1.0)]]), &[]),
+        Err(SkinError::Joint { point: 1, joint: 1, .. })
+    ));
     for bad in [0.0, -0.5, f32::NAN, f32::INFINITY] {
         assert!(matches!(make(weights(&[&[(0, bad)], &[]]), &[]), Err(SkinError::Weight { point: 0, .. })), "{bad}");
     }
@@ -145,7 +148,8 @@ fn any_skin() -> impl Strategy<Value = SkinFile> {
             }
             let places: Vec<Vec3> = points.iter().map(|(_, p)| Vec3::from_array(*p)).collect();
             let count = places.len() as u32;
-            let triangles: Vec<_> = triangles.iter().filter(|_| count > 0).map(|t| t.map(|c| c % count.max(1))).collect();
+            let triangles: Vec<_> =
+                triangles.iter().filter(|_| count > 0).map(|t| t.map(|c| c % count.max(1))).collect();
             let joints = labels.into_iter().map(|(uid, label)| SkinJoint { uid, label }).collect();
             SkinFile::new(joints, weights, &places, &triangles, keep_mesh).unwrap()
         },

@@ -4,7 +4,9 @@ use glam::{Vec2, Vec3};
 use rigsmith::{
     algo::{
         placement::PlaceSettings,
-        stroke::{ChainChoice, StrokeChain, StrokeError, StrokeKind, StrokeNote, StrokeSettings, classify, stroke_chain},
+        stroke::{
+            ChainChoice, StrokeChain, StrokeError, StrokeKind, StrokeNote, StrokeSettings, classify, stroke_chain,
+        },
         view::{View, ViewPlane},
     },
     mesh::surface::Surface,
@@ -81,8 +83,11 @@ fn thresholds_split_on_either_side() {
     let check = |corners: &[(f32, f32)], threshold: f32, expected: &[(f32, f32)]| {
         let corners: Vec<Vec2> = corners.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
         let chain = chain(&surface, View::Front, &dense(&corners, 20), RAW, ChainChoice::Threshold(threshold));
-        let found: Vec<(f32, f32)> =
-            chain.joints.iter().map(|j| ((j.position.x * 1e3).round() / 1e3, (j.position.y * 1e3).round() / 1e3)).collect();
+        let found: Vec<(f32, f32)> = chain
+            .joints
+            .iter()
+            .map(|j| ((j.position.x * 1e3).round() / 1e3, (j.position.y * 1e3).round() / 1e3))
+            .collect();
         assert_eq!(found, expected, "{corners:?} {threshold}");
         assert!(chain.joints.iter().all(|j| j.position.z.abs() < 1e-4 && j.hits == 2), "midway between the hits");
     };
@@ -102,11 +107,15 @@ fn thresholds_split_on_either_side() {
 #[test]
 fn no_point_stays_further_than_the_threshold() {
     let surface = slab();
-    let stroke: Vec<Vec2> = (0..400).map(|i| i as f32 * 0.02).map(|t| Vec2::new(t, (t * 1.7).sin() + 0.3 * (t * 9.0).cos())).collect();
+    let stroke: Vec<Vec2> =
+        (0..400).map(|i| i as f32 * 0.02).map(|t| Vec2::new(t, (t * 1.7).sin() + 0.3 * (t * 9.0).cos())).collect();
     let mut before = usize::MAX;
     for threshold in [0.05, 0.2, 0.5, 2.0] {
-        let joints: Vec<Vec2> =
-            chain(&surface, View::Front, &stroke, RAW, ChainChoice::Threshold(threshold)).joints.iter().map(|j| j.source).collect();
+        let joints: Vec<Vec2> = chain(&surface, View::Front, &stroke, RAW, ChainChoice::Threshold(threshold))
+            .joints
+            .iter()
+            .map(|j| j.source)
+            .collect();
         let far = |p: Vec2| {
             joints
                 .windows(2)
@@ -151,7 +160,8 @@ fn joints_are_as_many_as_wanted() {
     let surface = tubes(&[(&ARM, 0.04)]);
     let stroke = dense(&[ARM[0].lerp(ARM[1], 0.1).truncate(), ARM[0].lerp(ARM[1], 0.9).truncate()], 50);
     for (wanted, expected) in [(0, 2), (1, 2), (2, 2), (3, 3), (4, 4), (7, 7), (20, 20), (60, 60)] {
-        let joints = chain(&surface, View::Front, &stroke, StrokeSettings::default(), ChainChoice::Joints(wanted)).joints;
+        let joints =
+            chain(&surface, View::Front, &stroke, StrokeSettings::default(), ChainChoice::Joints(wanted)).joints;
         assert_eq!(joints.len(), expected);
         let along: Vec<f32> = joints.iter().map(|j| (j.position - ARM[0]).dot((ARM[1] - ARM[0]).normalize())).collect();
         assert!(along.windows(2).all(|w| w[0] < w[1]), "in the stroke's order");
@@ -190,7 +200,11 @@ fn a_chosen_depth_is_kept() {
     for (depth, z) in [(0.0, 0.1), (0.25, 0.05), (1.0, -0.1)] {
         let settings = StrokeSettings { place: PlaceSettings { depth, volume: None }, recentre: true };
         for joint in chain(&surface, View::Front, &stroke, settings, ChainChoice::Joints(3)).joints {
-            assert!((joint.position.z - z).abs() < 3e-3 && joint.position.y.abs() < 3e-3, "{depth}: {}", joint.position);
+            assert!(
+                (joint.position.z - z).abs() < 3e-3 && joint.position.y.abs() < 3e-3,
+                "{depth}: {}",
+                joint.position
+            );
         }
     }
 }
@@ -378,7 +392,9 @@ fn elbows_of_real_bodies() {
         let joints: serde_json::Value =
             serde_json::from_str(&std::fs::read_to_string(folder.join("joints.json")).expect("joints")).expect("JSON");
         let head = |bone: &str| {
-            Vec3::from_array([0, 1, 2].map(|i| joints["default163"][bone]["head"][i].as_f64().expect("a number") as f32))
+            Vec3::from_array(
+                [0, 1, 2].map(|i| joints["default163"][bone]["head"][i].as_f64().expect("a number") as f32),
+            )
         };
         let surface = Surface::build(&points, &triangles);
         for side in ["L", "R"] {

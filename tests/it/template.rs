@@ -41,7 +41,10 @@ proptest! {
 fn sound(mut rig: Rig) -> Rig {
     let joints: Vec<_> = rig.walk().map(|joint| joint.data.clone()).collect();
     let is_feature = |uid: &Uid| {
-        joints.iter().flat_map(|joint| &joint.tags).any(|tag| tag.uid == *uid && matches!(tag.kind, TagKind::Feature { .. }))
+        joints
+            .iter()
+            .flat_map(|joint| &joint.tags)
+            .any(|tag| tag.uid == *uid && matches!(tag.kind, TagKind::Feature { .. }))
     };
     for joint in &joints {
         if joint.mirror.is_some_and(|mirror| rig.joint(mirror).is_none()) {
@@ -146,9 +149,24 @@ fn mistakes_are_named_with_their_place() {
     // What is replaced, by what, what the error is about, and the text whose place it names.
     let exact = [
         ("label: \"hips\"", "label: \"hips\", mirror: \"0000000000000099\"", "mirror", "mirror: \"0000000000000099\""),
-        ("uid: \"0000000000000011\"", "uid: \"0000000000000010\"", "used twice", "uid: \"0000000000000010\", name: \"arm_l\""),
-        ("parent: \"0000000000000001\",\n            label: \"arm_r\"", "parent: \"0000000000000077\"", "not in the file", "parent: \"0000000000000077\""),
-        ("uid: \"0000000000000001\",\n", "uid: \"0000000000000001\",\n            parent: \"0000000000000002\",\n", "ancestor", "parent: \"0000000000000002\""),
+        (
+            "uid: \"0000000000000011\"",
+            "uid: \"0000000000000010\"",
+            "used twice",
+            "uid: \"0000000000000010\", name: \"arm_l\"",
+        ),
+        (
+            "parent: \"0000000000000001\",\n            label: \"arm_r\"",
+            "parent: \"0000000000000077\"",
+            "not in the file",
+            "parent: \"0000000000000077\"",
+        ),
+        (
+            "uid: \"0000000000000001\",\n",
+            "uid: \"0000000000000001\",\n            parent: \"0000000000000002\",\n",
+            "ancestor",
+            "parent: \"0000000000000002\"",
+        ),
         ("translation: (-0.2,", "translation: (NaN,", "finite", "translation: (NaN"),
         ("translation: (-0.2,", "translation: (1e39,", "finite", "translation: (1e39"),
         ("rotation: (0.0, 0.0, 0.7", "rotation: (0.0, 0.0, 0.9", "rotation", "rotation: (0.0, 0.0, 0.9"),
@@ -231,7 +249,11 @@ fn large_nonsense_is_refused_quickly() {
 fn fields_of_a_newer_format_are_named_before_they_are_lost() {
     let text = FROZEN
         .replacen("format: 1,", "format: 2, /* a /* nested */ \" comment */ licence: (name: \"(\\\"\", uid: \"1\"),", 1)
-        .replacen("            label: \"arm_r\",", "            // mood: 1,\n            mood: {'\"': [r#\"a \" ) b\"#]},\n            label: \"arm_r\",", 1)
+        .replacen(
+            "            label: \"arm_r\",",
+            "            // mood: 1,\n            mood: {'\"': [r#\"a \" ) b\"#]},\n            label: \"arm_r\",",
+            1,
+        )
         .replacen("module: \"ik_handle\",", "module: \"ik_handle\", weight: 0.5,", 1)
         .replacen("color: (0.9, 0.62, 0.0)", "color: (0.9, 0.62, 0.0), shape: Round", 1);
     let template = read_template(text.as_bytes()).unwrap();
@@ -251,7 +273,8 @@ fn fields_of_a_newer_format_are_named_before_they_are_lost() {
     assert!(read_template(text.replacen("format: 2", "format: 1", 1).as_bytes()).is_err());
     // Many of them take no longer than few.
     let joint = |i: usize| format!("(uid: \"{i:016x}\", translation: (0, 0, 0), extra: [{i}], more: (a: ({i}))),\n");
-    let many = format!("(format: 3, uid: \"{:016x}\", name: \"\", joints: [{}])", 0, (1..5000).map(joint).collect::<String>());
+    let many =
+        format!("(format: 3, uid: \"{:016x}\", name: \"\", joints: [{}])", 0, (1..5000).map(joint).collect::<String>());
     assert_eq!(read_template(many.as_bytes()).unwrap().notes.len(), 2 * 4999 + 1);
 }
 

@@ -51,8 +51,7 @@ fn share(weights: &Weights, point: usize, joint: u32) -> f32 {
 }
 
 fn run(source: &Mesh, weights: &Weights, target: &Mesh) -> (Weights, TransferReport) {
-    let (result, report) =
-        transfer_weights(mesh(source), weights, mesh(target), &TransferSettings::default()).unwrap();
+    let (result, report) = transfer_weights(mesh(source), weights, mesh(target), &TransferSettings::default()).unwrap();
     let total = report.copied + report.matched + report.inpainted + report.nearest + report.empty;
     assert_eq!((result.len(), total), (target.0.len(), target.0.len()));
     for (p, place) in target.0.iter().enumerate().filter(|(_, p)| p.is_finite()) {
@@ -71,10 +70,8 @@ fn the_same_mesh_keeps_its_weights_exactly() {
     assert_eq!(report.copied, source.0.len());
     // Vertices in another order.
     let count = source.0.len() as u32;
-    let turned: Mesh = (
-        source.0.iter().rev().copied().collect(),
-        source.1.iter().map(|t| t.map(|c| count - 1 - c)).collect(),
-    );
+    let turned: Mesh =
+        (source.0.iter().rev().copied().collect(), source.1.iter().map(|t| t.map(|c| count - 1 - c)).collect());
     let (result, report) = run(&source, &weights, &turned);
     assert_eq!(report.copied, source.0.len());
     for p in 0..count as usize {
@@ -157,14 +154,20 @@ fn hostile_input_gets_an_answer() {
     source.0.iter().for_each(|_| none.push([]));
     assert_eq!(transfer_weights(mesh(&source), &none, mesh(&source), &settings), Err(TransferError::NoWeights));
     let empty: Mesh = Mesh::default();
-    assert_eq!(transfer_weights(mesh(&empty), &Weights::default(), mesh(&source), &settings), Err(TransferError::NoWeights));
+    assert_eq!(
+        transfer_weights(mesh(&empty), &Weights::default(), mesh(&source), &settings),
+        Err(TransferError::NoWeights)
+    );
     assert_eq!(run(&source, &weights, &empty).0.len(), 0);
     // No faces on either side, points that are not finite, triangles out of range, extreme units.
     let cloud = (source.0.clone(), vec![]);
     run(&cloud, &weights, &tube(9, 12, 0.0));
     let (_, report) = run(&source, &weights, &(tube(9, 12, 0.0).0, vec![]));
     assert_eq!(report.empty, 0);
-    let wild = (vec![Vec3::NAN, Vec3::INFINITY, Vec3::splat(f32::MAX), Vec3::ZERO, Vec3::splat(1e-44)], vec![[0, 1, 2], [2, 3, 4], [3, 9, 4]]);
+    let wild = (
+        vec![Vec3::NAN, Vec3::INFINITY, Vec3::splat(f32::MAX), Vec3::ZERO, Vec3::splat(1e-44)],
+        vec![[0, 1, 2], [2, 3, 4], [3, 9, 4]],
+    );
     let (_, report) = run(&source, &weights, &wild);
     assert_eq!(report.empty, 2);
     let mut ragged = source.clone();

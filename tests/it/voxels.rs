@@ -10,7 +10,7 @@ use rigsmith::{
     },
     mesh::{
         model::Weights,
-        voxels::{Voxels, VoxelizeError},
+        voxels::{VoxelizeError, Voxels},
     },
 };
 
@@ -69,15 +69,24 @@ fn solid(voxels: &Voxels, x: f32, y: f32, z: f32) -> bool {
 fn boxes_are_solid_whatever_their_triangles_are_like() {
     let whole = cuboid(Vec3::ZERO, Vec3::new(2.0, 1.0, 1.0), 12);
     let flipped: Mesh = (whole.0.clone(), whole.1.iter().map(|t| [t[0], t[2], t[1]]).collect());
-    let mixed = (whole.0.clone(), whole.1.iter().enumerate().map(|(i, t)| if i % 2 == 0 { *t } else { [t[0], t[2], t[1]] }).collect());
+    let mixed = (
+        whole.0.clone(),
+        whole.1.iter().enumerate().map(|(i, t)| if i % 2 == 0 { *t } else { [t[0], t[2], t[1]] }).collect(),
+    );
     let open: Mesh = (whole.0.clone(), whole.1[288..].to_vec());
     let mut state = 1u32;
     let torn = (
         whole.0.clone(),
-        whole.1.chunks(2).filter(|_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            state >> 16 > 21845
-        }).flatten().copied().collect::<Vec<_>>(),
+        whole
+            .1
+            .chunks(2)
+            .filter(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                state >> 16 > 21845
+            })
+            .flatten()
+            .copied()
+            .collect::<Vec<_>>(),
     );
     let inner = cuboid(Vec3::new(0.3, 0.3, 0.3), Vec3::new(0.7, 0.7, 0.7), 4);
     let inside_out: Mesh = (inner.0.clone(), inner.1.iter().map(|t| [t[0], t[2], t[1]]).collect());
@@ -100,8 +109,12 @@ fn boxes_are_solid_whatever_their_triangles_are_like() {
             let sample = |step: f64| ((f64::from(i) * step).fract() * 2.0 - 0.5) as f32;
             let (x, y, z) = (sample(0.819_172_513) * 2.0, sample(0.671_043_607), sample(0.549_700_478));
             let margin = 0.08;
-            let deep = (margin..2.0 - margin).contains(&x) && (margin..1.0 - margin).contains(&y) && (margin..1.0 - margin).contains(&z);
-            let far = !(-margin..2.6).contains(&x) || !(-margin..1.0 + margin).contains(&y) || !(-margin..1.0 + margin).contains(&z);
+            let deep = (margin..2.0 - margin).contains(&x)
+                && (margin..1.0 - margin).contains(&y)
+                && (margin..1.0 - margin).contains(&z);
+            let far = !(-margin..2.6).contains(&x)
+                || !(-margin..1.0 + margin).contains(&y)
+                || !(-margin..1.0 + margin).contains(&z);
             let hit = usize::from(solid(&voxels, x, y, z));
             if deep {
                 inside = (inside.0 + hit, inside.1 + 1);
@@ -246,7 +259,8 @@ fn hostile_input_gets_an_answer() {
     assert_eq!(bind(&wrong, &some, &settings), Err(VoxelError::Mesh(out)));
     assert_eq!(bind(&cube, &[], &settings), Err(VoxelError::NoBones));
     assert_eq!(bind(&cube, &[bone(0, [f32::NAN; 3], [0.0; 3])], &settings), Err(VoxelError::NoBones));
-    let extreme = VoxelSettings { resolution: usize::MAX, labels: usize::MAX, falloff: f32::NAN, sharpness: 0, influences: 0 };
+    let extreme =
+        VoxelSettings { resolution: usize::MAX, labels: usize::MAX, falloff: f32::NAN, sharpness: 0, influences: 0 };
     assert!(bind(&(cube.0[..4].to_vec(), cube.1[..2].to_vec()), &some, &extreme).is_ok());
     let zero = VoxelSettings { resolution: 0, labels: 0, ..settings.clone() };
     assert!(bind(&cube, &some, &zero).is_ok());
@@ -281,7 +295,11 @@ fn progress_rises_and_cancels() {
 #[test]
 fn the_same_for_any_number_of_threads() {
     let mesh = join([cuboid(Vec3::ZERO, Vec3::new(2.0, 1.0, 0.5), 20), cuboid(Vec3::splat(0.4), Vec3::splat(1.4), 9)]);
-    let bones = [bone(0, [0.1, 0.5, 0.2], [1.0, 0.5, 0.2]), bone(1, [1.0, 0.5, 0.2], [1.9, 0.5, 0.3]), bone(2, [0.9; 3], [1.3; 3])];
+    let bones = [
+        bone(0, [0.1, 0.5, 0.2], [1.0, 0.5, 0.2]),
+        bone(1, [1.0, 0.5, 0.2], [1.9, 0.5, 0.3]),
+        bone(2, [0.9; 3], [1.3; 3]),
+    ];
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| bind(&mesh, &bones, &VoxelSettings { resolution: 64, ..VoxelSettings::default() }).unwrap())
@@ -311,28 +329,43 @@ fn bodies_are_bound_well_even_with_a_third_of_faces_missing() {
             let mut words = line.split_whitespace();
             match words.next() {
                 Some("v") => points.push(Vec3::from_array([0; 3].map(|_: i32| words.next().unwrap().parse().unwrap()))),
-                Some("f") => quads.push(words.map(|w| w.split('/').next().unwrap().parse::<u32>().unwrap() - 1).collect()),
+                Some("f") => {
+                    quads.push(words.map(|w| w.split('/').next().unwrap().parse::<u32>().unwrap() - 1).collect())
+                }
                 _ => {}
             }
         }
-        let bones: Vec<BoneSegment> = truth["bone_order"].as_array().unwrap().iter().enumerate().filter_map(|(i, name)| {
-            let bone = &joints[rig][name.as_str()?];
-            let used = name != "Root" && !bone.is_null();
-            used.then(|| BoneSegment { joint: i as u32, head: vector(&bone["head"]), tail: vector(&bone["tail"]) })
-        }).collect();
+        let bones: Vec<BoneSegment> = truth["bone_order"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .enumerate()
+            .filter_map(|(i, name)| {
+                let bone = &joints[rig][name.as_str()?];
+                let used = name != "Root" && !bone.is_null();
+                used.then(|| BoneSegment { joint: i as u32, head: vector(&bone["head"]), tail: vector(&bone["tail"]) })
+            })
+            .collect();
         let mut state = 7u32;
-        let torn: Vec<Vec<u32>> = quads.iter().filter(|_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            state >> 16 > 21845
-        }).cloned().collect();
+        let torn: Vec<Vec<u32>> = quads
+            .iter()
+            .filter(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                state >> 16 > 21845
+            })
+            .cloned()
+            .collect();
         for (name, quads, most) in [("whole", quads, most), ("torn", torn, most * 1.05)] {
-            let triangles: Vec<[u32; 3]> = quads.iter().flat_map(|f| (2..f.len()).map(|i| [f[0], f[i - 1], f[i]])).collect();
-            let weights = geodesic_voxel_weights(&points, &triangles, &bones, &VoxelSettings::default(), &|_| true).unwrap();
+            let triangles: Vec<[u32; 3]> =
+                quads.iter().flat_map(|f| (2..f.len()).map(|i| [f[0], f[i - 1], f[i]])).collect();
+            let weights =
+                geodesic_voxel_weights(&points, &triangles, &bones, &VoxelSettings::default(), &|_| true).unwrap();
             let mut sum = 0.0;
             for p in 0..points.len() {
                 let mut difference: BTreeMap<u32, f32> = weights.of(p).collect();
                 for entry in truth["weights"][p].as_array().unwrap() {
-                    *difference.entry(entry[0].as_u64().unwrap() as u32).or_default() -= entry[1].as_f64().unwrap() as f32;
+                    *difference.entry(entry[0].as_u64().unwrap() as u32).or_default() -=
+                        entry[1].as_f64().unwrap() as f32;
                 }
                 sum += difference.values().map(|d| d.abs() / 2.0).sum::<f32>();
             }

@@ -78,9 +78,7 @@ impl Axis {
         let normals: Vec<Vec3> = places.iter().map(|s| s.tangent).collect();
         let sections: Vec<Option<Section>> = places
             .iter()
-            .map(|station| {
-                fan.section(surface, station.centre, station.tangent, REACH * station.radius, 3, &mut hits)
-            })
+            .map(|station| fan.section(surface, station.centre, station.tangent, REACH * station.radius, 3, &mut hits))
             .collect();
         Self::assemble(&fine, &sections, &normals, rough.radius)
     }
@@ -154,7 +152,14 @@ impl Axis {
     }
 
     /// The centroid of the limb's section under `ray`, which stands at the arc length `at` of the stroke, and its radius.
-    pub(super) fn recentre(&self, surface: &Surface, fan: &Fan, at: f32, ray: &Ray, hits: &mut Vec<Hit>) -> (Vec3, f32) {
+    pub(super) fn recentre(
+        &self,
+        surface: &Surface,
+        fan: &Fan,
+        at: f32,
+        ray: &Ray,
+        hits: &mut Vec<Hit>,
+    ) -> (Vec3, f32) {
         let station = self.station(at, ray);
         let section = if station.own {
             fan.section(surface, station.centre, station.tangent, REACH * station.radius, 1, hits)

@@ -88,9 +88,10 @@ const SWING: f32 = 0.4;
 fn is_scribble(points: &[Vec2], tolerance: f32) -> bool {
     let [long, wide] = main_axes(points);
     let extent = |axis: Vec2| {
-        let (low, high) = points.iter().map(|p| p.dot(axis)).fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), x| {
-            (l.min(x), h.max(x))
-        });
+        let (low, high) = points
+            .iter()
+            .map(|p| p.dot(axis))
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
         high - low
     };
     let (length, width) = (extent(long), extent(wide));

@@ -100,7 +100,8 @@ impl Track {
     /// The span of a ray that belongs to the tracked volume near the arc length `at`.
     pub(super) fn span_at(&self, hits: &[Hit], at: f32) -> Option<Span> {
         let next = self.samples.partition_point(|s| s.at < at).min(self.samples.len() - 1);
-        let nearest = if next > 0 && at - self.samples[next - 1].at < self.samples[next].at - at { next - 1 } else { next };
+        let nearest =
+            if next > 0 && at - self.samples[next - 1].at < self.samples[next].at - at { next - 1 } else { next };
         continuing(&spans(hits), self.samples[nearest].span, self.volume)
     }
 }

@@ -57,7 +57,8 @@ pub fn fill_unweighted(
     let most = (0..weights.len()).map(|p| weights.of(p).len()).max().unwrap_or(0).clamp(4, 8);
     let unit = Unit::of((0..points.len()).filter(|&p| !empty(p)).map(|p| points[p]).chain(ends(bones)));
     let points = &unit.all(points);
-    let bones = &bones.iter().map(|b| BoneSegment { head: unit.to(b.head), tail: unit.to(b.tail), ..*b }).collect::<Vec<_>>();
+    let bones =
+        &bones.iter().map(|b| BoneSegment { head: unit.to(b.head), tail: unit.to(b.tail), ..*b }).collect::<Vec<_>>();
     let graph = Graph::new(points, triangles);
     // A place is known if a vertex there is; the first one speaks for it.
     let mut known: Vec<Option<Sparse>> = vec![None; graph.len()];

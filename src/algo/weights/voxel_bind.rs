@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::{bone::BoneSegment, fill::Unit};
 use crate::mesh::{
     model::Weights,
-    voxels::{MAX_RESOLUTION, Voxels, VoxelizeError},
+    voxels::{MAX_RESOLUTION, VoxelizeError, Voxels},
 };
 use labels::{Field, Joints, Limits};
 
@@ -101,7 +101,8 @@ pub fn geodesic_voxel_weights(
 ) -> Result<Weights, VoxelError> {
     let unit = Unit::of(bones.iter().flat_map(|b| [b.head, b.tail]));
     let points = &unit.all(points);
-    let bones: Vec<_> = bones.iter().map(|b| BoneSegment { head: unit.to(b.head), tail: unit.to(b.tail), ..*b }).collect();
+    let bones: Vec<_> =
+        bones.iter().map(|b| BoneSegment { head: unit.to(b.head), tail: unit.to(b.tail), ..*b }).collect();
     let joints = Joints::new(&bones);
     let (low, high) = joints.bounds().ok_or(VoxelError::NoBones)?;
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(VoxelError::Cancelled) };
@@ -123,7 +124,8 @@ pub fn geodesic_voxel_weights(
     }
     step(0.2)?;
     let limits = Limits { labels: settings.labels.clamp(1, labels::MOST), ratio: settings.reach() };
-    let field = Field::new(&voxels, &joints, limits, &|share| progress(0.2 + 0.6 * share)).ok_or(VoxelError::Cancelled)?;
+    let field =
+        Field::new(&voxels, &joints, limits, &|share| progress(0.2 + 0.6 * share)).ok_or(VoxelError::Cancelled)?;
     step(0.8)?;
     let chunks: Vec<Weights> = points
         .par_chunks(CHUNK)

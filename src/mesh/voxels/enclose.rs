@@ -15,8 +15,7 @@ pub(super) fn enclose(grid: &mut Voxels, surface: Vec<u64>, points: &[Vec3], tri
     let outside = flood(grid, &surface);
     let valid = row_masks(grid);
     let words = grid.words;
-    let mut solid: Vec<u64> =
-        outside.iter().enumerate().map(|(i, outside)| !outside & valid[i % words]).collect();
+    let mut solid: Vec<u64> = outside.iter().enumerate().map(|(i, outside)| !outside & valid[i % words]).collect();
     let (odd, winding) = votes(grid, points, triangles);
 
     let dims = grid.dims;
@@ -193,15 +192,13 @@ fn votes(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<i8>, Ve
                 tally(start, &mut odd, &mut winding, 0);
             }
         } else {
-            odd.par_chunks_mut(plane).zip(winding.par_chunks_mut(plane)).enumerate().for_each(
-                |(z, (odd, winding))| {
-                    let lines = if axis == 0 { dims[1] } else { dims[0] };
-                    let step = if axis == 0 { dims[0] } else { 1 };
-                    for line in 0..lines {
-                        tally(z * plane + line * step, odd, winding, z * plane);
-                    }
-                },
-            );
+            odd.par_chunks_mut(plane).zip(winding.par_chunks_mut(plane)).enumerate().for_each(|(z, (odd, winding))| {
+                let lines = if axis == 0 { dims[1] } else { dims[0] };
+                let step = if axis == 0 { dims[0] } else { 1 };
+                for line in 0..lines {
+                    tally(z * plane + line * step, odd, winding, z * plane);
+                }
+            });
         }
     }
     (odd, winding)

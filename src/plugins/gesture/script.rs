@@ -18,7 +18,10 @@ use crate::{
         stroke::{StrokeDone, StrokeRequest, StrokeResult},
         surface::{RigMeshes, RigSurface},
     },
-    rig::{Rig, Uid, operations::{MirrorPlane, Operation}},
+    rig::{
+        Rig, Uid,
+        operations::{MirrorPlane, Operation},
+    },
 };
 
 /// Gestures that are to be made on the rig of this entity, and the answers so far.
@@ -97,15 +100,8 @@ pub(super) struct Answers<'w, 's> {
     drawn: MessageReader<'w, 's, StrokeDone>,
 }
 
-type Scripted<'a> = (
-    Entity,
-    &'a mut GestureScript,
-    &'a Rig,
-    &'a Selection,
-    &'a mut Symmetry,
-    Option<&'a RigSurface>,
-    Has<RigMeshes>,
-);
+type Scripted<'a> =
+    (Entity, &'a mut GestureScript, &'a Rig, &'a Selection, &'a mut Symmetry, Option<&'a RigSurface>, Has<RigMeshes>);
 
 /// Reads the answers to the last gesture of each script and makes the next one.
 pub(super) fn run_scripts(mut scripts: Query<Scripted>, mut requests: Requests, mut answers: Answers) {

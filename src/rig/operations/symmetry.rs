@@ -43,12 +43,8 @@ impl MirrorPlane {
     /// across the plane turned over, so that it stays a proper rotation.
     pub fn mirrored_affine(&self, global: &Affine3) -> Affine3 {
         let n = self.normal;
-        let reflect = Mat3::from_cols(
-            Vec3::X - n * (2.0 * n.x),
-            Vec3::Y - n * (2.0 * n.y),
-            Vec3::Z - n * (2.0 * n.z),
-        );
-        Affine3 { matrix3: (reflect * Mat3::from(global.matrix3) * reflect).into(), translation: self.mirrored(global.translation) }
+        let reflect = Mat3::from_cols(Vec3::X - n * (2.0 * n.x), Vec3::Y - n * (2.0 * n.y), Vec3::Z - n * (2.0 * n.z));
+        Affine3 { matrix3: reflect * global.matrix3 * reflect, translation: self.mirrored(global.translation) }
     }
 }
 
@@ -141,7 +137,12 @@ pub(super) fn mirror(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationE
 /// skeleton that was not made by mirroring.
 fn standing_at(draft: &Draft, parent: Option<Uid>, plane: &MirrorPlane, place: Vec3) -> Option<Uid> {
     let unpaired = |uid: &&Uid| draft.rig().joint(**uid).is_some_and(|joint| joint.data.mirror.is_none());
-    let near = draft.rig().children(parent).iter().filter(unpaired).map(|uid| (draft.rig().position(*uid).distance(place), *uid));
+    let near = draft
+        .rig()
+        .children(parent)
+        .iter()
+        .filter(unpaired)
+        .map(|uid| (draft.rig().position(*uid).distance(place), *uid));
     let near = near.filter(|(distance, _)| *distance <= plane.tolerance);
     near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, uid)| uid)
 }

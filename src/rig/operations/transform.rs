@@ -47,11 +47,7 @@ pub(super) fn about(
 }
 
 /// Sets transforms in the rig's space, parents first, and mirrors them to partners that are not in the list.
-fn set_globals(
-    draft: &mut Draft,
-    mut targets: Vec<(Uid, Affine3)>,
-    with_children: bool,
-) -> Result<(), OperationError> {
+fn set_globals(draft: &mut Draft, mut targets: Vec<(Uid, Affine3)>, with_children: bool) -> Result<(), OperationError> {
     if let Some(plane) = draft.symmetry() {
         let listed: HashSet<Uid> = targets.iter().map(|(joint, _)| *joint).collect();
         for number in 0..targets.len() {

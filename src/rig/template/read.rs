@@ -195,17 +195,37 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
     let above = parent.and_then(|parent| parent.parent).map(|above| fields[above].name);
     match (field.depth, parent.map(|parent| parent.name)) {
         (1, None) => Some(&[
-            "format", "uid", "name", "version", "kind", "author", "description", "preview", "joint_count", "features",
-            "groups", "joints",
+            "format",
+            "uid",
+            "name",
+            "version",
+            "kind",
+            "author",
+            "description",
+            "preview",
+            "joint_count",
+            "features",
+            "groups",
+            "joints",
         ]),
         (3, Some("features")) => Some(&["kind", "name", "switches"]),
         (3, Some("groups")) => Some(&["uid", "name", "color", "enabled"]),
         (3, Some("joints")) => Some(&[
-            "uid", "parent", "label", "group", "mirror", "kind", "locked", "translation", "rotation", "scale", "tags",
+            "uid",
+            "parent",
+            "label",
+            "group",
+            "mirror",
+            "kind",
+            "locked",
+            "translation",
+            "rotation",
+            "scale",
+            "tags",
         ]),
-        (5, Some("tags")) if above == Some("joints") => Some(&[
-            "uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch",
-        ]),
+        (5, Some("tags")) if above == Some("joints") => {
+            Some(&["uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch"])
+        }
         _ => None,
     }
 }
@@ -229,7 +249,12 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result
         unique(group.uid)?;
         let color: [f32; 3] = group.color.into();
         if color.iter().any(|part| !part.is_finite()) {
-            return Err(places.error(group.uid, 0, "color", "the colour is not finite; use numbers from 0 to 1".into()));
+            return Err(places.error(
+                group.uid,
+                0,
+                "color",
+                "the colour is not finite; use numbers from 0 to 1".into(),
+            ));
         }
         rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
@@ -272,9 +297,12 @@ fn add_joints(
             }
         }
         if let Some(group) = joint.group.filter(|group| rig.group(*group).is_none()) {
-            return Err(places.error(uid, 0, "group", format!(
-                "joint {uid} is in the local group {group}, which is not in the file; add it under `groups`"
-            )));
+            return Err(places.error(
+                uid,
+                0,
+                "group",
+                format!("joint {uid} is in the local group {group}, which is not in the file; add it under `groups`"),
+            ));
         }
         let (x, y, z, w) = joint.rotation;
         let rest = RestTransform {
@@ -300,25 +328,33 @@ fn add_joints(
             if let TagKind::Command { feature: Some(feature), .. } = &tag.kind
                 && !features.contains(feature)
             {
-                return Err(places.error(tag.uid, 0, "feature", format!(
-                    "tag {} is in the feature {feature}, which is not in the file; add it or leave the field out",
-                    tag.uid
-                )));
+                return Err(places.error(
+                    tag.uid,
+                    0,
+                    "feature",
+                    format!(
+                        "tag {} is in the feature {feature}, which is not in the file; add it or leave the field out",
+                        tag.uid
+                    ),
+                ));
             }
             tags.push(tag);
         }
         order.push(uid);
         children.entry(joint.parent).or_default().push(uid);
-        data.insert(uid, JointData {
+        data.insert(
             uid,
-            label: joint.label,
-            group: joint.group,
-            kind: joint.kind,
-            rest,
-            mirror: joint.mirror,
-            locked: joint.locked,
-            tags,
-        });
+            JointData {
+                uid,
+                label: joint.label,
+                group: joint.group,
+                kind: joint.kind,
+                rest,
+                mirror: joint.mirror,
+                locked: joint.locked,
+                tags,
+            },
+        );
     }
     // Parents first, whatever the order in the file.
     let mut stack: Vec<(Option<Uid>, Uid)> = Vec::new();
@@ -333,9 +369,12 @@ fn add_joints(
         push(&mut stack, Some(uid));
     }
     match order.into_iter().find(|uid| data.contains_key(uid)) {
-        Some(uid) => Err(places.error(uid, 0, "parent", format!(
-            "joint {uid} is its own ancestor; give one joint of the cycle another parent"
-        ))),
+        Some(uid) => Err(places.error(
+            uid,
+            0,
+            "parent",
+            format!("joint {uid} is its own ancestor; give one joint of the cycle another parent"),
+        )),
         None => Ok(()),
     }
 }

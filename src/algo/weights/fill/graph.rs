@@ -17,7 +17,9 @@ impl Graph {
         let key = |i: u32| points[i as usize].to_array();
         let mut order: Vec<u32> = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite()).collect();
         // Finite numbers compare; -0 and 0 are equal, as they should be.
-        order.sort_unstable_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
+        order.sort_unstable_by(|&a, &b| {
+            key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b))
+        });
         // Nodes are numbered by their first vertex, so that the graph has the mesh's locality.
         let mut first: Vec<u32> = vec![u32::MAX; points.len()];
         for group in order.chunk_by(|&a, &b| key(a) == key(b)) {

@@ -53,7 +53,11 @@ impl Joints {
     /// The box of all segments.
     pub(super) fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let first = self.segments.first()?.0;
-        Some(self.segments.iter().fold((first, first), |(low, high), (a, b)| (low.min(*a).min(*b), high.max(*a).max(*b))))
+        Some(
+            self.segments
+                .iter()
+                .fold((first, first), |(low, high), (a, b)| (low.min(*a).min(*b), high.max(*a).max(*b))),
+        )
     }
 
     /// From the nearest point of a joint's bones to `point`.
