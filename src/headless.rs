@@ -1,6 +1,6 @@
 //! One rig and its mesh without a window: what the command line, pipelines and tests work with.
 //!
-//! A [`Workbench`] is an app with [`RigPlugins`](crate::plugins::RigPlugins) and a rig in it. It drives the very
+//! A [`Workbench`] is an app with [`RigPlugins`] and a rig in it. It drives the very
 //! plugins that a window drives, and waits for their background work.
 
 use std::{sync::Arc, time::Duration};

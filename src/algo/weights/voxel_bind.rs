@@ -3,7 +3,7 @@
 //! Dionne and de Lasa 2013, "Geodesic voxel binding for production character meshes": the mesh becomes solid voxels,
 //! which works for any triangle soup; each bone's distance to the voxels is measured along paths inside the body, so
 //! that a hand resting on a thigh is far from it; and weights fall off with that distance. Where the paper runs one
-//! search a bone, [`labels`] runs one for all and keeps the nearest few joints of each voxel.
+//! search a bone, `labels` runs one for all and keeps the nearest few joints of each voxel.
 
 mod labels;
 
