@@ -4,13 +4,13 @@
 //! same run (which is neither watertight nor finds the furthest hit). To compare all on the same mesh and rays:
 //!
 //! ```text
-//! cargo bench --bench surface -- --write-mesh /tmp/torus.obj
-//! python rays.py /tmp/torus.obj
-//! cargo bench --bench surface -- --rays /tmp/rays.f32
+//! cargo bench --bench surface -- --write-mesh torus.obj
+//! python rays.py torus.obj
+//! cargo bench --bench surface -- --rays rays.f32
 //! ```
 //!
-//! where `/tmp/rays.f32` holds origin and direction of each ray, six little-endian `f32`: in `rays.py`'s terms,
-//! `np.hstack([origins, directions]).astype('<f4').tofile('/tmp/rays.f32')`. Without `--rays`, rays of the same
+//! where `rays.f32` holds origin and direction of each ray, six little-endian `f32`: in `rays.py`'s terms,
+//! `np.hstack([origins, directions]).astype('<f4').tofile('rays.f32')`. Without `--rays`, rays of the same
 //! distribution are made here. `--only NAME` runs one part, for a profiler.
 
 use std::{

@@ -122,7 +122,14 @@ type Output = PathBuf;
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        // Help and version are answers; only wrong usage has to be told to programs, too.
+        Err(error) if error.use_stderr() && std::env::args().any(|argument| argument == "--json") => {
+            return report::finish(Err(Failure::Usage(error.to_string().trim_end().to_owned())), true);
+        }
+        Err(error) => error.exit(),
+    };
     let result = match cli.command {
         None => demo::run(),
         Some(Command::Sketch(args)) => sketch::run(&args),

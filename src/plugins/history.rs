@@ -72,6 +72,10 @@ impl RigHistory {
         let after = outcome
             .selected
             .unwrap_or_else(|| before.iter().copied().filter(|joint| rig.joint(*joint).is_some()).collect());
+        // What changed nothing is no step: undoing it would seem to do nothing.
+        if outcome.edits.is_empty() && after == before {
+            return Ok(operation.name());
+        }
         let step = Step {
             name: operation.name(),
             forward: outcome.edits,

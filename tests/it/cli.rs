@@ -227,6 +227,10 @@ fn wrong_usage_exits_with_2() {
         let answer = rigsmith(folder.path(), args);
         assert_eq!(answer.code, 2, "{args:?}: {}", answer.err);
         assert!(!answer.err.is_empty());
+        let mut args = args.to_vec();
+        args.insert(0, "--json");
+        let json = rigsmith(folder.path(), &args);
+        assert_eq!((json.code, json.json()["ok"].clone()), (2, false.into()), "{args:?}");
     }
 }
 

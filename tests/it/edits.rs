@@ -203,8 +203,14 @@ proptest! {
         for step in &steps {
             let plane = (step.1 % 3 == 0).then(|| MirrorPlane::sagittal(2.0));
             let operation = operation(&rig, step);
-            if history.edit(&mut rig, &mut selection, &mut uids, plane, &operation).is_ok() {
-                states.push((rig.clone(), selection.clone()));
+            let done = history.edit(&mut rig, &mut selection, &mut uids, plane, &operation).is_ok();
+            let now = (rig.clone(), selection.clone());
+            // An operation that changed nothing (locking what is locked is an edit, reparenting nobody is not) is no step.
+            if history.steps().1 == states.len() {
+                prop_assert!(done);
+                states.push(now);
+            } else {
+                prop_assert_eq!(states.last(), Some(&now), "changed without a step: {:?}", operation);
             }
         }
         prop_assert_eq!(history.steps().1, states.len() - 1);
