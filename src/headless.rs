@@ -24,6 +24,13 @@ use crate::{
     },
 };
 
+/// An app with [`RigPlugins`], without window and renderer, before `finish`. The same seed gives the same uids.
+pub fn headless_app(seed: u64) -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, TransformPlugin, RigPlugins)).insert_resource(UidSource::seeded(seed));
+    app
+}
+
 /// One rig, at most one mesh, and the plugins that work on them.
 pub struct Workbench {
     app: App,
@@ -45,8 +52,7 @@ pub enum WorkbenchError {
 impl Workbench {
     /// An empty rig. The same seed gives the same uids.
     pub fn new(seed: u64, name: &str) -> Self {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, TransformPlugin, RigPlugins)).insert_resource(UidSource::seeded(seed));
+        let mut app = headless_app(seed);
         app.finish();
         app.cleanup();
         let uid = app.world_mut().resource_mut::<UidSource>().next_uid();

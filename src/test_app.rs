@@ -1,13 +1,13 @@
-//! An app for tests, ours and yours: every plugin of [`RigPlugins`], no window, no renderer, the same uids every time.
+//! An app for tests, ours and yours: every plugin of [`RigPlugins`](crate::plugins::RigPlugins), no window, no renderer, the same uids every time.
 
 use bevy::{
     ecs::schedule::{LogLevel, ScheduleBuildSettings},
     prelude::*,
 };
 
-use crate::{plugins::RigPlugins, rig::UidSource};
+use crate::headless::headless_app;
 
-/// An app with [`RigPlugins`] that is ready for `app.update()`. Systems whose order is ambiguous are an error.
+/// An app with [`RigPlugins`](crate::plugins::RigPlugins) that is ready for `app.update()`. Systems whose order is ambiguous are an error.
 ///
 /// ```
 /// use rigsmith::{prelude::*, test_app::test_app};
@@ -22,8 +22,7 @@ use crate::{plugins::RigPlugins, rig::UidSource};
 /// assert_eq!(app.world().get::<Rig>(rig).map(Rig::len), Some(1));
 /// ```
 pub fn test_app() -> App {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, TransformPlugin, RigPlugins)).insert_resource(UidSource::seeded(1));
+    let mut app = headless_app(1);
     let strict = ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
     app.edit_schedule(Update, |schedule| {
         schedule.set_build_settings(strict.clone());

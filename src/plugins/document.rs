@@ -212,8 +212,9 @@ fn follow_rigs(
             };
             if *rest != data.rest {
                 let unposed = *pose == Transform::from(*rest);
-                let offset = Transform::from_matrix((rest.affine().inverse() * pose.compute_affine_unaligned()).into());
-                *pose = if unposed { data.rest.into() } else { Transform::from(data.rest) * offset };
+                let offset = rest.affine().inverse() * RestTransform::from(*pose).affine();
+                let posed = RestTransform::from_affine(&(data.rest.affine() * offset));
+                *pose = if unposed { data.rest.into() } else { posed.into() };
                 *rest = data.rest;
             }
             if child_of.is_none_or(|child_of| child_of.parent() != parent) {
@@ -248,15 +249,5 @@ fn describe(
             entity.remove::<InGroup>();
         }
         _ => {}
-    }
-}
-
-trait UnalignedAffine {
-    fn compute_affine_unaligned(&self) -> bevy::math::Affine3;
-}
-
-impl UnalignedAffine for Transform {
-    fn compute_affine_unaligned(&self) -> bevy::math::Affine3 {
-        bevy::math::Affine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
     }
 }

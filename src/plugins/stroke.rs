@@ -157,13 +157,6 @@ fn act(
             StrokeResult::Inserted { child }
         }
         StrokeKind::Chain { start, .. } => {
-            // The active joint takes twice the reach: recentring may have moved it from where it was drawn.
-            let near_active = || {
-                let active = posed.iter().position(|(uid, _)| Some(*uid) == selection.active())?;
-                let first = request.points.first()?;
-                (flat[active].0.distance(*first) <= 2.0 * request.reach).then_some(active)
-            };
-            let start = start.or_else(near_active);
             let Some(hierarchy) = surface.ready() else {
                 return StrokeResult::Nothing("the surface is not ready; draw the stroke again".to_owned());
             };

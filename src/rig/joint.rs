@@ -61,6 +61,12 @@ impl From<RestTransform> for Transform {
     }
 }
 
+impl From<Transform> for RestTransform {
+    fn from(transform: Transform) -> Self {
+        Self { translation: transform.translation, rotation: transform.rotation, scale: transform.scale }
+    }
+}
+
 impl From<RestTransform> for Trs {
     fn from(rest: RestTransform) -> Self {
         Self { translation: rest.translation, rotation: rest.rotation, scale: rest.scale }

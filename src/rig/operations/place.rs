@@ -13,8 +13,8 @@ pub(super) fn chain(draft: &mut Draft, positions: &[Vec3], parent: Option<Uid>) 
     }
     // A chain that keeps near the plane as a whole (a spine, drawn by hand) lies on it as a whole.
     let plane = draft.symmetry();
-    let central =
-        plane.is_some_and(|plane| positions.iter().all(|p| plane.distance(*p).abs() <= 2.0 * plane.tolerance));
+    let central = positions.len() > 1
+        && plane.is_some_and(|plane| positions.iter().all(|p| plane.distance(*p).abs() <= 2.0 * plane.tolerance));
     let mut parent = parent;
     let mut other_parent = parent.map(|p| draft.partner(p).unwrap_or(p));
     for &position in positions {
