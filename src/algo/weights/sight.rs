@@ -2,8 +2,11 @@
 //! inside.
 //!
 //! Every answer is the same for either orientation of the triangles, so shells that are inside-out cause no trouble.
+//!
+//! Vectors cross into obvhs as arrays: it takes a range of glam versions, and a user's lock file may have it use another
+//! than ours.
 
-use glam::{Vec3, Vec3A};
+use glam::Vec3;
 use obvhs::{
     BvhBuildParams,
     cwbvh::{CwBvh, builder::build_cwbvh_from_tris},
@@ -28,8 +31,9 @@ impl Sight {
     pub fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let soup: Vec<Triangle> = triangles
             .iter()
-            .map(|t| t.map(|i| Vec3A::from(points[i as usize])))
+            .map(|t| t.map(|i| points[i as usize]))
             .filter(|[a, b, c]| (*b - *a).cross(*c - *a).length_squared() > 0.0)
+            .map(|corners| corners.map(|corner| corner.to_array().into()))
             .map(|[v0, v1, v2]| Triangle { v0, v1, v2 })
             .collect();
         if soup.is_empty() {
@@ -43,11 +47,11 @@ impl Sight {
     /// True if no triangle crosses the segment strictly between its ends.
     pub fn clear(&self, from: Vec3, to: Vec3) -> bool {
         let Some(bvh) = &self.bvh else { return true };
-        let direction = Vec3A::from(to - from);
+        let direction = to - from;
         if direction.length_squared() <= 0.0 {
             return true;
         }
-        let ray = Ray::new(from.into(), direction, MARGIN, 1.0 - MARGIN);
+        let ray = Ray::new(from.to_array().into(), direction.to_array().into(), MARGIN, 1.0 - MARGIN);
         bvh.ray_traverse_miss(ray, |ray, index| self.triangles[index].intersect(ray))
     }
 
@@ -55,7 +59,7 @@ impl Sight {
     pub fn first(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
         let bvh = self.bvh.as_ref()?;
         let mut hit = RayHit::none();
-        let ray = Ray::new_inf(origin.into(), direction.into());
+        let ray = Ray::new_inf(origin.to_array().into(), direction.to_array().into());
         bvh.ray_traverse(ray, &mut hit, |ray, index| self.triangles[index].intersect(ray)).then_some(hit.t)
     }
 
@@ -69,9 +73,9 @@ impl Sight {
         let Some(bvh) = &self.bvh else { return false };
         let (mut winding, mut odd) = (0i32, 0usize);
         for direction in evenly_spread() {
-            let direction = Vec3A::from(direction);
+            let direction = direction.to_array().into();
             let mut crossings = 0;
-            bvh.ray_traverse_anyhit(Ray::new_inf(point.into(), direction), |ray, index| {
+            bvh.ray_traverse_anyhit(Ray::new_inf(point.to_array().into(), direction), |ray, index| {
                 let triangle = &self.triangles[index];
                 if triangle.intersect(ray) < f32::INFINITY {
                     let normal = (triangle.v1 - triangle.v0).cross(triangle.v2 - triangle.v0);
