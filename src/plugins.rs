@@ -5,6 +5,7 @@ pub mod gesture;
 pub mod history;
 pub mod picking;
 pub mod placement;
+pub mod selection;
 pub mod skinning;
 pub mod stroke;
 pub mod surface;

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 
 use bevy::prelude::*;
 
+pub use super::selection::Selection;
 use super::{RigSystems, configure_sets, history::RigHistory};
 use crate::rig::{
     RestTransform, Rig, Uid, UidSource,
@@ -43,17 +44,6 @@ pub struct RigBundle {
     pub history: RigHistory,
     /// The entities of its joints.
     pub entities: JointEntities,
-}
-
-/// Selected joints of a rig; the last one is active: the parent of what is placed next.
-#[derive(Component, Debug, Clone, PartialEq, Eq, Default)]
-pub struct Selection(pub Vec<Uid>);
-
-impl Selection {
-    /// The joint that was selected last.
-    pub fn active(&self) -> Option<Uid> {
-        self.0.last().copied()
-    }
 }
 
 /// The plane of live mirroring of a rig; `None` while it is off.

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use undo::{Edit, Record};
 
-use super::document::Selection;
+use super::selection::Selection;
 use crate::rig::{
     Rig, RigEdit, Uid, UidSource,
     operations::{MirrorPlane, Operation, OperationError},
