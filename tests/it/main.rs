@@ -21,6 +21,7 @@ mod mirror;
 mod models;
 mod mutate;
 mod obj;
+mod obj_materials;
 mod obj_torture;
 mod picking;
 mod placement;
