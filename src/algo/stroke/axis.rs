@@ -33,6 +33,9 @@ const LASTING: f32 = 1.5;
 /// Over how many radii the direction is taken in which the line goes on.
 const STRAIGHT: f32 = 3.0;
 
+/// How far beside the stroke, in radii, a joint may be put where the limb has no section of its own.
+const TREMBLE: f32 = 0.35;
+
 /// One place along the centre line.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Station {
@@ -161,11 +164,13 @@ impl Axis {
         hits: &mut Vec<Hit>,
     ) -> (Vec3, f32) {
         let station = self.station(at, ray);
-        let section = if station.own {
-            fan.section(surface, station.centre, station.tangent, REACH * station.radius, 1, hits)
-        } else {
-            None
-        };
+        if !station.own {
+            // Nothing was measured here: the line may correct a trembling hand, not lead away from the stroke.
+            let aside = across(station.centre, ray);
+            let too_far = aside - aside.clamp_length_max(TREMBLE * station.radius);
+            return (station.centre - too_far, station.radius);
+        }
+        let section = fan.section(surface, station.centre, station.tangent, REACH * station.radius, 1, hits);
         section.map_or((station.centre, station.radius), |s| (s.centroid, s.radius))
     }
 }
