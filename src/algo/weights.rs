@@ -96,7 +96,7 @@ pub struct WeightReport {
     pub by_fill: usize,
     /// By the nearest bone alone.
     pub by_nearest: usize,
-    /// As rigid parts, or wholly by locked joints, or because only one joint deforms.
+    /// As rigid parts, or because only one joint deforms. Points held by locked joints count where the rest of them would.
     pub given: usize,
     /// All points.
     pub points: usize,
