@@ -11,3 +11,5 @@ pub mod test_app;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "editor")]
+pub mod editor;

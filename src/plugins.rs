@@ -1,14 +1,21 @@
 //! The engine as Bevy plugins: one plugin a file, each public, replaceable and usable alone where that makes sense.
 
+#[cfg(feature = "draw")]
+pub mod display;
 pub mod document;
+#[cfg(feature = "draw")]
+pub mod drawing;
 pub mod gesture;
 pub mod history;
+pub mod journal;
 pub mod picking;
 pub mod placement;
 pub mod selection;
 pub mod skinning;
 pub mod stroke;
 pub mod surface;
+#[cfg(feature = "draw")]
+pub mod viewport;
 
 use bevy::{app::PluginGroupBuilder, prelude::*};
 

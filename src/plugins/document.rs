@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use bevy::prelude::*;
 
-pub use super::selection::Selection;
+pub use super::selection::{Hovered, Selection};
 use super::{RigSystems, configure_sets, history::RigHistory};
 use crate::rig::{
     RestTransform, Rig, Uid, UidSource,
@@ -38,6 +38,8 @@ pub struct RigBundle {
     pub transform: Transform,
     /// What is selected.
     pub selection: Selection,
+    /// What a click would pick.
+    pub hovered: Hovered,
     /// Live mirroring.
     pub symmetry: Symmetry,
     /// Undo and redo.

@@ -14,3 +14,7 @@ impl Selection {
         self.0.last().copied()
     }
 }
+
+/// The joint under the pointer: what a click would pick now.
+#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Hovered(pub Option<Uid>);

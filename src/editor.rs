@@ -1,0 +1,16 @@
+//! The editing window: panels and tools over the plugins.
+//!
+//! Nothing here changes a rig itself. Panels read the world and hand in [`Requests`](panel::Requests); tools read what
+//! the pointer does in the viewport and write the same requests that gesture lists and games write.
+
+pub mod actions;
+pub mod mode;
+pub mod notice;
+pub mod panel;
+pub mod pointer;
+
+use bevy::prelude::*;
+
+/// The rig that is edited. Its meshes are in its [`RigMeshes`](crate::plugins::surface::RigMeshes).
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ActiveRig(pub Entity);

@@ -1,0 +1,51 @@
+//! What the pointer does in the viewport.
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// What the pointer does in the viewport now. Tools run while it is theirs; nothing is deleted by changing it.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub enum Mode {
+    /// Clicks select joints, drags select boxes.
+    #[default]
+    Select,
+    /// Clicks place joints.
+    Place,
+    /// Strokes become chains.
+    Stroke,
+    /// A gizmo moves the selected joints at rest.
+    Move,
+    /// A gizmo turns the selected joints at rest.
+    Rotate,
+    /// A gizmo scales the selected joints at rest.
+    Scale,
+    /// A gizmo turns the selected joints on top of the rest pose; the rest pose stays.
+    Pose,
+    /// Shows the weights of the selected joint.
+    Weights,
+}
+
+impl Mode {
+    /// All modes, in the order of the toolbar.
+    pub const ALL: [Self; 8] =
+        [Self::Select, Self::Place, Self::Stroke, Self::Move, Self::Rotate, Self::Scale, Self::Pose, Self::Weights];
+
+    /// The name on the toolbar.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Select => "Select",
+            Self::Place => "Place",
+            Self::Stroke => "Stroke",
+            Self::Move => "Move",
+            Self::Rotate => "Rotate",
+            Self::Scale => "Scale",
+            Self::Pose => "Pose",
+            Self::Weights => "Weights",
+        }
+    }
+}
+
+/// True while `mode` is on: a run condition of tools.
+pub fn in_mode(mode: Mode) -> impl FnMut(Option<Res<Mode>>) -> bool + Clone {
+    move |now| now.is_some_and(|now| *now == mode)
+}

@@ -1,0 +1,1 @@
+//! The rig on the screen.

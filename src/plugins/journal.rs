@@ -1,0 +1,1 @@
+//! Every committed edit, on the disk at once.

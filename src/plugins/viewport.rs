@@ -1,0 +1,108 @@
+//! The camera through which people see and edit a rig: from pixels to rays and back.
+
+use bevy::prelude::*;
+
+use crate::{algo::view::ViewPlane, mesh::ray::Ray};
+
+/// Marks the camera through which people see and edit rigs.
+#[derive(Component, Debug, Clone, Copy)]
+pub struct RigViewport {
+    /// How far before the camera the point lies that it turns about, in world units. Strokes in a perspective view are
+    /// measured on the plane at that distance.
+    pub focus: f32,
+}
+
+impl Default for RigViewport {
+    fn default() -> Self {
+        Self { focus: 5.0 }
+    }
+}
+
+/// What a viewport sees, as numbers: enough to turn pixels into rays into a rig's space and places into pixels.
+///
+/// Pixels are logical, from the viewport's top left corner, y down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sight {
+    /// The plane square to the view through what the camera turns about, in the rig's space.
+    pub plane: ViewPlane,
+    /// Length of a logical pixel on that plane, in the rig's units.
+    pub pixel: f32,
+    /// Size of the viewport in logical pixels.
+    pub size: Vec2,
+}
+
+impl Sight {
+    /// What a camera sees of a rig that stands at `place`.
+    ///
+    /// `size` is the viewport's in logical pixels. `None` if it is empty, or the projection is none of a person's.
+    pub fn new(
+        camera: &GlobalTransform,
+        projection: &Projection,
+        viewport: &RigViewport,
+        size: Vec2,
+        place: &GlobalTransform,
+    ) -> Option<Self> {
+        if !(size.x >= 1.0 && size.y >= 1.0) {
+            return None;
+        }
+        let to_rig = place.affine().inverse();
+        let direction = |d: Dir3| to_rig.transform_vector3(*d);
+        let (right, up, back) = (direction(camera.right()), direction(camera.up()), direction(camera.back()));
+        let unit = right.length();
+        let eye = to_rig.transform_point3(camera.translation());
+        let focus = viewport.focus.max(1e-6);
+        let origin = eye - back * focus;
+        let (plane_eye, height) = match projection {
+            Projection::Perspective(perspective) => {
+                (Some(eye), 2.0 * focus * bevy::math::ops::tan(perspective.fov * 0.5))
+            }
+            Projection::Orthographic(orthographic) => (None, orthographic.area.height()),
+            Projection::Custom(_) => return None,
+        };
+        // Rays of an orthographic view start behind the camera as well, so that coming near never cuts the mesh open.
+        let standoff = unit * focus * 1e3;
+        let plane = ViewPlane { origin, right: right / unit, up: up / unit, eye: plane_eye, standoff };
+        let pixel = height * unit / size.y;
+        (pixel > 0.0 && pixel.is_finite() && origin.is_finite()).then_some(Self { plane, pixel, size })
+    }
+
+    /// The point of the plane under a pixel.
+    pub fn point(&self, at: Vec2) -> Vec2 {
+        let centred = at - self.size * 0.5;
+        Vec2::new(centred.x, -centred.y) * self.pixel
+    }
+
+    /// The pixel over a point of the plane.
+    pub fn pixel_of(&self, point: Vec2) -> Vec2 {
+        Vec2::new(point.x, -point.y) / self.pixel + self.size * 0.5
+    }
+
+    /// The ray under a pixel, in the rig's space.
+    pub fn ray(&self, at: Vec2) -> Ray {
+        self.plane.ray(self.point(at))
+    }
+
+    /// Where a place of the rig's space appears, in pixels; `None` behind the camera.
+    pub fn project(&self, position: Vec3) -> Option<Vec2> {
+        self.plane.project(position).map(|point| self.pixel_of(point))
+    }
+
+    /// Length in the rig's units of a logical pixel at a place.
+    pub fn pixel_at(&self, position: Vec3) -> f32 {
+        match self.plane.eye {
+            None => self.pixel,
+            Some(eye) => {
+                let towards = self.plane.towards();
+                let focus = (eye - self.plane.origin).dot(towards);
+                let depth = (eye - position).dot(towards);
+                self.pixel * (depth / focus).max(0.0)
+            }
+        }
+    }
+
+    /// The unit direction from a place towards the camera.
+    pub fn towards(&self, position: Vec3) -> Vec3 {
+        let fallback = self.plane.towards();
+        self.plane.eye.map_or(fallback, |eye| (eye - position).try_normalize().unwrap_or(fallback))
+    }
+}
