@@ -202,7 +202,7 @@ pub struct SkinBinding {
 }
 
 /// Influences of points: point `p` has the entries `starts[p]..starts[p + 1]`, strongest first, summing to one (or none).
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Weights {
     /// One entry a point and one more at the end.
     pub starts: Vec<u32>,

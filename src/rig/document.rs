@@ -43,7 +43,7 @@ pub struct RigAbout {
 }
 
 /// Weights of one mesh over joints of the rig.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct SkinData {
     /// The joint that each joint index of the weights means.
     pub joints: Vec<Uid>,

@@ -3,9 +3,12 @@
 //! [`Rig::apply`] either changes the rig and returns the edit that takes it back, or changes nothing and says why.
 //! Everything bigger (placing, mirroring, deleting a joint but keeping its children) is a list of these.
 
+mod shared;
+
 use std::{collections::HashSet, sync::Arc};
 
 use ron::value::RawValue;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Weights,
@@ -17,7 +20,7 @@ use crate::{
 };
 
 /// One change of a rig.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum RigEdit {
     /// Adds a joint as the `index`-th child of `parent` (the `index`-th root for `None`; past the end: last).
     AddJoint {
@@ -71,7 +74,7 @@ pub enum RigEdit {
     /// Changes name, version, author and the like.
     SetAbout(Box<RigAbout>),
     /// Binds a mesh with weights, replaces them, or lets the mesh go.
-    SetSkin(Uid, Option<Arc<SkinData>>),
+    SetSkin(Uid, #[serde(with = "shared")] Option<Arc<SkinData>>),
     /// Several edits as one: all or none.
     Batch(Vec<RigEdit>),
 }
