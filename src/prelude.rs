@@ -14,7 +14,7 @@ pub use crate::{
         picking::{Pick, PickRequest, Picked},
         placement::{PlaceRequest, Placed},
         skinning::{BindRequest, Bound},
-        stroke::{StrokeDone, StrokeRequest, StrokeResult},
+        stroke::{StrokeDone, StrokeParent, StrokeRequest, StrokeResult},
         surface::{RigMesh, RigSurface, SkinOf},
     },
     rig::{Rig, RigEdit, Uid, UidSource, operations::Operation},

@@ -1,11 +1,15 @@
 //! Strokes: freehand lines that become chains, insert joints, or erase them (Pencil Rigger, section 5.3).
 
+mod parent;
+
 use bevy::prelude::*;
+
+pub use parent::{ParentReason, StrokeParent, StrokeTips, nearest_parent, stroke_parent};
 
 use super::{
     RigSystems, configure_sets,
-    document::{EditRequest, JointEntities, Selection},
-    picking::posed_joints,
+    document::{EditRequest, JointEntities, Selection, Symmetry},
+    picking::{Picked, posed_joints},
     surface::RigSurface,
 };
 use crate::{
@@ -26,7 +30,14 @@ impl Plugin for StrokePlugin {
         app.init_resource::<WaitingStrokes>()
             .add_message::<StrokeRequest>()
             .add_message::<StrokeDone>()
-            .add_systems(Update, stroke.in_set(RigSystems::Gesture).after(super::placement::place));
+            .add_message::<Picked>()
+            .add_systems(
+                Update,
+                (
+                    stroke.in_set(RigSystems::Gesture).after(super::placement::place),
+                    note_tips.in_set(RigSystems::Build),
+                ),
+            );
     }
 }
 
@@ -47,6 +58,8 @@ pub struct StrokeRequest {
     pub chain_only: bool,
     /// How near, in model units, a stroke must come to a joint to mean it.
     pub reach: f32,
+    /// What a chain hangs on whose stroke starts on no joint.
+    pub parent: StrokeParent,
 }
 
 /// What became of a stroke.
@@ -67,6 +80,8 @@ pub enum StrokeResult {
         chain: StrokeChain,
         /// The joint that the chain continues or hangs on.
         parent: Option<Uid>,
+        /// Why that one.
+        why: ParentReason,
     },
     /// A joint was put into the bone above this joint.
     Inserted {
@@ -83,10 +98,21 @@ pub enum StrokeResult {
 #[derive(Resource, Default)]
 struct WaitingStrokes(Vec<StrokeRequest>);
 
+/// What a stroke is drawn on.
+type Drawn<'a> = (
+    &'a Rig,
+    &'a Selection,
+    &'a JointEntities,
+    &'a GlobalTransform,
+    &'a Symmetry,
+    Option<&'a StrokeTips>,
+    Option<&'a RigSurface>,
+);
+
 fn stroke(
     mut requests: MessageReader<StrokeRequest>,
     mut waiting: ResMut<WaitingStrokes>,
-    rigs: Query<(&Rig, &Selection, &JointEntities, &GlobalTransform, Option<&RigSurface>)>,
+    rigs: Query<Drawn>,
     joints: Query<&GlobalTransform>,
     mut edits: MessageWriter<EditRequest>,
     mut done: MessageWriter<StrokeDone>,
@@ -94,7 +120,8 @@ fn stroke(
     let mut queue = std::mem::take(&mut waiting.0);
     queue.extend(requests.read().cloned());
     for request in queue {
-        let Ok((rig, selection, entities, place, surface)) = rigs.get(request.rig) else { continue };
+        let Ok(drawn) = rigs.get(request.rig) else { continue };
+        let (rig, _, entities, place, _, _, surface) = drawn;
         let Some(surface) = surface else {
             let result = StrokeResult::Nothing("the rig has no mesh to draw on; open one first".to_owned());
             done.write(StrokeDone { rig: request.rig, result });
@@ -105,15 +132,14 @@ fn stroke(
             continue;
         }
         let posed = posed_joints(rig, entities, place, &joints);
-        let result = act(&request, rig, selection, &posed, surface, &mut edits);
+        let result = act(&request, drawn, &posed, surface, &mut edits);
         done.write(StrokeDone { rig: request.rig, result });
     }
 }
 
 fn act(
     request: &StrokeRequest,
-    rig: &Rig,
-    selection: &Selection,
+    (rig, selection, _, _, symmetry, tips, _): Drawn,
     posed: &[(Uid, Vec3)],
     surface: &RigSurface,
     edits: &mut MessageWriter<EditRequest>,
@@ -172,9 +198,42 @@ fn act(
             if positions.is_empty() {
                 return StrokeResult::Nothing("the stroke ends where it starts; draw it further".to_owned());
             }
-            let parent = from.or(selection.active());
+            let (parent, why) = match from {
+                Some(from) => (Some(from), ParentReason::StartsOn),
+                None => stroke_parent(request.parent, rig, selection, tips, symmetry.0, posed, positions[0]),
+            };
             send(Operation::Chain { positions, parent });
-            StrokeResult::Chain { chain, parent }
+            StrokeResult::Chain { chain, parent, why }
+        }
+    }
+}
+
+/// Remembers which joints strokes left selected, until somebody picks them.
+fn note_tips(
+    mut commands: Commands,
+    mut done: MessageReader<StrokeDone>,
+    mut picked: MessageReader<Picked>,
+    mut rigs: Query<(&Selection, Option<&mut StrokeTips>)>,
+) {
+    for Picked { rig, joints } in picked.read() {
+        let Ok((_, Some(mut tips))) = rigs.get_mut(*rig) else { continue };
+        if joints.iter().any(|joint| tips.contains(*joint)) {
+            tips.0.retain(|tip| !joints.contains(tip));
+        }
+    }
+    for StrokeDone { rig, result } in done.read() {
+        let (StrokeResult::Chain { parent, .. }, Ok((selection, tips))) = (result, rigs.get_mut(*rig)) else {
+            continue;
+        };
+        // The parent is still selected if the chain was refused.
+        let Some(tip) = selection.active().filter(|active| Some(*active) != *parent) else { continue };
+        match tips {
+            Some(mut tips) => {
+                tips.0.insert(tip);
+            }
+            None => {
+                commands.entity(*rig).insert(StrokeTips([tip].into()));
+            }
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::{
         document::{Change, EditRefused, EditRequest, Edited, Selection, Symmetry},
         picking::{Pick, PickRequest, Picked},
         placement::{PlaceRequest, Placed},
-        stroke::{StrokeDone, StrokeRequest, StrokeResult},
+        stroke::{StrokeDone, StrokeParent, StrokeRequest, StrokeResult},
         surface::{RigMeshes, RigSurface},
     },
     rig::{
@@ -180,7 +180,7 @@ impl Answers<'_, '_> {
                     script.say(format!("put a joint into the bone that ends at {}", name_of(rig, *child)));
                 }
                 StrokeResult::Erased(joints) => script.say(format!("deleted {} joints", joints.len())),
-                StrokeResult::Chain { chain, parent } => {
+                StrokeResult::Chain { chain, parent, .. } => {
                     let on = parent.map_or("as a root".to_owned(), |parent| format!("below {}", name_of(rig, parent)));
                     let notes: String = chain.notes.iter().map(|note| format!("; {}", heard(note))).collect();
                     script.say(format!("drew a chain of {} joints {on}{notes}", chain.joints.len()));
@@ -329,6 +329,7 @@ impl Act<'_, '_> {
             settings: StrokeSettings { place: self.state.place, recentre: self.state.recentre },
             chain_only: joints.is_some(),
             reach: self.reach(),
+            parent: StrokeParent::Selected,
         }
     }
 
