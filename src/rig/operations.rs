@@ -15,6 +15,7 @@ use bevy::math::{Affine3, Quat, Vec3};
 
 pub use draft::{Draft, Outcome};
 pub use orient::Axis;
+pub use place::settle;
 pub use symmetry::MirrorPlane;
 
 use crate::rig::{EditError, GroupData, Rig, RigEdit, Uid, UidSource};

@@ -2,7 +2,7 @@
 
 use bevy::math::Vec3;
 
-use super::{Draft, OperationError};
+use super::{Draft, MirrorPlane, OperationError};
 use crate::rig::{EditError, JointData, NodeKind, RestTransform, RigEdit, Uid};
 
 /// Adds a chain below `parent`. With symmetry on, the other side gets its chain too; joints near the plane are put on
@@ -11,27 +11,22 @@ pub(super) fn chain(draft: &mut Draft, positions: &[Vec3], parent: Option<Uid>) 
     if let Some(parent) = parent.filter(|parent| draft.rig().joint(*parent).is_none()) {
         return Err(EditError::NoJoint(parent).into());
     }
-    // A chain that keeps near the plane as a whole (a spine, drawn by hand) lies on it as a whole.
     let plane = draft.symmetry();
-    let central = positions.len() > 1
-        && plane.is_some_and(|plane| positions.iter().all(|p| plane.distance(*p).abs() <= 2.0 * plane.tolerance));
     let mut parent = parent;
     let mut other_parent = parent.map(|p| draft.partner(p).unwrap_or(p));
-    for &position in positions {
-        if !position.is_finite() {
-            return Err(OperationError::BadNumber("a joint's position is not finite; place it on the mesh"));
-        }
-        let on_plane = central || plane.is_some_and(|plane| plane.distance(position).abs() <= plane.tolerance);
-        let position = plane.filter(|_| on_plane).map_or(position, |plane| plane.onto(position));
+    if !positions.iter().all(|position| position.is_finite()) {
+        return Err(OperationError::BadNumber("a joint's position is not finite; place it on the mesh"));
+    }
+    for (position, other) in settle(positions, plane.as_ref()) {
         let joint = add(draft, position, parent)?;
-        match plane {
-            Some(plane) if !on_plane => {
-                let partner = add(draft, plane.mirrored(position), other_parent)?;
+        match other {
+            Some(other) => {
+                let partner = add(draft, other, other_parent)?;
                 draft.apply(RigEdit::SetMirror(joint, Some(partner)))?;
                 draft.apply(RigEdit::SetMirror(partner, Some(joint)))?;
                 other_parent = Some(partner);
             }
-            _ => other_parent = Some(joint),
+            None => other_parent = Some(joint),
         }
         parent = Some(joint);
     }
@@ -39,6 +34,23 @@ pub(super) fn chain(draft: &mut Draft, positions: &[Vec3], parent: Option<Uid>) 
         draft.select(vec![last]);
     }
     Ok(())
+}
+
+/// Where the joints of a chain go with live mirroring across `plane`: each with the place of its other side. Joints near
+/// the plane are put on it and have none, and so has everything without a plane.
+pub fn settle(positions: &[Vec3], plane: Option<&MirrorPlane>) -> Vec<(Vec3, Option<Vec3>)> {
+    let Some(plane) = plane else { return positions.iter().map(|position| (*position, None)).collect() };
+    let within = |position: &Vec3, reach: f32| plane.distance(*position).abs() <= reach;
+    // A chain that keeps near the plane as a whole (a spine, drawn by hand) lies on it as a whole.
+    let central = positions.len() > 1 && positions.iter().all(|position| within(position, 2.0 * plane.tolerance));
+    let settled = positions.iter().map(|position| {
+        if central || within(position, plane.tolerance) {
+            (plane.onto(*position), None)
+        } else {
+            (*position, Some(plane.mirrored(*position)))
+        }
+    });
+    settled.collect()
 }
 
 /// Puts a joint into the bone above `child`, on the other side too.
