@@ -1,0 +1,56 @@
+//! Light that goes with the camera, so that a mesh looks the same from everywhere and no side of it is in the dark.
+
+use bevy::{camera::Exposure, core_pipeline::tonemapping::Tonemapping, prelude::*};
+
+/// Light for a camera that looks at meshes: a key light over its left shoulder, a dimmer fill light from its right,
+/// and light from all around. None casts shadows: they cost a software renderer most, and hide what is edited.
+///
+/// The values say how bright a white matte surface becomes that squarely faces the light, where 1 is white on the
+/// screen. Together they stay at about 1 where a surface faces the camera, which with [`Tonemapping::None`] shows
+/// colours as they were authored. Several cameras that are lit so light each other's pictures.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use rigsmith::plugins::{display::ViewportLights, viewport::RigViewport};
+/// fn setup(mut commands: Commands) {
+///     commands.spawn((Camera3d::default(), RigViewport::default(), ViewportLights::default().bundle()));
+/// }
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewportLights {
+    /// Brightness of the key light.
+    pub key: f32,
+    /// Brightness of the fill light.
+    pub fill: f32,
+    /// Brightness of the light from all around.
+    pub ambient: f32,
+}
+
+impl Default for ViewportLights {
+    fn default() -> Self {
+        Self { key: 0.62, fill: 0.18, ambient: 0.3 }
+    }
+}
+
+impl ViewportLights {
+    /// Components for the camera: the lights as its children, ambient light, exposure and no tone mapping.
+    pub fn bundle(self) -> impl Bundle {
+        let exposure = Exposure::BLENDER;
+        // What a light must have so that a white surface that faces it reflects 1: a matte surface spreads what it
+        // gets over pi.
+        let white = 1.0 / exposure.exposure();
+        let light = |brightness: f32, from: Vec3| {
+            (
+                DirectionalLight {
+                    illuminance: brightness * white * std::f32::consts::PI,
+                    shadow_maps_enabled: false,
+                    ..default()
+                },
+                Transform::from_translation(from).looking_at(Vec3::ZERO, Vec3::Y),
+            )
+        };
+        let ambient = AmbientLight { brightness: self.ambient * white, ..default() };
+        let lights = children![light(self.key, Vec3::new(-0.6, 0.9, 1.4)), light(self.fill, Vec3::new(1.2, -0.1, 0.8))];
+        (ambient, exposure, Tonemapping::None, lights)
+    }
+}
