@@ -71,21 +71,29 @@ impl PickCycle {
     /// A click within `same_spot` of the last one, with the same candidates in whatever order, takes the one after the last
     /// picked in the order of the first click, and starts over after the furthest. Any other click takes the nearest.
     pub fn click(&mut self, point: Vec2, same_spot: f32, candidates: &[usize]) -> Option<usize> {
-        if candidates.is_empty() {
-            self.last = None;
-            return None;
+        let next = self.next(point, same_spot, candidates);
+        match (&mut self.last, next) {
+            (Some((_, _, picked)), Some(next)) => *picked = next,
+            _ => self.last = candidates.first().map(|_| (point, candidates.to_vec(), 0)),
         }
-        if let Some((spot, order, picked)) = &mut self.last {
-            let same = spot.distance(point) <= same_spot
-                && order.len() == candidates.len()
-                && order.iter().all(|joint| candidates.contains(joint));
-            if same {
-                *picked = (*picked + 1) % order.len();
-                return Some(order[*picked]);
-            }
+        self.last.as_ref().map(|(_, order, picked)| order[*picked])
+    }
+
+    /// What [`PickCycle::click`] would pick.
+    pub fn peek(&self, point: Vec2, same_spot: f32, candidates: &[usize]) -> Option<usize> {
+        match (&self.last, self.next(point, same_spot, candidates)) {
+            (Some((_, order, _)), Some(next)) => Some(order[next]),
+            _ => candidates.first().copied(),
         }
-        self.last = Some((point, candidates.to_vec(), 0));
-        Some(candidates[0])
+    }
+
+    /// The place in the order of the last click that a click goes on to; `None` if it is not at the same spot.
+    fn next(&self, point: Vec2, same_spot: f32, candidates: &[usize]) -> Option<usize> {
+        let (spot, order, picked) = self.last.as_ref()?;
+        let same = spot.distance(point) <= same_spot
+            && order.len() == candidates.len()
+            && order.iter().all(|joint| candidates.contains(joint));
+        (same && !order.is_empty()).then(|| (picked + 1) % order.len())
     }
 
     /// Forgets the last click: after an edit, a change of view or a deselection.

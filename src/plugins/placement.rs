@@ -2,13 +2,14 @@
 //!
 //! The joint goes to the midpoint of the closest and the furthest hit of a ray through the posed mesh, becomes a child
 //! of the selected joint or a root, and is selected. Where the ray meets nothing, nothing happens, and [`Placed`] says so.
+//! While the surface is behind the pose, requests wait for it.
 
 use bevy::prelude::*;
 
 use super::{
     RigSystems, configure_sets,
     document::{EditRequest, Selection},
-    surface::RigSurface,
+    surface::{Answer, RigMeshes, RigSurface, answer},
 };
 use crate::{
     algo::placement::{PlaceSettings, Placement, place_hits},
@@ -50,17 +51,21 @@ pub struct Placed {
 
 pub(super) fn place(
     mut requests: MessageReader<PlaceRequest>,
-    rigs: Query<(&Selection, Option<&RigSurface>)>,
+    mut waiting: Local<Vec<(PlaceRequest, Option<u64>)>>,
+    rigs: Query<(&Selection, Option<&RigSurface>, Has<RigMeshes>)>,
     mut edits: MessageWriter<EditRequest>,
     mut placed: MessageWriter<Placed>,
 ) {
-    for PlaceRequest { rig, ray, settings } in requests.read() {
-        let Ok((selection, surface)) = rigs.get(*rig) else { continue };
+    waiting.extend(requests.read().map(|request| (request.clone(), None)));
+    waiting.retain_mut(|(PlaceRequest { rig, ray, settings }, since)| {
+        let Ok((selection, surface, has_mesh)) = rigs.get(*rig) else { return false };
+        let Answer::Now(surface) = answer(since, has_mesh, surface) else { return true };
         let hits = surface.map(|surface| surface.hits(ray)).unwrap_or_default();
         let placement = place_hits(ray, &hits, *settings);
         if let Some(position) = placement.position() {
             edits.write(EditRequest::operation(*rig, Operation::Place { position, parent: selection.active() }));
         }
         placed.write(Placed { rig: *rig, placement });
-    }
+        false
+    });
 }

@@ -1,21 +1,29 @@
 //! Strokes: freehand lines that become chains, insert joints, or erase them (Pencil Rigger, section 5.3).
+//!
+//! Following a stroke takes some thousand rays, which on a large mesh is more than a frame has: it runs in a background
+//! task, and the chain comes a frame or two later. A preview does the same with a [`FollowedStroke`].
 
+mod followed;
 mod parent;
 
-use bevy::prelude::*;
+use bevy::{
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
 
+pub use followed::FollowedStroke;
 pub use parent::{ParentReason, StrokeParent, StrokeTips, nearest_parent, stroke_parent};
 
 use super::{
     RigSystems, configure_sets,
     document::{EditRequest, JointEntities, Selection, Symmetry},
     picking::{Picked, posed_joints},
-    surface::RigSurface,
+    surface::{Answer, RigMeshes, RigSurface, answer},
 };
 use crate::{
     algo::{
         placement::{PlaceSettings, place_hits},
-        stroke::{ChainChoice, StrokeChain, StrokeKind, StrokeSamples, StrokeSettings, classify, joint_at},
+        stroke::{ChainChoice, StrokeChain, StrokeError, StrokeKind, StrokeSettings, classify, joint_at},
         view::ViewPlane,
     },
     rig::{Rig, Uid, operations::Operation},
@@ -94,9 +102,19 @@ pub enum StrokeResult {
     Nothing(String),
 }
 
-/// Strokes that came while the surface was still being built: they are worth the wait of a fraction of a second.
+/// Strokes that have no answer yet, in the order they came.
 #[derive(Resource, Default)]
-struct WaitingStrokes(Vec<StrokeRequest>);
+struct WaitingStrokes(Vec<WaitingStroke>);
+
+struct WaitingStroke {
+    request: StrokeRequest,
+    /// The state of the surface that it was drawn on.
+    since: Option<u64>,
+    /// Its chain, once that is being computed.
+    chain: Option<Task<FoundChain>>,
+}
+
+type FoundChain = Result<StrokeChain, StrokeError>;
 
 /// What a stroke is drawn on.
 type Drawn<'a> = (
@@ -107,6 +125,7 @@ type Drawn<'a> = (
     &'a Symmetry,
     Option<&'a StrokeTips>,
     Option<&'a RigSurface>,
+    Option<&'a RigMeshes>,
 );
 
 fn stroke(
@@ -117,33 +136,59 @@ fn stroke(
     mut edits: MessageWriter<EditRequest>,
     mut done: MessageWriter<StrokeDone>,
 ) {
-    let mut queue = std::mem::take(&mut waiting.0);
-    queue.extend(requests.read().cloned());
-    for request in queue {
-        let Ok(drawn) = rigs.get(request.rig) else { continue };
-        let (rig, _, entities, place, _, _, surface) = drawn;
-        let Some(surface) = surface else {
-            let result = StrokeResult::Nothing("the rig has no mesh to draw on; open one first".to_owned());
-            done.write(StrokeDone { rig: request.rig, result });
-            continue;
-        };
-        if surface.ready().is_none() {
-            waiting.0.push(request);
-            continue;
-        }
-        let posed = posed_joints(rig, entities, place, &joints);
-        let result = act(&request, drawn, &posed, surface, &mut edits);
-        done.write(StrokeDone { rig: request.rig, result });
+    if waiting.0.is_empty() && requests.is_empty() {
+        return;
     }
+    let arrived = requests.read().map(|request| WaitingStroke { request: request.clone(), since: None, chain: None });
+    waiting.0.extend(arrived);
+    // One stroke a rig at a time: the next may start on a joint of the last.
+    let mut busy: Vec<Entity> = Vec::new();
+    waiting.0.retain_mut(|WaitingStroke { request, since, chain }| {
+        let Ok(drawn) = rigs.get(request.rig) else { return false };
+        let (rig, _, entities, place, _, _, surface, meshes) = drawn;
+        let found = chain.as_mut().map(check_ready);
+        if busy.contains(&request.rig) || matches!(found, Some(None)) {
+            busy.push(request.rig);
+            return true;
+        }
+        let result = match answer(since, meshes.is_some(), surface) {
+            Answer::Wait => None,
+            Answer::Now(None) => {
+                Some(StrokeResult::Nothing("the rig has no mesh to draw on; open one first".to_owned()))
+            }
+            Answer::Now(Some(surface)) => {
+                let posed = posed_joints(rig, entities, place, &joints);
+                match act(request, drawn, &posed, surface, found.flatten(), &mut edits) {
+                    Acted::Done(result) => Some(result),
+                    Acted::Follows(task) => {
+                        *chain = Some(task);
+                        None
+                    }
+                }
+            }
+        };
+        busy.push(request.rig);
+        let is_waiting = result.is_none();
+        done.write_batch(result.map(|result| StrokeDone { rig: request.rig, result }));
+        is_waiting
+    });
 }
 
+/// What came of looking at a stroke.
+enum Acted {
+    Done(StrokeResult),
+    Follows(Task<FoundChain>),
+}
+
+/// Does what a stroke means; if that is a chain, it must be `found` first.
 fn act(
     request: &StrokeRequest,
-    (rig, selection, _, _, symmetry, tips, _): Drawn,
+    (rig, selection, _, _, symmetry, tips, ..): Drawn,
     posed: &[(Uid, Vec3)],
     surface: &RigSurface,
+    found: Option<FoundChain>,
     edits: &mut MessageWriter<EditRequest>,
-) -> StrokeResult {
+) -> Acted {
     let mut send = |operation| {
         edits.write(EditRequest::operation(request.rig, operation));
     };
@@ -158,14 +203,14 @@ fn act(
         StrokeKind::Erase { joints } => {
             let joints: Vec<Uid> = joints.into_iter().map(|number| posed[number].0).collect();
             send(Operation::Delete { joints: joints.clone(), keep_children: true });
-            StrokeResult::Erased(joints)
+            Acted::Done(StrokeResult::Erased(joints))
         }
         StrokeKind::Insert { bone, t } => {
             let (child, end) = posed[bone];
             let parent = rig.joint(child).and_then(|joint| joint.parent);
             let start = parent.and_then(|parent| posed.iter().find(|(uid, _)| *uid == parent)).map(|(_, place)| *place);
             let Some(start) = start else {
-                return StrokeResult::Nothing("the stroke crosses no bone".to_owned());
+                return Acted::Done(StrokeResult::Nothing("the stroke crosses no bone".to_owned()));
             };
             // The crossing tells where along the bone; in depth the joint is placed like a click there, but only if
             // the bone itself runs through what the ray meets.
@@ -180,32 +225,47 @@ fn act(
                 _ => along,
             };
             send(Operation::Insert { child, position });
-            StrokeResult::Inserted { child }
+            Acted::Done(StrokeResult::Inserted { child })
         }
         StrokeKind::Chain { start, .. } => {
-            let Some(hierarchy) = surface.ready() else {
-                return StrokeResult::Nothing("the surface is not ready; draw the stroke again".to_owned());
+            let chain = match found.map_or_else(|| find_chain(request, surface), Found::Now) {
+                Found::Now(Ok(chain)) => chain,
+                Found::Now(Err(error)) => return Acted::Done(StrokeResult::Nothing(error.to_string())),
+                Found::Later(task) => return Acted::Follows(task),
             };
-            let samples = match StrokeSamples::new(hierarchy, &request.plane, &request.points, request.settings) {
-                Ok(samples) => samples,
-                Err(error) => return StrokeResult::Nothing(error.to_string()),
-            };
-            let chain = samples.chain(hierarchy, request.choice);
             let from = start.map(|number| posed[number].0);
             // A stroke that starts on a joint continues from it: that joint is the chain's first.
             let skip = usize::from(from.is_some());
             let positions: Vec<Vec3> = chain.joints.iter().skip(skip).map(|joint| joint.position).collect();
             if positions.is_empty() {
-                return StrokeResult::Nothing("the stroke ends where it starts; draw it further".to_owned());
+                let why = "the stroke ends where it starts; draw it further".to_owned();
+                return Acted::Done(StrokeResult::Nothing(why));
             }
             let (parent, why) = match from {
                 Some(from) => (Some(from), ParentReason::StartsOn),
                 None => stroke_parent(request.parent, rig, selection, tips, symmetry.0, posed, positions[0]),
             };
             send(Operation::Chain { positions, parent });
-            StrokeResult::Chain { chain, parent, why }
+            Acted::Done(StrokeResult::Chain { chain, parent, why })
         }
     }
+}
+
+enum Found {
+    Now(FoundChain),
+    Later(Task<FoundChain>),
+}
+
+/// Surfaces of no more triangles answer the rays of a stroke in less than a millisecond.
+const FEW_TRIANGLES: usize = 4096;
+
+fn find_chain(request: &StrokeRequest, surface: &RigSurface) -> Found {
+    let surface = surface.shared().unwrap_or_default();
+    let is_small = surface.triangle_count() <= FEW_TRIANGLES;
+    let StrokeRequest { plane, settings, choice, .. } = *request;
+    let points = request.points.clone();
+    let find = move || FollowedStroke::new(surface, &plane, &points, settings).map(|stroke| stroke.chain(choice));
+    if is_small { Found::Now(find()) } else { Found::Later(AsyncComputeTaskPool::get().spawn(async move { find() })) }
 }
 
 /// Remembers which joints strokes left selected, until somebody picks them.

@@ -1,30 +1,42 @@
 //! The posed surface of a rig: what rays meet.
 //!
 //! Bevy's own `MeshRayCast` gives one hit a mesh, in the bind pose. Placing needs all hits on the mesh as it stands
-//! now, so a rig has a [`RigSurface`] over all its meshes, refreshed in the background when the pose changes. Rays
-//! are answered at any time; while a hierarchy is being built, by testing every triangle.
+//! now, so a rig has a [`RigSurface`] over all its meshes.
+//!
+//! Nothing here is proportional to the mesh on the main thread. Reading the mesh, skinning its points and building or
+//! refitting the hierarchy run in a background task, one at a time for a rig; while it runs, the latest pose waits and
+//! those between are left out. Until a task lands, rays meet the surface as it last landed: a fraction of a second
+//! behind for the first one (which has none: it meets nothing), some hundredths for a pose. Whoever changes a rig by
+//! what a ray meets waits for the surface to catch up with the pose that the user saw ([`RigSurface::shows`]), so that
+//! results never depend on timing; a preview need not. Meshes of few points are refreshed within the frame.
 
-use std::sync::Arc;
+mod refresh;
+
+use std::{collections::HashMap, sync::Arc};
 
 use bevy::{
-    math::{Affine3A, Vec3A},
+    ecs::entity::EntityHashSet,
+    math::{Affine3, Affine3A},
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
+use self::refresh::{PosedMesh, Refresh, Refreshed, are_same, are_same_meshes, bend, is_same};
 use super::{
     RigSystems, configure_sets,
-    document::{Joint, JointEntities},
+    document::{Joint, JointEntities, JointOf},
 };
 use crate::{
     mesh::{
         model::Model,
         ray::{Hit, Ray},
-        skinning::skin_points,
-        surface::{PendingSurface, Surface},
+        surface::Surface,
     },
-    rig::{Rig, SkinData, Uid},
+    rig::{Rig, Uid},
 };
+
+/// Meshes of no more points are refreshed at once, which takes less than a millisecond.
+const FEW_POINTS: usize = 2048;
 
 /// Adds the posed surface.
 pub struct SurfacePlugin;
@@ -32,7 +44,7 @@ pub struct SurfacePlugin;
 impl Plugin for SurfacePlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_systems(PostUpdate, (refresh_surfaces, land_surfaces).chain().in_set(RigSystems::Surface));
+        app.add_systems(PreUpdate, land_surfaces).add_systems(PostUpdate, refresh_surfaces.in_set(RigSystems::Surface));
     }
 }
 
@@ -43,7 +55,7 @@ pub struct RigMesh {
     pub uid: Uid,
     /// The mesh as its file has it.
     pub file: Arc<Model>,
-    /// The mesh where its file's joints hold it at rest.
+    /// The mesh where its file's joints hold it at rest; shared with `file` if that has no skins.
     pub rest: Arc<Model>,
     /// The joint that each node of the file became.
     pub nodes: Arc<[Uid]>,
@@ -53,10 +65,25 @@ pub struct RigMesh {
 
 impl RigMesh {
     /// Takes a model as it was read; `nodes` are the joints that its nodes became.
+    ///
+    /// Linear in the size of the model, some tens of milliseconds for a million triangles: call it in the task that
+    /// reads the file and spawn what comes out of it.
     pub fn new(uid: Uid, file: Model, nodes: Vec<Uid>) -> Self {
-        let rest = Arc::new(file.at_rest());
         let triangles = file.point_triangles().into();
-        Self { uid, file: Arc::new(file), rest, nodes: nodes.into(), triangles }
+        let file = Arc::new(file);
+        let rest = if file.skins.is_empty() { file.clone() } else { Arc::new(file.at_rest()) };
+        Self { uid, file, rest, nodes: nodes.into(), triangles }
+    }
+}
+
+impl Drop for RigMesh {
+    fn drop(&mut self) {
+        // Handing a large model's memory back takes longer than a frame has.
+        if Arc::strong_count(&self.triangles) == 1 {
+            let arrays =
+                (std::mem::take(&mut self.file), std::mem::take(&mut self.rest), std::mem::take(&mut self.triangles));
+            discard(arrays);
+        }
     }
 }
 
@@ -71,157 +98,226 @@ pub struct SkinOf(pub Entity);
 pub struct RigMeshes(Vec<Entity>);
 
 /// The surface of all meshes of a rig as they stand now, in the rig's space.
+///
+/// `Changed<RigSurface>` tells that another pose was asked for, or that one has landed. An app that sleeps while nothing
+/// moves must run frames while the surface [is stale](RigSurface::is_stale).
 #[derive(Component)]
 pub struct RigSurface {
-    current: Arc<PendingSurface>,
-    points: Arc<[Vec3]>,
-    triangles: Arc<[[u32; 3]]>,
-    task: Option<Task<Arc<PendingSurface>>>,
+    /// The surface that answers, and the number of the state that it shows.
+    landed: Option<(Arc<Surface>, u64)>,
+    /// Whether it can be refitted.
+    is_whole: bool,
+    /// The state that it should show, and its number.
+    wanted: Vec<PosedMesh>,
+    number: u64,
+    /// The refresh under way, and what it will show.
+    task: Option<(Task<Refreshed>, u64)>,
+    /// The meshes that `landed` was built from, or that the task builds from.
+    built: Vec<PosedMesh>,
+    spare: Option<Surface>,
+    points: Vec<Vec3>,
 }
 
 impl RigSurface {
-    /// All places where a ray crosses the surface, nearest first.
+    /// All places where a ray crosses the surface, nearest first; none until it is ready.
+    ///
+    /// Microseconds, whatever the size of the mesh.
     pub fn hits(&self, ray: &Ray) -> Vec<Hit> {
         let mut hits = Vec::new();
-        self.current.hits(ray, &mut hits);
+        if let Some(surface) = self.ready() {
+            surface.hits(ray, &mut hits);
+        }
         hits
     }
 
-    /// The hierarchy over the surface, once it is built.
+    /// The surface as it last landed; `None` while the first hierarchy is being built.
     pub fn ready(&self) -> Option<&Surface> {
-        self.current.ready()
+        self.landed.as_ref().map(|(surface, _)| surface.as_ref())
     }
 
-    /// The least and greatest corner of the surface; the unit cube if it is empty.
+    /// The same, to be kept and asked in another thread: it stays as it is while the rig's surface goes on.
+    ///
+    /// For work that follows many rays ([`FollowedStroke`](super::stroke::FollowedStroke)). Let it go soon: while somebody
+    /// holds it, the next pose needs a copy.
+    pub fn shared(&self) -> Option<Arc<Surface>> {
+        self.landed.as_ref().map(|(surface, _)| surface.clone())
+    }
+
+    /// Whether the meshes or the pose have changed since what [`RigSurface::ready`] shows, or nothing is ready.
+    pub fn is_stale(&self) -> bool {
+        !self.shows(self.number)
+    }
+
+    /// The number of the state of meshes and pose that the surface should show; it rises with each change.
+    pub fn wanted(&self) -> u64 {
+        self.number
+    }
+
+    /// Whether it shows that state, or a later one.
+    pub fn shows(&self, number: u64) -> bool {
+        self.landed.as_ref().is_some_and(|(_, landed)| *landed >= number)
+    }
+
+    /// The least and greatest corner of the surface; the unit cube if it is empty or not ready.
     pub fn bounds(&self) -> [Vec3; 2] {
-        let finite = self.points.iter().filter(|point| point.is_finite());
-        let bounds = finite.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)]);
-        if bounds[0].cmple(bounds[1]).all() { bounds } else { [Vec3::splat(-0.5), Vec3::splat(0.5)] }
+        let bounds = self.ready().and_then(Surface::bounds);
+        bounds.map_or([Vec3::splat(-0.5), Vec3::splat(0.5)], |(low, high)| [low, high])
     }
-}
 
-/// Notices that a rig's meshes, weights or pose changed, and starts to build the surface for it.
-fn refresh_surfaces(
-    mut commands: Commands,
-    rigs: Query<(Entity, Ref<Rig>, Ref<RigMeshes>, &JointEntities, &GlobalTransform)>,
-    mut surfaces: Query<&mut RigSurface>,
-    meshes: Query<Ref<RigMesh>>,
-    joints: Query<Ref<GlobalTransform>, With<Joint>>,
-) {
-    for (entity, rig, bound, entities, place) in &rigs {
-        let mut models: Vec<Ref<RigMesh>> = bound.iter().filter_map(|mesh| meshes.get(mesh).ok()).collect();
-        models.sort_by_key(|mesh| mesh.uid);
-        let known = surfaces.get_mut(entity).ok();
-        let meshes_changed = bound.is_changed() || models.iter().any(|mesh| mesh.is_changed());
-        let pose_changed = || {
-            rig.skins().flat_map(|(_, skin)| &skin.joints).any(|uid| {
-                entities.get(*uid).and_then(|joint| joints.get(joint).ok()).is_some_and(|place| place.is_changed())
-            })
+    fn new(meshes: Vec<PosedMesh>) -> Self {
+        let mut surface = Self {
+            landed: None,
+            is_whole: false,
+            wanted: meshes,
+            number: 1,
+            task: None,
+            built: Vec::new(),
+            spare: None,
+            points: Vec::new(),
         };
-        if known.is_some() && !meshes_changed && !rig.is_changed() && !pose_changed() {
-            continue;
+        surface.start();
+        surface
+    }
+
+    /// Starts the refresh that is due, unless one is under way.
+    fn start(&mut self) {
+        if self.task.is_some() || !self.is_stale() {
+            return;
         }
-        let to_rig = place.affine().inverse();
-        let pose = |uid: Uid| {
-            let joint = entities.get(uid).and_then(|joint| joints.get(joint).ok());
-            joint.map(|place| to_rig * place.affine())
+        let fits = self.is_whole && are_same_meshes(&self.built, &self.wanted);
+        if !fits {
+            discard((self.spare.take(), std::mem::take(&mut self.built)));
+        }
+        let refresh = Refresh {
+            meshes: self.wanted.clone(),
+            base: if fits { self.shared() } else { None },
+            spare: self.spare.take(),
+            points: std::mem::take(&mut self.points),
         };
-        let mut points: Vec<Vec3> = Vec::new();
-        let mut triangles: Vec<[u32; 3]> = Vec::new();
-        for mesh in &models {
-            let first = points.len() as u32;
-            points.extend(posed_points(mesh, rig.skin(mesh.uid), &rig, &pose));
-            triangles.extend(mesh.triangles.iter().map(|t| t.map(|corner| corner + first)));
+        self.built.clone_from(&self.wanted);
+        if refresh.size() <= FEW_POINTS {
+            self.land(refresh.run(), self.number);
+        } else {
+            let task = AsyncComputeTaskPool::get().spawn(async move { refresh.run() });
+            self.task = Some((task, self.number));
         }
-        match known {
-            Some(mut surface) if !meshes_changed && surface.points.len() == points.len() => {
-                if surface.points.iter().zip(&points).all(|(a, b)| a == b) {
-                    continue;
-                }
-                surface.repose(points.into());
-            }
-            _ => {
-                let surface = RigSurface::build(points.into(), triangles.into());
-                commands.entity(entity).insert(surface);
-            }
+    }
+
+    fn land(&mut self, refreshed: Refreshed, number: u64) {
+        let Refreshed { surface, is_refit, is_whole, points } = refreshed;
+        let old = self.landed.replace((surface, number)).map(|(old, _)| old);
+        (self.is_whole, self.points) = (is_whole, points);
+        if is_refit {
+            self.spare = old.and_then(|old| Arc::try_unwrap(old).ok());
+        } else {
+            discard(old);
         }
     }
 }
 
-impl RigSurface {
-    fn build(points: Arc<[Vec3]>, triangles: Arc<[[u32; 3]]>) -> Self {
-        let current = Arc::new(PendingSurface::new(points.clone(), triangles.clone()));
-        let building = current.clone();
-        let task = AsyncComputeTaskPool::get().spawn(async move {
-            building.build();
-            building
-        });
-        Self { current, points, triangles, task: Some(task) }
-    }
-
-    /// Answers for other positions at once, and refits the hierarchy to them in the background.
-    fn repose(&mut self, points: Arc<[Vec3]>) {
-        let old = self.current.clone();
-        self.points = points.clone();
-        self.current = Arc::new(PendingSurface::new(points.clone(), self.triangles.clone()));
-        let current = self.current.clone();
-        self.task = Some(AsyncComputeTaskPool::get().spawn(async move {
-            let refitted = old.ready().cloned().and_then(|mut surface| surface.refit(&points).ok().map(|()| surface));
-            match refitted {
-                Some(surface) => current.set(surface),
-                None => {
-                    current.build();
-                }
-            }
-            current
-        }));
+impl Drop for RigSurface {
+    fn drop(&mut self) {
+        discard((self.landed.take(), self.spare.take(), std::mem::take(&mut self.points)));
+        discard((std::mem::take(&mut self.wanted), std::mem::take(&mut self.built)));
     }
 }
 
-/// Drops the tasks that are done.
+/// Drops in the background what may be large.
+fn discard<T: Send + 'static>(value: T) {
+    // Without a pool (no app was ever made) it is dropped right here.
+    if let Some(pool) = AsyncComputeTaskPool::try_get() {
+        pool.spawn(async move { drop(value) }).detach();
+    }
+}
+
+/// How a request that asks the surface is to go on.
+pub(super) enum Answer<'a> {
+    /// The surface shows what the user saw; `None`: the rig has no mesh.
+    Now(Option<&'a RigSurface>),
+    /// Not yet: ask again in the next frame.
+    Wait,
+}
+
+/// Whether a request can be answered. `since` belongs to the request and is `None` when it comes.
+pub(super) fn answer<'a>(since: &mut Option<u64>, has_mesh: bool, surface: Option<&'a RigSurface>) -> Answer<'a> {
+    match surface {
+        Some(surface) => match surface.shows(*since.get_or_insert(surface.wanted())) {
+            true => Answer::Now(Some(surface)),
+            false => Answer::Wait,
+        },
+        None if has_mesh => Answer::Wait,
+        None => Answer::Now(None),
+    }
+}
+
+/// Takes what background tasks have finished, before anyone asks.
 fn land_surfaces(mut surfaces: Query<&mut RigSurface>) {
     for mut surface in &mut surfaces {
-        let done = surface.bypass_change_detection().task.as_mut().is_some_and(|task| check_ready(task).is_some());
-        if done {
+        let running = &mut surface.bypass_change_detection().task;
+        let done = running.as_mut().and_then(|(task, number)| Some((check_ready(task)?, *number)));
+        if let Some((refreshed, number)) = done {
             surface.task = None;
+            surface.land(refreshed, number);
+            surface.start();
         }
     }
 }
 
-/// A mesh's points where the pose holds them, in the rig's space. `pose` gives a joint's transform to the rig's space.
-pub fn posed_points(
-    mesh: &RigMesh,
-    skin: Option<&Arc<SkinData>>,
-    rig: &Rig,
-    pose: &dyn Fn(Uid) -> Option<Affine3A>,
-) -> Vec<Vec3> {
-    let Some(skin) = skin else { return mesh.rest.points.clone() };
-    // Rest to pose. Weights that came with the file hold its bind pose; as long as nobody moves a joint that is the
-    // mesh at rest, and from there on the rest mesh follows its joints.
-    let matrices: Vec<Affine3A> = skin
-        .joints
-        .iter()
-        .map(|uid| match pose(*uid) {
-            Some(pose) => {
-                let rest: Affine3A = rig.rest_global(*uid).into();
-                if same(&pose, &rest) { Affine3A::IDENTITY } else { pose * rest.inverse() }
-            }
-            None => Affine3A::IDENTITY,
-        })
-        .collect();
-    if matrices.iter().all(|matrix| *matrix == Affine3A::IDENTITY) {
-        return mesh.rest.points.clone();
+/// Notices that a rig's meshes, weights or pose changed, and has the surface follow.
+fn refresh_surfaces(
+    mut commands: Commands,
+    mut rigs: Query<(Entity, Ref<Rig>, Ref<RigMeshes>, &JointEntities, &GlobalTransform, Option<&mut RigSurface>)>,
+    without: Query<Entity, (With<RigSurface>, Without<RigMeshes>)>,
+    meshes: Query<Ref<RigMesh>>,
+    moved: Query<&JointOf, (With<Joint>, Changed<GlobalTransform>)>,
+    joints: Query<&GlobalTransform, With<Joint>>,
+) {
+    for rig in &without {
+        commands.entity(rig).remove::<RigSurface>();
     }
-    let mut points = Vec::new();
-    skin_points(&mesh.rest.points, &skin.weights, &matrices, &mut points);
-    points
+    let moved: EntityHashSet = moved.iter().map(|of| of.0).collect();
+    for (entity, rig, bound, entities, place, surface) in &mut rigs {
+        let models = || bound.iter().filter_map(|mesh| meshes.get(mesh).ok());
+        let is_changed = rig.is_changed() || bound.is_changed() || moved.contains(&entity);
+        if surface.is_some() && !is_changed && !models().any(|mesh| mesh.is_changed()) {
+            continue;
+        }
+        let mut models: Vec<Ref<RigMesh>> = models().collect();
+        models.sort_by_key(|mesh| mesh.uid);
+        let is_skinned = models.iter().any(|mesh| rig.skin(mesh.uid).is_some());
+        let pose = if is_skinned { moves(&rig, entities, place, &joints) } else { HashMap::new() };
+        let wanted = models.iter().map(|mesh| PosedMesh {
+            rest: mesh.rest.clone(),
+            triangles: mesh.triangles.clone(),
+            bend: rig.skin(mesh.uid).and_then(|skin| bend(skin, &pose)),
+        });
+        let wanted: Vec<PosedMesh> = wanted.collect();
+        match surface {
+            Some(surface) if are_same(&surface.wanted, &wanted) => {}
+            Some(mut surface) => {
+                surface.wanted = wanted;
+                surface.number += 1;
+                surface.start();
+            }
+            None => {
+                commands.entity(entity).insert(RigSurface::new(wanted));
+            }
+        }
+    }
 }
 
-fn same(a: &Affine3A, b: &Affine3A) -> bool {
-    let tolerance = 1e-6;
-    let near = |a: Vec3A, b: Vec3A| (a - b).abs().max_element() <= tolerance * b.abs().max_element().max(1.0);
-    near(a.translation, b.translation)
-        && near(a.matrix3.x_axis, b.matrix3.x_axis)
-        && near(a.matrix3.y_axis, b.matrix3.y_axis)
-        && near(a.matrix3.z_axis, b.matrix3.z_axis)
+/// Matrices from rest to pose, in the rig's space, of the joints that have moved.
+fn moves(
+    rig: &Rig,
+    entities: &JointEntities,
+    place: &GlobalTransform,
+    joints: &Query<&GlobalTransform, With<Joint>>,
+) -> HashMap<Uid, Affine3A> {
+    let to_rig = place.affine().inverse();
+    let moved = |(uid, rest): (Uid, Affine3)| {
+        let pose = to_rig * joints.get(entities.get(uid)?).ok()?.affine();
+        let rest = Affine3A::from(rest);
+        (!is_same(&pose, &rest)).then(|| (uid, pose * rest.inverse()))
+    };
+    rig.rest_globals().into_iter().filter_map(moved).collect()
 }

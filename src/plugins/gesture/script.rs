@@ -107,7 +107,7 @@ type Scripted<'a> =
 pub(super) fn run_scripts(mut scripts: Query<Scripted>, mut requests: Requests, mut answers: Answers) {
     answers.collect(&mut scripts);
     for (entity, mut script, rig, selection, mut symmetry, surface, has_mesh) in &mut scripts {
-        if script.pending || script.waiting.is_empty() || (has_mesh && surface.is_none()) {
+        if script.pending || script.waiting.is_empty() || (has_mesh && surface.and_then(RigSurface::ready).is_none()) {
             continue;
         }
         script.state.joints_before = rig.len();
