@@ -1,0 +1,199 @@
+//! Triangles for pictures over the mesh: lines, discs and faces with sizes in pixels.
+//!
+//! Everything is built on the processor for one view. That keeps sizes in pixels where tests can measure them, and one
+//! mesh a rig is all that the renderer sees.
+
+use std::f32::consts::TAU;
+
+use bevy::{math::ops, prelude::*};
+
+use super::theme::Tint;
+use crate::plugins::viewport::Sight;
+
+/// The part of the depth buffer that pictures over the mesh share: in front of everything else, yet ordered among
+/// themselves (1 is the near plane).
+const FRONT: [f32; 2] = [0.9, 0.999];
+
+/// Triangles with colours, in the rig's space.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Ink {
+    /// Places of the vertices.
+    pub positions: Vec<[f32; 3]>,
+    /// Where each vertex goes in the depth buffer, 0 far to 1 near; exactly 0 leaves it where the camera has it.
+    pub depths: Vec<f32>,
+    /// Colours of the vertices.
+    pub tints: Vec<Tint>,
+    /// Three vertices a triangle, in no particular winding.
+    pub indices: Vec<u32>,
+}
+
+impl Ink {
+    /// True if there is nothing to draw.
+    pub fn is_empty(&self) -> bool {
+        self.indices.is_empty()
+    }
+
+    /// Removes everything, keeping the memory.
+    pub fn clear(&mut self) {
+        self.positions.clear();
+        self.depths.clear();
+        self.tints.clear();
+        self.indices.clear();
+    }
+}
+
+/// Where a picture goes in depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Layer {
+    /// Over the mesh, sorted among all that is over it.
+    Over,
+    /// In the scene: what is nearer hides it.
+    Scene,
+    /// At exactly this depth (see [`Ink::depths`]).
+    Fixed(f32),
+}
+
+/// Draws into [`Ink`] for one view.
+pub struct Pen<'a> {
+    /// What it draws into.
+    pub ink: &'a mut Ink,
+    /// The view it draws for.
+    pub sight: &'a Sight,
+    /// Where it draws in depth.
+    pub layer: Layer,
+    towards: Vec3,
+    focus: f32,
+    span: f32,
+}
+
+impl<'a> Pen<'a> {
+    /// A pen over the mesh.
+    pub fn new(ink: &'a mut Ink, sight: &'a Sight) -> Self {
+        let towards = sight.plane.towards();
+        let focus = sight.plane.eye.map_or(1.0, |eye| (eye - sight.plane.origin).dot(towards)).max(1e-9);
+        let span = sight.pixel * sight.size.max_element();
+        Self { ink, sight, layer: Layer::Over, towards, focus, span }
+    }
+
+    /// Distance from the eye along the view; from the view plane where there is no eye.
+    pub fn distance(&self, position: Vec3) -> f32 {
+        (self.sight.plane.eye.unwrap_or(self.sight.plane.origin) - position).dot(self.towards)
+    }
+
+    /// Depth of a place that lies `lift` nearer to the camera than `position`. Nearer places have greater depths.
+    pub fn depth(&self, position: Vec3, lift: f32) -> f32 {
+        let [far, near] = FRONT;
+        match self.layer {
+            Layer::Scene => 0.0,
+            Layer::Fixed(depth) => depth,
+            Layer::Over => {
+                let distance = self.distance(position) - lift;
+                let part = match self.sight.plane.eye {
+                    // Affine in the reciprocal, so that flat faces stay flat in depth.
+                    Some(_) if distance > 0.0 => (self.focus / 32.0 / distance).min(1.0),
+                    Some(_) => 1.0,
+                    None => 0.5 - 0.5 * distance / (distance.abs() + self.span),
+                };
+                far + (near - far) * part
+            }
+        }
+    }
+
+    /// Adds a vertex; `lift` brings it nearer in depth only.
+    pub fn vertex(&mut self, position: Vec3, lift: f32, tint: Tint) -> u32 {
+        let depth = self.depth(position, lift);
+        let index = self.ink.positions.len() as u32;
+        self.ink.positions.push(position.to_array());
+        self.ink.depths.push(depth);
+        self.ink.tints.push(tint);
+        index
+    }
+
+    /// A triangle of one colour.
+    pub fn triangle(&mut self, corners: [Vec3; 3], lift: f32, tint: Tint) {
+        let corners = corners.map(|corner| self.vertex(corner, lift, tint));
+        self.ink.indices.extend(corners);
+    }
+
+    /// A flat quad of one colour, corners in turn.
+    pub fn quad(&mut self, corners: [Vec3; 4], lift: f32, tint: Tint) {
+        let [a, b, c, d] = corners.map(|corner| self.vertex(corner, lift, tint));
+        self.ink.indices.extend([a, b, c, a, c, d]);
+    }
+
+    /// A line `width` pixels wide, facing the camera, with square ends. What lies behind the camera is cut off.
+    pub fn line(&mut self, ends: [Vec3; 2], width: f32, lift: f32, tint: Tint) {
+        self.blend_line(ends, width, lift, [tint, tint]);
+    }
+
+    /// A line whose colour runs from one end to the other.
+    pub fn blend_line(&mut self, ends: [Vec3; 2], width: f32, lift: f32, tints: [Tint; 2]) {
+        let Some([from, to]) = self.before_eye(ends) else { return };
+        let along = to - from;
+        let halves = [from, to].map(|end| 0.5 * width * self.sight.pixel_at(end));
+        let across = along.cross(self.sight.towards(from.midpoint(to))).normalize_or_zero();
+        if across == Vec3::ZERO {
+            return;
+        }
+        let along = along.normalize_or_zero();
+        let [a, b] = [from - along * halves[0], to + along * halves[1]];
+        let corners = [
+            self.vertex(a - across * halves[0], lift, tints[0]),
+            self.vertex(a + across * halves[0], lift, tints[0]),
+            self.vertex(b + across * halves[1], lift, tints[1]),
+            self.vertex(b - across * halves[1], lift, tints[1]),
+        ];
+        let [a, b, c, d] = corners;
+        self.ink.indices.extend([a, b, c, a, c, d]);
+    }
+
+    /// The part of a line that lies before the eye.
+    fn before_eye(&self, ends: [Vec3; 2]) -> Option<[Vec3; 2]> {
+        if self.sight.plane.eye.is_none() {
+            return Some(ends);
+        }
+        let least = self.focus * 1e-3;
+        let [a, b] = ends.map(|end| self.distance(end));
+        let cut = |from: Vec3, to: Vec3, near: f32, far: f32| from.lerp(to, (least - near) / (far - near));
+        match (a >= least, b >= least) {
+            (true, true) => Some(ends),
+            (false, false) => None,
+            (false, true) => Some([cut(ends[0], ends[1], a, b), ends[1]]),
+            (true, false) => Some([ends[0], cut(ends[1], ends[0], b, a)]),
+        }
+    }
+
+    /// How many corners a circle needs to look round.
+    fn corners(&self, centre: Vec3, radius: f32) -> u32 {
+        let pixels = radius / self.sight.pixel_at(centre).max(f32::MIN_POSITIVE);
+        ((pixels.max(0.0).sqrt() * 5.0) as u32).clamp(8, 48)
+    }
+
+    /// A disc that faces the camera, with a lighter spot up and to the left that makes it look like a ball.
+    pub fn ball(&mut self, centre: Vec3, radius: f32, lift: f32, spot: Tint, rim: Tint) {
+        let (right, up) = (self.sight.plane.right * radius, self.sight.plane.up * radius);
+        let middle = self.vertex(centre - right * 0.32 + up * 0.32, lift, spot);
+        let count = self.corners(centre, radius);
+        let first = middle + 1;
+        for corner in 0..count {
+            let (sin, cos) = ops::sin_cos(corner as f32 / count as f32 * TAU);
+            self.vertex(centre + right * cos + up * sin, lift, rim);
+            self.ink.indices.extend([middle, first + corner, first + (corner + 1) % count]);
+        }
+    }
+
+    /// A ring that faces the camera, between two radii. `corners` of `None` makes it round.
+    pub fn ring(&mut self, centre: Vec3, radii: [f32; 2], corners: Option<u32>, lift: f32, tint: Tint) {
+        let (right, up) = (self.sight.plane.right, self.sight.plane.up);
+        let count = corners.unwrap_or_else(|| self.corners(centre, radii[1]));
+        let first = self.ink.positions.len() as u32;
+        for corner in 0..count {
+            let (sin, cos) = ops::sin_cos(corner as f32 / count as f32 * TAU);
+            let outwards = right * cos + up * sin;
+            self.vertex(centre + outwards * radii[0], lift, tint);
+            self.vertex(centre + outwards * radii[1], lift, tint);
+            let (here, next) = (first + 2 * corner, first + 2 * ((corner + 1) % count));
+            self.ink.indices.extend([here, here + 1, next + 1, here, next + 1, next]);
+        }
+    }
+}

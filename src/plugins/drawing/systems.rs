@@ -1,0 +1,339 @@
+//! When pictures are built, and the entities that show them.
+
+use bevy::{
+    asset::RenderAssetUsages,
+    camera::visibility::NoFrustumCulling,
+    ecs::system::SystemParam,
+    mesh::{Indices, PrimitiveTopology, VertexAttributeValues},
+    prelude::*,
+};
+
+use super::{
+    DrawingCounts, Ghosts, LETTER, LabelChoice, LabelWish, RigDrawing, RigLabels, ghosts, grid,
+    ink::Ink,
+    label_places,
+    material::{DEPTH, OverlayMaterial, TINT},
+    skeleton::{DrawnJoint, Emphasis, ball_radii, bones, draw_skeleton, drawn_joints},
+};
+use crate::{
+    plugins::{
+        document::{Hovered, Joint, JointEntities, JointOf, Selection, Symmetry},
+        surface::{RigMesh, RigMeshes},
+        viewport::{RigViewport, Sight},
+    },
+    rig::Rig,
+};
+
+/// The materials of all pictures.
+#[derive(Resource)]
+pub(super) struct Looks {
+    solid: Handle<OverlayMaterial>,
+    /// Blended, after everything else.
+    glass: Handle<OverlayMaterial>,
+    /// Blended, before everything else.
+    ground: Handle<OverlayMaterial>,
+}
+
+impl FromWorld for Looks {
+    fn from_world(world: &mut World) -> Self {
+        let mut materials = world.resource_mut::<Assets<OverlayMaterial>>();
+        let mut add =
+            |alpha_mode, order| materials.add(OverlayMaterial { color: LinearRgba::WHITE, alpha_mode, order });
+        Self {
+            solid: add(AlphaMode::Opaque, 0.0),
+            glass: add(AlphaMode::Blend, 1e6),
+            ground: add(AlphaMode::Blend, -1e6),
+        }
+    }
+}
+
+/// The entity that shows a picture of a rig; the rig it shows.
+#[derive(Component, Debug)]
+#[relationship(relationship_target = Pictures)]
+pub(super) struct PictureOf(Entity);
+
+/// The pictures of a rig.
+#[derive(Component, Debug)]
+#[relationship_target(relationship = PictureOf, linked_spawn)]
+pub(super) struct Pictures(Vec<Entity>);
+
+/// One picture: its entity and the view it was built for.
+#[derive(Debug, Default)]
+pub(super) struct Picture {
+    entity: Option<Entity>,
+    sight: Option<Sight>,
+    place: Option<GlobalTransform>,
+    ink: Ink,
+}
+
+impl Picture {
+    /// True if it has to be built again for this view.
+    fn is_stale(&self, sight: Option<&Sight>) -> bool {
+        self.sight.as_ref() != sight
+    }
+}
+
+/// The pictures of a rig, and what its symmetry plane spans.
+#[derive(Component, Debug, Default)]
+pub(super) struct Drawn {
+    skeleton: Picture,
+    ghosts: Picture,
+    plane: Picture,
+    bounds: Option<[Vec3; 2]>,
+}
+
+/// Shows ink: spawns, fills and hides entities.
+#[derive(SystemParam)]
+pub(super) struct Gallery<'w, 's> {
+    commands: Commands<'w, 's>,
+    meshes: ResMut<'w, Assets<Mesh>>,
+    shown: Query<'w, 's, (&'static Mesh3d, &'static mut Visibility, &'static mut GlobalTransform), With<OverlayMesh>>,
+}
+
+/// Marks entities that show pictures.
+#[derive(Component, Debug)]
+pub(super) struct OverlayMesh;
+
+impl Gallery<'_, '_> {
+    /// Shows a picture with what is in its ink.
+    fn show(
+        &mut self,
+        picture: &mut Picture,
+        of: Option<Entity>,
+        place: GlobalTransform,
+        look: &Handle<OverlayMaterial>,
+    ) {
+        let visibility = if picture.ink.is_empty() { Visibility::Hidden } else { Visibility::Visible };
+        let entity = picture.entity.filter(|entity| self.shown.contains(*entity));
+        let Some(entity) = entity else {
+            // An empty mesh cannot be drawn.
+            if picture.ink.is_empty() {
+                return;
+            }
+            let mesh = self.meshes.add(mesh_of(&mut picture.ink));
+            let bundle = (OverlayMesh, Mesh3d(mesh), MeshMaterial3d(look.clone()), NoFrustumCulling, visibility);
+            let mut spawned = self.commands.spawn((bundle, Transform::from_matrix(place.to_matrix()), place));
+            if let Some(rig) = of {
+                spawned.insert(PictureOf(rig));
+            }
+            picture.entity = Some(spawned.id());
+            picture.place = Some(place);
+            return;
+        };
+        let Ok((mesh, mut shown, mut stands)) = self.shown.get_mut(entity) else { return };
+        shown.set_if_neq(visibility);
+        stands.set_if_neq(place);
+        if !picture.ink.is_empty() {
+            // A handle that is alive always has its place.
+            let _ = self.meshes.insert(mesh.id(), mesh_of(&mut picture.ink));
+        }
+        picture.place = Some(place);
+    }
+
+    /// Moves a picture along with its rig.
+    fn follow(&mut self, picture: &Picture, place: &GlobalTransform) {
+        let shown = picture.entity.and_then(|entity| self.shown.get_mut(entity).ok());
+        if let Some((_, _, mut stands)) = shown {
+            stands.set_if_neq(*place);
+        }
+    }
+}
+
+/// Moves ink into a mesh.
+fn mesh_of(ink: &mut Ink) -> Mesh {
+    let ink = std::mem::take(ink);
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, ink.positions)
+        .with_inserted_attribute(DEPTH, ink.depths)
+        .with_inserted_attribute(TINT, VertexAttributeValues::Unorm8x4(ink.tints))
+        .with_inserted_indices(Indices::U32(ink.indices))
+}
+
+/// The view through the camera that counts.
+#[derive(SystemParam)]
+pub(super) struct Views<'w, 's> {
+    cameras:
+        Query<'w, 's, (Entity, &'static Camera, &'static GlobalTransform, &'static Projection, &'static RigViewport)>,
+}
+
+impl Views<'_, '_> {
+    /// What it sees of a thing that stands at `place`.
+    fn sight(&self, place: &GlobalTransform) -> Option<Sight> {
+        let active = self.cameras.iter().filter(|(_, camera, ..)| camera.is_active);
+        let (_, camera, eye, projection, viewport) =
+            active.min_by_key(|(entity, camera, ..)| (camera.order, *entity))?;
+        Sight::new(eye, projection, viewport, camera.logical_viewport_size()?, place)
+    }
+}
+
+/// Gives rigs what drawing needs to remember, and finds out what their symmetry planes span.
+pub(super) fn frame_planes(
+    mut commands: Commands,
+    fresh: Query<Entity, (With<Rig>, Without<Drawn>)>,
+    mut rigs: Query<(&mut Drawn, &Rig, Ref<Symmetry>, Option<Ref<RigMeshes>>)>,
+    meshes: Query<&RigMesh>,
+) {
+    for rig in &fresh {
+        commands.entity(rig).insert((Drawn::default(), RigLabels::default()));
+    }
+    for (mut drawn, rig, symmetry, bound) in &mut rigs {
+        let changed = symmetry.is_changed() || bound.as_ref().is_some_and(|bound| bound.is_changed());
+        if symmetry.0.is_none() || !(changed || drawn.bounds.is_none()) {
+            continue;
+        }
+        let models = bound.iter().flat_map(|bound| bound.iter()).filter_map(|mesh| meshes.get(mesh).ok());
+        let points = models.flat_map(|mesh| mesh.rest.points.iter().copied()).filter(|point| point.is_finite());
+        let joints = rig.rest_globals().into_iter().map(|(_, global)| global.translation);
+        let [low, high] =
+            points.chain(joints).fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)]);
+        let bounds = if low.cmple(high).all() { [low, high] } else { [Vec3::splat(-0.5), Vec3::splat(0.5)] };
+        drawn.bounds = Some(bounds);
+        drawn.plane.sight = None;
+    }
+}
+
+/// Builds the pictures of rigs.
+pub(super) fn draw_rigs(
+    settings: Res<RigDrawing>,
+    looks: Res<Looks>,
+    views: Views,
+    mut rigs: Query<(
+        Entity,
+        Ref<Rig>,
+        Ref<Selection>,
+        Ref<Hovered>,
+        &JointEntities,
+        &GlobalTransform,
+        &mut Drawn,
+        &mut RigLabels,
+    )>,
+    moved: Query<&JointOf, (With<Joint>, Changed<GlobalTransform>)>,
+    poses: Query<&GlobalTransform, With<Joint>>,
+    mut gallery: Gallery,
+    mut counts: ResMut<DrawingCounts>,
+) {
+    for (entity, rig, selection, hovered, entities, place, mut drawn, mut labels) in &mut rigs {
+        let sight = views.sight(place).filter(|_| settings.rig);
+        let changed = rig.is_changed() || selection.is_changed() || hovered.is_changed() || settings.is_changed();
+        let stale = changed || drawn.skeleton.is_stale(sight.as_ref());
+        let posed = || moved.iter().any(|joint| joint.0 == entity);
+        if !stale && !posed() {
+            gallery.follow(&drawn.skeleton, place);
+            continue;
+        }
+        let drawn = &mut drawn.bypass_change_detection().skeleton;
+        drawn.sight = sight;
+        let mut texts = Vec::new();
+        if let Some(sight) = &sight {
+            let to_rig = place.affine().inverse();
+            let joints = drawn_joints(&rig, &selection, &hovered, |uid| {
+                let joint = entities.get(uid).and_then(|joint| poses.get(joint).ok())?;
+                Some(to_rig * joint.affine())
+            });
+            texts = labels_of(&rig, &joints, sight, &settings);
+            let written: &[(Vec2, String)] = if settings.write_labels { &texts } else { &[] };
+            draw_skeleton(&joints, written, sight, &settings, &mut drawn.ink);
+        }
+        labels.set_if_neq(RigLabels(texts));
+        gallery.show(drawn, Some(entity), *place, &looks.solid);
+        counts.rigs += 1;
+    }
+}
+
+/// The labels that [`RigDrawing::labels`] asks for.
+fn labels_of(rig: &Rig, joints: &[DrawnJoint], sight: &Sight, settings: &RigDrawing) -> Vec<(Vec2, String)> {
+    if settings.labels == LabelChoice::None {
+        return Vec::new();
+    }
+    let radii = ball_radii(joints, &bones(joints), sight, settings.ball_scale);
+    let wishes: Vec<LabelWish> = joints
+        .iter()
+        .zip(radii)
+        .filter_map(|(joint, radius)| {
+            let rank = match joint.emphasis {
+                _ if joint.hovered => 3,
+                Emphasis::Active => 2,
+                Emphasis::Selected => 1,
+                Emphasis::None if settings.labels == LabelChoice::Selected => return None,
+                Emphasis::None => 0,
+            };
+            let text = rig.joint(joint.uid)?.data.label.as_deref()?;
+            Some(LabelWish { position: joint.position, radius, text, rank })
+        })
+        .collect();
+    label_places(sight, &wishes, LETTER)
+}
+
+/// Builds the pictures of ghosts.
+pub(super) fn draw_ghosts(
+    settings: Res<RigDrawing>,
+    looks: Res<Looks>,
+    wanted: Res<Ghosts>,
+    views: Views,
+    mut rigs: Query<(Entity, &GlobalTransform, &mut Drawn)>,
+    mut gallery: Gallery,
+    mut counts: ResMut<DrawingCounts>,
+) {
+    for (entity, place, mut drawn) in &mut rigs {
+        let meant = wanted.rig.is_none_or(|rig| rig == entity) && !wanted.is_empty();
+        let picture = &mut drawn.bypass_change_detection().ghosts;
+        let sight = views.sight(place).filter(|_| meant);
+        if !picture.is_stale(sight.as_ref()) && (sight.is_none() || !(wanted.is_changed() || settings.is_changed())) {
+            continue;
+        }
+        picture.sight = sight;
+        if let Some(sight) = &sight {
+            ghosts::draw_ghosts(&wanted, sight, &settings.theme, settings.ball_scale, &mut picture.ink);
+        }
+        gallery.show(picture, Some(entity), *place, &looks.glass);
+        counts.ghosts += 1;
+    }
+}
+
+/// Builds the pictures of symmetry planes.
+pub(super) fn draw_planes(
+    settings: Res<RigDrawing>,
+    looks: Res<Looks>,
+    views: Views,
+    mut rigs: Query<(Entity, &GlobalTransform, &Symmetry, &mut Drawn)>,
+    mut gallery: Gallery,
+    mut counts: ResMut<DrawingCounts>,
+) {
+    for (entity, place, symmetry, mut drawn) in &mut rigs {
+        let drawn = drawn.bypass_change_detection();
+        let shown = symmetry.0.zip(drawn.bounds).filter(|_| settings.plane);
+        let picture = &mut drawn.plane;
+        let sight = views.sight(place).filter(|_| shown.is_some());
+        if !picture.is_stale(sight.as_ref()) && (sight.is_none() || !settings.is_changed()) {
+            continue;
+        }
+        picture.sight = sight;
+        if let (Some(sight), Some((plane, bounds))) = (&sight, shown) {
+            ghosts::draw_plane(&plane, bounds, sight, &settings.theme, &mut picture.ink);
+        }
+        gallery.show(picture, Some(entity), *place, &looks.glass);
+        counts.planes += 1;
+    }
+}
+
+/// Builds the picture of the grid.
+pub(super) fn draw_grid(
+    settings: Res<RigDrawing>,
+    looks: Res<Looks>,
+    views: Views,
+    mut picture: Local<Picture>,
+    mut gallery: Gallery,
+    mut counts: ResMut<DrawingCounts>,
+) {
+    let place = GlobalTransform::IDENTITY;
+    let sight = views.sight(&place).filter(|_| settings.grid);
+    if !picture.is_stale(sight.as_ref()) && (sight.is_none() || !settings.is_changed()) {
+        return;
+    }
+    picture.sight = sight;
+    if let Some(sight) = &sight {
+        grid::draw_grid(sight, &settings.theme, &mut picture.ink);
+    }
+    gallery.show(&mut picture, None, place, &looks.ground);
+    counts.grid += 1;
+}
