@@ -4,14 +4,14 @@
 //! hierarchy, so that Bevy's transforms, skinning and animation work on them; they follow the document and are never
 //! edited themselves. An [`EditRequest`] is the only way to change a rig.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use bevy::prelude::*;
 
 pub use super::selection::{Hovered, Selection};
 use super::{RigSystems, configure_sets, history::RigHistory};
 use crate::rig::{
-    RestTransform, Rig, Uid, UidSource,
+    PoseOffset, RestTransform, Rig, Uid, UidSource,
     operations::{MirrorPlane, Operation},
 };
 
@@ -56,12 +56,21 @@ pub struct Symmetry(pub Option<MirrorPlane>);
 #[derive(Component, Debug, Default)]
 pub struct JointEntities {
     entities: HashMap<Uid, Entity>,
+    /// The offsets of the document that the joints' transforms were last set to.
+    posed: BTreeMap<Uid, PoseOffset>,
 }
 
 impl JointEntities {
     /// The entity of a joint.
     pub fn get(&self, joint: Uid) -> Option<Entity> {
         self.entities.get(&joint).copied()
+    }
+
+    fn set_posed(&mut self, joint: Uid, offset: Option<&PoseOffset>) {
+        match offset {
+            Some(offset) => self.posed.insert(joint, *offset),
+            None => self.posed.remove(&joint),
+        };
     }
 }
 
@@ -167,8 +176,9 @@ fn apply_edits(
     }
 }
 
-/// Makes the joint entities equal to their rig: spawns, despawns, reparents, and moves what moved at rest. A pose
-/// stays on top of the rest pose.
+/// Makes the joint entities equal to their rig: spawns, despawns, reparents, moves what moved at rest, and poses what
+/// the document poses otherwise than before. As long as the document's pose stays, so does what an animation, a game or
+/// a drag under way put on top of the rest pose.
 fn follow_rigs(
     mut commands: Commands,
     mut rigs: Query<(Entity, &Rig, &mut JointEntities), Changed<Rig>>,
@@ -185,6 +195,7 @@ fn follow_rigs(
             // Children that stay have been listed below another parent by now; they must not go along.
             commands.entity(entity).detach_all_children().despawn();
             known.entities.remove(&uid);
+            known.posed.remove(&uid);
         }
         for joint in rig.walk() {
             let data = &joint.data;
@@ -192,9 +203,10 @@ fn follow_rigs(
             let entity = match known.get(data.uid) {
                 Some(entity) => entity,
                 None => {
-                    let bundle = (Joint, data.uid, data.rest, Transform::from(data.rest), JointOf(rig_entity));
+                    let bundle = (Joint, data.uid, data.rest, rig.posed_local(data.uid), JointOf(rig_entity));
                     let entity = commands.spawn((bundle, ChildOf(parent))).id();
                     known.entities.insert(data.uid, entity);
+                    known.set_posed(data.uid, rig.offset(data.uid));
                     entity
                 }
             };
@@ -202,11 +214,17 @@ fn follow_rigs(
                 describe(&mut commands.entity(entity), data.label.as_deref(), data.group, None, None);
                 continue;
             };
+            let offset = rig.offset(data.uid);
+            if known.posed.get(&data.uid) != offset {
+                *pose = rig.posed_local(data.uid);
+                known.set_posed(data.uid, offset);
+            } else if *rest != data.rest {
+                let before = offset.copied().unwrap_or_default();
+                let is_documents = *pose == before.on(&rest);
+                let offset = if is_documents { before } else { PoseOffset::between(&rest, &pose) };
+                *pose = offset.on(&data.rest);
+            }
             if *rest != data.rest {
-                let unposed = *pose == Transform::from(*rest);
-                let offset = rest.affine().inverse() * RestTransform::from(*pose).affine();
-                let posed = RestTransform::from_affine(&(data.rest.affine() * offset));
-                *pose = if unposed { data.rest.into() } else { posed.into() };
                 *rest = data.rest;
             }
             if child_of.is_none_or(|child_of| child_of.parent() != parent) {

@@ -9,7 +9,7 @@ use bevy::{math::Affine3, prelude::*};
 
 use crate::{
     mesh::model::Weights,
-    rig::{GroupData, RestTransform, RigJoint, Uid},
+    rig::{GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, Uid},
 };
 
 /// A rig (= global group). Reading is free; changing goes through [`Rig::apply`](crate::rig::edit) only.
@@ -23,6 +23,9 @@ pub struct Rig {
     /// Uids of all tags, so that adding one needs no search.
     pub(super) tags: HashSet<Uid>,
     pub(super) skins: BTreeMap<Uid, Arc<SkinData>>,
+    /// The current pose; only joints of the rig that do not stand as they rest.
+    pub(super) pose: BTreeMap<Uid, PoseOffset>,
+    pub(super) poses: Vec<StoredPose>,
 }
 
 /// What a template's header tells people.
@@ -90,9 +93,12 @@ impl Rig {
         self.joints.get(&uid)
     }
 
-    /// True if a joint, group or tag has that uid.
+    /// True if a joint, group, tag or stored pose has that uid.
     pub fn is_taken(&self, uid: Uid) -> bool {
-        self.joints.contains_key(&uid) || self.tags.contains(&uid) || self.group(uid).is_some()
+        self.joints.contains_key(&uid)
+            || self.tags.contains(&uid)
+            || self.group(uid).is_some()
+            || self.stored_pose(uid).is_some()
     }
 
     /// The number of joints.

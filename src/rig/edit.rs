@@ -3,6 +3,7 @@
 //! [`Rig::apply`] either changes the rig and returns the edit that takes it back, or changes nothing and says why.
 //! Everything bigger (placing, mirroring, deleting a joint but keeping its children) is a list of these.
 
+mod poses;
 mod shared;
 
 use std::{collections::HashSet, sync::Arc};
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     mesh::model::Weights,
     rig::{
-        GroupData, JointData, RestTransform, Rig, RigJoint, Tag, TagKind, Uid,
+        GroupData, JointData, PoseOffset, RestTransform, Rig, RigJoint, StoredPose, Tag, TagKind, Uid,
         document::{RigAbout, SkinData},
         source::ron_options,
     },
@@ -31,7 +32,7 @@ pub enum RigEdit {
         /// Its place among the siblings.
         index: usize,
     },
-    /// Removes a joint that has no children.
+    /// Removes a joint that has no children, and its part of the current pose.
     RemoveJoint(Uid),
     /// Gives a joint another rest transform, relative to its parent.
     SetRest(Uid, RestTransform),
@@ -75,6 +76,14 @@ pub enum RigEdit {
     SetAbout(Box<RigAbout>),
     /// Binds a mesh with weights, replaces them, or lets the mesh go.
     SetSkin(Uid, #[serde(with = "shared")] Option<Arc<SkinData>>),
+    /// Poses a joint: what is added to its rest transform; `None` puts it to rest.
+    SetOffset(Uid, Option<PoseOffset>),
+    /// Adds a stored pose as the `index`-th.
+    AddStoredPose(Box<StoredPose>, usize),
+    /// Removes a stored pose.
+    RemoveStoredPose(Uid),
+    /// Replaces the stored pose that has the same uid.
+    SetStoredPose(Box<StoredPose>),
     /// Several edits as one: all or none.
     Batch(Vec<RigEdit>),
 }
@@ -91,6 +100,9 @@ pub enum EditError {
     /// No such tag.
     #[error("joint {0} has no tag {1}; it may have been deleted")]
     NoTag(Uid, Uid),
+    /// No such stored pose.
+    #[error("there is no stored pose {0} in the rig; it may have been deleted: choose another")]
+    NoPose(Uid),
     /// The uid is taken.
     #[error("uid {0} is already used in the rig; give the added thing another uid")]
     Taken(Uid),
@@ -109,7 +121,7 @@ pub enum EditError {
         parent: Uid,
     },
     /// A number is not finite or a rotation is not of unit length.
-    #[error("joint {0} would get a rest transform that is not finite or not a rotation; check the numbers")]
+    #[error("joint {0} would get a transform that is not finite or not a rotation; check the numbers")]
     BadTransform(Uid),
     /// Weights do not fit.
     #[error("the weights name {0} joints that the rig does not have; skin the mesh again")]
@@ -199,6 +211,10 @@ impl Rig {
                 RigEdit::SetAbout(Box::new(std::mem::replace(&mut self.about, (**about).clone())))
             }
             RigEdit::SetSkin(mesh, skin) => self.set_skin(*mesh, skin.as_ref())?,
+            RigEdit::SetOffset(joint, offset) => self.set_offset(*joint, *offset)?,
+            RigEdit::AddStoredPose(pose, index) => self.add_stored_pose(pose, *index)?,
+            RigEdit::RemoveStoredPose(uid) => self.remove_stored_pose(*uid)?,
+            RigEdit::SetStoredPose(pose) => self.set_stored_pose(pose)?,
             RigEdit::Batch(edits) => self.apply_batch(edits)?,
         })
     }
@@ -285,7 +301,11 @@ impl Rig {
         for tag in &joint.data.tags {
             self.tags.remove(&tag.uid);
         }
-        Ok(RigEdit::AddJoint { joint: Box::new(joint.data), parent, index })
+        let back = RigEdit::AddJoint { joint: Box::new(joint.data), parent, index };
+        Ok(match self.pose.remove(&uid) {
+            Some(offset) => RigEdit::Batch(vec![back, RigEdit::SetOffset(uid, Some(offset))]),
+            None => back,
+        })
     }
 
     fn set_parent(&mut self, uid: Uid, parent: Option<Uid>, index: usize) -> Result<RigEdit, EditError> {

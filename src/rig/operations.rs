@@ -8,6 +8,7 @@ mod draft;
 mod hierarchy;
 mod orient;
 mod place;
+mod pose;
 mod symmetry;
 mod transform;
 
@@ -18,7 +19,7 @@ pub use orient::Axis;
 pub use place::settle;
 pub use symmetry::MirrorPlane;
 
-use crate::rig::{EditError, GroupData, Rig, RigEdit, Uid, UidSource};
+use crate::rig::{EditError, GroupData, PoseOffset, Rig, RigEdit, Uid, UidSource};
 
 /// One thing a person asks of a rig. Positions and transforms are in the rig's space.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,6 +113,18 @@ pub enum Operation {
     },
     /// Protects joints from automatic skinning, or no longer.
     Lock(Vec<Uid>, bool),
+    /// Poses joints: what is put on top of each one's rest transform. Partners get the mirror image.
+    Pose(Vec<(Uid, PoseOffset)>),
+    /// Puts joints and their partners to rest; all joints if none is listed.
+    ResetPose(Vec<Uid>),
+    /// Keeps the current pose under a name; a stored pose of that name is replaced.
+    StorePose(String),
+    /// Makes a stored pose the current one; joints that it does not name stand as they rest.
+    ApplyPose(Uid),
+    /// Renames a stored pose.
+    RenamePose(Uid, String),
+    /// Deletes a stored pose; the current pose stays.
+    DeletePose(Uid),
     /// Edits as they are.
     Edits(Vec<RigEdit>),
 }
@@ -128,6 +141,12 @@ pub enum OperationError {
     /// The bone to insert into does not exist.
     #[error("joint {0} is a root: there is no bone above it to insert into")]
     NoBone(Uid),
+    /// A pose needs a name.
+    #[error("a stored pose needs a name; type one")]
+    NoName,
+    /// Another pose has the name.
+    #[error("there is a stored pose \"{0}\" already; choose another name, or delete that pose first")]
+    PoseName(String),
 }
 
 impl Operation {
@@ -147,6 +166,12 @@ impl Operation {
             Self::Mirror { .. } => "Mirror joints",
             Self::Group { .. } => "Assign group",
             Self::Lock(..) => "Lock joints",
+            Self::Pose(..) => "Pose joints",
+            Self::ResetPose(..) => "Reset pose",
+            Self::StorePose(..) => "Store pose",
+            Self::ApplyPose(..) => "Apply pose",
+            Self::RenamePose(..) => "Rename pose",
+            Self::DeletePose(..) => "Delete pose",
             Self::Edits(..) => "Edit rig",
         }
     }
@@ -200,6 +225,12 @@ impl Operation {
                 }
                 Ok(())
             }
+            Self::Pose(offsets) => pose::pose(draft, offsets),
+            Self::ResetPose(joints) => pose::reset(draft, joints),
+            Self::StorePose(name) => pose::store(draft, name),
+            Self::ApplyPose(pose) => pose::apply(draft, *pose),
+            Self::RenamePose(pose, name) => pose::rename(draft, *pose, name),
+            Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),
             Self::Edits(edits) => edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?)),
         }
     }

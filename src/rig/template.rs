@@ -10,8 +10,10 @@ mod write;
 
 use serde::{Deserialize, Serialize};
 
+pub(super) use read::read_text;
 pub use read::{read_header, read_template};
 pub use write::write_template;
+pub(super) use write::{quoted, vector};
 
 use crate::rig::{Rig, Uid};
 

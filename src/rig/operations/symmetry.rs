@@ -39,11 +39,16 @@ impl MirrorPlane {
         point - self.normal * (2.0 * self.distance(point))
     }
 
+    /// Takes directions to the other side.
+    pub fn reflection(&self) -> Mat3 {
+        let n = self.normal;
+        Mat3::from_cols(Vec3::X - n * (2.0 * n.x), Vec3::Y - n * (2.0 * n.y), Vec3::Z - n * (2.0 * n.z))
+    }
+
     /// The transform on the other side: positions mirrored and every local axis mirrored too, with the local axis
     /// across the plane turned over, so that it stays a proper rotation.
     pub fn mirrored_affine(&self, global: &Affine3) -> Affine3 {
-        let n = self.normal;
-        let reflect = Mat3::from_cols(Vec3::X - n * (2.0 * n.x), Vec3::Y - n * (2.0 * n.y), Vec3::Z - n * (2.0 * n.z));
+        let reflect = self.reflection();
         Affine3 { matrix3: reflect * global.matrix3 * reflect, translation: self.mirrored(global.translation) }
     }
 }

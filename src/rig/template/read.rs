@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::{FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader, write::feature_summaries};
 use crate::rig::{
     GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError, Tag, TagKind, Uid,
+    format::{Format, blanked},
     scan::{self, Field},
     source::{parse_ron, ron_options, utf8},
 };
@@ -16,7 +17,8 @@ use crate::rig::{
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TemplateFile {
-    format: u32,
+    #[serde(rename = "format")]
+    _format: u32,
     uid: Uid,
     name: String,
     #[serde(default)]
@@ -113,12 +115,19 @@ fn no_scale() -> (f32, f32, f32) {
     (1.0, 1.0, 1.0)
 }
 
+const TEMPLATE: Format = Format { what: "template", number: FORMAT, known: known_names };
+
 /// Reads a template. Nothing is returned unless all of it is right.
 pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
-    let text = utf8(bytes, MAX_BYTES, "template")?;
+    read_text(utf8(bytes, MAX_BYTES, "template")?, 1)
+}
+
+/// Reads a template that stands in another file, where its first line has the number `first_line`.
+pub(in crate::rig) fn read_text(text: &str, first_line: usize) -> Result<Template, SourceError> {
     let mut notes = Vec::new();
     let fields = scan::fields(text);
-    let file = parse(text, &fields, &mut notes)?;
+    let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
+    let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
     let rig = build(&Places { text, fields: &fields }, file, &mut notes)?;
     Ok(Template { rig, notes })
 }
@@ -132,61 +141,13 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
     };
     let fields = scan::fields(text);
     let is_list = |field: &&Field| field.depth == 1 && matches!(field.name, "groups" | "joints");
-    let unknown = |field: &&Field| known_names(&fields, field).is_some_and(|known| !known.contains(&field.name));
-    let passed_over: Vec<&Field> = fields.iter().filter(|field| is_list(field) || unknown(field)).collect();
+    let mut passed_over = TEMPLATE.unknown(&fields);
+    passed_over.extend(fields.iter().filter(is_list));
+    passed_over.sort_unstable_by_key(|field| field.start);
     let whole = parse_ron(&blanked(text, &passed_over));
     let Some(first) = fields.iter().find(is_list) else { return whole };
     // Where the lists are cut short or wrong, what stands before them is enough.
     whole.or_else(|_| parse_ron(&format!("{})", &text[..first.start])))
-}
-
-/// The text without these fields: blanks in their place, so that lines and columns stay.
-fn blanked(text: &str, without: &[&Field]) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut at = 0;
-    for field in without.iter().filter(|field| field.start < field.end) {
-        let from = field.start.max(at);
-        out.push_str(&text[at..from]);
-        out.extend(text[from..field.end.max(from)].chars().map(|c| if c == '\n' { '\n' } else { ' ' }));
-        at = field.end.max(from);
-    }
-    out.push_str(&text[at..]);
-    out
-}
-
-/// Parses the text; fields that only a newer format has are passed over and named in `notes`.
-fn parse(text: &str, fields: &[Field], notes: &mut Vec<String>) -> Result<TemplateFile, SourceError> {
-    let format = fields.iter().find(|field| field.depth == 1 && field.name == "format");
-    let number = format.and_then(|field| {
-        let rest = text[field.value..field.end].trim_start();
-        let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
-        rest[..digits].parse::<u32>().ok()
-    });
-    match (number, format) {
-        (Some(0), Some(field)) => {
-            return Err(SourceError::at(text, field.start, "format 0 was never released; the first is format: 1"));
-        }
-        (Some(newer), _) if newer > FORMAT => {}
-        _ => return parse_ron(text),
-    }
-    let unknown: Vec<&Field> = fields
-        .iter()
-        .filter(|field| known_names(fields, field).is_some_and(|known| !known.contains(&field.name)))
-        .collect();
-    let (mut line, mut counted) = (1, 0);
-    for field in &unknown {
-        line += text[counted..field.start].matches('\n').count();
-        counted = field.start;
-        notes.push(format!("line {line}: the field `{}` is of a newer format and is not kept", field.name));
-    }
-    // Places stay the same without these fields, so errors are shown in the text as it is.
-    let known = blanked(text, &unknown);
-    let file: TemplateFile = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
-    let newer = file.format;
-    notes.insert(0, format!(
-        "the template has format {newer}, newer than {FORMAT}: update Rigsmith, or save under another name to keep what it does not know"
-    ));
-    Ok(file)
 }
 
 /// The names that a field may have where it stands; `None` where anything may stand (parameters of modules).

@@ -161,12 +161,12 @@ fn write_uid(out: &mut String, field: &str, uid: Option<Uid>) -> std::fmt::Resul
     }
 }
 
-fn vector(v: Vec3) -> String {
+pub(in crate::rig) fn vector(v: Vec3) -> String {
     format!("({:?}, {:?}, {:?})", v.x, v.y, v.z)
 }
 
 /// A RON string literal.
-fn quoted(text: &str) -> String {
+pub(in crate::rig) fn quoted(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 2);
     out.push('"');
     for c in text.chars() {

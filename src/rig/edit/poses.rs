@@ -1,0 +1,52 @@
+//! Edits of the current pose and of stored poses.
+
+use crate::rig::{EditError, PoseOffset, Rig, RigEdit, StoredPose, Uid};
+
+impl Rig {
+    pub(super) fn set_offset(&mut self, joint: Uid, offset: Option<PoseOffset>) -> Result<RigEdit, EditError> {
+        if self.joint(joint).is_none() {
+            return Err(EditError::NoJoint(joint));
+        }
+        if offset.is_some_and(|offset| !offset.is_valid()) {
+            return Err(EditError::BadTransform(joint));
+        }
+        let old = match offset.filter(is_posed) {
+            Some(offset) => self.pose.insert(joint, offset),
+            None => self.pose.remove(&joint),
+        };
+        Ok(RigEdit::SetOffset(joint, old))
+    }
+
+    pub(super) fn add_stored_pose(&mut self, pose: &StoredPose, index: usize) -> Result<RigEdit, EditError> {
+        self.check_free(pose.uid)?;
+        let pose = checked(pose)?;
+        let uid = pose.uid;
+        self.poses.insert(index.min(self.poses.len()), pose);
+        Ok(RigEdit::RemoveStoredPose(uid))
+    }
+
+    pub(super) fn remove_stored_pose(&mut self, uid: Uid) -> Result<RigEdit, EditError> {
+        let index = self.poses.iter().position(|pose| pose.uid == uid).ok_or(EditError::NoPose(uid))?;
+        Ok(RigEdit::AddStoredPose(Box::new(self.poses.remove(index)), index))
+    }
+
+    pub(super) fn set_stored_pose(&mut self, pose: &StoredPose) -> Result<RigEdit, EditError> {
+        let next = checked(pose)?;
+        let old = self.poses.iter_mut().find(|old| old.uid == pose.uid).ok_or(EditError::NoPose(pose.uid))?;
+        Ok(RigEdit::SetStoredPose(Box::new(std::mem::replace(old, next))))
+    }
+}
+
+fn is_posed(offset: &PoseOffset) -> bool {
+    *offset != PoseOffset::IDENTITY
+}
+
+/// The pose as the rig keeps it: without joints that stand as they rest.
+fn checked(pose: &StoredPose) -> Result<StoredPose, EditError> {
+    if let Some((joint, _)) = pose.offsets.iter().find(|(_, offset)| !offset.is_valid()) {
+        return Err(EditError::BadTransform(*joint));
+    }
+    let mut pose = pose.clone();
+    pose.offsets.retain(|_, offset| is_posed(offset));
+    Ok(pose)
+}

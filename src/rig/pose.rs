@@ -1,0 +1,151 @@
+//! Poses: what is put on top of the rest pose.
+//!
+//! Rest and pose never mix: a pose is a list of offsets from rest, one for each joint that does not stand as it rests.
+//! Changing the rest pose keeps the offsets, and changing a pose never touches the rest pose.
+
+use std::collections::{BTreeMap, HashMap};
+
+use bevy::{math::Affine3, prelude::*};
+use serde::{Deserialize, Serialize};
+
+use crate::rig::{RestTransform, Rig, Uid};
+
+/// What a pose adds to the rest transform of one joint, in the joint's own space at rest.
+///
+/// Both are multiplied as Bevy multiplies two [`Transform`]s: the translation is moved and turned by rest, rotations
+/// follow one another, scales are multiplied axis by axis. So there is never any shear, and the way back is exact.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PoseOffset {
+    /// Translation in the joint's space at rest.
+    pub translation: Vec3,
+    /// Rotation about the joint's own axes, a unit quaternion.
+    pub rotation: Quat,
+    /// Factors along the joint's own axes.
+    pub scale: Vec3,
+}
+
+impl Default for PoseOffset {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+impl PoseOffset {
+    /// The joint as it rests.
+    pub const IDENTITY: Self = Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE };
+
+    /// An offset that only turns.
+    pub fn from_rotation(rotation: Quat) -> Self {
+        Self { rotation, ..Self::IDENTITY }
+    }
+
+    /// The offset that takes a joint from `rest` to `posed`, both relative to its parent. What a rest scale of zero
+    /// hides stays at rest.
+    pub fn between(rest: &RestTransform, posed: &Transform) -> Self {
+        let back = rest.rotation.inverse();
+        let divided = |value: f32, by: f32, otherwise: f32| if by == 0.0 { otherwise } else { value / by };
+        let moved = back * (posed.translation - rest.translation);
+        Self {
+            translation: Vec3::new(
+                divided(moved.x, rest.scale.x, 0.0),
+                divided(moved.y, rest.scale.y, 0.0),
+                divided(moved.z, rest.scale.z, 0.0),
+            ),
+            rotation: (back * posed.rotation).normalize(),
+            scale: Vec3::new(
+                divided(posed.scale.x, rest.scale.x, 1.0),
+                divided(posed.scale.y, rest.scale.y, 1.0),
+                divided(posed.scale.z, rest.scale.z, 1.0),
+            ),
+        }
+    }
+
+    /// Where a joint with that rest transform stands, relative to its parent.
+    pub fn on(&self, rest: &RestTransform) -> Transform {
+        if *self == Self::IDENTITY {
+            return (*rest).into();
+        }
+        Transform {
+            translation: rest.translation + rest.rotation * (rest.scale * self.translation),
+            rotation: (rest.rotation * self.rotation).normalize(),
+            scale: rest.scale * self.scale,
+        }
+    }
+
+    /// True if the joint stands as it rests, to `tolerance` (of lengths, factors and half the sine of the angle).
+    pub fn is_rest(&self, tolerance: f32) -> bool {
+        self.translation.abs().max_element() <= tolerance
+            && self.rotation.xyz().abs().max_element() <= tolerance
+            && (self.scale - Vec3::ONE).abs().max_element() <= tolerance
+    }
+
+    /// True if every number is finite and the rotation has a length.
+    pub fn is_valid(&self) -> bool {
+        let Self { translation, rotation, scale } = *self;
+        RestTransform { translation, rotation, scale }.is_valid()
+    }
+}
+
+/// A pose that was kept under a name.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct StoredPose {
+    /// Identity.
+    pub uid: Uid,
+    /// The name people see.
+    pub name: String,
+    /// Offsets of the joints that do not stand as they rest. A joint that was deleted since may be named: undoing the
+    /// deletion brings its part of the pose back.
+    pub offsets: BTreeMap<Uid, PoseOffset>,
+}
+
+/// Poses of a rig.
+impl Rig {
+    /// What the current pose adds to a joint's rest transform; `None` for a joint that stands as it rests.
+    pub fn offset(&self, joint: Uid) -> Option<&PoseOffset> {
+        self.pose.get(&joint)
+    }
+
+    /// The current pose: offsets of all joints that do not stand as they rest.
+    pub fn pose(&self) -> &BTreeMap<Uid, PoseOffset> {
+        &self.pose
+    }
+
+    /// The stored poses in order.
+    pub fn stored_poses(&self) -> &[StoredPose] {
+        &self.poses
+    }
+
+    /// The stored pose with that uid.
+    pub fn stored_pose(&self, uid: Uid) -> Option<&StoredPose> {
+        self.poses.iter().find(|pose| pose.uid == uid)
+    }
+
+    /// Where a joint stands in the current pose, relative to its parent. Identity for an unknown joint.
+    pub fn posed_local(&self, joint: Uid) -> Transform {
+        let Some(data) = self.joint(joint).map(|joint| &joint.data) else { return Transform::IDENTITY };
+        self.pose.get(&joint).map_or_else(|| data.rest.into(), |offset| offset.on(&data.rest))
+    }
+
+    /// Transform of a joint from its own space to the rig's, in the current pose. Identity for an unknown joint.
+    pub fn posed_global(&self, joint: Uid) -> Affine3 {
+        let own = affine(&self.posed_local(joint));
+        self.ancestors(joint).fold(own, |global, above| affine(&self.posed_local(above.data.uid)) * global)
+    }
+
+    /// Posed transforms of all joints to the rig's space, in the order of [`Rig::walk`].
+    pub fn posed_globals(&self) -> Vec<(Uid, Affine3)> {
+        let mut known: HashMap<Uid, Affine3> = HashMap::with_capacity(self.len());
+        let mut list = Vec::with_capacity(self.len());
+        for joint in self.walk() {
+            let parent = joint.parent.and_then(|parent| known.get(&parent)).copied().unwrap_or(Affine3::IDENTITY);
+            let global = parent * affine(&self.posed_local(joint.data.uid));
+            known.insert(joint.data.uid, global);
+            list.push((joint.data.uid, global));
+        }
+        list
+    }
+}
+
+fn affine(transform: &Transform) -> Affine3 {
+    Affine3::from_scale_rotation_translation(transform.scale, transform.rotation, transform.translation)
+}
