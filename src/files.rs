@@ -3,6 +3,7 @@
 //! - [`save_atomic`] and [`save_all_atomic`] leave the old file or the finished one, whatever fails: each writes a
 //!   temporary file beside its target, syncs it, and renames it over the target.
 //! - [`read_capped`] and [`open`] answer a missing, empty, oversized or forbidden file with an error that says what to do.
+//! - [`journal`] keeps every edit as it is made, and gives it back after a crash.
 //! - [`ModelFolder`] finds the textures and buffers that a model names, and nothing outside the model's folder.
 //! - [`Disk`] is what they stand on. [`RealDisk`] is the file system; [`FaultyDisk`] fails at a chosen operation in a chosen
 //!   manner, so that a test can try every one of them (as SQLite's tests do), including tests of games that save rigs.
@@ -16,6 +17,7 @@ mod atomic;
 mod disk;
 mod fault;
 mod folder;
+pub mod journal;
 mod load;
 mod read;
 mod store;

@@ -15,6 +15,7 @@ pub mod project;
 mod scan;
 pub mod skin;
 mod source;
+pub mod step;
 mod tag;
 pub mod template;
 pub mod text;

@@ -304,7 +304,7 @@ fn ends_in_separator(path: &Path) -> bool {
 }
 
 /// A name that no other process or thread uses at the same time.
-fn temp_name() -> String {
+pub(super) fn temp_name() -> String {
     let mut hasher = std::hash::RandomState::new().build_hasher();
     hasher.write_u32(std::process::id());
     if let Ok(now) = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH) {

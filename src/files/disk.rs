@@ -43,6 +43,17 @@ pub trait DiskFile: Send {
 
     /// Returns once everything written has reached the device.
     fn sync(&mut self) -> io::Result<()>;
+
+    /// Marks the file as in use until it is closed, for [`Disk::is_locked`]; does nothing where files cannot be locked.
+    fn lock(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Another handle of the same file, through which it can be synced while this one goes on writing; an error where
+    /// there is none.
+    fn another(&self) -> io::Result<Box<dyn DiskFile>> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
 }
 
 /// The operations on files that Rigsmith uses. Each call may fail on its own; none is assumed to be atomic but `rename`.
@@ -79,6 +90,11 @@ pub trait Disk: Send + Sync {
 
     /// Opens a file for reading.
     fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>>;
+
+    /// Tells whether a process that lives has the file at `path` [locked](DiskFile::lock).
+    fn is_locked(&self, path: &Path) -> io::Result<bool> {
+        self.entry(path, true).map(|_| false)
+    }
 }
 
 /// The file system of this machine.
@@ -167,6 +183,11 @@ impl Disk for RealDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
         Ok(Box::new(fs::File::open(path)?))
     }
+
+    fn is_locked(&self, path: &Path) -> io::Result<bool> {
+        // Some file systems know no locks; then nobody can tell.
+        Ok(matches!(fs::File::open(path)?.try_lock_shared(), Err(fs::TryLockError::WouldBlock)))
+    }
 }
 
 struct RealFile(fs::File);
@@ -197,5 +218,17 @@ impl DiskFile for RealFile {
 
     fn sync(&mut self) -> io::Result<()> {
         self.0.sync_all()
+    }
+
+    fn lock(&mut self) -> io::Result<()> {
+        match self.0.try_lock() {
+            Err(fs::TryLockError::WouldBlock) => Err(io::ErrorKind::WouldBlock.into()),
+            // Some file systems know no locks.
+            Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(()),
+        }
+    }
+
+    fn another(&self) -> io::Result<Box<dyn DiskFile>> {
+        Ok(Box::new(Self(self.0.try_clone()?)))
     }
 }

@@ -25,7 +25,7 @@ pub enum Fault {
     Short,
     /// The process dies: this and all later operations fail, and the files stay as they are. A write stores half of its bytes.
     Crash,
-    /// Like `Crash`, and files written but not synced lose their content.
+    /// Like `Crash`, and files lose what was written to them since they were last synced.
     PowerLoss,
 }
 
@@ -73,8 +73,16 @@ struct Inner {
 #[derive(Default)]
 struct State {
     log: Vec<&'static str>,
-    unsynced: Vec<PathBuf>,
+    written: Vec<Written>,
     lost_power: bool,
+}
+
+/// A file that was created here.
+struct Written {
+    /// Its name now.
+    path: PathBuf,
+    bytes: u64,
+    synced: u64,
 }
 
 impl FaultyDisk {
@@ -123,9 +131,14 @@ impl Inner {
         if std::mem::replace(&mut state.lost_power, true) {
             return;
         }
-        for path in std::mem::take(&mut state.unsynced) {
-            if self.disk.remove(&path).is_ok() {
-                let _ = self.disk.create(&path);
+        for file in state.written.drain(..).filter(|file| file.synced < file.bytes) {
+            let mut kept = Vec::new();
+            let read = self.disk.open(&file.path).and_then(|reader| reader.take(file.synced).read_to_end(&mut kept));
+            if read.is_ok()
+                && self.disk.remove(&file.path).is_ok()
+                && let Ok(mut file) = self.disk.create(&file.path)
+            {
+                let _ = file.write(&kept);
             }
         }
     }
@@ -142,6 +155,7 @@ impl Inner {
     }
 }
 
+/// Files have no second handle, so that operations come in the same order every time.
 impl Disk for FaultyDisk {
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
         self.inner.run("entry", |disk| disk.entry(path, follow))
@@ -161,15 +175,22 @@ impl Disk for FaultyDisk {
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
         let file = self.inner.run("create", |disk| disk.create(path))?;
-        self.inner.state().unsynced.push(path.to_path_buf());
-        Ok(Box::new(FaultyFile { file, path: path.to_path_buf(), inner: Arc::clone(&self.inner) }))
+        let mut state = self.inner.state();
+        let number = state.written.len();
+        state.written.push(Written { path: path.to_path_buf(), bytes: 0, synced: 0 });
+        Ok(Box::new(FaultyFile { file, number, inner: Arc::clone(&self.inner) }))
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         self.inner.run("rename", |disk| disk.rename(from, to))?;
-        // Content that was not synced is as unsafe under its other name.
-        for path in self.inner.state().unsynced.iter_mut().filter(|path| *path == from) {
-            *path = to.to_path_buf();
+        // Content that was not synced is as unsafe under its other name; what had that name before is gone.
+        for file in &mut self.inner.state().written {
+            if file.path == to {
+                file.synced = file.bytes;
+                file.path = PathBuf::new();
+            } else if file.path == from {
+                file.path = to.to_path_buf();
+            }
         }
         Ok(())
     }
@@ -194,12 +215,27 @@ impl Disk for FaultyDisk {
         let reader = self.inner.run("open", |disk| disk.open(path))?;
         Ok(Box::new(FaultyReader { reader, inner: Arc::clone(&self.inner) }))
     }
+
+    fn is_locked(&self, path: &Path) -> io::Result<bool> {
+        self.inner.run("is_locked", |disk| disk.is_locked(path))
+    }
 }
 
 struct FaultyFile {
     file: Box<dyn DiskFile>,
-    path: PathBuf,
+    /// Its place in the list of files created here.
+    number: usize,
     inner: Arc<Inner>,
+}
+
+impl FaultyFile {
+    fn write_counted(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.file.write(bytes)?;
+        if let Some(written) = self.inner.state().written.get_mut(self.number) {
+            written.bytes += count as u64;
+        }
+        Ok(count)
+    }
 }
 
 impl DiskFile for FaultyFile {
@@ -209,11 +245,11 @@ impl DiskFile for FaultyFile {
         let crashed =
             self.inner.plan.is_some_and(|plan| plan.fault.is_crash() && self.inner.state().log.len() > plan.at);
         match self.inner.step("write") {
-            None => self.file.write(bytes),
-            Some(Fault::Short) => self.file.write(half),
+            None => self.write_counted(bytes),
+            Some(Fault::Short) => self.write_counted(half),
             Some(fault) => {
                 if !crashed && fault != Fault::NoAccess {
-                    let _ = self.file.write(half);
+                    let _ = self.write_counted(half);
                 }
                 self.inner.settle(fault);
                 Err(fault.error())
@@ -235,7 +271,9 @@ impl DiskFile for FaultyFile {
         match self.inner.step("sync") {
             None | Some(Fault::Short) => {
                 self.file.sync()?;
-                self.inner.state().unsynced.retain(|path| *path != self.path);
+                if let Some(written) = self.inner.state().written.get_mut(self.number) {
+                    written.synced = written.bytes;
+                }
                 Ok(())
             }
             Some(fault) => {
@@ -243,6 +281,10 @@ impl DiskFile for FaultyFile {
                 Err(fault.error())
             }
         }
+    }
+
+    fn lock(&mut self) -> io::Result<()> {
+        self.file.lock()
     }
 }
 

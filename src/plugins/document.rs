@@ -4,7 +4,10 @@
 //! hierarchy, so that Bevy's transforms, skinning and animation work on them; they follow the document and are never
 //! edited themselves. An [`EditRequest`] is the only way to change a rig.
 
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, HashMap},
+};
 
 use bevy::prelude::*;
 
@@ -13,6 +16,7 @@ use super::{RigSystems, configure_sets, history::RigHistory};
 use crate::rig::{
     PoseOffset, RestTransform, Rig, Uid, UidSource,
     operations::{MirrorPlane, Operation},
+    step::Committed,
 };
 
 /// Adds rigs, their joint entities and the edit path.
@@ -129,8 +133,10 @@ impl EditRequest {
 pub struct Edited {
     /// The rig.
     pub rig: Entity,
-    /// What was done, in a few words.
-    pub name: &'static str,
+    /// What was done, undone or redone, in a few words.
+    pub name: Cow<'static, str>,
+    /// The change; `None` if the operation had nothing to do.
+    pub committed: Option<Committed>,
 }
 
 /// A change was refused; the rig is as it was.
@@ -155,19 +161,22 @@ fn apply_edits(
             Ok((mut rig, mut selection, mut history, symmetry)) => match change {
                 Change::Do(operation) => history
                     .edit(&mut rig, &mut selection, &mut uids, symmetry.0, operation)
+                    .map(|recorded| (recorded.name, recorded.step.map(Committed::Done)))
                     .map_err(|error| error.to_string()),
-                Change::Undo => {
-                    history.undo(&mut rig, &mut selection).unwrap_or_else(|| Err("there is nothing to undo".to_owned()))
-                }
-                Change::Redo => {
-                    history.redo(&mut rig, &mut selection).unwrap_or_else(|| Err("there is nothing to redo".to_owned()))
-                }
+                Change::Undo => history
+                    .undo(&mut rig, &mut selection)
+                    .unwrap_or_else(|| Err("there is nothing to undo".to_owned()))
+                    .map(|step| (step.name.clone(), Some(Committed::Undone(step)))),
+                Change::Redo => history
+                    .redo(&mut rig, &mut selection)
+                    .unwrap_or_else(|| Err("there is nothing to redo".to_owned()))
+                    .map(|step| (step.name.clone(), Some(Committed::Redone(step)))),
             },
             Err(_) => Err(format!("entity {entity} is no rig; it may have been closed")),
         };
         match result {
-            Ok(name) => {
-                edited.write(Edited { rig: *entity, name });
+            Ok((name, committed)) => {
+                edited.write(Edited { rig: *entity, name, committed });
             }
             Err(reason) => {
                 refused.write(EditRefused { rig: *entity, reason });

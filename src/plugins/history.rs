@@ -1,5 +1,7 @@
 //! Undo and redo, one step a gesture, the selection included.
 
+use std::{borrow::Cow, sync::Arc};
+
 use bevy::prelude::*;
 use undo::{Edit, Record};
 
@@ -7,21 +9,27 @@ use super::selection::Selection;
 use crate::rig::{
     Rig, RigEdit, Uid, UidSource,
     operations::{MirrorPlane, Operation, OperationError},
+    step::{Step, Timeline},
 };
 
 /// The steps that were done to a rig.
 #[derive(Component, Default)]
 pub struct RigHistory {
-    record: Record<Step>,
+    record: Record<Entry>,
 }
 
-/// One step: edits that were applied together, and the selection around them.
-struct Step {
-    name: &'static str,
-    forward: Vec<RigEdit>,
-    backward: Vec<RigEdit>,
-    before: Vec<Uid>,
-    after: Vec<Uid>,
+/// What an operation did.
+#[derive(Debug, Clone)]
+pub struct Recorded {
+    /// What was done, in a few words.
+    pub name: Cow<'static, str>,
+    /// The step; `None` if nothing changed, which is no step.
+    pub step: Option<Arc<Step>>,
+}
+
+/// A step in the record.
+struct Entry {
+    step: Arc<Step>,
     /// True until the step is recorded: its edits have been applied already.
     applied: bool,
 }
@@ -31,24 +39,28 @@ struct Step {
 struct Editable {
     rig: Rig,
     selection: Vec<Uid>,
+    /// True while a history is restored, when the rig is as it shall be already.
+    inert: bool,
 }
 
-impl Edit for Step {
+impl Edit for Entry {
     type Target = Editable;
-    type Output = Result<&'static str, String>;
+    type Output = Result<Arc<Step>, String>;
 
     fn edit(&mut self, target: &mut Editable) -> Self::Output {
-        if !std::mem::take(&mut self.applied) {
-            apply_all(&mut target.rig, &self.forward)?;
+        if !std::mem::take(&mut self.applied) && !target.inert {
+            apply_all(&mut target.rig, &self.step.forward)?;
         }
-        target.selection.clone_from(&self.after);
-        Ok(self.name)
+        target.selection.clone_from(&self.step.after);
+        Ok(self.step.clone())
     }
 
     fn undo(&mut self, target: &mut Editable) -> Self::Output {
-        apply_all(&mut target.rig, &self.backward)?;
-        target.selection.clone_from(&self.before);
-        Ok(self.name)
+        if !target.inert {
+            apply_all(&mut target.rig, &self.step.backward)?;
+        }
+        target.selection.clone_from(&self.step.before);
+        Ok(self.step.clone())
     }
 }
 
@@ -57,8 +69,20 @@ fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), String> {
 }
 
 impl RigHistory {
-    /// Runs an operation and records it as one step; returns its name. Joints that the operation deleted leave the
-    /// selection.
+    /// A history that was kept, for a rig in which its steps are in effect already.
+    pub fn restored(timeline: &Timeline) -> Self {
+        let mut record = Record::new();
+        let mut target = Editable { inert: true, ..default() };
+        for step in timeline.done.iter().chain(timeline.undone.iter().rev()) {
+            let _ = record.edit(&mut target, Entry { step: step.clone(), applied: true });
+        }
+        for _ in &timeline.undone {
+            let _ = record.undo(&mut target);
+        }
+        Self { record }
+    }
+
+    /// Runs an operation and records it as one step. Joints that the operation deleted leave the selection.
     pub fn edit(
         &mut self,
         rig: &mut Rig,
@@ -66,51 +90,48 @@ impl RigHistory {
         uids: &mut UidSource,
         symmetry: Option<MirrorPlane>,
         operation: &Operation,
-    ) -> Result<&'static str, OperationError> {
+    ) -> Result<Recorded, OperationError> {
         let before = selection.0.clone();
         let outcome = operation.run(rig, uids, symmetry)?;
         let after = outcome
             .selected
             .unwrap_or_else(|| before.iter().copied().filter(|joint| rig.joint(*joint).is_some()).collect());
+        let name = Cow::Borrowed(operation.name());
         // What changed nothing is no step: undoing it would seem to do nothing.
         if outcome.edits.is_empty() && after == before {
-            return Ok(operation.name());
+            return Ok(Recorded { name, step: None });
         }
-        let step = Step {
-            name: operation.name(),
-            forward: outcome.edits,
-            backward: outcome.inverses,
-            before,
-            after,
-            applied: true,
-        };
-        let recorded = self.with(rig, selection, |record, target| record.edit(target, step));
+        let step = Step { name: name.clone(), forward: outcome.edits, backward: outcome.inverses, before, after };
+        let step = Arc::new(step);
+        let entry = Entry { step: step.clone(), applied: true };
+        let recorded = self.with(rig, selection, |record, target| record.edit(target, entry));
         debug_assert!(recorded.is_ok(), "a step that was applied already cannot fail");
-        Ok(operation.name())
+        Ok(Recorded { name, step: Some(step) })
     }
 
-    /// Takes the last step back; its name, or `None` if there is none.
-    pub fn undo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<&'static str, String>> {
+    /// Takes the last step back and returns it, or `None` if there is none.
+    pub fn undo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
         self.with(rig, selection, Record::undo)
     }
 
-    /// Does the last undone step again; its name, or `None` if there is none.
-    pub fn redo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<&'static str, String>> {
+    /// Does the last undone step again and returns it, or `None` if there is none.
+    pub fn redo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
         self.with(rig, selection, Record::redo)
     }
 
     /// Names of all steps, oldest first, and how many of them are in effect.
-    pub fn steps(&self) -> (Vec<&'static str>, usize) {
-        (self.record.entries().map(|entry| entry.as_ref().name).collect(), self.record.head())
+    pub fn steps(&self) -> (Vec<&str>, usize) {
+        (self.record.entries().map(|entry| entry.as_ref().step.name.as_ref()).collect(), self.record.head())
     }
 
     fn with<T>(
         &mut self,
         rig: &mut Rig,
         selection: &mut Selection,
-        change: impl FnOnce(&mut Record<Step>, &mut Editable) -> T,
+        change: impl FnOnce(&mut Record<Entry>, &mut Editable) -> T,
     ) -> T {
-        let mut target = Editable { rig: std::mem::take(rig), selection: std::mem::take(&mut selection.0) };
+        let mut target =
+            Editable { rig: std::mem::take(rig), selection: std::mem::take(&mut selection.0), inert: false };
         let result = change(&mut self.record, &mut target);
         *rig = target.rig;
         selection.0 = target.selection;

@@ -1,1 +1,106 @@
-//! Every committed edit, on the disk at once.
+//! Every committed edit, in a safe place at once.
+//!
+//! A rig with a [`RigJournal`] hands each change to a [`StepSink`] in the frame in which it was made: there is no timer
+//! that a long gesture could hold up. Where the sink puts them is its business;
+//! [`files::Journal`](crate::files::Journal) is an append-only file.
+
+use std::{
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
+
+use bevy::prelude::*;
+
+use super::{
+    RigSystems, configure_sets,
+    document::{Edited, RigBundle},
+    history::RigHistory,
+    selection::Selection,
+};
+use crate::rig::step::{Committed, Replayed, StepSink};
+
+/// Adds journals; does nothing for rigs without a [`RigJournal`].
+pub struct JournalPlugin;
+
+impl Plugin for JournalPlugin {
+    fn build(&self, app: &mut App) {
+        configure_sets(app);
+        app.add_message::<Edited>().add_message::<JournalTrouble>().add_systems(
+            Update,
+            (record_edits.run_if(on_message::<Edited>), report_trouble)
+                .chain()
+                .after(RigSystems::Edits)
+                .before(RigSystems::Build),
+        );
+    }
+}
+
+/// Where the changes of a rig go. Remove it to stop.
+#[derive(Component, Clone)]
+pub struct RigJournal {
+    sink: Arc<dyn StepSink>,
+    told: Arc<Mutex<Option<Arc<str>>>>,
+}
+
+impl RigJournal {
+    /// Sends the changes of the rig to `sink` from now on.
+    pub fn new(sink: impl StepSink + 'static) -> Self {
+        Self { sink: Arc::new(sink), told: Arc::default() }
+    }
+
+    /// Hands over a change that was made outside the edit path of the plugins.
+    pub fn record(&self, committed: Committed) {
+        self.sink.record(committed);
+    }
+
+    /// Waits until every change so far is safe, at most for `limit`: before quitting, or when the renderer fails.
+    ///
+    /// # Errors
+    /// Why they are not safe, in words for people.
+    pub fn flush(&self, limit: Duration) -> Result<(), String> {
+        self.sink.flush(limit)
+    }
+
+    /// The reason why changes are not safe at the moment; `None` while they are.
+    pub fn trouble(&self) -> Option<Arc<str>> {
+        self.sink.trouble()
+    }
+}
+
+/// A rig's changes can no longer be kept safe, or can again. Told once each time.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct JournalTrouble {
+    /// The rig.
+    pub rig: Entity,
+    /// What is wrong and what to do; `None` once all changes, the earlier ones included, are safe again.
+    pub reason: Option<Arc<str>>,
+}
+
+fn record_edits(mut edited: MessageReader<Edited>, journals: Query<&RigJournal>) {
+    for Edited { rig, committed, .. } in edited.read() {
+        if let (Ok(journal), Some(committed)) = (journals.get(*rig), committed) {
+            journal.record(committed.clone());
+        }
+    }
+}
+
+fn report_trouble(journals: Query<(Entity, &RigJournal)>, mut trouble: MessageWriter<JournalTrouble>) {
+    for (rig, journal) in &journals {
+        let reason = journal.trouble();
+        let mut told = journal.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if *told != reason {
+            told.clone_from(&reason);
+            trouble.write(JournalTrouble { rig, reason });
+        }
+    }
+}
+
+/// The components of a rig that was replayed: document, selection and history.
+pub fn replayed_bundle(replayed: &Replayed) -> RigBundle {
+    RigBundle {
+        rig: replayed.rig.clone(),
+        selection: Selection(replayed.selection.clone().unwrap_or_default()),
+        history: RigHistory::restored(&replayed.timeline),
+        ..default()
+    }
+}

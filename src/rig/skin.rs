@@ -6,6 +6,7 @@
 //! small and exact.
 
 mod bytes;
+mod data;
 mod hash;
 mod reader;
 
@@ -13,6 +14,7 @@ use glam::Vec3;
 
 use crate::mesh::model::Weights;
 use bytes::{put_signed, put_varint};
+pub use data::{read_skin_data, skin_data_bytes};
 pub use hash::{content_hash, mesh_hash};
 pub use reader::SkinFileError;
 

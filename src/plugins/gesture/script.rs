@@ -188,7 +188,7 @@ impl Answers<'_, '_> {
             }
             script.pending = false;
         }
-        for Edited { rig: entity, name } in self.edited.read() {
+        for Edited { rig: entity, name, .. } in self.edited.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             if script.pending {
                 script.note_added(rig);

@@ -1,0 +1,113 @@
+//! Changes to frames.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Content, Origin, SaveMark,
+    frame::{Kind, put_frame, put_prelude},
+    text::{SkinsOut, rig_text, step_text, value_text},
+};
+use crate::rig::step::{Committed, Timeline};
+
+/// The header's payload.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Header {
+    pub generation: u64,
+    pub started: u64,
+    pub process: u32,
+    pub origin: Origin,
+    pub first: u64,
+}
+
+/// Turns what happens into the bytes to append to one file.
+pub(super) struct Encoder {
+    session: u64,
+    number: u64,
+    /// As a reader will have it, so that steps it knows need not be written again.
+    timeline: Timeline,
+    skins: SkinsOut,
+}
+
+impl Encoder {
+    /// The bytes of a whole file, and what appends to it.
+    pub(super) fn begin(session: u64, content: &Content) -> Result<(Self, Vec<u8>), String> {
+        let mut encoder = Self { session, number: 0, timeline: Timeline::default(), skins: SkinsOut::default() };
+        let mut out = Vec::new();
+        put_prelude(&mut out, session);
+        let header = Header {
+            generation: content.generation,
+            started: content.started,
+            process: std::process::id(),
+            origin: content.origin.clone(),
+            first: content.first,
+        };
+        encoder.put(&mut out, Kind::Header, value_text(&header)?.as_bytes())?;
+        encoder.context(&mut out, &content.context)?;
+        if let Some(rig) = &content.base {
+            let text = rig_text(rig, &mut encoder.skins)?;
+            encoder.put_with_skins(&mut out, Kind::Base, &text)?;
+        }
+        for committed in &content.changes {
+            encoder.change(&mut out, committed)?;
+        }
+        for mark in &content.marks {
+            encoder.mark(&mut out, mark)?;
+        }
+        Ok((encoder, out))
+    }
+
+    /// Appends a change. On failure `out` is as before, and this change and all later ones cannot be in this file.
+    pub(super) fn change(&mut self, out: &mut Vec<u8>, committed: &Committed) -> Result<(), String> {
+        let (kind, whole) = match committed {
+            Committed::Done(_) => (Kind::Done, true),
+            Committed::Undone(step) if self.timeline.undoes(step) => (Kind::Undone, false),
+            Committed::Undone(_) => (Kind::UndoneOlder, true),
+            Committed::Redone(step) if self.timeline.redoes(step) => (Kind::Redone, false),
+            Committed::Redone(_) => (Kind::RedoneOlder, true),
+        };
+        let text = if whole { step_text(committed.step(), &mut self.skins)? } else { String::new() };
+        self.put_with_skins(out, kind, &text)?;
+        self.timeline.follow(committed);
+        Ok(())
+    }
+
+    /// Appends a note that the project is about to be saved.
+    pub(super) fn mark(&mut self, out: &mut Vec<u8>, mark: &SaveMark) -> Result<(), String> {
+        self.put(out, Kind::Mark, value_text(mark)?.as_bytes())
+    }
+
+    /// Appends the caller's text.
+    pub(super) fn context(&mut self, out: &mut Vec<u8>, context: &str) -> Result<(), String> {
+        self.put(out, Kind::Context, context.as_bytes())
+    }
+
+    /// Appends the word that nothing is to be recovered.
+    pub(super) fn end(&mut self, out: &mut Vec<u8>) -> Result<(), String> {
+        self.put(out, Kind::End, &[])
+    }
+
+    fn put_with_skins(&mut self, out: &mut Vec<u8>, kind: Kind, text: &str) -> Result<(), String> {
+        let (start, number) = (out.len(), self.number);
+        let mut put = || {
+            for (hash, bytes) in self.skins.take_fresh() {
+                let payload = [&hash.to_le_bytes()[..], &bytes].concat();
+                self.put(out, Kind::Skin, &payload)?;
+            }
+            self.put(out, kind, text.as_bytes())
+        };
+        let result = put();
+        if result.is_err() {
+            out.truncate(start);
+            self.number = number;
+        }
+        result
+    }
+
+    fn put(&mut self, out: &mut Vec<u8>, kind: Kind, payload: &[u8]) -> Result<(), String> {
+        if !put_frame(out, self.session, self.number, kind, payload) {
+            return Err(format!("{} MiB are more than a record holds", payload.len() >> 20));
+        }
+        self.number += 1;
+        Ok(())
+    }
+}

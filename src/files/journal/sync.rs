@@ -1,0 +1,67 @@
+//! Syncing beside writing: a slow disk must not keep changes from the kernel.
+
+use std::{
+    sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel},
+    thread,
+    time::{Duration, Instant},
+};
+
+use crate::files::DiskFile;
+
+/// Changes that come within this time share a sync, unless someone waits for it.
+const GROUP: Duration = Duration::from_millis(50);
+
+/// What a sync came to: `Err` with the reason.
+pub(super) type Synced = Result<(), String>;
+
+/// A thread that syncs one file.
+pub(super) struct Syncer {
+    orders: Sender<Option<Sender<Synced>>>,
+}
+
+impl Syncer {
+    /// Starts on a handle of the file; `failed` is told the reason when a sync fails, which ends the thread.
+    pub(super) fn start(file: Box<dyn DiskFile>, failed: impl FnOnce(String) + Send + 'static) -> Option<Self> {
+        let (orders, inbox) = channel();
+        let work = move || run(file, &inbox, failed);
+        thread::Builder::new().name("journal sync".to_owned()).spawn(work).ok()?;
+        Some(Self { orders })
+    }
+
+    /// Something was written: sync soon.
+    pub(super) fn soon(&self) {
+        let _ = self.orders.send(None);
+    }
+
+    /// Sync now and answer.
+    pub(super) fn now(&self, answer: Sender<Synced>) {
+        if let Err(refused) = self.orders.send(Some(answer))
+            && let Some(answer) = refused.0
+        {
+            let _ = answer.send(Err("the disk did not take earlier changes".to_owned()));
+        }
+    }
+}
+
+fn run(mut file: Box<dyn DiskFile>, inbox: &Receiver<Option<Sender<Synced>>>, failed: impl FnOnce(String)) {
+    let mut next = Instant::now();
+    while let Ok(order) = inbox.recv() {
+        let mut waiting: Vec<Sender<Synced>> = order.into_iter().collect();
+        while waiting.is_empty() {
+            match inbox.recv_timeout(next.saturating_duration_since(Instant::now())) {
+                Ok(order) => waiting.extend(order),
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        waiting.extend(inbox.try_iter().flatten());
+        let result = file.sync().map_err(|error| error.to_string());
+        next = Instant::now() + GROUP;
+        for answer in waiting {
+            let _ = answer.send(result.clone());
+        }
+        if let Err(reason) = result {
+            failed(reason);
+            return;
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Payloads: steps and rigs as RON, in which weights are named by the hash of their bytes.
+
+use std::{
+    borrow::Cow,
+    collections::{HashMap, HashSet},
+    sync::{Arc, Weak},
+};
+
+use serde::{Deserialize, Serialize};
+
+use crate::rig::{
+    Rig, RigEdit, SkinData, Uid,
+    skin::{content_hash, skin_data_bytes},
+    step::{Step, edits_from_empty},
+};
+
+/// Bytes of RON that one record holds at most.
+pub(super) const MAX_TEXT: usize = 64 << 20;
+
+#[derive(Serialize)]
+enum EditRef<'a> {
+    Edit(&'a RigEdit),
+    Skin(Uid, u64),
+    Batch(Vec<EditRef<'a>>),
+}
+
+#[derive(Deserialize)]
+enum EditText {
+    Edit(RigEdit),
+    Skin(Uid, u64),
+    Batch(Vec<EditText>),
+}
+
+#[derive(Serialize)]
+struct StepRef<'a> {
+    name: &'a str,
+    forward: Vec<EditRef<'a>>,
+    backward: Vec<EditRef<'a>>,
+    before: &'a [Uid],
+    after: &'a [Uid],
+}
+
+#[derive(Deserialize)]
+struct StepText {
+    name: String,
+    forward: Vec<EditText>,
+    backward: Vec<EditText>,
+    before: Vec<Uid>,
+    after: Vec<Uid>,
+}
+
+#[derive(Serialize)]
+struct RigRef<'a> {
+    uid: Uid,
+    edits: Vec<EditRef<'a>>,
+}
+
+#[derive(Deserialize)]
+struct RigText {
+    uid: Uid,
+    edits: Vec<EditText>,
+}
+
+/// The hashes of weights that a journal holds, and the weights that are still to be written.
+#[derive(Default)]
+pub(super) struct SkinsOut {
+    known: HashSet<u64>,
+    /// By address, which the weak reference keeps from being used again.
+    seen: HashMap<usize, (Weak<SkinData>, u64)>,
+    fresh: Vec<(u64, Vec<u8>)>,
+}
+
+impl SkinsOut {
+    /// Weights that have been named but not written yet: hash and bytes.
+    pub(super) fn take_fresh(&mut self) -> Vec<(u64, Vec<u8>)> {
+        std::mem::take(&mut self.fresh)
+    }
+
+    fn name(&mut self, skin: &Arc<SkinData>) -> Result<u64, String> {
+        let address = Arc::as_ptr(skin) as usize;
+        if let Some((_, hash)) = self.seen.get(&address) {
+            return Ok(*hash);
+        }
+        let bytes = skin_data_bytes(skin).ok_or("the lists of the weights do not fit together")?;
+        let hash = content_hash(&bytes);
+        self.seen.insert(address, (Arc::downgrade(skin), hash));
+        if self.known.insert(hash) {
+            self.fresh.push((hash, bytes));
+        }
+        Ok(hash)
+    }
+
+    fn edits<'a>(&mut self, edits: &'a [RigEdit]) -> Result<Vec<EditRef<'a>>, String> {
+        edits.iter().map(|edit| self.edit(edit)).collect()
+    }
+
+    fn edit<'a>(&mut self, edit: &'a RigEdit) -> Result<EditRef<'a>, String> {
+        Ok(match edit {
+            RigEdit::SetSkin(mesh, Some(skin)) => EditRef::Skin(*mesh, self.name(skin)?),
+            RigEdit::Batch(edits) => EditRef::Batch(self.edits(edits)?),
+            edit => EditRef::Edit(edit),
+        })
+    }
+}
+
+fn written(value: &impl Serialize) -> Result<String, String> {
+    let text = ron::to_string(value).map_err(|error| error.to_string())?;
+    if text.len() > MAX_TEXT {
+        return Err(format!("{} MiB of text are more than a record holds", text.len() >> 20));
+    }
+    Ok(text)
+}
+
+/// A step as text.
+pub(super) fn step_text(step: &Step, skins: &mut SkinsOut) -> Result<String, String> {
+    let (forward, backward) = (skins.edits(&step.forward)?, skins.edits(&step.backward)?);
+    written(&StepRef { name: &step.name, forward, backward, before: &step.before, after: &step.after })
+}
+
+/// A whole rig as text.
+pub(super) fn rig_text(rig: &Rig, skins: &mut SkinsOut) -> Result<String, String> {
+    let edits = edits_from_empty(rig);
+    written(&RigRef { uid: rig.uid(), edits: skins.edits(&edits)? })
+}
+
+/// A caller's value as text.
+pub(super) fn value_text(value: &impl Serialize) -> Result<String, String> {
+    written(value)
+}
+
+/// The weights that a journal held so far, by hash.
+pub(super) type SkinsIn = HashMap<u64, Arc<SkinData>>;
+
+fn parsed<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Option<T> {
+    let text = std::str::from_utf8(payload).ok().filter(|text| text.len() <= MAX_TEXT)?;
+    ron::from_str(text).ok()
+}
+
+/// Reads a step; `None` if it is none, or names weights that are not there.
+pub(super) fn read_step(payload: &[u8], skins: &SkinsIn) -> Option<Step> {
+    let StepText { name, forward, backward, before, after } = parsed(payload)?;
+    let (forward, backward) = (edits(forward, skins)?, edits(backward, skins)?);
+    Some(Step { name: Cow::Owned(name), forward, backward, before, after })
+}
+
+/// Reads a rig; `None` if it is none.
+pub(super) fn read_rig(payload: &[u8], skins: &SkinsIn) -> Option<Rig> {
+    let RigText { uid, edits: list } = parsed(payload)?;
+    let mut rig = Rig::new(uid, "");
+    for edit in edits(list, skins)? {
+        rig.apply(&edit).ok()?;
+    }
+    Some(rig)
+}
+
+/// Reads a value that [`value_text`] wrote.
+pub(super) fn read_value<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Option<T> {
+    parsed(payload)
+}
+
+fn edits(list: Vec<EditText>, skins: &SkinsIn) -> Option<Vec<RigEdit>> {
+    let edit = |text| {
+        Some(match text {
+            EditText::Edit(edit) => edit,
+            EditText::Skin(mesh, hash) => RigEdit::SetSkin(mesh, Some(skins.get(&hash)?.clone())),
+            EditText::Batch(list) => RigEdit::Batch(edits(list, skins)?),
+        })
+    };
+    list.into_iter().map(edit).collect()
+}

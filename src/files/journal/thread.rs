@@ -1,0 +1,321 @@
+//! The thread that owns the file.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        mpsc::{Receiver, Sender},
+    },
+    time::{Duration, Instant},
+};
+
+use super::{
+    Content, JournalPlaces, SaveMark,
+    encode::Encoder,
+    sync::{Synced, Syncer},
+    writer::{Order, Shared},
+};
+use crate::files::{
+    Disk, DiskFile,
+    atomic::{folder_of, temp_name},
+};
+
+/// How long to leave a disk alone that refused.
+const RETRY: Duration = Duration::from_secs(2);
+/// Bytes that are gathered before they are written while more changes wait.
+const BLOCK: usize = 1 << 20;
+
+/// What the thread works with.
+pub(super) struct Writer {
+    pub disk: Arc<dyn Disk>,
+    pub shared: Arc<Shared>,
+    /// Its own inbox, for what the syncing thread has to say.
+    pub orders: Sender<Order>,
+    pub session: u64,
+    pub places: JournalPlaces,
+    pub content: Content,
+    /// A journal that this one takes the place of.
+    pub replaces: Option<PathBuf>,
+}
+
+/// A journal that is being written.
+struct Open {
+    path: PathBuf,
+    file: Box<dyn DiskFile>,
+    /// `None` where there is no second handle: then every write is synced by itself.
+    syncer: Option<Syncer>,
+    encoder: Encoder,
+}
+
+/// A writer and its file.
+struct Work {
+    writer: Writer,
+    open: Option<Open>,
+    /// When to try again after a failure.
+    retry: Instant,
+}
+
+impl Writer {
+    /// Works until told to end.
+    pub(super) fn run(self, inbox: &Receiver<Order>) {
+        let mut work = Work { writer: self, open: None, retry: Instant::now() };
+        work.reopen();
+        let mut block = Vec::new();
+        while let Ok(order) = inbox.recv() {
+            let mut next = Some(order);
+            while let Some(order) = next {
+                if !work.take(order, &mut block) {
+                    return;
+                }
+                next = if block.len() < BLOCK { inbox.try_recv().ok() } else { None };
+            }
+            work.write(&mut block);
+        }
+    }
+}
+
+impl Work {
+    /// Carries out an order; false to end. What is to be appended is gathered in `block`.
+    fn take(&mut self, order: Order, block: &mut Vec<u8>) -> bool {
+        match order {
+            Order::Change(committed) => {
+                self.writer.content.changes.push(committed.clone());
+                self.append(block, |encoder, out| encoder.change(out, &committed));
+            }
+            Order::Context(context) => {
+                self.append(block, |encoder, out| encoder.context(out, &context));
+                self.writer.content.context = context;
+            }
+            Order::Saving(mark, answer) => {
+                self.append(block, |encoder, out| encoder.mark(out, &mark));
+                self.writer.content.marks.push(mark);
+                self.write(block);
+                self.sync(answer);
+            }
+            Order::Saved(mark, places) => {
+                self.write(block);
+                self.rebase(&mark, places);
+            }
+            Order::Flush(answer) => {
+                self.write(block);
+                if self.open.is_none() {
+                    self.reopen();
+                }
+                self.sync(answer);
+            }
+            Order::SyncFailed(path, reason) => {
+                self.write(block);
+                if self.open.as_ref().is_some_and(|open| open.path == path) {
+                    // What a failed sync left on the disk is anyone's guess, so all is written again.
+                    self.open = None;
+                    self.report(&path, &reason);
+                    self.reopen();
+                }
+            }
+            Order::Finish(answer) => {
+                self.write(block);
+                self.sync(answer);
+                return false;
+            }
+            Order::Close(answer) => {
+                self.write(block);
+                let _ = answer.send(self.close());
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Encodes for the open file; what its encoder refuses ends it.
+    fn append(&mut self, block: &mut Vec<u8>, put: impl FnOnce(&mut Encoder, &mut Vec<u8>) -> Result<(), String>) {
+        let Some(open) = &mut self.open else { return };
+        if let Err(reason) = put(&mut open.encoder, block) {
+            // Everything up to here is still worth having.
+            self.write(block);
+            if let Some(open) = self.open.take() {
+                self.report(&open.path, &reason);
+            }
+        }
+    }
+
+    /// Writes a block; after a failure, everything to the next place that takes it.
+    fn write(&mut self, block: &mut Vec<u8>) {
+        let Some(open) = &mut self.open else {
+            block.clear();
+            if Instant::now() >= self.retry && self.writer.shared.trouble().is_some() {
+                self.reopen();
+            }
+            return;
+        };
+        if block.is_empty() {
+            return;
+        }
+        let mut result = write_all(open.file.as_mut(), block);
+        block.clear();
+        if result.is_ok() {
+            match &open.syncer {
+                Some(syncer) => syncer.soon(),
+                None => result = open.file.sync().map_err(|error| error.to_string()),
+            }
+        }
+        if let Err(reason) = result {
+            let path = open.path.clone();
+            self.open = None;
+            self.report(&path, &reason);
+            self.reopen();
+        }
+    }
+
+    fn sync(&mut self, answer: Sender<Synced>) {
+        let Some(open) = &mut self.open else {
+            let trouble = self.writer.shared.trouble();
+            let _ = answer.send(Err(trouble.map_or_else(|| "no journal is open".to_owned(), |t| t.to_string())));
+            return;
+        };
+        match &open.syncer {
+            Some(syncer) => syncer.now(answer),
+            None => {
+                let _ = answer.send(open.file.sync().map_err(|error| error.to_string()));
+            }
+        }
+    }
+
+    /// Writes everything into a file of its own, in the first place that takes it.
+    fn reopen(&mut self) {
+        let writer = &mut self.writer;
+        writer.content.generation += 1;
+        let former = writer.shared.path();
+        match create_somewhere(writer, &writer.content, &writer.places, former.as_deref()) {
+            Ok(open) => self.adopt(open),
+            Err((path, reason)) => {
+                self.retry = Instant::now() + RETRY;
+                self.report(&path, &reason);
+            }
+        }
+    }
+
+    /// Starts again on a saved project, or goes on as before if that cannot be written: the mark in the file says all.
+    fn rebase(&mut self, mark: &SaveMark, places: JournalPlaces) {
+        let writer = &mut self.writer;
+        let mut content = writer.content.clone();
+        content.rebase(mark);
+        content.generation += 1;
+        let former = writer.shared.path();
+        match create_somewhere(writer, &content, &places, former.as_deref()) {
+            Ok(open) => {
+                writer.content = content;
+                writer.places = places;
+                self.adopt(open);
+            }
+            Err((path, reason)) if self.open.is_none() => self.report(&path, &reason),
+            Err(_) => {}
+        }
+    }
+
+    /// Goes on with a file that holds everything, and removes the one before it.
+    fn adopt(&mut self, mut open: Open) {
+        let writer = &mut self.writer;
+        let former = writer.shared.settle(Some(open.path.clone()));
+        // Windows removes only closed files.
+        self.open = None;
+        for old in former.into_iter().chain(writer.replaces.take()).filter(|old| *old != open.path) {
+            let _ = writer.disk.remove(&old);
+        }
+        open.syncer = open.file.another().ok().and_then(|file| {
+            let (orders, path) = (writer.orders.clone(), open.path.clone());
+            Syncer::start(file, move |reason| {
+                let _ = orders.send(Order::SyncFailed(path, reason));
+            })
+        });
+        self.open = Some(open);
+    }
+
+    /// Ends cleanly: nothing is to be recovered.
+    fn close(&mut self) -> Synced {
+        let open = self.open.take();
+        let path = self.writer.shared.settle(None);
+        let Some(path) = path else { return Ok(()) };
+        if let Some(mut open) = open {
+            let mut out = Vec::new();
+            // Counts where the file cannot be removed.
+            if open.encoder.end(&mut out).is_ok() && write_all(open.file.as_mut(), &out).is_ok() {
+                let _ = open.file.sync();
+            }
+        }
+        match self.writer.disk.remove(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(format!("`{}`: {error}", path.display())),
+            _ => Ok(()),
+        }
+    }
+
+    fn report(&self, path: &Path, reason: &str) {
+        self.writer.shared.fail(format!(
+            "changes cannot be kept for recovery in `{}`: {reason}; save soon, and free space or allow writing there",
+            path.display()
+        ));
+    }
+}
+
+/// Creates the journal in the first place that takes it; else says what was wrong with the first one.
+fn create_somewhere(
+    writer: &Writer,
+    content: &Content,
+    places: &JournalPlaces,
+    former: Option<&Path>,
+) -> Result<Open, (PathBuf, String)> {
+    let mut first = None;
+    for (number, path) in places.candidates(writer.session).into_iter().enumerate() {
+        let folder = folder_of(&path);
+        // The project's own folder exists, or the project could not be there.
+        if number > 0 || places.project.is_none() {
+            let _ = writer.disk.create_folder(folder);
+        }
+        let own = former == Some(&path);
+        let replaced = writer.replaces.as_ref() == Some(&path) && !writer.disk.is_locked(&path).unwrap_or(false);
+        let taken = !own && !replaced && writer.disk.entry(&path, false).is_ok();
+        let created = if taken {
+            // Another window works on this project, or its work waits to be recovered.
+            Err("another journal lies there".to_owned())
+        } else {
+            create(writer.disk.as_ref(), &path, writer.session, content)
+        };
+        match created {
+            Ok(open) => return Ok(open),
+            Err(reason) => first = first.or(Some((path, reason))),
+        }
+    }
+    Err(first.unwrap_or_else(|| (PathBuf::new(), "there is no place for it".to_owned())))
+}
+
+/// Writes a whole journal beside its place, then puts it there.
+fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Result<Open, String> {
+    let (encoder, bytes) = Encoder::begin(session, content)?;
+    let temp = folder_of(path).join(temp_name());
+    let mut file = disk.create(&temp).map_err(|error| error.to_string())?;
+    let mut fill = || {
+        file.lock().map_err(|error| error.to_string())?;
+        write_all(file.as_mut(), &bytes)?;
+        file.sync().map_err(|error| error.to_string())?;
+        disk.rename(&temp, path).map_err(|error| error.to_string())
+    };
+    if let Err(reason) = fill() {
+        drop(file);
+        let _ = disk.remove(&temp);
+        return Err(reason);
+    }
+    // Without this a power cut may bring the former file back, which tells the same story less far.
+    let _ = disk.sync_folder(folder_of(path));
+    Ok(Open { path: path.to_owned(), file, syncer: None, encoder })
+}
+
+fn write_all(file: &mut dyn DiskFile, mut bytes: &[u8]) -> Result<(), String> {
+    while !bytes.is_empty() {
+        match file.write(bytes) {
+            Ok(0) => return Err("the disk takes nothing more".to_owned()),
+            Ok(count) => bytes = bytes.get(count..).unwrap_or_default(),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error.to_string()),
+        }
+    }
+    Ok(())
+}

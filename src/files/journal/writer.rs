@@ -1,0 +1,256 @@
+//! The journal as its caller holds it.
+
+use std::{
+    hash::{BuildHasher, RandomState},
+    path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+        mpsc::{RecvTimeoutError, Sender, channel},
+    },
+    thread,
+    time::{Duration, SystemTime},
+};
+
+use super::{Content, JournalPlaces, Origin, Recovered, SaveMark, place::hash_of, sync::Synced, thread::Writer};
+use crate::{
+    files::Disk,
+    rig::{
+        Rig,
+        step::{Committed, StepSink},
+    },
+};
+
+/// How long the last handle waits for what is still to be written.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// A journal that is being written; handles are cheap to clone and work from any thread. When the last one goes
+/// without [`Journal::close`], the file stays, as after a crash.
+#[derive(Clone)]
+pub struct Journal {
+    inner: Arc<Inner>,
+}
+
+/// What a journal starts from.
+#[derive(Debug, Clone, Default)]
+pub struct JournalStart {
+    /// Where it may lie.
+    pub places: JournalPlaces,
+    /// What was opened.
+    pub origin: Origin,
+    /// The rig as it stands now; `None` if a project file holds exactly that, or it is empty and has no uid.
+    pub rig: Option<Rig>,
+    /// Whatever else the caller needs to go on after a crash, such as the meshes that are open; given back as it is.
+    pub context: String,
+}
+
+/// What the thread is asked for.
+pub(super) enum Order {
+    Change(Committed),
+    Context(String),
+    Saving(SaveMark, Sender<Synced>),
+    Saved(SaveMark, JournalPlaces),
+    Flush(Sender<Synced>),
+    SyncFailed(PathBuf, String),
+    Finish(Sender<Synced>),
+    Close(Sender<Synced>),
+}
+
+/// What the thread tells.
+#[derive(Default)]
+pub(super) struct Shared {
+    state: Mutex<State>,
+    troubled: AtomicBool,
+}
+
+#[derive(Default)]
+struct State {
+    path: Option<PathBuf>,
+    trouble: Option<Arc<str>>,
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn path(&self) -> Option<PathBuf> {
+        self.state().path.clone()
+    }
+
+    pub(super) fn trouble(&self) -> Option<Arc<str>> {
+        // Asked in every frame.
+        if self.troubled.load(Ordering::Acquire) { self.state().trouble.clone() } else { None }
+    }
+
+    /// All is well at `path`; returns where it was before.
+    pub(super) fn settle(&self, path: Option<PathBuf>) -> Option<PathBuf> {
+        let mut state = self.state();
+        state.trouble = None;
+        self.troubled.store(false, Ordering::Release);
+        std::mem::replace(&mut state.path, path)
+    }
+
+    pub(super) fn fail(&self, reason: String) {
+        self.state().trouble = Some(reason.into());
+        self.troubled.store(true, Ordering::Release);
+    }
+}
+
+struct Inner {
+    orders: Sender<Order>,
+    shared: Arc<Shared>,
+    position: AtomicU64,
+    closed: AtomicBool,
+}
+
+impl Journal {
+    /// Begins a journal. What goes wrong is told by [`Journal::trouble`].
+    pub fn start(disk: Arc<dyn Disk>, start: JournalStart) -> Self {
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let content = Content {
+            started: now.as_secs(),
+            origin: start.origin,
+            base: start.rig.map(Arc::new),
+            context: start.context,
+            ..Content::default()
+        };
+        let session = RandomState::new().hash_one((SystemTime::now(), std::process::id()));
+        Self::begin(disk, session, start.places, content, None)
+    }
+
+    /// Goes on with what was recovered from the file `old`, whose first `applied` changes are in the rig again
+    /// ([`Replayed::applied`](crate::rig::step::Replayed::applied)). Everything not saved is in the journal from the
+    /// start; when that is on the disk, `old` is removed.
+    ///
+    /// If not all changes could be replayed, `old` is kept under the ending `.kept`, where nothing looks for it again.
+    pub fn resume(
+        disk: Arc<dyn Disk>,
+        places: JournalPlaces,
+        recovered: &Recovered,
+        applied: usize,
+        old: &Path,
+    ) -> Self {
+        let mut content = recovered.content.clone();
+        let mut old = old.to_owned();
+        if applied < content.changes.len() {
+            content.changes.truncate(applied);
+            let mut kept = old.clone().into_os_string();
+            kept.push(".kept");
+            let _ = disk.rename(&old, Path::new(&kept));
+            old = PathBuf::new();
+        }
+        let saved = recovered.saved(&mut |path| hash_of(disk.as_ref(), path)).cloned();
+        if let Some(mark) = saved {
+            content.rebase(&mark);
+        }
+        // Under the same session the file has the same name, and takes the place of the old one in one step.
+        Self::begin(disk, recovered.session, places, content, Some(old).filter(|old| !old.as_os_str().is_empty()))
+    }
+
+    fn begin(
+        disk: Arc<dyn Disk>,
+        session: u64,
+        places: JournalPlaces,
+        content: Content,
+        replaces: Option<PathBuf>,
+    ) -> Self {
+        let (orders, inbox) = channel();
+        let shared = Arc::new(Shared::default());
+        let position = AtomicU64::new(content.first.saturating_add(content.changes.len() as u64));
+        let writer =
+            Writer { disk, shared: shared.clone(), orders: orders.clone(), session, places, content, replaces };
+        let spawned = thread::Builder::new().name("journal".to_owned()).spawn(move || writer.run(&inbox));
+        if let Err(error) = spawned {
+            shared.fail(format!("changes cannot be kept for recovery: {error}; save often, and restart the program"));
+        }
+        Self { inner: Arc::new(Inner { orders, shared, position, closed: AtomicBool::new(false) }) }
+    }
+
+    /// How many changes were recorded since the work started: what is in the document now, for [`SaveMark::position`].
+    pub fn position(&self) -> u64 {
+        self.inner.position.load(Ordering::Acquire)
+    }
+
+    /// Where the journal lies; `None` before it is created, and when no place takes it.
+    pub fn path(&self) -> Option<PathBuf> {
+        self.inner.shared.path()
+    }
+
+    /// Replaces the caller's text, for [`Recovered::context`].
+    pub fn context(&self, context: impl Into<String>) {
+        self.order(Order::Context(context.into()));
+    }
+
+    /// Notes that the project file is about to get the content with that hash, and waits until the note is on the disk.
+    /// Call it before the file is written; if that then fails, nothing needs to be done.
+    ///
+    /// # Errors
+    /// Why the note is not on the disk. The project can be saved nevertheless.
+    pub fn saving(&self, mark: SaveMark, limit: Duration) -> Result<(), String> {
+        self.ask(|answer| Order::Saving(mark, answer), limit)
+    }
+
+    /// The file is in place: the journal starts again on it, with what was changed meanwhile. Returns at once.
+    pub fn saved(&self, mark: SaveMark, places: JournalPlaces) {
+        self.order(Order::Saved(mark, places));
+    }
+
+    /// Ends the journal and removes its file: everything is saved, or not wanted. Changes recorded later are dropped.
+    ///
+    /// # Errors
+    /// Why the file could not be removed; it says inside that it holds nothing.
+    pub fn close(&self, limit: Duration) -> Result<(), String> {
+        if self.inner.closed.swap(true, Ordering::AcqRel) {
+            return Ok(());
+        }
+        self.ask(Order::Close, limit)
+    }
+
+    fn order(&self, order: Order) {
+        // Fails only after the thread has ended, which its caller asked for or was told.
+        let _ = self.inner.orders.send(order);
+    }
+
+    fn ask(&self, order: impl FnOnce(Sender<Synced>) -> Order, limit: Duration) -> Result<(), String> {
+        self.inner.ask(order, limit)
+    }
+}
+
+impl Inner {
+    fn ask(&self, order: impl FnOnce(Sender<Synced>) -> Order, limit: Duration) -> Result<(), String> {
+        let (answer, inbox) = channel();
+        let ended = || Err("the journal has been closed".to_owned());
+        if self.orders.send(order(answer)).is_err() {
+            return ended();
+        }
+        match inbox.recv_timeout(limit) {
+            Ok(result) => result,
+            Err(RecvTimeoutError::Timeout) => Err(format!("the disk has not answered within {limit:?}")),
+            Err(RecvTimeoutError::Disconnected) => ended(),
+        }
+    }
+}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        if !self.closed.load(Ordering::Acquire) {
+            let _ = self.ask(Order::Finish, PATIENCE);
+        }
+    }
+}
+
+impl StepSink for Journal {
+    fn record(&self, committed: Committed) {
+        self.inner.position.fetch_add(1, Ordering::AcqRel);
+        self.order(Order::Change(committed));
+    }
+
+    fn trouble(&self) -> Option<Arc<str>> {
+        self.inner.shared.trouble()
+    }
+
+    fn flush(&self, limit: Duration) -> Result<(), String> {
+        self.ask(Order::Flush, limit)
+    }
+}
