@@ -30,6 +30,7 @@ use bevy::{app::PluginGroupBuilder, prelude::*};
 /// | [`stroke::StrokePlugin`] | chains from strokes |
 /// | [`gesture::GesturePlugin`] | lists of gestures that drive all of the above |
 /// | [`skinning::SkinningPlugin`] | automatic weights in the background |
+/// | [`journal::JournalPlugin`] | every change in a safe place, for rigs that ask for it |
 pub struct RigPlugins;
 
 impl PluginGroup for RigPlugins {
@@ -42,6 +43,7 @@ impl PluginGroup for RigPlugins {
             .add(stroke::StrokePlugin)
             .add(gesture::GesturePlugin)
             .add(skinning::SkinningPlugin)
+            .add(journal::JournalPlugin)
     }
 }
 

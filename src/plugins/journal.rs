@@ -2,7 +2,7 @@
 //!
 //! A rig with a [`RigJournal`] hands each change to a [`StepSink`] in the frame in which it was made: there is no timer
 //! that a long gesture could hold up. Where the sink puts them is its business;
-//! [`files::Journal`](crate::files::Journal) is an append-only file.
+//! [`Journal`](crate::files::journal::Journal) is an append-only file.
 
 use std::{
     sync::{Arc, Mutex, PoisonError},

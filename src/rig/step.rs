@@ -156,5 +156,7 @@ pub fn edits_from_empty(rig: &Rig) -> Vec<RigEdit> {
         index: last,
     }));
     edits.extend(rig.skins().map(|(mesh, skin)| RigEdit::SetSkin(mesh, Some(skin.clone()))));
+    edits.extend(rig.pose().iter().map(|(joint, offset)| RigEdit::SetOffset(*joint, Some(*offset))));
+    edits.extend(rig.stored_poses().iter().map(|pose| RigEdit::AddStoredPose(Box::new(pose.clone()), last)));
     edits
 }
