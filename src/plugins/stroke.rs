@@ -5,6 +5,7 @@
 
 mod followed;
 mod parent;
+mod plan;
 
 use bevy::{
     prelude::*,
@@ -13,6 +14,7 @@ use bevy::{
 
 pub use followed::FollowedStroke;
 pub use parent::{ParentReason, StrokeParent, StrokeTips, nearest_parent, stroke_parent};
+pub use plan::{StrokePlan, StrokeScene, plan_stroke, stroke_kind};
 
 use super::{
     RigSystems, configure_sets,
@@ -22,11 +24,10 @@ use super::{
 };
 use crate::{
     algo::{
-        placement::{PlaceSettings, place_hits},
-        stroke::{ChainChoice, StrokeChain, StrokeError, StrokeKind, StrokeSettings, classify, joint_at},
+        stroke::{ChainChoice, StrokeChain, StrokeError, StrokeSettings},
         view::ViewPlane,
     },
-    rig::{Rig, Uid, operations::Operation},
+    rig::{Rig, Uid},
 };
 
 /// Adds strokes.
@@ -68,6 +69,8 @@ pub struct StrokeRequest {
     pub reach: f32,
     /// What a chain hangs on whose stroke starts on no joint.
     pub parent: StrokeParent,
+    /// The chain, if a preview has chosen it from this very stroke: it is taken as it is.
+    pub chain: Option<StrokeChain>,
 }
 
 /// What became of a stroke.
@@ -114,7 +117,8 @@ struct WaitingStroke {
     chain: Option<Task<FoundChain>>,
 }
 
-type FoundChain = Result<StrokeChain, StrokeError>;
+/// What following a stroke finds.
+pub type FoundChain = Result<StrokeChain, StrokeError>;
 
 /// What a stroke is drawn on.
 type Drawn<'a> = (
@@ -145,7 +149,7 @@ fn stroke(
     let mut busy: Vec<Entity> = Vec::new();
     waiting.0.retain_mut(|WaitingStroke { request, since, chain }| {
         let Ok(drawn) = rigs.get(request.rig) else { return false };
-        let (rig, _, entities, place, _, _, surface, meshes) = drawn;
+        let (rig, selection, entities, place, symmetry, tips, surface, meshes) = drawn;
         let found = chain.as_mut().map(check_ready);
         if busy.contains(&request.rig) || matches!(found, Some(None)) {
             busy.push(request.rig);
@@ -158,7 +162,8 @@ fn stroke(
             }
             Answer::Now(Some(surface)) => {
                 let posed = posed_joints(rig, entities, place, &joints);
-                match act(request, drawn, &posed, surface, found.flatten(), &mut edits) {
+                let scene = StrokeScene { rig, selection, symmetry, tips, surface, posed: &posed };
+                match act(request, &scene, found.flatten(), &mut edits) {
                     Acted::Done(result) => Some(result),
                     Acted::Follows(task) => {
                         *chain = Some(task);
@@ -183,71 +188,24 @@ enum Acted {
 /// Does what a stroke means; if that is a chain, it must be `found` first.
 fn act(
     request: &StrokeRequest,
-    (rig, selection, _, _, symmetry, tips, ..): Drawn,
-    posed: &[(Uid, Vec3)],
-    surface: &RigSurface,
+    scene: &StrokeScene,
     found: Option<FoundChain>,
     edits: &mut MessageWriter<EditRequest>,
 ) -> Acted {
-    let mut send = |operation| {
-        edits.write(EditRequest::operation(request.rig, operation));
+    let known = found.or_else(|| request.chain.clone().map(Ok));
+    let plan = match plan_stroke(request, scene, known) {
+        StrokePlan::NeedsChain => match find_chain(request, scene.surface) {
+            Found::Now(chain) => plan_stroke(request, scene, Some(chain)),
+            Found::Later(task) => return Acted::Follows(task),
+        },
+        ready => ready,
     };
-    let flat = projected(rig, posed, &request.plane);
-    let kind = if request.chain_only {
-        let start = request.points.first().and_then(|point| joint_at(*point, &flat, request.reach));
-        StrokeKind::Chain { start, end: None }
-    } else {
-        classify(&request.points, &flat, request.reach)
-    };
-    match kind {
-        StrokeKind::Erase { joints } => {
-            let joints: Vec<Uid> = joints.into_iter().map(|number| posed[number].0).collect();
-            send(Operation::Delete { joints: joints.clone(), keep_children: true });
-            Acted::Done(StrokeResult::Erased(joints))
+    match plan {
+        StrokePlan::Ready { operation, result } => {
+            edits.write_batch(operation.map(|operation| EditRequest::operation(request.rig, operation)));
+            Acted::Done(result)
         }
-        StrokeKind::Insert { bone, t } => {
-            let (child, end) = posed[bone];
-            let parent = rig.joint(child).and_then(|joint| joint.parent);
-            let start = parent.and_then(|parent| posed.iter().find(|(uid, _)| *uid == parent)).map(|(_, place)| *place);
-            let Some(start) = start else {
-                return Acted::Done(StrokeResult::Nothing("the stroke crosses no bone".to_owned()));
-            };
-            // The crossing tells where along the bone; in depth the joint is placed like a click there, but only if
-            // the bone itself runs through what the ray meets.
-            let along = start.lerp(end, t);
-            let position = match request.plane.project(along) {
-                Some(point) if request.settings.recentre => {
-                    let ray = request.plane.ray(point);
-                    let hits = surface.hits(&ray);
-                    let settings = PlaceSettings { volume: volume_at(&ray, &hits, along), ..request.settings.place };
-                    place_hits(&ray, &hits, settings).position().unwrap_or(along)
-                }
-                _ => along,
-            };
-            send(Operation::Insert { child, position });
-            Acted::Done(StrokeResult::Inserted { child })
-        }
-        StrokeKind::Chain { start, .. } => {
-            let chain = match found.map_or_else(|| find_chain(request, surface), Found::Now) {
-                Found::Now(Ok(chain)) => chain,
-                Found::Now(Err(error)) => return Acted::Done(StrokeResult::Nothing(error.to_string())),
-                Found::Later(task) => return Acted::Follows(task),
-            };
-            let from = start.map(|number| posed[number].0);
-            // A stroke that starts on a joint continues from it: that joint is the chain's first.
-            let skip = usize::from(from.is_some());
-            let positions: Vec<Vec3> = chain.joints.iter().skip(skip).map(|joint| joint.position).collect();
-            if positions.is_empty() {
-                let why = "the stroke ends where it starts; draw it further".to_owned();
-                return Acted::Done(StrokeResult::Nothing(why));
-            }
-            let (parent, why) = match from {
-                Some(from) => (Some(from), ParentReason::StartsOn),
-                None => stroke_parent(request.parent, rig, selection, tips, symmetry.0, posed, positions[0]),
-            };
-            send(Operation::Chain { positions, parent });
-            Acted::Done(StrokeResult::Chain { chain, parent, why })
-        }
+        StrokePlan::NeedsChain => Acted::Done(StrokeResult::Nothing("the stroke became no chain".to_owned())),
     }
 }
 
@@ -296,24 +254,4 @@ fn note_tips(
             }
         }
     }
-}
-
-/// Joints on the view plane, each with its parent's number; those behind the camera are nowhere.
-fn projected(rig: &Rig, posed: &[(Uid, Vec3)], plane: &ViewPlane) -> Vec<(Vec2, Option<usize>)> {
-    let numbers: std::collections::HashMap<Uid, usize> =
-        posed.iter().enumerate().map(|(n, (uid, _))| (*uid, n)).collect();
-    let project = |(uid, position): &(Uid, Vec3)| {
-        let parent = rig.joint(*uid).and_then(|joint| joint.parent).and_then(|parent| numbers.get(&parent).copied());
-        (plane.project(*position).unwrap_or(Vec2::NAN), parent)
-    };
-    posed.iter().map(project).collect()
-}
-
-/// Which entry/exit pair of a ray holds a point (or comes nearest to it), counted from one.
-fn volume_at(ray: &crate::mesh::ray::Ray, hits: &[crate::mesh::ray::Hit], point: Vec3) -> Option<u32> {
-    let depth = (point - ray.origin).dot(ray.direction);
-    let apart = |volume: &crate::mesh::surface::Volume| (volume.near - depth).max(depth - volume.far).max(0.0);
-    let volumes = crate::mesh::surface::volumes(hits);
-    let nearest = volumes.iter().enumerate().min_by(|(_, a), (_, b)| apart(a).total_cmp(&apart(b)));
-    nearest.map(|(number, _)| number as u32 + 1)
 }

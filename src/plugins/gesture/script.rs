@@ -330,6 +330,7 @@ impl Act<'_, '_> {
             chain_only: joints.is_some(),
             reach: self.reach(),
             parent: StrokeParent::Selected,
+            chain: None,
         }
     }
 

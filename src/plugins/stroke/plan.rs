@@ -1,0 +1,136 @@
+//! What a stroke would do to a rig as it stands.
+//!
+//! Planning changes nothing and is one function: a preview that plans what the request then carries out cannot show
+//! anything else.
+
+use bevy::prelude::*;
+
+use super::{FoundChain, ParentReason, StrokeRequest, StrokeResult, StrokeTips, stroke_parent};
+use crate::{
+    algo::{
+        placement::{PlaceSettings, place_hits},
+        stroke::{StrokeKind, classify, joint_at},
+        view::ViewPlane,
+    },
+    plugins::{
+        document::{Selection, Symmetry},
+        surface::RigSurface,
+    },
+    rig::{Rig, Uid, operations::Operation},
+};
+
+/// What a stroke is drawn on.
+#[derive(Clone, Copy)]
+pub struct StrokeScene<'a> {
+    /// The rig.
+    pub rig: &'a Rig,
+    /// What is selected.
+    pub selection: &'a Selection,
+    /// Live mirroring.
+    pub symmetry: &'a Symmetry,
+    /// What strokes left selected.
+    pub tips: Option<&'a StrokeTips>,
+    /// The posed surface.
+    pub surface: &'a RigSurface,
+    /// Places of the joints as [`posed_joints`](crate::plugins::picking::posed_joints) gives them.
+    pub posed: &'a [(Uid, Vec3)],
+}
+
+/// What a stroke would do.
+#[derive(Debug, Clone)]
+pub enum StrokePlan {
+    /// This.
+    Ready {
+        /// The operation to ask for, if any.
+        operation: Option<Operation>,
+        /// What to tell.
+        result: StrokeResult,
+    },
+    /// It is a chain, which has to be found first: by following the stroke through the surface.
+    NeedsChain,
+}
+
+/// What a stroke would do to a rig as it stands. `chain` is what following it found, if that was done.
+pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<FoundChain>) -> StrokePlan {
+    let StrokeScene { rig, selection, symmetry, tips, surface, posed } = *scene;
+    let nothing = |why: String| StrokePlan::Ready { operation: None, result: StrokeResult::Nothing(why) };
+    match stroke_kind(request, rig, posed) {
+        StrokeKind::Erase { joints } => {
+            let joints: Vec<Uid> = joints.into_iter().map(|number| posed[number].0).collect();
+            let operation = Operation::Delete { joints: joints.clone(), keep_children: true };
+            StrokePlan::Ready { operation: Some(operation), result: StrokeResult::Erased(joints) }
+        }
+        StrokeKind::Insert { bone, t } => {
+            let (child, end) = posed[bone];
+            let parent = rig.joint(child).and_then(|joint| joint.parent);
+            let start = parent.and_then(|parent| posed.iter().find(|(uid, _)| *uid == parent)).map(|(_, place)| *place);
+            let Some(start) = start else { return nothing("the stroke crosses no bone".to_owned()) };
+            // The crossing tells where along the bone; in depth the joint is placed like a click there, but only if
+            // the bone itself runs through what the ray meets.
+            let along = start.lerp(end, t);
+            let position = match request.plane.project(along) {
+                Some(point) if request.settings.recentre => {
+                    let ray = request.plane.ray(point);
+                    let hits = surface.hits(&ray);
+                    let settings = PlaceSettings { volume: volume_at(&ray, &hits, along), ..request.settings.place };
+                    place_hits(&ray, &hits, settings).position().unwrap_or(along)
+                }
+                _ => along,
+            };
+            let operation = Operation::Insert { child, position };
+            StrokePlan::Ready { operation: Some(operation), result: StrokeResult::Inserted { child } }
+        }
+        StrokeKind::Chain { start, .. } => {
+            let chain = match chain {
+                Some(Ok(chain)) => chain,
+                Some(Err(error)) => return nothing(error.to_string()),
+                None => return StrokePlan::NeedsChain,
+            };
+            let from = start.map(|number| posed[number].0);
+            // A stroke that starts on a joint continues from it: that joint is the chain's first.
+            let skip = usize::from(from.is_some());
+            let positions: Vec<Vec3> = chain.joints.iter().skip(skip).map(|joint| joint.position).collect();
+            let Some(first) = positions.first() else {
+                return nothing("the stroke ends where it starts; draw it further".to_owned());
+            };
+            let (parent, why) = match from {
+                Some(from) => (Some(from), ParentReason::StartsOn),
+                None => stroke_parent(request.parent, rig, selection, tips, symmetry.0, posed, *first),
+            };
+            let operation = Operation::Chain { positions, parent };
+            StrokePlan::Ready { operation: Some(operation), result: StrokeResult::Chain { chain, parent, why } }
+        }
+    }
+}
+
+/// What a stroke means by its shape alone: cheap enough to be asked for at every point. Joints are numbered as in
+/// `posed`.
+pub fn stroke_kind(request: &StrokeRequest, rig: &Rig, posed: &[(Uid, Vec3)]) -> StrokeKind {
+    let flat = projected(rig, posed, &request.plane);
+    if request.chain_only {
+        let start = request.points.first().and_then(|point| joint_at(*point, &flat, request.reach));
+        StrokeKind::Chain { start, end: None }
+    } else {
+        classify(&request.points, &flat, request.reach)
+    }
+}
+
+/// Joints on the view plane, each with its parent's number; those behind the camera are nowhere.
+fn projected(rig: &Rig, posed: &[(Uid, Vec3)], plane: &ViewPlane) -> Vec<(Vec2, Option<usize>)> {
+    let numbers: std::collections::HashMap<Uid, usize> =
+        posed.iter().enumerate().map(|(n, (uid, _))| (*uid, n)).collect();
+    let project = |(uid, position): &(Uid, Vec3)| {
+        let parent = rig.joint(*uid).and_then(|joint| joint.parent).and_then(|parent| numbers.get(&parent).copied());
+        (plane.project(*position).unwrap_or(Vec2::NAN), parent)
+    };
+    posed.iter().map(project).collect()
+}
+
+/// Which entry/exit pair of a ray holds a point (or comes nearest to it), counted from one.
+fn volume_at(ray: &crate::mesh::ray::Ray, hits: &[crate::mesh::ray::Hit], point: Vec3) -> Option<u32> {
+    let depth = (point - ray.origin).dot(ray.direction);
+    let apart = |volume: &crate::mesh::surface::Volume| (volume.near - depth).max(depth - volume.far).max(0.0);
+    let volumes = crate::mesh::surface::volumes(hits);
+    let nearest = volumes.iter().enumerate().min_by(|(_, a), (_, b)| apart(a).total_cmp(&apart(b)));
+    nearest.map(|(number, _)| number as u32 + 1)
+}
