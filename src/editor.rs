@@ -4,10 +4,12 @@
 //! the pointer does in the viewport and write the same requests that gesture lists and games write.
 
 pub mod actions;
+pub mod camera;
 pub mod mode;
 pub mod notice;
 pub mod panel;
 pub mod pointer;
+pub mod tools;
 
 use bevy::prelude::*;
 

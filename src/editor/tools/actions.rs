@@ -1,0 +1,70 @@
+//! Actions on the selection that need no pointer.
+
+use bevy::prelude::*;
+
+use super::{
+    ToolSystems,
+    scene::{Scene, joints},
+};
+use crate::{
+    editor::{
+        actions::{Action, ActionRequest},
+        notice::Notice,
+    },
+    plugins::{
+        document::EditRequest,
+        picking::{Pick, PickRequest},
+    },
+    rig::operations::Operation,
+};
+
+/// Carries out deleting, selecting all or none, and mirroring.
+pub struct ToolActionsPlugin;
+
+impl Plugin for ToolActionsPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_systems(Update, act_on_selection.in_set(ToolSystems::Actions));
+    }
+}
+
+pub(super) fn act_on_selection(
+    mut actions: MessageReader<ActionRequest>,
+    scene: Scene,
+    mut edits: MessageWriter<EditRequest>,
+    mut picks: MessageWriter<PickRequest>,
+    mut notices: MessageWriter<Notice>,
+) {
+    for ActionRequest(action) in actions.read() {
+        let Some(rig) = scene.rig() else { continue };
+        let pick = |what| PickRequest { rig: rig.entity, what, add: false };
+        let selected = rig.selection.0.clone();
+        let operation = match action {
+            Action::SelectAll => {
+                picks.write(pick(Pick::All));
+                continue;
+            }
+            Action::SelectNone => {
+                picks.write(pick(Pick::None));
+                continue;
+            }
+            Action::Delete => Operation::Delete { joints: selected, keep_children: true },
+            Action::DeleteHierarchy => Operation::Delete { joints: selected, keep_children: false },
+            Action::MirrorSelected => Operation::Mirror { joints: selected },
+            _ => continue,
+        };
+        if rig.selection.0.is_empty() {
+            notices.write(Notice::info("No joint is selected: click one first, or drag a box around some."));
+            continue;
+        }
+        let what = joints(rig.selection.0.len());
+        notices.write(
+            match action {
+                Action::MirrorSelected => Notice::done(format!("Made the other side of {what} and all below.")),
+                Action::Delete => Notice::done(format!("Deleted {what}; what hung below moved up.")),
+                _ => Notice::done(format!("Deleted {what} and all below.")),
+            }
+            .quiet(),
+        );
+        edits.write(EditRequest::operation(rig.entity, operation));
+    }
+}

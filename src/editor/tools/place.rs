@@ -1,0 +1,312 @@
+//! Placing: a ghost shows where the joint would go, a click puts it exactly there.
+
+use bevy::prelude::*;
+
+use super::{
+    Tool, ToolPointer, ToolSystems,
+    scene::{EditedRig, Scene},
+    select,
+};
+use crate::{
+    algo::placement::{PlaceSettings, Placement, place_hits},
+    editor::{
+        actions::{Action, ActionRequest},
+        mode::Mode,
+        notice::{Notice, StatusLine},
+        pointer::PointerAct,
+    },
+    mesh::ray::Ray,
+    plugins::{
+        picking::{HoverRequest, Pick, PickRequest},
+        placement::PlaceRequest,
+        viewport::Sight,
+    },
+    rig::{Uid, operations::settle},
+};
+
+/// Adds placing joints with the pointer.
+pub struct PlacePlugin;
+
+impl Plugin for PlacePlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<PlaceTool>()
+            .add_systems(Update, place.in_set(ToolSystems::Tools).after(select::select))
+            .add_systems(PostUpdate, show.in_set(ToolSystems::Show).after(select::say));
+    }
+}
+
+/// What placing is about.
+#[derive(Resource, Debug, Clone, PartialEq, Default)]
+pub struct PlaceTool {
+    /// Depth and volume of the next joint. The volume is kept until Tab has gone through all; the depth only for one joint.
+    pub settings: PlaceSettings,
+    /// What a click would place now.
+    pub ghost: Option<PlaceGhost>,
+    pointer: Option<Vec2>,
+    press: Option<Press>,
+    /// True while Control is held: a click selects.
+    picks: bool,
+    /// What the last hover request was about.
+    hovers: bool,
+}
+
+impl PlaceTool {
+    /// True while the next joint has a depth to choose.
+    pub fn has_depth(&self) -> bool {
+        self.ghost.is_some_and(|ghost| matches!(ghost.placement, Placement::Between { .. }))
+    }
+}
+
+/// The button is down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Press {
+    at: Vec2,
+    depth: f32,
+}
+
+/// A joint that a click would place, in the rig's space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlaceGhost {
+    /// The ray under the pointer.
+    pub ray: Ray,
+    /// What it meets.
+    pub placement: Placement,
+    /// Where the joint would go: on the mirror plane, if near it.
+    pub position: Vec3,
+    /// Where its other side would go.
+    pub mirrored: Option<Vec3>,
+    /// The joint it would hang on.
+    pub parent: Option<Uid>,
+    /// Where that is.
+    pub parent_place: Option<Vec3>,
+    /// Where the parent of the other side is.
+    pub mirrored_parent: Option<Vec3>,
+}
+
+/// Why a click places nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum PlaceObstacle {
+    /// There is no rig.
+    #[error("no rig is open; open a mesh first (Ctrl+O)")]
+    NoRig,
+    /// There is no mesh.
+    #[error("the rig has no mesh to place joints in; open one first (Ctrl+O)")]
+    NoMesh,
+    /// The surface is being built.
+    #[error("the mesh is still being prepared; a click waits for it")]
+    Preparing,
+    /// The ray meets nothing.
+    #[error("the pointer is beside the mesh; move it over the mesh")]
+    Beside,
+}
+
+/// Notches of the wheel from the near to the far end of the span.
+const NOTCHES: f32 = 20.0;
+/// Pixels that a drag takes from the near to the far end, at least and at most.
+const DRAG_SPAN: [f32; 2] = [80.0, 400.0];
+
+/// What a click at a pixel would place.
+///
+/// # Errors
+/// Says why it would place nothing.
+pub fn ghost_at(
+    scene: &Scene,
+    rig: &EditedRig,
+    sight: &Sight,
+    at: Vec2,
+    settings: PlaceSettings,
+) -> Result<PlaceGhost, PlaceObstacle> {
+    let surface = rig.surface.as_ref().and_then(|surface| surface.ready());
+    let surface = surface.ok_or(if rig.has_mesh { PlaceObstacle::Preparing } else { PlaceObstacle::NoMesh })?;
+    let ray = sight.ray(at);
+    let mut hits = Vec::new();
+    surface.hits(&ray, &mut hits);
+    let placement = place_hits(&ray, &hits, settings);
+    let place = placement.position().ok_or(PlaceObstacle::Beside)?;
+    let plane = rig.symmetry.0;
+    let (position, mirrored) = settle(&[place], plane.as_ref()).first().copied().unwrap_or((place, None));
+    let parent = rig.selection.active();
+    let posed = scene.posed(rig);
+    let place_of = |joint: Uid| posed.iter().find(|(uid, _)| *uid == joint).map(|(_, place)| *place);
+    let other = parent.map(|parent| rig.rig.joint(parent).and_then(|joint| joint.data.mirror).unwrap_or(parent));
+    Ok(PlaceGhost {
+        ray,
+        placement,
+        position,
+        mirrored,
+        parent,
+        parent_place: parent.and_then(place_of),
+        mirrored_parent: mirrored.and(other).and_then(place_of),
+    })
+}
+
+pub(super) fn place(
+    mut tool: ResMut<PlaceTool>,
+    mode: Res<Mode>,
+    mut pointers: MessageReader<ToolPointer>,
+    mut actions: MessageReader<ActionRequest>,
+    scene: Scene,
+    mut places: MessageWriter<PlaceRequest>,
+    mut picks: MessageWriter<PickRequest>,
+    mut hovers: MessageWriter<HoverRequest>,
+    mut notices: MessageWriter<Notice>,
+) {
+    let is_on = *mode == Mode::Place || tool.press.is_some();
+    for ActionRequest(action) in actions.read() {
+        match action {
+            Action::NextVolume if is_on => next_volume(&mut tool),
+            Action::Cancel if is_on && (tool.press.is_some() || tool.settings.depth != 0.5) => {
+                tool.press = None;
+                tool.settings.depth = 0.5;
+            }
+            _ => {}
+        }
+    }
+    let found = scene.rig().zip(scene.sight());
+    for ToolPointer { tool: who, pointer } in pointers.read() {
+        if *who != Tool::Place {
+            if tool.pointer.is_some() {
+                tool.pointer = None;
+            }
+            continue;
+        }
+        let before = tool.picks;
+        tool.picks = pointer.held.control && tool.press.is_none();
+        tool.pointer = Some(pointer.at);
+        match pointer.act {
+            PointerAct::Left => tool.pointer = None,
+            PointerAct::Moved => {}
+            PointerAct::Pressed => tool.press = Some(Press { at: pointer.at, depth: tool.settings.depth() }),
+            PointerAct::Dragged => {
+                let span = found.as_ref().and_then(|(_, sight)| drag_span(&tool, sight)).unwrap_or(DRAG_SPAN[0]);
+                if let Some(press) = tool.press {
+                    tool.settings.depth = (press.depth + (press.at.y - pointer.at.y) / span).clamp(0.0, 1.0);
+                }
+            }
+            PointerAct::Wheel(notches) => {
+                tool.settings.depth = (tool.settings.depth() + notches / NOTCHES).clamp(0.0, 1.0);
+            }
+            PointerAct::Released { dragged, count } => {
+                let (Some(press), Some((rig, sight))) = (tool.press.take(), &found) else { continue };
+                if pointer.held.control && !dragged {
+                    let what = select::click(&scene, rig, sight, press.at).unwrap_or(Pick::None);
+                    picks.write(PickRequest { rig: rig.entity, what, add: pointer.held.shift });
+                    continue;
+                }
+                // The second click of a double click would put a joint into the one that the first has put there.
+                if count > 1 && !dragged {
+                    continue;
+                }
+                match ghost_at(&scene, rig, sight, press.at, tool.settings) {
+                    Ok(_) | Err(PlaceObstacle::Preparing) => {
+                        places.write(PlaceRequest {
+                            rig: rig.entity,
+                            ray: sight.ray(press.at),
+                            settings: tool.settings,
+                        });
+                        tool.settings.depth = 0.5;
+                    }
+                    Err(why) => {
+                        notices.write(Notice::info(format!("No joint was placed: {why}.")));
+                    }
+                }
+            }
+        }
+        if before != tool.picks {
+            tool.set_changed();
+        }
+    }
+    // With Control a click selects; what it would select is shown as anywhere else.
+    let hovering = tool.picks && is_on;
+    if let Some((rig, sight)) = &found
+        && (hovering || tool.hovers)
+    {
+        let at = tool.pointer.filter(|_| hovering);
+        let what = at.and_then(|at| select::click(&scene, rig, sight, at));
+        let what = what.and_then(|what| match what {
+            Pick::Click { plane, point, reach } => Some((plane, point, reach)),
+            _ => None,
+        });
+        if tool.is_changed() || scene.is_changed() {
+            hovers.write(HoverRequest { rig: rig.entity, what });
+        }
+        if tool.hovers != hovering {
+            tool.hovers = hovering;
+        }
+    }
+}
+
+/// From the whole span to the near volume, to the next, to the whole span.
+fn next_volume(tool: &mut PlaceTool) {
+    let count = match tool.ghost.map(|ghost| ghost.placement) {
+        Some(Placement::Between { volumes, .. }) => volumes,
+        _ => 1,
+    };
+    tool.settings.volume = match tool.settings.volume {
+        None if count > 1 => Some(1),
+        Some(number) if number < count => Some(number + 1),
+        _ => None,
+    };
+}
+
+/// How many pixels a drag takes from the near to the far end: as many as the span is long.
+fn drag_span(tool: &PlaceTool, sight: &Sight) -> Option<f32> {
+    let Placement::Between { near, far, .. } = tool.ghost?.placement else { return None };
+    let pixel = sight.pixel_at(near.midpoint(far));
+    (pixel > 0.0).then(|| (near.distance(far) / pixel).clamp(DRAG_SPAN[0], DRAG_SPAN[1]))
+}
+
+/// Keeps the ghost and the status line true.
+pub(super) fn show(mut tool: ResMut<PlaceTool>, mode: Res<Mode>, scene: Scene, mut status: ResMut<StatusLine>) {
+    let is_on = *mode == Mode::Place || tool.press.is_some();
+    if !is_on {
+        if tool.ghost.is_some() || tool.pointer.is_some() {
+            tool.ghost = None;
+            tool.pointer = None;
+        }
+        return;
+    }
+    if !(tool.is_changed() || mode.is_changed() || scene.is_changed()) {
+        return;
+    }
+    let at = tool.press.map(|press| press.at).or(tool.pointer).filter(|_| !tool.picks);
+    let found = match (scene.rig(), scene.sight(), at) {
+        (None, ..) | (_, None, _) => Some(Err(PlaceObstacle::NoRig)),
+        (Some(rig), Some(sight), Some(at)) => Some(ghost_at(&scene, &rig, &sight, at, tool.settings)),
+        (Some(_), Some(_), None) => None,
+    };
+    let ghost = found.and_then(Result::ok);
+    if tool.ghost != ghost {
+        tool.bypass_change_detection().ghost = ghost;
+    }
+    if *mode != Mode::Place {
+        return;
+    }
+    let hint = match (&ghost, scene.rig()) {
+        _ if tool.picks => "Ctrl and click selects the joint that the next one hangs on.".to_owned(),
+        (Some(ghost), Some(rig)) => describe(ghost, &rig, tool.settings),
+        _ => "Click places a joint in the middle of the mesh; Ctrl and click selects its parent.".to_owned(),
+    };
+    let obstacle = found.and_then(Result::err).map(|why| why.to_string());
+    let banner = status.banner.clone();
+    status.set_if_neq(StatusLine { hint, obstacle, banner });
+}
+
+/// What a click would do, in a sentence or two.
+fn describe(ghost: &PlaceGhost, rig: &EditedRig, settings: PlaceSettings) -> String {
+    let below = ghost.parent.map_or("as a root".to_owned(), |parent| format!("below {}", rig.name(parent)));
+    let both = if ghost.mirrored.is_some() { " on both sides" } else { "" };
+    let what = format!("Click places a joint {below}{both}");
+    let depth = (settings.depth() * 100.0).round();
+    match ghost.placement {
+        Placement::Between { volumes, volume: None, .. } if volumes > 1 => {
+            format!("{what}, midway through {volumes} volumes: Tab for the near one. Wheel: depth ({depth} %).")
+        }
+        Placement::Between { volumes, volume: Some(number), .. } if volumes > 1 => {
+            let next = if number < volumes { "the next" } else { "all of them" };
+            format!("{what}, in volume {number} of {volumes}: Tab for {next}. Wheel: depth ({depth} %).")
+        }
+        Placement::Between { .. } => format!("{what}. Wheel, or drag up and down: depth ({depth} %)."),
+        _ => format!("{what}, on the surface: the mesh has no other side here."),
+    }
+}

@@ -1,0 +1,121 @@
+//! The rig that is edited, as tools see it.
+
+use bevy::{ecs::system::SystemParam, prelude::*};
+
+use crate::{
+    editor::{ActiveRig, camera::ViewportSight},
+    plugins::{
+        document::{JointEntities, Selection, Symmetry},
+        picking::posed_joints,
+        surface::{RigMeshes, RigSurface},
+        viewport::Sight,
+    },
+    rig::{Rig, Uid},
+};
+
+/// Reads the active rig and the view of it.
+#[derive(SystemParam)]
+pub struct Scene<'w, 's> {
+    active: Option<Res<'w, ActiveRig>>,
+    sight: Res<'w, ViewportSight>,
+    rigs: Query<'w, 's, RigQuery>,
+    joints: Query<'w, 's, &'static GlobalTransform>,
+}
+
+type RigQuery = (
+    Ref<'static, Rig>,
+    Ref<'static, Selection>,
+    Ref<'static, Symmetry>,
+    &'static JointEntities,
+    &'static GlobalTransform,
+    Option<Ref<'static, RigSurface>>,
+    Has<RigMeshes>,
+);
+
+/// The active rig.
+pub struct EditedRig<'a> {
+    /// Its entity.
+    pub entity: Entity,
+    /// The document.
+    pub rig: Ref<'a, Rig>,
+    /// What is selected.
+    pub selection: Ref<'a, Selection>,
+    /// Live mirroring.
+    pub symmetry: Ref<'a, Symmetry>,
+    /// Entities of its joints.
+    pub entities: &'a JointEntities,
+    /// Where it stands.
+    pub place: &'a GlobalTransform,
+    /// Its posed surface, if there is one yet.
+    pub surface: Option<Ref<'a, RigSurface>>,
+    /// True if it has a mesh, even if its surface is still being built.
+    pub has_mesh: bool,
+}
+
+impl Scene<'_, '_> {
+    /// What the viewport sees.
+    pub fn sight(&self) -> Option<Sight> {
+        self.sight.0
+    }
+
+    /// The active rig, if it is there.
+    pub fn rig(&self) -> Option<EditedRig<'_>> {
+        let entity = self.active.as_ref()?.0;
+        let (rig, selection, symmetry, entities, place, surface, has_mesh) = self.rigs.get(entity).ok()?;
+        Some(EditedRig { entity, rig, selection, symmetry, entities, place, surface, has_mesh })
+    }
+
+    /// Places of a rig's joints as posed, in the rig's space.
+    pub fn posed(&self, rig: &EditedRig) -> Vec<(Uid, Vec3)> {
+        posed_joints(&rig.rig, rig.entities, rig.place, &self.joints)
+    }
+
+    /// True if what a tool shows may look different now: another rig, view, selection or surface.
+    pub fn is_changed(&self) -> bool {
+        let other = self.sight.is_changed() || self.active.as_ref().is_some_and(|active| active.is_changed());
+        other
+            || self.rig().is_some_and(|rig| {
+                rig.rig.is_changed()
+                    || rig.selection.is_changed()
+                    || rig.symmetry.is_changed()
+                    || rig.surface.is_some_and(|surface| surface.is_changed())
+            })
+    }
+}
+
+impl EditedRig<'_> {
+    /// A joint's name for people: its label, or the end of its uid.
+    pub fn name(&self, joint: Uid) -> String {
+        joint_name(&self.rig, joint)
+    }
+
+    /// How large the character is, in the rig's units: the longest side of its surface, or of its skeleton.
+    pub fn size(&self) -> f32 {
+        let [low, high] = self.bounds();
+        (high - low).max_element()
+    }
+
+    /// Least and greatest corner of its surface, or of its skeleton at rest; a unit cube if there is neither.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        if let Some(surface) = &self.surface {
+            return surface.bounds();
+        }
+        let joints = self.rig.rest_globals();
+        let bounds = joints.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], (_, joint)| {
+            [low.min(joint.translation), high.max(joint.translation)]
+        });
+        let is_solid = (bounds[1] - bounds[0]).max_element() > 0.0;
+        if is_solid { bounds } else { [Vec3::splat(-0.5), Vec3::splat(0.5)] }
+    }
+}
+
+/// A joint's name for people: its label, or the end of its uid.
+pub fn joint_name(rig: &Rig, joint: Uid) -> String {
+    let label = rig.joint(joint).and_then(|joint| joint.data.label.clone());
+    label.unwrap_or_else(|| format!("joint {:04x}", joint.0 & 0xffff))
+}
+
+/// `1 joint`, `2 joints`.
+pub fn joints(count: usize) -> String {
+    if count == 1 { "1 joint".to_owned() } else { format!("{count} joints") }
+}

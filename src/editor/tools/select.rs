@@ -1,0 +1,218 @@
+//! Selecting: a click picks a joint, a drag a box of them, a double click all that hangs below.
+//!
+//! What a click would pick is shown before the click: the engine answers both questions with the same code.
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+
+use super::{
+    Tool, ToolPointer, ToolSystems,
+    scene::{EditedRig, Scene, joints},
+};
+use crate::{
+    algo::picking::in_box,
+    editor::{
+        mode::Mode,
+        notice::StatusLine,
+        panel::{PanelApp, ViewportPainter},
+        pointer::{Held, PointerAct},
+    },
+    plugins::{
+        document::Hovered,
+        picking::{HoverRequest, Pick, PickRequest},
+        viewport::Sight,
+    },
+    rig::Uid,
+};
+
+/// Adds selecting with the pointer.
+pub struct SelectPlugin;
+
+impl Plugin for SelectPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<SelectTool>()
+            .add_systems(Update, select.in_set(ToolSystems::Tools))
+            .add_systems(PostUpdate, say.in_set(ToolSystems::Show))
+            .add_painter(BandPainter);
+    }
+}
+
+/// What selecting is about.
+#[derive(Resource, Debug, Clone, PartialEq, Default)]
+pub struct SelectTool {
+    /// Opposite corners of the box that is being dragged, in pixels of the viewport.
+    pub band: Option<[Vec2; 2]>,
+    press: Option<Vec2>,
+    pointer: Option<Vec2>,
+    /// What the last hover request was about.
+    asked: Option<(Entity, Sight, Vec2)>,
+}
+
+/// How near a click must come to be at the same spot, in pixels.
+pub const REACH: f32 = 8.0;
+/// How far beside the mesh a click still means a joint, in pixels.
+const BESIDE: f32 = 24.0;
+
+/// What a click picks; `None` for one beside everything.
+pub fn click(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Pick> {
+    is_over(scene, rig, sight, at).then(|| Pick::Click {
+        plane: sight.plane,
+        point: sight.point(at),
+        reach: REACH * sight.pixel,
+    })
+}
+
+/// Whether a pixel lies over the mesh or near a joint.
+fn is_over(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> bool {
+    let near = |place: Vec3| sight.project(place).is_some_and(|pixel| pixel.distance(at) <= BESIDE);
+    let met = rig
+        .surface
+        .as_ref()
+        .and_then(|surface| surface.ready())
+        .is_some_and(|surface| surface.closest(&sight.ray(at)).is_some());
+    met || scene.posed(rig).iter().any(|(_, place)| near(*place))
+}
+
+pub(super) fn select(
+    mut tool: ResMut<SelectTool>,
+    mut pointers: MessageReader<ToolPointer>,
+    scene: Scene,
+    hovered: Query<&Hovered>,
+    mut picks: MessageWriter<PickRequest>,
+    mut hovers: MessageWriter<HoverRequest>,
+) {
+    let tool = tool.bypass_change_detection();
+    let (Some(rig), Some(sight)) = (scene.rig(), scene.sight()) else {
+        pointers.clear();
+        return;
+    };
+    for ToolPointer { tool: who, pointer } in pointers.read() {
+        if *who != Tool::Select {
+            tool.pointer = None;
+            continue;
+        }
+        tool.pointer = Some(pointer.at);
+        match pointer.act {
+            PointerAct::Left => tool.pointer = None,
+            PointerAct::Pressed => tool.press = Some(pointer.at),
+            PointerAct::Dragged => tool.band = tool.press.map(|press| [press, pointer.at]),
+            PointerAct::Released { dragged, count } => {
+                let band = tool.band.take();
+                let Some(press) = tool.press.take() else { continue };
+                let request = match band.filter(|_| dragged) {
+                    Some(band) => boxed(&scene, &rig, &sight, band, pointer.held),
+                    None => clicked(&scene, &rig, &sight, press, pointer.held, count, hovered.get(rig.entity).ok()),
+                };
+                picks.write(request);
+            }
+            PointerAct::Moved | PointerAct::Wheel(_) => {}
+        }
+    }
+    let at = tool.pointer.filter(|_| tool.press.is_none());
+    let asked = at.map(|at| (rig.entity, sight, at));
+    if asked != tool.asked {
+        // Nothing is asked for again and again where the pointer is not this tool's: another may have asked.
+        tool.asked = asked;
+        let what = at.and_then(|at| match click(&scene, &rig, &sight, at) {
+            Some(Pick::Click { plane, point, reach }) => Some((plane, point, reach)),
+            _ => None,
+        });
+        hovers.write(HoverRequest { rig: rig.entity, what });
+    }
+}
+
+fn clicked(
+    scene: &Scene,
+    rig: &EditedRig,
+    sight: &Sight,
+    at: Vec2,
+    held: Held,
+    count: u8,
+    hovered: Option<&Hovered>,
+) -> PickRequest {
+    let request = |what, add| PickRequest { rig: rig.entity, what, add };
+    let selected = &rig.selection.0;
+    if count > 1
+        && let Some(active) = rig.selection.active()
+    {
+        // All that hangs below, the joint itself last: it stays the active one.
+        let mut below: Vec<Uid> = rig.rig.hierarchy(active).map(|joint| joint.data.uid).collect();
+        below.reverse();
+        return request(Pick::Joints(below), held.shift || held.control);
+    }
+    let Some(pick) = click(scene, rig, sight, at) else {
+        return if held.shift || held.control {
+            request(Pick::Joints(Vec::new()), true)
+        } else {
+            request(Pick::None, false)
+        };
+    };
+    match hovered.and_then(|hovered| hovered.0) {
+        Some(joint) if held.control && selected.contains(&joint) => {
+            request(Pick::Joints(selected.iter().copied().filter(|other| *other != joint).collect()), false)
+        }
+        _ => request(pick, held.shift || held.control),
+    }
+}
+
+fn boxed(scene: &Scene, rig: &EditedRig, sight: &Sight, band: [Vec2; 2], held: Held) -> PickRequest {
+    let corners = band.map(|corner| sight.point(corner));
+    if !held.control {
+        return PickRequest { rig: rig.entity, what: Pick::Box { plane: sight.plane, corners }, add: held.shift };
+    }
+    let posed = scene.posed(rig);
+    let places: Vec<Vec3> = posed.iter().map(|(_, place)| *place).collect();
+    let inside: Vec<Uid> = in_box(&sight.plane, corners, &places).into_iter().map(|number| posed[number].0).collect();
+    let rest = rig.selection.0.iter().copied().filter(|joint| !inside.contains(joint)).collect();
+    PickRequest { rig: rig.entity, what: Pick::Joints(rest), add: false }
+}
+
+/// Says what a click would do.
+pub(super) fn say(
+    mode: Res<Mode>,
+    tool: Res<SelectTool>,
+    scene: Scene,
+    hovered: Query<Ref<Hovered>>,
+    mut status: ResMut<StatusLine>,
+) {
+    if *mode != Mode::Select {
+        return;
+    }
+    let Some(rig) = scene.rig() else { return };
+    let hovered = hovered.get(rig.entity).ok();
+    let hint = if tool.band.is_some() {
+        "Release to select what is in the box; Shift adds, Ctrl takes away.".to_owned()
+    } else if let Some(joint) = hovered.as_ref().and_then(|hovered| hovered.0) {
+        let name = rig.name(joint);
+        if rig.selection.active() == Some(joint) {
+            format!("{name} is selected. Click again: the next nearest. Double click: all that hangs below.")
+        } else {
+            format!("Click selects {name}. Shift adds, Ctrl takes away. Drag: a box.")
+        }
+    } else if rig.rig.is_empty() {
+        "There are no joints yet: press A to place one, S to draw a stroke.".to_owned()
+    } else {
+        let selected = rig.selection.0.len();
+        let clear = if selected > 0 {
+            format!(" Click beside the mesh: none ({} selected).", joints(selected))
+        } else {
+            String::new()
+        };
+        format!("Click a joint, or drag a box around some.{clear}")
+    };
+    status.set_if_neq(StatusLine { hint, obstacle: None, banner: status.banner.clone() });
+}
+
+/// Paints the box that is being dragged.
+struct BandPainter;
+
+impl ViewportPainter for BandPainter {
+    fn paint(&mut self, painter: &egui::Painter, area: egui::Rect, world: &World) {
+        let Some([a, b]) = world.get_resource::<SelectTool>().and_then(|tool| tool.band) else { return };
+        let place = |at: Vec2| area.min + egui::vec2(at.x, at.y);
+        let band = egui::Rect::from_two_pos(place(a), place(b));
+        let color = egui::Color32::from_rgb(255, 170, 60);
+        painter.rect_filled(band, 0.0, color.gamma_multiply(0.12));
+        painter.rect_stroke(band, 0.0, egui::Stroke::new(1.0, color), egui::StrokeKind::Inside);
+    }
+}

@@ -1,0 +1,476 @@
+//! Drawing: a line that follows the pointer, and a preview of the chain it becomes until that is taken or dropped.
+//!
+//! Following the stroke through the mesh takes a task; choosing joints from what it found takes microseconds, so the
+//! number of joints changes under the wheel while the person watches. What is taken is what was shown: both come from
+//! [`plan_stroke`].
+
+mod bar;
+
+use std::sync::Arc;
+
+use bevy::{
+    ecs::system::SystemParam,
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
+
+use super::{
+    Tool, ToolPointer, ToolSystems,
+    scene::{EditedRig, Scene, joints},
+};
+use crate::{
+    algo::stroke::{
+        ChainChoice, MAX_JOINTS, StrokeChain, StrokeError, StrokeKind, StrokeNote, StrokeSettings, joint_at,
+    },
+    editor::{
+        ActiveRig,
+        actions::{Action, ActionRequest},
+        mode::Mode,
+        notice::{Notice, StatusLine},
+        panel::PanelApp,
+        pointer::PointerAct,
+    },
+    mesh::surface::Surface,
+    plugins::{
+        document::Hovered,
+        picking::{Pick, PickRequest},
+        stroke::{
+            FollowedStroke, StrokeDone, StrokeParent, StrokePlan, StrokeRequest, StrokeResult, StrokeScene, StrokeTips,
+            plan_stroke, stroke_kind,
+        },
+        viewport::Sight,
+    },
+    rig::{Uid, operations::Operation},
+};
+
+/// Adds drawing with the pointer.
+pub struct StrokeToolPlugin;
+
+impl Plugin for StrokeToolPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<StrokeTool>()
+            .add_message::<StrokeTune>()
+            .add_systems(Update, draw.in_set(ToolSystems::Tools).after(super::place::place))
+            .add_systems(PostUpdate, (show, answer).chain().in_set(ToolSystems::Show).after(super::place::show))
+            .add_painter(bar::StrokeBar);
+    }
+}
+
+/// What drawing is about.
+#[derive(Resource, Debug)]
+pub struct StrokeTool {
+    /// What is being drawn or previewed.
+    pub state: StrokeState,
+    /// How far a stroke may stray from its bones, in parts of the character's size: where the next preview begins.
+    pub threshold: f32,
+}
+
+impl Default for StrokeTool {
+    fn default() -> Self {
+        Self { state: StrokeState::Idle, threshold: 0.02 }
+    }
+}
+
+/// Where a stroke is on its way.
+#[derive(Debug, Default)]
+pub enum StrokeState {
+    /// There is none.
+    #[default]
+    Idle,
+    /// The button is down.
+    Drawing(Box<StrokeRequest>),
+    /// It waits to be taken or dropped.
+    Preview(Box<StrokePreview>),
+}
+
+/// A stroke that waits to be taken or dropped.
+#[derive(Debug)]
+pub struct StrokePreview {
+    /// What taking it would ask for, except for the chain that is known already.
+    pub request: StrokeRequest,
+    /// What would come of it; `None` while the stroke is being followed.
+    pub plan: Option<StrokePlan>,
+    followed: Option<FollowedStroke>,
+    task: Option<Task<Result<FollowedStroke, StrokeError>>>,
+    /// The surface that the stroke was or is being followed through.
+    on: Option<Arc<Surface>>,
+}
+
+impl StrokePreview {
+    /// What taking it would do to the rig, as far as that is known.
+    pub fn operation(&self) -> Option<&Operation> {
+        match self.plan.as_ref()? {
+            StrokePlan::Ready { operation, .. } => operation.as_ref(),
+            StrokePlan::NeedsChain => None,
+        }
+    }
+
+    /// The chain that it would become, with the joint it starts on, as far as that is known.
+    pub fn chain(&self) -> Option<&StrokeChain> {
+        match self.plan.as_ref()? {
+            StrokePlan::Ready { result: StrokeResult::Chain { chain, .. }, .. } => Some(chain),
+            _ => None,
+        }
+    }
+}
+
+/// Changes the preview of a stroke.
+#[derive(Message, Debug, Clone, Copy, PartialEq)]
+pub enum StrokeTune {
+    /// Which joints it becomes.
+    Choice(ChainChoice),
+    /// The volume it runs in, counted from one; `None` for the one it would take by itself.
+    Volume(Option<u32>),
+}
+
+/// How near a stroke must come to a joint to mean it, in pixels.
+const REACH: f32 = 10.0;
+
+/// The request that a stroke begins with.
+fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequest {
+    StrokeRequest {
+        rig: rig.entity,
+        plane: sight.plane,
+        points: vec![sight.point(at)],
+        choice: ChainChoice::Threshold(threshold * rig.size()),
+        settings: StrokeSettings::default(),
+        chain_only: false,
+        reach: REACH * sight.pixel,
+        parent: StrokeParent::Natural,
+        chain: None,
+    }
+}
+
+/// Where the button went down, and the view at that moment: it holds for the whole line.
+#[derive(Debug, Clone, Copy)]
+struct Press {
+    sight: Sight,
+    at: Vec2,
+}
+
+/// What strokes become.
+#[derive(SystemParam)]
+struct Outcomes<'w> {
+    strokes: MessageWriter<'w, StrokeRequest>,
+    picks: MessageWriter<'w, PickRequest>,
+    notices: MessageWriter<'w, Notice>,
+}
+
+fn draw(
+    mut tool: ResMut<StrokeTool>,
+    mode: Res<Mode>,
+    mut pointers: MessageReader<ToolPointer>,
+    mut actions: MessageReader<ActionRequest>,
+    mut tunes: MessageReader<StrokeTune>,
+    scene: Scene,
+    mut press: Local<Option<Press>>,
+    mut hovered: Query<&mut Hovered>,
+    mut out: Outcomes,
+) {
+    for ActionRequest(action) in actions.read() {
+        match action {
+            // What saves, computes or leaves must not leave a drawing behind.
+            Action::Accept
+            | Action::Save
+            | Action::SaveAs
+            | Action::Export
+            | Action::Skin
+            | Action::Quit
+            | Action::New
+            | Action::Open => take(&mut tool, &mut out.strokes),
+            Action::Cancel if !matches!(tool.state, StrokeState::Idle) => {
+                tool.state = StrokeState::Idle;
+                *press = None;
+            }
+            Action::NextVolume => next_volume(&mut tool),
+            _ => {}
+        }
+    }
+    if *mode != Mode::Stroke && matches!(tool.state, StrokeState::Preview(_)) {
+        take(&mut tool, &mut out.strokes);
+        out.notices.write(Notice::info("The stroke was taken as you left its mode; Ctrl+Z takes it back."));
+    }
+    for change in tunes.read() {
+        tune(&mut tool, *change, scene.rig());
+    }
+    let found = scene.rig().zip(scene.sight());
+    for ToolPointer { tool: who, pointer } in pointers.read() {
+        let Some((rig, sight)) = &found else { continue };
+        let mut under = None;
+        match (who, pointer.act) {
+            (Tool::Stroke, PointerAct::Pressed) => *press = Some(Press { sight: *sight, at: pointer.at }),
+            (Tool::Stroke, PointerAct::Dragged) => {
+                let Some(Press { sight, at }) = &*press else { continue };
+                if !matches!(tool.state, StrokeState::Drawing(_)) {
+                    // Whoever draws on has what is there already.
+                    take(&mut tool, &mut out.strokes);
+                    tool.state = StrokeState::Drawing(Box::new(begin(rig, sight, *at, tool.threshold)));
+                }
+                if let StrokeState::Drawing(request) = &mut tool.state {
+                    request.points.push(sight.point(pointer.at));
+                }
+                continue;
+            }
+            (Tool::Stroke, PointerAct::Released { dragged: true, .. }) => {
+                *press = None;
+                release(&mut tool, &scene, rig, &mut out.strokes);
+                continue;
+            }
+            (Tool::Stroke, PointerAct::Released { dragged: false, .. }) => {
+                *press = None;
+                under = joint_under(&scene, rig, sight, pointer.at);
+                let what = under.map(|joint| Pick::Joints(vec![joint]));
+                let request = |what| PickRequest { rig: rig.entity, what, add: pointer.held.shift };
+                out.picks.write_batch(what.map(request));
+            }
+            (Tool::Stroke, PointerAct::Wheel(notches)) => wheel(&mut tool, notches),
+            (Tool::Stroke, PointerAct::Moved) => under = joint_under(&scene, rig, sight, pointer.at),
+            (Tool::Stroke, PointerAct::Left) => {}
+            _ => continue,
+        }
+        // A stroke that starts here continues from this joint; a click selects it.
+        if let Ok(mut hovered) = hovered.get_mut(rig.entity) {
+            hovered.set_if_neq(Hovered(under));
+        }
+    }
+    let surface = found.as_ref().and_then(|(rig, _)| rig.surface.as_ref()).and_then(|surface| surface.shared());
+    follow(&mut tool, surface, &mut out.notices);
+}
+
+/// The joint that a stroke from a pixel starts on.
+fn joint_under(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
+    let posed = scene.posed(rig);
+    let flat: Vec<(Vec2, Option<usize>)> =
+        posed.iter().map(|(_, place)| (sight.plane.project(*place).unwrap_or(Vec2::NAN), None)).collect();
+    joint_at(sight.point(at), &flat, REACH * sight.pixel).map(|number| posed[number].0)
+}
+
+/// Takes what is previewed, as it is shown.
+fn take(tool: &mut ResMut<StrokeTool>, strokes: &mut MessageWriter<StrokeRequest>) {
+    if !matches!(tool.state, StrokeState::Preview(_)) {
+        return;
+    }
+    let StrokeState::Preview(preview) = std::mem::take(&mut tool.state) else { return };
+    // Where the stroke is still being followed, the engine waits for the same.
+    let chain = preview.chain().cloned();
+    strokes.write(StrokeRequest { chain, ..preview.request });
+}
+
+/// Ends the line: a chain is previewed, everything else is done at once.
+fn release(tool: &mut ResMut<StrokeTool>, scene: &Scene, rig: &EditedRig, strokes: &mut MessageWriter<StrokeRequest>) {
+    let StrokeState::Drawing(request) = std::mem::take(&mut tool.state) else { return };
+    match stroke_kind(&request, &rig.rig, &scene.posed(rig)) {
+        StrokeKind::Chain { .. } if rig.has_mesh => {
+            let preview = StrokePreview { request: *request, plan: None, followed: None, task: None, on: None };
+            tool.state = StrokeState::Preview(Box::new(preview));
+        }
+        _ => {
+            strokes.write(*request);
+        }
+    }
+}
+
+fn tune(tool: &mut ResMut<StrokeTool>, change: StrokeTune, rig: Option<EditedRig>) {
+    let StrokeState::Preview(preview) = &mut tool.state else { return };
+    match change {
+        StrokeTune::Choice(choice) => preview.request.choice = choice,
+        StrokeTune::Volume(volume) => {
+            preview.request.settings.place.volume = volume;
+            preview.on = None;
+        }
+    }
+    if let (StrokeTune::Choice(ChainChoice::Threshold(threshold)), Some(rig)) = (change, rig) {
+        tool.threshold = threshold / rig.size();
+    }
+}
+
+/// One joint more or less a notch.
+fn wheel(tool: &mut ResMut<StrokeTool>, notches: f32) {
+    let StrokeState::Preview(preview) = &mut tool.state else { return };
+    let count = match preview.request.choice {
+        ChainChoice::Joints(count) => count,
+        ChainChoice::Threshold(_) => preview.chain().map_or(2, |chain| chain.joints.len()),
+    };
+    let steps = if notches.abs() < 1.0 { notches.signum() } else { notches.round() };
+    let count = (count as f32 + steps).clamp(2.0, MAX_JOINTS as f32);
+    preview.request.choice = ChainChoice::Joints(count as usize);
+}
+
+/// The volume after the one that the stroke runs in; after the last, the one it takes by itself.
+fn next_volume(tool: &mut ResMut<StrokeTool>) {
+    if !matches!(tool.state, StrokeState::Preview(_)) {
+        return;
+    }
+    let StrokeState::Preview(preview) = &mut tool.state else { return };
+    let Some((taken, of)) = preview.chain().and_then(volumes) else { return };
+    let volume = &mut preview.request.settings.place.volume;
+    *volume = match *volume {
+        None if taken > 1 => Some(1),
+        None => Some(2),
+        Some(number) if number < of => Some(number + 1),
+        Some(_) => None,
+    };
+    preview.on = None;
+}
+
+/// The volume taken where the stroke starts, and how many there are; `None` for a single one.
+fn volumes(chain: &StrokeChain) -> Option<(u32, u32)> {
+    chain.notes.iter().find_map(|note| match note {
+        StrokeNote::VolumeChosen { volume, of } => Some((*volume, *of)),
+        _ => None,
+    })
+}
+
+/// Follows the previewed stroke through the surface in a task, again when the surface changes.
+fn follow(tool: &mut ResMut<StrokeTool>, surface: Option<Arc<Surface>>, notices: &mut MessageWriter<Notice>) {
+    let StrokeState::Preview(preview) = &mut tool.bypass_change_detection().state else { return };
+    let Some(surface) = surface else { return };
+    if preview.on.as_ref().is_none_or(|on| !Arc::ptr_eq(on, &surface)) {
+        let (plane, points, settings) =
+            (preview.request.plane, preview.request.points.clone(), preview.request.settings);
+        preview.on = Some(surface.clone());
+        let follow = async move { FollowedStroke::new(surface, &plane, &points, settings) };
+        preview.task = Some(AsyncComputeTaskPool::get().spawn(follow));
+    }
+    let Some(followed) = preview.task.as_mut().and_then(check_ready) else { return };
+    preview.task = None;
+    match followed {
+        Ok(followed) => preview.followed = Some(followed),
+        Err(error) => {
+            notices.write(Notice::warning(format!("No chain: {error}.")));
+            tool.bypass_change_detection().state = StrokeState::Idle;
+        }
+    }
+    tool.set_changed();
+}
+
+/// Plans what is previewed on the rig as it stands, and says so.
+pub(super) fn show(
+    mut tool: ResMut<StrokeTool>,
+    mode: Res<Mode>,
+    scene: Scene,
+    tips: Query<&StrokeTips>,
+    hovered: Query<Ref<Hovered>>,
+    mut status: ResMut<StatusLine>,
+) {
+    let is_on = *mode == Mode::Stroke || matches!(tool.state, StrokeState::Drawing(_));
+    let hover_changed = hovered.iter().any(|hovered| hovered.is_changed());
+    if !is_on || !(tool.is_changed() || mode.is_changed() || scene.is_changed() || hover_changed) {
+        return;
+    }
+    let Some(rig) = scene.rig() else { return };
+    let posed = scene.posed(&rig);
+    if let StrokeState::Preview(preview) = &mut tool.bypass_change_detection().state
+        && let Some(surface) = &rig.surface
+    {
+        let on = StrokeScene {
+            rig: &rig.rig,
+            selection: &rig.selection,
+            symmetry: &rig.symmetry,
+            tips: tips.get(rig.entity).ok(),
+            surface,
+            posed: &posed,
+        };
+        let chain = preview.followed.as_ref().map(|followed| Ok(followed.chain(preview.request.choice)));
+        preview.plan = Some(plan_stroke(&preview.request, &on, chain));
+        tool.set_changed();
+    }
+    let (hint, obstacle) = describe(&tool, &rig, &posed, hovered.get(rig.entity).ok().and_then(|hovered| hovered.0));
+    let banner = status.banner.clone();
+    status.set_if_neq(StatusLine { hint, obstacle, banner });
+}
+
+/// What releasing, Enter or the next stroke would do.
+fn describe(
+    tool: &StrokeTool,
+    rig: &EditedRig,
+    posed: &[(Uid, Vec3)],
+    hovered: Option<Uid>,
+) -> (String, Option<String>) {
+    match &tool.state {
+        StrokeState::Idle if !rig.has_mesh => {
+            (String::new(), Some("the rig has no mesh to draw on; open one first (Ctrl+O)".to_owned()))
+        }
+        StrokeState::Idle => {
+            let hint = match hovered {
+                Some(joint) => {
+                    let name = rig.name(joint);
+                    format!("Draw from here to continue from {name}; click to select it.")
+                }
+                None => "Draw over the mesh: the stroke becomes a chain. A short tick across a bone puts a joint into \
+                         it; a scribble over joints deletes them."
+                    .to_owned(),
+            };
+            (hint, None)
+        }
+        StrokeState::Drawing(request) => {
+            let name = |number: usize| posed.get(number).map(|(joint, _)| rig.name(*joint)).unwrap_or_default();
+            let hint = match stroke_kind(request, &rig.rig, posed) {
+                StrokeKind::Chain { start: Some(start), .. } => {
+                    format!("Release to see the chain that continues from {}.", name(start))
+                }
+                StrokeKind::Chain { .. } => "Release to see the chain; nothing is changed yet.".to_owned(),
+                StrokeKind::Insert { bone, .. } => {
+                    format!("Release to put a joint into the bone above {}.", name(bone))
+                }
+                StrokeKind::Erase { joints: under } => format!("Release to delete {}.", joints(under.len())),
+            };
+            (hint, None)
+        }
+        StrokeState::Preview(preview) => describe_preview(preview, rig),
+    }
+}
+
+fn describe_preview(preview: &StrokePreview, rig: &EditedRig) -> (String, Option<String>) {
+    let keys = "Wheel: more or fewer. Enter takes it, Esc drops it.";
+    let Some(StrokePlan::Ready { operation, result }) = &preview.plan else {
+        return (
+            "The stroke is being followed through the mesh\u{2026} Enter takes it, Esc drops it.".to_owned(),
+            None,
+        );
+    };
+    match result {
+        StrokeResult::Chain { chain, parent, why } => {
+            let count = match operation {
+                Some(Operation::Chain { positions, .. }) => positions.len(),
+                _ => chain.joints.len(),
+            };
+            let parent = parent.map(|parent| rig.name(parent)).unwrap_or_default();
+            let notes: String = chain.notes.iter().map(|note| format!(" {}", heard(note))).collect();
+            (format!("{}; the chain {}.{notes} {keys}", joints(count), why.describe(&parent)), None)
+        }
+        StrokeResult::Nothing(why) => (keys.to_owned(), Some(why.clone())),
+        StrokeResult::Inserted { child } => {
+            (format!("Enter puts a joint into the bone above {}.", rig.name(*child)), None)
+        }
+        StrokeResult::Erased(under) => (format!("Enter deletes {}.", joints(under.len())), None),
+    }
+}
+
+fn heard(note: &StrokeNote) -> String {
+    match note {
+        StrokeNote::EndMoved { start: true } => "It begins where the mesh does.".to_owned(),
+        StrokeNote::EndMoved { start: false } => "It ends where the mesh does.".to_owned(),
+        StrokeNote::VolumeChosen { volume, of } => format!("In volume {volume} of {of}: Tab for another."),
+        StrokeNote::JointsLeftOut { count } => format!("Without {} over a gap of the mesh.", joints(*count)),
+    }
+}
+
+/// Says what became of strokes.
+fn answer(mut done: MessageReader<StrokeDone>, active: Option<Res<ActiveRig>>, mut notices: MessageWriter<Notice>) {
+    let Some(active) = active else { return done.clear() };
+    for StrokeDone { rig, result } in done.read() {
+        if *rig != active.0 {
+            continue;
+        }
+        let notice = match result {
+            StrokeResult::Chain { chain, .. } => Notice::done(format!("Drew {}.", joints(chain.joints.len()))).quiet(),
+            StrokeResult::Inserted { .. } => Notice::done("Put a joint into a bone.").quiet(),
+            StrokeResult::Erased(under) => {
+                Notice::done(format!("Deleted {}; Ctrl+Z brings back.", joints(under.len())))
+            }
+            StrokeResult::Nothing(why) => Notice::warning(format!("Nothing was drawn: {why}.")),
+        };
+        notices.write(notice);
+    }
+}

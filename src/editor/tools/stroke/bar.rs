@@ -1,0 +1,85 @@
+//! The bar under a previewed stroke: how many joints, how far it may stray, take it or drop it.
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+
+use super::{StrokePreview, StrokeState, StrokeTool, StrokeTune, volumes};
+use crate::{
+    algo::stroke::ChainChoice,
+    editor::{
+        ActiveRig,
+        actions::{Action, ActionRequest},
+        panel::{Requests, ViewportPainter},
+    },
+    plugins::surface::RigSurface,
+};
+
+/// Shows the bar while there is a preview.
+pub(super) struct StrokeBar;
+
+/// The most joints that the bar offers; the wheel goes on.
+const MOST: usize = 60;
+
+impl ViewportPainter for StrokeBar {
+    fn paint(&mut self, _: &egui::Painter, _: egui::Rect, _: &World) {}
+
+    fn widgets(&mut self, ui: &mut egui::Ui, area: egui::Rect, world: &World, requests: &mut Requests) {
+        let Some(tool) = world.get_resource::<StrokeTool>() else { return };
+        let StrokeState::Preview(preview) = &tool.state else { return };
+        let active = world.get_resource::<ActiveRig>();
+        let surface = active.and_then(|rig| world.get::<RigSurface>(rig.0));
+        let size = surface.map_or(1.0, |surface| {
+            let [low, high] = surface.bounds();
+            (high - low).max_element()
+        });
+        egui::Area::new(egui::Id::new("stroke bar"))
+            .order(egui::Order::Middle)
+            .pivot(egui::Align2::CENTER_BOTTOM)
+            .fixed_pos(area.center_bottom() - egui::vec2(0.0, 14.0))
+            .constrain_to(area)
+            .show(ui.ctx(), |ui| {
+                egui::Frame::popup(ui.style()).show(ui, |ui| {
+                    ui.horizontal(|ui| contents(ui, preview, size, requests));
+                });
+            });
+    }
+}
+
+fn contents(ui: &mut egui::Ui, preview: &StrokePreview, size: f32, requests: &mut Requests) {
+    let chain = preview.chain();
+    let mut count = match preview.request.choice {
+        ChainChoice::Joints(count) => count,
+        ChainChoice::Threshold(_) => chain.map_or(2, |chain| chain.joints.len()),
+    };
+    let most = MOST.max(count);
+    let drag = egui::DragValue::new(&mut count).range(2..=most).speed(0.05).suffix(" joints");
+    if ui.add(drag).on_hover_text("Exactly so many joints (wheel)").changed() {
+        requests.send(StrokeTune::Choice(ChainChoice::Joints(count)));
+    }
+    ui.separator();
+    let mut share = match preview.request.choice {
+        ChainChoice::Threshold(threshold) => 100.0 * threshold / size,
+        ChainChoice::Joints(_) => 2.0,
+    };
+    let slider =
+        egui::Slider::new(&mut share, 0.2..=10.0).logarithmic(true).fixed_decimals(1).suffix(" %").text("threshold");
+    let hint = "Joints wherever the stroke strays further than this share of the character's size from the bones";
+    if ui.add(slider).on_hover_text(hint).changed() {
+        requests.send(StrokeTune::Choice(ChainChoice::Threshold(share * 0.01 * size)));
+    }
+    if let Some((volume, of)) = chain.and_then(volumes) {
+        ui.separator();
+        let text = format!("volume {volume} of {of}");
+        if ui.button(text).on_hover_text("The stroke runs through several volumes here: take the next (Tab)").clicked()
+        {
+            requests.send(ActionRequest(Action::NextVolume));
+        }
+    }
+    ui.separator();
+    if ui.button("Take").on_hover_text("Enter").clicked() {
+        requests.send(ActionRequest(Action::Accept));
+    }
+    if ui.button("Drop").on_hover_text("Esc").clicked() {
+        requests.send(ActionRequest(Action::Cancel));
+    }
+}

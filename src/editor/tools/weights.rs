@@ -1,0 +1,90 @@
+//! Weights: shows what the active joint moves for as long as the mode is on.
+
+use bevy::prelude::*;
+
+use super::{
+    ToolSystems,
+    scene::{EditedRig, Scene},
+};
+use crate::{
+    editor::{mode::Mode, notice::StatusLine},
+    plugins::display::{MeshDisplay, WeightColors},
+    rig::Uid,
+};
+
+/// Shows weights in their mode.
+pub struct WeightsPlugin;
+
+impl Plugin for WeightsPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<MeshDisplay>()
+            .init_resource::<WeightsTool>()
+            .add_systems(PostUpdate, show_weights.in_set(ToolSystems::Show).after(super::stroke::show));
+    }
+}
+
+/// What the display showed before the mode was entered.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
+pub struct WeightsTool {
+    before: Option<WeightColors>,
+}
+
+fn show_weights(
+    mut tool: ResMut<WeightsTool>,
+    mode: Res<Mode>,
+    scene: Scene,
+    mut display: ResMut<MeshDisplay>,
+    mut status: ResMut<StatusLine>,
+) {
+    if *mode != Mode::Weights {
+        if let Some(before) = tool.before.take() {
+            display.weights = before;
+        }
+        return;
+    }
+    if !(mode.is_changed() || scene.is_changed()) {
+        return;
+    }
+    if tool.before.is_none() {
+        tool.before = Some(display.weights);
+    }
+    let Some(rig) = scene.rig() else { return };
+    let wanted = rig.selection.active().map_or(WeightColors::AllJoints, WeightColors::Joint);
+    if display.weights != wanted {
+        display.weights = wanted;
+    }
+    let (hint, obstacle) = describe(&rig);
+    let banner = status.banner.clone();
+    status.set_if_neq(StatusLine { hint, obstacle, banner });
+}
+
+/// What the active joint moves, and why it moves nothing.
+fn describe(rig: &EditedRig) -> (String, Option<String>) {
+    if rig.rig.skins().next().is_none() {
+        let why = "the mesh has no weights yet; compute them first (B)".to_owned();
+        return ("Click a joint to see what it moves.".to_owned(), Some(why));
+    }
+    let Some(joint) = rig.selection.active() else {
+        return ("Every joint in a colour of its own. Click a joint to see what it moves.".to_owned(), None);
+    };
+    let (moved, of) = points_moved(rig, joint);
+    let name = rig.name(joint);
+    let hint = match moved {
+        0 => format!("{name} moves no point of {of}."),
+        _ => format!("{name} moves {moved} of {of} points."),
+    };
+    (format!("{hint} Click another joint to see what it moves."), None)
+}
+
+/// How many points of all bound meshes a joint has a part in, and how many there are.
+pub fn points_moved(rig: &EditedRig, joint: Uid) -> (usize, usize) {
+    let mut moved = 0;
+    let mut of = 0;
+    for (_, skin) in rig.rig.skins() {
+        of += skin.weights.len();
+        let Some(number) = skin.joints.iter().position(|uid| *uid == joint) else { continue };
+        // A point lists a joint at most once, and never with a weight of zero.
+        moved += skin.weights.joints.iter().filter(|joint| **joint as usize == number).count();
+    }
+    (moved, of)
+}
