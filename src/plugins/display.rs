@@ -2,19 +2,32 @@
 //!
 //! A [`RigMesh`](super::surface::RigMesh) is data. This plugin shows it: Bevy meshes, materials and images are built in
 //! the background and handed to the renderer piece by piece, so that no frame waits for a large model. Weights move
-//! the pieces on the graphics card exactly as [`posed_points`](super::surface::posed_points) moves the surface that
+//! the pieces on the graphics card as they move [`RigSurface`](super::surface::RigSurface), the surface that
 //! rays meet, so that the picture and picking agree.
 //!
 //! No editor is needed: a game that has [`DefaultPlugins`] and [`RigPlugins`](super::RigPlugins) adds
 //! [`DisplayPlugin`] and gives its camera [`ViewportLights`] or lights of its own. What is drawn are children of the
 //! mesh's entity, which becomes a child of its rig; hide and show it with its [`Visibility`].
 
+mod build;
+mod colors;
+mod follow;
+mod layer;
 mod lights;
+mod looks;
+mod plan;
+mod textures;
+mod wire;
 
-use bevy::prelude::*;
+use bevy::{prelude::*, window::RequestRedraw};
 
-pub use self::lights::ViewportLights;
-use super::RigSystems;
+use self::follow::{EdgeMaterials, dress_pieces, follow_skins, land_jobs, place_meshes, start_jobs};
+pub use self::{
+    colors::{joint_color, weight_color},
+    lights::ViewportLights,
+    wire::WireMaterial,
+};
+use super::{RigSystems, configure_sets};
 use crate::rig::Uid;
 
 /// Shows the meshes of rigs. Needs Bevy's rendering plugins, as in [`DefaultPlugins`].
@@ -22,7 +35,17 @@ pub struct DisplayPlugin;
 
 impl Plugin for DisplayPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<MeshDisplay>().configure_sets(Update, DisplaySystems.after(RigSystems::Bind));
+        configure_sets(app);
+        wire::add_wire(app);
+        app.init_resource::<MeshDisplay>()
+            .init_resource::<EdgeMaterials>()
+            .add_message::<DisplayNote>()
+            .add_message::<RequestRedraw>()
+            .configure_sets(Update, DisplaySystems.after(RigSystems::Bind))
+            .add_systems(
+                Update,
+                (place_meshes, start_jobs, land_jobs, follow_skins, dress_pieces).chain().in_set(DisplaySystems),
+            );
     }
 }
 
@@ -86,4 +109,13 @@ pub enum DisplayPiece {
     Surface,
     /// Edges of polygons.
     Edges,
+}
+
+/// Something of a mesh cannot be shown.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct DisplayNote {
+    /// The mesh.
+    pub mesh: Uid,
+    /// What and why, in a sentence for people.
+    pub text: String,
 }

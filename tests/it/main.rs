@@ -2,6 +2,8 @@
 
 #[cfg(feature = "cli")]
 mod cli;
+#[cfg(feature = "draw")]
+mod display;
 mod edits;
 mod exports;
 mod files;

@@ -1,0 +1,372 @@
+//! What is drawn follows meshes, weights, rest poses and the way they are to be shown.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use bevy::{
+    mesh::skinning::SkinnedMeshInverseBindposes,
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+    window::RequestRedraw,
+};
+
+use super::{
+    DisplayJob, DisplayNote, DisplayPiece, MeshDisplay, Shading, WeightColors,
+    build::RIG,
+    layer::{Layer, LayerKey, Plans, Shown},
+    looks::{self, Materials},
+    wire::WireMaterial,
+};
+use crate::{
+    mesh::model::Model,
+    plugins::{
+        document::JointEntities,
+        surface::{RigMesh, SkinOf},
+    },
+    rig::{Rig, Uid},
+};
+
+/// The picture of a mesh.
+#[derive(Component)]
+pub(super) struct Displayed {
+    model: Arc<Model>,
+    plans: Plans,
+    surface: Layer,
+    edges: Layer,
+    materials: Vec<StandardMaterial>,
+    textures: Option<TextureJob>,
+    dresses: BTreeMap<Dress, Handle<StandardMaterial>>,
+    /// Pieces have come, or their materials changed, in this frame.
+    fresh: bool,
+}
+
+/// What a piece of the surface is drawn with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Dress {
+    look: Look,
+    xray: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Look {
+    Material(usize),
+    Clay,
+    Painted,
+}
+
+/// Images that are being decoded.
+struct TextureJob {
+    task: Task<()>,
+    queue: Arc<Mutex<Vec<(Handle<Image>, Result<Image, String>)>>>,
+    /// Materials with their textures, to be used when all of them are there.
+    materials: Vec<StandardMaterial>,
+    total: usize,
+    landed: usize,
+    missing: Vec<AssetId<Image>>,
+}
+
+/// The materials of edges.
+#[derive(Resource)]
+pub(super) struct EdgeMaterials {
+    solid: Handle<WireMaterial>,
+    xray: Handle<WireMaterial>,
+}
+
+impl FromWorld for EdgeMaterials {
+    fn from_world(world: &mut World) -> Self {
+        let mut materials = world.resource_mut::<Assets<WireMaterial>>();
+        let solid = materials.add(WireMaterial { color: LinearRgba::new(0.0, 0.0, 0.0, 0.55) });
+        let xray = materials.add(WireMaterial { color: LinearRgba::new(0.55, 0.62, 0.70, 0.35) });
+        Self { solid, xray }
+    }
+}
+
+/// Puts meshes below their rigs, where they are drawn, and takes down the picture of what is no mesh of a rig any more.
+pub(super) fn place_meshes(
+    mut commands: Commands,
+    placed: Query<(Entity, &SkinOf, Option<&ChildOf>), (With<RigMesh>, Or<(Added<RigMesh>, Changed<SkinOf>)>)>,
+    gone: Query<(Entity, &Displayed), Or<(Without<RigMesh>, Without<SkinOf>)>>,
+) {
+    for (mesh, of, child_of) in &placed {
+        if child_of.is_none_or(|child_of| child_of.parent() != of.0) {
+            commands.entity(mesh).insert_if_new((Transform::default(), Visibility::default())).insert(ChildOf(of.0));
+            commands.entity(of.0).insert_if_new((Transform::default(), Visibility::default()));
+        }
+    }
+    for (mesh, displayed) in &gone {
+        for piece in displayed.surface.entities().chain(displayed.edges.entities()) {
+            commands.entity(piece).try_despawn();
+        }
+        commands.entity(mesh).remove::<(Displayed, DisplayJob)>();
+    }
+}
+
+/// Starts to build what is to be shown and is not.
+pub(super) fn start_jobs(
+    mut commands: Commands,
+    display: Res<MeshDisplay>,
+    mut meshes: Query<(Entity, Ref<RigMesh>, &SkinOf, Option<&mut Displayed>)>,
+    rigs: Query<Ref<Rig>>,
+    images: Res<Assets<Image>>,
+) {
+    for (entity, mesh, of, displayed) in &mut meshes {
+        let Ok(rig) = rigs.get(of.0) else { continue };
+        if displayed.is_some() && !(display.is_changed() || mesh.is_changed() || rig.is_changed()) {
+            continue;
+        }
+        let skin = rig.skin(mesh.uid).cloned();
+        let surface = LayerKey { skin: skin.clone(), colors: display.weights };
+        let edges = LayerKey { skin, colors: WeightColors::Off };
+        let start = |displayed: &mut Displayed| {
+            if displayed.surface.key.as_ref() != Some(&surface) {
+                displayed.surface.start(&displayed.model, &displayed.plans, surface.clone());
+            }
+            if display.wireframe && displayed.edges.key.as_ref() != Some(&edges) {
+                displayed.edges.start(&displayed.model, &displayed.plans, edges.clone());
+            }
+        };
+        match displayed {
+            Some(mut displayed) => {
+                if !Arc::ptr_eq(&displayed.model, &mesh.rest) {
+                    displayed.change_model(&mesh.rest, &images);
+                }
+                start(&mut displayed);
+            }
+            None => {
+                let mut displayed = Displayed::new(&mesh.rest, &images);
+                start(&mut displayed);
+                commands.entity(entity).insert(displayed);
+            }
+        }
+    }
+}
+
+impl Displayed {
+    fn new(model: &Arc<Model>, images: &Assets<Image>) -> Self {
+        let mut displayed = Self {
+            model: model.clone(),
+            plans: Plans::default(),
+            surface: Layer::new(DisplayPiece::Surface),
+            edges: Layer::new(DisplayPiece::Edges),
+            materials: Vec::new(),
+            textures: None,
+            dresses: BTreeMap::new(),
+            fresh: false,
+        };
+        displayed.change_model(model, images);
+        displayed
+    }
+
+    fn change_model(&mut self, model: &Arc<Model>, images: &Assets<Image>) {
+        self.model = model.clone();
+        self.plans = Plans::default();
+        self.surface.forget();
+        self.edges.forget();
+        self.dresses.clear();
+        let Materials { materials, textures } = looks::translate(&model.looks, &images.get_handle_provider());
+        if textures.is_empty() {
+            (self.materials, self.textures) = (materials, None);
+            return;
+        }
+        self.materials = materials.iter().map(|material| looks::without_textures(material, |_| true)).collect();
+        let queue = Arc::new(Mutex::new(Vec::new()));
+        let (model, out, total) = (model.clone(), queue.clone(), textures.len());
+        let task = AsyncComputeTaskPool::get().spawn(async move {
+            for done in looks::decode_textures(&model.looks, &textures) {
+                out.lock().unwrap_or_else(PoisonError::into_inner).push(done);
+                bevy::tasks::futures_lite::future::yield_now().await;
+            }
+        });
+        self.textures = Some(TextureJob { task, queue, materials, total, landed: 0, missing: Vec::new() });
+    }
+
+    fn progress(&self) -> Option<f32> {
+        let textures = self.textures.as_ref().map(|job| job.landed as f32 / job.total as f32);
+        let parts = [self.surface.progress(), self.edges.progress(), textures];
+        let (count, sum) = parts.iter().flatten().fold((0, 0.0), |(count, sum), part| (count + 1, sum + part));
+        (count > 0).then(|| sum / count as f32)
+    }
+}
+
+/// Puts up what is built, a bounded amount a frame.
+pub(super) fn land_jobs(
+    mut commands: Commands,
+    mut displays: Query<(Entity, &RigMesh, &mut Displayed, Option<&mut DisplayJob>)>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut images: ResMut<Assets<Image>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+    mut notes: MessageWriter<DisplayNote>,
+    mut redraw: MessageWriter<RequestRedraw>,
+) {
+    for (entity, mesh, mut displayed, job) in &mut displays {
+        let busy = displayed.surface.is_busy() || displayed.edges.is_busy() || displayed.textures.is_some();
+        if !busy && job.is_none() {
+            continue;
+        }
+        redraw.write(RequestRedraw);
+        let displayed = &mut *displayed;
+        displayed.fresh |= displayed.surface.land(entity, &mut commands, &mut meshes);
+        displayed.fresh |= displayed.edges.land(entity, &mut commands, &mut meshes);
+        displayed.land_textures(&mut images, &mut materials, |text| {
+            notes.write(DisplayNote { mesh: mesh.uid, text });
+        });
+        match (displayed.progress(), job) {
+            (Some(done), Some(mut job)) => job.done = done,
+            (Some(done), None) => {
+                commands.entity(entity).insert(DisplayJob { done });
+            }
+            (None, Some(_)) => {
+                commands.entity(entity).remove::<DisplayJob>();
+            }
+            (None, None) => {}
+        }
+    }
+}
+
+impl Displayed {
+    fn land_textures(
+        &mut self,
+        images: &mut Assets<Image>,
+        materials: &mut Assets<StandardMaterial>,
+        mut note: impl FnMut(String),
+    ) {
+        let Some(job) = &mut self.textures else { return };
+        let done = check_ready(&mut job.task).is_some();
+        let waiting = std::mem::take(&mut *job.queue.lock().unwrap_or_else(PoisonError::into_inner));
+        for (handle, image) in waiting {
+            job.landed += 1;
+            let id = handle.id();
+            match image.map(|image| images.insert(id, image)) {
+                Ok(Ok(())) => {}
+                Ok(Err(_)) => job.missing.push(id),
+                Err(text) => {
+                    warn!("{text}");
+                    note(text);
+                    job.missing.push(id);
+                }
+            }
+        }
+        if !done {
+            return;
+        }
+        let missing = |image: &Handle<Image>| job.missing.contains(&image.id());
+        self.materials = job.materials.iter().map(|material| looks::without_textures(material, missing)).collect();
+        self.textures = None;
+        for (dress, handle) in &self.dresses {
+            // The handle is held, so its place is there.
+            let _ = materials.insert(handle.id(), dress.material(&self.materials));
+        }
+    }
+}
+
+/// Joins pieces to the joints that hold them, and tells the renderer where the joints rest.
+pub(super) fn follow_skins(
+    mut commands: Commands,
+    mut displays: Query<(&mut Displayed, Ref<SkinOf>)>,
+    rigs: Query<(Entity, Ref<Rig>, Ref<JointEntities>)>,
+    mut bind_assets: ResMut<Assets<SkinnedMeshInverseBindposes>>,
+) {
+    for (mut displayed, of) in &mut displays {
+        let Ok((entity, rig, entities)) = rigs.get(of.0) else { continue };
+        if !(displayed.fresh || of.is_changed() || rig.is_changed() || entities.is_changed()) {
+            continue;
+        }
+        let mut rests: BTreeMap<Uid, (Entity, Mat4)> = BTreeMap::new();
+        let displayed = displayed.bypass_change_detection();
+        for shown in displayed.surface.pieces.iter_mut().chain(&mut displayed.edges.pieces) {
+            follow_skin(shown, entity, &rig, &entities, &mut rests, &mut commands, &mut bind_assets);
+        }
+    }
+}
+
+fn follow_skin(
+    shown: &mut Shown,
+    rig_entity: Entity,
+    rig: &Rig,
+    entities: &JointEntities,
+    rests: &mut BTreeMap<Uid, (Entity, Mat4)>,
+    commands: &mut Commands,
+    bind_assets: &mut Assets<SkinnedMeshInverseBindposes>,
+) {
+    let (Some(palette), Some(skin)) = (&shown.palette, &shown.key.skin) else { return };
+    // Points without influences, and those of joints that are gone, stay where the rig is: there is no pose for them.
+    let free = (rig_entity, Mat4::IDENTITY);
+    let mut hold = |joint: u32| {
+        let Some(uid) = (joint != RIG).then(|| skin.joints.get(joint as usize)).flatten() else { return free };
+        *rests.entry(*uid).or_insert_with(|| {
+            let Some(entity) = entities.get(*uid).filter(|_| rig.joint(*uid).is_some()) else { return free };
+            let bind = Mat4::from(bevy::math::Affine3A::from(rig.rest_global(*uid)).inverse());
+            if bind.is_finite() { (entity, bind) } else { free }
+        })
+    };
+    let (joints, binds): (Vec<Entity>, Vec<Mat4>) = palette.iter().map(|joint| hold(*joint)).unzip();
+    let moved = shown.binds != binds;
+    let rejoined = shown.joints != joints || shown.bind_asset.is_none();
+    if moved || rejoined {
+        shown.binds = binds;
+        let poses = SkinnedMeshInverseBindposes::from(shown.binds.clone());
+        let handle = match shown.bind_asset.take() {
+            Some(handle) => {
+                // The handle is held, so its place is there.
+                let _ = bind_assets.insert(handle.id(), poses);
+                handle
+            }
+            None => bind_assets.add(poses),
+        };
+        if rejoined {
+            shown.joints = joints;
+            shown.hold(commands, handle.clone());
+        }
+        shown.bind_asset = Some(handle);
+    }
+}
+
+impl Dress {
+    fn material(self, materials: &[StandardMaterial]) -> StandardMaterial {
+        let material = match self.look {
+            Look::Material(index) => materials.get(index).cloned().unwrap_or_else(looks::clay),
+            Look::Clay => looks::clay(),
+            Look::Painted => looks::painted(),
+        };
+        if self.xray { looks::xray(material) } else { material }
+    }
+}
+
+/// Gives pieces their materials, and shows or hides edges.
+pub(super) fn dress_pieces(
+    mut commands: Commands,
+    display: Res<MeshDisplay>,
+    edges: Res<EdgeMaterials>,
+    mut displays: Query<&mut Displayed>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
+    for mut displayed in &mut displays {
+        if !(displayed.fresh || display.is_changed()) {
+            continue;
+        }
+        let displayed = displayed.bypass_change_detection();
+        displayed.fresh = false;
+        for shown in &mut displayed.surface.pieces {
+            let look = match (shown.painted(), display.shading, shown.material) {
+                (true, ..) => Look::Painted,
+                (_, Shading::Shaded, Some(material)) => Look::Material(material),
+                _ => Look::Clay,
+            };
+            let dress = Dress { look, xray: display.xray };
+            let handle =
+                displayed.dresses.entry(dress).or_insert_with(|| materials.add(dress.material(&displayed.materials)));
+            if shown.dress.as_ref().is_none_or(|known| known.id() != handle.id().untyped()) {
+                shown.dress = Some(handle.clone().untyped());
+                commands.entity(shown.entity).insert(MeshMaterial3d(handle.clone()));
+            }
+        }
+        let handle = if display.xray { &edges.xray } else { &edges.solid };
+        let visible = if display.wireframe { Visibility::Inherited } else { Visibility::Hidden };
+        for shown in &mut displayed.edges.pieces {
+            shown.dress = Some(handle.clone().untyped());
+            commands.entity(shown.entity).insert((MeshMaterial3d(handle.clone()), visible));
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! One layer of a mesh's picture, its surface or its edges: built in the background, put up piece by piece.
+
+use std::{
+    collections::VecDeque,
+    sync::{
+        Arc, Mutex, OnceLock, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use bevy::{
+    camera::visibility::DynamicSkinnedMeshBounds,
+    mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, block_on, futures::check_ready, futures_lite::future::yield_now},
+};
+
+use super::{
+    DisplayPiece, WeightColors,
+    build::{Piece, build_edges, build_surface},
+    colors::Painter,
+    plan::{EdgePlan, SurfacePlan, plan_edges, plan_surface},
+};
+use crate::{mesh::model::Model, rig::SkinData};
+
+/// Bytes that go to the renderer in one frame, about; a piece more than that still goes whole.
+const FRAME_BYTES: usize = 4 << 20;
+/// Models with fewer vertices are built at once: that takes less than waiting for the next frame.
+const SMALL: usize = 20_000;
+/// Frames for which what is replaced by a piece of another kind stays, until the renderer is sure to have the piece.
+const OVERLAP: u8 = 4;
+
+/// What a layer is built for.
+#[derive(Debug, Clone, Default)]
+pub(super) struct LayerKey {
+    /// The weights.
+    pub skin: Option<Arc<SkinData>>,
+    /// Which of them are painted.
+    pub colors: WeightColors,
+}
+
+impl PartialEq for LayerKey {
+    fn eq(&self, other: &Self) -> bool {
+        let skins = match (&self.skin, &other.skin) {
+            (None, None) => true,
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        };
+        skins && self.colors == other.colors
+    }
+}
+
+/// How a model is cut, found once and kept.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Plans {
+    surface: Arc<OnceLock<Vec<SurfacePlan>>>,
+    edges: Arc<OnceLock<Vec<EdgePlan>>>,
+}
+
+/// A piece on the screen.
+#[derive(Debug)]
+pub(super) struct Shown {
+    /// What draws it.
+    pub entity: Entity,
+    /// Index into the model's materials.
+    pub material: Option<usize>,
+    /// What it was built for.
+    pub key: LayerKey,
+    /// See [`Piece::palette`].
+    pub palette: Option<Vec<u32>>,
+    /// True if its vertices have colours.
+    colored: bool,
+    /// The entities of its palette's joints, and how the mesh stands to them at rest.
+    pub joints: Vec<Entity>,
+    /// See `joints`.
+    pub binds: Vec<Mat4>,
+    /// `binds` for the renderer.
+    pub bind_asset: Option<Handle<SkinnedMeshInverseBindposes>>,
+    /// What it is drawn with.
+    pub dress: Option<UntypedHandle>,
+}
+
+/// The pieces of one kind.
+#[derive(Debug)]
+pub(super) struct Layer {
+    kind: DisplayPiece,
+    /// What the pieces are, or are being, built for.
+    pub key: Option<LayerKey>,
+    /// What is on the screen.
+    pub pieces: Vec<Shown>,
+    /// Pieces of another model, until the first of this one comes.
+    stale: Vec<Entity>,
+    /// Replaced pieces and for how many frames they stay.
+    retiring: Vec<(Entity, u8)>,
+    job: Option<Job>,
+}
+
+#[derive(Debug)]
+struct Job {
+    task: Option<Task<()>>,
+    queue: Arc<Queue>,
+    key: LayerKey,
+    landed: usize,
+}
+
+/// Where finished pieces wait.
+#[derive(Debug, Default)]
+struct Queue {
+    pieces: Mutex<VecDeque<Piece>>,
+    /// How many there will be; 0 until the model is cut.
+    total: AtomicUsize,
+    built: AtomicUsize,
+}
+
+impl Queue {
+    fn push(&self, piece: Piece) {
+        self.pieces.lock().unwrap_or_else(PoisonError::into_inner).push_back(piece);
+        self.built.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn pop(&self) -> Option<Piece> {
+        self.pieces.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
+    }
+}
+
+impl Layer {
+    /// A layer with nothing in it.
+    pub fn new(kind: DisplayPiece) -> Self {
+        Self { kind, key: None, pieces: Vec::new(), stale: Vec::new(), retiring: Vec::new(), job: None }
+    }
+
+    /// Starts to build the pieces for `key`; what is on the screen stays until they come.
+    pub fn start(&mut self, model: &Arc<Model>, plans: &Plans, key: LayerKey) {
+        let queue = Arc::new(Queue::default());
+        let work = build(self.kind, model.clone(), plans.clone(), key.clone(), queue.clone());
+        let vertices: usize = model.parts.iter().map(|part| part.vertices.len()).sum();
+        let task = if vertices <= SMALL {
+            block_on(work);
+            None
+        } else {
+            Some(AsyncComputeTaskPool::get().spawn(work))
+        };
+        self.key = Some(key.clone());
+        // A task that runs already stops at its next piece.
+        self.job = Some(Job { task, queue, key, landed: 0 });
+    }
+
+    /// Forgets the model: its pieces stay until those of another come.
+    pub fn forget(&mut self) {
+        self.stale.extend(self.pieces.drain(..).map(|shown| shown.entity));
+        self.key = None;
+        self.job = None;
+    }
+
+    /// How much of a running job is done, 0 to 1.
+    pub fn progress(&self) -> Option<f32> {
+        let job = self.job.as_ref()?;
+        let total = job.queue.total.load(Ordering::Relaxed);
+        let done = job.queue.built.load(Ordering::Relaxed) + job.landed;
+        Some(if total == 0 { 0.0 } else { done as f32 / (2 * total) as f32 })
+    }
+
+    /// True while pieces are coming or going.
+    pub fn is_busy(&self) -> bool {
+        self.job.is_some() || !self.retiring.is_empty()
+    }
+
+    /// All entities that draw this layer.
+    pub fn entities(&self) -> impl Iterator<Item = Entity> {
+        let pieces = self.pieces.iter().map(|shown| shown.entity);
+        pieces.chain(self.stale.iter().copied()).chain(self.retiring.iter().map(|(entity, _)| *entity))
+    }
+
+    /// Puts up finished pieces below `mesh`, as many as fit into a frame. True if there was any.
+    pub fn land(&mut self, mesh: Entity, commands: &mut Commands, meshes: &mut Assets<Mesh>) -> bool {
+        self.retiring.retain_mut(|(entity, frames)| {
+            *frames -= 1;
+            if *frames == 0 {
+                commands.entity(*entity).try_despawn();
+            }
+            *frames > 0
+        });
+        let Some(job) = &mut self.job else { return false };
+        // Asked before the queue is emptied: what is done has nothing to add.
+        let done = job.task.as_mut().is_none_or(|task| check_ready(task).is_some());
+        if done {
+            job.task = None;
+        }
+        let mut bytes = 0;
+        while bytes < FRAME_BYTES {
+            let Some(piece) = job.queue.pop() else { break };
+            bytes += piece.bytes.max(1);
+            let index = job.landed;
+            job.landed += 1;
+            self.stale.drain(..).for_each(|entity| commands.entity(entity).try_despawn());
+            let handle = meshes.add(piece.mesh);
+            let known = self.pieces.get(index);
+            let alike = |old: &&Shown| old.palette.is_some() == piece.palette.is_some() && old.colored == piece.colored;
+            let entity = match known.filter(alike) {
+                Some(old) => commands.entity(old.entity).insert(Mesh3d(handle)).id(),
+                None => {
+                    // The renderer may need some frames to prepare for another kind of mesh.
+                    self.retiring.extend(known.map(|old| (old.entity, OVERLAP)));
+                    commands.spawn((self.kind, Mesh3d(handle), Transform::default(), ChildOf(mesh))).id()
+                }
+            };
+            let old = (index < self.pieces.len()).then(|| self.pieces.swap_remove(index));
+            let old = old.filter(|old| old.entity == entity);
+            let (bind_asset, dress) = old.map_or((None, None), |old| (old.bind_asset, old.dress));
+            self.pieces.push(Shown {
+                entity,
+                material: piece.material,
+                key: job.key.clone(),
+                palette: piece.palette,
+                colored: piece.colored,
+                joints: Vec::new(),
+                binds: Vec::new(),
+                bind_asset,
+                dress,
+            });
+            let last = self.pieces.len() - 1;
+            self.pieces.swap(index, last);
+        }
+        if done && job.landed == job.queue.built.load(Ordering::Relaxed) {
+            let gone = self.pieces.drain(job.landed.min(self.pieces.len())..).map(|shown| shown.entity);
+            gone.chain(self.stale.drain(..)).for_each(|entity| commands.entity(entity).try_despawn());
+            self.job = None;
+        }
+        bytes > 0
+    }
+}
+
+impl Shown {
+    /// True if it shows weights.
+    pub fn painted(&self) -> bool {
+        self.key.colors != WeightColors::Off
+    }
+
+    /// What the renderer needs to hold the piece by its joints.
+    pub fn hold(&self, commands: &mut Commands, inverse_bindposes: Handle<SkinnedMeshInverseBindposes>) {
+        let skinned = SkinnedMesh { inverse_bindposes, joints: self.joints.clone() };
+        commands.entity(self.entity).insert((skinned, DynamicSkinnedMeshBounds));
+    }
+}
+
+async fn build(kind: DisplayPiece, model: Arc<Model>, plans: Plans, key: LayerKey, queue: Arc<Queue>) {
+    let skin = key.skin.as_deref();
+    match kind {
+        DisplayPiece::Surface => {
+            let plan = plans.surface.get_or_init(|| plan_surface(&model));
+            queue.total.store(plan.len(), Ordering::Relaxed);
+            let painter = Painter::new(key.colors, skin);
+            for piece in plan {
+                let material = piece.traits.material.and_then(|material| model.looks.materials.get(material));
+                let bumps =
+                    painter.is_none() && material.is_some_and(|material| material.get("normalTexture").is_some());
+                queue.push(build_surface(&model, piece, skin, painter.as_ref(), bumps));
+                yield_now().await;
+            }
+        }
+        DisplayPiece::Edges => {
+            let plan = plans.edges.get_or_init(|| plan_edges(&model));
+            queue.total.store(plan.len(), Ordering::Relaxed);
+            for piece in plan {
+                queue.push(build_edges(&model, piece, skin));
+                yield_now().await;
+            }
+        }
+    }
+}

@@ -1,0 +1,535 @@
+//! What is drawn of a rig's meshes: pieces, weights, edges, colours, materials. No renderer is needed to look at it.
+
+use std::{
+    collections::{BTreeSet, HashSet},
+    path::Path,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use bevy::{
+    asset::AssetPlugin,
+    ecs::schedule::{LogLevel, ScheduleBuildSettings},
+    mesh::{
+        MeshPlugin, VertexAttributeValues,
+        skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
+    },
+    prelude::*,
+};
+use rigsmith::{
+    files::{RealDisk, load_model},
+    headless::headless_app,
+    mesh::{
+        model::{Faces, Image as ModelImage, Model, Object, Part, Weights},
+        skinning::skin_points,
+    },
+    plugins::{
+        display::{DisplayJob, DisplayNote, DisplayPiece, DisplayPlugin, MeshDisplay, WeightColors, weight_color},
+        document::JointEntities,
+    },
+    prelude::*,
+    rig::SkinData,
+};
+use serde_json::json;
+
+use crate::gestures::boxes;
+
+const MESH: Uid = Uid(99);
+
+#[derive(Resource, Default)]
+struct Notes(Vec<String>);
+
+fn gather_notes(mut messages: MessageReader<DisplayNote>, mut notes: ResMut<Notes>) {
+    notes.0.extend(messages.read().map(|note| note.text.clone()));
+}
+
+struct Bench {
+    app: App,
+    rig: Entity,
+    mesh: Entity,
+}
+
+impl Bench {
+    /// A mesh below an empty rig that stands somewhere, all of it shown.
+    fn new(model: Model) -> Self {
+        let mut app = headless_app(1);
+        app.add_plugins((AssetPlugin::default(), MeshPlugin));
+        app.init_asset::<Image>().init_asset::<StandardMaterial>().add_plugins(DisplayPlugin);
+        let strict = ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
+        app.edit_schedule(Update, |schedule| {
+            schedule.set_build_settings(strict.clone());
+        });
+        app.init_resource::<Notes>().add_systems(Last, gather_notes);
+        app.finish();
+        app.cleanup();
+        let place =
+            Transform::from_xyz(3.0, -1.0, 2.0).with_rotation(Quat::from_rotation_y(1.0)).with_scale(Vec3::splat(2.0));
+        let bundle = RigBundle { rig: Rig::new(Uid(1), "rig"), transform: place, ..default() };
+        let rig = app.world_mut().spawn(bundle).id();
+        let mesh = app.world_mut().spawn((RigMesh::new(MESH, model, Vec::new()), SkinOf(rig))).id();
+        let mut bench = Self { app, rig, mesh };
+        bench.settle();
+        bench
+    }
+
+    /// Runs until nothing is being built any more; returns the progress that was seen.
+    fn settle(&mut self) -> Vec<f32> {
+        let (started, mut seen) = (Instant::now(), Vec::new());
+        let mut quiet = 0;
+        while quiet < 6 {
+            assert!(started.elapsed() < Duration::from_secs(60), "the mesh is never shown");
+            self.app.update();
+            match self.app.world().get::<DisplayJob>(self.mesh) {
+                Some(job) => {
+                    seen.push(job.fraction());
+                    quiet = 0;
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                None => quiet += 1,
+            }
+        }
+        seen
+    }
+
+    fn edit(&mut self, operation: Operation) {
+        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
+        self.app.update();
+    }
+
+    fn change(&mut self, change: Change) {
+        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
+        self.app.update();
+    }
+
+    fn bind(&mut self, skin: SkinData) {
+        self.edit(Operation::Edits(vec![RigEdit::SetSkin(MESH, Some(Arc::new(skin)))]));
+        self.settle();
+    }
+
+    fn chain(&mut self, places: &[[f32; 3]]) -> Vec<Uid> {
+        let positions = places.iter().map(|place| Vec3::from(*place)).collect();
+        self.edit(Operation::Chain { positions, parent: None });
+        self.rig().walk().map(|joint| joint.data.uid).collect()
+    }
+
+    fn rig(&self) -> &Rig {
+        self.app.world().get::<Rig>(self.rig).unwrap()
+    }
+
+    fn joint(&self, joint: Uid) -> Entity {
+        self.app.world().get::<JointEntities>(self.rig).unwrap().get(joint).unwrap()
+    }
+
+    fn show(&mut self, display: MeshDisplay) {
+        *self.app.world_mut().resource_mut::<MeshDisplay>() = display;
+        self.settle();
+    }
+
+    fn entities(&mut self, kind: DisplayPiece) -> Vec<Entity> {
+        let mut pieces = self.app.world_mut().query::<(Entity, &DisplayPiece)>();
+        let found = pieces.iter(self.app.world()).filter(|(_, other)| **other == kind);
+        found.map(|(entity, _)| entity).collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    fn meshes(&mut self, kind: DisplayPiece) -> Vec<Mesh> {
+        let entities = self.entities(kind);
+        let assets = self.app.world().resource::<Assets<Mesh>>();
+        let mesh = |entity| assets.get(&self.app.world().get::<Mesh3d>(entity).unwrap().0).unwrap().clone();
+        entities.into_iter().map(mesh).collect()
+    }
+
+    fn materials(&mut self) -> Vec<StandardMaterial> {
+        let entities = self.entities(DisplayPiece::Surface);
+        let assets = self.app.world().resource::<Assets<StandardMaterial>>();
+        let material = |entity| {
+            let handle = &self.app.world().get::<MeshMaterial3d<StandardMaterial>>(entity).unwrap().0;
+            assets.get(handle).unwrap().clone()
+        };
+        entities.into_iter().map(material).collect()
+    }
+
+    /// For each piece of the surface the matrices that the renderer makes of its joints.
+    fn matrices(&mut self) -> Vec<Vec<Mat4>> {
+        let entities = self.entities(DisplayPiece::Surface);
+        let world = self.app.world();
+        let binds = world.resource::<Assets<SkinnedMeshInverseBindposes>>();
+        let of = |entity| {
+            let skinned = world.get::<SkinnedMesh>(entity).expect("the piece is skinned");
+            let binds = binds.get(&skinned.inverse_bindposes).unwrap();
+            assert_eq!(binds.len(), skinned.joints.len());
+            let globals = skinned.joints.iter().map(|joint| world.get::<GlobalTransform>(*joint).unwrap().to_matrix());
+            globals.zip(binds.iter()).map(|(global, bind)| global * *bind).collect()
+        };
+        entities.into_iter().map(of).collect()
+    }
+
+    /// Where the renderer puts the vertices of the surface's first piece, in the world.
+    fn skinned(&mut self) -> Vec<Vec3> {
+        let matrices = self.matrices().swap_remove(0);
+        let mesh = self.meshes(DisplayPiece::Surface).swap_remove(0);
+        let (joints, weights) = influences(&mesh);
+        let positions = mesh.attribute(Mesh::ATTRIBUTE_POSITION).unwrap().as_float3().unwrap();
+        let points = positions.iter().zip(joints.iter().zip(weights));
+        let blend = |(position, (joints, weights)): (&[f32; 3], (&[u16; 4], [f32; 4]))| {
+            let all = joints.iter().zip(weights);
+            all.map(|(j, w)| matrices[*j as usize].transform_point3((*position).into()) * w).sum()
+        };
+        points.map(blend).collect()
+    }
+
+    /// Asserts that at rest no joint moves the surface from where the rig stands.
+    fn assert_still(&mut self) {
+        let place = self.app.world().get::<GlobalTransform>(self.rig).unwrap().to_matrix();
+        for matrix in self.matrices().concat() {
+            assert!(matrix.abs_diff_eq(place, 1e-5), "{matrix} is not {place}");
+        }
+    }
+}
+
+fn influences(mesh: &Mesh) -> (Vec<[u16; 4]>, Vec<[f32; 4]>) {
+    let Some(VertexAttributeValues::Uint16x4(joints)) = mesh.attribute(Mesh::ATTRIBUTE_JOINT_INDEX) else {
+        panic!("joint indices are missing")
+    };
+    let Some(VertexAttributeValues::Float32x4(weights)) = mesh.attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT) else {
+        panic!("weights are missing")
+    };
+    (joints.clone(), weights.clone())
+}
+
+fn colors(mesh: &Mesh) -> Option<Vec<[f32; 4]>> {
+    match mesh.attribute(Mesh::ATTRIBUTE_COLOR)? {
+        VertexAttributeValues::Float32x4(colors) => Some(colors.clone()),
+        other => panic!("colours are {}", other.enum_variant_name()),
+    }
+}
+
+fn triangles(meshes: &[Mesh]) -> usize {
+    meshes.iter().map(|mesh| mesh.indices().unwrap().len() / 3).sum()
+}
+
+fn bundled_biped() -> Model {
+    load_model(&RealDisk, Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.obj"))).unwrap()
+}
+
+/// A square of `side` by `side` quads with normals.
+fn field(side: u32) -> Model {
+    let across = side + 1;
+    let points: Vec<Vec3> =
+        (0..across * across).map(|i| Vec3::new((i % across) as f32, (i / across) as f32, 0.0)).collect();
+    let quads = (0..side * side).map(|i| {
+        let low = i / side * across + i % side;
+        [low, low + 1, low + across + 1, low + across]
+    });
+    let quads: Vec<[u32; 4]> = quads.collect();
+    let part = Part {
+        vertices: (0..across * across).collect(),
+        normals: vec![Vec3::Z; points.len()],
+        faces: Faces { starts: (0..=quads.len() as u32).map(|i| 4 * i).collect(), corners: quads.concat() },
+        triangles: quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect(),
+        ..default()
+    };
+    Model { points, objects: vec![Object::default()], parts: vec![part], ..default() }
+}
+
+/// One box from y = 0 to 2; its lower points follow the first joint, its upper ones both.
+fn held_box(joints: &[Uid]) -> SkinData {
+    let mut weights = Weights::default();
+    for point in 0..8 {
+        let upper = point >> 1 & 1 == 1;
+        weights.push(if upper { vec![(1, 0.75), (0, 0.25)] } else { vec![(0, 1.0)] });
+    }
+    SkinData { joints: joints.to_vec(), weights, at_rest: true }
+}
+
+fn held_bench() -> (Bench, Vec<Uid>) {
+    let mut bench = Bench::new(boxes(&[[[-1.0, 0.0, -1.0], [1.0, 2.0, 1.0]]]));
+    let joints = bench.chain(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]]);
+    bench.bind(held_box(&joints));
+    (bench, joints)
+}
+
+#[test]
+fn every_triangle_is_in_a_piece() {
+    let model = bundled_biped();
+    let count = model.point_triangles().len();
+    let mut bench = Bench::new(model);
+    let meshes = bench.meshes(DisplayPiece::Surface);
+    assert_eq!(triangles(&meshes), count);
+    for mesh in &meshes {
+        assert!(mesh.attribute(Mesh::ATTRIBUTE_NORMAL).is_some(), "a mesh is shown with normals");
+        assert!(mesh.attribute(Mesh::ATTRIBUTE_JOINT_INDEX).is_none(), "nothing is bound");
+    }
+}
+
+#[test]
+fn large_meshes_come_in_pieces_and_say_how_far_they_are() {
+    let mut bench = Bench::new(boxes(&[[[0.0; 3], [1.0; 3]]]));
+    assert_eq!(triangles(&bench.meshes(DisplayPiece::Surface)), 12);
+    let mesh = RigMesh::new(MESH, field(450), Vec::new());
+    bench.app.world_mut().entity_mut(bench.mesh).insert(mesh);
+    let seen = bench.settle();
+    assert!(seen.is_sorted() && seen.first() < seen.last(), "progress is {seen:?}");
+    let meshes = bench.meshes(DisplayPiece::Surface);
+    assert!(meshes.len() > 5, "{} pieces", meshes.len());
+    assert!(meshes.iter().all(|mesh| mesh.indices().unwrap().len() <= 3 << 16));
+    assert_eq!(triangles(&meshes), 450 * 450 * 2);
+}
+
+#[test]
+fn edges_are_those_of_polygons() {
+    let model = bundled_biped();
+    let key =
+        |corner: u32, part: &Part| model.points[part.vertices[corner as usize] as usize].to_array().map(f32::to_bits);
+    let mut wanted = HashSet::new();
+    for part in &model.parts {
+        for face in part.faces.iter() {
+            for corner in 0..face.len() {
+                let (a, b) = (key(face[corner], part), key(face[(corner + 1) % face.len()], part));
+                wanted.insert((a.min(b), a.max(b)));
+            }
+        }
+    }
+    let diagonals = model.point_triangles().len() - model.face_count();
+    assert!(diagonals > 0, "the model has quads");
+    let mut bench = Bench::new(model.clone());
+    assert!(bench.entities(DisplayPiece::Edges).is_empty(), "edges are built when they are asked for");
+    bench.show(MeshDisplay { wireframe: true, ..default() });
+    let lines: usize = bench.meshes(DisplayPiece::Edges).iter().map(|mesh| mesh.indices().unwrap().len() / 2).sum();
+    assert_eq!(lines, wanted.len());
+    bench.show(MeshDisplay::default());
+    let edges = bench.entities(DisplayPiece::Edges);
+    assert!(edges.iter().all(|entity| bench.app.world().get::<Visibility>(*entity) == Some(&Visibility::Hidden)));
+}
+
+#[test]
+fn weights_hold_the_mesh_as_they_hold_its_surface() {
+    let (mut bench, joints) = held_bench();
+    bench.assert_still();
+    let bend = Quat::from_rotation_z(0.7);
+    let entity = bench.joint(joints[1]);
+    bench.app.world_mut().get_mut::<Transform>(entity).unwrap().rotate_local(bend);
+    bench.app.update();
+    let place = bench.app.world().get::<GlobalTransform>(bench.rig).unwrap().affine();
+    let moves: Vec<_> = joints
+        .iter()
+        .map(|uid| {
+            let global = bench.app.world().get::<GlobalTransform>(bench.joint(*uid)).unwrap().affine();
+            let rest: bevy::math::Affine3A = bench.rig().rest_global(*uid).into();
+            place.inverse() * global * rest.inverse()
+        })
+        .collect();
+    let mesh = bench.app.world().get::<RigMesh>(bench.mesh).unwrap().clone();
+    let mut posed = Vec::new();
+    skin_points(&mesh.rest.points, &held_box(&joints).weights, &moves, &mut posed);
+    let on_screen = bench.skinned();
+    assert!(on_screen.len() >= posed.len());
+    for wanted in posed.iter().map(|point| place.transform_point3(*point)) {
+        assert!(on_screen.iter().any(|point| point.distance(wanted) < 1e-5), "nothing is shown at {wanted}");
+    }
+    let moved = posed.iter().zip(&mesh.rest.points).filter(|(a, b)| a.distance(**b) > 0.1);
+    assert_eq!(moved.count(), 4, "the upper half is bent");
+}
+
+#[test]
+fn the_four_strongest_influences_count() {
+    let mut bench = Bench::new(boxes(&[[[-1.0; 3], [1.0; 3]]]));
+    let places: Vec<[f32; 3]> = (0..6).map(|i| [0.0, i as f32 * 0.2, 0.0]).collect();
+    let joints = bench.chain(&places);
+    let mut weights = Weights::default();
+    weights.push([(5, 0.4), (4, 0.2), (3, 0.2), (2, 0.1), (1, 0.06), (0, 0.04)]);
+    (1..8).for_each(|_| weights.push([]));
+    bench.bind(SkinData { joints, weights, at_rest: true });
+    let mesh = bench.meshes(DisplayPiece::Surface).swap_remove(0);
+    let (_, weights) = influences(&mesh);
+    let positions = mesh.attribute(Mesh::ATTRIBUTE_POSITION).unwrap().as_float3().unwrap();
+    for (position, weights) in positions.iter().zip(weights) {
+        assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+        let wanted = if *position == [-1.0; 3] { [0.4, 0.2, 0.2, 0.1].map(|w| w / 0.9) } else { [1.0, 0.0, 0.0, 0.0] };
+        assert!(weights.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-6), "{weights:?} at {position:?}");
+    }
+    bench.assert_still();
+}
+
+#[test]
+fn joints_moved_at_rest_leave_the_mesh_alone() {
+    let (mut bench, joints) = held_bench();
+    // In the very frame of the edit, and of taking it back.
+    bench.edit(Operation::Move { to: vec![(joints[1], Vec3::new(0.5, 1.5, 0.25))], with_children: false });
+    bench.assert_still();
+    bench.change(Change::Undo);
+    bench.assert_still();
+}
+
+#[test]
+fn a_deleted_joint_lets_go_and_comes_back() {
+    let (mut bench, joints) = held_bench();
+    let before = bench.skinned();
+    bench.edit(Operation::Delete { joints: vec![joints[1]], keep_children: false });
+    bench.settle();
+    assert!(bench.rig().joint(joints[1]).is_none());
+    bench.assert_still();
+    let after = bench.skinned();
+    assert!(before.iter().zip(&after).all(|(a, b)| a.distance(*b) < 1e-5));
+    bench.change(Change::Undo);
+    bench.settle();
+    bench.assert_still();
+    let entity = bench.joint(joints[1]);
+    bench.app.world_mut().get_mut::<Transform>(entity).unwrap().rotate_local_z(1.0);
+    bench.app.update();
+    assert!(before.iter().zip(&bench.skinned()).any(|(a, b)| a.distance(*b) > 0.1), "the joint holds the mesh again");
+}
+
+#[test]
+fn rebinding_keeps_what_is_on_the_screen() {
+    let (mut bench, joints) = held_bench();
+    let entities = bench.entities(DisplayPiece::Surface);
+    let mut skin = held_box(&joints);
+    skin.weights = Weights::default();
+    (0..8).for_each(|_| skin.weights.push([(2, 1.0)]));
+    bench.edit(Operation::Edits(vec![RigEdit::SetSkin(MESH, Some(Arc::new(skin)))]));
+    assert_eq!(bench.entities(DisplayPiece::Surface), entities, "pieces are filled again where they are alike");
+    bench.assert_still();
+    bench.edit(Operation::Edits(vec![RigEdit::SetSkin(MESH, None)]));
+    assert!(bench.entities(DisplayPiece::Surface).len() > entities.len(), "both are there until the renderer is ready");
+    bench.settle();
+    let entities = bench.entities(DisplayPiece::Surface);
+    assert_eq!(entities.len(), 1);
+    assert!(bench.app.world().get::<SkinnedMesh>(entities[0]).is_none());
+}
+
+#[test]
+fn weights_have_colours() {
+    let (mut bench, joints) = held_bench();
+    assert!(colors(&bench.meshes(DisplayPiece::Surface)[0]).is_none());
+    let cases = [
+        (WeightColors::Joint(joints[0]), [1.0, 0.25]),
+        (WeightColors::Joint(joints[1]), [0.0, 0.75]),
+        (WeightColors::Joint(Uid(12345)), [0.0, 0.0]),
+    ];
+    for (weights, [lower, upper]) in cases {
+        bench.show(MeshDisplay { weights, ..default() });
+        let mesh = bench.meshes(DisplayPiece::Surface).swap_remove(0);
+        let positions = mesh.attribute(Mesh::ATTRIBUTE_POSITION).unwrap().as_float3().unwrap();
+        for (position, color) in positions.iter().zip(colors(&mesh).unwrap()) {
+            let weight = if position[1] > 1.0 { upper } else { lower };
+            let wanted = weight_color(weight).to_linear().to_f32_array();
+            assert!(color.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-6), "{weights:?} at {position:?}");
+        }
+    }
+    bench.show(MeshDisplay { weights: WeightColors::AllJoints, ..default() });
+    let mesh = bench.meshes(DisplayPiece::Surface).swap_remove(0);
+    let kinds: BTreeSet<[u32; 4]> = colors(&mesh).unwrap().iter().map(|color| color.map(f32::to_bits)).collect();
+    assert_eq!(kinds.len(), 2, "one colour for the lower points and one for the upper");
+    bench.show(MeshDisplay::default());
+    assert!(colors(&bench.meshes(DisplayPiece::Surface)[0]).is_none());
+    assert_eq!(bench.entities(DisplayPiece::Surface).len(), 1);
+}
+
+#[test]
+fn the_ramp_gets_lighter_with_the_weight() {
+    let lightness = |weight: f32| Oklaba::from(weight_color(weight).to_linear()).lightness;
+    let steps: Vec<f32> = (1..=20).map(|step| lightness(step as f32 / 20.0)).collect();
+    assert!(steps.is_sorted(), "{steps:?}");
+    assert_ne!(weight_color(0.0), weight_color(1e-6));
+    assert_eq!(weight_color(f32::NAN), weight_color(0.0));
+}
+
+#[test]
+fn pictures_go_with_their_meshes() {
+    let (mut bench, _) = held_bench();
+    bench.show(MeshDisplay { wireframe: true, ..default() });
+    bench.app.world_mut().entity_mut(bench.mesh).remove::<RigMesh>();
+    bench.app.update();
+    bench.app.update();
+    for kind in [DisplayPiece::Surface, DisplayPiece::Edges] {
+        assert!(bench.entities(kind).is_empty());
+    }
+    let (mut bench, _) = held_bench();
+    bench.app.world_mut().despawn(bench.rig);
+    bench.app.update();
+    assert!(bench.entities(DisplayPiece::Surface).is_empty());
+}
+
+/// Two by two pixels.
+const PNG: [u8; 75] = [
+    137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 2, 0, 0, 0, 2, 8, 2, 0, 0, 0, 253, 212, 154,
+    115, 0, 0, 0, 18, 73, 68, 65, 84, 120, 156, 99, 248, 207, 192, 192, 0, 194, 12, 255, 129, 0, 0, 31, 238, 5, 251,
+    11, 217, 104, 139, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96, 130,
+];
+
+fn textured(bytes: Vec<u8>) -> Model {
+    let mut model = field(2);
+    model.parts[0].uvs = vec![vec![Vec2::ZERO; 9]];
+    model.parts[0].material = Some(0);
+    model.looks.images = vec![ModelImage { name: "skin.png".into(), bytes, ..default() }];
+    model.looks.textures = vec![json!({ "source": 0 })];
+    model.looks.materials = vec![json!({
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [0.5, 0.25, 1.0, 0.5],
+            "baseColorTexture": { "index": 0 },
+            "metallicFactor": 0.25,
+        },
+        "emissiveFactor": [1.0, 0.5, 0.0],
+        "alphaMode": "MASK",
+        "alphaCutoff": 0.75,
+        "doubleSided": true,
+        "extensions": { "KHR_materials_unlit": {}, "KHR_materials_emissive_strength": { "emissiveStrength": 2.0 } },
+    })];
+    model
+}
+
+#[test]
+fn materials_are_the_files() {
+    let mut bench = Bench::new(textured(PNG.to_vec()));
+    let material = bench.materials().swap_remove(0);
+    assert_eq!(material.base_color.to_linear(), LinearRgba::new(0.5, 0.25, 1.0, 0.5));
+    assert_eq!((material.metallic, material.perceptual_roughness), (0.25, 1.0));
+    assert_eq!(material.emissive, LinearRgba::rgb(2.0, 1.0, 0.0));
+    assert_eq!(material.alpha_mode, AlphaMode::Mask(0.75));
+    assert!(material.double_sided && material.cull_mode.is_none() && material.unlit);
+    let images = bench.app.world().resource::<Assets<Image>>();
+    let image = images.get(&material.base_color_texture.unwrap()).expect("the texture is there");
+    assert_eq!((image.width(), image.height(), image.texture_descriptor.mip_level_count), (2, 2, 2));
+    assert_eq!(image.data.as_ref().map(Vec::len), Some(4 * 5));
+
+    bench.show(MeshDisplay { xray: true, ..default() });
+    let material = bench.materials().swap_remove(0);
+    assert!(material.base_color.alpha() < 0.5 && material.alpha_mode == AlphaMode::Blend);
+    bench.show(MeshDisplay { weights: WeightColors::AllJoints, ..default() });
+    assert!(bench.materials().swap_remove(0).base_color_texture.is_none());
+}
+
+#[test]
+fn broken_images_are_noted_and_left_out() {
+    let mut huge = PNG.to_vec();
+    huge[16..24].copy_from_slice(&[0, 0, 250, 0, 0, 0, 250, 0]);
+    let mut cut = PNG.to_vec();
+    cut.truncate(50);
+    let cases = [(Vec::new(), "not found"), (b"GIF89a".to_vec(), "neither"), (cut, "skin.png"), (huge, "256 MiB")];
+    for (bytes, wanted) in cases {
+        let mut bench = Bench::new(textured(bytes));
+        assert!(bench.materials().swap_remove(0).base_color_texture.is_none());
+        let notes = &bench.app.world().resource::<Notes>().0;
+        assert!(notes.len() == 1 && notes[0].contains(wanted), "{wanted}: {notes:?}");
+    }
+}
+
+#[test]
+fn wrong_numbers_draw_nothing_and_break_nothing() {
+    let mut bench = Bench::new(field(1));
+    let whole = RigMesh::new(MESH, field(2), Vec::new());
+    let mut model = field(2);
+    model.parts[0].triangles.push([0, 1, 99]);
+    model.parts[0].vertices[8] = 4000;
+    model.parts[0].material = Some(7);
+    bench.app.world_mut().entity_mut(bench.mesh).insert(RigMesh { rest: Arc::new(model), ..whole });
+    bench.settle();
+    // The corner that is gone belongs to one quad, and two triangles met there.
+    assert_eq!(triangles(&bench.meshes(DisplayPiece::Surface)), 8 - 2);
+    let joints = bench.chain(&[[0.0; 3], [0.0, 1.0, 0.0]]);
+    let mut weights = Weights::default();
+    weights.push([(77, 1.0)]);
+    bench.bind(SkinData { joints, weights, at_rest: true });
+    bench.assert_still();
+    bench.show(MeshDisplay { wireframe: true, weights: WeightColors::AllJoints, ..default() });
+}
