@@ -35,6 +35,11 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// Open the window on a mesh, a template or a project; without a file on the bundled character
+    Edit {
+        /// The file
+        file: Option<PathBuf>,
+    },
     /// Make gestures (clicks, strokes) on a mesh and save the skeleton, or the skinned character
     Sketch(sketch::SketchArgs),
     /// Bind a mesh to a skeleton and save the character
@@ -120,8 +125,11 @@ const SEED: u64 = 0x5249_4753_4D49_5448;
 /// A file to write.
 type Output = PathBuf;
 
-/// Runs the command line of this process.
-pub fn main() -> ExitCode {
+/// Opens the window on a file, or on the bundled character, and returns when it is closed; or says in a line why it cannot.
+pub type OpenWindow<'a> = &'a dyn Fn(Option<PathBuf>) -> Result<ExitCode, String>;
+
+/// Runs the command line of this process. `window` opens the editor, which this module does not know.
+pub fn main(window: OpenWindow) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         // Help and version are answers; only wrong usage has to be told to programs, too.
@@ -131,7 +139,15 @@ pub fn main() -> ExitCode {
         Err(error) => error.exit(),
     };
     let result = match cli.command {
-        None => demo::run(),
+        None if cli.json => demo::run(None),
+        None => match window(None) {
+            Ok(code) => return code,
+            Err(reason) => demo::run(Some(&reason)),
+        },
+        Some(Command::Edit { file }) => match window(file) {
+            Ok(code) => return code,
+            Err(reason) => Err(Failure::Usage(format!("{reason}; sketch, skin and convert work without a window"))),
+        },
         Some(Command::Sketch(args)) => sketch::run(&args),
         Some(Command::Skin(args)) => skin::run(&args),
         Some(Command::Convert(args)) => convert::run(&args),

@@ -4,12 +4,26 @@
 //! the pointer does in the viewport and write the same requests that gesture lists and games write.
 
 pub mod actions;
+pub mod app;
 pub mod camera;
+pub mod dock;
+pub mod files;
+pub mod keys;
+mod menu;
 pub mod mode;
 pub mod notice;
 pub mod panel;
 pub mod pointer;
+pub mod probe;
+pub mod screen;
+pub mod settings;
+mod status;
+pub mod style;
+mod toolbar;
 pub mod tools;
+<<<<<<< HEAD
+=======
+>>>>>>> 8088779 (Open a window: dock, toolbar, menus, keys, camera, files)
 
 use bevy::prelude::*;
 

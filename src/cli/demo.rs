@@ -18,8 +18,12 @@ use crate::{
 const MESH: &[u8] = include_bytes!("../../assets/models/biped.obj");
 const GESTURES: &[u8] = include_bytes!("../../assets/gestures/biped.ron");
 
-pub(super) fn run() -> Result<Report, Failure> {
+/// Does it without a window; `reason` says why.
+pub(super) fn run(reason: Option<&str>) -> Result<Report, Failure> {
     let mut report = Report::default();
+    if let Some(reason) = reason {
+        report.line(format!("No window: {reason}. Doing the job without one."));
+    }
     report.line("Rigging the bundled character; give a command to rig yours (see below).");
     let model = read_model(MESH, "biped", &ObjSettings::default(), &mut |_| None)
         .map_err(|error| Failure::Input(Box::new(error)))?;

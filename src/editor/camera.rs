@@ -1,9 +1,321 @@
-//! The camera of the viewport.
+//! The camera of the viewport: it turns about a point, and stays where the user put it.
+//!
+//! | | mouse | trackpad | pen |
+//! | --- | --- | --- | --- |
+//! | orbit | middle drag, or Alt and left drag | two fingers | Alt and drag |
+//! | pan | right drag, or Shift and middle drag | Shift and two fingers | Alt, Shift and drag |
+//! | zoom | wheel, or Alt and right drag | Control and two fingers, or pinch | wheel |
 
-use bevy::prelude::*;
+use bevy::{
+    camera::{Viewport, visibility::RenderLayers},
+    prelude::*,
+    window::PrimaryWindow,
+};
+use bevy_panorbit_camera::{PanOrbitCamera, PanOrbitCameraPlugin, PanOrbitCameraSystemSet, TrackpadBehavior};
 
-use crate::plugins::viewport::Sight;
+use super::{
+    ActiveRig,
+    actions::{Action, ActionRequest},
+    pointer::{PointerState, ViewportArea, WheelUse},
+};
+use crate::{
+    algo::view::View,
+    plugins::{
+        document::{JointEntities, Selection},
+        surface::RigSurface,
+        viewport::{RigViewport, Sight},
+    },
+    rig::Rig,
+};
+
+/// Adds the viewport's camera.
+pub struct CameraPlugin;
+
+impl Plugin for CameraPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins(PanOrbitCameraPlugin)
+            .init_resource::<ViewportSight>()
+            .init_resource::<FrameWhenReady>()
+            .add_systems(Startup, spawn_camera)
+            .add_systems(PreUpdate, see.after(super::pointer::follow_pointer))
+            .add_systems(Update, (carry_out, frame_when_ready))
+            .add_systems(PostUpdate, (steer, fit_viewport).chain().before(PanOrbitCameraSystemSet))
+            .add_systems(PostUpdate, keep_depths.after(PanOrbitCameraSystemSet).before(TransformSystems::Propagate));
+    }
+}
 
 /// What the viewport sees of the active rig; `None` while there is nothing to see it with.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
 pub struct ViewportSight(pub Option<Sight>);
+
+/// Set to show everything as soon as there is something to show: after a file was opened.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FrameWhenReady(pub bool);
+
+/// Vertical field of view of the perspective camera, in radians: that of a 50 mm lens, about.
+const FIELD_OF_VIEW: f32 = 0.55;
+
+fn spawn_camera(mut commands: Commands) {
+    commands.spawn((
+        Camera3d::default(),
+        RigViewport::default(),
+        Projection::Perspective(PerspectiveProjection { fov: FIELD_OF_VIEW, ..default() }),
+        Transform::from_xyz(0.0, 1.0, 4.0).looking_at(Vec3::Y, Vec3::Y),
+        RenderLayers::layer(0),
+        PanOrbitCamera {
+            focus: Vec3::Y,
+            orbit_smoothness: 0.0,
+            pan_smoothness: 0.0,
+            zoom_smoothness: 0.0,
+            button_orbit: MouseButton::Middle,
+            button_pan: MouseButton::Right,
+            trackpad_behavior: TrackpadBehavior::blender_default(),
+            trackpad_pinch_to_zoom_enabled: true,
+            zoom_lower_limit: 1e-4,
+            ..default()
+        },
+    ));
+}
+
+/// Keeps [`ViewportSight`] true: after the last frame's transforms have propagated, before tools read it.
+fn see(
+    cameras: Query<(&GlobalTransform, &Projection, &RigViewport), With<PanOrbitCamera>>,
+    rig: Option<Res<ActiveRig>>,
+    places: Query<&GlobalTransform>,
+    area: Res<ViewportArea>,
+    mut sight: ResMut<ViewportSight>,
+) {
+    let place = rig.and_then(|rig| places.get(rig.0).ok()).copied().unwrap_or_default();
+    let next = cameras
+        .single()
+        .ok()
+        .and_then(|(camera, projection, viewport)| Sight::new(camera, projection, viewport, area.size, &place));
+    sight.set_if_neq(ViewportSight(next));
+}
+
+/// Views, framing and projection.
+fn carry_out(
+    mut actions: MessageReader<ActionRequest>,
+    mut cameras: Query<(&mut PanOrbitCamera, &mut Projection)>,
+    rig: Option<Res<ActiveRig>>,
+    rigs: Query<(&Rig, &Selection, &JointEntities, &GlobalTransform, Option<&RigSurface>)>,
+    places: Query<&GlobalTransform>,
+    area: Res<ViewportArea>,
+) {
+    for ActionRequest(action) in actions.read() {
+        let Ok((mut camera, mut projection)) = cameras.single_mut() else { continue };
+        let found = rig.as_ref().and_then(|rig| rigs.get(rig.0).ok());
+        match action {
+            Action::ViewFront => turn(&mut camera, View::Front),
+            Action::ViewBack => turn(&mut camera, View::Back),
+            Action::ViewLeft => turn(&mut camera, View::Left),
+            Action::ViewRight => turn(&mut camera, View::Right),
+            Action::ViewTop => turn(&mut camera, View::Top),
+            Action::ViewBottom => turn(&mut camera, View::Bottom),
+            Action::Projection => {
+                *projection = match &*projection {
+                    Projection::Perspective(_) => Projection::Orthographic(OrthographicProjection {
+                        scaling_mode: bevy::camera::ScalingMode::FixedVertical {
+                            viewport_height: 2.0 * bevy::math::ops::tan(FIELD_OF_VIEW * 0.5),
+                        },
+                        ..OrthographicProjection::default_3d()
+                    }),
+                    _ => Projection::Perspective(PerspectiveProjection { fov: FIELD_OF_VIEW, ..default() }),
+                };
+                camera.force_update = true;
+            }
+            Action::FrameSelected | Action::FrameAll => {
+                let Some((data, selection, entities, place, surface)) = found else { continue };
+                let joints = selection.0.iter().filter_map(|joint| places.get(entities.get(*joint)?).ok());
+                let points: Vec<Vec3> = joints.map(GlobalTransform::translation).collect();
+                let bounds = match (*action, points.as_slice()) {
+                    (Action::FrameSelected, [first, rest @ ..]) => {
+                        let around = rest.iter().fold([*first; 2], |[low, high], p| [low.min(*p), high.max(*p)]);
+                        let margin = surface.map_or(0.1, |surface| extent(surface.bounds()) * 0.08);
+                        [around[0] - margin, around[1] + margin]
+                    }
+                    _ => everything(surface, place, data, entities, &places),
+                };
+                frame(&mut camera, bounds, area.size);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Bounds in the world of a rig's surface and joints; a cube of one unit if there is neither.
+fn everything(
+    surface: Option<&RigSurface>,
+    place: &GlobalTransform,
+    rig: &Rig,
+    entities: &JointEntities,
+    places: &Query<&GlobalTransform>,
+) -> [Vec3; 2] {
+    if let Some(surface) = surface {
+        let [low, high] = surface.bounds();
+        let corners = (0..8).map(|bits: u32| {
+            let pick = |bit: u32, low: f32, high: f32| if bits & bit == 0 { low } else { high };
+            place.transform_point(Vec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z)))
+        });
+        return around(corners);
+    }
+    let joints = rig.walk().filter_map(|joint| places.get(entities.get(joint.data.uid)?).ok());
+    around(joints.map(GlobalTransform::translation))
+}
+
+fn around(points: impl Iterator<Item = Vec3>) -> [Vec3; 2] {
+    let bounds = points.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)]);
+    if bounds[0].is_finite() { bounds } else { [Vec3::new(-0.5, 0.0, -0.5), Vec3::new(0.5, 1.0, 0.5)] }
+}
+
+fn extent([low, high]: [Vec3; 2]) -> f32 {
+    (high - low).max_element().max(1e-6)
+}
+
+/// Turns the camera without moving what it looks at.
+fn turn(camera: &mut PanOrbitCamera, view: View) {
+    let (yaw, pitch) = angles(view);
+    camera.target_yaw = yaw;
+    camera.target_pitch = pitch;
+    camera.force_update = true;
+}
+
+/// Yaw and pitch in radians of a view.
+pub fn angles(view: View) -> (f32, f32) {
+    use std::f32::consts::{FRAC_PI_2, PI};
+    match view {
+        View::Front => (0.0, 0.0),
+        View::Back => (PI, 0.0),
+        View::Left => (FRAC_PI_2, 0.0),
+        View::Right => (-FRAC_PI_2, 0.0),
+        View::Top => (0.0, FRAC_PI_2),
+        View::Bottom => (0.0, -FRAC_PI_2),
+        View::Orbit(yaw, pitch) => (yaw.to_radians(), pitch.to_radians()),
+    }
+}
+
+/// Moves the camera so that a box fills the viewport, from where it looks now.
+fn frame(camera: &mut PanOrbitCamera, [low, high]: [Vec3; 2], size: Vec2) {
+    let centre = (low + high) * 0.5;
+    let (sin, cos) = bevy::math::ops::sin_cos(camera.target_yaw);
+    let reach = (high - low) * 0.5;
+    // Half the width and height of the box as this view sees it, and its depth before the centre.
+    let across = reach.x * cos.abs() + reach.z * sin.abs();
+    let (sin_pitch, cos_pitch) = bevy::math::ops::sin_cos(camera.target_pitch);
+    let deep = reach.x * sin.abs() + reach.z * cos.abs();
+    let tall = reach.y * cos_pitch.abs() + deep * sin_pitch.abs();
+    let before = deep * cos_pitch.abs() + reach.y * sin_pitch.abs();
+    let aspect = if size.y > 0.0 { (size.x / size.y).max(0.1) } else { 1.5 };
+    let half = bevy::math::ops::tan(FIELD_OF_VIEW * 0.5);
+    let distance = 1.12 * (tall / half).max(across / (half * aspect)) + before;
+    camera.target_focus = centre;
+    camera.target_radius = distance.max(1e-3);
+    camera.zoom_upper_limit = Some(camera.target_radius * 50.0);
+    camera.force_update = true;
+}
+
+/// Shows everything once the mesh of a file that was opened is there.
+fn frame_when_ready(
+    mut wanted: ResMut<FrameWhenReady>,
+    rig: Option<Res<ActiveRig>>,
+    rigs: Query<(&Rig, &JointEntities, &GlobalTransform, Option<&RigSurface>)>,
+    places: Query<&GlobalTransform>,
+    mut cameras: Query<&mut PanOrbitCamera>,
+    area: Res<ViewportArea>,
+) {
+    if !wanted.0 || area.size.x < 1.0 {
+        return;
+    }
+    let Some((data, entities, place, surface)) = rig.and_then(|rig| rigs.get(rig.0).ok()) else { return };
+    let Ok(mut camera) = cameras.single_mut() else { return };
+    if surface.is_none() && data.is_empty() {
+        return;
+    }
+    frame(&mut camera, everything(surface, place, data, entities, &places), area.size);
+    wanted.0 = false;
+}
+
+/// Gives the camera the buttons that are its own now, and takes the wheel away while a tool has it.
+fn steer(
+    mut cameras: Query<&mut PanOrbitCamera>,
+    area: Res<ViewportArea>,
+    wheel: Res<WheelUse>,
+    pointer: Res<PointerState>,
+    keys: Res<ButtonInput<KeyCode>>,
+) {
+    let Ok(mut camera) = cameras.single_mut() else { return };
+    let alt = keys.any_pressed([KeyCode::AltLeft, KeyCode::AltRight]);
+    let shift = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
+    let control = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
+    let (orbit, pan, zoom) = match (alt, shift) {
+        (true, false) => (MouseButton::Left, MouseButton::Middle, Some(MouseButton::Right)),
+        (true, true) => (MouseButton::Middle, MouseButton::Left, Some(MouseButton::Right)),
+        (false, true) => (MouseButton::Other(0), MouseButton::Middle, None),
+        (false, false) => (MouseButton::Middle, MouseButton::Right, None),
+    };
+    let wheel_free = *wheel == WheelUse::Zoom || control;
+    let enabled = !pointer.is_captured() && (pointer.is_camera() || (area.pointer.is_some() && wheel_free));
+    if camera.enabled != enabled || (camera.button_orbit, camera.button_pan, camera.button_zoom) != (orbit, pan, zoom) {
+        camera.enabled = enabled;
+        camera.button_orbit = orbit;
+        camera.button_pan = pan;
+        camera.button_zoom = zoom;
+    }
+}
+
+/// Draws into the part of the window that the panels leave.
+fn fit_viewport(
+    area: Res<ViewportArea>,
+    windows: Query<&Window, With<PrimaryWindow>>,
+    mut cameras: Query<&mut Camera, With<PanOrbitCamera>>,
+) {
+    let (Ok(window), Ok(mut camera)) = (windows.single(), cameras.single_mut()) else { return };
+    let limit = UVec2::new(window.physical_width(), window.physical_height());
+    let scale = if area.scale > 0.0 { area.scale } else { 1.0 };
+    let min = (area.min * scale).round().max(Vec2::ZERO).as_uvec2().min(limit);
+    let max = ((area.min + area.size) * scale).round().max(Vec2::ZERO).as_uvec2().min(limit);
+    if max.cmple(min).any() {
+        if camera.is_active {
+            camera.is_active = false;
+        }
+        return;
+    }
+    let (position, size) = (min, max - min);
+    let same = camera.viewport.as_ref().is_some_and(|v| v.physical_position == position && v.physical_size == size);
+    if !same || !camera.is_active {
+        camera.is_active = true;
+        camera.viewport = Some(Viewport { physical_position: position, physical_size: size, ..default() });
+    }
+}
+
+/// Keeps the distance to the focus known and the clipping planes beyond everything.
+fn keep_depths(
+    mut cameras: Query<(&mut PanOrbitCamera, &Transform, &mut Projection, &mut RigViewport), Changed<Transform>>,
+) {
+    for (mut orbit, place, mut projection, mut viewport) in &mut cameras {
+        let focus = place.translation.distance(orbit.focus).max(1e-6);
+        if viewport.focus != focus {
+            viewport.focus = focus;
+        }
+        let changed = |now: f32, wanted: f32| !((now / wanted - 1.0).abs() < 0.3);
+        let next = match &*projection {
+            Projection::Perspective(perspective) => {
+                let near = (focus * 0.01).clamp(1e-5, 0.1);
+                let next = PerspectiveProjection { near, far: near * 1e6, ..perspective.clone() };
+                changed(perspective.near, near).then_some(Projection::Perspective(next))
+            }
+            Projection::Orthographic(orthographic) => {
+                // The camera stands in the middle between the planes: far enough not to cut into the mesh.
+                let framed = orbit.zoom_upper_limit.unwrap_or_default() * 0.1;
+                let far = 2.0 * framed.max(orbit.target_radius * 5.0);
+                let next = OrthographicProjection { near: 0.0, far, ..orthographic.clone() };
+                changed(orthographic.far, far).then_some(Projection::Orthographic(next))
+            }
+            Projection::Custom(_) => None,
+        };
+        if let Some(next) = next {
+            *projection = next;
+            orbit.force_update = true;
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! The window: what it is made of, and when it cannot be opened.
+
+use std::{path::PathBuf, time::Duration};
+
+use bevy::{
+    asset::UnapprovedPathMode,
+    camera::{CameraOutputMode, visibility::RenderLayers},
+    prelude::*,
+    render::{
+        RenderPlugin,
+        renderer::RenderAdapterInfo,
+        settings::{RenderCreation, WgpuSettings},
+    },
+    window::{ExitCondition, WindowResolution},
+    winit::{UpdateMode, WinitSettings},
+};
+use bevy_egui::{EguiGlobalSettings, EguiPlugin, PrimaryEguiContext};
+use wgpu::BlendState;
+
+use super::{
+    ActiveRig,
+    actions::{Action, ActionRequest},
+    camera::CameraPlugin,
+    dock::DockPlugin,
+    files::{FilesPlugin, Loading, OpenRequest},
+    keys::KeysPlugin,
+    mode::Mode,
+    notice::{Notice, StatusLine},
+    pointer::PointerPlugin,
+    screen::ScreenPlugin,
+    settings::SettingsPlugin,
+};
+use crate::plugins::{
+    RigPlugins,
+    display::DisplayPlugin,
+    document::{Change, EditRequest},
+    drawing::DrawingPlugin,
+    skinning::SkinningJob,
+};
+
+/// What to open, and how.
+#[derive(Debug, Clone, Default)]
+pub struct EditorOptions {
+    /// The file to open; the bundled character without one.
+    pub file: Option<PathBuf>,
+}
+
+/// Why the window could not be opened. One line, said before the work is done without it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NoWindow {
+    /// No display.
+    #[error("there is no display to open a window on ({0})")]
+    Display(String),
+    /// No graphics adapter.
+    #[error(
+        "there is no graphics adapter, not even a software one; install a Vulkan driver (Debian: mesa-vulkan-drivers)"
+    )]
+    Adapter,
+    /// The window system refused.
+    #[error("the window could not be opened: {0}")]
+    Refused(String),
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// If there is no display or no adapter; nothing has been changed then, and the work can be done without a window.
+pub fn run(options: EditorOptions) -> Result<AppExit, NoWindow> {
+    super::probe::display().map_err(NoWindow::Display)?;
+    if !super::probe::adapter() {
+        return Err(NoWindow::Adapter);
+    }
+    // The event loop is made while plugins are built; where the display refuses it, Bevy panics.
+    let built = std::panic::catch_unwind(|| {
+        let mut app = App::new();
+        app.add_plugins(EditorPlugin { options });
+        app
+    });
+    match built {
+        Ok(mut app) => Ok(app.run()),
+        Err(cause) => {
+            let text = cause.downcast_ref::<String>().cloned();
+            let text = text.or_else(|| cause.downcast_ref::<&str>().map(|text| (*text).to_owned()));
+            Err(NoWindow::Refused(text.unwrap_or_else(|| "the window system gave no reason".to_owned())))
+        }
+    }
+}
+
+/// Everything the window is made of, Bevy's own plugins included.
+pub struct EditorPlugin {
+    /// What to open.
+    pub options: EditorOptions,
+}
+
+/// What to open at the start.
+#[derive(Resource, Debug, Clone)]
+struct OpenFirst(OpenRequest);
+
+impl Plugin for EditorPlugin {
+    fn build(&self, app: &mut App) {
+        let first = self.options.file.clone().map_or(OpenRequest::Bundled, OpenRequest::File);
+        let window = Window {
+            title: "Rigsmith".to_owned(),
+            name: Some("rigsmith".to_owned()),
+            resolution: WindowResolution::new(1280, 720),
+            ..default()
+        };
+        app.add_plugins(
+            DefaultPlugins
+                .set(WindowPlugin {
+                    primary_window: Some(window),
+                    exit_condition: ExitCondition::OnPrimaryClosed,
+                    close_when_requested: false,
+                    ..default()
+                })
+                .set(RenderPlugin {
+                    render_creation: RenderCreation::Automatic(Box::new(WgpuSettings::default())),
+                    ..default()
+                })
+                .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Deny, ..default() })
+                .disable::<bevy::gizmos::transform_gizmo::TransformGizmoPlugin>(),
+        )
+        .add_plugins(EguiPlugin::default())
+        .add_plugins((RigPlugins, DisplayPlugin, DrawingPlugin))
+        .add_plugins((SettingsPlugin, KeysPlugin, PointerPlugin, DockPlugin, CameraPlugin, ScreenPlugin, FilesPlugin))
+        .add_plugins((super::panels::PanelsPlugin, super::tools::ToolsPlugin))
+        .insert_resource(WinitSettings {
+            focused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
+            unfocused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
+        })
+        .insert_resource(OpenFirst(first))
+        .init_resource::<Mode>()
+        .init_resource::<StatusLine>()
+        .add_message::<Notice>()
+        .add_systems(Startup, (spawn_interface, open_first, say_adapter))
+        .add_systems(Update, (carry_out, redraw_while_busy));
+    }
+}
+
+/// The camera that panels are drawn by: above the others, seeing nothing itself.
+fn spawn_interface(mut commands: Commands, mut settings: ResMut<EguiGlobalSettings>) {
+    settings.auto_create_primary_context = false;
+    commands.spawn((
+        PrimaryEguiContext,
+        Camera2d,
+        RenderLayers::none(),
+        Camera {
+            order: 100,
+            output_mode: CameraOutputMode::Write {
+                blend_state: Some(BlendState::ALPHA_BLENDING),
+                clear_color: ClearColorConfig::None,
+            },
+            clear_color: ClearColorConfig::Custom(Color::NONE),
+            ..default()
+        },
+    ));
+}
+
+fn open_first(first: Res<OpenFirst>, mut requests: MessageWriter<OpenRequest>) {
+    requests.write(first.0.clone());
+}
+
+/// Says so if a program draws instead of a graphics card.
+fn say_adapter(adapter: Option<Res<RenderAdapterInfo>>, mut notices: MessageWriter<Notice>) {
+    let Some(adapter) = adapter else { return };
+    if adapter.device_type == wgpu::DeviceType::Cpu {
+        notices
+            .write(Notice::info(format!("No graphics card: drawing in software ({}), which is slower", adapter.name)));
+    }
+}
+
+/// Modes, undo and redo.
+fn carry_out(
+    mut actions: MessageReader<ActionRequest>,
+    mut mode: ResMut<Mode>,
+    rig: Option<Res<ActiveRig>>,
+    mut edits: MessageWriter<EditRequest>,
+) {
+    for ActionRequest(action) in actions.read() {
+        match action {
+            Action::Mode(next) => {
+                mode.set_if_neq(*next);
+            }
+            Action::Undo | Action::Redo => {
+                let Some(rig) = &rig else { continue };
+                let change = if *action == Action::Undo { Change::Undo } else { Change::Redo };
+                edits.write(EditRequest { rig: rig.0, change });
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Draws on as long as something goes on in the background; else the window sleeps until somebody does something.
+fn redraw_while_busy(
+    loading: Res<Loading>,
+    jobs: Query<(), With<SkinningJob>>,
+    mut redraw: MessageWriter<bevy::window::RequestRedraw>,
+) {
+    if loading.what().is_some() || !jobs.is_empty() {
+        redraw.write(bevy::window::RequestRedraw);
+    }
+}

@@ -1,0 +1,197 @@
+//! The window's frame: menu and toolbar above, status line below, panels docked around the viewport.
+//!
+//! Everything is drawn in one system that lends the world out for reading; what panels ask for is carried out after
+//! the last of them.
+
+use bevy::{ecs::system::SystemState, prelude::*, window::PrimaryWindow};
+use bevy_egui::{EguiContext, EguiPrimaryContextPass, PrimaryEguiContext, egui};
+use egui_dock::{DockArea, DockState, NodeIndex, TabViewer, tab_viewer::OnCloseResponse};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    menu,
+    panel::{Panels, Requests},
+    pointer::ViewportArea,
+    status, style, toolbar,
+};
+
+/// Draws the window.
+pub struct DockPlugin;
+
+impl Plugin for DockPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Panels>().init_resource::<Layout>().add_systems(EguiPrimaryContextPass, draw);
+    }
+}
+
+/// The name of the tab that is the viewport.
+pub const VIEWPORT: &str = "Viewport";
+
+/// Where the panels are; remembered between runs.
+#[derive(Resource, Clone, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Layout {
+    dock: DockState<String>,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        let mut dock = DockState::new(vec![VIEWPORT.to_owned()]);
+        let tabs = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let tree = dock.main_surface_mut();
+        let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy"]));
+        let [centre, right] = tree.split_right(centre, 0.75, tabs(&["Properties", "Skinning"]));
+        let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Poses"]));
+        let [_, _] = tree.split_below(centre, 0.84, tabs(&["Log"]));
+        Self { dock }
+    }
+}
+
+impl Layout {
+    /// True if a panel is shown.
+    pub fn shows(&self, title: &str) -> bool {
+        self.dock.iter_all_tabs().any(|(_, tab)| tab == title)
+    }
+
+    /// Shows or hides a panel. The viewport stays.
+    pub fn toggle(&mut self, title: &str) {
+        if title == VIEWPORT {
+            return;
+        }
+        match self.dock.find_tab_from(|tab| tab == title) {
+            Some(path) => {
+                self.dock.remove_tab(path);
+            }
+            None => self.dock.push_to_first_leaf(title.to_owned()),
+        }
+    }
+
+    /// Drops panels that do not exist (of another version), and brings the viewport back if it is not there.
+    pub fn repair(&mut self, known: &[&str]) {
+        self.dock.retain_tabs(|tab| tab == VIEWPORT || known.contains(&tab.as_str()));
+        if !self.shows(VIEWPORT) {
+            *self = Self::default();
+        }
+    }
+}
+
+/// Draws everything, then carries out what was asked for.
+fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<PrimaryEguiContext>>>) {
+    let context = match state.get_mut(world) {
+        Ok(mut contexts) => contexts.single_mut().ok().map(|mut context| context.get_mut().clone()),
+        Err(_) => None,
+    };
+    let Some(ctx) = context else { return };
+    style::apply(&ctx);
+    let (Some(mut panels), Some(mut layout)) = (world.remove_resource::<Panels>(), world.remove_resource::<Layout>())
+    else {
+        return;
+    };
+    let mut requests = Requests::default();
+    let mut viewport = None;
+    let mut ui = egui::Ui::new(
+        ctx.clone(),
+        "window".into(),
+        egui::UiBuilder::new().layer_id(egui::LayerId::background()).max_rect(ctx.viewport_rect()),
+    );
+    let titles: Vec<&'static str> = panels.panels.iter().map(|panel| panel.title()).collect();
+    egui::Panel::top("menu")
+        .frame(style::bar(&ctx))
+        .show(&mut ui, |ui| menu::show(ui, world, &layout, &titles, &mut requests));
+    egui::Panel::top("toolbar").frame(style::bar(&ctx)).show(&mut ui, |ui| toolbar::show(ui, world, &mut requests));
+    egui::Panel::bottom("status").frame(style::bar(&ctx)).show(&mut ui, |ui| status::show(ui, world));
+    egui::CentralPanel::no_frame().show(&mut ui, |ui| {
+        let mut tabs = Tabs { panels: &mut panels, world, requests: &mut requests, viewport: &mut viewport };
+        DockArea::new(&mut layout.dock)
+            .style(style::dock(&ctx))
+            .show_leaf_close_all_buttons(false)
+            .show_leaf_collapse_buttons(false)
+            .show_inside(ui, &mut tabs);
+    });
+    for overlay in &mut panels.overlays {
+        overlay.show(&ctx, world, &mut requests);
+    }
+    world.insert_resource(panels);
+    world.insert_resource(layout);
+    remember_area(world, viewport);
+    requests.carry_out(world);
+}
+
+/// Tells the pointer and the camera where the viewport is.
+fn remember_area(world: &mut World, viewport: Option<egui::Rect>) {
+    let scale = world.query_filtered::<&Window, With<PrimaryWindow>>().single(world).map_or(1.0, Window::scale_factor);
+    let Some(mut area) = world.get_resource_mut::<ViewportArea>() else { return };
+    let rect = viewport.unwrap_or(egui::Rect::NOTHING);
+    let (min, size) = if rect.is_positive() {
+        (Vec2::new(rect.min.x, rect.min.y), Vec2::new(rect.width(), rect.height()))
+    } else {
+        (Vec2::ZERO, Vec2::ZERO)
+    };
+    if area.min != min || area.size != size || area.scale != scale {
+        area.min = min;
+        area.size = size;
+        area.scale = scale;
+    }
+}
+
+/// The contents of tabs.
+struct Tabs<'a> {
+    panels: &'a mut Panels,
+    world: &'a World,
+    requests: &'a mut Requests,
+    viewport: &'a mut Option<egui::Rect>,
+}
+
+impl TabViewer for Tabs<'_> {
+    type Tab = String;
+
+    fn id(&mut self, tab: &mut String) -> egui::Id {
+        egui::Id::new(tab.as_str())
+    }
+
+    fn title(&mut self, tab: &mut String) -> egui::WidgetText {
+        tab.as_str().into()
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, tab: &mut String) {
+        if tab == VIEWPORT {
+            let rect = ui.max_rect();
+            *self.viewport = Some(rect);
+            ui.allocate_rect(rect, egui::Sense::hover());
+            let painter = ui.painter_at(rect);
+            for painted in &mut self.panels.painters {
+                painted.paint(&painter, rect, self.world);
+            }
+            for painted in &mut self.panels.painters {
+                painted.widgets(ui, rect, self.world, self.requests);
+            }
+            return;
+        }
+        match self.panels.panels.iter_mut().find(|panel| panel.title() == tab) {
+            Some(panel) => panel.show(ui, self.world, self.requests),
+            None => {
+                ui.weak("This panel does not exist in this version.");
+            }
+        }
+    }
+
+    fn on_close(&mut self, _tab: &mut String) -> OnCloseResponse {
+        OnCloseResponse::Close
+    }
+
+    fn is_closeable(&self, tab: &String) -> bool {
+        tab != VIEWPORT
+    }
+
+    fn allowed_in_windows(&self, tab: &mut String) -> bool {
+        tab != VIEWPORT
+    }
+
+    fn clear_background(&self, tab: &String) -> bool {
+        tab != VIEWPORT
+    }
+
+    fn scroll_bars(&self, _tab: &String) -> [bool; 2] {
+        [false, false]
+    }
+}

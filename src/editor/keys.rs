@@ -1,0 +1,213 @@
+//! Which key asks for which action.
+//!
+//! Every action has at most one default key, and no key has two. People may bind others in the settings file.
+
+use bevy::{
+    input::{
+        ButtonState,
+        keyboard::{Key, KeyboardInput},
+    },
+    prelude::*,
+    window::WindowFocused,
+};
+use bevy_egui::{EguiContext, PrimaryEguiContext};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    actions::{Action, ActionRequest},
+    mode::Mode,
+    pointer::Held,
+};
+
+/// Turns keys into actions.
+pub struct KeysPlugin;
+
+impl Plugin for KeysPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<KeyBindings>()
+            .add_message::<ActionRequest>()
+            .add_systems(PreUpdate, press_keys.after(bevy::input::InputSystems));
+    }
+}
+
+/// A key with its modifiers, for example `Ctrl+Shift+S`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Chord {
+    /// The key as people call it: `A`, `1`, `Tab`, `Delete`, `F2`.
+    pub key: String,
+    /// Control, or Command.
+    pub control: bool,
+    /// Shift.
+    pub shift: bool,
+    /// Alt.
+    pub alt: bool,
+}
+
+/// Why a text names no key.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` names no key; write one such as `S`, `Ctrl+S`, `Shift+F`, `Tab` or `F2`")]
+pub struct ChordError(String);
+
+impl TryFrom<String> for Chord {
+    type Error = ChordError;
+
+    fn try_from(text: String) -> Result<Self, ChordError> {
+        let mut chord = Self { key: String::new(), control: false, shift: false, alt: false };
+        for part in text.split('+') {
+            match part.trim() {
+                "Ctrl" | "Cmd" => chord.control = true,
+                "Shift" => chord.shift = true,
+                "Alt" => chord.alt = true,
+                key if chord.key.is_empty() && !key.is_empty() => chord.key = key.to_owned(),
+                _ => return Err(ChordError(text.clone())),
+            }
+        }
+        if chord.key.is_empty() { Err(ChordError(text)) } else { Ok(chord) }
+    }
+}
+
+impl From<Chord> for String {
+    fn from(chord: Chord) -> Self {
+        chord.to_string()
+    }
+}
+
+impl std::fmt::Display for Chord {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (held, name) in [(self.control, "Ctrl+"), (self.shift, "Shift+"), (self.alt, "Alt+")] {
+            if held {
+                f.write_str(name)?;
+            }
+        }
+        f.write_str(&self.key)
+    }
+}
+
+/// Keys and their actions.
+#[derive(Resource, Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct KeyBindings(pub Vec<(Chord, Action)>);
+
+/// The keys as they come.
+const DEFAULTS: &[(&str, Action)] = &[
+    ("Q", Action::Mode(Mode::Select)),
+    ("A", Action::Mode(Mode::Place)),
+    ("S", Action::Mode(Mode::Stroke)),
+    ("W", Action::Mode(Mode::Move)),
+    ("E", Action::Mode(Mode::Rotate)),
+    ("R", Action::Mode(Mode::Scale)),
+    ("P", Action::Mode(Mode::Pose)),
+    ("G", Action::Mode(Mode::Weights)),
+    ("Ctrl+N", Action::New),
+    ("Ctrl+O", Action::Open),
+    ("Ctrl+S", Action::Save),
+    ("Ctrl+Shift+S", Action::SaveAs),
+    ("Ctrl+E", Action::Export),
+    ("Ctrl+Q", Action::Quit),
+    ("Ctrl+Z", Action::Undo),
+    ("Ctrl+Shift+Z", Action::Redo),
+    ("Ctrl+Y", Action::Redo),
+    ("Delete", Action::Delete),
+    ("Shift+Delete", Action::DeleteHierarchy),
+    ("Ctrl+A", Action::SelectAll),
+    ("Ctrl+D", Action::SelectNone),
+    ("Ctrl+M", Action::MirrorSelected),
+    ("M", Action::Symmetry),
+    ("C", Action::MoveChildren),
+    ("Enter", Action::Accept),
+    ("Escape", Action::Cancel),
+    ("Tab", Action::NextVolume),
+    ("B", Action::Skin),
+    ("Shift+P", Action::ResetPose),
+    ("Ctrl+P", Action::StorePose),
+    ("V", Action::GizmoSpace),
+    ("F", Action::FrameSelected),
+    ("Home", Action::FrameAll),
+    ("1", Action::ViewFront),
+    ("Ctrl+1", Action::ViewBack),
+    ("3", Action::ViewLeft),
+    ("Ctrl+3", Action::ViewRight),
+    ("7", Action::ViewTop),
+    ("Ctrl+7", Action::ViewBottom),
+    ("5", Action::Projection),
+    ("X", Action::XRay),
+    ("Z", Action::Wireframe),
+    ("L", Action::Labels),
+    ("Shift+L", Action::LocalAxes),
+    ("Shift+G", Action::Grid),
+    ("F1", Action::Help),
+];
+
+impl Default for KeyBindings {
+    fn default() -> Self {
+        let chords =
+            DEFAULTS.iter().filter_map(|(text, action)| Some((Chord::try_from((*text).to_owned()).ok()?, *action)));
+        Self(chords.collect())
+    }
+}
+
+impl KeyBindings {
+    /// The action of a key.
+    pub fn action(&self, chord: &Chord) -> Option<Action> {
+        self.0.iter().find(|(known, _)| known == chord).map(|(_, action)| *action)
+    }
+
+    /// The first key of an action, for menus and tooltips.
+    pub fn key(&self, action: Action) -> Option<&Chord> {
+        self.0.iter().find(|(_, known)| *known == action).map(|(chord, _)| chord)
+    }
+
+    /// Chords that ask for two different things.
+    pub fn doubles(&self) -> Vec<&Chord> {
+        let twice = |number: usize| self.0[..number].iter().any(|(chord, _)| *chord == self.0[number].0);
+        (0..self.0.len()).filter(|number| twice(*number)).map(|number| &self.0[number].0).collect()
+    }
+}
+
+/// The name of a key as people call it: letters by what they type, everything else by its place.
+pub fn key_name(input: &KeyboardInput) -> Option<String> {
+    if let Key::Character(text) = &input.logical_key {
+        let mut letters = text.chars();
+        if let (Some(letter), None) = (letters.next(), letters.next())
+            && letter.is_alphabetic()
+        {
+            return Some(letter.to_uppercase().collect());
+        }
+    }
+    let name = format!("{:?}", input.key_code);
+    let name = name.strip_prefix("Key").or(name.strip_prefix("Digit")).or(name.strip_prefix("Numpad")).unwrap_or(&name);
+    (!name.is_empty() && !name.contains(' ')).then(|| name.to_owned())
+}
+
+/// Turns presses into actions, unless a text field has the keyboard.
+fn press_keys(
+    mut keys: MessageReader<KeyboardInput>,
+    mut lost: MessageReader<WindowFocused>,
+    mut held: Local<Held>,
+    bindings: Res<KeyBindings>,
+    mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>,
+    mut actions: MessageWriter<ActionRequest>,
+) {
+    if lost.read().any(|focus| !focus.focused) {
+        *held = Held::default();
+    }
+    if keys.is_empty() {
+        return;
+    }
+    let typing = contexts.iter_mut().any(|mut context| context.get_mut().egui_wants_keyboard_input());
+    for input in keys.read() {
+        if held.follow(input) || input.state == ButtonState::Released || input.repeat {
+            continue;
+        }
+        let Some(key) = key_name(input) else { continue };
+        let chord = Chord { key, control: held.control, shift: held.shift, alt: held.alt };
+        match bindings.action(&chord) {
+            // Saving is never what a text field does with its keys.
+            Some(action) if !typing || matches!(action, Action::Save | Action::SaveAs | Action::Help) => {
+                actions.write(ActionRequest(action));
+            }
+            _ => {}
+        }
+    }
+}

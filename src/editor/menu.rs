@@ -1,0 +1,159 @@
+//! The menu bar: everything there is, with its key.
+
+use std::path::PathBuf;
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+
+use super::{
+    actions::{Action, ActionRequest},
+    dock::Layout,
+    files::OpenRequest,
+    keys::KeyBindings,
+    mode::Mode,
+    panel::Requests,
+    settings::EditorSettings,
+};
+
+/// Draws the menu bar.
+pub(super) fn show(
+    ui: &mut egui::Ui,
+    world: &World,
+    layout: &Layout,
+    panels: &[&'static str],
+    requests: &mut Requests,
+) {
+    let keys = world.get_resource::<KeyBindings>();
+    let mut entries = |ui: &mut egui::Ui, list: &[Option<(&str, Action)>]| {
+        for entry in list {
+            let Some((name, action)) = entry else {
+                ui.separator();
+                continue;
+            };
+            let button = egui::Button::new(*name);
+            let button = match keys.and_then(|keys| keys.key(*action)) {
+                Some(key) => button.shortcut_text(key.to_string()),
+                None => button,
+            };
+            if ui.add(button).clicked() {
+                requests.send(ActionRequest(*action));
+                ui.close();
+            }
+        }
+    };
+    let mut recent: Option<PathBuf> = None;
+    let mut toggled: Option<&'static str> = None;
+    let mut reset = false;
+    egui::MenuBar::new().ui(ui, |ui| {
+        ui.menu_button("File", |ui| {
+            entries(ui, &[Some(("New", Action::New)), Some(("Open…", Action::Open))]);
+            let list =
+                world.get_resource::<EditorSettings>().map(|settings| settings.recent.clone()).unwrap_or_default();
+            ui.add_enabled_ui(!list.is_empty(), |ui| {
+                ui.menu_button("Open recent", |ui| {
+                    for path in &list {
+                        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+                        if ui.button(name).on_hover_text(path.display().to_string()).clicked() {
+                            recent = Some(path.clone());
+                            ui.close();
+                        }
+                    }
+                });
+            });
+            entries(
+                ui,
+                &[
+                    None,
+                    Some(("Save", Action::Save)),
+                    Some(("Save as…", Action::SaveAs)),
+                    Some(("Export…", Action::Export)),
+                    None,
+                    Some(("Quit", Action::Quit)),
+                ],
+            );
+        });
+        ui.menu_button("Edit", |ui| {
+            entries(
+                ui,
+                &[
+                    Some(("Undo", Action::Undo)),
+                    Some(("Redo", Action::Redo)),
+                    None,
+                    Some(("Select all", Action::SelectAll)),
+                    Some(("Select none", Action::SelectNone)),
+                    None,
+                    Some(("Delete", Action::Delete)),
+                    Some(("Delete with children", Action::DeleteHierarchy)),
+                    Some(("Mirror selected", Action::MirrorSelected)),
+                ],
+            );
+        });
+        ui.menu_button("Mode", |ui| {
+            for mode in Mode::ALL {
+                entries(ui, &[Some((mode.name(), Action::Mode(mode)))]);
+            }
+            entries(
+                ui,
+                &[None, Some(("Symmetry", Action::Symmetry)), Some(("Move children along", Action::MoveChildren))],
+            );
+        });
+        ui.menu_button("Rig", |ui| {
+            entries(
+                ui,
+                &[
+                    Some(("Skin", Action::Skin)),
+                    None,
+                    Some(("Reset pose", Action::ResetPose)),
+                    Some(("Store pose", Action::StorePose)),
+                ],
+            );
+        });
+        ui.menu_button("View", |ui| {
+            entries(
+                ui,
+                &[
+                    Some(("Frame selected", Action::FrameSelected)),
+                    Some(("Frame all", Action::FrameAll)),
+                    None,
+                    Some(("Front", Action::ViewFront)),
+                    Some(("Back", Action::ViewBack)),
+                    Some(("Left side", Action::ViewLeft)),
+                    Some(("Right side", Action::ViewRight)),
+                    Some(("Top", Action::ViewTop)),
+                    Some(("Bottom", Action::ViewBottom)),
+                    Some(("Perspective or orthographic", Action::Projection)),
+                    None,
+                    Some(("X-ray", Action::XRay)),
+                    Some(("Wireframe", Action::Wireframe)),
+                    Some(("Labels", Action::Labels)),
+                    Some(("Local axes", Action::LocalAxes)),
+                    Some(("Grid", Action::Grid)),
+                ],
+            );
+        });
+        ui.menu_button("Window", |ui| {
+            for panel in panels {
+                if ui.selectable_label(layout.shows(panel), *panel).clicked() {
+                    toggled = Some(panel);
+                    ui.close();
+                }
+            }
+            ui.separator();
+            if ui.button("Reset layout").clicked() {
+                reset = true;
+                ui.close();
+            }
+        });
+        ui.menu_button("Help", |ui| entries(ui, &[Some(("Keys", Action::Help))]));
+    });
+    if let Some(path) = recent {
+        requests.send(OpenRequest::File(path));
+    }
+    if reset {
+        requests.set(Layout::default());
+    } else if let Some(panel) = toggled {
+        let mut next = layout.clone();
+        next.toggle(panel);
+        requests.set(next);
+    }
+}

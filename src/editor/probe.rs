@@ -1,0 +1,60 @@
+//! Whether there is a display and an adapter, found out before Bevy needs them: it would panic.
+
+/// Looks for a display to open a window on.
+///
+/// # Errors
+/// What is missing, in a few words.
+pub fn display() -> Result<(), String> {
+    if cfg!(not(all(unix, not(target_os = "macos")))) {
+        return Ok(());
+    }
+    let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    if cfg!(feature = "wayland") && set("WAYLAND_DISPLAY").is_some() {
+        return Ok(());
+    }
+    let Some(name) = set("DISPLAY") else { return Err("DISPLAY is not set".to_owned()) };
+    if answers(&name) { Ok(()) } else { Err(format!("nothing answers at DISPLAY={name}")) }
+}
+
+/// True if something listens where an X display of that name would.
+#[cfg(unix)]
+fn answers(name: &str) -> bool {
+    use std::{net::TcpStream, os::unix::net::UnixStream, path::Path};
+    let Some((host, rest)) = name.rsplit_once(':') else { return false };
+    let Ok(number) = rest.split('.').next().unwrap_or_default().parse::<u16>() else { return false };
+    if host.is_empty() || host == "unix" {
+        let path = format!("/tmp/.X11-unix/X{number}");
+        // Without the file a server may still listen under the abstract name; then the window system decides.
+        return !Path::new(&path).exists() && abstract_socket(&path) || UnixStream::connect(path).is_ok();
+    }
+    TcpStream::connect((host, 6000 + number)).is_ok()
+}
+
+#[cfg(target_os = "linux")]
+fn abstract_socket(path: &str) -> bool {
+    use std::os::{
+        linux::net::SocketAddrExt,
+        unix::net::{SocketAddr, UnixStream},
+    };
+    SocketAddr::from_abstract_name(path).and_then(|address| UnixStream::connect_addr(&address)).is_ok()
+}
+
+#[cfg(all(unix, not(target_os = "linux")))]
+fn abstract_socket(_path: &str) -> bool {
+    false
+}
+
+#[cfg(not(unix))]
+fn answers(_name: &str) -> bool {
+    true
+}
+
+/// True if there is an adapter to draw with, be it a software one.
+pub fn adapter() -> bool {
+    let backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all());
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends,
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    });
+    !bevy::tasks::block_on(instance.enumerate_adapters(backends)).is_empty()
+}

@@ -1,0 +1,77 @@
+//! The line at the bottom: what a click would do now, and why it cannot.
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+
+use super::{ActiveRig, files::Loading, notice::StatusLine, style};
+use crate::{
+    plugins::{
+        document::Selection,
+        skinning::SkinningJob,
+        surface::{RigMesh, RigMeshes},
+    },
+    rig::Rig,
+};
+
+/// Draws the status line.
+pub(super) fn show(ui: &mut egui::Ui, world: &World) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(18.0);
+        let status = world.get_resource::<StatusLine>().cloned().unwrap_or_default();
+        let counts = counts(world);
+        let room = ui.available_width();
+        let right =
+            ui.painter().layout_no_wrap(counts.clone(), egui::FontId::proportional(12.0), style::QUIET).size().x;
+        let text = match (&status.banner, &status.obstacle) {
+            (Some(banner), _) => egui::RichText::new(banner).color(style::ACCENT).strong(),
+            (None, Some(obstacle)) => egui::RichText::new(obstacle).color(style::OBSTACLE),
+            (None, None) => egui::RichText::new(&status.hint),
+        };
+        ui.scope(|ui| {
+            ui.set_max_width((room - right - 24.0).max(80.0));
+            if let Some(doing) = doing(world) {
+                ui.add(egui::Spinner::new().size(12.0));
+                ui.label(egui::RichText::new(doing).color(style::ACCENT));
+            }
+            let label = ui.add(egui::Label::new(text).truncate());
+            if let Some(hover) = status.obstacle.as_ref().or(Some(&status.hint)).filter(|hint| !hint.is_empty()) {
+                label.on_hover_text(hover);
+            }
+        });
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.label(egui::RichText::new(counts).size(12.0).color(style::QUIET));
+        });
+    });
+}
+
+/// What goes on in the background.
+fn doing(world: &World) -> Option<String> {
+    if let Some(loading) = world.get_resource::<Loading>()
+        && let Some(what) = loading.what()
+    {
+        return Some(format!("Opening {what}"));
+    }
+    let rig = world.get_resource::<ActiveRig>()?.0;
+    let jobs = world.get::<RigMeshes>(rig)?.iter().filter_map(|mesh| world.get::<SkinningJob>(mesh));
+    let progress: Vec<f32> = jobs.map(SkinningJob::progress).collect();
+    let least = progress.iter().copied().reduce(f32::min)?;
+    Some(format!("Skinning {:.0} %", least * 100.0))
+}
+
+fn counts(world: &World) -> String {
+    let Some(rig) = world.get_resource::<ActiveRig>() else { return String::new() };
+    let joints = world.get::<Rig>(rig.0).map_or(0, Rig::len);
+    let selected = world.get::<Selection>(rig.0).map_or(0, |selection| selection.0.len());
+    let meshes = world.get::<RigMeshes>(rig.0).map(|meshes| {
+        meshes.iter().filter_map(|mesh| world.get::<RigMesh>(mesh)).map(|mesh| mesh.triangles.len()).sum::<usize>()
+    });
+    let mut parts = Vec::new();
+    if selected > 0 {
+        parts.push(format!("{selected} selected"));
+    }
+    parts.push(format!("{joints} joints"));
+    if let Some(triangles) = meshes {
+        parts.push(format!("{triangles} triangles"));
+    }
+    parts.join("  ·  ")
+}
