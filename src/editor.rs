@@ -21,9 +21,6 @@ mod status;
 pub mod style;
 mod toolbar;
 pub mod tools;
-<<<<<<< HEAD
-=======
->>>>>>> 8088779 (Open a window: dock, toolbar, menus, keys, camera, files)
 
 use bevy::prelude::*;
 

@@ -123,7 +123,6 @@ impl Plugin for EditorPlugin {
         .add_plugins(EguiPlugin::default())
         .add_plugins((RigPlugins, DisplayPlugin, DrawingPlugin))
         .add_plugins((SettingsPlugin, KeysPlugin, PointerPlugin, DockPlugin, CameraPlugin, ScreenPlugin, FilesPlugin))
-        .add_plugins((super::panels::PanelsPlugin, super::tools::ToolsPlugin))
         .insert_resource(WinitSettings {
             focused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
             unfocused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),

@@ -3,7 +3,10 @@
 use bevy::prelude::*;
 
 use super::actions::{Action, ActionRequest};
-use crate::plugins::{display::MeshDisplay, drawing::RigDrawing};
+use crate::plugins::{
+    display::MeshDisplay,
+    drawing::{LabelChoice, RigDrawing},
+};
 
 /// Adds the switches of the display.
 pub struct ScreenPlugin;
@@ -23,7 +26,12 @@ fn switch(
         match action {
             Action::XRay => display.xray = !display.xray,
             Action::Wireframe => display.wireframe = !display.wireframe,
-            Action::Labels => drawing.labels = !drawing.labels,
+            Action::Labels => {
+                drawing.labels = match drawing.labels {
+                    LabelChoice::All => LabelChoice::None,
+                    _ => LabelChoice::All,
+                }
+            }
             Action::LocalAxes => drawing.axes = !drawing.axes,
             Action::Grid => drawing.grid = !drawing.grid,
             _ => {}

@@ -12,7 +12,11 @@ use super::{
     settings::EditorSettings,
     style,
 };
-use crate::plugins::{display::MeshDisplay, document::Symmetry, drawing::RigDrawing};
+use crate::plugins::{
+    display::MeshDisplay,
+    document::Symmetry,
+    drawing::{LabelChoice, RigDrawing},
+};
 
 /// Draws the toolbar.
 pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
@@ -60,7 +64,13 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         switch(ui, display.is_some_and(|d| d.xray), "X-ray", "The mesh half transparent", Action::XRay);
         switch(ui, display.is_some_and(|d| d.wireframe), "Wire", "The edges of the mesh", Action::Wireframe);
         let drawing = world.get_resource::<RigDrawing>();
-        switch(ui, drawing.is_some_and(|d| d.labels), "Labels", "The names of all joints", Action::Labels);
+        switch(
+            ui,
+            drawing.is_some_and(|d| d.labels == LabelChoice::All),
+            "Labels",
+            "The names of all joints",
+            Action::Labels,
+        );
         switch(ui, drawing.is_some_and(|d| d.axes), "Axes", "The axes of the selected joints", Action::LocalAxes);
         switch(ui, drawing.is_some_and(|d| d.grid), "Grid", "The ground", Action::Grid);
     });
