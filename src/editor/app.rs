@@ -117,12 +117,11 @@ impl Plugin for EditorPlugin {
                     render_creation: RenderCreation::Automatic(Box::new(WgpuSettings::default())),
                     ..default()
                 })
-                .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Deny, ..default() })
-                .disable::<bevy::gizmos::transform_gizmo::TransformGizmoPlugin>(),
+                .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Deny, ..default() }),
         )
         .add_plugins(EguiPlugin::default())
         .add_plugins((RigPlugins, DisplayPlugin, DrawingPlugin))
-        .add_plugins((SettingsPlugin, KeysPlugin, PointerPlugin, DockPlugin, CameraPlugin, ScreenPlugin, FilesPlugin))
+        .add_plugins((super::tools::ToolsPlugin, SettingsPlugin, KeysPlugin, PointerPlugin, DockPlugin, CameraPlugin, ScreenPlugin, FilesPlugin))
         .insert_resource(WinitSettings {
             focused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
             unfocused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
