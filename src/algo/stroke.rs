@@ -23,12 +23,22 @@ use thiserror::Error;
 
 pub use gesture::{StrokeKind, classify, joint_at};
 
-use self::{axis::Axis, path::Path, section::Fan, track::Track};
+use self::{
+    axis::Axis,
+    path::Path,
+    section::Fan,
+    track::{SAMPLES, Span, Track},
+};
 use super::{placement::PlaceSettings, view::ViewPlane};
 use crate::mesh::{ray::Hit, surface::Surface};
 
 /// The most joints a stroke becomes, whatever is asked for.
 pub const MAX_JOINTS: usize = 1000;
+
+/// Less of a volume than this many radii under a joint is its edge.
+const EDGE: f32 = 0.5;
+/// How much of the volume, in depth, lies between a joint and either side of it at least.
+const MARGIN: f32 = 0.15;
 
 /// How a stroke is placed in depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -148,12 +158,23 @@ impl StrokeSamples {
     ) -> Result<Self, StrokeError> {
         let path = Path::new(points)?;
         let fan = Fan::new();
-        let follow = |volume| {
-            let track = Track::follow(surface, plane, &path, volume)?;
+        let with_axis = |track: Track| {
             let axis = Axis::find(surface, &fan, &track);
-            Some((track, axis))
+            (track, axis)
         };
+        let follow = |volume| Track::follow(surface, plane, &path, volume, None).map(with_axis);
         let (mut track, mut axis) = follow(settings.place.volume).ok_or(StrokeError::Misses)?;
+        // A volume that the stroke leaves soon is not what it follows: a hand before the hip at which a leg begins.
+        if settings.place.volume.is_none() && (track.samples.len() as f32) < 0.8 * SAMPLES as f32 {
+            let others = (0..track.volumes_at_start as usize).rev();
+            let others = others.filter_map(|first| Track::follow(surface, plane, &path, None, Some(first)));
+            let longest = others.max_by_key(|other| other.samples.len());
+            if let Some(longest) =
+                longest.filter(|other| other.samples.len() as f32 > 1.25 * track.samples.len() as f32)
+            {
+                (track, axis) = with_axis(longest);
+            }
+        }
         if settings.place.volume.is_none()
             && track.ambiguous
             && let Some(near) = follow(Some(1)).filter(|near| is_meant(near, (&track, axis.as_ref())))
@@ -161,6 +182,11 @@ impl StrokeSamples {
             (track, axis) = near;
         }
         Ok(Self { plane: *plane, settings, path, track, axis, fan })
+    }
+
+    /// Midway through the volume under the stroke, at even lengths along it, in the surface's space; at least one place.
+    pub fn middles(&self) -> impl Iterator<Item = Vec3> {
+        self.track.samples.iter().map(|sample| sample.middle)
     }
 
     /// Chooses joints and places them: a ray, and a fan of section rays if recentring is on, for each.
@@ -213,7 +239,9 @@ impl StrokeSamples {
         let depth = self.settings.place.depth();
         let section = self.axis.as_ref().map(|axis| axis.recentre(surface, &self.fan, at, &ray, hits));
         let position = match section {
-            Some((centroid, _)) if self.settings.recentre && depth == 0.5 => centroid,
+            Some((centroid, radius)) if self.settings.recentre && depth == 0.5 => {
+                self.kept_inside(surface, centroid, ray.at(span.middle()), radius, at, hits)
+            }
             // The chosen depth, at the place across the view that the section asks for.
             Some((centroid, _)) if self.settings.recentre => {
                 let ray = self.plane.project(centroid).map_or(ray, |point| self.plane.ray(point));
@@ -224,6 +252,36 @@ impl StrokeSamples {
             _ => ray.at(span.at(depth)),
         };
         Some(PlacedJoint { position, radius: section.map(|(_, radius)| radius), source, hits: count })
+    }
+}
+
+impl StrokeSamples {
+    /// A joint moved from `position` as little as puts it well inside of the volume: in depth, or, where the ray through it
+    /// meets no more than an edge of that, towards `anchor`, which is inside. Sections that are open or carried on from
+    /// elsewhere may have led it out.
+    fn kept_inside(
+        &self,
+        surface: &Surface,
+        position: Vec3,
+        anchor: Vec3,
+        radius: f32,
+        at: f32,
+        hits: &mut Vec<Hit>,
+    ) -> Vec3 {
+        for step in 0..4 {
+            let place = position.lerp(anchor, step as f32 / 4.0);
+            let Some(seen) = self.plane.project(place) else { break };
+            let ray = self.plane.ray(seen);
+            surface.hits(&ray, hits);
+            let Some(Span { near, far }) = self.track.span_at(hits, at) else { continue };
+            if far - near >= EDGE * radius {
+                let depth = (place - ray.origin).dot(ray.direction);
+                let margin = MARGIN * (far - near);
+                let kept = depth.clamp(near + margin, far - margin);
+                return if kept == depth { place } else { ray.at(kept) };
+            }
+        }
+        anchor
     }
 }
 

@@ -27,7 +27,7 @@ use crate::{
         stroke::{ChainChoice, StrokeChain, StrokeError, StrokeSettings},
         view::ViewPlane,
     },
-    rig::{Rig, Uid},
+    rig::{Rig, Uid, operations::MirrorPlane},
 };
 
 /// Adds strokes.
@@ -194,7 +194,7 @@ fn act(
 ) -> Acted {
     let known = found.or_else(|| request.chain.clone().map(Ok));
     let plan = match plan_stroke(request, scene, known) {
-        StrokePlan::NeedsChain => match find_chain(request, scene.surface) {
+        StrokePlan::NeedsChain => match find_chain(request, scene.surface, scene.symmetry.0) {
             Found::Now(chain) => plan_stroke(request, scene, Some(chain)),
             Found::Later(task) => return Acted::Follows(task),
         },
@@ -217,12 +217,15 @@ enum Found {
 /// Surfaces of no more triangles answer the rays of a stroke in less than a millisecond.
 const FEW_TRIANGLES: usize = 4096;
 
-fn find_chain(request: &StrokeRequest, surface: &RigSurface) -> Found {
+fn find_chain(request: &StrokeRequest, surface: &RigSurface, symmetry: Option<MirrorPlane>) -> Found {
     let surface = surface.shared().unwrap_or_default();
     let is_small = surface.triangle_count() <= FEW_TRIANGLES;
     let StrokeRequest { plane, settings, choice, .. } = *request;
     let points = request.points.clone();
-    let find = move || FollowedStroke::new(surface, &plane, &points, settings).map(|stroke| stroke.chain(choice));
+    let find = move || {
+        let followed = FollowedStroke::with_symmetry(surface, &plane, &points, settings, symmetry);
+        followed.map(|stroke| stroke.chain(choice))
+    };
     if is_small { Found::Now(find()) } else { Found::Later(AsyncComputeTaskPool::get().spawn(async move { find() })) }
 }
 

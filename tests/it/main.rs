@@ -33,6 +33,7 @@ mod skin_file;
 mod stroke;
 mod surface;
 mod template;
+mod three_strokes;
 mod transfer;
 mod voxels;
 mod weights;

@@ -1,11 +1,11 @@
 //! The other side: live mirroring, and mirroring afterwards.
 
-use bevy::math::{Quat, Vec3};
+use bevy::math::{Quat, Vec3, Vec3Swizzles};
 use proptest::prelude::*;
 use rigsmith::rig::{
     Uid,
     label::{label_side, mirrored_label},
-    operations::{Axis, MirrorPlane, Operation},
+    operations::{Axis, MirrorPlane, Operation, settle},
 };
 
 use crate::edits::{Bench, assert_at};
@@ -230,6 +230,30 @@ fn both_sides_of_a_skeleton_without_pairs_are_paired_not_doubled() {
     assert_eq!(bench.rig.len(), 5);
     assert_eq!((partner(&bench, left[0]), partner(&bench, left[1])), (right[0], right[1]));
     assert_at(&bench, right[0], [-0.1, 0.9, 0.0]);
+}
+
+#[test]
+fn what_runs_along_the_plane_belongs_to_it_as_a_whole() {
+    // Of two units: joints within 0.02 are on the plane, a line of the middle may stray to 0.1.
+    let plane = MirrorPlane::sagittal(2.0);
+    let check = |what: &str, places: &[[f32; 3]], on_plane: &[bool]| {
+        let places: Vec<Vec3> = places.iter().map(|place| Vec3::from(*place)).collect();
+        let settled = settle(&places, Some(&plane));
+        let found: Vec<bool> = settled.iter().map(|(place, _)| place.x == 0.0).collect();
+        assert_eq!(found, on_plane, "{what}: {settled:?}");
+        for (before, (after, other)) in places.iter().zip(&settled) {
+            assert!(before.yz() == after.yz() && (after.x == 0.0 || after.x == before.x), "{what}");
+            assert_eq!(*other, (after.x != 0.0).then_some(*after * FLIP), "{what}");
+        }
+    };
+    check("a spine", &[[0.05, 1.0, 0.0], [-0.06, 1.3, 0.1], [0.04, 1.7, 0.0]], &[true; 3]);
+    check("a leg", &[[0.09, 1.0, 0.0], [0.08, 0.5, 0.0], [0.07, 0.1, 0.0]], &[false; 3]);
+    check("a clavicle", &[[0.03, 1.4, 0.0], [0.15, 1.45, 0.0]], &[true, false]);
+    check("an arm", &[[0.15, 1.4, 0.0], [0.4, 1.2, 0.0]], &[false; 2]);
+    check("an eye", &[[0.03, 1.7, 0.1], [0.03, 1.7, 0.13]], &[false; 2]);
+    check("one joint near the plane", &[[0.015, 1.0, 0.0]], &[true]);
+    check("one joint beside it", &[[0.03, 1.0, 0.0]], &[false]);
+    check("nothing", &[], &[]);
 }
 
 #[test]

@@ -62,8 +62,15 @@ pub(super) struct Track {
 }
 
 impl Track {
-    /// `None` if no ray meets the surface.
-    pub(super) fn follow(surface: &Surface, plane: &ViewPlane, path: &Path, volume: Option<u32>) -> Option<Self> {
+    /// `None` if no ray meets the surface. `first` is the number of the volume, from zero, in which the stroke starts; by
+    /// itself it is chosen as everywhere, by `volume`.
+    pub(super) fn follow(
+        surface: &Surface,
+        plane: &ViewPlane,
+        path: &Path,
+        volume: Option<u32>,
+        first: Option<usize>,
+    ) -> Option<Self> {
         let mut hits = Vec::new();
         let mut samples: Vec<Sample> = Vec::with_capacity(SAMPLES);
         let (mut volume_at_start, mut volumes_at_start) = (1, 1);
@@ -78,7 +85,7 @@ impl Track {
             let span = match samples.last() {
                 None if spans.is_empty() => continue,
                 None => {
-                    let chosen = start(&spans, volume);
+                    let chosen = first.filter(|first| *first < spans.len()).unwrap_or_else(|| start(&spans, volume));
                     (volume_at_start, volumes_at_start) = (chosen as u32 + 1, spans.len() as u32);
                     spans[chosen]
                 }

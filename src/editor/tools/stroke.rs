@@ -40,7 +40,10 @@ use crate::{
         },
         viewport::Sight,
     },
-    rig::{Uid, operations::Operation},
+    rig::{
+        Uid,
+        operations::{MirrorPlane, Operation},
+    },
 };
 
 /// Adds drawing with the pointer.
@@ -83,6 +86,13 @@ pub enum StrokeState {
     Preview(Box<StrokePreview>),
 }
 
+/// A surface to draw on, and across what it is mirrored.
+#[derive(Debug, Clone)]
+struct On {
+    surface: Arc<Surface>,
+    symmetry: Option<MirrorPlane>,
+}
+
 /// A stroke that waits to be taken or dropped.
 #[derive(Debug)]
 pub struct StrokePreview {
@@ -93,7 +103,7 @@ pub struct StrokePreview {
     followed: Option<FollowedStroke>,
     task: Option<Task<Result<FollowedStroke, StrokeError>>>,
     /// The surface that the stroke was or is being followed through.
-    on: Option<Arc<Surface>>,
+    on: Option<On>,
 }
 
 impl StrokePreview {
@@ -233,8 +243,11 @@ fn draw(
             hovered.set_if_neq(Hovered(under));
         }
     }
-    let surface = found.as_ref().and_then(|(rig, _)| rig.surface.as_ref()).and_then(|surface| surface.shared());
-    follow(&mut tool, surface, &mut out.notices);
+    let on = found.as_ref().and_then(|(rig, _)| {
+        let surface = rig.surface.as_ref()?.shared()?;
+        Some(On { surface, symmetry: rig.symmetry.0 })
+    });
+    follow(&mut tool, on, &mut out.notices);
 }
 
 /// The joint that a stroke from a pixel starts on.
@@ -322,14 +335,15 @@ fn volumes(chain: &StrokeChain) -> Option<(u32, u32)> {
 }
 
 /// Follows the previewed stroke through the surface in a task, again when the surface changes.
-fn follow(tool: &mut ResMut<StrokeTool>, surface: Option<Arc<Surface>>, notices: &mut MessageWriter<Notice>) {
+fn follow(tool: &mut ResMut<StrokeTool>, on: Option<On>, notices: &mut MessageWriter<Notice>) {
     let StrokeState::Preview(preview) = &mut tool.bypass_change_detection().state else { return };
-    let Some(surface) = surface else { return };
-    if preview.on.as_ref().is_none_or(|on| !Arc::ptr_eq(on, &surface)) {
+    let Some(on) = on else { return };
+    let is_same = |was: &On| Arc::ptr_eq(&was.surface, &on.surface) && was.symmetry == on.symmetry;
+    if !preview.on.as_ref().is_some_and(is_same) {
         let (plane, points, settings) =
             (preview.request.plane, preview.request.points.clone(), preview.request.settings);
-        preview.on = Some(surface.clone());
-        let follow = async move { FollowedStroke::new(surface, &plane, &points, settings) };
+        preview.on = Some(on.clone());
+        let follow = async move { FollowedStroke::with_symmetry(on.surface, &plane, &points, settings, on.symmetry) };
         preview.task = Some(AsyncComputeTaskPool::get().spawn(follow));
     }
     let Some(followed) = preview.task.as_mut().and_then(check_ready) else { return };

@@ -1,4 +1,8 @@
 //! A stroke followed through a surface, kept with it: what a preview asks every frame.
+//!
+//! With symmetry on, a spine drawn by hand strays from the middle by a percent or two of the character's height, and a
+//! section's centroid is not exactly there either. What decides is how the stroke as a whole runs, see
+//! [`FollowedStroke::with_symmetry`].
 
 use std::sync::Arc;
 
@@ -9,7 +13,8 @@ use crate::{
         stroke::{ChainChoice, StrokeChain, StrokeError, StrokeSamples, StrokeSettings},
         view::ViewPlane,
     },
-    mesh::surface::Surface,
+    mesh::{ray::Ray, surface::Surface},
+    rig::operations::MirrorPlane,
 };
 
 /// A stroke and the surface it was drawn on, as that stood then.
@@ -19,11 +24,11 @@ use crate::{
 /// # use rigsmith::{algo::stroke::StrokeError, plugins::stroke::FollowedStroke, prelude::*};
 /// /// On release, once. Poll the task with `check_ready`, then ask `chain` whenever the choice changes.
 /// fn follow(
-///     surface: &RigSurface, plane: ViewPlane, points: Vec<Vec2>,
+///     surface: &RigSurface, plane: ViewPlane, points: Vec<Vec2>, symmetry: Symmetry,
 /// ) -> Option<Task<Result<FollowedStroke, StrokeError>>> {
 ///     let surface = surface.shared()?; // `None`: not ready; try in the next frame.
 ///     let settings = StrokeSettings::default();
-///     let follow = async move { FollowedStroke::new(surface, &plane, &points, settings) };
+///     let follow = async move { FollowedStroke::with_symmetry(surface, &plane, &points, settings, symmetry.0) };
 ///     Some(AsyncComputeTaskPool::get().spawn(follow))
 /// }
 /// ```
@@ -31,7 +36,12 @@ use crate::{
 pub struct FollowedStroke {
     surface: Arc<Surface>,
     samples: StrokeSamples,
+    /// The plane that it runs along, if it does.
+    middle: Option<MirrorPlane>,
 }
+
+/// Of the places along a stroke of the middle, so many may have the surface between them and the mirror plane.
+const BLOCKED: f32 = 0.25;
 
 impl FollowedStroke {
     /// Follows `points` on `plane` through `surface` ([`RigSurface::shared`](crate::plugins::surface::RigSurface::shared)):
@@ -46,11 +56,60 @@ impl FollowedStroke {
         settings: StrokeSettings,
     ) -> Result<Self, StrokeError> {
         let samples = StrokeSamples::new(&surface, plane, points, settings)?;
-        Ok(Self { surface, samples })
+        Ok(Self { surface, samples, middle: None })
+    }
+
+    /// As [`FollowedStroke::new`], on a mesh whose two sides are equal.
+    ///
+    /// A stroke is one of the middle (a spine) if the middles of the volume under it
+    /// [run along the plane of symmetry](MirrorPlane::runs_along) and the way from them to that plane leads through the mesh,
+    /// not out of it (a leg beside the other). It is then taken as if drawn exactly on the plane, and so are its joints.
+    ///
+    /// # Errors
+    /// As [`StrokeSamples::new`].
+    pub fn with_symmetry(
+        surface: Arc<Surface>,
+        plane: &ViewPlane,
+        points: &[Vec2],
+        settings: StrokeSettings,
+        symmetry: Option<MirrorPlane>,
+    ) -> Result<Self, StrokeError> {
+        let drawn = Self::new(surface, plane, points, settings)?;
+        let Some(mirror) = symmetry else { return Ok(drawn) };
+        let middles: Vec<Vec3> = drawn.samples.middles().collect();
+        if !mirror.runs_along(&middles) || blocked(&drawn.surface, &mirror, &middles) > BLOCKED {
+            return Ok(drawn);
+        }
+        let on_plane: Vec<Vec2> = middles.iter().filter_map(|middle| plane.project(mirror.onto(*middle))).collect();
+        // On the plane it may be too short for a stroke: seen along the line on which it runs.
+        let samples = StrokeSamples::new(&drawn.surface, plane, &on_plane, settings).unwrap_or(drawn.samples);
+        Ok(Self { surface: drawn.surface, samples, middle: Some(mirror) })
+    }
+
+    /// Whether the stroke is one of the middle: its chain has no other side.
+    pub fn is_central(&self) -> bool {
+        self.middle.is_some()
     }
 
     /// The chain that the stroke becomes, as [`StrokeSamples::chain`]: some ten microseconds a joint.
     pub fn chain(&self, choice: ChainChoice) -> StrokeChain {
-        self.samples.chain(&self.surface, choice)
+        let mut chain = self.samples.chain(&self.surface, choice);
+        if let Some(mirror) = self.middle {
+            for joint in &mut chain.joints {
+                joint.position = mirror.onto(joint.position);
+            }
+        }
+        chain
     }
+}
+
+/// The part of some places, 0 to 1, whose straight way to the plane crosses the surface.
+fn blocked(surface: &Surface, mirror: &MirrorPlane, places: &[Vec3]) -> f32 {
+    let mut hits = Vec::new();
+    let crosses = |place: &&Vec3| {
+        let distance = mirror.distance(**place);
+        surface.hits(&Ray { origin: **place, direction: mirror.normal * -distance.signum() }, &mut hits);
+        hits.first().is_some_and(|hit| hit.distance < distance.abs())
+    };
+    places.iter().filter(crosses).count() as f32 / places.len().max(1) as f32
 }

@@ -36,15 +36,21 @@ pub(super) fn chain(draft: &mut Draft, positions: &[Vec3], parent: Option<Uid>) 
     Ok(())
 }
 
-/// Where the joints of a chain go with live mirroring across `plane`: each with the place of its other side. Joints near
-/// the plane are put on it and have none, and so has everything without a plane.
+/// Where the joints of a chain go with live mirroring across `plane`: each with the place of its other side. Joints of
+/// the middle are put on the plane and have none, and so has everything without a plane.
+///
+/// Of the middle is a chain as a whole that [runs along the plane](MirrorPlane::runs_along), a spine; of any other chain
+/// the joints within the plane's tolerance, and where it begins those within two, if it then leaves the plane by far
+/// more: a clavicle.
 pub fn settle(positions: &[Vec3], plane: Option<&MirrorPlane>) -> Vec<(Vec3, Option<Vec3>)> {
     let Some(plane) = plane else { return positions.iter().map(|position| (*position, None)).collect() };
-    let within = |position: &Vec3, reach: f32| plane.distance(*position).abs() <= reach;
-    // A chain that keeps near the plane as a whole (a spine, drawn by hand) lies on it as a whole.
-    let central = positions.len() > 1 && positions.iter().all(|position| within(position, 2.0 * plane.tolerance));
-    let settled = positions.iter().map(|position| {
-        if central || within(position, plane.tolerance) {
+    let distance = |position: &Vec3| plane.distance(*position).abs();
+    let central = positions.len() > 1 && plane.runs_along(positions);
+    let furthest = positions.iter().map(distance).fold(0.0, f32::max);
+    let near = (0.25 * furthest).min(2.0 * plane.tolerance);
+    let begins = positions.iter().take_while(|position| distance(position) <= near).count();
+    let settled = positions.iter().enumerate().map(|(number, position)| {
+        if central || number < begins || distance(position) <= plane.tolerance {
             (plane.onto(*position), None)
         } else {
             (*position, Some(plane.mirrored(*position)))

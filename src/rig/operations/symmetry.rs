@@ -39,6 +39,16 @@ impl MirrorPlane {
         point - self.normal * (2.0 * self.distance(point))
     }
 
+    /// Whether a line through these places runs along the plane, as a spine drawn by hand does: nowhere further from it
+    /// than five tolerances or a sixth of the line's length (but at least one tolerance), on average less than three.
+    pub fn runs_along(&self, places: &[Vec3]) -> bool {
+        let (Some(first), Some(last)) = (places.first(), places.last()) else { return false };
+        let length = first.distance(*last);
+        let most = (length / 6.0).min(5.0 * self.tolerance).max(self.tolerance);
+        let mean = places.iter().map(|place| self.distance(*place)).sum::<f32>() / places.len() as f32;
+        places.iter().all(|place| self.distance(*place).abs() <= most) && mean.abs() <= 3.0 * self.tolerance
+    }
+
     /// Takes directions to the other side.
     pub fn reflection(&self) -> Mat3 {
         let n = self.normal;
