@@ -4,6 +4,10 @@
 mod cli;
 #[cfg(feature = "draw")]
 mod display;
+#[cfg(feature = "draw")]
+mod drawing;
+#[cfg(feature = "draw")]
+mod drawing_pictures;
 mod edits;
 mod exports;
 mod files;

@@ -33,12 +33,15 @@ impl Ink {
         self.indices.is_empty()
     }
 
-    /// Removes everything, keeping the memory.
-    pub fn clear(&mut self) {
-        self.positions.clear();
-        self.depths.clear();
-        self.tints.clear();
-        self.indices.clear();
+    /// Empty ink with as much memory as `other` needs.
+    pub fn with_capacity_of(other: &Self) -> Self {
+        let (vertices, indices) = (other.positions.len(), other.indices.len());
+        Self {
+            positions: Vec::with_capacity(vertices),
+            depths: Vec::with_capacity(vertices),
+            tints: Vec::with_capacity(vertices),
+            indices: Vec::with_capacity(indices),
+        }
     }
 }
 

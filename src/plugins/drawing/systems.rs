@@ -62,7 +62,6 @@ pub(super) struct Pictures(Vec<Entity>);
 pub(super) struct Picture {
     entity: Option<Entity>,
     sight: Option<Sight>,
-    place: Option<GlobalTransform>,
     ink: Ink,
 }
 
@@ -117,7 +116,6 @@ impl Gallery<'_, '_> {
                 spawned.insert(PictureOf(rig));
             }
             picture.entity = Some(spawned.id());
-            picture.place = Some(place);
             return;
         };
         let Ok((mesh, mut shown, mut stands)) = self.shown.get_mut(entity) else { return };
@@ -126,15 +124,6 @@ impl Gallery<'_, '_> {
         if !picture.ink.is_empty() {
             // A handle that is alive always has its place.
             let _ = self.meshes.insert(mesh.id(), mesh_of(&mut picture.ink));
-        }
-        picture.place = Some(place);
-    }
-
-    /// Moves a picture along with its rig.
-    fn follow(&mut self, picture: &Picture, place: &GlobalTransform) {
-        let shown = picture.entity.and_then(|entity| self.shown.get_mut(entity).ok());
-        if let Some((_, _, mut stands)) = shown {
-            stands.set_if_neq(*place);
         }
     }
 }
@@ -152,8 +141,12 @@ fn mesh_of(ink: &mut Ink) -> Mesh {
 /// The view through the camera that counts.
 #[derive(SystemParam)]
 pub(super) struct Views<'w, 's> {
-    cameras:
-        Query<'w, 's, (Entity, &'static Camera, &'static GlobalTransform, &'static Projection, &'static RigViewport)>,
+    cameras: Query<
+        'w,
+        's,
+        (Entity, &'static Camera, &'static GlobalTransform, &'static Projection, &'static RigViewport),
+        Without<OverlayMesh>,
+    >,
 }
 
 impl Views<'_, '_> {
@@ -197,18 +190,12 @@ pub(super) fn draw_rigs(
     settings: Res<RigDrawing>,
     looks: Res<Looks>,
     views: Views,
-    mut rigs: Query<(
-        Entity,
-        Ref<Rig>,
-        Ref<Selection>,
-        Ref<Hovered>,
-        &JointEntities,
-        &GlobalTransform,
-        &mut Drawn,
-        &mut RigLabels,
-    )>,
-    moved: Query<&JointOf, (With<Joint>, Changed<GlobalTransform>)>,
-    poses: Query<&GlobalTransform, With<Joint>>,
+    mut rigs: Query<
+        (Entity, Ref<Rig>, Ref<Selection>, Ref<Hovered>, &JointEntities, &GlobalTransform, &mut Drawn, &mut RigLabels),
+        Without<OverlayMesh>,
+    >,
+    moved: Query<&JointOf, (With<Joint>, Changed<GlobalTransform>, Without<OverlayMesh>)>,
+    poses: Query<&GlobalTransform, (With<Joint>, Without<OverlayMesh>)>,
     mut gallery: Gallery,
     mut counts: ResMut<DrawingCounts>,
 ) {
@@ -218,7 +205,6 @@ pub(super) fn draw_rigs(
         let stale = changed || drawn.skeleton.is_stale(sight.as_ref());
         let posed = || moved.iter().any(|joint| joint.0 == entity);
         if !stale && !posed() {
-            gallery.follow(&drawn.skeleton, place);
             continue;
         }
         let drawn = &mut drawn.bypass_change_detection().skeleton;
@@ -270,7 +256,7 @@ pub(super) fn draw_ghosts(
     looks: Res<Looks>,
     wanted: Res<Ghosts>,
     views: Views,
-    mut rigs: Query<(Entity, &GlobalTransform, &mut Drawn)>,
+    mut rigs: Query<(Entity, &GlobalTransform, &mut Drawn), Without<OverlayMesh>>,
     mut gallery: Gallery,
     mut counts: ResMut<DrawingCounts>,
 ) {
@@ -295,7 +281,7 @@ pub(super) fn draw_planes(
     settings: Res<RigDrawing>,
     looks: Res<Looks>,
     views: Views,
-    mut rigs: Query<(Entity, &GlobalTransform, &Symmetry, &mut Drawn)>,
+    mut rigs: Query<(Entity, &GlobalTransform, &Symmetry, &mut Drawn), Without<OverlayMesh>>,
     mut gallery: Gallery,
     mut counts: ResMut<DrawingCounts>,
 ) {

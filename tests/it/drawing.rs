@@ -1,0 +1,431 @@
+//! Drawing without a renderer: shapes, sizes in pixels, colours, labels, and when pictures are built.
+
+use std::time::{Duration, Instant};
+
+use bevy::{
+    asset::AssetPlugin,
+    camera::{ComputedCameraValues, PerspectiveProjection, RenderTargetInfo},
+    math::Affine3A,
+    prelude::*,
+};
+use rigsmith::{
+    headless::headless_app,
+    plugins::{
+        document::Hovered,
+        drawing::{
+            DrawingCounts, DrawingPlugin, GhostJoint, Ghosts, LETTER, LabelChoice, LabelWish, RigDrawing, RigLabels,
+            ghosts::{draw_ghosts, draw_plane},
+            grid::{GridPlane, draw_grid, spacing},
+            ink::{Ink, Pen},
+            label_places,
+            shapes::{LEAST_BALL, Octahedron, ball_radius},
+            skeleton::{DrawnJoint, Emphasis, ball_radii, bones, draw_skeleton, drawn_joints},
+            theme::{Tint, group_tint},
+        },
+        viewport::{RigViewport, Sight},
+    },
+    prelude::*,
+    rig::{NodeKind, operations::MirrorPlane, template::read_template},
+};
+
+const SIZE: Vec2 = Vec2::new(1280.0, 720.0);
+
+/// A perspective view from `eye` to `target`.
+fn sight(eye: Vec3, target: Vec3) -> Sight {
+    let camera = GlobalTransform::from(Transform::from_translation(eye).looking_at(target, Vec3::Y));
+    let projection = Projection::Perspective(PerspectiveProjection::default());
+    let viewport = RigViewport { focus: eye.distance(target) };
+    Sight::new(&camera, &projection, &viewport, SIZE, &GlobalTransform::IDENTITY).unwrap()
+}
+
+/// An orthographic view from `towards`, `height` units high.
+fn flat(towards: Vec3, up: Vec3, height: f32) -> Sight {
+    let camera = GlobalTransform::from(Transform::from_translation(towards * 5.0).looking_to(-towards, up));
+    let mut projection = OrthographicProjection::default_3d();
+    projection.area = Rect::from_center_size(Vec2::ZERO, Vec2::new(height * SIZE.x / SIZE.y, height));
+    let projection = Projection::Orthographic(projection);
+    Sight::new(&camera, &projection, &RigViewport::default(), SIZE, &GlobalTransform::IDENTITY).unwrap()
+}
+
+fn joint(uid: u64, position: [f32; 3], parent: Option<usize>) -> DrawnJoint {
+    DrawnJoint {
+        uid: Uid(uid),
+        position: position.into(),
+        axes: Mat3::IDENTITY,
+        parent,
+        kind: NodeKind::Joint,
+        color: None,
+        emphasis: Emphasis::None,
+        hovered: false,
+    }
+}
+
+fn chain() -> Vec<DrawnJoint> {
+    vec![joint(1, [0.0, 0.0, 0.0], None), joint(2, [0.0, 0.4, 0.0], Some(0)), joint(3, [0.3, 0.4, 0.0], Some(1))]
+}
+
+fn draw(joints: &[DrawnJoint], sight: &Sight) -> Ink {
+    let mut ink = Ink::default();
+    draw_skeleton(joints, &[], sight, &RigDrawing::default(), &mut ink);
+    ink
+}
+
+fn has(ink: &Ink, tint: Tint) -> bool {
+    ink.tints.contains(&tint)
+}
+
+#[test]
+fn balls_keep_their_size_on_screen() {
+    let cases =
+        [(0.0, 4.0), (f32::NAN, 4.0), (f32::INFINITY, 4.0), (10.0, 4.0), (60.0, 5.0), (96.0, 8.0), (320.0, 8.0)];
+    for (bone, radius) in cases {
+        assert_eq!(ball_radius(bone, 1.0), radius, "a bone of {bone} pixels");
+    }
+    assert_eq!(ball_radius(800.0, 1.0), 20.0, "near balls grow with the bone");
+    assert_eq!(ball_radius(60.0, 10.0), 12.0, "never more than a fifth of the bone");
+    let mut last = 0.0;
+    for bone in 0..2000 {
+        let radius = ball_radius(bone as f32, 1.0);
+        assert!(radius >= last && radius >= LEAST_BALL);
+        last = radius;
+    }
+}
+
+/// Distance in pixels from a joint to the furthest vertex of its ball, as drawn.
+fn measured(ink: &Ink, sight: &Sight, position: Vec3) -> f32 {
+    let centre = sight.project(position).unwrap();
+    let outline = RigDrawing::default().theme.outline;
+    // The rim of a ball: outline-coloured vertices at the very distance of its centre.
+    let on_plane = |at: &[f32; 3]| (Vec3::from(*at) - position).dot(sight.plane.towards()).abs() < 1e-6;
+    let rim = ink.positions.iter().zip(&ink.tints).filter(|(at, tint)| **tint == outline && on_plane(at));
+    let distances = rim.filter_map(|(at, _)| Some(sight.project(Vec3::from(*at))?.distance(centre)));
+    distances.filter(|distance| *distance > 2.5 && *distance < 30.0).fold(0.0, f32::max)
+}
+
+#[test]
+fn drawn_balls_measure_what_they_should_at_every_zoom() {
+    let joints = vec![joint(1, [0.0; 3], None), joint(2, [0.3, 0.0, 0.0], Some(0)), joint(3, [0.6, 0.0, 0.0], Some(1))];
+    for distance in [0.4, 1.0, 3.0, 10.0, 40.0, 400.0] {
+        let sight = sight(Vec3::new(0.3, 0.0, distance), Vec3::new(0.3, 0.0, 0.0));
+        let radii = ball_radii(&joints, &bones(&joints), &sight, 1.0);
+        let bone = 0.3 / sight.pixel_at(joints[1].position);
+        assert!((radii[1] - ball_radius(bone, 1.0)).abs() < 0.01, "from {distance}");
+        assert!(radii[1] >= LEAST_BALL && (radii[1] <= 8.01 || bone > 320.0), "from {distance}: {}", radii[1]);
+        // Bones shorter than two pixels are left out, so that nothing else is near the ball.
+        let alone = [joints[1]];
+        let alone = [DrawnJoint { parent: None, ..alone[0] }];
+        let ink = draw(&alone, &sight);
+        let measured = measured(&ink, &sight, joints[1].position);
+        assert!((measured - (LEAST_BALL + 4.5 + 3.2)).abs() < 0.1, "the mark of a root from {distance}: {measured}");
+    }
+}
+
+#[test]
+fn bones_span_their_joints_and_close() {
+    let (head, tail) = (Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.5, -0.2, 0.9));
+    let shape = Octahedron::new(head, tail, 0.05, Vec3::X).unwrap();
+    let middle = head.lerp(tail, 0.3);
+    for face in shape.faces() {
+        assert!(face.normal.dot(face.corners[0] - middle) > 0.0, "faces look outwards");
+        assert!(face.corners.contains(&head) ^ face.corners.contains(&tail));
+    }
+    for corner in shape.waist {
+        let along = (corner - head).dot((tail - head).normalize()) / head.distance(tail);
+        assert!((along - 0.1).abs() < 1e-5);
+        assert!((corner.distance(head.lerp(tail, 0.1)) - 0.05).abs() < 1e-4);
+    }
+    let faces = shape.faces();
+    for (ends, sides) in shape.edges() {
+        for side in sides {
+            assert!(ends.iter().all(|end| faces[side].corners.contains(end)), "an edge belongs to both of its faces");
+        }
+    }
+    assert_eq!(Octahedron::new(head, head, 0.05, Vec3::X), None);
+    assert_eq!(Octahedron::new(head, Vec3::NAN, 0.05, Vec3::X), None);
+    assert!(Octahedron::new(Vec3::ZERO, Vec3::X, 0.1, Vec3::X).is_some(), "a side along the bone");
+
+    let joints = chain();
+    let ink = draw(&joints, &sight(Vec3::new(0.4, 0.3, 1.5), Vec3::new(0.1, 0.2, 0.0)));
+    for end in [joints[0].position, joints[1].position, joints[2].position] {
+        assert!(ink.positions.contains(&end.to_array()), "a bone ends at {end}");
+    }
+    let list = bones(&joints);
+    assert_eq!(list.len(), 3);
+    let leaf = list[2];
+    assert!(leaf.leaf && leaf.joint == 2 && leaf.tail.distance(Vec3::new(0.4, 0.4, 0.0)) < 1e-6);
+}
+
+#[test]
+fn bones_have_the_colour_of_their_group() {
+    let red = group_tint([1.0, 0.0, 0.0]);
+    assert_eq!(red, [255, 0, 0, 255]);
+    let mut joints = chain();
+    let view = sight(Vec3::new(0.4, 0.3, 1.5), Vec3::new(0.1, 0.2, 0.0));
+    let reds = |ink: &Ink| ink.tints.iter().filter(|tint| tint[0] > 80 && tint[1] == 0 && tint[2] == 0).count();
+    assert_eq!(reds(&draw(&joints, &view)), 0);
+    joints[0].color = Some(red);
+    let one = reds(&draw(&joints, &view));
+    assert!(one > 0);
+    joints[1].color = Some(red);
+    assert!(reds(&draw(&joints, &view)) > one);
+}
+
+#[test]
+fn hovered_selected_and_active_stand_out_and_differ() {
+    let view = sight(Vec3::new(0.4, 0.3, 1.5), Vec3::new(0.1, 0.2, 0.0));
+    let theme = RigDrawing::default().theme;
+    let with = |emphasis: Emphasis, hovered: bool| {
+        let mut joints = chain();
+        (joints[1].emphasis, joints[1].hovered) = (emphasis, hovered);
+        draw(&joints, &view)
+    };
+    let plain = with(Emphasis::None, false);
+    let pictures = [
+        (with(Emphasis::None, true), theme.hovered),
+        (with(Emphasis::Selected, false), theme.selected),
+        (with(Emphasis::Active, false), theme.active),
+    ];
+    for (number, (picture, tint)) in pictures.iter().enumerate() {
+        assert!(has(picture, *tint) && !has(&plain, *tint), "picture {number}");
+        for (other, _) in &pictures[..number] {
+            assert_ne!(picture, other);
+        }
+    }
+    let mut null = chain();
+    null[0].kind = NodeKind::Null;
+    assert!(has(&draw(&null, &view), theme.null) && !has(&plain, theme.null));
+}
+
+#[test]
+fn pictures_are_in_front_and_sorted_among_themselves() {
+    let views = [
+        sight(Vec3::new(0.4, 0.3, 1.5), Vec3::new(0.1, 0.2, 0.0)),
+        sight(Vec3::new(0.0, 0.0, 400.0), Vec3::ZERO),
+        flat(Vec3::Z, Vec3::Y, 2.0),
+        flat(Vec3::Y, Vec3::NEG_Z, 0.01),
+    ];
+    for view in views {
+        let ink = draw(&chain(), &view);
+        assert!(!ink.is_empty());
+        assert!(ink.depths.iter().all(|depth| (0.9..1.0).contains(depth)));
+        assert_eq!((ink.positions.len(), ink.tints.len()), (ink.depths.len(), ink.depths.len()));
+        assert!(ink.indices.iter().all(|index| (*index as usize) < ink.positions.len()));
+        let mut scratch = Ink::default();
+        let pen = Pen::new(&mut scratch, &view);
+        let towards = view.plane.towards();
+        let step = 2.0 * view.pixel;
+        for place in [-20.0, -1.0, 0.0, 1.0, 20.0] {
+            let at = view.plane.origin + towards * (place * step);
+            assert!(pen.depth(at + towards * step, 0.0) > pen.depth(at, 0.0), "two pixels nearer are nearer");
+            assert!(pen.depth(at, step) > pen.depth(at, 0.0));
+        }
+    }
+}
+
+#[test]
+fn a_picture_survives_joints_behind_and_at_the_camera() {
+    let joints = chain();
+    for eye in [Vec3::new(0.0, 0.2, 1e-4), joints[1].position, Vec3::new(0.3, 0.4, -0.5)] {
+        let ink = draw(&joints, &sight(eye, eye + Vec3::Z));
+        assert!(ink.positions.iter().flatten().chain(&ink.depths).all(|number| number.is_finite()));
+    }
+}
+
+#[test]
+fn labels_are_thinned_out() {
+    let view = sight(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO);
+    let wish = |x: f32, z: f32, text, rank| LabelWish { position: Vec3::new(x, 0.0, z), radius: 5.0, text, rank };
+    let wishes = [
+        wish(0.0, 0.0, "far", 0),
+        wish(0.0, 0.2, "near", 0),
+        wish(0.01, -0.5, "selected", 1),
+        wish(1.0, 0.0, "beside", 0),
+        wish(0.5, 9.0, "behind", 5),
+        wish(90.0, 0.0, "outside", 5),
+        wish(-1.0, 0.0, "", 5),
+    ];
+    let texts = |wishes: &[LabelWish]| -> Vec<String> {
+        label_places(&view, wishes, LETTER).into_iter().map(|(_, text)| text).collect()
+    };
+    assert_eq!(texts(&wishes), ["selected", "beside"]);
+    assert_eq!(texts(&wishes[..2]), ["near"]);
+    let places = label_places(&view, &wishes[3..4], LETTER);
+    let joint = view.project(Vec3::X).unwrap();
+    assert!((places[0].0 - joint - Vec2::new(9.0, 0.0)).length() < 1e-3);
+}
+
+#[test]
+fn the_grid_follows_the_zoom_and_fades() {
+    for (pixel, step) in [(0.001, 0.01), (0.01, 0.1), (0.011, 0.1), (0.02, 1.0), (3.0, 100.0)] {
+        assert!((spacing(pixel) / step - 1.0).abs() < 1e-4, "pixel {pixel}: {}", spacing(pixel));
+    }
+    let views = [
+        (sight(Vec3::new(2.0, 1.5, 3.0), Vec3::Y), GridPlane::Ground),
+        (sight(Vec3::new(0.0, 1.0, 3.0), Vec3::Y), GridPlane::Ground),
+        (flat(Vec3::Z, Vec3::Y, 2.0), GridPlane::Front),
+        (flat(Vec3::NEG_X, Vec3::Y, 2.0), GridPlane::Side),
+        (flat(Vec3::Y, Vec3::NEG_Z, 2.0), GridPlane::Ground),
+        (flat(Vec3::new(1.0, 1.0, 1.0).normalize(), Vec3::Y, 2.0), GridPlane::Ground),
+    ];
+    let theme = RigDrawing::default().theme;
+    for (view, plane) in views {
+        assert_eq!(GridPlane::of(&view), plane);
+        let mut ink = Ink::default();
+        draw_grid(&view, &theme, &mut ink);
+        assert!(ink.tints.iter().any(|tint| tint[3] > 60), "{plane:?} shows");
+        assert!(ink.tints.iter().any(|tint| tint[3] == 0), "{plane:?} fades");
+        assert!(ink.positions.iter().flatten().all(|number| number.is_finite()));
+        assert!(ink.positions.len() < 60_000, "{plane:?}: {} vertices", ink.positions.len());
+        let in_scene = ink.depths.iter().all(|depth| *depth == 0.0);
+        let behind = ink.depths.iter().all(|depth| *depth > 0.0 && *depth < 1e-6);
+        assert!(in_scene || behind);
+    }
+}
+
+#[test]
+fn ghosts_show_what_would_be_made() {
+    let view = sight(Vec3::new(0.0, 0.5, 2.0), Vec3::new(0.0, 0.5, 0.0));
+    let theme = RigDrawing::default().theme;
+    let draw = |ghosts: &Ghosts| {
+        let mut ink = Ink::default();
+        draw_ghosts(ghosts, &view, &theme, 1.0, &mut ink);
+        ink
+    };
+    assert!(draw(&Ghosts::default()).is_empty() && Ghosts::default().is_empty());
+    let joint = GhostJoint { position: Vec3::new(0.2, 0.6, 0.0), parent: Some(Vec3::Y), mirrored: false };
+    let one = Ghosts { joints: vec![joint], ..default() };
+    let both = GhostJoint { position: Vec3::new(-0.2, 0.6, 0.0), mirrored: true, ..joint };
+    let both = Ghosts { joints: vec![joint, both], ..default() };
+    assert!(has(&draw(&one), theme.ghost) && !has(&draw(&one), theme.ghost_mirrored));
+    assert!(has(&draw(&both), theme.ghost) && has(&draw(&both), theme.ghost_mirrored));
+    let span = Some((Vec3::new(0.1, 0.6, 0.2), Vec3::new(0.3, 0.6, -0.2)));
+    let (without, with) = (Ghosts { depth_span: span, ..default() }, Ghosts { depth_span: span, ..one.clone() });
+    let ticks = |ghosts: &Ghosts| draw(ghosts).tints.iter().filter(|tint| **tint == theme.depth).count();
+    assert_eq!(ticks(&with) - ticks(&without), 4, "one more bar where the joint goes");
+    let stroke = Ghosts { stroke: vec![Vec3::ZERO, Vec3::Y, Vec3::new(0.2, 1.0, 0.0)], ..default() };
+    assert_eq!(draw(&stroke).tints.iter().filter(|tint| **tint == theme.stroke).count(), 8);
+    let mut ink = Ink::default();
+    let bounds = [Vec3::new(-0.5, 0.0, -0.2), Vec3::new(0.7, 1.8, 0.2)];
+    draw_plane(&MirrorPlane::sagittal(1.8), bounds, &view, &theme, &mut ink);
+    let x = ink.positions.iter().map(|at| at[0].abs()).fold(0.0, f32::max);
+    let y = ink.positions.iter().map(|at| at[1]).fold(0.0, f32::max);
+    assert!(x < 0.01 && y > 1.8, "the plane stands at x = 0 and reaches over the mesh");
+}
+
+fn long_rig(joints: usize) -> Rig {
+    let mut app = headless_app(1);
+    app.finish();
+    let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(1), "rig"), ..default() }).id();
+    let place = |n: usize| Vec3::new((n % 40) as f32 * 0.05, (n / 40) as f32 * 0.05, (n % 7) as f32 * 0.03);
+    let positions = (0..joints).map(place).collect();
+    app.world_mut().write_message(EditRequest::operation(rig, Operation::Chain { positions, parent: None }));
+    app.update();
+    app.world().get::<Rig>(rig).unwrap().clone()
+}
+
+#[test]
+fn a_thousand_joints_are_drawn_in_a_millisecond_or_two() {
+    let rig = long_rig(1000);
+    let view = sight(Vec3::new(1.0, 0.6, 2.5), Vec3::new(1.0, 0.6, 0.0));
+    let globals: std::collections::HashMap<Uid, Affine3A> =
+        rig.rest_globals().into_iter().map(|(uid, global)| (uid, global.into())).collect();
+    let mut ink = Ink::default();
+    let mut times: Vec<Duration> = (0..30)
+        .map(|_| {
+            let start = Instant::now();
+            let mut next = Ink::with_capacity_of(&ink);
+            let joints = drawn_joints(&rig, &Selection::default(), &Hovered(None), |uid| globals.get(&uid).copied());
+            draw_skeleton(&joints, &[], &view, &RigDrawing::default(), &mut next);
+            let time = start.elapsed();
+            ink = next;
+            time
+        })
+        .collect();
+    times.sort_unstable();
+    println!("1000 joints: {:?} at best, {:?} median, {} vertices", times[0], times[15], ink.positions.len());
+    assert!(ink.positions.len() > 50_000 && ink.positions.len() < 200_000);
+    assert!(times[0] < Duration::from_millis(30), "far too slow: {:?}", times[0]);
+}
+
+fn drawing_app() -> (App, Entity, Entity) {
+    let mut app = headless_app(1);
+    app.add_plugins(AssetPlugin::default()).init_asset::<Mesh>().add_plugins(DrawingPlugin);
+    app.finish();
+    app.cleanup();
+    let template = read_template(include_bytes!("../../assets/templates/biped.rig.ron")).unwrap();
+    let rig = app.world_mut().spawn(RigBundle { rig: template.rig, ..default() }).id();
+    let target = RenderTargetInfo { physical_size: SIZE.as_uvec2(), scale_factor: 1.0 };
+    let computed = ComputedCameraValues { target_info: Some(target), ..default() };
+    let eye = Transform::from_xyz(0.0, 1.0, 3.0).looking_at(Vec3::Y, Vec3::Y);
+    let camera = (Camera3d::default(), Camera { computed, ..default() }, RigViewport { focus: 3.0 }, eye);
+    let camera = app.world_mut().spawn(camera).id();
+    (app, rig, camera)
+}
+
+#[test]
+fn nothing_is_built_while_nothing_changes() {
+    let (mut app, rig, camera) = drawing_app();
+    let counts = |app: &mut App| {
+        for _ in 0..3 {
+            app.update();
+        }
+        *app.world().resource::<DrawingCounts>()
+    };
+    let mut last = counts(&mut app);
+    assert!(last.rigs > 0 && last.grid > 0);
+    assert_eq!(counts(&mut app), last, "idle");
+    let first = app.world().get::<Rig>(rig).unwrap().walk().next().unwrap().data.uid;
+
+    type Act<'a> = Box<dyn Fn(&mut World) + 'a>;
+    let acts: [(&str, Act, [u64; 4]); 7] = [
+        ("hovering", Box::new(|world| world.get_mut::<Hovered>(rig).unwrap().0 = Some(first)), [1, 0, 0, 0]),
+        ("selecting", Box::new(|world| world.get_mut::<Selection>(rig).unwrap().0 = vec![first]), [1, 0, 0, 0]),
+        (
+            "symmetry",
+            Box::new(|world| world.get_mut::<Symmetry>(rig).unwrap().0 = Some(MirrorPlane::sagittal(1.8))),
+            [0, 0, 1, 0],
+        ),
+        (
+            "a ghost",
+            Box::new(|world| {
+                let joint = GhostJoint { position: Vec3::Y, parent: None, mirrored: false };
+                world.resource_mut::<Ghosts>().joints = vec![joint];
+            }),
+            [0, 1, 0, 0],
+        ),
+        ("the camera", Box::new(|world| world.get_mut::<Transform>(camera).unwrap().translation.x = 0.5), [1, 1, 1, 1]),
+        (
+            "a pose",
+            Box::new(|world| {
+                let mut joints = world.query_filtered::<&mut Transform, With<rigsmith::plugins::document::Joint>>();
+                joints.iter_mut(world).next().unwrap().rotation = Quat::from_rotation_x(0.3);
+            }),
+            [1, 0, 0, 0],
+        ),
+        ("no ghost", Box::new(|world| *world.resource_mut::<Ghosts>() = Ghosts::default()), [0, 1, 0, 0]),
+    ];
+    for (name, act, more) in acts {
+        act(app.world_mut());
+        let now = counts(&mut app);
+        let built = [now.rigs - last.rigs, now.ghosts - last.ghosts, now.planes - last.planes, now.grid - last.grid];
+        assert_eq!(built, more, "{name}: rigs, ghosts, planes, grid");
+        last = now;
+    }
+}
+
+#[test]
+fn labels_come_on_demand() {
+    let (mut app, rig, _) = drawing_app();
+    app.update();
+    let labels = |app: &App| app.world().get::<RigLabels>(rig).unwrap().0.clone();
+    assert!(labels(&app).is_empty());
+    app.world_mut().resource_mut::<RigDrawing>().labels = LabelChoice::All;
+    app.update();
+    let all = labels(&app);
+    assert!(all.len() > 8 && all.iter().any(|(_, text)| text == "head"), "{all:?}");
+    let head = app.world().get::<Rig>(rig).unwrap().find_label("head").unwrap();
+    app.world_mut().get_mut::<Selection>(rig).unwrap().0 = vec![head];
+    app.world_mut().resource_mut::<RigDrawing>().labels = LabelChoice::Selected;
+    app.update();
+    assert_eq!(labels(&app).len(), 1);
+}
