@@ -23,7 +23,9 @@ use super::{
     camera::CameraPlugin,
     dock::DockPlugin,
     files::{FilesPlugin, Loading, OpenRequest},
+    help::HelpPlugin,
     keys::KeysPlugin,
+    labels::LabelsPlugin,
     mode::Mode,
     notice::{Notice, StatusLine},
     pointer::PointerPlugin,
@@ -121,7 +123,18 @@ impl Plugin for EditorPlugin {
         )
         .add_plugins(EguiPlugin::default())
         .add_plugins((RigPlugins, DisplayPlugin, DrawingPlugin))
-        .add_plugins((super::tools::ToolsPlugin, SettingsPlugin, KeysPlugin, PointerPlugin, DockPlugin, CameraPlugin, ScreenPlugin, FilesPlugin))
+        .add_plugins((
+            super::tools::ToolsPlugin,
+            SettingsPlugin,
+            KeysPlugin,
+            PointerPlugin,
+            DockPlugin,
+            CameraPlugin,
+            ScreenPlugin,
+            HelpPlugin,
+            LabelsPlugin,
+            FilesPlugin,
+        ))
         .insert_resource(WinitSettings {
             focused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
             unfocused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),

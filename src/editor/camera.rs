@@ -21,7 +21,9 @@ use super::{
 use crate::{
     algo::view::View,
     plugins::{
+        display::ViewportLights,
         document::{JointEntities, Selection},
+        drawing::BACKGROUND,
         surface::RigSurface,
         viewport::{RigViewport, Sight},
     },
@@ -58,6 +60,8 @@ const FIELD_OF_VIEW: f32 = 0.55;
 fn spawn_camera(mut commands: Commands) {
     commands.spawn((
         Camera3d::default(),
+        Camera { clear_color: ClearColorConfig::Custom(BACKGROUND), ..default() },
+        ViewportLights::default().bundle(),
         RigViewport::default(),
         Projection::Perspective(PerspectiveProjection { fov: FIELD_OF_VIEW, ..default() }),
         Transform::from_xyz(0.0, 1.0, 4.0).looking_at(Vec3::Y, Vec3::Y),

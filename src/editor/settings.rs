@@ -1,18 +1,33 @@
-//! What the editor remembers between runs.
+//! What the editor remembers between runs: recent files, switches, keys and where the panels are.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
 
-use bevy::prelude::*;
+use bevy::{
+    prelude::*,
+    tasks::{IoTaskPool, Task, futures::check_ready},
+};
 use serde::{Deserialize, Serialize};
 
-use super::actions::{Action, ActionRequest};
+use super::{
+    actions::{Action, ActionRequest},
+    dock::Layout,
+    keys::KeyBindings,
+    notice::Notice,
+    panel::Panels,
+};
+use crate::files::{RealDisk, read_capped, save_atomic};
 
-/// Adds the settings and the switches in them.
+/// Adds the settings, the switches in them, and their file.
 pub struct SettingsPlugin;
 
 impl Plugin for SettingsPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<EditorSettings>().add_systems(Update, switch);
+        app.init_resource::<EditorSettings>()
+            .init_resource::<SettingsFile>()
+            .add_message::<Notice>()
+            .add_systems(PreStartup, read)
+            .add_systems(Update, switch)
+            .add_systems(Last, write);
     }
 }
 
@@ -69,6 +84,71 @@ impl EditorSettings {
     }
 }
 
+/// Where settings are kept, and whether they can be.
+#[derive(Resource, Default)]
+pub struct SettingsFile {
+    path: Option<PathBuf>,
+    refused: bool,
+    /// What was saved last, or found at the start.
+    text: Option<String>,
+    looked: Duration,
+    saving: Option<Task<Result<(), String>>>,
+}
+
+/// The content of the file.
+#[derive(Serialize, Deserialize, Default)]
+#[serde(default)]
+struct Kept {
+    settings: EditorSettings,
+    keys: Option<KeyBindings>,
+    layout: Option<Layout>,
+}
+
+/// The most bytes of settings that are read.
+const MAX_BYTES: u64 = 1 << 20;
+/// How often it is looked for changes while the window is in use.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// The folder for what the editor keeps: `RIGSMITH_CONFIG`, or the user's configuration folder.
+pub fn folder() -> Option<PathBuf> {
+    let chosen = std::env::var_os("RIGSMITH_CONFIG").filter(|folder| !folder.is_empty()).map(PathBuf::from);
+    chosen.or_else(|| directories::ProjectDirs::from("", "", "rigsmith").map(|dirs| dirs.config_dir().to_owned()))
+}
+
+fn read(world: &mut World) {
+    let Some(path) = folder().map(|folder| folder.join("settings.ron")) else { return };
+    let text = read_capped(&RealDisk, &path, MAX_BYTES).ok().and_then(|bytes| String::from_utf8(bytes).ok());
+    if let Some(text) = text {
+        match ron::from_str::<Kept>(&text) {
+            Ok(kept) => {
+                world.insert_resource(kept.settings);
+                if let Some(keys) = kept.keys {
+                    for chord in keys.doubles() {
+                        let text = format!("{}: {chord} is bound twice; the first one counts", path.display());
+                        world.write_message(Notice::warning(text));
+                    }
+                    world.insert_resource(keys);
+                }
+                if let Some(mut layout) = kept.layout {
+                    let titles: Vec<&'static str> = world
+                        .get_resource::<Panels>()
+                        .map(|panels| panels.panels.iter().map(|panel| panel.title()).collect())
+                        .unwrap_or_default();
+                    layout.repair(&titles);
+                    world.insert_resource(layout);
+                }
+            }
+            Err(error) => {
+                let text = format!("{}:{error}: the settings are not read; correct or delete the file", path.display());
+                world.write_message(Notice::warning(text));
+                // What somebody wrote there by hand is not overwritten.
+                world.resource_mut::<SettingsFile>().refused = true;
+            }
+        }
+    }
+    world.resource_mut::<SettingsFile>().path = Some(path);
+}
+
 fn switch(mut actions: MessageReader<ActionRequest>, mut settings: ResMut<EditorSettings>) {
     for ActionRequest(action) in actions.read() {
         match action {
@@ -76,5 +156,56 @@ fn switch(mut actions: MessageReader<ActionRequest>, mut settings: ResMut<Editor
             Action::GizmoSpace => settings.gizmo_space = settings.gizmo_space.next(),
             _ => {}
         }
+    }
+}
+
+/// Saves what changed, at most once a second, and at once when the window closes.
+fn write(
+    mut file: ResMut<SettingsFile>,
+    settings: Res<EditorSettings>,
+    keys: Res<KeyBindings>,
+    layout: Option<Res<Layout>>,
+    time: Res<Time<Real>>,
+    exits: MessageReader<AppExit>,
+    mut notices: MessageWriter<Notice>,
+) {
+    let file = file.bypass_change_detection();
+    if let Some(result) = file.saving.as_mut().and_then(check_ready) {
+        file.saving = None;
+        if let Err(reason) = result
+            && !std::mem::replace(&mut file.refused, true)
+        {
+            notices.write(Notice::warning(format!("Settings are not kept: {reason}")));
+        }
+    }
+    let closing = !exits.is_empty();
+    if !closing && time.elapsed().saturating_sub(file.looked) < LOOK_EVERY {
+        return;
+    }
+    file.looked = time.elapsed();
+    let Some(path) = file.path.clone().filter(|_| !file.refused && file.saving.is_none()) else { return };
+    let keys = (*keys != KeyBindings::default()).then(|| keys.clone());
+    let kept = Kept { settings: settings.clone(), keys, layout: layout.map(|layout| layout.clone()) };
+    // Panels may have been moved by any frame, and tell nobody: the text is what shows it.
+    let Ok(text) = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::default()) else { return };
+    if file.text.as_ref() == Some(&text) {
+        return;
+    }
+    let first = file.text.replace(text.clone()).is_none();
+    if first && !closing {
+        return;
+    }
+    let save = move || {
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        }
+        save_atomic(&RealDisk, &path, text.as_bytes()).map_err(|error| error.to_string())
+    };
+    if closing {
+        if let Err(reason) = save() {
+            warn!("settings are not kept: {reason}");
+        }
+    } else {
+        file.saving = Some(IoTaskPool::get().spawn(async move { save() }));
     }
 }
