@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report, skin::load_rig};
 use crate::{
-    files::{FileKind, LoadError, RealDisk, load_gestures, load_model, load_skin},
+    files::{FileKind, LoadError, RealDisk, load_gestures, load_model, load_project, load_skin},
     mesh::{
         adjacency::{edges, islands, weld},
         model::Model,
@@ -67,10 +67,15 @@ fn check(path: &Path) -> Result<Findings, Failure> {
             }
             Ok(())
         }
+        Some(FileKind::Project) => load_project(&RealDisk, path).map(|project| {
+            found.remarks = project.notes;
+            found.remarks.extend(project.rigs.iter().flat_map(remarks_on_rig));
+        }),
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
         Some(FileKind::Gestures) => load_gestures(&RealDisk, path).map(drop),
         None => {
-            found.error = Some("Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .skin and .ron".to_owned());
+            found.error =
+                Some("Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .skin and .ron".to_owned());
             Ok(())
         }
     };

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report, progress::spinning, sketch::describe_rig};
 use crate::{
-    files::{FileKind, RealDisk, load_gestures, load_model, load_rig_text, load_skin, load_template},
+    files::{FileKind, RealDisk, load_gestures, load_model, load_project, load_rig_text, load_skin, load_template},
     mesh::model::Model,
     rig::{Rig, Uid, UidSource, character::import_rig_text},
 };
@@ -49,6 +49,21 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             report.set("kind", "rig");
             describe_joints(&mut report, &rig);
         }
+        Some(FileKind::Project) => {
+            let project = spinning("reading", || load_project(&RealDisk, path))?;
+            report.line(format!("project \"{}\": {} meshes", project.name, project.meshes.len()));
+            report.set("kind", "project");
+            report.set("name", project.name);
+            report.notes(project.notes);
+            for mesh in &project.meshes {
+                report.line(format!("mesh {}", mesh.path.display()));
+            }
+            for rig in &project.rigs {
+                let (posed, stored) = (rig.pose().len(), rig.stored_poses().len());
+                report.line(format!("rig \"{}\": {posed} joints posed, {stored} stored poses", rig.about().name));
+                describe_joints(&mut report, rig);
+            }
+        }
         Some(FileKind::Skin) => {
             let skin = load_skin(&RealDisk, path)?;
             let (points, joints) = (skin.weights().len(), skin.joints().len());
@@ -66,8 +81,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             report.set("gestures", gestures.len());
         }
         None => {
-            let message =
-                format!("`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .skin and .ron", path.display());
+            let message = format!(
+                "`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .skin and .ron",
+                path.display()
+            );
             return Err(Failure::Usage(message));
         }
     }

@@ -11,7 +11,8 @@ use crate::{
     },
     rig::{
         SourceError,
-        skin::{SkinFile, SkinFileError},
+        project::{self, ReadProject, read_project},
+        skin::{SkinFile, SkinFileError, content_hash},
         template::{self, Template, read_template},
         text::{self, RigText, RigTextError},
     },
@@ -39,9 +40,11 @@ pub enum FileKind {
     RigText,
     /// `.rig.ron`
     Template,
+    /// `.rigsmith.ron`
+    Project,
     /// `.skin`
     Skin,
-    /// `.ron` that is no template: a list of gestures
+    /// `.ron` that is neither template nor project: a list of gestures
     Gestures,
 }
 
@@ -51,6 +54,7 @@ impl FileKind {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let endings = [
             (".rig.ron", Self::Template),
+            (".rigsmith.ron", Self::Project),
             (".ron", Self::Gestures),
             (".rig", Self::RigText),
             (".skin", Self::Skin),
@@ -179,8 +183,20 @@ pub fn load_gestures(disk: &dyn Disk, path: &Path) -> Result<Vec<crate::plugins:
 
 /// Reads weights.
 pub fn load_skin(disk: &dyn Disk, path: &Path) -> Result<SkinFile, LoadError> {
+    Ok(load_hashed_skin(disk, path)?.0)
+}
+
+/// Reads weights, and tells the hash of the file.
+pub(super) fn load_hashed_skin(disk: &dyn Disk, path: &Path) -> Result<(SkinFile, u64), LoadError> {
     let bytes = read_capped(disk, path, MAX_GLTF_BYTES)?;
-    SkinFile::read(&bytes).map_err(|source| LoadError::Skin { path: path.into(), source })
+    let file = SkinFile::read(&bytes).map_err(|source| LoadError::Skin { path: path.into(), source })?;
+    Ok((file, content_hash(&bytes)))
+}
+
+/// Reads a project file alone, without what it names.
+pub(super) fn load_project_file(disk: &dyn Disk, path: &Path) -> Result<ReadProject, LoadError> {
+    let bytes = read_capped(disk, path, project::MAX_BYTES as u64)?;
+    read_project(&bytes).map_err(|source| in_source(path, &bytes, source))
 }
 
 fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadError {
@@ -190,7 +206,7 @@ fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadError {
 /// A file's name without folder and endings.
 pub fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    for ending in [".rig.ron", ".obj", ".gltf", ".glb", ".rig", ".ron", ".skin"] {
+    for ending in [".rig.ron", ".rigsmith.ron", ".obj", ".gltf", ".glb", ".rig", ".ron", ".skin"] {
         let split = name.len().saturating_sub(ending.len());
         if split > 0 && name.is_char_boundary(split) && name[split..].eq_ignore_ascii_case(ending) {
             return name[..split].to_owned();

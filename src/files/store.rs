@@ -12,7 +12,8 @@ use crate::{
     rig::{
         Rig,
         character::rig_text,
-        skin::SkinFile,
+        project,
+        skin::{SkinError, SkinFile},
         template::{self, write_template},
         text::{self, RigTextError},
     },
@@ -51,6 +52,26 @@ pub enum StoreError {
         path: PathBuf,
         /// How long it would be.
         mebibytes: usize,
+    },
+    /// The project would be longer than any that is read.
+    #[error(
+        "`{}`: the project would have {mebibytes} MiB, and no more than {} are read; delete stored poses, or split the rig",
+        path.display(),
+        project::MAX_BYTES >> 20
+    )]
+    ProjectTooLarge {
+        /// The file.
+        path: PathBuf,
+        /// How long it would be.
+        mebibytes: usize,
+    },
+    /// Weights that no file can hold.
+    #[error("`{}`: {source}", path.display())]
+    Skin {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with them.
+        source: SkinError,
     },
     /// Its name has no ending that fits.
     #[error("`{}`: {wanted}", path.display())]

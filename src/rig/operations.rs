@@ -5,6 +5,7 @@
 //! refused. With symmetry on, an operation does the same to the joints on the other side; pairs are known by uid.
 
 mod draft;
+mod frame;
 mod hierarchy;
 mod orient;
 mod place;

@@ -8,8 +8,8 @@ use rigsmith::{
     mesh::model::Weights,
     plugins::{document::Selection, history::RigHistory},
     rig::{
-        EditError, GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SkinData, Tag, TagKind, Uid,
-        UidSource,
+        EditError, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigAbout, RigEdit, SkinData,
+        StoredPose, Tag, TagKind, Uid, UidSource,
         operations::{Axis, MirrorPlane, Operation, OperationError, Outcome},
     },
 };
@@ -62,7 +62,13 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
     let odd = b % 2 == 1;
     let uid = Uid(u64::from(a) << 8 | u64::from(kind));
     let edit = |edit| Operation::Edits(vec![edit]);
-    match kind % 26 {
+    let offset = PoseOffset {
+        translation: if odd { place } else { Vec3::ZERO },
+        rotation: Quat::from_rotation_z(place.y) * Quat::from_rotation_x(place.x),
+        scale: if a % 3 == 0 { place.abs() + 0.5 } else { Vec3::ONE },
+    };
+    let stored = rig.stored_poses().get(usize::from(b) % (rig.stored_poses().len() + 1)).map_or(uid, |pose| pose.uid);
+    match kind % 34 {
         0 | 1 => Operation::Place { position: place, parent },
         2 | 3 => Operation::Chain { positions: vec![place, place + Vec3::X, place + Vec3::Y * 2.0], parent },
         4 => Operation::Insert { child: x, position: place },
@@ -141,6 +147,17 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
             ..Default::default()
         }))),
         24 => edit(RigEdit::SetMirror(x, (b % 3 > 0).then_some(y))),
+        25 | 26 => Operation::Pose(vec![(x, offset), (y, PoseOffset::from_rotation(offset.rotation))]),
+        27 => Operation::ResetPose(if odd { vec![x] } else { Vec::new() }),
+        28 => Operation::StorePose(text),
+        29 => Operation::ApplyPose(stored),
+        30 => Operation::RenamePose(stored, text),
+        31 => Operation::DeletePose(stored),
+        32 => edit(RigEdit::AddStoredPose(
+            // A joint that never was, as after a deletion.
+            Box::new(StoredPose { uid, name: text, offsets: [(x, offset), (Uid(0xbeef), offset)].into() }),
+            usize::from(b % 3),
+        )),
         _ => Operation::Edits(vec![
             RigEdit::SetLocked(x, odd),
             RigEdit::Batch(vec![RigEdit::SetLabel(x, Some(text)), RigEdit::RemoveJoint(y)]),

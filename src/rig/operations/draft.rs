@@ -1,9 +1,9 @@
 //! A run of edits that is kept or taken back as a whole.
 
-use bevy::math::{Affine3, Vec3};
+use bevy::math::{Affine3, Mat3, Vec3};
 
-use super::MirrorPlane;
-use crate::rig::{EditError, Rig, RigEdit, Uid, UidSource};
+use super::{MirrorPlane, frame::Frame};
+use crate::rig::{EditError, PoseOffset, Rig, RigEdit, Uid, UidSource};
 
 /// A rig under change: edits are applied at once and remembered with their inverses.
 pub struct Draft<'a> {
@@ -97,7 +97,8 @@ impl<'a> Draft<'a> {
         self.apply(RigEdit::SetRest(joint, rest))
     }
 
-    /// Runs `change` on a joint and puts its children back where they were before.
+    /// Runs `change` on a joint and puts its children back where they were before. Poses go on turning it about the
+    /// same axes, and moving it the same way, however its own axes are turned now.
     pub fn keeping_children(
         &mut self,
         joint: Uid,
@@ -105,8 +106,24 @@ impl<'a> Draft<'a> {
     ) -> Result<(), EditError> {
         let children: Vec<(Uid, Affine3)> =
             self.rig.children(Some(joint)).iter().map(|child| (*child, self.rig.rest_global(*child))).collect();
+        let before = Frame::of(self.rig, joint);
         change(self)?;
-        children.iter().try_for_each(|(child, global)| self.set_global(*child, global))
+        children.iter().try_for_each(|(child, global)| self.set_global(*child, global))?;
+        let now = Frame::of(self.rig, joint);
+        if before.is_like(&now) { Ok(()) } else { self.carry_poses(joint, &before, &now) }
+    }
+
+    fn carry_poses(&mut self, joint: Uid, before: &Frame, now: &Frame) -> Result<(), EditError> {
+        let carried = |offset: &PoseOffset| before.carried(offset, now, Mat3::IDENTITY);
+        if let Some(offset) = self.rig.offset(joint).map(carried) {
+            self.apply(RigEdit::SetOffset(joint, Some(offset)))?;
+        }
+        let stored = self.rig.stored_poses().iter().filter(|pose| pose.offsets.contains_key(&joint));
+        for mut pose in stored.cloned().collect::<Vec<_>>() {
+            pose.offsets.entry(joint).and_modify(|offset| *offset = carried(offset));
+            self.apply(RigEdit::SetStoredPose(Box::new(pose)))?;
+        }
+        Ok(())
     }
 
     /// Position of a joint, or an error.
