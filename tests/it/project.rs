@@ -24,7 +24,7 @@ use rigsmith::{
     },
 };
 
-use crate::edits::{Bench, random_rig, steps};
+use crate::edits::{Bench, command, random_rig, steps};
 
 const FROZEN: &str = include_str!("../frozen/format-1.rigsmith.ron");
 
@@ -131,18 +131,20 @@ fn one_change_is_one_line() {
 }
 
 #[test]
-fn line_breaks_in_parameters_stay_as_they_are() {
+fn parameters_stay_as_they_are_with_their_line_breaks_and_however_deep() {
     let mut bench = Bench::new();
     let joint = bench.place([0.0; 3], None);
-    let params = [
-        "(a: \"x\",\n  b: r#\"raw\n    text \"with\" lines\n\"#, // params: [\n)",
-        "[\n1]",
-        &format!("{}1{}", "[".repeat(90), "]".repeat(90)),
-    ];
-    for (number, params) in params.iter().enumerate() {
-        let tag = crate::edits::command(Uid(100 + number as u64), params, None);
-        bench.run(Operation::Edits(vec![RigEdit::AddTag { joint, tag: Box::new(tag), index: usize::MAX }]));
+    let params = ["(a: \"x\",\n  b: r#\"raw\n    text \"with\" lines\n\"#, // params: [\n)", "[\n1]"];
+    for (number, params) in params.into_iter().enumerate() {
+        let tag = Box::new(command(Uid(100 + number as u64), params, None));
+        bench.run(Operation::Edits(vec![RigEdit::AddTag { joint, tag, index: usize::MAX }]));
     }
+    // As deep as a rig takes them.
+    let deep = |depth: usize| {
+        let tag = command(Uid(200), &format!("{}1{}", "[".repeat(depth), "]".repeat(depth)), None);
+        RigEdit::AddTag { joint, tag: Box::new(tag), index: usize::MAX }
+    };
+    assert!((20..200).rev().any(|depth| bench.rig.apply(&deep(depth)).is_ok()));
     assert_eq!(as_file(&bench.rig), bench.rig);
 }
 
@@ -175,7 +177,7 @@ fn mistakes_are_named_with_their_place() {
             pose,
             "(joint: \"0000000000000003\"), (joint: \"0000000000000003\")",
             "twice",
-            "joint: \"0000000000000003\")\n",
+            "joint: \"0000000000000003\"),\n",
         ),
         (pose, "(joint: \"0000000000000002\", rotation: (0, 0, 0, 0.5))", "not a rotation", "rotation: (0, 0, 0, 0.5)"),
         (pose, "(joint: \"0000000000000002\", turn: 1)", "turn", "turn: 1"),
