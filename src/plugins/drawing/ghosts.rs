@@ -45,14 +45,14 @@ pub struct GhostJoint {
 /// Draws ghosts into blended ink.
 pub fn draw_ghosts(ghosts: &Ghosts, sight: &Sight, theme: &Theme, ball_scale: f32, ink: &mut Ink) {
     let mut pen = Pen::new(ink, sight);
-    if let Some((near, far)) = ghosts.depth_span {
-        let at = ghosts.joints.first().map(|joint| joint.position);
-        draw_span(&mut pen, [near, far], at, theme);
-    }
     let tint = |joint: &GhostJoint| if joint.mirrored { theme.ghost_mirrored } else { theme.ghost };
     for joint in &ghosts.joints {
         let Some(parent) = joint.parent else { continue };
         ghost_bone(&mut pen, [parent, joint.position], tint(joint), theme);
+    }
+    if let Some((near, far)) = ghosts.depth_span {
+        let at = ghosts.joints.first().map(|joint| joint.position);
+        draw_span(&mut pen, [near, far], at, theme);
     }
     for joint in &ghosts.joints {
         let pixel = sight.pixel_at(joint.position);
@@ -73,9 +73,9 @@ pub fn draw_ghosts(ghosts: &Ghosts, sight: &Sight, theme: &Theme, ball_scale: f3
         );
     }
     for ends in ghosts.stroke.windows(2) {
-        pen.layer = Layer::Fixed(0.9985);
+        pen.layer = Layer::Fixed(0.999_9);
         pen.line([ends[0], ends[1]], 4.6, 0.0, fade(theme.outline, 0.35));
-        pen.layer = Layer::Fixed(0.9988);
+        pen.layer = Layer::Fixed(0.999_92);
         pen.line([ends[0], ends[1]], 2.4, 0.0, theme.stroke);
     }
 }
@@ -106,7 +106,7 @@ fn draw_span(pen: &mut Pen, span: [Vec3; 2], at: Option<Vec3>, theme: &Theme) {
     pen.line(span, 3.0, 0.0, fade(theme.outline, 0.4));
     pen.line(span, 1.4, 0.0, theme.depth);
     let along = (span[1] - span[0]).normalize_or_zero();
-    for (place, half) in [(Some(span[0]), 4.0), (Some(span[1]), 4.0), (at, 9.0)] {
+    for (place, half) in [(Some(span[0]), 5.0), (Some(span[1]), 5.0), (at, 13.0)] {
         let Some(place) = place else { continue };
         let across = along.cross(pen.sight.towards(place)).try_normalize().unwrap_or(pen.sight.plane.right);
         let half = across * (half * pen.sight.pixel_at(place));

@@ -178,7 +178,7 @@ impl Grid<'_> {
             GridPlane::Side => Vec3::X,
         };
         let slope = self.sight.towards(point).dot(normal).abs();
-        let pixels = step / pixel * slope.max(1e-3).sqrt();
+        let pixels = step / pixel * ops::powf(slope.max(1e-4), 0.85);
         let part = ((pixels - 6.0) / 60.0).clamp(0.0, 1.0);
         0.25 * (part * 16.0).min(1.0) + 0.75 * part
     }

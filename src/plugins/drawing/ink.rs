@@ -11,8 +11,10 @@ use super::theme::Tint;
 use crate::plugins::viewport::Sight;
 
 /// The part of the depth buffer that pictures over the mesh share: in front of everything else, yet ordered among
-/// themselves (1 is the near plane).
-const FRONT: [f32; 2] = [0.9, 0.999];
+/// themselves (1 is the near plane). In a perspective view only what almost touches the camera is in there, too; depth
+/// in an orthographic view is even, so the part must be thin: with Bevy's range of a kilometre, a metre.
+const FRONT: [f32; 2] = [0.9, 0.9998];
+const FLAT_FRONT: [f32; 2] = [0.999, 0.9998];
 
 /// Triangles with colours, in the rig's space.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -85,7 +87,7 @@ impl<'a> Pen<'a> {
 
     /// Depth of a place that lies `lift` nearer to the camera than `position`. Nearer places have greater depths.
     pub fn depth(&self, position: Vec3, lift: f32) -> f32 {
-        let [far, near] = FRONT;
+        let [far, near] = if self.sight.plane.eye.is_some() { FRONT } else { FLAT_FRONT };
         match self.layer {
             Layer::Scene => 0.0,
             Layer::Fixed(depth) => depth,
@@ -178,9 +180,8 @@ impl<'a> Pen<'a> {
         let middle = self.vertex(centre - right * 0.32 + up * 0.32, lift, spot);
         let count = self.corners(centre, radius);
         let first = middle + 1;
-        for corner in 0..count {
-            let (sin, cos) = ops::sin_cos(corner as f32 / count as f32 * TAU);
-            self.vertex(centre + right * cos + up * sin, lift, rim);
+        for (corner, at) in circle(count) {
+            self.vertex(centre + right * at.x + up * at.y, lift, rim);
             self.ink.indices.extend([middle, first + corner, first + (corner + 1) % count]);
         }
     }
@@ -190,13 +191,23 @@ impl<'a> Pen<'a> {
         let (right, up) = (self.sight.plane.right, self.sight.plane.up);
         let count = corners.unwrap_or_else(|| self.corners(centre, radii[1]));
         let first = self.ink.positions.len() as u32;
-        for corner in 0..count {
-            let (sin, cos) = ops::sin_cos(corner as f32 / count as f32 * TAU);
-            let outwards = right * cos + up * sin;
+        for (corner, at) in circle(count) {
+            let outwards = right * at.x + up * at.y;
             self.vertex(centre + outwards * radii[0], lift, tint);
             self.vertex(centre + outwards * radii[1], lift, tint);
             let (here, next) = (first + 2 * corner, first + 2 * ((corner + 1) % count));
             self.ink.indices.extend([here, here + 1, next + 1, here, next + 1, next]);
         }
     }
+}
+
+/// Points around the unit circle with their numbers. One sine for all of them: balls have many corners.
+fn circle(count: u32) -> impl Iterator<Item = (u32, Vec2)> {
+    let (sin, cos) = ops::sin_cos(TAU / count as f32);
+    let turn = Vec2::new(cos, sin);
+    (0..count).scan(Vec2::X, move |next, number| {
+        let at = *next;
+        *next = at.rotate(turn);
+        Some((number, at))
+    })
 }

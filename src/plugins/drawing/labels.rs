@@ -62,7 +62,7 @@ pub(super) fn write_label(pen: &mut Pen, at: Vec2, text: &str, tint: Tint, outli
     let sight = *pen.sight;
     let place = |point: Vec3| sight.plane.lift(sight.point(at + Vec2::new(point.x, -point.y)));
     let layer = pen.layer;
-    for (width, color, depth) in [(3.6, outline, 0.9992), (1.3, tint, 0.9994)] {
+    for (width, color, depth) in [(3.6, outline, 0.999_94), (1.3, tint, 0.999_96)] {
         pen.layer = Layer::Fixed(depth);
         for ends in letters.strip_positions.windows(2) {
             if ends.iter().all(|end| end.is_finite()) {

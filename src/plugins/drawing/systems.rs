@@ -244,7 +244,9 @@ fn labels_of(rig: &Rig, joints: &[DrawnJoint], sight: &Sight, settings: &RigDraw
                 Emphasis::None => 0,
             };
             let text = rig.joint(joint.uid)?.data.label.as_deref()?;
-            Some(LabelWish { position: joint.position, radius, text, rank })
+            // Room for the mark of a root and the ring of what is hovered.
+            let mark = if joint.hovered || joint.parent.is_none() { 7.0 } else { 0.0 };
+            Some(LabelWish { position: joint.position, radius: radius + mark, text, rank })
         })
         .collect();
     label_places(sight, &wishes, LETTER)
