@@ -6,7 +6,7 @@ use super::{WeightColors, build::influences};
 use crate::rig::SkinData;
 
 /// Where a joint has no weight at all.
-const NONE: Srgba = Srgba::rgb(0.27, 0.27, 0.28);
+const NONE: Srgba = Srgba::rgb(0.36, 0.36, 0.37);
 /// Colours at equal steps of the weight. Matplotlib's "plasma" map: its lightness rises evenly with the weight, so that
 /// it can be read without colour vision, too.
 const RAMP: [[u8; 3]; 9] = [

@@ -88,18 +88,24 @@ pub(super) fn place_meshes(
     mut commands: Commands,
     placed: Query<(Entity, &SkinOf, Option<&ChildOf>), (With<RigMesh>, Or<(Added<RigMesh>, Changed<SkinOf>)>)>,
     gone: Query<(Entity, &Displayed), Or<(Without<RigMesh>, Without<SkinOf>)>>,
+    orphans: Query<Entity, (With<DisplayPiece>, Without<ChildOf>)>,
 ) {
     for (mesh, of, child_of) in &placed {
         if child_of.is_none_or(|child_of| child_of.parent() != of.0) {
-            commands.entity(mesh).insert_if_new((Transform::default(), Visibility::default())).insert(ChildOf(of.0));
-            commands.entity(of.0).insert_if_new((Transform::default(), Visibility::default()));
+            let mut entity = commands.entity(mesh);
+            entity.try_insert_if_new((Transform::default(), Visibility::default())).try_insert(ChildOf(of.0));
+            commands.entity(of.0).try_insert_if_new((Transform::default(), Visibility::default()));
         }
     }
     for (mesh, displayed) in &gone {
         for piece in displayed.surface.entities().chain(displayed.edges.entities()) {
             commands.entity(piece).try_despawn();
         }
-        commands.entity(mesh).remove::<(Displayed, DisplayJob)>();
+        commands.entity(mesh).try_remove::<(Displayed, DisplayJob)>();
+    }
+    // Pieces that were put up in the very moment in which their mesh went.
+    for piece in &orphans {
+        commands.entity(piece).try_despawn();
     }
 }
 
@@ -137,7 +143,7 @@ pub(super) fn start_jobs(
             None => {
                 let mut displayed = Displayed::new(&mesh.rest, &images);
                 start(&mut displayed);
-                commands.entity(entity).insert(displayed);
+                commands.entity(entity).try_insert(displayed);
             }
         }
     }
@@ -215,10 +221,10 @@ pub(super) fn land_jobs(
         match (displayed.progress(), job) {
             (Some(done), Some(mut job)) => job.done = done,
             (Some(done), None) => {
-                commands.entity(entity).insert(DisplayJob { done });
+                commands.entity(entity).try_insert(DisplayJob { done });
             }
             (None, Some(_)) => {
-                commands.entity(entity).remove::<DisplayJob>();
+                commands.entity(entity).try_remove::<DisplayJob>();
             }
             (None, None) => {}
         }
@@ -359,14 +365,14 @@ pub(super) fn dress_pieces(
                 displayed.dresses.entry(dress).or_insert_with(|| materials.add(dress.material(&displayed.materials)));
             if shown.dress.as_ref().is_none_or(|known| known.id() != handle.id().untyped()) {
                 shown.dress = Some(handle.clone().untyped());
-                commands.entity(shown.entity).insert(MeshMaterial3d(handle.clone()));
+                commands.entity(shown.entity).try_insert(MeshMaterial3d(handle.clone()));
             }
         }
         let handle = if display.xray { &edges.xray } else { &edges.solid };
         let visible = if display.wireframe { Visibility::Inherited } else { Visibility::Hidden };
         for shown in &mut displayed.edges.pieces {
             shown.dress = Some(handle.clone().untyped());
-            commands.entity(shown.entity).insert((MeshMaterial3d(handle.clone()), visible));
+            commands.entity(shown.entity).try_insert((MeshMaterial3d(handle.clone()), visible));
         }
     }
 }

@@ -12,7 +12,7 @@ use bevy::{
     camera::visibility::DynamicSkinnedMeshBounds,
     mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     prelude::*,
-    tasks::{AsyncComputeTaskPool, Task, block_on, futures::check_ready, futures_lite::future::yield_now},
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
 use super::{
@@ -132,16 +132,17 @@ impl Layer {
     /// Starts to build the pieces for `key`; what is on the screen stays until they come.
     pub fn start(&mut self, model: &Arc<Model>, plans: &Plans, key: LayerKey) {
         let queue = Arc::new(Queue::default());
-        let work = build(self.kind, model.clone(), plans.clone(), key.clone(), queue.clone());
+        let (kind, model, plans, wanted, out) = (self.kind, model.clone(), plans.clone(), key.clone(), queue.clone());
         let vertices: usize = model.parts.iter().map(|part| part.vertices.len()).sum();
+        let work = move || build(kind, &model, &plans, &wanted, &out);
         let task = if vertices <= SMALL {
-            block_on(work);
+            work();
             None
         } else {
-            Some(AsyncComputeTaskPool::get().spawn(work))
+            Some(AsyncComputeTaskPool::get().spawn(async move { work() }))
         };
         self.key = Some(key.clone());
-        // A task that runs already stops at its next piece.
+        // An older task that runs already stops at its next piece.
         self.job = Some(Job { task, queue, key, landed: 0 });
     }
 
@@ -197,7 +198,7 @@ impl Layer {
             let known = self.pieces.get(index);
             let alike = |old: &&Shown| old.palette.is_some() == piece.palette.is_some() && old.colored == piece.colored;
             let entity = match known.filter(alike) {
-                Some(old) => commands.entity(old.entity).insert(Mesh3d(handle)).id(),
+                Some(old) => commands.entity(old.entity).try_insert(Mesh3d(handle)).id(),
                 None => {
                     // The renderer may need some frames to prepare for another kind of mesh.
                     self.retiring.extend(known.map(|old| (old.entity, OVERLAP)));
@@ -239,31 +240,33 @@ impl Shown {
     /// What the renderer needs to hold the piece by its joints.
     pub fn hold(&self, commands: &mut Commands, inverse_bindposes: Handle<SkinnedMeshInverseBindposes>) {
         let skinned = SkinnedMesh { inverse_bindposes, joints: self.joints.clone() };
-        commands.entity(self.entity).insert((skinned, DynamicSkinnedMeshBounds));
+        commands.entity(self.entity).try_insert((skinned, DynamicSkinnedMeshBounds));
     }
 }
 
-async fn build(kind: DisplayPiece, model: Arc<Model>, plans: Plans, key: LayerKey, queue: Arc<Queue>) {
+/// Builds all pieces, unless the layer stops waiting for them. In one go: a single thread may have to build the
+/// hierarchy that answers rays as well, and people want to see the mesh first.
+fn build(kind: DisplayPiece, model: &Model, plans: &Plans, key: &LayerKey, queue: &Arc<Queue>) {
     let skin = key.skin.as_deref();
+    // The layer and this task hold the queue.
+    let abandoned = || Arc::strong_count(queue) < 2;
     match kind {
         DisplayPiece::Surface => {
-            let plan = plans.surface.get_or_init(|| plan_surface(&model));
+            let plan = plans.surface.get_or_init(|| plan_surface(model));
             queue.total.store(plan.len(), Ordering::Relaxed);
             let painter = Painter::new(key.colors, skin);
-            for piece in plan {
+            for piece in plan.iter().take_while(|_| !abandoned()) {
                 let material = piece.traits.material.and_then(|material| model.looks.materials.get(material));
                 let bumps =
                     painter.is_none() && material.is_some_and(|material| material.get("normalTexture").is_some());
-                queue.push(build_surface(&model, piece, skin, painter.as_ref(), bumps));
-                yield_now().await;
+                queue.push(build_surface(model, piece, skin, painter.as_ref(), bumps));
             }
         }
         DisplayPiece::Edges => {
-            let plan = plans.edges.get_or_init(|| plan_edges(&model));
+            let plan = plans.edges.get_or_init(|| plan_edges(model));
             queue.total.store(plan.len(), Ordering::Relaxed);
-            for piece in plan {
-                queue.push(build_edges(&model, piece, skin));
-                yield_now().await;
+            for piece in plan.iter().take_while(|_| !abandoned()) {
+                queue.push(build_edges(model, piece, skin));
             }
         }
     }

@@ -2,8 +2,9 @@
 
 use bevy::{camera::Exposure, core_pipeline::tonemapping::Tonemapping, prelude::*};
 
-/// Light for a camera that looks at meshes: a key light over its left shoulder, a dimmer fill light from its right,
-/// and light from all around. None casts shadows: they cost a software renderer most, and hide what is edited.
+/// Light for a camera that looks at meshes: a key light over its left shoulder, a dimmer fill light from its right, a
+/// rim light from behind that sets outlines off, and light from all around. None casts shadows: they cost a software
+/// renderer most, and hide what is edited.
 ///
 /// The values say how bright a white matte surface becomes that squarely faces the light, where 1 is white on the
 /// screen. Together they stay at about 1 where a surface faces the camera, which with [`Tonemapping::None`] shows
@@ -22,13 +23,15 @@ pub struct ViewportLights {
     pub key: f32,
     /// Brightness of the fill light.
     pub fill: f32,
+    /// Brightness of the rim light.
+    pub rim: f32,
     /// Brightness of the light from all around.
     pub ambient: f32,
 }
 
 impl Default for ViewportLights {
     fn default() -> Self {
-        Self { key: 0.62, fill: 0.18, ambient: 0.3 }
+        Self { key: 0.78, fill: 0.2, rim: 0.4, ambient: 0.2 }
     }
 }
 
@@ -50,7 +53,11 @@ impl ViewportLights {
             )
         };
         let ambient = AmbientLight { brightness: self.ambient * white, ..default() };
-        let lights = children![light(self.key, Vec3::new(-0.6, 0.9, 1.4)), light(self.fill, Vec3::new(1.2, -0.1, 0.8))];
+        let lights = children![
+            light(self.key, Vec3::new(-0.7, 0.9, 1.2)),
+            light(self.fill, Vec3::new(1.2, -0.1, 0.8)),
+            light(self.rim, Vec3::new(0.6, 0.8, -1.2)),
+        ];
         (ambient, exposure, Tonemapping::None, lights)
     }
 }

@@ -18,8 +18,8 @@ use serde_json::{Map, Value};
 use super::textures::{TextureBudget, decode};
 use crate::mesh::model::Looks;
 
-/// What see-through surfaces let through at most.
-const XRAY_OPACITY: f32 = 0.3;
+/// How opaque see-through surfaces are at most.
+const XRAY_OPACITY: f32 = 0.36;
 
 /// An image that a material uses, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -44,7 +44,7 @@ pub(super) struct Materials {
 /// The neutral material of what has none.
 pub(super) fn clay() -> StandardMaterial {
     StandardMaterial {
-        base_color: Color::srgb(0.72, 0.70, 0.67),
+        base_color: Color::srgb(0.80, 0.78, 0.75),
         perceptual_roughness: 0.75,
         reflectance: 0.3,
         double_sided: true,

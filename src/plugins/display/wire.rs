@@ -46,6 +46,11 @@ impl Material for WireMaterial {
         AlphaMode::Blend
     }
 
+    fn depth_bias(&self) -> f32 {
+        // Among what blends: after see-through surfaces, before what is drawn over everything.
+        1e5
+    }
+
     fn enable_prepass() -> bool {
         false
     }
