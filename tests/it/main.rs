@@ -40,6 +40,7 @@ mod rig_text;
 mod skin_file;
 mod stroke;
 mod surface;
+mod surface_refresh;
 mod template;
 mod three_strokes;
 mod transfer;
