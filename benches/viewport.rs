@@ -174,6 +174,7 @@ impl Session {
             chain_only: true,
             reach: 0.0,
             parent: StrokeParent::default(),
+            chain: None,
         };
         self.phase("stroke requests", 200, |session, i| {
             if i % 10 == 0 {

@@ -16,6 +16,7 @@ use crate::{
         gesture::{Gesture, GestureAnswer, GestureScript},
         skinning::{BindRequest, Bound, SkinningJob},
         surface::{RigMesh, SkinOf},
+        task_pools,
     },
     rig::{
         Rig, RigEdit, SkinData, Uid, UidSource,
@@ -27,7 +28,8 @@ use crate::{
 /// An app with [`RigPlugins`], without window and renderer, before `finish`. The same seed gives the same uids.
 pub fn headless_app(seed: u64) -> App {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, TransformPlugin, RigPlugins)).insert_resource(UidSource::seeded(seed));
+    app.add_plugins((MinimalPlugins.set(task_pools()), TransformPlugin, RigPlugins))
+        .insert_resource(UidSource::seeded(seed));
     app
 }
 

@@ -17,7 +17,10 @@ pub mod surface;
 #[cfg(feature = "draw")]
 pub mod viewport;
 
-use bevy::{app::PluginGroupBuilder, prelude::*};
+use bevy::{
+    app::{PluginGroupBuilder, TaskPoolOptions},
+    prelude::*,
+};
 
 /// Everything a rig needs, head-less.
 ///
@@ -64,6 +67,15 @@ pub enum RigSystems {
     Bind,
     /// In `PostUpdate`, after transforms have propagated: surfaces follow the pose.
     Surface,
+}
+
+/// Task pools in which a long task (weights, a file) does not keep a short one (the surface of a pose, a stroke) waiting:
+/// at least four background threads, where Bevy takes one on a small machine. Set it on `MinimalPlugins` or
+/// `DefaultPlugins` of the first app in a process.
+pub fn task_pools() -> TaskPoolPlugin {
+    let mut task_pool_options = TaskPoolOptions::default();
+    task_pool_options.async_compute.min_threads = 4;
+    TaskPoolPlugin { task_pool_options }
 }
 
 /// Orders [`RigSystems`]; added by every plugin of [`RigPlugins`], harmless when repeated.

@@ -172,18 +172,19 @@ fn start_skinning(
             bound.write(Bound { mesh: request.mesh, result });
             continue;
         };
-        let input = SkinningInput::new(rig, mesh, &request.rigid);
-        let (mesh, settings) = (mesh.clone(), request.settings.clone());
+        let (rig, mesh, request) = (rig.clone(), mesh.clone(), request.clone());
+        let entity = request.mesh;
         let progress = Arc::new(AtomicU32::new(0));
         let cancelled = Arc::new(AtomicBool::new(false));
         let (told, stop) = (progress.clone(), cancelled.clone());
         let task = AsyncComputeTaskPool::get().spawn(async move {
-            input.compute(&mesh, &settings, &|part| {
+            let input = SkinningInput::new(&rig, &mesh, &request.rigid);
+            input.compute(&mesh, &request.settings, &|part| {
                 told.store(part.to_bits(), Ordering::Relaxed);
                 !stop.load(Ordering::Relaxed)
             })
         });
-        commands.entity(request.mesh).insert(SkinningJob { progress, cancelled, task });
+        commands.entity(entity).insert(SkinningJob { progress, cancelled, task });
     }
 }
 

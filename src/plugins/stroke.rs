@@ -150,11 +150,20 @@ fn stroke(
     waiting.0.retain_mut(|WaitingStroke { request, since, chain }| {
         let Ok(drawn) = rigs.get(request.rig) else { return false };
         let (rig, selection, entities, place, symmetry, tips, surface, meshes) = drawn;
-        let found = chain.as_mut().map(check_ready);
-        if busy.contains(&request.rig) || matches!(found, Some(None)) {
-            busy.push(request.rig);
+        if busy.contains(&request.rig) {
             return true;
         }
+        busy.push(request.rig);
+        let found = match chain.take() {
+            None => None,
+            Some(mut task) => match check_ready(&mut task) {
+                None => {
+                    *chain = Some(task);
+                    return true;
+                }
+                found => found,
+            },
+        };
         let result = match answer(since, meshes.is_some(), surface) {
             Answer::Wait => None,
             Answer::Now(None) => {
@@ -163,7 +172,7 @@ fn stroke(
             Answer::Now(Some(surface)) => {
                 let posed = posed_joints(rig, entities, place, &joints);
                 let scene = StrokeScene { rig, selection, symmetry, tips, surface, posed: &posed };
-                match act(request, &scene, found.flatten(), &mut edits) {
+                match act(request, &scene, found, &mut edits) {
                     Acted::Done(result) => Some(result),
                     Acted::Follows(task) => {
                         *chain = Some(task);
@@ -172,7 +181,6 @@ fn stroke(
                 }
             }
         };
-        busy.push(request.rig);
         let is_waiting = result.is_none();
         done.write_batch(result.map(|result| StrokeDone { rig: request.rig, result }));
         is_waiting

@@ -241,10 +241,11 @@ pub(super) enum Answer<'a> {
 /// Whether a request can be answered. `since` belongs to the request and is `None` when it comes.
 pub(super) fn answer<'a>(since: &mut Option<u64>, has_mesh: bool, surface: Option<&'a RigSurface>) -> Answer<'a> {
     match surface {
-        Some(surface) => match surface.shows(*since.get_or_insert(surface.wanted())) {
-            true => Answer::Now(Some(surface)),
-            false => Answer::Wait,
-        },
+        Some(surface) => {
+            // The surface counts anew after its last mesh was closed and another opened.
+            let since = (*since.get_or_insert(surface.wanted())).min(surface.wanted());
+            if surface.shows(since) { Answer::Now(Some(surface)) } else { Answer::Wait }
+        }
         None if has_mesh => Answer::Wait,
         None => Answer::Now(None),
     }

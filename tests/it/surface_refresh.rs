@@ -385,6 +385,7 @@ fn strokes_are_followed_in_the_background_one_after_another() {
         chain_only: true,
         reach: 0.0,
         parent: StrokeParent::default(),
+        chain: None,
     };
     let expected = stroke_chain(&surface, &plane, &points, request.settings, request.choice).unwrap();
     let before = bench.rig().len();
