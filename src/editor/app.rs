@@ -11,12 +11,13 @@ use bevy::{
         renderer::RenderAdapterInfo,
         settings::{RenderCreation, WgpuSettings},
     },
-    window::{ExitCondition, WindowResolution},
+    window::{ExitCondition, RequestRedraw, WindowEvent, WindowResolution},
     winit::{UpdateMode, WinitSettings},
 };
 use bevy_egui::{EguiGlobalSettings, EguiPlugin, PrimaryEguiContext};
 use wgpu::BlendState;
 
+use super::tools::stroke::StrokeTool;
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
@@ -34,10 +35,11 @@ use super::{
 };
 use crate::plugins::{
     RigPlugins,
-    display::DisplayPlugin,
-    document::{Change, EditRequest},
+    display::{DisplayJob, DisplayPlugin},
+    document::{Change, EditRequest, Edited},
     drawing::DrawingPlugin,
     skinning::SkinningJob,
+    surface::RigSurface,
 };
 
 /// What to open, and how.
@@ -144,7 +146,8 @@ impl Plugin for EditorPlugin {
         .init_resource::<StatusLine>()
         .add_message::<Notice>()
         .add_systems(Startup, (spawn_interface, open_first, say_adapter))
-        .add_systems(Update, (carry_out, redraw_while_busy));
+        .add_systems(Update, carry_out)
+        .add_systems(Last, keep_drawing);
     }
 }
 
@@ -202,13 +205,31 @@ fn carry_out(
     }
 }
 
-/// Draws on as long as something goes on in the background; else the window sleeps until somebody does something.
-fn redraw_while_busy(
+/// Frames drawn after the last event: what a click did is on the screen one frame after it, and the renderer works one
+/// frame behind.
+const FRAMES_AFTER: u8 = 3;
+
+/// Draws on after something happened, and as long as something goes on in the background; else the window sleeps until
+/// somebody does something.
+fn keep_drawing(
+    mut events: MessageReader<WindowEvent>,
+    mut edited: MessageReader<Edited>,
+    mut notices: MessageReader<Notice>,
     loading: Res<Loading>,
-    jobs: Query<(), With<SkinningJob>>,
-    mut redraw: MessageWriter<bevy::window::RequestRedraw>,
+    jobs: Query<(), Or<(With<SkinningJob>, With<DisplayJob>)>>,
+    surfaces: Query<&RigSurface>,
+    stroke: Res<StrokeTool>,
+    mut left: Local<u8>,
+    mut redraw: MessageWriter<RequestRedraw>,
 ) {
-    if loading.what().is_some() || !jobs.is_empty() {
-        redraw.write(bevy::window::RequestRedraw);
+    let happened = events.read().any(|event| !matches!(event, WindowEvent::RequestRedraw(_)));
+    let told = edited.read().count() + notices.read().count() > 0;
+    let surface = surfaces.iter().any(|surface| surface.is_stale() || surface.ready().is_none());
+    if happened || told || loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy() {
+        *left = FRAMES_AFTER;
+    }
+    if *left > 0 {
+        *left -= 1;
+        redraw.write(RequestRedraw);
     }
 }

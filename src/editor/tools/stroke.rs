@@ -74,6 +74,13 @@ impl Default for StrokeTool {
     }
 }
 
+impl StrokeTool {
+    /// True while a stroke is being followed in the background.
+    pub fn is_busy(&self) -> bool {
+        matches!(&self.state, StrokeState::Preview(preview) if preview.plan.is_none())
+    }
+}
+
 /// Where a stroke is on its way.
 #[derive(Debug, Default)]
 pub enum StrokeState {
