@@ -24,6 +24,8 @@ mod fuzz_template;
 mod gestures;
 mod gltf;
 mod gltf_torture;
+mod journal;
+mod journal_kill;
 mod layout;
 mod mirror;
 mod models;

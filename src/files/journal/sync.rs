@@ -17,6 +17,7 @@ pub(super) type Synced = Result<(), String>;
 /// A thread that syncs one file.
 pub(super) struct Syncer {
     orders: Sender<Option<Sender<Synced>>>,
+    thread: thread::JoinHandle<()>,
 }
 
 impl Syncer {
@@ -24,8 +25,14 @@ impl Syncer {
     pub(super) fn start(file: Box<dyn DiskFile>, failed: impl FnOnce(String) + Send + 'static) -> Option<Self> {
         let (orders, inbox) = channel();
         let work = move || run(file, &inbox, failed);
-        thread::Builder::new().name("journal sync".to_owned()).spawn(work).ok()?;
-        Some(Self { orders })
+        let thread = thread::Builder::new().name("journal sync".to_owned()).spawn(work).ok()?;
+        Some(Self { orders, thread })
+    }
+
+    /// Waits for the last sync and closes this handle of the file.
+    pub(super) fn end(self) {
+        drop(self.orders);
+        let _ = self.thread.join();
     }
 
     /// Something was written: sync soon.

@@ -47,6 +47,16 @@ struct Open {
     encoder: Encoder,
 }
 
+impl Open {
+    /// Syncs and closes every handle, which unlocks the file.
+    fn close(mut self) -> Synced {
+        if let Some(syncer) = self.syncer.take() {
+            syncer.end();
+        }
+        self.file.sync().map_err(|error| error.to_string())
+    }
+}
+
 /// A writer and its file.
 struct Work {
     writer: Writer,
@@ -114,7 +124,11 @@ impl Work {
             }
             Order::Finish(answer) => {
                 self.write(block);
-                self.sync(answer);
+                let result = match self.open.take() {
+                    Some(open) => open.close(),
+                    None => Err("no journal is open".to_owned()),
+                };
+                let _ = answer.send(result);
                 return false;
             }
             Order::Close(answer) => {
@@ -238,9 +252,10 @@ impl Work {
         if let Some(mut open) = open {
             let mut out = Vec::new();
             // Counts where the file cannot be removed.
-            if open.encoder.end(&mut out).is_ok() && write_all(open.file.as_mut(), &out).is_ok() {
-                let _ = open.file.sync();
+            if open.encoder.end(&mut out).is_ok() {
+                let _ = write_all(open.file.as_mut(), &out);
             }
+            let _ = open.close();
         }
         match self.writer.disk.remove(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(format!("`{}`: {error}", path.display())),
