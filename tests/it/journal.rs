@@ -11,7 +11,7 @@ use bevy::prelude::*;
 use proptest::prelude::*;
 use rigsmith::{
     files::{
-        Disk, Fault, FaultPlan, FaultyDisk, RealDisk,
+        Disk, DiskFile, Fault, FaultPlan, FaultyDisk, RealDisk,
         journal::{
             Basis, Ending, Journal, JournalError, JournalPlaces, JournalStart, Origin, Recovered, SaveMark, file_hash,
             journal_beside, pending_journal, pending_journals, recover,
@@ -250,11 +250,11 @@ fn every_cut_and_every_flipped_byte_leaves_what_came_before() {
             check(&flipped, at, "flip");
             assert_ne!(recover(&flipped).as_ref(), Ok(&whole), "bit {bit} of byte {at} counts for nothing");
         }
-        let mut zeros = bytes.clone();
-        zeros[at..].fill(0);
-        // What is zero already stays as it was.
-        if zeros != bytes {
-            check(&zeros, at, "zeros");
+        // Zeros that were there already change nothing.
+        if let Some(first) = (at..bytes.len()).find(|&i| bytes[i] != 0) {
+            let mut zeros = bytes.clone();
+            zeros[at..].fill(0);
+            check(&zeros, first, "zeros");
         }
     }
     assert!(open >= 12, "{open} cuts between records");
@@ -633,6 +633,107 @@ fn whatever_fails_what_was_said_to_be_safe_is_recovered() {
     assert!(held > operations * 2, "hardly any work survived: {held}");
 }
 
+/// A disk that is full while the switch is on.
+struct Switched(Arc<std::sync::atomic::AtomicBool>);
+
+impl Switched {
+    fn check(&self) -> std::io::Result<RealDisk> {
+        if self.0.load(std::sync::atomic::Ordering::Relaxed) {
+            return Err(std::io::ErrorKind::StorageFull.into());
+        }
+        Ok(RealDisk)
+    }
+}
+
+struct SwitchedFile(Box<dyn DiskFile>, Switched);
+
+impl DiskFile for SwitchedFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.1.check()?;
+        self.0.write(bytes)
+    }
+    fn keep_permissions(&mut self, of: &Path) -> std::io::Result<()> {
+        self.0.keep_permissions(of)
+    }
+    fn sync(&mut self) -> std::io::Result<()> {
+        self.0.sync()
+    }
+}
+
+impl Disk for Switched {
+    fn entry(&self, path: &Path, follow: bool) -> std::io::Result<rigsmith::files::Entry> {
+        RealDisk.entry(path, follow)
+    }
+    fn read_link(&self, path: &Path) -> std::io::Result<PathBuf> {
+        RealDisk.read_link(path)
+    }
+    fn canonical(&self, path: &Path) -> std::io::Result<PathBuf> {
+        RealDisk.canonical(path)
+    }
+    fn list(&self, folder: &Path, limit: usize) -> std::io::Result<Vec<std::ffi::OsString>> {
+        RealDisk.list(folder, limit)
+    }
+    fn create(&self, path: &Path) -> std::io::Result<Box<dyn DiskFile>> {
+        Ok(Box::new(SwitchedFile(self.check()?.create(path)?, Self(self.0.clone()))))
+    }
+    fn rename(&self, from: &Path, to: &Path) -> std::io::Result<()> {
+        RealDisk.rename(from, to)
+    }
+    fn hard_link(&self, existing: &Path, path: &Path) -> std::io::Result<()> {
+        RealDisk.hard_link(existing, path)
+    }
+    fn sync_folder(&self, folder: &Path) -> std::io::Result<()> {
+        RealDisk.sync_folder(folder)
+    }
+    fn remove(&self, path: &Path) -> std::io::Result<()> {
+        RealDisk.remove(path)
+    }
+    fn create_folder(&self, path: &Path) -> std::io::Result<()> {
+        RealDisk.create_folder(path)
+    }
+    fn open(&self, path: &Path) -> std::io::Result<Box<dyn std::io::Read + Send>> {
+        RealDisk.open(path)
+    }
+}
+
+#[test]
+fn a_full_disk_is_told_and_nothing_is_missing_once_there_is_room() {
+    let folder = fresh();
+    let full = Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let set = |on| full.store(on, std::sync::atomic::Ordering::Relaxed);
+    let begin = JournalStart { rig: Some(Rig::new(Uid(42), "random")), ..start(folder.path()) };
+    let mut desk = Desk::new(Arc::new(Switched(full.clone())), begin);
+    desk.place(0);
+    desk.flush();
+    assert_eq!(desk.journal.trouble(), None);
+    set(true);
+    desk.place(1);
+    let refused = desk.journal.flush(LONG).unwrap_err();
+    assert!(refused.contains("save soon"), "{refused}");
+    assert_eq!(desk.journal.trouble().as_deref(), Some(refused.as_str()));
+    desk.place(2);
+    // What was written before is still there.
+    assert_eq!(recover_at(&desk.journal.path().unwrap()).rig.len(), 1);
+    set(false);
+    desk.undo();
+    desk.flush();
+    assert_eq!(desk.journal.trouble(), None);
+    assert_eq!(recover_at(&desk.journal.path().unwrap()).rig, desk.rig);
+    assert_eq!(desk.rig.len(), 2);
+}
+
+#[test]
+fn a_journal_of_the_first_format_still_opens() {
+    let recovered = recover(include_bytes!("../frozen/format-1.journal")).unwrap();
+    let back = replayed(&recovered);
+    assert_eq!((recovered.ending, back.applied, back.rig.len()), (Ending::Open, 55, 11));
+    assert_eq!(back.rig.about().name, "victim");
+    let kinds = |is: fn(&Committed) -> bool| recovered.changes().iter().filter(|change| is(change)).count();
+    assert!(kinds(|change| matches!(change, Committed::Undone(_))) > 0);
+    assert!(kinds(|change| matches!(change, Committed::Redone(_))) > 0);
+    assert!(back.rig.skins().count() == 1 && !back.rig.pose().is_empty());
+}
+
 #[test]
 fn an_app_keeps_what_its_rigs_ask_for_and_tells_trouble_once() {
     let folder = fresh();
@@ -686,11 +787,17 @@ fn weights_of_a_large_mesh_neither_hold_up_the_caller_nor_the_recovery() {
     let mut desk = Desk::apart(folder.path());
     desk.place(0);
     let large = skin(500_000, 1);
-    let operation = Operation::Edits(vec![RigEdit::SetSkin(Uid(8), Some(large.clone()))]);
-    let recorded = desk.history.edit(&mut desk.rig, &mut desk.selection, &mut desk.uids, None, &operation).unwrap();
     let started = Instant::now();
-    desk.journal.record(Committed::Done(recorded.step.unwrap()));
-    let handed = started.elapsed();
+    let mut handed = Duration::MAX;
+    // The least of a few: the machine may be busy with something else.
+    for _ in 0..3 {
+        let skin = Arc::new(large.as_ref().clone());
+        let operation = Operation::Edits(vec![RigEdit::SetSkin(Uid(8), Some(skin))]);
+        let recorded = desk.history.edit(&mut desk.rig, &mut desk.selection, &mut desk.uids, None, &operation).unwrap();
+        let before = Instant::now();
+        desk.journal.record(Committed::Done(recorded.step.unwrap()));
+        handed = handed.min(before.elapsed());
+    }
     desk.place(1);
     let bytes = desk.bytes();
     let written = started.elapsed();

@@ -17,6 +17,7 @@ mod files_set;
 mod fill;
 mod fuzz_gestures;
 mod fuzz_gltf;
+mod fuzz_journal;
 mod fuzz_obj;
 mod fuzz_project;
 mod fuzz_rig_text;

@@ -167,6 +167,25 @@ impl Journal {
         Self { inner: Arc::new(Inner { orders, shared, position, closed: AtomicBool::new(false) }) }
     }
 
+    /// Takes one change. Returns at once; large weights are encoded by the journal's own thread.
+    pub fn record(&self, committed: Committed) {
+        self.inner.position.fetch_add(1, Ordering::AcqRel);
+        self.order(Order::Change(committed));
+    }
+
+    /// The reason why changes cannot be kept at the moment and what to do, for people; `None` while they are.
+    pub fn trouble(&self) -> Option<Arc<str>> {
+        self.inner.shared.trouble()
+    }
+
+    /// Waits until all changes so far are on the disk, at most for `limit`. Where they are not, tries again at once.
+    ///
+    /// # Errors
+    /// Why they are not there, for people.
+    pub fn flush(&self, limit: Duration) -> Result<(), String> {
+        self.ask(Order::Flush, limit)
+    }
+
     /// How many changes were recorded since the work started: what is in the document now, for [`SaveMark::position`].
     pub fn position(&self) -> u64 {
         self.inner.position.load(Ordering::Acquire)
@@ -242,15 +261,14 @@ impl Drop for Inner {
 
 impl StepSink for Journal {
     fn record(&self, committed: Committed) {
-        self.inner.position.fetch_add(1, Ordering::AcqRel);
-        self.order(Order::Change(committed));
+        Journal::record(self, committed);
     }
 
     fn trouble(&self) -> Option<Arc<str>> {
-        self.inner.shared.trouble()
+        Journal::trouble(self)
     }
 
     fn flush(&self, limit: Duration) -> Result<(), String> {
-        self.ask(Order::Flush, limit)
+        Journal::flush(self, limit)
     }
 }
