@@ -56,7 +56,7 @@ impl Editing {
         app.finish();
         app.cleanup();
         let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(seed), "victim"), ..default() }).id();
-        Self { app, rig, random: Random::new(seed), saves: seed % 2 == 0 }
+        Self { app, rig, random: Random::new(seed), saves: seed.is_multiple_of(2) }
     }
 
     fn rig(&self) -> &Rig {
