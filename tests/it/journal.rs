@@ -157,7 +157,11 @@ fn skin(points: u32, seed: u32) -> Arc<SkinData> {
         }
         weights.starts.push(weights.joints.len() as u32);
     }
-    Arc::new(SkinData { joints: (0..4).map(|joint| Uid(100 + joint)).collect(), weights, at_rest: seed.is_multiple_of(2) })
+    Arc::new(SkinData {
+        joints: (0..4).map(|joint| Uid(100 + joint)).collect(),
+        weights,
+        at_rest: seed.is_multiple_of(2),
+    })
 }
 
 /// A journal with a record of every kind, and the desk that wrote it.

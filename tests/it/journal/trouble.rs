@@ -71,11 +71,13 @@ fn work(folder: &Path, disk: &Arc<FaultyDisk>) -> (Vec<Rig>, usize) {
     let project = folder.join("hero.rigsmith.ron");
     let mut desk = Desk::new(disk.clone(), JournalStart { rig: Some(Rig::new(Uid(42), "random")), ..start(folder) });
     let (mut states, mut safe) = (vec![desk.rig.clone()], 0);
+    let mut names = Vec::new();
     let mut note = |desk: &Desk, states: &mut Vec<Rig>| {
         states.push(desk.rig.clone());
         if desk.journal.flush(LONG).is_ok() {
             safe = states.len() - 1;
         }
+        names.extend(desk.journal.path());
     };
     for number in 0..3 {
         desk.place(number);
@@ -95,8 +97,10 @@ fn work(folder: &Path, disk: &Arc<FaultyDisk>) -> (Vec<Rig>, usize) {
     note(&desk, &mut states);
     if let Some(path) = desk.journal.path().filter(|path| !path.starts_with(folder)) {
         // Found again by the one that started it; other tests use that folder, too.
-        let _ = fs::copy(&path, folder.join("moved.journal"));
-        let _ = fs::remove_file(path);
+        let _ = fs::copy(path, folder.join("moved.journal"));
+    }
+    for name in names.iter().filter_map(|path| path.file_name()) {
+        let _ = fs::remove_file(std::env::temp_dir().join(name));
     }
     (states, safe)
 }
