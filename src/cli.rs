@@ -8,6 +8,8 @@ mod convert;
 mod demo;
 mod info;
 mod progress;
+#[cfg(feature = "render")]
+mod render;
 mod report;
 mod sketch;
 mod skin;
@@ -50,6 +52,9 @@ enum Command {
     Info(info::InfoArgs),
     /// Look for problems in files
     Check(check::CheckArgs),
+    /// Take a picture of a mesh, a template or a project, without a window
+    #[cfg(feature = "render")]
+    Render(render::RenderArgs),
 }
 
 /// How weights are computed.
@@ -153,6 +158,8 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Check(args)) => check::run(&args),
+        #[cfg(feature = "render")]
+        Some(Command::Render(args)) => render::run(&args),
     };
     report::finish(result, cli.json)
 }

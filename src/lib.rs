@@ -13,3 +13,5 @@ pub mod test_app;
 pub mod cli;
 #[cfg(feature = "editor")]
 pub mod editor;
+#[cfg(feature = "render")]
+pub mod render;

@@ -71,7 +71,7 @@ pub enum NoWindow {
 /// If there is no display or no adapter; nothing has been changed then, and the work can be done without a window.
 pub fn run(options: EditorOptions) -> Result<AppExit, NoWindow> {
     super::probe::display().map_err(NoWindow::Display)?;
-    if !super::probe::adapter() {
+    if crate::render::adapter().is_none() {
         return Err(NoWindow::Adapter);
     }
     // The event loop is made while plugins are built; where the display refuses it, Bevy panics.

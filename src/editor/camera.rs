@@ -25,7 +25,7 @@ use crate::{
         document::{JointEntities, Selection},
         drawing::BACKGROUND,
         surface::RigSurface,
-        viewport::{RigViewport, Sight},
+        viewport::{FIELD_OF_VIEW, RigViewport, Sight, framing},
     },
     rig::Rig,
 };
@@ -53,9 +53,6 @@ pub struct ViewportSight(pub Option<Sight>);
 /// Set to show everything as soon as there is something to show: after a file was opened.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FrameWhenReady(pub bool);
-
-/// Vertical field of view of the perspective camera, in radians: that of a 50 mm lens, about.
-const FIELD_OF_VIEW: f32 = 0.55;
 
 fn spawn_camera(mut commands: Commands) {
     commands.spawn((
@@ -199,22 +196,14 @@ pub fn angles(view: View) -> (f32, f32) {
 }
 
 /// Moves the camera so that a box fills the viewport, from where it looks now.
-fn frame(camera: &mut PanOrbitCamera, [low, high]: [Vec3; 2], size: Vec2) {
-    let centre = (low + high) * 0.5;
-    let (sin, cos) = bevy::math::ops::sin_cos(camera.target_yaw);
-    let reach = (high - low) * 0.5;
-    // Half the width and height of the box as this view sees it, and its depth before the centre.
-    let across = reach.x * cos.abs() + reach.z * sin.abs();
-    let (sin_pitch, cos_pitch) = bevy::math::ops::sin_cos(camera.target_pitch);
-    let deep = reach.x * sin.abs() + reach.z * cos.abs();
-    let tall = reach.y * cos_pitch.abs() + deep * sin_pitch.abs();
-    let before = deep * cos_pitch.abs() + reach.y * sin_pitch.abs();
-    let aspect = if size.y > 0.0 { (size.x / size.y).max(0.1) } else { 1.5 };
-    let half = bevy::math::ops::tan(FIELD_OF_VIEW * 0.5);
-    let distance = 1.12 * (tall / half).max(across / (half * aspect)) + before;
-    camera.target_focus = centre;
-    camera.target_radius = distance.max(1e-3);
-    camera.zoom_upper_limit = Some(camera.target_radius * 50.0);
+fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2) {
+    let aspect = if size.y > 0.0 { size.x / size.y } else { 1.5 };
+    let degrees = |radians: f32| radians.to_degrees();
+    let view = View::Orbit(degrees(camera.target_yaw), degrees(camera.target_pitch));
+    let (focus, distance) = framing(bounds, view.axes(), aspect);
+    camera.target_focus = focus;
+    camera.target_radius = distance;
+    camera.zoom_upper_limit = Some(distance * 50.0);
     camera.force_update = true;
 }
 

@@ -1,4 +1,4 @@
-//! Whether there is a display and an adapter, found out before Bevy needs them: it would panic.
+//! Whether there is a display, found out before Bevy needs it: it would panic.
 
 /// Looks for a display to open a window on.
 ///
@@ -47,14 +47,4 @@ fn abstract_socket(_path: &str) -> bool {
 #[cfg(not(unix))]
 fn answers(_name: &str) -> bool {
     true
-}
-
-/// True if there is an adapter to draw with, be it a software one.
-pub fn adapter() -> bool {
-    let backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all());
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
-        backends,
-        ..wgpu::InstanceDescriptor::new_without_display_handle()
-    });
-    !bevy::tasks::block_on(instance.enumerate_adapters(backends)).is_empty()
 }

@@ -4,6 +4,23 @@ use bevy::prelude::*;
 
 use crate::{algo::view::ViewPlane, mesh::ray::Ray};
 
+/// Vertical field of view of perspective cameras, in radians: that of a 50 mm lens, about.
+pub const FIELD_OF_VIEW: f32 = 0.55;
+
+/// Where a camera must look, and from how far, so that a box fills the picture: the point, and the distance to it.
+///
+/// `bounds` are the box's least and greatest corner; `axes` the view's right, up and towards-the-camera axes; `aspect`
+/// is the picture's width over its height. For an orthographic camera the same distance gives the same size at the
+/// point, with a height of `2 tan(FIELD_OF_VIEW / 2)` times the distance.
+pub fn framing(bounds: [Vec3; 2], axes: [Vec3; 3], aspect: f32) -> (Vec3, f32) {
+    let [low, high] = bounds;
+    let reach = (high - low) * 0.5;
+    let [across, tall, before] = axes.map(|axis| reach.dot(axis.abs()));
+    let half = bevy::math::ops::tan(FIELD_OF_VIEW * 0.5);
+    let distance = 1.12 * (tall / half).max(across / (half * aspect.max(0.1))) + before;
+    ((low + high) * 0.5, distance.max(1e-3))
+}
+
 /// Marks the camera through which people see and edit rigs.
 #[derive(Component, Debug, Clone, Copy)]
 pub struct RigViewport {
