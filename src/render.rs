@@ -26,6 +26,7 @@ use crate::{
         document::{RigBundle, Selection, Symmetry},
         drawing::{BACKGROUND, DrawingPlugin, RigDrawing},
         surface::{RigMesh, RigSurface, SkinOf},
+        task_pools,
         viewport::{FIELD_OF_VIEW, RigViewport, framing},
     },
     rig::{Rig, Uid},
@@ -196,6 +197,7 @@ pub fn adapter() -> Option<(String, bool)> {
 /// Bevy's own plugins for drawing without a window.
 pub fn bevy_plugins() -> PluginGroupBuilder {
     let plugins = DefaultPlugins
+        .set(task_pools())
         .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
         .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
         .disable::<LogPlugin>()

@@ -40,6 +40,7 @@ use crate::plugins::{
     drawing::DrawingPlugin,
     skinning::SkinningJob,
     surface::RigSurface,
+    task_pools,
 };
 
 /// What to open, and how.
@@ -117,6 +118,7 @@ impl Plugin for EditorPlugin {
                     close_when_requested: false,
                     ..default()
                 })
+                .set(task_pools())
                 .set(RenderPlugin {
                     render_creation: RenderCreation::Automatic(Box::new(WgpuSettings::default())),
                     ..default()

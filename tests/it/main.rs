@@ -39,6 +39,8 @@ mod placement;
 mod plugins;
 mod pose;
 mod project;
+#[cfg(feature = "render")]
+mod render;
 mod rig_text;
 mod skin_file;
 mod stroke;

@@ -18,7 +18,7 @@ use rigsmith::{
         surface::RigMesh,
     },
     render::{PictureSettings, adapter, png, take_picture},
-    rig::{Rig, operations::Operation, pose::PoseOffset},
+    rig::{PoseOffset, Rig, operations::Operation},
 };
 
 /// One renderer at a time: several on one software adapter take their time from each other.
@@ -79,9 +79,24 @@ fn pictures_are_like_their_references_on_a_gpu() {
     let pictures: Vec<(&str, &Rig, PictureSettings)> = vec![
         ("front", &rig, plain.clone()),
         ("mesh_only", &rig, PictureSettings { drawing: no_rig, view: View::Orbit(35.0, 15.0), ..plain.clone() }),
-        ("xray_side", &rig, PictureSettings { orthographic: true, view: View::Left, ..display(MeshDisplay { xray: true, ..MeshDisplay::default() }) }),
+        (
+            "xray_side",
+            &rig,
+            PictureSettings {
+                orthographic: true,
+                view: View::Left,
+                ..display(MeshDisplay { xray: true, ..MeshDisplay::default() })
+            },
+        ),
         ("wireframe", &rig, display(MeshDisplay { wireframe: true, ..MeshDisplay::default() })),
-        ("weights", &rig, PictureSettings { selected: vec![arm], ..display(MeshDisplay { weights: WeightColors::Joint(arm), ..MeshDisplay::default() }) }),
+        (
+            "weights",
+            &rig,
+            PictureSettings {
+                selected: vec![arm],
+                ..display(MeshDisplay { weights: WeightColors::Joint(arm), ..MeshDisplay::default() })
+            },
+        ),
         ("posed", &posed, PictureSettings { selected: vec![arm], drawing: labels, ..plain.clone() }),
     ];
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/pictures");
