@@ -1,0 +1,293 @@
+//! The tree of joints.
+//!
+//! It shows the rig's own selection and changes it with pick requests, so the viewport and the tree never differ.
+
+mod keys;
+mod menu;
+mod row;
+pub mod rows;
+
+use std::collections::HashSet;
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, DragAndDrop, Rect, Sense, TextEdit, Ui, WidgetInfo, WidgetType};
+
+use super::{
+    list::{self, List},
+    shown::{Shown, Stamp},
+};
+use crate::{
+    editor::{
+        notice::Notice,
+        panel::{EditorPanel, Requests},
+    },
+    plugins::{
+        document::EditRequest,
+        picking::{Pick, PickRequest},
+    },
+    rig::{Rig, Uid, operations::Operation},
+};
+use rows::{Row, rows};
+
+/// The panel.
+#[derive(Default)]
+pub struct HierarchyPanel {
+    filter: String,
+    folded: HashSet<Uid>,
+    tree: Tree,
+    /// True once what is folded changed.
+    stale: bool,
+    selected: (Option<Stamp>, HashSet<Uid>),
+    /// The active joint that was last brought into view.
+    revealed: Option<Uid>,
+    /// Where a range of rows begins.
+    anchor: Option<Uid>,
+    rename: Option<Rename>,
+    group: String,
+}
+
+/// The listed rows and what they were made from.
+#[derive(Default)]
+struct Tree {
+    made_from: Option<(Stamp, String)>,
+    rows: Vec<Row>,
+    deepest: usize,
+}
+
+/// A label being typed.
+struct Rename {
+    joint: Uid,
+    text: String,
+    /// True once the field has had the keyboard.
+    focused: bool,
+}
+
+/// Joints on their way to another parent.
+struct Dragged(Vec<Uid>);
+
+impl EditorPanel for HierarchyPanel {
+    fn title(&self) -> &'static str {
+        "Hierarchy"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let Some(shown) = Shown::of(world) else {
+            return list::nothing(ui, "No rig is open.");
+        };
+        if shown.rig.is_empty() {
+            self.rename = None;
+            return list::nothing(ui, "No joints yet: place them with clicks or draw them with strokes.");
+        }
+        self.bar(ui, &shown);
+        self.reveal_active(&shown);
+        self.refresh(&shown);
+        keys::press(self, ui, &shown, requests);
+        let reveal = self.newly_active(&shown);
+        let drawn = self.list(ui, &shown, reveal, requests);
+        self.end_rename(&shown, drawn, requests);
+    }
+}
+
+impl HierarchyPanel {
+    /// The filter, and buttons that fold.
+    fn bar(&mut self, ui: &mut Ui, shown: &Shown) {
+        ui.horizontal(|ui| {
+            let side = ui.spacing().interact_size.y + ui.spacing().item_spacing.x;
+            let buttons = if self.filter.is_empty() { 2.0 } else { 1.0 };
+            let width = (ui.available_width() - buttons * side - 4.0).max(40.0);
+            let field = TextEdit::singleline(&mut self.filter).hint_text("Filter").desired_width(width);
+            let response = ui.add(field).on_hover_text("Joints whose label or group contains all of these words");
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Filter"));
+            if !self.filter.is_empty() {
+                if list::symbol_button(ui, "✖", "Clear filter") {
+                    self.filter.clear();
+                }
+                return;
+            }
+            if list::symbol_button(ui, "⏷", "Unfold all") {
+                self.folded.clear();
+                self.stale = true;
+            }
+            if list::symbol_button(ui, "⏵", "Fold all") {
+                let parents = shown.rig.walk().filter(|joint| !joint.children.is_empty());
+                self.folded = parents.map(|joint| joint.data.uid).collect();
+                self.stale = true;
+            }
+        });
+        if !self.filter.trim().is_empty() {
+            let found = self.tree.rows.iter().filter(|row| row.matches).count();
+            ui.weak(format!("{found} of {} joints", shown.rig.len()));
+        }
+    }
+
+    /// Lists the rows again if the rig, the filter or what is folded changed.
+    fn refresh(&mut self, shown: &Shown) {
+        let stamp = shown.stamp();
+        let fresh = self.tree.made_from.as_ref().is_some_and(|(from, filter)| *from == stamp && *filter == self.filter);
+        if !fresh || std::mem::take(&mut self.stale) {
+            self.folded.retain(|joint| shown.rig.joint(*joint).is_some());
+            self.tree.rows = rows(&shown.rig, &self.folded, &self.filter);
+            self.tree.deepest = self.tree.rows.iter().map(|row| row.depth).max().unwrap_or_default();
+            self.tree.made_from = Some((stamp, self.filter.clone()));
+        }
+        let stamp = shown.selection_stamp();
+        if self.selected.0 != Some(stamp) {
+            self.selected = (Some(stamp), shown.selection.0.iter().copied().collect());
+        }
+    }
+
+    /// Unfolds what hides a joint that became active.
+    fn reveal_active(&mut self, shown: &Shown) {
+        let active = shown.selection.active();
+        if active != self.revealed
+            && let Some(active) = active
+        {
+            let before = self.folded.len();
+            for above in shown.rig.ancestors(active) {
+                self.folded.remove(&above.data.uid);
+            }
+            if self.folded.len() != before {
+                self.stale = true;
+            }
+        }
+    }
+
+    /// The row of the joint that became active since the last time.
+    fn newly_active(&mut self, shown: &Shown) -> Option<usize> {
+        let active = shown.selection.active();
+        if active == self.revealed {
+            return None;
+        }
+        self.revealed = active;
+        self.row_of(active?)
+    }
+
+    fn row_of(&self, joint: Uid) -> Option<usize> {
+        self.tree.rows.iter().position(|row| row.joint == joint)
+    }
+
+    /// Draws the rows in view; true if the one that is being renamed was among them.
+    fn list(&mut self, ui: &mut Ui, shown: &Shown, reveal: Option<usize>, requests: &mut Requests) -> bool {
+        let height = list::row_height(ui);
+        let tree = std::mem::take(&mut self.tree);
+        let renamed = self.rename.as_ref().map(|rename| rename.joint);
+        let reveal = reveal.or_else(|| {
+            let rename = self.rename.as_ref().filter(|rename| !rename.focused)?;
+            tree.rows.iter().position(|row| row.joint == rename.joint)
+        });
+        let mut drawn = false;
+        List { id: "joints", count: tree.rows.len(), height, reveal, follow: false }.show(ui, |ui, range, place| {
+            let view = ui.clip_rect();
+            let ground = ui.interact(view, ui.id().with("ground"), Sense::click());
+            for number in range {
+                drawn |= renamed == Some(tree.rows[number].joint);
+                row::show(self, ui, place(number), &tree, number, shown, requests);
+            }
+            self.ground(ui, view, &ground, shown, requests);
+        });
+        self.tree = tree;
+        drawn
+    }
+
+    /// What happens below the last row: a click selects nothing, a drop makes roots.
+    fn ground(&mut self, ui: &Ui, view: Rect, ground: &egui::Response, shown: &Shown, requests: &mut Requests) {
+        if ground.clicked() {
+            requests.send(PickRequest { rig: shown.entity, what: Pick::None, add: false });
+        }
+        autoscroll(ui, view);
+        if let Some(dragged) = ground.dnd_release_payload::<Dragged>() {
+            reparent(&dragged.0, None, shown, requests);
+        }
+    }
+
+    /// Takes what was typed once the field has lost the keyboard or is out of sight; Escape drops it.
+    fn end_rename(&mut self, shown: &Shown, drawn: bool, requests: &mut Requests) {
+        let over = self.rename.as_ref().is_some_and(|rename| !drawn && rename.focused);
+        if over {
+            self.accept_rename(shown, requests);
+        }
+    }
+
+    fn accept_rename(&mut self, shown: &Shown, requests: &mut Requests) {
+        let Some(Rename { joint, text, .. }) = self.rename.take() else { return };
+        let Some(known) = shown.rig.joint(joint) else { return };
+        if known.data.label.as_deref().unwrap_or_default() != text.trim() {
+            let operation = Operation::Labels(vec![(joint, text.trim().to_owned())]);
+            requests.send(EditRequest::operation(shown.entity, operation));
+        }
+    }
+
+    fn start_rename(&mut self, joint: Uid, shown: &Shown) {
+        if let Some(known) = shown.rig.joint(joint) {
+            let text = known.data.label.clone().unwrap_or_default();
+            self.rename = Some(Rename { joint, text, focused: false });
+        }
+    }
+
+    /// Folds or unfolds a joint, with `deep` everything below it, too.
+    fn fold(&mut self, joint: Uid, fold: bool, deep: bool, shown: &Shown) {
+        let all: Vec<Uid> = match deep {
+            true => shown.rig.hierarchy(joint).map(|joint| joint.data.uid).collect(),
+            false => vec![joint],
+        };
+        for joint in all {
+            if fold { self.folded.insert(joint) } else { self.folded.remove(&joint) };
+        }
+        self.stale = true;
+    }
+}
+
+/// Selects joints; the last is active.
+fn select(joints: Vec<Uid>, shown: &Shown, requests: &mut Requests) {
+    requests.send(PickRequest { rig: shown.entity, what: Pick::Joints(joints), add: false });
+}
+
+/// Those of `joints` that hang below none of the others, in the order of the tree.
+fn tops(rig: &Rig, joints: &[Uid]) -> Vec<Uid> {
+    let listed: HashSet<Uid> = joints.iter().copied().collect();
+    let is_top = |joint: &Uid| !rig.ancestors(*joint).any(|above| listed.contains(&above.data.uid));
+    rig.walk().map(|joint| joint.data.uid).filter(|joint| listed.contains(joint)).filter(is_top).collect()
+}
+
+/// Why joints cannot hang below `parent`, if they cannot.
+fn obstacle(joints: &[Uid], parent: Option<Uid>, shown: &Shown) -> Option<String> {
+    let parent = parent?;
+    if joints.contains(&parent) {
+        return Some(format!("{} cannot hang below itself", shown.name(parent)));
+    }
+    let above = shown.rig.ancestors(parent).find(|above| joints.contains(&above.data.uid))?;
+    let (joint, parent) = (shown.name(above.data.uid), shown.name(parent));
+    Some(format!("{joint} cannot hang below {parent}, which hangs below it"))
+}
+
+/// Hangs joints below another, or says why not. Those that hang there already stay.
+fn reparent(joints: &[Uid], parent: Option<Uid>, shown: &Shown, requests: &mut Requests) {
+    if joints == [parent.unwrap_or_default()] {
+        // Let go where it was picked up.
+        return;
+    }
+    if let Some(obstacle) = obstacle(joints, parent, shown) {
+        requests.send(Notice::warning(format!("{obstacle}. Drop it on a joint outside its hierarchy.")));
+        return;
+    }
+    let elsewhere = |joint: &Uid| shown.rig.joint(*joint).is_some_and(|joint| joint.parent != parent);
+    let joints: Vec<Uid> = joints.iter().copied().filter(elsewhere).collect();
+    if !joints.is_empty() {
+        requests.send(EditRequest::operation(shown.entity, Operation::Reparent { joints, parent }));
+    }
+}
+
+/// Scrolls while joints are held near an edge of the view.
+fn autoscroll(ui: &Ui, view: Rect) {
+    let Some(pointer) = ui.input(|input| input.pointer.latest_pos()) else { return };
+    if !DragAndDrop::has_payload_of_type::<Dragged>(ui.ctx()) || !view.x_range().contains(pointer.x) {
+        return;
+    }
+    let edge = 24.0;
+    let (up, down) = (view.top() + edge - pointer.y, pointer.y - (view.bottom() - edge));
+    let speed = if up > 0.0 { up.min(edge) } else { -down.clamp(0.0, edge) };
+    if speed != 0.0 {
+        ui.scroll_with_delta_animation(egui::vec2(0.0, speed * 0.4), egui::style::ScrollAnimation::none());
+        ui.ctx().request_repaint();
+    }
+}

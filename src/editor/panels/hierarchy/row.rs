@@ -1,0 +1,246 @@
+//! One row of the tree.
+
+use bevy_egui::egui::{
+    Align2, CursorIcon, FontId, Id, Key, Rect, Response, Sense, Stroke, StrokeKind, TextEdit, Ui, WidgetInfo,
+    WidgetType,
+    containers::collapsing_header::paint_default_icon,
+    pos2,
+    text::{CCursor, CCursorRange},
+    text_edit::TextEditState,
+    vec2,
+};
+
+use super::{Dragged, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
+use crate::{
+    editor::{
+        panel::Requests,
+        panels::{groups, list, shown::Shown},
+    },
+    rig::{NodeKind, Uid},
+};
+
+/// Draws a row and takes what is done to it.
+pub(super) fn show(
+    panel: &mut HierarchyPanel,
+    ui: &mut Ui,
+    rect: Rect,
+    tree: &Tree,
+    number: usize,
+    shown: &Shown,
+    requests: &mut Requests,
+) {
+    let row = tree.rows[number];
+    let id = ui.id().with(row.joint);
+    if panel.rename.as_ref().is_some_and(|rename| rename.joint == row.joint) {
+        rename(panel, ui, text_rect(ui, rect, tree, row), id, shown, requests);
+        return;
+    }
+    let selected = panel.selected.1.contains(&row.joint);
+    let name = shown.name(row.joint);
+    let response = ui.interact(rect, id, Sense::click_and_drag());
+    response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, selected, &name));
+    let fold = row.parent.then(|| fold_rect(ui, rect, tree, row));
+    let fold = fold.map(|fold| ui.interact(fold, id.with("fold"), Sense::click()));
+    let cut = paint(ui, rect, tree, row, selected, shown, &response, fold.as_ref());
+    if fold.is_some_and(|fold| fold.clicked()) && panel.filter.trim().is_empty() {
+        let deep = ui.input(|input| input.modifiers.shift || input.modifiers.command);
+        panel.fold(row.joint, row.open, deep, shown);
+        return;
+    }
+    let response = if cut { response.on_hover_text(name.as_ref()) } else { response };
+    click(panel, ui, &response, tree, number, shown, requests);
+    drag(panel, ui, &response, rect, row.joint, shown, requests);
+    menu::show(panel, &response, shown, requests);
+}
+
+/// How far a level is indented: less in a narrow panel, so that names stay readable.
+fn indent(ui: &Ui, rect: Rect, tree: &Tree) -> f32 {
+    let room = rect.width() - 110.0;
+    (room / tree.deepest.max(1) as f32).clamp(3.0, 14.0).min(ui.spacing().indent)
+}
+
+fn fold_rect(ui: &Ui, rect: Rect, tree: &Tree, row: Row) -> Rect {
+    let left = rect.left() + indent(ui, rect, tree) * row.depth as f32;
+    Rect::from_min_size(pos2(left, rect.top()), vec2(16.0, rect.height()))
+}
+
+fn dot_rect(ui: &Ui, rect: Rect, tree: &Tree, row: Row) -> Rect {
+    fold_rect(ui, rect, tree, row).translate(vec2(15.0, 0.0))
+}
+
+fn text_rect(ui: &Ui, rect: Rect, tree: &Tree, row: Row) -> Rect {
+    let left = dot_rect(ui, rect, tree, row).right() + 1.0;
+    rect.with_min_x(left.min(rect.right() - 24.0))
+}
+
+/// Paints the row; true if the name did not fit.
+fn paint(
+    ui: &Ui,
+    rect: Rect,
+    tree: &Tree,
+    row: Row,
+    selected: bool,
+    shown: &Shown,
+    response: &Response,
+    fold: Option<&Response>,
+) -> bool {
+    let visuals = ui.visuals();
+    let hovered = response.hovered() || shown.hovered == Some(row.joint);
+    if selected {
+        let active = shown.selection.active() == Some(row.joint);
+        let fill = visuals.selection.bg_fill.gamma_multiply(if active { 1.0 } else { 0.55 });
+        ui.painter().rect_filled(rect, 3.0, fill);
+    }
+    if hovered {
+        ui.painter().rect_filled(rect, 3.0, visuals.widgets.hovered.bg_fill.gamma_multiply(0.35));
+    }
+    if let Some(fold) = fold {
+        let small = fold.clone().with_new_rect(Rect::from_center_size(fold.rect.center(), vec2(11.0, 11.0)));
+        let mut painter = ui.new_child(bevy_egui::egui::UiBuilder::new().max_rect(fold.rect));
+        paint_default_icon(&mut painter, if row.open { 1.0 } else { 0.0 }, &small);
+    }
+    groups::dot(ui, dot_rect(ui, rect, tree, row), shown.color(row.joint));
+    let data = shown.rig.joint(row.joint).map(|joint| &joint.data);
+    let mut text = text_rect(ui, rect, tree, row);
+    if data.is_some_and(|data| data.locked) {
+        let lock = text.with_min_x(text.right() - 16.0);
+        list::symbol(ui, lock, "🔒", visuals.weak_text_color());
+        text.set_right(lock.left());
+    }
+    let labelled = data.is_some_and(|data| data.label.is_some() && data.kind == NodeKind::Joint);
+    let color = match (selected, labelled && row.matches) {
+        (true, _) => visuals.strong_text_color(),
+        (false, true) => visuals.text_color(),
+        (false, false) => visuals.weak_text_color(),
+    };
+    list::line(ui, text, &shown.name(row.joint), color)
+}
+
+/// Clicks select: alone, with control one more or less, with shift all from the last one.
+fn click(
+    panel: &mut HierarchyPanel,
+    ui: &Ui,
+    response: &Response,
+    tree: &Tree,
+    number: usize,
+    shown: &Shown,
+    requests: &mut Requests,
+) {
+    let joint = tree.rows[number].joint;
+    if response.double_clicked() {
+        panel.start_rename(joint, shown);
+        return;
+    }
+    if response.secondary_clicked() && !panel.selected.1.contains(&joint) {
+        select(vec![joint], shown, requests);
+    }
+    if !response.clicked() {
+        return;
+    }
+    let held = ui.input(|input| input.modifiers);
+    let anchor = panel.anchor.and_then(|anchor| tree.rows.iter().position(|row| row.joint == anchor));
+    match (held.shift, held.command) {
+        (true, add) => {
+            let from = anchor.unwrap_or(number);
+            let range = tree.rows[from.min(number)..=from.max(number)].iter().map(|row| row.joint);
+            let mut joints = if add { shown.selection.0.clone() } else { Vec::new() };
+            let range: Vec<Uid> = range.filter(|other| *other != joint).collect();
+            joints.retain(|other| *other != joint && !range.contains(other));
+            joints.extend(range);
+            joints.push(joint);
+            select(joints, shown, requests);
+        }
+        (false, true) => {
+            let mut joints = shown.selection.0.clone();
+            joints.retain(|other| *other != joint);
+            if !panel.selected.1.contains(&joint) {
+                joints.push(joint);
+            }
+            panel.anchor = Some(joint);
+            select(joints, shown, requests);
+        }
+        (false, false) => {
+            panel.anchor = Some(joint);
+            select(vec![joint], shown, requests);
+        }
+    }
+}
+
+/// Drags hang joints below another.
+fn drag(
+    panel: &HierarchyPanel,
+    ui: &Ui,
+    response: &Response,
+    rect: Rect,
+    joint: Uid,
+    shown: &Shown,
+    requests: &mut Requests,
+) {
+    if response.drag_started_by(bevy_egui::egui::PointerButton::Primary) {
+        let joints = match panel.selected.1.contains(&joint) {
+            true => tops(&shown.rig, &shown.selection.0),
+            false => vec![joint],
+        };
+        response.dnd_set_drag_payload(Dragged(joints));
+    }
+    if let Some(dragged) = response.dnd_hover_payload::<Dragged>() {
+        let over_itself = dragged.0.contains(&joint);
+        let refused = obstacle(&dragged.0, Some(joint), shown).filter(|_| !over_itself);
+        let color = if refused.is_some() { ui.visuals().error_fg_color } else { ui.visuals().selection.stroke.color };
+        if !over_itself {
+            ui.painter().rect_stroke(rect.shrink(0.5), 3.0, Stroke::new(1.5, color), StrokeKind::Inside);
+        }
+        ui.ctx().set_cursor_icon(if refused.is_some() { CursorIcon::NotAllowed } else { CursorIcon::Grabbing });
+        carried(ui, &dragged.0, shown, refused.as_deref());
+    }
+    if let Some(dragged) = response.dnd_release_payload::<Dragged>() {
+        reparent(&dragged.0, Some(joint), shown, requests);
+    }
+}
+
+/// What is being dragged, or why it cannot be dropped here, beside the pointer.
+fn carried(ui: &Ui, joints: &[Uid], shown: &Shown, refused: Option<&str>) {
+    let Some(pointer) = ui.input(|input| input.pointer.latest_pos()) else { return };
+    let text = match (refused, joints) {
+        (Some(refused), _) => refused.to_owned(),
+        (None, [one]) => shown.name(*one).into_owned(),
+        (None, more) => format!("{} joints", more.len()),
+    };
+    let painter = ui.ctx().layer_painter(bevy_egui::egui::LayerId::new(
+        bevy_egui::egui::Order::Tooltip,
+        Id::new("dragged joints"),
+    ));
+    let visuals = ui.visuals();
+    let font = FontId::proportional(12.0);
+    let galley = painter.layout(text, font, visuals.strong_text_color(), 260.0);
+    let window = ui.ctx().content_rect();
+    let mut back = Rect::from_min_size(pointer + vec2(14.0, 10.0), galley.size() + vec2(10.0, 6.0));
+    back = back.translate(vec2((window.right() - back.right()).min(0.0), (window.bottom() - back.bottom()).min(0.0)));
+    painter.rect_filled(back, 3.0, visuals.window_fill);
+    painter.rect_stroke(back, 3.0, visuals.window_stroke, StrokeKind::Inside);
+    let at = Align2::LEFT_TOP.anchor_rect(Rect::from_min_size(back.min + vec2(5.0, 3.0), galley.size())).min;
+    painter.galley(at, galley, visuals.strong_text_color());
+}
+
+/// The field in place of a name.
+fn rename(panel: &mut HierarchyPanel, ui: &mut Ui, rect: Rect, id: Id, shown: &Shown, requests: &mut Requests) {
+    let Some(rename) = panel.rename.as_mut() else { return };
+    let id = id.with("rename");
+    let field = TextEdit::singleline(&mut rename.text).id(id).margin(vec2(3.0, 1.0)).desired_width(rect.width());
+    let response = ui.place(rect, field);
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Rename"));
+    if !rename.focused {
+        rename.focused = true;
+        response.request_focus();
+        let mut state = TextEditState::load(ui.ctx(), id).unwrap_or_default();
+        let all = CCursorRange::two(CCursor::new(0), CCursor::new(rename.text.chars().count()));
+        state.cursor.set_char_range(Some(all));
+        state.store(ui.ctx(), id);
+    } else if !response.has_focus() {
+        if ui.input(|input| input.key_pressed(Key::Escape)) {
+            panel.rename = None;
+        } else {
+            panel.accept_rename(shown, requests);
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The rows of the tree: which joints are listed, and how deep.
+
+use std::collections::HashSet;
+
+use crate::rig::{Rig, RigJoint, Uid};
+
+/// A joint in the tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Row {
+    /// The joint.
+    pub joint: Uid,
+    /// How many joints are above it.
+    pub depth: usize,
+    /// True if it has children that could be listed.
+    pub parent: bool,
+    /// True if they are listed.
+    pub open: bool,
+    /// False for a joint that is listed only because one below it matches the filter.
+    pub matches: bool,
+}
+
+/// The joints that are listed, top to bottom: all but those below a folded one, or, with a filter, those that match it
+/// and everything above them. All words of the filter must be in the label or the group's name, in any case.
+pub fn rows(rig: &Rig, folded: &HashSet<Uid>, filter: &str) -> Vec<Row> {
+    let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
+    if words.is_empty() { unfolded(rig, folded) } else { matching(rig, &words) }
+}
+
+fn unfolded(rig: &Rig, folded: &HashSet<Uid>) -> Vec<Row> {
+    let mut stack: Vec<(Uid, usize)> = rig.roots().iter().rev().map(|root| (*root, 0)).collect();
+    let mut rows = Vec::with_capacity(rig.len());
+    while let Some((joint, depth)) = stack.pop() {
+        let children = rig.children(Some(joint));
+        let open = !folded.contains(&joint);
+        rows.push(Row { joint, depth, parent: !children.is_empty(), open, matches: true });
+        if open {
+            stack.extend(children.iter().rev().map(|child| (*child, depth + 1)));
+        }
+    }
+    rows
+}
+
+fn matching(rig: &Rig, words: &[String]) -> Vec<Row> {
+    let groups: Vec<(Uid, String)> = rig.groups().iter().map(|g| (g.uid, g.name.to_lowercase())).collect();
+    let hit = |joint: &RigJoint| {
+        let name = super::super::joint_name(&joint.data).to_lowercase();
+        let group = joint.data.group.and_then(|uid| groups.iter().find(|(group, _)| *group == uid));
+        words.iter().all(|word| name.contains(word) || group.is_some_and(|(_, name)| name.contains(word)))
+    };
+    // Parents come first: their number is known, and reversed, children tell their parents that they are listed.
+    let mut numbers = std::collections::HashMap::with_capacity(rig.len());
+    let mut all: Vec<(Row, Option<usize>, bool)> = Vec::with_capacity(rig.len());
+    for joint in rig.walk() {
+        let above: Option<usize> = joint.parent.and_then(|parent| numbers.get(&parent).copied());
+        let depth = above.map_or(0, |above| all[above].0.depth + 1);
+        let matches = hit(joint);
+        numbers.insert(joint.data.uid, all.len());
+        let row = Row { joint: joint.data.uid, depth, parent: false, open: true, matches };
+        all.push((row, above, matches));
+    }
+    for number in (0..all.len()).rev() {
+        if let (_, Some(above), true) = all[number] {
+            all[above].2 = true;
+            all[above].0.parent = true;
+        }
+    }
+    all.into_iter().filter(|(_, _, listed)| *listed).map(|(row, ..)| row).collect()
+}

@@ -1,0 +1,88 @@
+//! Lists with any number of rows, of which only those in view cost anything.
+
+use std::ops::Range;
+
+use bevy_egui::egui::{
+    Align2, Color32, FontId, Pos2, Rect, ScrollArea, TextStyle, Ui, Vec2, scroll_area::ScrollBarVisibility, style::ScrollAnimation,
+    text::{LayoutJob, TextWrapping},
+    vec2,
+};
+
+/// A scrolled list of rows of one height.
+pub(super) struct List<'a> {
+    pub id: &'a str,
+    pub count: usize,
+    pub height: f32,
+    /// The row to bring into view.
+    pub reveal: Option<usize>,
+    /// True to stay at the end while rows are added there.
+    pub follow: bool,
+}
+
+impl List<'_> {
+    /// Draws the rows in view. `draw` gets the numbers in view and the rectangle of any row.
+    pub fn show(self, ui: &mut Ui, draw: impl FnOnce(&mut Ui, Range<usize>, &dyn Fn(usize) -> Rect)) {
+        let List { id, count, height, reveal, follow } = self;
+        let area = ScrollArea::vertical()
+            .id_salt(id)
+            .auto_shrink(false)
+            .stick_to_bottom(follow)
+            .scroll_bar_visibility(ScrollBarVisibility::VisibleWhenNeeded);
+        area.show_viewport(ui, |ui, viewport| {
+            ui.set_height(height * count as f32);
+            let (corner, width) = (ui.max_rect().min, ui.max_rect().width());
+            let row = |number: usize| -> Rect {
+                Rect::from_min_size(corner + vec2(0.0, height * number as f32), vec2(width, height))
+            };
+            let first = (viewport.min.y / height).floor().max(0.0) as usize;
+            let last = ((viewport.max.y / height).ceil().max(0.0) as usize).min(count);
+            draw(ui, first.min(last)..last, &row);
+            if let Some(reveal) = reveal {
+                ui.scroll_to_rect_animation(row(reveal), None, ScrollAnimation::none());
+            }
+        });
+    }
+}
+
+/// One line of text in a rectangle, vertically centred and cut with an ellipsis; true if it was cut.
+pub(super) fn line(ui: &Ui, rect: Rect, text: &str, color: Color32) -> bool {
+    let font = TextStyle::Body.resolve(ui.style());
+    let mut job = LayoutJob::simple_singleline(text.to_owned(), font, color);
+    job.wrap = TextWrapping::truncate_at_width(rect.width().max(1.0));
+    let galley = ui.painter().layout_job(job);
+    let at = Pos2::new(rect.left(), rect.center().y - galley.size().y / 2.0);
+    let cut = galley.elided;
+    ui.painter().galley(at, galley, color);
+    cut
+}
+
+/// A symbol in the middle of a rectangle.
+pub(super) fn symbol(ui: &Ui, rect: Rect, symbol: &str, color: Color32) {
+    let size = TextStyle::Body.resolve(ui.style()).size;
+    ui.painter().text(rect.center(), Align2::CENTER_CENTER, symbol, FontId::proportional(size), color);
+}
+
+/// The height of a row of text.
+pub(super) fn row_height(ui: &Ui) -> f32 {
+    (ui.text_style_height(&TextStyle::Body) + 4.0).max(18.0).round()
+}
+
+/// What is said where a panel has nothing to show.
+pub(super) fn nothing(ui: &mut Ui, text: &str) {
+    ui.add_space(8.0);
+    ui.vertical_centered(|ui| {
+        ui.set_max_width((ui.available_width() - 12.0).max(60.0));
+        ui.weak(text);
+    });
+}
+
+/// A small square button with a symbol.
+pub(super) fn symbol_button(ui: &mut Ui, text: &str, tip: &str) -> bool {
+    let side = ui.spacing().interact_size.y;
+    let button = bevy_egui::egui::Button::new(text).min_size(Vec2::splat(side));
+    let response = ui.add(button).on_hover_text(tip);
+    response.widget_info(|| {
+        bevy_egui::egui::WidgetInfo::labeled(bevy_egui::egui::WidgetType::Button, true, tip)
+    });
+    response.clicked()
+}

@@ -1,0 +1,272 @@
+//! Everything that was told, and where it is kept.
+
+use std::{collections::VecDeque, time::Duration};
+
+use bevy::{prelude::*, window::RequestRedraw};
+use bevy_egui::egui::{self, Color32, Label, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, WidgetInfo, WidgetType};
+
+use super::list::{self, List};
+use crate::{
+    editor::{
+        notice::{Notice, Severity},
+        panel::{EditorPanel, Requests},
+    },
+    plugins::document::EditRefused,
+};
+
+/// Keeps notices, and makes notices of refused edits.
+pub struct LogPlugin;
+
+impl Plugin for LogPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<LogBook>()
+            .add_message::<Notice>()
+            .add_message::<ClearLog>()
+            .add_message::<EditRefused>()
+            .add_message::<RequestRedraw>()
+            .add_systems(Last, (tell_refusals, keep_notices).chain().in_set(LogSystems));
+    }
+}
+
+/// In `Last`: notices of this frame are written into the [`LogBook`]. Who makes notices of other messages in `Last` does
+/// so before.
+#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct LogSystems;
+
+/// The notices so far, oldest first; the oldest go when there are more than [`LogBook::CAPACITY`].
+#[derive(Resource, Debug, Default)]
+pub struct LogBook {
+    entries: VecDeque<LogEntry>,
+    /// The number of the next entry.
+    next: u64,
+}
+
+/// A notice and when it was given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogEntry {
+    /// Counts from 0 and never repeats.
+    pub number: u64,
+    /// Since the program started.
+    pub at: Duration,
+    /// What was told.
+    pub notice: Notice,
+    /// How often in a row.
+    pub times: u32,
+}
+
+/// Asks to forget all entries.
+#[derive(Message, Debug, Clone, Copy)]
+pub struct ClearLog;
+
+impl LogBook {
+    /// The largest number of entries.
+    pub const CAPACITY: usize = 2_000;
+
+    /// The entries, oldest first.
+    pub fn entries(&self) -> impl DoubleEndedIterator<Item = &LogEntry> + ExactSizeIterator {
+        self.entries.iter()
+    }
+
+    /// The number that the next entry gets: changes whenever one is added.
+    pub fn next_number(&self) -> u64 {
+        self.next
+    }
+
+    /// Adds a notice. One that repeats the last is counted there and takes its place at the end.
+    pub fn add(&mut self, notice: Notice, at: Duration) {
+        let mut times = 1;
+        if let Some(last) = self.entries.pop_back_if(|last| last.notice == notice) {
+            times = last.times.saturating_add(1);
+        }
+        if self.entries.len() >= Self::CAPACITY {
+            self.entries.pop_front();
+        }
+        self.entries.push_back(LogEntry { number: self.next, at, notice, times });
+        self.next += 1;
+    }
+}
+
+impl LogEntry {
+    /// One line for the clipboard.
+    pub fn line(&self) -> String {
+        let times = if self.times > 1 { format!(" ({} times)", self.times) } else { String::new() };
+        format!("{} {}: {}{times}", clock(self.at), severity_name(self.notice.severity), self.notice.text)
+    }
+}
+
+fn tell_refusals(mut refused: MessageReader<EditRefused>, mut notices: MessageWriter<Notice>) {
+    for refused in refused.read() {
+        notices.write(Notice::error(sentence(&refused.reason)));
+    }
+}
+
+/// A reason as a sentence of its own.
+fn sentence(reason: &str) -> String {
+    let mut letters = reason.chars();
+    let first = letters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
+    let end = if reason.ends_with(['.', '!', '?']) { "" } else { "." };
+    format!("{first}{}{end}", letters.as_str())
+}
+
+fn keep_notices(
+    mut notices: MessageReader<Notice>,
+    mut clear: MessageReader<ClearLog>,
+    mut book: ResMut<LogBook>,
+    time: Option<Res<Time<Real>>>,
+    mut redraw: MessageWriter<RequestRedraw>,
+) {
+    if clear.read().count() > 0 {
+        book.entries.clear();
+    }
+    let at = time.map(|time| time.elapsed()).unwrap_or_default();
+    for notice in notices.read() {
+        book.add(notice.clone(), at);
+        redraw.write(RequestRedraw);
+    }
+}
+
+/// The panel.
+#[derive(Default)]
+pub struct LogPanel {
+    search: String,
+    /// The entry whose whole text is shown.
+    chosen: Option<u64>,
+    listed: Listed,
+}
+
+/// Numbers of the entries that the search finds, and what they were found for.
+#[derive(Default)]
+struct Listed {
+    made_from: Option<(u64, usize, String)>,
+    places: Vec<usize>,
+}
+
+impl EditorPanel for LogPanel {
+    fn title(&self) -> &'static str {
+        "Log"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let Some(book) = world.get_resource::<LogBook>() else { return };
+        self.refresh(book);
+        self.bar(ui, book, requests);
+        if book.entries.is_empty() {
+            return list::nothing(ui, "Nothing has been told yet.");
+        }
+        let chosen = self.chosen.and_then(|chosen| book.entries().find(|entry| entry.number == chosen));
+        let detail = chosen.map_or(0.0, |_| (ui.available_height() * 0.35).clamp(44.0, 110.0));
+        let height = (ui.available_height() - detail).max(40.0);
+        ui.allocate_ui(egui::vec2(ui.available_width(), height), |ui| {
+            ui.set_height(height);
+            self.entries(ui, book);
+        });
+        if let Some(entry) = chosen {
+            ui.separator();
+            ScrollArea::vertical().id_salt("whole text").auto_shrink(false).show(ui, |ui| {
+                ui.add(Label::new(RichText::new(entry.line())).wrap().selectable(true));
+            });
+        }
+    }
+}
+
+impl LogPanel {
+    fn refresh(&mut self, book: &LogBook) {
+        let key = (book.next, book.entries.len(), self.search.clone());
+        if self.listed.made_from.as_ref() == Some(&key) {
+            return;
+        }
+        let words: Vec<String> = self.search.split_whitespace().map(str::to_lowercase).collect();
+        let found = |entry: &LogEntry| {
+            let text = entry.notice.text.to_lowercase();
+            let kind = severity_name(entry.notice.severity);
+            words.iter().all(|word| text.contains(word) || kind.starts_with(word.as_str()))
+        };
+        self.listed.places =
+            book.entries().enumerate().filter(|(_, entry)| found(entry)).map(|(place, _)| place).collect();
+        self.listed.made_from = Some(key);
+    }
+
+    fn bar(&mut self, ui: &mut Ui, book: &LogBook, requests: &mut Requests) {
+        ui.horizontal(|ui| {
+            let side = ui.spacing().interact_size.y + ui.spacing().item_spacing.x;
+            let width = (ui.available_width() - 2.0 * side - 4.0).max(40.0);
+            let field = ui.add(TextEdit::singleline(&mut self.search).hint_text("Search").desired_width(width));
+            field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Search"));
+            if list::symbol_button(ui, "📋", "Copy what is listed") {
+                let lines = self.listed.places.iter().filter_map(|place| book.entries.get(*place)).map(LogEntry::line);
+                ui.ctx().copy_text(lines.collect::<Vec<_>>().join("\n"));
+            }
+            if list::symbol_button(ui, "🗑", "Clear the log") {
+                requests.send(ClearLog);
+            }
+        });
+    }
+
+    fn entries(&mut self, ui: &mut Ui, book: &LogBook) {
+        let height = list::row_height(ui);
+        let places = &self.listed.places;
+        let chosen = &mut self.chosen;
+        List { id: "entries", count: places.len(), height, reveal: None, follow: true }.show(ui, |ui, range, row| {
+            for number in range {
+                let Some(entry) = places.get(number).and_then(|place| book.entries.get(*place)) else { continue };
+                entry_row(ui, row(number), entry, chosen);
+            }
+        });
+    }
+}
+
+fn entry_row(ui: &mut Ui, rect: Rect, entry: &LogEntry, chosen: &mut Option<u64>) {
+    let is_chosen = *chosen == Some(entry.number);
+    let response = ui.interact(rect, ui.id().with(entry.number), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_chosen, &entry.notice.text));
+    if is_chosen {
+        ui.painter().rect_filled(rect, 3.0, ui.visuals().selection.bg_fill);
+    } else if response.hovered() {
+        ui.painter().rect_filled(rect, 3.0, ui.visuals().widgets.hovered.bg_fill.gamma_multiply(0.35));
+    }
+    let icon = Rect::from_min_size(rect.min, egui::vec2(rect.height(), rect.height()));
+    let (symbol, color) = severity_symbol(ui, entry.notice.severity);
+    list::symbol(ui, icon, symbol, color);
+    let mut text = rect.with_min_x(icon.right() + 2.0);
+    if rect.width() > 240.0 {
+        list::line(ui, text.with_max_x(text.left() + 52.0), &clock(entry.at), ui.visuals().weak_text_color());
+        text.min.x += 54.0;
+    }
+    let times = if entry.times > 1 { format!("{}× ", entry.times) } else { String::new() };
+    // Line breaks would show as boxes in a single line.
+    let line = format!("{times}{}", entry.notice.text.replace('\n', " "));
+    let cut = list::line(ui, text, &line, ui.visuals().text_color());
+    if response.clicked() {
+        *chosen = if is_chosen { None } else { Some(entry.number) };
+    }
+    if cut {
+        response.on_hover_text(&entry.notice.text);
+    }
+}
+
+/// Minutes and seconds, and hours once there are some.
+fn clock(at: Duration) -> String {
+    let seconds = at.as_secs();
+    let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    if hours > 0 { format!("{hours}:{minutes:02}:{seconds:02}") } else { format!("{minutes}:{seconds:02}") }
+}
+
+fn severity_name(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Info => "info",
+        Severity::Done => "done",
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    }
+}
+
+/// The symbol of a severity and its colour, the same in the log and in toasts.
+pub(super) fn severity_symbol(ui: &Ui, severity: Severity) -> (&'static str, Color32) {
+    let visuals = ui.visuals();
+    match severity {
+        Severity::Info => ("ℹ", visuals.hyperlink_color),
+        Severity::Done => ("✔", Color32::from_rgb(92, 184, 92)),
+        Severity::Warning => ("⚠", visuals.warn_fg_color),
+        Severity::Error => ("✖", visuals.error_fg_color),
+    }
+}

@@ -1,0 +1,331 @@
+//! One button that gives every mesh its weights, and what came of it.
+
+use bevy::prelude::*;
+use bevy_egui::egui::{
+    self, Button, CollapsingHeader, ComboBox, DragValue, ProgressBar, RichText, ScrollArea, Slider, Ui,
+};
+
+use super::{
+    fields,
+    list,
+    log::LogSystems,
+    shown::{Shown, joint_name},
+};
+use crate::{
+    algo::weights::{Method, WeightReport, WeightSettings},
+    editor::{
+        ActiveRig,
+        actions::{Action, ActionRequest},
+        notice::{Notice, Severity},
+        panel::{EditorPanel, Requests},
+    },
+    plugins::{
+        RigSystems,
+        skinning::{BindRequest, Bound, SkinningJob},
+        surface::{RigMesh, RigMeshes},
+    },
+    rig::{NodeKind, Rig, SkinData, Uid},
+};
+
+/// Carries [`Action::Skin`] out and tells what came of it.
+pub struct SkinningPanelPlugin;
+
+impl Plugin for SkinningPanelPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<SkinningSettings>()
+            .init_resource::<SkinningResults>()
+            .add_message::<ActionRequest>()
+            .add_message::<CancelSkinning>()
+            .add_message::<Notice>()
+            .add_message::<Bound>()
+            .add_systems(Update, (skin, cancel).chain().after(RigSystems::Build).before(RigSystems::Bind))
+            .add_systems(Last, tell_results.before(LogSystems));
+    }
+}
+
+/// How [`Action::Skin`] computes weights.
+#[derive(Resource, Debug, Clone, PartialEq, Default)]
+pub struct SkinningSettings(pub WeightSettings);
+
+/// What came of the last computation of each mesh.
+#[derive(Resource, Debug, Default)]
+pub struct SkinningResults(Vec<(Entity, Result<WeightReport, String>)>);
+
+impl SkinningResults {
+    /// The last result for a mesh.
+    pub fn get(&self, mesh: Entity) -> Option<&Result<WeightReport, String>> {
+        self.0.iter().find(|(known, _)| *known == mesh).map(|(_, result)| result)
+    }
+}
+
+/// Asks to stop all computations for the active rig; the weights stay as they are.
+#[derive(Message, Debug, Clone, Copy)]
+pub struct CancelSkinning;
+
+/// Asks for weights of every mesh, or says why that cannot be.
+fn skin(
+    mut actions: MessageReader<ActionRequest>,
+    active: Option<Res<ActiveRig>>,
+    rigs: Query<(&Rig, Option<&RigMeshes>)>,
+    jobs: Query<&SkinningJob>,
+    settings: Res<SkinningSettings>,
+    mut commands: Commands,
+) {
+    if !actions.read().any(|request| request.0 == Action::Skin) {
+        return;
+    }
+    let Some((rig, meshes)) = active.and_then(|active| rigs.get(active.0).ok()) else { return };
+    let meshes: Vec<Entity> = meshes.iter().flat_map(|meshes| meshes.iter()).collect();
+    if let Some(progress) = meshes.iter().find_map(|mesh| jobs.get(*mesh).ok()).map(SkinningJob::progress) {
+        let percent = (progress * 100.0) as u32;
+        let text = format!("Skinning is running ({percent} %). Wait for it, or cancel it in the Skinning panel.");
+        commands.write_message(Notice::info(text));
+        return;
+    }
+    if let Some(obstacle) = obstacle(rig, meshes.len()) {
+        commands.write_message(Notice::warning(obstacle));
+        return;
+    }
+    for mesh in meshes {
+        commands.write_message(BindRequest { mesh, settings: settings.0.clone(), rigid: Vec::new() });
+    }
+}
+
+/// Why there is nothing to skin, if there is nothing.
+fn obstacle(rig: &Rig, meshes: usize) -> Option<&'static str> {
+    if meshes == 0 {
+        Some("There is no mesh to skin: open one first.")
+    } else if rig.is_empty() {
+        Some("There are no joints to skin to: place some or draw a stroke first.")
+    } else {
+        None
+    }
+}
+
+fn cancel(
+    mut requests: MessageReader<CancelSkinning>,
+    active: Option<Res<ActiveRig>>,
+    rigs: Query<&RigMeshes>,
+    jobs: Query<&SkinningJob>,
+) {
+    if requests.read().count() == 0 {
+        return;
+    }
+    let Some(meshes) = active.and_then(|active| rigs.get(active.0).ok()) else { return };
+    meshes.iter().filter_map(|mesh| jobs.get(mesh).ok()).for_each(SkinningJob::cancel);
+}
+
+fn tell_results(
+    mut bound: MessageReader<Bound>,
+    meshes: Query<&RigMesh>,
+    mut results: ResMut<SkinningResults>,
+    mut notices: MessageWriter<Notice>,
+) {
+    for Bound { mesh, result } in bound.read() {
+        let name = meshes.get(*mesh).map_or("The mesh", |mesh| mesh_name(mesh));
+        notices.write(match result {
+            Ok(report) => {
+                let told = format!("{name} is skinned: {}.", covered(report.points, unweighted(report)));
+                if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told) }
+            }
+            Err(reason) if is_cancelled(reason) => Notice::info("Skinning was cancelled. The weights are as they were."),
+            Err(reason) => Notice::error(format!("{name} was not skinned: {reason}.")),
+        });
+        results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
+        results.0.push((*mesh, result.clone()));
+    }
+}
+
+fn is_cancelled(reason: &str) -> bool {
+    reason == crate::algo::weights::WeightError::Cancelled.to_string()
+}
+
+fn mesh_name(mesh: &RigMesh) -> &str {
+    if mesh.file.name.is_empty() { "The mesh" } else { &mesh.file.name }
+}
+
+/// Points that nothing holds.
+fn unweighted(report: &WeightReport) -> usize {
+    let held = report.by_surface + report.by_voxels + report.by_fill + report.by_nearest + report.given;
+    report.points.saturating_sub(held)
+}
+
+/// "100 % of 13380 points have weights", or how many have none.
+fn covered(points: usize, without: usize) -> String {
+    if without == 0 {
+        format!("100 % of {points} points have weights")
+    } else {
+        format!("{without} of {points} points have no weights")
+    }
+}
+
+/// The panel.
+#[derive(Default)]
+pub struct SkinningPanel {
+    /// Points without weights, by the weights they were counted in.
+    counted: Vec<(Uid, std::sync::Weak<SkinData>, usize)>,
+}
+
+impl EditorPanel for SkinningPanel {
+    fn title(&self) -> &'static str {
+        "Skinning"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let Some(shown) = Shown::of(world) else {
+            return list::nothing(ui, "No rig is open.");
+        };
+        let meshes = world.get::<RigMeshes>(shown.entity);
+        let meshes: Vec<Entity> = meshes.iter().flat_map(|meshes| meshes.iter()).collect();
+        let running: Vec<&SkinningJob> = meshes.iter().filter_map(|mesh| world.get::<SkinningJob>(*mesh)).collect();
+        ScrollArea::vertical().id_salt("skinning").auto_shrink(false).show(ui, |ui| {
+            skin_button(ui, &shown, meshes.len(), &running, requests);
+            ui.add_space(4.0);
+            settings(ui, world, requests);
+            for mesh in &meshes {
+                ui.add_space(6.0);
+                self.mesh(ui, world, *mesh, &shown);
+            }
+        });
+    }
+}
+
+/// The button; while a job runs, its progress and a button that stops it.
+fn skin_button(ui: &mut Ui, shown: &Shown, meshes: usize, running: &[&SkinningJob], requests: &mut Requests) {
+    let size = egui::vec2(ui.available_width(), 34.0);
+    if running.is_empty() {
+        let obstacle = obstacle(&shown.rig, meshes);
+        let button = Button::new(RichText::new("Skin").size(16.0).strong()).min_size(size);
+        let tip = "Compute weights of all meshes in the background";
+        let response = ui.add_enabled(obstacle.is_none(), button).on_hover_text(tip);
+        if response.clicked() {
+            requests.send(ActionRequest(Action::Skin));
+        }
+        if let Some(obstacle) = obstacle {
+            ui.weak(obstacle);
+        }
+        return;
+    }
+    let progress = running.iter().map(|job| job.progress()).sum::<f32>() / running.len() as f32;
+    ui.add(ProgressBar::new(progress).text(format!("{:.0} %", progress * 100.0)).desired_height(20.0));
+    if ui.add(Button::new("Cancel").min_size(egui::vec2(ui.available_width(), 24.0))).clicked() {
+        requests.send(CancelSkinning);
+    }
+    ui.ctx().request_repaint_after_secs(0.1);
+}
+
+/// How weights are computed, folded away.
+fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
+    let current = world.get_resource::<SkinningSettings>().cloned().unwrap_or_default();
+    let mut next = current.clone();
+    CollapsingHeader::new("Settings").show(ui, |ui| {
+        fields::labelled(ui, "Method", |ui| {
+            let names = [(Method::Auto, "Automatic"), (Method::Heat, "Heat"), (Method::Voxel, "Voxels")];
+            let name = names.iter().find(|(method, _)| *method == next.0.method).map_or("", |(_, name)| name);
+            ComboBox::from_id_salt("method").selected_text(name).width(ui.available_width()).truncate().show_ui(ui, |ui| {
+                for (method, name) in names {
+                    ui.selectable_value(&mut next.0.method, method, name);
+                }
+            });
+        });
+        fields::labelled(ui, "Smoothing", |ui| {
+            ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
+            let slider = Slider::new(&mut next.0.smoothing, 0.25..=4.0).logarithmic(true).max_decimals(2);
+            ui.add(slider).on_hover_text("Width of the blend between joints: 1 is usual, less is stiffer");
+        });
+        fields::labelled(ui, "Influences", |ui| {
+            let field = DragValue::new(&mut next.0.max_influences).range(1..=16).speed(0.05);
+            ui.add(field).on_hover_text("The largest number of joints that move one point; many games allow 4");
+        });
+        fields::labelled(ui, "Voxels", |ui| {
+            let field = DragValue::new(&mut next.0.voxel_resolution).range(32..=1024).speed(2.0);
+            ui.add(field).on_hover_text("Voxels along the longest side, where voxels are used");
+        });
+        if next.0 != WeightSettings::default() && ui.button("Defaults").clicked() {
+            next = SkinningSettings::default();
+        }
+    });
+    if next != current {
+        requests.set(next);
+    }
+}
+
+impl SkinningPanel {
+    /// Coverage of one mesh, and how its points got their weights.
+    fn mesh(&mut self, ui: &mut Ui, world: &World, entity: Entity, shown: &Shown) {
+        let Some(mesh) = world.get::<RigMesh>(entity) else { return };
+        ui.separator();
+        ui.strong(mesh_name(mesh));
+        let points = mesh.rest.points.len();
+        let Some(skin) = shown.rig.skin(mesh.uid) else {
+            ui.weak(format!("Not skinned ({points} points)"));
+            self.failure(ui, world, entity);
+            return;
+        };
+        let without = self.without_weights(mesh.uid, skin) + points.saturating_sub(skin.weights.len());
+        let good = without == 0;
+        let (symbol, color) = super::log::severity_symbol(ui, if good { Severity::Done } else { Severity::Warning });
+        ui.horizontal_wrapped(|ui| {
+            ui.colored_label(color, symbol);
+            ui.label(covered(points, without));
+        });
+        self.failure(ui, world, entity);
+        if let Some(Ok(report)) = world.get_resource::<SkinningResults>().and_then(|results| results.get(entity)) {
+            for note in notes(report) {
+                ui.weak(note);
+            }
+        }
+        if !skin.at_rest {
+            ui.weak("Weights as they came with the file");
+        }
+        if let Some(note) = unbound(&shown.rig, skin) {
+            ui.weak(note);
+        }
+    }
+
+    fn failure(&self, ui: &mut Ui, world: &World, mesh: Entity) {
+        let result = world.get_resource::<SkinningResults>().and_then(|results| results.get(mesh));
+        if let Some(Err(reason)) = result.filter(|result| !result.as_ref().is_err_and(|reason| is_cancelled(reason))) {
+            ui.colored_label(ui.visuals().error_fg_color, reason);
+        }
+    }
+
+    /// Counts points without weights, once for each set of weights.
+    fn without_weights(&mut self, mesh: Uid, skin: &std::sync::Arc<SkinData>) -> usize {
+        let same = |known: &std::sync::Weak<SkinData>| std::ptr::eq(known.as_ptr(), std::sync::Arc::as_ptr(skin));
+        if let Some((.., count)) = self.counted.iter().find(|(uid, known, _)| *uid == mesh && same(known)) {
+            return *count;
+        }
+        let count = skin.weights.starts.windows(2).filter(|ends| ends[0] == ends[1]).count();
+        self.counted.retain(|(uid, known, _)| *uid != mesh && known.strong_count() > 0);
+        self.counted.push((mesh, std::sync::Arc::downgrade(skin), count));
+        count
+    }
+}
+
+/// How points got their weights, where that is worth a look.
+fn notes(report: &WeightReport) -> Vec<String> {
+    let share = |count: usize| 100.0 * count as f64 / report.points.max(1) as f64;
+    let kinds = [
+        (report.by_surface, "by heat on the surface"),
+        (report.by_voxels, "through voxels"),
+        (report.by_fill, "from their neighbours"),
+        (report.by_nearest, "by the nearest bone alone: look at them"),
+        (report.given, "given"),
+    ];
+    kinds.iter().filter(|(count, _)| *count > 0).map(|(count, how)| format!("{:.1} % {how}", share(*count))).collect()
+}
+
+/// Joints that were added since, and move nothing yet.
+fn unbound(rig: &Rig, skin: &SkinData) -> Option<String> {
+    let bound: std::collections::HashSet<Uid> = skin.joints.iter().copied().collect();
+    let mut missing =
+        rig.walk().filter(|joint| joint.data.kind == NodeKind::Joint && !bound.contains(&joint.data.uid));
+    let first = missing.next()?;
+    let more = missing.count();
+    let name = joint_name(&first.data);
+    Some(match more {
+        0 => format!("{name} was added after skinning and moves nothing: skin again"),
+        more => format!("{name} and {more} more were added after skinning and move nothing: skin again"),
+    })
+}
