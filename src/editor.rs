@@ -15,6 +15,7 @@ mod menu;
 pub mod mode;
 pub mod notice;
 pub mod panel;
+pub mod panels;
 pub mod pointer;
 pub mod probe;
 pub mod screen;

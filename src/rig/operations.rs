@@ -20,7 +20,7 @@ pub use orient::Axis;
 pub use place::settle;
 pub use symmetry::MirrorPlane;
 
-use crate::rig::{EditError, GroupData, PoseOffset, Rig, RigEdit, Uid, UidSource};
+use crate::rig::{EditError, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
 
 /// One thing a person asks of a rig. Positions and transforms are in the rig's space.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +79,13 @@ pub enum Operation {
         scale: Vec3,
         /// About which point; each joint about itself for `None`.
         pivot: Option<Vec3>,
+        /// True to take along what hangs below; else it stays in place.
+        with_children: bool,
+    },
+    /// Gives joints rest transforms, each relative to its parent.
+    Rest {
+        /// Which, and what they get.
+        to: Vec<(Uid, RestTransform)>,
         /// True to take along what hangs below; else it stays in place.
         with_children: bool,
     },
@@ -161,6 +168,7 @@ impl Operation {
             Self::Move { .. } => "Move joints",
             Self::Rotate { .. } => "Rotate joints",
             Self::Scale { .. } => "Scale joints",
+            Self::Rest { .. } => "Set rest pose",
             Self::Reparent { .. } => "Reparent joints",
             Self::Labels(..) => "Rename joints",
             Self::Orient { .. } => "Orient joints",
@@ -216,6 +224,7 @@ impl Operation {
                 }
                 transform::about(draft, joints, Affine3::from_scale(*scale), *pivot, *with_children)
             }
+            Self::Rest { to, with_children } => transform::rest(draft, to, *with_children),
             Self::Labels(labels) => labels.iter().try_for_each(|(joint, label)| label_joint(draft, *joint, label)),
             Self::Orient { joints, along } => orient::orient(draft, joints, *along),
             Self::Mirror { joints } => symmetry::mirror(draft, joints),

@@ -231,7 +231,11 @@ impl HierarchyPanel {
             false => vec![joint],
         };
         for joint in all {
-            if fold { self.folded.insert(joint) } else { self.folded.remove(&joint) };
+            if fold {
+                self.folded.insert(joint)
+            } else {
+                self.folded.remove(&joint)
+            };
         }
         self.stale = true;
     }

@@ -6,8 +6,7 @@ use bevy_egui::egui::{
 };
 
 use super::{
-    fields,
-    list,
+    fields, list,
     log::LogSystems,
     shown::{Shown, joint_name},
 };
@@ -128,7 +127,9 @@ fn tell_results(
                 let told = format!("{name} is skinned: {}.", covered(report.points, unweighted(report)));
                 if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told) }
             }
-            Err(reason) if is_cancelled(reason) => Notice::info("Skinning was cancelled. The weights are as they were."),
+            Err(reason) if is_cancelled(reason) => {
+                Notice::info("Skinning was cancelled. The weights are as they were.")
+            }
             Err(reason) => Notice::error(format!("{name} was not skinned: {reason}.")),
         });
         results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
@@ -222,11 +223,14 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
         fields::labelled(ui, "Method", |ui| {
             let names = [(Method::Auto, "Automatic"), (Method::Heat, "Heat"), (Method::Voxel, "Voxels")];
             let name = names.iter().find(|(method, _)| *method == next.0.method).map_or("", |(_, name)| name);
-            ComboBox::from_id_salt("method").selected_text(name).width(ui.available_width()).truncate().show_ui(ui, |ui| {
-                for (method, name) in names {
-                    ui.selectable_value(&mut next.0.method, method, name);
-                }
-            });
+            ComboBox::from_id_salt("method").selected_text(name).width(ui.available_width()).truncate().show_ui(
+                ui,
+                |ui| {
+                    for (method, name) in names {
+                        ui.selectable_value(&mut next.0.method, method, name);
+                    }
+                },
+            );
         });
         fields::labelled(ui, "Smoothing", |ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
@@ -319,8 +323,7 @@ fn notes(report: &WeightReport) -> Vec<String> {
 /// Joints that were added since, and move nothing yet.
 fn unbound(rig: &Rig, skin: &SkinData) -> Option<String> {
     let bound: std::collections::HashSet<Uid> = skin.joints.iter().copied().collect();
-    let mut missing =
-        rig.walk().filter(|joint| joint.data.kind == NodeKind::Joint && !bound.contains(&joint.data.uid));
+    let mut missing = rig.walk().filter(|joint| joint.data.kind == NodeKind::Joint && !bound.contains(&joint.data.uid));
     let first = missing.next()?;
     let more = missing.count();
     let name = joint_name(&first.data);

@@ -6,7 +6,9 @@
 use std::time::Duration;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Align2, Area, Frame, Id, Label, Order, Rect, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType};
+use bevy_egui::egui::{
+    self, Align2, Area, Frame, Id, Label, Order, Rect, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType,
+};
 
 use super::log::{LogBook, severity_symbol};
 use crate::editor::{
@@ -131,7 +133,8 @@ fn draw(ui: &mut Ui, toast: &Toast, width: f32) -> bool {
             let room = ui.available_width() - 24.0;
             ui.allocate_ui(egui::vec2(room, 0.0), |ui| {
                 ui.set_width(room);
-                let text = RichText::new(format!("{times}{}", toast.notice.text)).color(ui.visuals().strong_text_color());
+                let text =
+                    RichText::new(format!("{times}{}", toast.notice.text)).color(ui.visuals().strong_text_color());
                 ui.add(Label::new(text).wrap().selectable(false));
             });
             let cross = ui.add(egui::Button::new(RichText::new("✖").small()).frame(false));

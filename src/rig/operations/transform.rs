@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use bevy::math::{Affine3, Vec3};
 
 use super::{Draft, OperationError};
-use crate::rig::Uid;
+use crate::rig::{RestTransform, RigEdit, Uid};
 
 /// Puts joints at positions.
 pub(super) fn place_at(draft: &mut Draft, to: &[(Uid, Vec3)], with_children: bool) -> Result<(), OperationError> {
@@ -20,6 +20,35 @@ pub(super) fn place_at(draft: &mut Draft, to: &[(Uid, Vec3)], with_children: boo
         targets.push((joint, global));
     }
     set_globals(draft, targets, with_children)
+}
+
+/// Gives joints rest transforms relative to their parents, parents first, and their partners the mirrored ones.
+pub(super) fn rest(draft: &mut Draft, to: &[(Uid, RestTransform)], with_children: bool) -> Result<(), OperationError> {
+    let listed: HashSet<Uid> = to.iter().map(|(joint, _)| *joint).collect();
+    let mut to = to.to_vec();
+    to.sort_by_key(|(joint, _)| draft.rig().ancestors(*joint).count());
+    for (joint, rest) in to {
+        let set = |draft: &mut Draft| draft.apply(RigEdit::SetRest(joint, rest));
+        if with_children {
+            set(draft)?
+        } else {
+            draft.keeping_children(joint, set)?
+        }
+        let (Some(plane), global) = (draft.symmetry(), draft.rig().rest_global(joint)) else { continue };
+        // The other side follows; a joint on the plane stays on it.
+        let (other, global) = match draft.partner(joint) {
+            Some(partner) if listed.contains(&partner) => continue,
+            Some(partner) => (partner, plane.mirrored_affine(&global)),
+            None if plane.distance(global.translation).abs() <= plane.tolerance => {
+                (joint, Affine3 { translation: plane.onto(global.translation), ..global })
+            }
+            None => continue,
+        };
+        if global != draft.rig().rest_global(other) {
+            set_globals_of(draft, &[(other, global)], with_children)?;
+        }
+    }
+    Ok(())
 }
 
 /// Applies `change` about a pivot (or each joint's own position).
@@ -64,7 +93,11 @@ fn set_globals(draft: &mut Draft, mut targets: Vec<(Uid, Affine3)>, with_childre
         }
     }
     targets.sort_by_key(|(joint, _)| draft.rig().ancestors(*joint).count());
-    for (joint, global) in &targets {
+    set_globals_of(draft, &targets, with_children)
+}
+
+fn set_globals_of(draft: &mut Draft, targets: &[(Uid, Affine3)], with_children: bool) -> Result<(), OperationError> {
+    for (joint, global) in targets {
         if with_children {
             draft.set_global(*joint, global)?;
         } else {

@@ -75,7 +75,7 @@ fn text_rect(ui: &Ui, rect: Rect, tree: &Tree, row: Row) -> Rect {
 
 /// Paints the row; true if the name did not fit.
 fn paint(
-    ui: &Ui,
+    ui: &mut Ui,
     rect: Rect,
     tree: &Tree,
     row: Row,
@@ -84,7 +84,7 @@ fn paint(
     response: &Response,
     fold: Option<&Response>,
 ) -> bool {
-    let visuals = ui.visuals();
+    let visuals = ui.visuals().clone();
     let hovered = response.hovered() || shown.hovered == Some(row.joint);
     if selected {
         let active = shown.selection.active() == Some(row.joint);
@@ -206,10 +206,9 @@ fn carried(ui: &Ui, joints: &[Uid], shown: &Shown, refused: Option<&str>) {
         (None, [one]) => shown.name(*one).into_owned(),
         (None, more) => format!("{} joints", more.len()),
     };
-    let painter = ui.ctx().layer_painter(bevy_egui::egui::LayerId::new(
-        bevy_egui::egui::Order::Tooltip,
-        Id::new("dragged joints"),
-    ));
+    let painter = ui
+        .ctx()
+        .layer_painter(bevy_egui::egui::LayerId::new(bevy_egui::egui::Order::Tooltip, Id::new("dragged joints")));
     let visuals = ui.visuals();
     let font = FontId::proportional(12.0);
     let galley = painter.layout(text, font, visuals.strong_text_color(), 260.0);

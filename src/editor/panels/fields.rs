@@ -1,0 +1,154 @@
+//! Fields of forms: a name and a value, numbers that are dragged or typed, and "mixed" where joints differ.
+
+use std::cell::Cell;
+
+use bevy_egui::egui::{self, Align, Color32, DragValue, Id, Key, Layout, RichText, Sense, Ui, vec2};
+
+use super::list;
+
+/// A value of several things: that of the active one, and whether all have it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Shared<T> {
+    pub value: T,
+    pub mixed: bool,
+}
+
+impl<T: PartialEq> Shared<T> {
+    /// The last of `values` is the active one's; `None` if there is none.
+    pub fn of(values: impl DoubleEndedIterator<Item = T>) -> Option<Self> {
+        let mut values = values.rev();
+        let value = values.next()?;
+        let mixed = values.any(|other| other != value);
+        Some(Self { value, mixed })
+    }
+}
+
+/// What is shown where values differ.
+pub(super) const MIXED: &str = "mixed";
+
+/// A row with a name on the left.
+pub(super) fn labelled<R>(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
+    let row = |ui: &mut Ui| {
+        let width = (ui.available_width() * 0.34).clamp(58.0, 96.0);
+        let (rect, response) = ui.allocate_exact_size(vec2(width, ui.spacing().interact_size.y), Sense::hover());
+        if list::line(ui, rect, name, ui.visuals().text_color()) {
+            response.on_hover_text(name);
+        }
+        add(ui)
+    };
+    ui.with_layout(Layout::left_to_right(Align::Min), |ui| {
+        ui.allocate_ui(vec2(ui.available_width(), 0.0), |ui| ui.horizontal(row).inner).inner
+    })
+    .inner
+}
+
+/// Numbers while they are dragged: the rig gets the last one, as one step.
+#[derive(Default)]
+pub(super) struct Numbers {
+    dragged: Option<(Id, f64)>,
+}
+
+/// How a number is shown and dragged.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look {
+    /// Change a pixel.
+    pub speed: f64,
+    pub decimals: usize,
+    pub suffix: &'static str,
+}
+
+impl Numbers {
+    /// Three fields, X, Y and Z, beside each other or below each other where it is narrow. Returns the axis and the
+    /// number once one is committed.
+    pub fn vector(&mut self, ui: &mut Ui, name: &str, shown: [Shared<f32>; 3], look: Look) -> Option<(usize, f32)> {
+        ui.label(name);
+        let mut committed = None;
+        let narrow = ui.available_width() < 170.0;
+        let height = ui.spacing().interact_size.y;
+        let mut fields = |ui: &mut Ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            let width = if narrow { ui.available_width() } else { ((ui.available_width() - 6.0) / 3.0).floor() };
+            for (axis, (letter, color)) in AXES.into_iter().enumerate() {
+                let prefix = RichText::new(format!("{letter} ")).color(color);
+                let said = format!("{name} {letter}");
+                if let Some(number) = self.field(ui, &said, prefix, shown[axis], look, vec2(width, height)) {
+                    committed = Some((axis, number));
+                }
+            }
+        };
+        if narrow {
+            ui.vertical(|ui| fields(ui))
+        } else {
+            ui.horizontal(|ui| fields(ui))
+        };
+        ui.add_space(2.0);
+        committed
+    }
+
+    /// One field; the number once it is committed: typed, or let go after a drag. Escape drops it.
+    fn field(
+        &mut self,
+        ui: &mut Ui,
+        said: &str,
+        prefix: RichText,
+        shown: Shared<f32>,
+        look: Look,
+        size: egui::Vec2,
+    ) -> Option<f32> {
+        let id = ui.id().with(said);
+        let dragged = self.dragged.filter(|(other, _)| *other == id).map(|(_, value)| value);
+        let mut value = dragged.unwrap_or(f64::from(shown.value));
+        let typed: Cell<Option<f64>> = Cell::new(None);
+        let mixed = shown.mixed && dragged.is_none();
+        let field = DragValue::new(&mut value)
+            .speed(look.speed)
+            .max_decimals(look.decimals)
+            .prefix(prefix)
+            .suffix(look.suffix)
+            .update_while_editing(false)
+            .custom_formatter(|number, _| if mixed { MIXED.to_owned() } else { short(number, look.decimals) })
+            .custom_parser(|text| {
+                let number = parse(text, look.suffix);
+                typed.set(number.or(typed.get()));
+                number
+            });
+        let response = ui.push_id(said, |ui| ui.add_sized(size, field)).inner;
+        ui.ctx().accesskit_node_builder(response.id, |node| node.set_label(said));
+        let escaped = ui.input(|input| input.key_pressed(Key::Escape));
+        let number = if response.drag_stopped() {
+            self.dragged.take().map(|(_, value)| value).filter(|_| !escaped)
+        } else if response.dragged() {
+            if response.changed() || dragged.is_some() {
+                self.dragged = Some((id, value));
+            }
+            None
+        } else if dragged.is_some() {
+            // Something else took the pointer.
+            self.dragged = None;
+            None
+        } else {
+            typed.get().or(response.changed().then_some(value))
+        };
+        let number = number.map(|number| number as f32).filter(|number| number.is_finite())?;
+        (shown.mixed || number != shown.value).then_some(number)
+    }
+}
+
+const AXES: [(&str, Color32); 3] = [
+    ("X", Color32::from_rgb(230, 96, 96)),
+    ("Y", Color32::from_rgb(120, 190, 80)),
+    ("Z", Color32::from_rgb(90, 150, 240)),
+];
+
+/// A number without digits that say nothing.
+pub(super) fn short(number: f64, decimals: usize) -> String {
+    let text = format!("{number:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// A typed number: with a comma or a point, with or without its unit.
+fn parse(text: &str, suffix: &str) -> Option<f64> {
+    let text = text.trim().trim_end_matches(suffix.trim()).trim().replace(',', ".").replace('−', "-");
+    text.parse::<f64>().ok().filter(|number| number.is_finite())
+}

@@ -1,0 +1,247 @@
+//! The selected joints: label, group, rest pose, weights' lock. Several at once where they have a field in common.
+//!
+//! A field that is typed or dragged is one step of the history: it reaches the rig when it is left or let go.
+
+mod values;
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Checkbox, ComboBox, Key, ScrollArea, TextEdit, Ui, WidgetInfo, WidgetType};
+
+use super::{
+    fields::{self, Look, MIXED, Numbers, Shared, labelled, short},
+    groups, list,
+    shown::{Shown, color},
+};
+use crate::{
+    editor::{
+        mode::Mode,
+        panel::{EditorPanel, Requests},
+    },
+    plugins::{
+        document::EditRequest,
+        picking::{Pick, PickRequest},
+    },
+    rig::{NodeKind, Uid, operations::Operation},
+};
+use values::{Part, Values};
+
+/// The panel.
+#[derive(Default)]
+pub struct PropertiesPanel {
+    values: Values,
+    numbers: Numbers,
+    label: Option<LabelDraft>,
+    group: String,
+    /// A group's colour while it is being chosen.
+    color: Option<(String, [u8; 3])>,
+}
+
+/// A label being typed, and whose it is: the selection may change before it is committed.
+struct LabelDraft {
+    joints: Vec<Uid>,
+    text: String,
+}
+
+impl EditorPanel for PropertiesPanel {
+    fn title(&self) -> &'static str {
+        "Properties"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let Some(shown) = Shown::of(world) else {
+            return list::nothing(ui, "No rig is open.");
+        };
+        self.values.refresh(&shown);
+        self.keep_label(&shown, requests);
+        if self.values.joints.is_empty() {
+            return list::nothing(ui, "Select a joint to see its properties.");
+        }
+        let posing = world.get_resource::<Mode>() == Some(&Mode::Pose);
+        ScrollArea::vertical().id_salt("properties").auto_shrink(false).show(ui, |ui| {
+            if self.values.joints.len() > 1 {
+                ui.strong(format!("{} joints", self.values.joints.len()));
+            }
+            self.label_field(ui, &shown, requests);
+            self.group_field(ui, &shown, requests);
+            self.relations(ui, &shown, requests);
+            self.lock_field(ui, &shown, requests);
+            ui.separator();
+            if posing { pose(ui) } else { self.rest(ui, &shown, requests) }
+        });
+    }
+}
+
+impl PropertiesPanel {
+    fn send(&self, operation: Operation, shown: &Shown, requests: &mut Requests) {
+        requests.send(EditRequest::operation(shown.entity, operation));
+    }
+
+    /// Commits a label that was typed for joints that are no longer selected.
+    fn keep_label(&mut self, shown: &Shown, requests: &mut Requests) {
+        if self.label.as_ref().is_some_and(|draft| draft.joints != self.values.joints) {
+            self.accept_label(shown, requests);
+        }
+    }
+
+    fn accept_label(&mut self, shown: &Shown, requests: &mut Requests) {
+        let Some(draft) = self.label.take() else { return };
+        let labels = numbered(&draft.joints, draft.text.trim()).into_iter().filter(|(uid, label)| {
+            shown.rig.joint(*uid).is_some_and(|joint| joint.data.label.as_deref().unwrap_or_default() != label)
+        });
+        let labels: Vec<(Uid, String)> = labels.collect();
+        if !labels.is_empty() {
+            self.send(Operation::Labels(labels), shown, requests);
+        }
+    }
+
+    fn label_field(&mut self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+        let several = self.values.joints.len() > 1;
+        let Shared { value, mixed } = self.values.label.clone();
+        let kept = self.label.as_ref().map(|draft| draft.text.clone());
+        let mut text = kept.unwrap_or(if mixed { String::new() } else { value });
+        let hint = if mixed { MIXED.to_owned() } else { shown.name(self.values.joints[0]).into_owned() };
+        let response = labelled(ui, "Label", |ui| {
+            let field = TextEdit::singleline(&mut text).hint_text(hint).desired_width(ui.available_width());
+            let response = ui.add(field);
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Label"));
+            if several {
+                response.on_hover_text("# becomes a number: finger_# gives finger_1, finger_2 ...")
+            } else {
+                response
+            }
+        });
+        if response.changed() {
+            self.label = Some(LabelDraft { joints: self.values.joints.clone(), text });
+        }
+        if self.label.is_some() && !response.has_focus() {
+            if ui.input(|input| input.key_pressed(Key::Escape)) {
+                self.label = None;
+            } else {
+                self.accept_label(shown, requests);
+            }
+        }
+    }
+
+    fn group_field(&mut self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+        let Shared { value, mixed } = self.values.group;
+        let group = value.filter(|_| !mixed).and_then(|uid| shown.rig.group(uid)).cloned();
+        let text = match &group {
+            Some(group) => group.name.as_str(),
+            None if mixed => MIXED,
+            None => "None",
+        };
+        let mut operation = None;
+        let joints = self.values.joints.clone();
+        labelled(ui, "Group", |ui| {
+            let room = if group.is_some() { ui.spacing().interact_size.x + ui.spacing().item_spacing.x } else { 0.0 };
+            let current = if mixed { None } else { Some(group.as_ref().map_or("", |group| group.name.as_str())) };
+            let combo = ComboBox::from_id_salt("group").selected_text(text).truncate();
+            let combo = combo
+                .width((ui.available_width() - room).max(40.0))
+                .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+            combo.show_ui(ui, |ui| {
+                if let Some(name) = groups::choose(ui, &shown.rig, current, &mut self.group) {
+                    operation = Some(Operation::Group { joints: joints.clone(), name, color: None });
+                }
+            });
+            let Some(group) = &group else { return };
+            let stored = color(group.color);
+            let kept = self.color.as_ref().filter(|(name, _)| *name == group.name).map(|(_, color)| *color);
+            let mut rgb = kept.unwrap_or([stored.r(), stored.g(), stored.b()]);
+            if ui.color_edit_button_srgb(&mut rgb).on_hover_text("Colour of the group").changed() {
+                self.color = Some((group.name.clone(), rgb));
+            }
+            let holding = ui.input(|input| input.pointer.any_down()) || ui.ctx().egui_wants_keyboard_input();
+            if let Some((name, rgb)) = self.color.take_if(|_| !holding) {
+                let color = Some(rgb.map(|byte| f32::from(byte) / 255.0));
+                operation = Some(Operation::Group { joints: joints.clone(), name, color });
+            }
+        });
+        if let Some(operation) = operation {
+            self.send(operation, shown, requests);
+        }
+    }
+
+    /// Kind, parent and other side, each a click away.
+    fn relations(&self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+        let kind = match (self.values.kind.mixed, self.values.kind.value) {
+            (true, _) => MIXED,
+            (false, NodeKind::Joint) => "Joint",
+            (false, NodeKind::Null) => "Null (no weights)",
+        };
+        labelled(ui, "Kind", |ui| ui.add(egui::Label::new(kind).truncate()));
+        let [joint] = self.values.joints[..] else { return };
+        let Some(data) = shown.rig.joint(joint) else { return };
+        let mirror = data.data.mirror.filter(|other| shown.rig.joint(*other).is_some());
+        for (name, other, none) in [("Parent", data.parent, "None (root)"), ("Mirror", mirror, "None")] {
+            labelled(ui, name, |ui| match other {
+                Some(other) => {
+                    let link = egui::Link::new(shown.name(other).into_owned());
+                    if ui.add(link).on_hover_text("Select it").clicked() {
+                        let what = Pick::Joints(vec![other]);
+                        requests.send(PickRequest { rig: shown.entity, what, add: false });
+                    }
+                }
+                None => {
+                    ui.weak(none);
+                }
+            });
+        }
+    }
+
+    fn lock_field(&self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+        let Shared { mut value, mixed } = self.values.locked;
+        let field = Checkbox::new(&mut value, "Lock weights").indeterminate(mixed);
+        if ui.add(field).on_hover_text("Skinning leaves the weights of these joints as they are").clicked() {
+            let lock = mixed || value;
+            self.send(Operation::Lock(self.values.joints.clone(), lock), shown, requests);
+        }
+    }
+
+    fn rest(&mut self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+        ui.strong("Rest pose");
+        let length = Look { speed: self.values.speed(), decimals: 4, suffix: "" };
+        let degrees = Look { speed: 0.5, decimals: 2, suffix: "°" };
+        let factor = Look { speed: 0.005, decimals: 3, suffix: "" };
+        let mut edit = None;
+        let fields = [
+            (Part::Position, "Position", self.values.position, length),
+            (Part::Local, "Local position", self.values.local, length),
+            (Part::Rotation, "Rotation", self.values.rotation, degrees),
+            (Part::Scale, "Scale", self.values.scale, factor),
+        ];
+        for (part, name, shared, look) in fields {
+            if let Some((axis, number)) = self.numbers.vector(ui, name, shared, look) {
+                edit = Some((part, axis, number));
+            }
+        }
+        labelled(ui, "Bone length", |ui| ui.label(lengths(&self.values.lengths)));
+        if let Some((part, axis, number)) = edit
+            && let Some(operation) = self.values.set(&shown.rig, part, axis, number, false)
+        {
+            self.send(operation, shown, requests);
+        }
+    }
+}
+
+fn pose(ui: &mut Ui) {
+    ui.strong("Pose");
+    let _ = fields::MIXED;
+}
+
+/// Lengths of the bones that begin at the selected joints.
+fn lengths(lengths: &[f32]) -> String {
+    let (least, most) = lengths.iter().fold((f32::INFINITY, 0.0_f32), |(a, b), l| (a.min(*l), b.max(*l)));
+    match lengths {
+        [] => "no child".to_owned(),
+        [_] => short(f64::from(most), 4),
+        more => format!("{} to {} ({} bones)", short(f64::from(least), 3), short(f64::from(most), 3), more.len()),
+    }
+}
+
+/// A label for each joint; `#` stands for its number in the selection.
+fn numbered(joints: &[Uid], text: &str) -> Vec<(Uid, String)> {
+    let several = joints.len() > 1;
+    let label = |number: usize| if several { text.replace('#', &(number + 1).to_string()) } else { text.to_owned() };
+    joints.iter().enumerate().map(|(number, uid)| (*uid, label(number))).collect()
+}
