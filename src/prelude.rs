@@ -11,7 +11,7 @@ pub use crate::{
         RigPlugins, RigSystems,
         document::{Change, EditRefused, EditRequest, Edited, Joint, JointOf, RigBundle, Selection, Symmetry},
         gesture::{Gesture, GestureScript},
-        picking::{HoverRequest, Pick, PickRequest, Picked},
+        picking::{HoverJoint, HoverRequest, Pick, PickRequest, Picked},
         placement::{PlaceRequest, Placed},
         skinning::{BindRequest, Bound},
         stroke::{FollowedStroke, StrokeDone, StrokeParent, StrokeRequest, StrokeResult},

@@ -34,6 +34,7 @@ impl Plugin for PickingPlugin {
         app.init_resource::<LastClick>()
             .add_message::<PickRequest>()
             .add_message::<HoverRequest>()
+            .add_message::<HoverJoint>()
             .add_message::<Picked>()
             .add_systems(Update, (forget_click, pick, hover).chain().in_set(RigSystems::Pick));
     }
@@ -87,6 +88,16 @@ pub struct HoverRequest {
     pub rig: Entity,
     /// View, point of the view plane and reach, as in [`Pick::Click`]; `None` when the pointer has left.
     pub what: Option<(ViewPlane, Vec2, f32)>,
+}
+
+/// Names the joint that the pointer is at where no view is: in a list, for example. [`Hovered`] follows while the pointer
+/// is over no view of that rig.
+#[derive(Message, Debug, Clone, Copy)]
+pub struct HoverJoint {
+    /// The rig.
+    pub rig: Entity,
+    /// The joint; `None` when the pointer has left it.
+    pub joint: Option<Uid>,
 }
 
 /// Where the pointer rests.
@@ -227,6 +238,7 @@ fn candidates(
 /// Keeps [`Hovered`] at what a click under the pointer would pick. Looks again only when something changed.
 fn hover(
     mut requests: MessageReader<HoverRequest>,
+    mut named: MessageReader<HoverJoint>,
     mut spots: Local<EntityHashMap<HoverSpot>>,
     rigs: Query<Seen>,
     changed: Query<(), Or<(Changed<Rig>, Changed<RigSurface>, Changed<GlobalTransform>)>>,
@@ -264,6 +276,11 @@ fn hover(
             },
         };
         hovered.set_if_neq(Hovered(joint));
+    }
+    for HoverJoint { rig, joint } in named.read() {
+        if let (false, Ok(mut hovered)) = (spots.contains_key(rig), hovered.get_mut(*rig)) {
+            hovered.set_if_neq(Hovered(*joint));
+        }
     }
 }
 

@@ -23,7 +23,7 @@ use crate::{
     },
     plugins::{
         document::EditRequest,
-        picking::{Pick, PickRequest},
+        picking::{HoverJoint, Pick, PickRequest},
     },
     rig::{Rig, Uid, operations::Operation},
 };
@@ -44,6 +44,10 @@ pub struct HierarchyPanel {
     anchor: Option<Uid>,
     rename: Option<Rename>,
     group: String,
+    /// The joint that the tree said the pointer is at.
+    pointed: Option<Uid>,
+    /// The joint whose row the pointer is over now.
+    under: Option<Uid>,
 }
 
 /// The listed rows and what they were made from.
@@ -83,8 +87,13 @@ impl EditorPanel for HierarchyPanel {
         self.refresh(&shown);
         keys::press(self, ui, &shown, requests);
         let reveal = self.newly_active(&shown);
+        self.under = None;
         let drawn = self.list(ui, &shown, reveal, requests);
         self.end_rename(&shown, drawn, requests);
+        if self.under != self.pointed {
+            self.pointed = self.under;
+            requests.send(HoverJoint { rig: shown.entity, joint: self.under });
+        }
     }
 }
 

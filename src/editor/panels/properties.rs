@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Checkbox, ComboBox, Key, ScrollArea, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use super::{
-    fields::{self, Look, MIXED, Numbers, Shared, labelled, short},
+    fields::{Look, MIXED, Numbers, Shared, labelled, short},
     groups, list,
     shown::{Shown, color},
 };
@@ -56,7 +56,6 @@ impl EditorPanel for PropertiesPanel {
         if self.values.joints.is_empty() {
             return list::nothing(ui, "Select a joint to see its properties.");
         }
-        let posing = world.get_resource::<Mode>() == Some(&Mode::Pose);
         ScrollArea::vertical().id_salt("properties").auto_shrink(false).show(ui, |ui| {
             if self.values.joints.len() > 1 {
                 ui.strong(format!("{} joints", self.values.joints.len()));
@@ -66,7 +65,7 @@ impl EditorPanel for PropertiesPanel {
             self.relations(ui, &shown, requests);
             self.lock_field(ui, &shown, requests);
             ui.separator();
-            if posing { pose(ui) } else { self.rest(ui, &shown, requests) }
+            self.transform(ui, world, &shown, requests);
         });
     }
 }
@@ -198,35 +197,52 @@ impl PropertiesPanel {
         }
     }
 
-    fn rest(&mut self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
-        ui.strong("Rest pose");
+    /// The rest pose; in Pose mode what the pose puts on top of it.
+    fn transform(&mut self, ui: &mut Ui, world: &World, shown: &Shown, requests: &mut Requests) {
+        let posing = world.get_resource::<Mode>() == Some(&Mode::Pose);
         let length = Look { speed: self.values.speed(), decimals: 4, suffix: "" };
         let degrees = Look { speed: 0.5, decimals: 2, suffix: "°" };
         let factor = Look { speed: 0.005, decimals: 3, suffix: "" };
-        let mut edit = None;
-        let fields = [
-            (Part::Position, "Position", self.values.position, length),
-            (Part::Local, "Local position", self.values.local, length),
-            (Part::Rotation, "Rotation", self.values.rotation, degrees),
-            (Part::Scale, "Scale", self.values.scale, factor),
+        let rest = [
+            (Part::Position, "Position", length),
+            (Part::Local, "Local position", length),
+            (Part::Rotation, "Rotation", degrees),
+            (Part::Scale, "Scale", factor),
         ];
-        for (part, name, shared, look) in fields {
-            if let Some((axis, number)) = self.numbers.vector(ui, name, shared, look) {
-                edit = Some((part, axis, number));
+        let pose = [
+            (Part::PoseRotation, "Pose rotation", degrees),
+            (Part::PosePosition, "Pose offset", length),
+            (Part::PoseScale, "Pose scale", factor),
+        ];
+        ui.horizontal_wrapped(|ui| {
+            ui.strong(if posing { "Pose" } else { "Rest pose" });
+            match (posing, self.values.posed) {
+                (true, _) => ui.weak("on top of the rest pose"),
+                (false, true) => ui.weak("posed: see Pose mode"),
+                (false, false) => return,
+            };
+        });
+        let mut edit = None;
+        for (part, name, look) in if posing { &pose[..] } else { &rest[..] } {
+            if let Some((axis, number)) = self.numbers.vector(ui, name, self.values.vector(*part), *look) {
+                edit = Some((*part, axis, number));
             }
         }
-        labelled(ui, "Bone length", |ui| ui.label(lengths(&self.values.lengths)));
+        if posing {
+            let reset = ui.add_enabled(self.values.posed, egui::Button::new("Reset pose of the selection"));
+            if reset.clicked() {
+                self.send(Operation::ResetPose(self.values.joints.clone()), shown, requests);
+            }
+        } else {
+            labelled(ui, "Bone length", |ui| ui.add(egui::Label::new(lengths(&self.values.lengths)).truncate()));
+        }
+        let with_children = false;
         if let Some((part, axis, number)) = edit
-            && let Some(operation) = self.values.set(&shown.rig, part, axis, number, false)
+            && let Some(operation) = self.values.set(&shown.rig, part, axis, number, with_children)
         {
             self.send(operation, shown, requests);
         }
     }
-}
-
-fn pose(ui: &mut Ui) {
-    ui.strong("Pose");
-    let _ = fields::MIXED;
 }
 
 /// Lengths of the bones that begin at the selected joints.

@@ -7,7 +7,7 @@ use bevy_egui::egui::Color32;
 
 use crate::{
     editor::ActiveRig,
-    plugins::document::{Hovered, Selection, Symmetry},
+    plugins::document::{Hovered, Selection},
     rig::{JointData, Rig, Uid},
 };
 
@@ -17,8 +17,6 @@ pub(super) struct Shown<'w> {
     pub rig: Ref<'w, Rig>,
     pub selection: Ref<'w, Selection>,
     pub hovered: Option<Uid>,
-    /// True while live mirroring is on.
-    pub symmetric: bool,
 }
 
 /// Which rig in which state something was made from; unequal as soon as it has to be made again.
@@ -36,7 +34,6 @@ impl<'w> Shown<'w> {
         Some(Self {
             entity,
             hovered: rig.get::<Hovered>().and_then(|hovered| hovered.0),
-            symmetric: rig.get::<Symmetry>().is_some_and(|symmetry| symmetry.0.is_some()),
             rig: rig.get_ref()?,
             selection: rig.get_ref()?,
         })

@@ -39,6 +39,9 @@ pub(super) fn show(
     let name = shown.name(row.joint);
     let response = ui.interact(rect, id, Sense::click_and_drag());
     response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, selected, &name));
+    if response.hovered() {
+        panel.under = Some(row.joint);
+    }
     let fold = row.parent.then(|| fold_rect(ui, rect, tree, row));
     let fold = fold.map(|fold| ui.interact(fold, id.with("fold"), Sense::click()));
     let cut = paint(ui, rect, tree, row, selected, shown, &response, fold.as_ref());

@@ -1,6 +1,6 @@
 //! What the selected joints have in common, and the operations that change it.
 
-use std::f32::consts::PI;
+use std::{collections::HashMap, f32::consts::PI};
 
 use bevy::{math::EulerRot, prelude::*};
 
@@ -9,7 +9,7 @@ use crate::{
         fields::Shared,
         shown::{Shown, Stamp},
     },
-    rig::{NodeKind, RestTransform, Rig, Uid, operations::Operation},
+    rig::{JointData, NodeKind, PoseOffset, Rig, Uid, operations::Operation},
 };
 
 /// Values of the selected joints; positions in model units, angles in degrees.
@@ -23,28 +23,52 @@ pub(super) struct Values {
     pub group: Shared<Option<Uid>>,
     pub kind: Shared<NodeKind>,
     pub locked: Shared<bool>,
-    /// In the rig's space.
-    pub position: [Shared<f32>; 3],
-    /// Relative to the parent.
-    pub local: [Shared<f32>; 3],
-    /// Relative to the parent, degrees, turns about X, then the turned Y, then the turned Z.
-    pub rotation: [Shared<f32>; 3],
-    pub scale: [Shared<f32>; 3],
-    /// From each joint to its children.
+    /// True if one of them does not stand as it rests.
+    pub posed: bool,
+    vectors: [[Shared<f32>; 3]; Part::ALL.len()],
+    /// From each joint to its children, at rest.
     pub lengths: Vec<f32>,
-    /// The size of the rig, for the speed of drags.
-    pub extent: f32,
-    /// The angles as they were typed last, which say the same rotation as those computed from it.
-    typed: Vec<(Uid, Vec3)>,
+    /// The size of the skeleton, for the speed of drags.
+    extent: f32,
+    typed: Typed,
 }
 
-/// Which of a joint's vectors is edited.
+/// One of a joint's vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
+    /// Rest position in the rig's space.
     Position,
+    /// Rest position relative to the parent.
     Local,
+    /// Rest rotation relative to the parent: degrees about X, then the turned Y, then the turned Z.
     Rotation,
+    /// Rest scale.
     Scale,
+    /// What the pose turns on top, degrees as above, about the joint's own axes at rest.
+    PoseRotation,
+    /// What the pose moves on top, along the joint's own axes at rest.
+    PosePosition,
+    /// What the pose scales on top.
+    PoseScale,
+}
+
+impl Part {
+    const ALL: [Self; 7] = [
+        Self::Position,
+        Self::Local,
+        Self::Rotation,
+        Self::Scale,
+        Self::PoseRotation,
+        Self::PosePosition,
+        Self::PoseScale,
+    ];
+}
+
+/// Angles as they were typed last: of the many that say the same rotation, the ones that people expect to see.
+#[derive(Debug, Clone, Default)]
+struct Typed {
+    rest: Vec<(Uid, Vec3)>,
+    pose: Vec<(Uid, Vec3)>,
 }
 
 impl Values {
@@ -59,79 +83,112 @@ impl Values {
         self.made_from = Some(key);
     }
 
-    fn of(rig: &Rig, selected: &[Uid], typed: Vec<(Uid, Vec3)>) -> Option<Self> {
+    fn of(rig: &Rig, selected: &[Uid], typed: Typed) -> Option<Self> {
         let known: Vec<_> = selected.iter().filter_map(|uid| rig.joint(*uid)).collect();
         let data = || known.iter().map(|joint| &joint.data);
-        let globals: std::collections::HashMap<Uid, Vec3> =
+        let places: HashMap<Uid, Vec3> =
             rig.rest_globals().into_iter().map(|(uid, global)| (uid, global.translation)).collect();
-        let place = |uid: Uid| globals.get(&uid).copied().unwrap_or_default();
-        let vector = |of: &dyn Fn(Uid, &RestTransform) -> Vec3| -> Option<[Shared<f32>; 3]> {
-            let list: Vec<Vec3> = data().map(|joint| of(joint.uid, &joint.rest)).collect();
-            let axis = |axis: usize| Shared::of(list.iter().map(|vector| vector[axis]));
-            Some([axis(0)?, axis(1)?, axis(2)?])
-        };
-        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for place in globals.values().filter(|place| place.is_finite()) {
-            (low, high) = (low.min(*place), high.max(*place));
+        let place = |uid: Uid| places.get(&uid).copied().unwrap_or_default();
+        let mut vectors = [[Shared::default(); 3]; Part::ALL.len()];
+        for part in Part::ALL {
+            let of = |joint: &JointData| match part {
+                Part::Position => place(joint.uid),
+                _ => vector(rig, joint, part, &typed),
+            };
+            let list: Vec<Vec3> = data().map(of).collect();
+            for axis in 0..3 {
+                vectors[part as usize][axis] = Shared::of(list.iter().map(|vector| vector[axis]))?;
+            }
         }
-        let lengths = known.iter().flat_map(|joint| {
-            let head = place(joint.data.uid);
-            joint.children.iter().map(move |child| (*child, head))
-        });
+        let finite = places.values().filter(|place| place.is_finite());
+        let (low, high) =
+            finite.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
+        let bones = known.iter().flat_map(|joint| joint.children.iter().map(|child| (joint.data.uid, *child)));
         Some(Self {
             made_from: None,
             label: Shared::of(data().map(|joint| joint.label.clone().unwrap_or_default()))?,
             group: Shared::of(data().map(|joint| joint.group))?,
             kind: Shared::of(data().map(|joint| joint.kind))?,
             locked: Shared::of(data().map(|joint| joint.locked))?,
-            position: vector(&|uid, _| place(uid))?,
-            local: vector(&|_, rest| rest.translation)?,
-            rotation: vector(&|uid, rest| angles(uid, rest.rotation, &typed))?,
-            scale: vector(&|_, rest| rest.scale)?,
-            lengths: lengths.map(|(child, head)| place(child).distance(head)).collect(),
+            posed: data().any(|joint| rig.offset(joint.uid).is_some()),
+            vectors,
+            lengths: bones.map(|(head, tail)| place(head).distance(place(tail))).collect(),
             extent: (high - low).max_element().max(0.0),
             joints: data().map(|joint| joint.uid).collect(),
             typed,
         })
     }
 
-    /// The operation that gives all selected joints a number on an axis of one of their vectors.
-    pub fn set(&mut self, rig: &Rig, part: Part, axis: usize, number: f32, with_children: bool) -> Option<Operation> {
-        if part == Part::Position {
-            let to = self.joints.iter().map(|uid| {
-                let mut place = rig.position(*uid);
-                place[axis] = number;
-                (*uid, place)
-            });
-            return Some(Operation::Move { to: to.collect(), with_children });
-        }
-        let mut to = Vec::with_capacity(self.joints.len());
-        let mut typed = Vec::new();
-        for uid in &self.joints {
-            let mut rest = rig.joint(*uid)?.data.rest;
-            match part {
-                Part::Position => {}
-                Part::Local => rest.translation[axis] = number,
-                Part::Scale => rest.scale[axis] = number,
-                Part::Rotation => {
-                    let mut turned = angles(*uid, rest.rotation, &self.typed);
-                    turned[axis] = number;
-                    rest.rotation = rotation(turned);
-                    typed.push((*uid, turned));
-                }
-            }
-            to.push((*uid, rest));
-        }
-        if !typed.is_empty() {
-            self.typed = typed;
-        }
-        Some(Operation::Rest { to, with_children })
+    /// What the joints have in common of one of their vectors.
+    pub fn vector(&self, part: Part) -> [Shared<f32>; 3] {
+        self.vectors[part as usize]
     }
 
-    /// How far a pixel of a drag goes.
+    /// The operation that gives all selected joints a number on an axis of one of their vectors.
+    pub fn set(&mut self, rig: &Rig, part: Part, axis: usize, number: f32, with_children: bool) -> Option<Operation> {
+        let joints: Vec<&JointData> =
+            self.joints.iter().filter_map(|uid| rig.joint(*uid)).map(|joint| &joint.data).collect();
+        let changed = |joint: &JointData| {
+            let mut changed = match part {
+                Part::Position => rig.position(joint.uid),
+                _ => vector(rig, joint, part, &self.typed),
+            };
+            changed[axis] = number;
+            (joint.uid, changed)
+        };
+        let to: Vec<(Uid, Vec3)> = joints.iter().map(|joint| changed(joint)).collect();
+        match part {
+            Part::Rotation => self.typed.rest.clone_from(&to),
+            Part::PoseRotation => self.typed.pose.clone_from(&to),
+            _ => {}
+        }
+        let pairs = joints.into_iter().zip(to);
+        Some(match part {
+            Part::Position => Operation::Move { to: pairs.map(|(_, to)| to).collect(), with_children },
+            Part::Local | Part::Rotation | Part::Scale => {
+                let rest = |(joint, (uid, to)): (&JointData, (Uid, Vec3))| {
+                    let mut rest = joint.rest;
+                    match part {
+                        Part::Local => rest.translation = to,
+                        Part::Rotation => rest.rotation = rotation(to),
+                        _ => rest.scale = to,
+                    }
+                    (uid, rest)
+                };
+                Operation::Rest { to: pairs.map(rest).collect(), with_children }
+            }
+            Part::PoseRotation | Part::PosePosition | Part::PoseScale => {
+                let offset = |(_, (uid, to)): (&JointData, (Uid, Vec3))| {
+                    let mut offset = rig.offset(uid).copied().unwrap_or(PoseOffset::IDENTITY);
+                    match part {
+                        Part::PoseRotation => offset.rotation = rotation(to),
+                        Part::PosePosition => offset.translation = to,
+                        _ => offset.scale = to,
+                    }
+                    (uid, offset)
+                };
+                Operation::Pose(pairs.map(offset).collect())
+            }
+        })
+    }
+
+    /// How far a pixel of a drag goes, in model units.
     pub fn speed(&self) -> f64 {
         let extent = if self.extent.is_finite() && self.extent > 0.0 { self.extent } else { 1.0 };
         f64::from(extent) / 1000.0
+    }
+}
+
+/// A vector of one joint, relative to its parent.
+fn vector(rig: &Rig, joint: &JointData, part: Part, typed: &Typed) -> Vec3 {
+    let offset = rig.offset(joint.uid).copied().unwrap_or(PoseOffset::IDENTITY);
+    match part {
+        Part::Position | Part::Local => joint.rest.translation,
+        Part::Rotation => angles(joint.uid, joint.rest.rotation, &typed.rest),
+        Part::Scale => joint.rest.scale,
+        Part::PoseRotation => angles(joint.uid, offset.rotation, &typed.pose),
+        Part::PosePosition => offset.translation,
+        Part::PoseScale => offset.scale,
     }
 }
 
