@@ -20,7 +20,7 @@ use crate::{
 pub struct HistoryPanel {
     made_from: Option<(Entity, bevy::ecs::change_detection::Tick)>,
     /// Names of the steps, oldest first.
-    steps: Vec<&'static str>,
+    steps: Vec<String>,
     /// How many of them are in effect.
     done: usize,
     /// The step that was last brought into view.
@@ -41,7 +41,9 @@ impl EditorPanel for HistoryPanel {
         };
         let key = (shown.entity, history.last_changed());
         if self.made_from != Some(key) {
-            (self.steps, self.done) = history.steps();
+            let (steps, done) = history.steps();
+            self.steps = steps.into_iter().map(str::to_owned).collect();
+            self.done = done;
             self.made_from = Some(key);
         }
         ui.horizontal(|ui| {
@@ -71,7 +73,7 @@ impl EditorPanel for HistoryPanel {
 impl HistoryPanel {
     /// Draws the state after so many steps; true if it was clicked.
     fn step(&self, ui: &Ui, rect: Rect, number: usize) -> bool {
-        let name = number.checked_sub(1).and_then(|step| self.steps.get(step)).copied().unwrap_or("Start");
+        let name = number.checked_sub(1).and_then(|step| self.steps.get(step)).map_or("Start", String::as_str);
         let current = number == self.done;
         let response = ui.interact(rect, ui.id().with(number), Sense::click());
         let said = format!("{number} {name}");
