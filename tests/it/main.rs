@@ -34,6 +34,8 @@ mod mutate;
 mod obj;
 mod obj_materials;
 mod obj_torture;
+#[cfg(feature = "editor")]
+mod panels;
 mod picking;
 mod placement;
 mod plugins;

@@ -1,0 +1,499 @@
+//! The editor's panels: what a person does in them reaches the rig as one step, and everything is told.
+
+mod desk;
+
+use std::{
+    collections::HashSet,
+    time::{Duration, Instant},
+};
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Key, Modifiers, Pos2};
+use rigsmith::{
+    editor::{
+        actions::{Action, ActionRequest},
+        mode::Mode,
+        notice::Notice,
+        panel::EditorPanel,
+        panels::{
+            hierarchy::{HierarchyPanel, rows::rows},
+            history::HistoryPanel,
+            log::{LogBook, LogPanel},
+            poses::PosesPanel,
+            properties::PropertiesPanel,
+            skinning::SkinningPanel,
+            toasts::Toasts,
+        },
+    },
+    plugins::{document::Hovered, skinning::SkinningJob},
+    prelude::*,
+};
+
+use crate::gestures::boxes;
+use desk::{Desk, Sheet};
+
+#[test]
+fn the_filter_keeps_matches_and_what_is_above_them() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["hips", "spine", "Arm_L", "hand_L"]);
+    desk.chain(&["tail"]);
+    desk.edit(Operation::Group { joints: vec![joints[1]], name: "Trunk".into(), color: None });
+    let cases: &[(&str, &[&str])] = &[
+        ("", &["hips", "spine", "Arm_L", "hand_L", "tail"]),
+        ("arm", &["hips", "spine", "Arm_L"]),
+        ("trunk", &["hips", "spine"]),
+        ("_l hand", &["hips", "spine", "Arm_L", "hand_L"]),
+        ("TAIL", &["tail"]),
+        ("nothing", &[]),
+    ];
+    for (filter, expected) in cases {
+        let found = rows(desk.rig(), &HashSet::new(), filter);
+        let labels: Vec<&str> = found.iter().map(|row| desk.label(row.joint)).collect();
+        assert_eq!(labels, *expected, "{filter}");
+    }
+    let folded = rows(desk.rig(), &[joints[1]].into(), "");
+    assert_eq!(folded.iter().map(|row| desk.label(row.joint)).collect::<Vec<_>>(), ["hips", "spine", "tail"]);
+
+    // The same, typed.
+    desk.click("Filter");
+    desk.type_text("arm");
+    desk.frames(2);
+    assert!(desk.look("Arm_L").is_some() && desk.look("hips").is_some() && desk.look("tail").is_none());
+    desk.click("Clear filter");
+    desk.frames(2);
+    assert!(desk.look("tail").is_some());
+}
+
+#[test]
+fn joints_are_renamed_in_place() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    let before = desk.steps().0;
+    desk.double_click("b");
+    assert_eq!(desk.selected(), [joints[1]]);
+    desk.type_text("elbow");
+    desk.key(Key::Enter);
+    assert_eq!((desk.label(joints[1]), desk.steps().0), ("elbow", before + 1), "typing replaces the selected text");
+
+    desk.click("a");
+    desk.key(Key::F2);
+    desk.type_text("dropped");
+    desk.key(Key::Escape);
+    assert_eq!((desk.label(joints[0]), desk.steps().0), ("a", before + 1), "Escape drops it");
+
+    desk.key(Key::F2);
+    desk.type_text("kept");
+    desk.click("c");
+    assert_eq!((desk.label(joints[0]), desk.steps().0), ("kept", before + 2), "a click elsewhere takes it");
+
+    desk.key(Key::F2);
+    desk.key(Key::Enter);
+    assert_eq!(desk.steps().0, before + 2, "the same name is no step");
+}
+
+#[test]
+fn drags_reparent_and_refuse_cycles() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let [hips, spine, head] = desk.chain(&["hips", "spine", "head"])[..] else { panic!() };
+    let [tail, tip] = desk.chain(&["tail", "tip"])[..] else { panic!() };
+    let before = desk.steps().0;
+    let at = |desk: &Desk, label: &str| desk.find(label).rect.center();
+
+    let place = desk.rig().position(tail);
+    desk.drag(at(&desk, "tail"), at(&desk, "hips"));
+    assert_eq!((desk.parent(tail), desk.parent(tip), desk.steps().0), (Some(hips), Some(tail), before + 1));
+    assert!(desk.rig().position(tail).distance(place) < 1e-5, "it stays where it is");
+
+    desk.drag(at(&desk, "hips"), at(&desk, "head"));
+    assert_eq!((desk.parent(hips), desk.steps().0), (None, before + 1));
+    assert!(desk.told().last().is_some_and(|told| told.contains("hips cannot hang below head")), "{:?}", desk.told());
+
+    desk.drag(at(&desk, "spine"), at(&desk, "spine") + egui::vec2(30.0, 1.0));
+    assert_eq!(desk.steps().0, before + 1, "let go where it was");
+
+    let below = desk.find("tip").rect.center() + egui::vec2(0.0, 300.0);
+    desk.drag(at(&desk, "head"), below);
+    assert_eq!((desk.parent(head), desk.steps().0), (None, before + 2), "the empty space makes roots");
+
+    // What is selected goes along; what hangs below it anyway does not.
+    desk.select(&[tip, tail, spine]);
+    desk.drag(at(&desk, "tail"), at(&desk, "head"));
+    assert_eq!([tip, tail, spine].map(|joint| desk.parent(joint)), [Some(tail), Some(head), Some(head)]);
+    assert_eq!(desk.steps().0, before + 3);
+}
+
+#[test]
+fn clicks_select_one_a_range_or_one_more() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["a", "b", "c", "d"]);
+    desk.click("b");
+    assert_eq!(desk.selected(), [joints[1]]);
+    desk.hold(Modifiers::SHIFT);
+    desk.click("d");
+    assert_eq!(desk.selected(), [joints[1], joints[2], joints[3]], "the clicked one is active");
+    desk.click("a");
+    assert_eq!(desk.selected(), [joints[1], joints[0]], "a range begins where the last click was");
+    desk.hold(Modifiers::COMMAND);
+    desk.click("c");
+    assert_eq!(desk.selected(), [joints[1], joints[0], joints[2]]);
+    desk.click("a");
+    assert_eq!(desk.selected(), [joints[1], joints[2]]);
+    desk.hold(Modifiers::NONE);
+    let steps = desk.steps();
+    desk.key(Key::ArrowUp);
+    assert_eq!(desk.selected(), [joints[1]], "the row above the active one");
+    assert_eq!(desk.steps(), steps, "selecting is no step");
+
+    // Both ways: what is selected elsewhere is unfolded and shown.
+    desk.click("Fold all");
+    desk.frames(2);
+    assert!(desk.look("d").is_none());
+    desk.select(&[joints[3]]);
+    assert_eq!(desk.find("d").on, Some(true));
+
+    // And the row under the pointer is the hovered joint.
+    desk.move_to(desk.find("c").rect.center());
+    desk.frames(2);
+    assert_eq!(desk.app.world().get::<Hovered>(desk.rig), Some(&Hovered(Some(joints[2]))));
+    desk.move_to(Pos2::new(150.0, 590.0));
+    desk.frames(2);
+    assert_eq!(desk.app.world().get::<Hovered>(desk.rig), Some(&Hovered(None)));
+}
+
+#[test]
+fn the_menu_of_a_row_is_about_the_selection() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    let choose = |desk: &mut Desk, row: &str, entry: &str| {
+        desk.secondary_click(row);
+        desk.click(entry);
+        desk.frames(2);
+    };
+    choose(&mut desk, "b", "Lock weights");
+    assert_eq!(desk.selected(), [joints[1]]);
+    assert!(desk.rig().joint(joints[1]).unwrap().data.locked);
+    choose(&mut desk, "a", "Select hierarchy");
+    assert_eq!(desk.selected(), [joints[1], joints[2], joints[0]]);
+    desk.select(&[joints[1]]);
+    choose(&mut desk, "b", "Delete");
+    assert_eq!((desk.rig().len(), desk.parent(joints[2])), (2, Some(joints[0])));
+    choose(&mut desk, "a", "Delete hierarchy");
+    assert!(desk.rig().is_empty());
+}
+
+#[test]
+fn a_field_is_one_step() {
+    let mut desk = Desk::new(PropertiesPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    desk.select(&[joints[1]]);
+    let before = desk.steps().0;
+    let child = desk.rig().position(joints[2]);
+
+    let at = desk.find("Position X").rect.center();
+    desk.drag(at, at + egui::vec2(80.0, 0.0));
+    let x = desk.rig().position(joints[1]).x;
+    assert!(x > 0.01, "{x}");
+    assert_eq!(desk.steps().0, before + 1, "a drag of many pixels");
+    assert_eq!(desk.rig().position(joints[2]), child, "children stay");
+
+    let typed = [
+        ("Position Y", "1.25", 1.25),
+        ("Local position Z", "-0,5", -0.5),
+        ("Rotation X", "45°", 45.0),
+        ("Scale Y", "2", 2.0),
+    ];
+    for (number, (field, text, value)) in typed.into_iter().enumerate() {
+        desk.click(field);
+        desk.type_text(text);
+        desk.key(Key::Enter);
+        desk.frames(2);
+        assert_eq!(desk.steps().0, before + 2 + number, "{field}");
+        let shown: f32 =
+            desk.find(field).value.trim_start_matches(['X', 'Y', 'Z', ' ']).trim_end_matches('°').parse().unwrap();
+        assert!((shown - value).abs() < 1e-3, "{field} shows {shown}");
+    }
+    let position = desk.rig().position(joints[1]);
+    assert!((position.y - 1.25).abs() < 1e-5 && (position.z + 0.5).abs() < 1e-5, "{position}");
+
+    let steps = desk.steps();
+    desk.click("Scale X");
+    desk.type_text("7");
+    desk.key(Key::Escape);
+    desk.click("Scale X");
+    desk.type_text("seven");
+    desk.key(Key::Enter);
+    desk.click("Scale X");
+    desk.key(Key::Enter);
+    assert_eq!(desk.steps(), steps, "Escape, no number, the same number");
+
+    desk.click("Label");
+    desk.type_text("x");
+    desk.key(Key::Enter);
+    assert_eq!((desk.label(joints[1]), desk.steps().0), ("bx", steps.0 + 1));
+}
+
+#[test]
+fn several_joints_share_fields() {
+    let mut desk = Desk::new(PropertiesPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    desk.select(&joints);
+    let before = desk.steps().0;
+    assert!(desk.find("Position Y").value.contains("mixed"));
+    assert!(!desk.find("Position X").value.contains("mixed"));
+
+    desk.click("Position Y");
+    // The active one's own height: the others get it, too.
+    desk.type_text("2");
+    desk.key(Key::Enter);
+    assert_eq!(desk.steps().0, before + 1);
+    assert!(joints.iter().all(|joint| (desk.rig().position(*joint).y - 2.0).abs() < 1e-5));
+
+    desk.click("Label");
+    desk.type_text("bone_#");
+    desk.key(Key::Enter);
+    assert_eq!(joints.iter().map(|joint| desk.label(*joint)).collect::<Vec<_>>(), ["bone_1", "bone_2", "bone_3"]);
+
+    desk.click("Lock weights");
+    assert!(joints.iter().all(|joint| desk.rig().joint(*joint).unwrap().data.locked));
+    assert_eq!(desk.steps().0, before + 3);
+}
+
+#[test]
+fn pose_mode_edits_the_pose_and_never_the_rest() {
+    let mut desk = Desk::new(PropertiesPanel::default());
+    let joints = desk.chain(&["a", "b"]);
+    desk.select(&[joints[0]]);
+    let rest = desk.rig().joint(joints[0]).unwrap().data.rest;
+    desk.app.insert_resource(Mode::Pose);
+    desk.frames(2);
+    assert!(desk.look("Rotation X").is_none(), "no rest field is in reach");
+    desk.click("Pose rotation Z");
+    desk.type_text("30");
+    desk.key(Key::Enter);
+    let turned = desk.rig().offset(joints[0]).unwrap().rotation;
+    assert!(turned.angle_between(Quat::from_rotation_z(30f32.to_radians())) < 1e-3);
+    assert_eq!(desk.rig().joint(joints[0]).unwrap().data.rest, rest);
+    desk.frames(2);
+    desk.click("Reset pose of the selection");
+    assert!(desk.rig().offset(joints[0]).is_none());
+}
+
+#[test]
+fn poses_are_stored_applied_renamed_and_deleted() {
+    let mut desk = Desk::new(PosesPanel::default());
+    let joints = desk.chain(&["a", "b"]);
+    let bent = rigsmith::rig::PoseOffset::from_rotation(Quat::from_rotation_z(1.0));
+    desk.edit(Operation::Pose(vec![(joints[1], bent)]));
+    desk.click("Pose name");
+    desk.type_text("bent");
+    desk.key(Key::Enter);
+    desk.click("Store");
+    let names = |desk: &Desk| desk.rig().stored_poses().iter().map(|pose| pose.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&desk), ["bent", "Pose 1"], "without a name it gets the next free one");
+    desk.click("Reset all");
+    assert!(desk.rig().pose().is_empty());
+    desk.frames(2);
+    desk.click("Apply");
+    assert_eq!(desk.rig().pose().len(), 1);
+    desk.double_click("bent");
+    desk.type_text("waving");
+    desk.key(Key::Enter);
+    assert_eq!(names(&desk), ["waving", "Pose 1"]);
+    desk.frames(2);
+    desk.click("Delete");
+    assert_eq!(names(&desk).len(), 1);
+
+    desk.app.world_mut().write_message(ActionRequest(Action::ResetPose));
+    desk.frame();
+    assert!(desk.rig().pose().is_empty(), "the key does the same as the button");
+}
+
+#[test]
+fn skinning_says_why_not_runs_once_and_can_be_cancelled() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    assert!(!desk.find("Skin").enabled);
+    desk.app.world_mut().write_message(ActionRequest(Action::Skin));
+    desk.frames(2);
+    assert!(desk.told().last().is_some_and(|told| told.contains("no mesh")), "{:?}", desk.told());
+    // Two hundred thousand points are not done within a few frames.
+    let grid: Vec<[[f32; 3]; 2]> = (0..25_000)
+        .map(|i| {
+            let (x, y, z) = ((i % 30) as f32, (i / 30 % 30) as f32, (i / 900) as f32);
+            [[x * 0.03, y * 0.03, z * 0.03], [x * 0.03 + 0.029, y * 0.03 + 0.029, z * 0.03 + 0.029]]
+        })
+        .collect();
+    let mesh = RigMesh::new(Uid(99), boxes(&grid), Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(desk.rig))).id();
+    desk.frames(2);
+    assert!(!desk.find("Skin").enabled, "there are no joints");
+    desk.chain(&["a", "b"]);
+    desk.frames(2);
+    desk.click("Skin");
+    desk.frames(2);
+    assert!(desk.app.world().get::<SkinningJob>(mesh).is_some(), "it runs");
+    desk.app.world_mut().write_message(ActionRequest(Action::Skin));
+    desk.frames(2);
+    assert!(desk.told().last().is_some_and(|told| told.contains("running")), "{:?}", desk.told());
+    assert!(desk.app.world().get::<SkinningJob>(mesh).is_some(), "nothing is lost");
+    desk.click("Cancel");
+    wait(&mut desk, mesh);
+    assert!(desk.rig().skin(Uid(99)).is_none());
+    assert!(desk.told().last().is_some_and(|told| told.contains("cancelled")), "{:?}", desk.told());
+
+    desk.app.world_mut().entity_mut(mesh).despawn();
+    let small = RigMesh::new(Uid(98), boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]), Vec::new());
+    let small = desk.app.world_mut().spawn((small, SkinOf(desk.rig))).id();
+    desk.frames(2);
+    desk.click("Skin");
+    wait(&mut desk, small);
+    assert!(desk.rig().skin(Uid(98)).is_some());
+    assert!(desk.told().last().is_some_and(|told| told.contains("100 %")), "{:?}", desk.told());
+}
+
+fn wait(desk: &mut Desk, mesh: Entity) {
+    let started = Instant::now();
+    while desk.app.world().get::<SkinningJob>(mesh).is_some() {
+        assert!(started.elapsed() < Duration::from_secs(20), "the job does not end");
+        desk.frame();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    desk.frames(3);
+}
+
+#[test]
+fn the_history_jumps() {
+    let mut desk = Desk::new(HistoryPanel::default());
+    for number in 0..6 {
+        desk.edit(Operation::Place { position: Vec3::new(number as f32, 0.0, 0.0), parent: None });
+    }
+    assert_eq!(desk.find("6 Place joint").on, Some(true));
+    for (row, joints) in [("2 Place joint", 2), ("0 Start", 0), ("5 Place joint", 5)] {
+        desk.click(row);
+        desk.frames(2);
+        assert_eq!((desk.rig().len(), desk.steps()), (joints, (6, joints)), "{row}");
+        assert_eq!(desk.find(row).on, Some(true));
+    }
+    desk.click("⮪ Undo");
+    assert_eq!(desk.steps(), (6, 4));
+    desk.click("⮫ Redo");
+    assert_eq!(desk.steps(), (6, 5));
+}
+
+#[test]
+fn everything_is_told_and_the_log_is_capped() {
+    let mut desk = Desk::new(LogPanel::default());
+    desk.edit(Operation::Delete { joints: vec![Uid(404)], keep_children: true });
+    desk.frames(2);
+    let told = desk.told();
+    assert!(told.len() == 1 && told[0].starts_with("There is no joint"), "{told:?}");
+    for number in 0..LogBook::CAPACITY + 300 {
+        desk.app.world_mut().write_message(Notice::info(format!("notice {number}")));
+    }
+    for _ in 0..5 {
+        desk.app.world_mut().write_message(Notice::warning("again"));
+    }
+    desk.frames(2);
+    let book = desk.app.world().resource::<LogBook>();
+    assert_eq!(book.entries().len(), LogBook::CAPACITY);
+    assert_eq!(book.entries().next_back().map(|last| last.times), Some(5), "repetitions are counted");
+    assert!(desk.look("again").is_some(), "the newest is in view");
+    desk.click("Search");
+    desk.type_text("notice 1234");
+    desk.frames(3);
+    assert!(desk.look("notice 1234").is_some() && desk.look("again").is_none());
+    desk.click("Clear the log");
+    desk.frames(2);
+    assert!(desk.told().is_empty());
+}
+
+#[test]
+fn toasts_are_few_and_errors_stay() {
+    let size = egui::vec2(1280.0, 720.0);
+    let mut desk = Desk::with(Sheet::Overlay(Box::new(Toasts::default())), size);
+    let shown = |desk: &Desk| desk.seen.iter().filter(|seen| seen.label == "Close").count();
+    desk.app.world_mut().write_message(Notice::error("It cannot be. Do that instead."));
+    desk.app.world_mut().write_message(Notice::info("not shown").quiet());
+    for number in 0..7 {
+        desk.app.world_mut().write_message(Notice::info(format!("notice {number}")));
+    }
+    desk.frames(4);
+    assert_eq!(shown(&desk), 4);
+    let low = desk.seen.iter().filter(|seen| seen.label == "Close").all(|seen| seen.rect.top() > 200.0);
+    assert!(low, "none is near the toolbar");
+    desk.time += 30.0;
+    desk.frames(3);
+    assert_eq!(shown(&desk), 1, "the error stays");
+    desk.click("Close");
+    desk.frames(2);
+    assert_eq!(shown(&desk), 0);
+}
+
+#[test]
+fn symbols_are_in_the_fonts() {
+    let ctx = egui::Context::default();
+    let _ = ctx.run_ui(egui::RawInput::default(), |_| {});
+    let missing: Vec<char> = "✖⏷⏵📋🗑✏🔒ℹ✔⚠⮪⮫×°…"
+        .chars()
+        .filter(|c| !ctx.fonts_mut(|fonts| fonts.has_glyph(&egui::FontId::proportional(13.0), *c)))
+        .collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+#[test]
+fn nothing_is_cut_off_in_a_narrow_panel() {
+    let panels: [(&str, fn() -> Box<dyn EditorPanel>); 6] = [
+        ("hierarchy", || Box::new(HierarchyPanel::default())),
+        ("properties", || Box::new(PropertiesPanel::default())),
+        ("skinning", || Box::new(SkinningPanel::default())),
+        ("poses", || Box::new(PosesPanel::default())),
+        ("history", || Box::new(HistoryPanel::default())),
+        ("log", || Box::new(LogPanel::default())),
+    ];
+    for (name, panel) in panels {
+        let mut desk = Desk::with(Sheet::Panel(panel()), egui::vec2(180.0, 400.0));
+        let joints = desk.chain(&["hips", "a_rather_long_label_of_a_joint_in_the_middle_of_the_spine", "head"]);
+        desk.edit(Operation::Group { joints: joints.clone(), name: "A group with a long name".into(), color: None });
+        desk.edit(Operation::StorePose("A pose with a name that is long".into()));
+        desk.app.world_mut().write_message(Notice::error("A long sentence that says what went wrong, and where."));
+        desk.select(&joints[1..2]);
+        for width in [180.0, 260.0, 700.0] {
+            desk.resize(width, 400.0);
+            for seen in &desk.seen {
+                assert!(seen.rect.right() <= width + 0.5, "{name} at {width}: {seen:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn only_rows_in_view_cost() {
+    for count in [1_000, 5_000] {
+        let mut desk = Desk::with(Sheet::Panel(Box::new(HierarchyPanel::default())), egui::vec2(300.0, 640.0));
+        let labels: Vec<String> = (0..count).map(|number| format!("joint_{number}")).collect();
+        for chunk in labels.chunks(20) {
+            let labels: Vec<&str> = chunk.iter().map(String::as_str).collect();
+            let positions = (0..chunk.len()).map(|number| Vec3::new(0.0, number as f32, 0.0)).collect();
+            let from = desk.rig().len();
+            let edit = |desk: &mut Desk, operation| {
+                desk.app.world_mut().write_message(EditRequest::operation(desk.rig, operation));
+                desk.app.update();
+            };
+            edit(&mut desk, Operation::Chain { positions, parent: None });
+            let joints: Vec<Uid> = desk.rig().walk().map(|joint| joint.data.uid).skip(from).collect();
+            let named = joints.iter().zip(labels).map(|(uid, label)| (*uid, label.to_owned()));
+            edit(&mut desk, Operation::Labels(named.collect()));
+        }
+        desk.ctx.disable_accesskit();
+        desk.frames(3);
+        let mut times: Vec<Duration> = (0..60)
+            .map(|_| {
+                let started = Instant::now();
+                desk.frame();
+                started.elapsed()
+            })
+            .collect();
+        times.sort_unstable();
+        println!("hierarchy with {count} joints: a whole frame takes {:?} (median), {:?} (least)", times[30], times[0]);
+        assert!(times[0] < Duration::from_millis(50), "{:?}", times[0]);
+    }
+}

@@ -1,0 +1,262 @@
+//! A panel without a window: frames are run with raw input, and widgets are found by what they tell screen readers.
+
+use bevy::{
+    ecs::schedule::{LogLevel, ScheduleBuildSettings},
+    prelude::*,
+};
+use bevy_egui::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, accesskit};
+use rigsmith::{
+    editor::{
+        ActiveRig,
+        panel::{EditorOverlay, EditorPanel, Requests},
+        panels::{PanelsPlugin, log::LogBook},
+    },
+    headless::headless_app,
+    plugins::history::RigHistory,
+    prelude::*,
+};
+
+/// What is being looked at.
+pub enum Sheet {
+    Panel(Box<dyn EditorPanel>),
+    Overlay(Box<dyn EditorOverlay>),
+}
+
+/// An app with a rig, and one panel of it.
+pub struct Desk {
+    pub app: App,
+    pub rig: Entity,
+    pub ctx: egui::Context,
+    sheet: Sheet,
+    size: egui::Vec2,
+    pub time: f64,
+    events: Vec<Event>,
+    /// Everything in the last frame: what it says, its value, and where it is.
+    pub seen: Vec<Seen>,
+    held: Modifiers,
+}
+
+/// A widget.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    pub label: String,
+    pub value: String,
+    pub rect: Rect,
+    pub on: Option<bool>,
+    pub enabled: bool,
+}
+
+impl Desk {
+    pub fn new(panel: impl EditorPanel) -> Self {
+        Self::with(Sheet::Panel(Box::new(panel)), egui::vec2(300.0, 600.0))
+    }
+
+    pub fn with(sheet: Sheet, size: egui::Vec2) -> Self {
+        let mut app = headless_app(1);
+        app.add_plugins(PanelsPlugin);
+        let strict = ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
+        app.edit_schedule(Update, |schedule| {
+            schedule.set_build_settings(strict);
+        });
+        app.finish();
+        app.cleanup();
+        let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(1), "rig"), ..default() }).id();
+        app.insert_resource(ActiveRig(rig));
+        let ctx = egui::Context::default();
+        ctx.enable_accesskit();
+        let mut desk =
+            Self { app, rig, ctx, sheet, size, time: 0.0, events: Vec::new(), seen: Vec::new(), held: Modifiers::NONE };
+        desk.frame();
+        desk
+    }
+
+    /// Draws a frame and lets the app carry out what was asked for.
+    pub fn frame(&mut self) {
+        self.time += 1.0 / 60.0;
+        let input = RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, self.size)),
+            time: Some(self.time),
+            events: std::mem::take(&mut self.events),
+            ..default()
+        };
+        let mut requests = Requests::default();
+        let (sheet, world) = (&mut self.sheet, self.app.world());
+        let output = self.ctx.run_ui(input, |ui| match sheet {
+            Sheet::Panel(panel) => panel.show(ui, world, &mut requests),
+            Sheet::Overlay(overlay) => overlay.show(&ui.ctx().clone(), world, &mut requests),
+        });
+        if let Some(update) = output.platform_output.accesskit_update {
+            self.seen = update.nodes.iter().filter_map(|(_, node)| seen(node)).collect();
+        }
+        requests.carry_out(self.app.world_mut());
+        self.app.update();
+    }
+
+    pub fn frames(&mut self, count: usize) {
+        (0..count).for_each(|_| self.frame());
+    }
+
+    pub fn resize(&mut self, width: f32, height: f32) {
+        self.size = egui::vec2(width, height);
+        self.frames(3);
+    }
+
+    pub fn look(&self, label: &str) -> Option<&Seen> {
+        self.seen.iter().find(|seen| seen.label == label)
+    }
+
+    #[track_caller]
+    pub fn find(&self, label: &str) -> Seen {
+        let labels: Vec<&str> = self.seen.iter().map(|seen| seen.label.as_str()).collect();
+        self.look(label).unwrap_or_else(|| panic!("{label:?} is not among {labels:?}")).clone()
+    }
+
+    pub fn hold(&mut self, held: Modifiers) {
+        self.held = held;
+        self.events.push(Event::ModifiersChanged(held));
+    }
+
+    fn button(&mut self, pos: Pos2, button: PointerButton, pressed: bool) {
+        self.events.push(Event::PointerButton { pos, button, pressed, modifiers: self.held });
+    }
+
+    pub fn move_to(&mut self, at: Pos2) {
+        self.events.push(Event::PointerMoved(at));
+        self.frame();
+    }
+
+    pub fn press(&mut self, at: Pos2) {
+        self.move_to(at);
+        self.button(at, PointerButton::Primary, true);
+        self.frame();
+    }
+
+    pub fn release(&mut self, at: Pos2) {
+        self.button(at, PointerButton::Primary, false);
+        self.frame();
+    }
+
+    pub fn click_at(&mut self, at: Pos2) {
+        self.press(at);
+        self.release(at);
+        self.frame();
+    }
+
+    #[track_caller]
+    pub fn click(&mut self, label: &str) {
+        // Clicks that follow too soon would count as double clicks.
+        self.time += 1.0;
+        let at = self.find(label).rect.center();
+        self.click_at(at);
+    }
+
+    #[track_caller]
+    pub fn double_click(&mut self, label: &str) {
+        self.click(label);
+        let at = self.find(label).rect.center();
+        self.press(at);
+        self.release(at);
+        self.frames(2);
+    }
+
+    #[track_caller]
+    pub fn secondary_click(&mut self, label: &str) {
+        let at = self.find(label).rect.center();
+        self.move_to(at);
+        self.button(at, PointerButton::Secondary, true);
+        self.frame();
+        self.button(at, PointerButton::Secondary, false);
+        self.frame();
+        self.frames(2);
+    }
+
+    /// Drags in eight steps.
+    pub fn drag(&mut self, from: Pos2, to: Pos2) {
+        self.time += 1.0;
+        self.press(from);
+        for step in 1..=8 {
+            self.move_to(from.lerp(to, step as f32 / 8.0));
+        }
+        self.release(to);
+        self.frames(2);
+    }
+
+    pub fn key(&mut self, key: Key) {
+        for pressed in [true, false] {
+            self.events.push(Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: self.held });
+        }
+        self.frame();
+        self.frame();
+    }
+
+    pub fn type_text(&mut self, text: &str) {
+        self.events.push(Event::Text(text.to_owned()));
+        self.frame();
+    }
+
+    pub fn edit(&mut self, operation: Operation) {
+        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
+        self.app.update();
+        self.frames(2);
+    }
+
+    /// A chain with these labels, one below the other, upwards from the rig's origin.
+    pub fn chain(&mut self, labels: &[&str]) -> Vec<Uid> {
+        let from = self.rig().len();
+        let positions = (0..labels.len()).map(|number| Vec3::new(0.0, number as f32, 0.0)).collect();
+        self.edit(Operation::Chain { positions, parent: None });
+        let joints: Vec<Uid> = self.rig().walk().map(|joint| joint.data.uid).skip(from).collect();
+        let labels = joints.iter().zip(labels).map(|(uid, label)| (*uid, (*label).to_owned()));
+        self.edit(Operation::Labels(labels.collect()));
+        joints
+    }
+
+    pub fn select(&mut self, joints: &[Uid]) {
+        let what = Pick::Joints(joints.to_vec());
+        self.app.world_mut().write_message(PickRequest { rig: self.rig, what, add: false });
+        self.app.update();
+        self.frames(2);
+    }
+
+    pub fn rig(&self) -> &Rig {
+        self.app.world().get::<Rig>(self.rig).unwrap()
+    }
+
+    pub fn selected(&self) -> &[Uid] {
+        &self.app.world().get::<Selection>(self.rig).unwrap().0
+    }
+
+    pub fn label(&self, joint: Uid) -> &str {
+        self.rig().joint(joint).unwrap().data.label.as_deref().unwrap_or_default()
+    }
+
+    pub fn parent(&self, joint: Uid) -> Option<Uid> {
+        self.rig().joint(joint).unwrap().parent
+    }
+
+    /// How many steps the history has, and how many are in effect.
+    pub fn steps(&self) -> (usize, usize) {
+        let (steps, done) = self.app.world().get::<RigHistory>(self.rig).unwrap().steps();
+        (steps.len(), done)
+    }
+
+    pub fn told(&self) -> Vec<String> {
+        let book = self.app.world().resource::<LogBook>();
+        book.entries().map(|entry| entry.notice.text.clone()).collect()
+    }
+}
+
+fn seen(node: &accesskit::Node) -> Option<Seen> {
+    let bounds = node.bounds()?;
+    let rect = Rect::from_min_max(
+        egui::pos2(bounds.x0 as f32, bounds.y0 as f32),
+        egui::pos2(bounds.x1 as f32, bounds.y1 as f32),
+    );
+    Some(Seen {
+        label: node.label().unwrap_or_default().to_owned(),
+        value: node.value().unwrap_or_default().to_owned(),
+        rect,
+        on: node.toggled().map(|toggled| toggled == accesskit::Toggled::True),
+        enabled: !node.is_disabled(),
+    })
+}
