@@ -127,6 +127,7 @@ impl Plugin for EditorPlugin {
         )
         .add_plugins(EguiPlugin::default())
         .add_plugins((RigPlugins, DisplayPlugin, DrawingPlugin))
+        .add_plugins(super::panels::PanelsPlugin)
         .add_plugins((
             super::tools::ToolsPlugin,
             SettingsPlugin,

@@ -114,6 +114,10 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
     world.insert_resource(panels);
     world.insert_resource(layout);
     remember_area(world, viewport);
+    if !requests.is_empty() {
+        // What was asked for is done in the next frame, which nothing else may bring about.
+        world.write_message(bevy::window::RequestRedraw);
+    }
     requests.carry_out(world);
 }
 

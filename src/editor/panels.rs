@@ -27,7 +27,7 @@ pub struct PanelsPlugin;
 
 impl Plugin for PanelsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins((log::LogPlugin, skinning::SkinningPanelPlugin, poses::PosesPlugin))
+        app.add_plugins((log::LogPlugin, skinning::SkinningPanelPlugin, poses::PosesPlugin, toasts::ToastsPlugin))
             .add_panel(hierarchy::HierarchyPanel::default())
             .add_panel(properties::PropertiesPanel::default())
             .add_panel(skinning::SkinningPanel::default())

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use bevy_egui::egui::{
-    Align2, Color32, FontId, Pos2, Rect, ScrollArea, TextStyle, Ui, Vec2,
+    Align2, Button, Color32, FontId, Pos2, Rect, ScrollArea, TextStyle, Ui, Vec2, WidgetInfo, WidgetType,
     scroll_area::ScrollBarVisibility,
     style::ScrollAnimation,
     text::{LayoutJob, TextWrapping},
@@ -81,8 +81,8 @@ pub(super) fn nothing(ui: &mut Ui, text: &str) {
 /// A small square button with a symbol.
 pub(super) fn symbol_button(ui: &mut Ui, text: &str, tip: &str) -> bool {
     let side = ui.spacing().interact_size.y;
-    let button = bevy_egui::egui::Button::new(text).min_size(Vec2::splat(side));
+    let button = Button::new(text).min_size(Vec2::splat(side));
     let response = ui.add(button).on_hover_text(tip);
-    response.widget_info(|| bevy_egui::egui::WidgetInfo::labeled(bevy_egui::egui::WidgetType::Button, true, tip));
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tip));
     response.clicked()
 }

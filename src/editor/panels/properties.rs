@@ -16,6 +16,7 @@ use crate::{
     editor::{
         mode::Mode,
         panel::{EditorPanel, Requests},
+        settings::EditorSettings,
     },
     plugins::{
         document::EditRequest,
@@ -236,7 +237,7 @@ impl PropertiesPanel {
         } else {
             labelled(ui, "Bone length", |ui| ui.add(egui::Label::new(lengths(&self.values.lengths)).truncate()));
         }
-        let with_children = false;
+        let with_children = world.get_resource::<EditorSettings>().is_some_and(|settings| settings.move_children);
         if let Some((part, axis, number)) = edit
             && let Some(operation) = self.values.set(&shown.rig, part, axis, number, with_children)
         {

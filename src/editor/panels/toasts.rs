@@ -1,11 +1,14 @@
 //! Toasts: what was told just now, in the viewport's lower right corner.
 //!
-//! They are areas of their own, so a click on one never reaches the viewport below it, and they ask for a frame only
-//! when one of them has to go.
+//! They are areas of their own, so a click on one never reaches the viewport below it, and they cost a frame only when
+//! one of them has to go: the window sleeps until then.
 
 use std::time::Duration;
 
-use bevy::prelude::*;
+use bevy::{
+    prelude::*,
+    winit::{UpdateMode, WinitSettings},
+};
 use bevy_egui::egui::{
     self, Align2, Area, Frame, Id, Label, Order, Rect, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType,
 };
@@ -16,6 +19,49 @@ use crate::editor::{
     panel::{EditorOverlay, Requests},
     pointer::ViewportArea,
 };
+
+/// Wakes the window when a toast has to go.
+pub struct ToastsPlugin;
+
+impl Plugin for ToastsPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<NextToast>().add_systems(Last, wake_for_toasts);
+    }
+}
+
+/// How long after the program's start the next toast goes, in seconds; `None` while none goes by itself.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
+struct NextToast(Option<f64>);
+
+/// Shortens the window's sleep while there are toasts, and puts it back.
+fn wake_for_toasts(
+    next: Res<NextToast>,
+    time: Res<Time<Real>>,
+    settings: Option<ResMut<WinitSettings>>,
+    mut usual: Local<Option<(UpdateMode, UpdateMode)>>,
+) {
+    let Some(mut settings) = settings else { return };
+    let Some(until) = next.0 else {
+        if let Some((focused, unfocused)) = usual.take() {
+            (settings.focused_mode, settings.unfocused_mode) = (focused, unfocused);
+        }
+        return;
+    };
+    let (focused, unfocused) = *usual.get_or_insert((settings.focused_mode, settings.unfocused_mode));
+    let left = Duration::from_secs_f64((until - time.elapsed_secs_f64()).clamp(0.02, 60.0));
+    let shortened = |mode: UpdateMode| match mode {
+        UpdateMode::Reactive { wait, react_to_device_events, react_to_user_events, react_to_window_events } => {
+            UpdateMode::Reactive {
+                wait: wait.min(left),
+                react_to_device_events,
+                react_to_user_events,
+                react_to_window_events,
+            }
+        }
+        UpdateMode::Continuous => mode,
+    };
+    (settings.focused_mode, settings.unfocused_mode) = (shortened(focused), shortened(unfocused));
+}
 
 /// The overlay.
 #[derive(Default)]
@@ -68,7 +114,7 @@ fn lifetime(notice: &Notice) -> Option<Duration> {
 }
 
 impl EditorOverlay for Toasts {
-    fn show(&mut self, ctx: &egui::Context, world: &World, _requests: &mut Requests) {
+    fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
         let Some(book) = world.get_resource::<LogBook>() else { return };
         let now = ctx.input(|input| input.time);
         self.follow(book, now);
@@ -94,12 +140,16 @@ impl EditorOverlay for Toasts {
             let rect: Rect = shown.response.rect;
             if let Some(until) = &mut toast.until {
                 // What is being read stays.
-                if ctx.input(|input| input.pointer.hover_pos()).is_some_and(|pointer| rect.contains(pointer)) {
-                    *until = until.max(now + 2.0);
+                let read = ctx.input(|input| input.pointer.hover_pos()).is_some_and(|pointer| rect.contains(pointer));
+                if read && *until < now + 1.0 {
+                    *until = now + 2.0;
                 }
-                ctx.request_repaint_after_secs((*until - now) as f32 + 0.02);
             }
             bottom = rect.top() - 6.0;
+        }
+        let next = self.shown.iter().filter_map(|toast| toast.until).min_by(f64::total_cmp);
+        if world.get_resource::<NextToast>().is_some_and(|known| known.0 != next) {
+            requests.set(NextToast(next));
         }
         if let Some(closed) = closed {
             self.shown.retain(|toast| toast.number != closed);

@@ -56,7 +56,7 @@ impl Desk {
         app.add_plugins(PanelsPlugin);
         let strict = ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
         app.edit_schedule(Update, |schedule| {
-            schedule.set_build_settings(strict);
+            schedule.set_build_settings(strict.clone());
         });
         app.finish();
         app.cleanup();

@@ -1,8 +1,8 @@
 //! One row of the tree.
 
 use bevy_egui::egui::{
-    Align2, CursorIcon, FontId, Id, Key, Rect, Response, Sense, Stroke, StrokeKind, TextEdit, Ui, WidgetInfo,
-    WidgetType,
+    Align2, CursorIcon, FontId, Id, Key, LayerId, Order, PointerButton, Rect, Response, Sense, Stroke, StrokeKind,
+    TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType,
     containers::collapsing_header::paint_default_icon,
     pos2,
     text::{CCursor, CCursorRange},
@@ -99,7 +99,7 @@ fn paint(
     }
     if let Some(fold) = fold {
         let small = fold.clone().with_new_rect(Rect::from_center_size(fold.rect.center(), vec2(11.0, 11.0)));
-        let mut painter = ui.new_child(bevy_egui::egui::UiBuilder::new().max_rect(fold.rect));
+        let mut painter = ui.new_child(UiBuilder::new().max_rect(fold.rect));
         paint_default_icon(&mut painter, if row.open { 1.0 } else { 0.0 }, &small);
     }
     groups::dot(ui, dot_rect(ui, rect, tree, row), shown.color(row.joint));
@@ -179,7 +179,7 @@ fn drag(
     shown: &Shown,
     requests: &mut Requests,
 ) {
-    if response.drag_started_by(bevy_egui::egui::PointerButton::Primary) {
+    if response.drag_started_by(PointerButton::Primary) {
         let joints = match panel.selected.1.contains(&joint) {
             true => tops(&shown.rig, &shown.selection.0),
             false => vec![joint],
@@ -209,9 +209,7 @@ fn carried(ui: &Ui, joints: &[Uid], shown: &Shown, refused: Option<&str>) {
         (None, [one]) => shown.name(*one).into_owned(),
         (None, more) => format!("{} joints", more.len()),
     };
-    let painter = ui
-        .ctx()
-        .layer_painter(bevy_egui::egui::LayerId::new(bevy_egui::egui::Order::Tooltip, Id::new("dragged joints")));
+    let painter = ui.ctx().layer_painter(LayerId::new(Order::Tooltip, Id::new("dragged joints")));
     let visuals = ui.visuals();
     let font = FontId::proportional(12.0);
     let galley = painter.layout(text, font, visuals.strong_text_color(), 260.0);
