@@ -17,7 +17,7 @@ pub(super) fn press(panel: &mut HierarchyPanel, ui: &Ui, shown: &Shown, requests
     {
         panel.start_rename(active, shown);
     }
-    if !ui.ui_contains_pointer() {
+    if !ui.rect_contains_pointer(ui.max_rect()) {
         return;
     }
     let row = active.and_then(|active| panel.row_of(active));
