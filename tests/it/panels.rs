@@ -194,7 +194,7 @@ fn a_field_is_one_step() {
     let x = desk.rig().position(joints[1]).x;
     assert!(x > 0.01, "{x}");
     assert_eq!(desk.steps().0, before + 1, "a drag of many pixels");
-    assert_eq!(desk.rig().position(joints[2]), child, "children stay");
+    assert!(desk.rig().position(joints[2]).distance(child) < 1e-5, "children stay");
 
     let typed = [
         ("Position Y", "1.25", 1.25),
@@ -487,13 +487,12 @@ fn only_rows_in_view_cost() {
         desk.frames(3);
         let mut times: Vec<Duration> = (0..60)
             .map(|_| {
-                let started = Instant::now();
                 desk.frame();
-                started.elapsed()
+                desk.drawing
             })
             .collect();
         times.sort_unstable();
-        println!("hierarchy with {count} joints: a whole frame takes {:?} (median), {:?} (least)", times[30], times[0]);
-        assert!(times[0] < Duration::from_millis(50), "{:?}", times[0]);
+        println!("hierarchy with {count} joints: drawing it takes {:?} (median), {:?} (least)", times[30], times[0]);
+        assert!(times[0] < Duration::from_millis(8), "{:?}", times[0]);
     }
 }

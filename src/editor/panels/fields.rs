@@ -2,7 +2,12 @@
 
 use std::cell::Cell;
 
-use bevy_egui::egui::{self, Align, Color32, DragValue, Id, Key, Layout, RichText, Sense, Ui, vec2};
+use bevy_egui::egui::{
+    self, Align, Color32, DragValue, Id, Key, Layout, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo, WidgetType,
+    text::{CCursor, CCursorRange},
+    text_edit::TextEditState,
+    vec2,
+};
 
 use super::list;
 
@@ -40,6 +45,39 @@ pub(super) fn labelled<R>(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui) -> 
         ui.allocate_ui(vec2(ui.available_width(), 0.0), |ui| ui.horizontal(row).inner).inner
     })
     .inner
+}
+
+/// What became of a name that is typed in place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Renaming {
+    /// The field has the keyboard.
+    Typing,
+    /// Escape.
+    Dropped,
+    /// Enter, or a click elsewhere.
+    Accepted,
+}
+
+/// A field in place of a name, all of which is selected at first. `focused` is true once it has had the keyboard.
+pub(super) fn rename(ui: &mut Ui, rect: Rect, id: Id, said: &str, text: &mut String, focused: &mut bool) -> Renaming {
+    let field = TextEdit::singleline(text).id(id).margin(vec2(3.0, 1.0)).desired_width(rect.width());
+    let response = ui.place(rect, field);
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, said));
+    if !*focused {
+        *focused = true;
+        response.request_focus();
+        let mut state = TextEditState::load(ui.ctx(), id).unwrap_or_default();
+        let all = CCursorRange::two(CCursor::new(0), CCursor::new(text.chars().count()));
+        state.cursor.set_char_range(Some(all));
+        state.store(ui.ctx(), id);
+        Renaming::Typing
+    } else if response.has_focus() {
+        Renaming::Typing
+    } else if ui.input(|input| input.key_pressed(Key::Escape)) {
+        Renaming::Dropped
+    } else {
+        Renaming::Accepted
+    }
 }
 
 /// Numbers while they are dragged: the rig gets the last one, as one step.

@@ -4,6 +4,7 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Align, Button, Key, Layout, Rect, Sense, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType};
 
 use super::{
+    fields::{self, Renaming},
     list::{self, List},
     shown::Shown,
 };
@@ -25,7 +26,8 @@ pub struct PosesPlugin;
 
 impl Plugin for PosesPlugin {
     fn build(&self, app: &mut App) {
-        app.add_message::<ActionRequest>().add_systems(Update, pose_actions.before(RigSystems::Edits));
+        app.add_message::<ActionRequest>()
+            .add_systems(Update, pose_actions.after(RigSystems::Gesture).before(RigSystems::Edits));
     }
 }
 
@@ -103,9 +105,12 @@ fn current(ui: &mut Ui, shown: &Shown) -> Option<Operation> {
     let selected = shown.selection.0.iter().any(|joint| shown.rig.offset(*joint).is_some());
     let size = egui::vec2((ui.available_width() - ui.spacing().item_spacing.x) / 2.0, ui.spacing().interact_size.y);
     ui.horizontal(|ui| {
-        let one = ui.add_enabled(selected, Button::new("Reset selected").truncate().min_size(size));
-        let all = ui.add_enabled(posed > 0, Button::new("Reset all").truncate().min_size(size));
-        match (one.clicked(), all.clicked()) {
+        let mut button = |text: &str, enabled: bool| {
+            let button = Button::new(text).truncate();
+            ui.add_enabled_ui(enabled, |ui| ui.add_sized(size, button)).inner.clicked()
+        };
+        let (one, all) = (button("Reset selected", selected), button("Reset all", posed > 0));
+        match (one, all) {
             (true, _) => Some(Operation::ResetPose(shown.selection.0.clone())),
             (_, true) => Some(Operation::ResetPose(Vec::new())),
             _ => None,
@@ -199,18 +204,15 @@ impl PosesPanel {
     /// The field in place of a name.
     fn rename(&mut self, ui: &mut Ui, rect: Rect, pose: &StoredPose) -> Option<Operation> {
         let rename = self.rename.as_mut()?;
-        let response = ui.place(rect, TextEdit::singleline(&mut rename.text).id_salt(pose.uid));
-        response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Rename pose"));
-        if !rename.focused {
-            rename.focused = true;
-            response.request_focus();
-            return None;
+        let id = ui.id().with((pose.uid, "rename"));
+        match fields::rename(ui, rect, id, "Rename pose", &mut rename.text, &mut rename.focused) {
+            Renaming::Typing => None,
+            Renaming::Dropped => {
+                self.rename = None;
+                None
+            }
+            Renaming::Accepted => renamed(pose, &self.rename.take()?.text),
         }
-        if response.has_focus() {
-            return None;
-        }
-        let text = self.rename.take()?.text;
-        if ui.input(|input| input.key_pressed(Key::Escape)) { None } else { renamed(pose, &text) }
     }
 }
 

@@ -176,7 +176,8 @@ impl PropertiesPanel {
         for (name, other, none) in [("Parent", data.parent, "None (root)"), ("Mirror", mirror, "None")] {
             labelled(ui, name, |ui| match other {
                 Some(other) => {
-                    let link = egui::Link::new(shown.name(other).into_owned());
+                    let text = egui::RichText::new(shown.name(other)).color(ui.visuals().hyperlink_color);
+                    let link = egui::Label::new(text).truncate().sense(egui::Sense::click());
                     if ui.add(link).on_hover_text("Select it").clicked() {
                         let what = Pick::Joints(vec![other]);
                         requests.send(PickRequest { rig: shown.entity, what, add: false });

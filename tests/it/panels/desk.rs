@@ -34,6 +34,8 @@ pub struct Desk {
     /// Everything in the last frame: what it says, its value, and where it is.
     pub seen: Vec<Seen>,
     held: Modifiers,
+    /// How long drawing the last frame took.
+    pub drawing: std::time::Duration,
 }
 
 /// A widget.
@@ -64,8 +66,18 @@ impl Desk {
         app.insert_resource(ActiveRig(rig));
         let ctx = egui::Context::default();
         ctx.enable_accesskit();
-        let mut desk =
-            Self { app, rig, ctx, sheet, size, time: 0.0, events: Vec::new(), seen: Vec::new(), held: Modifiers::NONE };
+        let mut desk = Self {
+            app,
+            rig,
+            ctx,
+            sheet,
+            size,
+            time: 0.0,
+            events: Vec::new(),
+            seen: Vec::new(),
+            held: Modifiers::NONE,
+            drawing: default(),
+        };
         desk.frame();
         desk
     }
@@ -81,10 +93,12 @@ impl Desk {
         };
         let mut requests = Requests::default();
         let (sheet, world) = (&mut self.sheet, self.app.world());
+        let started = std::time::Instant::now();
         let output = self.ctx.run_ui(input, |ui| match sheet {
             Sheet::Panel(panel) => panel.show(ui, world, &mut requests),
             Sheet::Overlay(overlay) => overlay.show(&ui.ctx().clone(), world, &mut requests),
         });
+        self.drawing = started.elapsed();
         if let Some(update) = output.platform_output.accesskit_update {
             self.seen = update.nodes.iter().filter_map(|(_, node)| seen(node)).collect();
         }

@@ -59,7 +59,9 @@ pub(super) fn show(panel: &mut HierarchyPanel, response: &Response, shown: &Show
 }
 
 fn entry(ui: &mut Ui, text: &str, key: &str) -> bool {
-    let clicked = ui.add(Button::new(text).shortcut_text(key)).clicked();
+    let button = Button::new(text);
+    let button = if key.is_empty() { button } else { button.shortcut_text(key) };
+    let clicked = ui.add(button).clicked();
     if clicked {
         ui.close();
     }

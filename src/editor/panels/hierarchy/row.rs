@@ -1,20 +1,19 @@
 //! One row of the tree.
 
 use bevy_egui::egui::{
-    Align2, CursorIcon, FontId, Id, Key, LayerId, Order, PointerButton, Rect, Response, Sense, Stroke, StrokeKind,
-    TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType,
-    containers::collapsing_header::paint_default_icon,
-    pos2,
-    text::{CCursor, CCursorRange},
-    text_edit::TextEditState,
-    vec2,
+    Align2, CursorIcon, FontId, Id, LayerId, Order, PointerButton, Rect, Response, Sense, Stroke, StrokeKind, Ui,
+    UiBuilder, WidgetInfo, WidgetType, containers::collapsing_header::paint_default_icon, pos2, vec2,
 };
 
 use super::{Dragged, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
 use crate::{
     editor::{
         panel::Requests,
-        panels::{groups, list, shown::Shown},
+        panels::{
+            fields::{self, Renaming},
+            groups, list,
+            shown::Shown,
+        },
     },
     rig::{NodeKind, Uid},
 };
@@ -225,22 +224,9 @@ fn carried(ui: &Ui, joints: &[Uid], shown: &Shown, refused: Option<&str>) {
 /// The field in place of a name.
 fn rename(panel: &mut HierarchyPanel, ui: &mut Ui, rect: Rect, id: Id, shown: &Shown, requests: &mut Requests) {
     let Some(rename) = panel.rename.as_mut() else { return };
-    let id = id.with("rename");
-    let field = TextEdit::singleline(&mut rename.text).id(id).margin(vec2(3.0, 1.0)).desired_width(rect.width());
-    let response = ui.place(rect, field);
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Rename"));
-    if !rename.focused {
-        rename.focused = true;
-        response.request_focus();
-        let mut state = TextEditState::load(ui.ctx(), id).unwrap_or_default();
-        let all = CCursorRange::two(CCursor::new(0), CCursor::new(rename.text.chars().count()));
-        state.cursor.set_char_range(Some(all));
-        state.store(ui.ctx(), id);
-    } else if !response.has_focus() {
-        if ui.input(|input| input.key_pressed(Key::Escape)) {
-            panel.rename = None;
-        } else {
-            panel.accept_rename(shown, requests);
-        }
+    match fields::rename(ui, rect, id.with("rename"), "Rename", &mut rename.text, &mut rename.focused) {
+        Renaming::Typing => {}
+        Renaming::Dropped => panel.rename = None,
+        Renaming::Accepted => panel.accept_rename(shown, requests),
     }
 }
