@@ -50,6 +50,8 @@ mod surface;
 mod surface_refresh;
 mod template;
 mod three_strokes;
+#[cfg(feature = "editor")]
+mod tools;
 mod transfer;
 mod voxels;
 mod weights;
