@@ -14,7 +14,7 @@ use super::{
 use crate::{
     algo::placement::{PlaceSettings, Placement, place_hits},
     mesh::ray::Ray,
-    rig::operations::Operation,
+    rig::{Rig, operations::Operation},
 };
 
 /// Adds placing.
@@ -52,18 +52,21 @@ pub struct Placed {
 pub(super) fn place(
     mut requests: MessageReader<PlaceRequest>,
     mut waiting: Local<Vec<(PlaceRequest, Option<u64>)>>,
-    rigs: Query<(&Selection, Option<&RigSurface>, Has<RigMeshes>)>,
+    rigs: Query<(&Rig, &Selection, Option<&RigSurface>, Has<RigMeshes>)>,
     mut edits: MessageWriter<EditRequest>,
     mut placed: MessageWriter<Placed>,
 ) {
     waiting.extend(requests.read().map(|request| (request.clone(), None)));
     waiting.retain_mut(|(PlaceRequest { rig, ray, settings }, since)| {
-        let Ok((selection, surface, has_mesh)) = rigs.get(*rig) else { return false };
+        let Ok((document, selection, surface, has_mesh)) = rigs.get(*rig) else { return false };
         let Answer::Now(surface) = answer(since, has_mesh, surface) else { return true };
         let hits = surface.map(|surface| surface.hits(ray)).unwrap_or_default();
         let placement = place_hits(ray, &hits, *settings);
         if let Some(position) = placement.position() {
-            edits.write(EditRequest::operation(*rig, Operation::Place { position, parent: selection.active() }));
+            let parent = selection.active();
+            // On a posed mesh the joint rests where its parent's pose brings it to what was clicked.
+            let position = document.rest_from_pose(parent).transform_point3(position);
+            edits.write(EditRequest::operation(*rig, Operation::Place { position, parent }));
         }
         placed.write(Placed { rig: *rig, placement });
         false

@@ -132,6 +132,15 @@ impl Rig {
         self.ancestors(joint).fold(own, |global, above| affine(&self.posed_local(above.data.uid)) * global)
     }
 
+    /// Takes a place as the pose of `joint` holds it to where it is at rest, both in the rig's space: what is placed on the
+    /// posed mesh, to hang on `joint`, rests there. Exactly the identity for `None` and where no joint above is posed.
+    pub fn rest_from_pose(&self, joint: Option<Uid>) -> Affine3 {
+        let Some(joint) = joint else { return Affine3::IDENTITY };
+        let is_posed = self.pose.contains_key(&joint)
+            || self.ancestors(joint).any(|above| self.pose.contains_key(&above.data.uid));
+        if is_posed { self.rest_global(joint) * self.posed_global(joint).inverse() } else { Affine3::IDENTITY }
+    }
+
     /// Posed transforms of all joints to the rig's space, in the order of [`Rig::walk`].
     pub fn posed_globals(&self) -> Vec<(Uid, Affine3)> {
         let mut known: HashMap<Uid, Affine3> = HashMap::with_capacity(self.len());

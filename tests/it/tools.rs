@@ -35,7 +35,7 @@ use rigsmith::{
         viewport::{RigViewport, Sight},
     },
     prelude::*,
-    rig::SkinData,
+    rig::{PoseOffset, SkinData},
 };
 
 struct Bench {
@@ -89,7 +89,7 @@ impl Bench {
         app.add_plugins(ToolsPlugin);
         let strict = ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
         app.edit_schedule(Update, |schedule| {
-            schedule.set_build_settings(strict);
+            schedule.set_build_settings(strict.clone());
         });
         app.finish();
         app.cleanup();
@@ -328,6 +328,33 @@ fn wheel_and_drag_change_the_depth() {
     bench.mode(Mode::Select);
     assert_eq!(*bench.app.world().resource::<WheelUse>(), WheelUse::Zoom);
     assert!(bench.ghosts().is_empty(), "no ghost without its mode");
+}
+
+#[test]
+fn on_a_posed_rig_joints_stand_where_the_ghost_was() {
+    let (mut bench, joints) = Bench::new(Mode::Place).with_joints();
+    let turn = PoseOffset::from_rotation(Quat::from_rotation_z(0.4));
+    bench.operate(Operation::Pose(vec![(joints[1], turn)]));
+    for symmetry in [false, true] {
+        if symmetry {
+            bench.act(Action::Symmetry);
+        }
+        bench.app.world_mut().write_message(PickRequest {
+            rig: bench.rig,
+            what: Pick::Joints(vec![joints[2]]),
+            add: false,
+        });
+        bench.hover(front().project(Vec3::new(0.12, 1.25, 0.0)).unwrap());
+        let ghost = bench.place_tool().ghost.unwrap();
+        let before = bench.rig().len();
+        bench.click(PLAIN, front().project(Vec3::new(0.12, 1.25, 0.0)).unwrap());
+        assert_eq!(bench.rig().len(), before + 1 + usize::from(symmetry));
+        let posed: Vec<Vec3> = bench.rig().posed_globals().iter().map(|(_, joint)| joint.translation).collect();
+        for place in [Some(ghost.position), ghost.mirrored].into_iter().flatten() {
+            assert!(posed.iter().any(|posed| posed.distance(place) <= 3.0 * EXACT), "{posed:?} has no {place}");
+        }
+        assert_eq!(bench.rig().pose().len(), 1, "placing poses nothing");
+    }
 }
 
 #[test]

@@ -69,10 +69,12 @@ fn line(request: &StrokeRequest) -> Vec<Vec3> {
 /// The joints of a chain, each with its parent, on both sides.
 fn chain(positions: &[Vec3], parent: Option<Uid>, rig: &EditedRig, posed: &[(Uid, Vec3)]) -> Vec<GhostJoint> {
     let place_of = |joint: Uid| posed.iter().find(|(uid, _)| *uid == joint).map(|(_, place)| *place);
-    let other = parent.map(|parent| rig.rig.joint(parent).and_then(|joint| joint.data.mirror).unwrap_or(parent));
-    let (mut before, mut before_other) = (parent.and_then(place_of), other.and_then(place_of));
+    let other_parent = rig.other_side(parent);
+    let (mut before, mut before_other) = (parent.and_then(place_of), other_parent.and_then(place_of));
     let mut joints = Vec::with_capacity(2 * positions.len());
     for (position, other) in settle(positions, rig.symmetry.0.as_ref()) {
+        let position = rig.posed_below(parent, position);
+        let other = other.map(|other| rig.posed_below(other_parent, other));
         joints.push(GhostJoint { position, parent: before, mirrored: false });
         joints.extend(other.map(|other| GhostJoint { position: other, parent: before_other, mirrored: true }));
         (before, before_other) = (Some(position), Some(other.unwrap_or(position)));

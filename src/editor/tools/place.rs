@@ -123,12 +123,14 @@ pub fn ghost_at(
     surface.hits(&ray, &mut hits);
     let placement = place_hits(&ray, &hits, settings);
     let place = placement.position().ok_or(PlaceObstacle::Beside)?;
-    let plane = rig.symmetry.0;
-    let (position, mirrored) = settle(&[place], plane.as_ref()).first().copied().unwrap_or((place, None));
     let parent = rig.selection.active();
     let posed = scene.posed(rig);
     let place_of = |joint: Uid| posed.iter().find(|(uid, _)| *uid == joint).map(|(_, place)| *place);
-    let other = parent.map(|parent| rig.rig.joint(parent).and_then(|joint| joint.data.mirror).unwrap_or(parent));
+    let other = rig.other_side(parent);
+    let rests = rig.rig.rest_from_pose(parent).transform_point3(place);
+    let (position, mirrored) = settle(&[rests], rig.symmetry.0.as_ref()).first().copied().unwrap_or((rests, None));
+    let position = rig.posed_below(parent, position);
+    let mirrored = mirrored.map(|mirrored| rig.posed_below(other, mirrored));
     Ok(PlaceGhost {
         ray,
         placement,
@@ -277,7 +279,7 @@ pub(super) fn show(mut tool: ResMut<PlaceTool>, mode: Res<Mode>, scene: Scene, m
     };
     let ghost = found.and_then(Result::ok);
     if tool.ghost != ghost {
-        tool.bypass_change_detection().ghost = ghost;
+        tool.ghost = ghost;
     }
     if *mode != Mode::Place {
         return;

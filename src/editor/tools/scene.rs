@@ -1,6 +1,6 @@
 //! The rig that is edited, as tools see it.
 
-use bevy::{ecs::system::SystemParam, prelude::*};
+use bevy::{ecs::system::SystemParam, math::Affine3, prelude::*};
 
 use crate::{
     editor::{ActiveRig, camera::ViewportSight},
@@ -87,6 +87,17 @@ impl EditedRig<'_> {
     /// A joint's name for people: its label, or the end of its uid.
     pub fn name(&self, joint: Uid) -> String {
         joint_name(&self.rig, joint)
+    }
+
+    /// The joint on the other side; the joint itself in the middle.
+    pub fn other_side(&self, joint: Option<Uid>) -> Option<Uid> {
+        joint.map(|joint| self.rig.joint(joint).and_then(|joint| joint.data.mirror).unwrap_or(joint))
+    }
+
+    /// Where the pose of `parent` brings a place that rests below it, in the rig's space.
+    pub fn posed_below(&self, parent: Option<Uid>, rests: Vec3) -> Vec3 {
+        let to_rest = self.rig.rest_from_pose(parent);
+        if to_rest == Affine3::IDENTITY { rests } else { to_rest.inverse().transform_point3(rests) }
     }
 
     /// How large the character is, in the rig's units: the longest side of its surface, or of its skeleton.

@@ -74,18 +74,20 @@ fn is_over(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> bool {
 }
 
 pub(super) fn select(
-    mut tool: ResMut<SelectTool>,
+    mut shown: ResMut<SelectTool>,
     mut pointers: MessageReader<ToolPointer>,
     scene: Scene,
     hovered: Query<&Hovered>,
     mut picks: MessageWriter<PickRequest>,
     mut hovers: MessageWriter<HoverRequest>,
 ) {
-    let tool = tool.bypass_change_detection();
     let (Some(rig), Some(sight)) = (scene.rig(), scene.sight()) else {
         pointers.clear();
         return;
     };
+    // Only the box is to be seen; where the pointer is changes nothing.
+    let band = shown.band;
+    let tool = shown.bypass_change_detection();
     for ToolPointer { tool: who, pointer } in pointers.read() {
         if *who != Tool::Select {
             tool.pointer = None;
@@ -118,6 +120,9 @@ pub(super) fn select(
             _ => None,
         });
         hovers.write(HoverRequest { rig: rig.entity, what });
+    }
+    if tool.band != band {
+        shown.set_changed();
     }
 }
 
@@ -175,11 +180,15 @@ pub(super) fn say(
     hovered: Query<Ref<Hovered>>,
     mut status: ResMut<StatusLine>,
 ) {
-    if *mode != Mode::Select {
-        return;
-    }
     let Some(rig) = scene.rig() else { return };
     let hovered = hovered.get(rig.entity).ok();
+    let is_changed = tool.is_changed()
+        || mode.is_changed()
+        || scene.is_changed()
+        || hovered.as_ref().is_some_and(|hovered| hovered.is_changed());
+    if *mode != Mode::Select || !is_changed {
+        return;
+    }
     let hint = if tool.band.is_some() {
         "Release to select what is in the box; Shift adds, Ctrl takes away.".to_owned()
     } else if let Some(joint) = hovered.as_ref().and_then(|hovered| hovered.0) {

@@ -111,6 +111,8 @@ pub struct StrokePreview {
     task: Option<Task<Result<FollowedStroke, StrokeError>>>,
     /// The surface that the stroke was or is being followed through.
     on: Option<On>,
+    /// Parts of a notch that the wheel has turned: trackpads turn by little.
+    turned: f32,
 }
 
 impl StrokePreview {
@@ -181,6 +183,7 @@ fn draw(
     mut tunes: MessageReader<StrokeTune>,
     scene: Scene,
     mut press: Local<Option<Press>>,
+    mut hovering: Local<bool>,
     mut hovered: Query<&mut Hovered>,
     mut out: Outcomes,
 ) {
@@ -249,6 +252,13 @@ fn draw(
         if let Ok(mut hovered) = hovered.get_mut(rig.entity) {
             hovered.set_if_neq(Hovered(under));
         }
+        *hovering = under.is_some();
+    }
+    if *mode != Mode::Stroke
+        && std::mem::take(&mut *hovering)
+        && let Some(mut hovered) = found.as_ref().and_then(|(rig, _)| hovered.get_mut(rig.entity).ok())
+    {
+        hovered.set_if_neq(Hovered(None));
     }
     let on = found.as_ref().and_then(|(rig, _)| {
         let surface = rig.surface.as_ref()?.shared()?;
@@ -281,7 +291,8 @@ fn release(tool: &mut ResMut<StrokeTool>, scene: &Scene, rig: &EditedRig, stroke
     let StrokeState::Drawing(request) = std::mem::take(&mut tool.state) else { return };
     match stroke_kind(&request, &rig.rig, &scene.posed(rig)) {
         StrokeKind::Chain { .. } if rig.has_mesh => {
-            let preview = StrokePreview { request: *request, plan: None, followed: None, task: None, on: None };
+            let preview =
+                StrokePreview { request: *request, plan: None, followed: None, task: None, on: None, turned: 0.0 };
             tool.state = StrokeState::Preview(Box::new(preview));
         }
         _ => {
@@ -311,7 +322,12 @@ fn wheel(tool: &mut ResMut<StrokeTool>, notches: f32) {
         ChainChoice::Joints(count) => count,
         ChainChoice::Threshold(_) => preview.chain().map_or(2, |chain| chain.joints.len()),
     };
-    let steps = if notches.abs() < 1.0 { notches.signum() } else { notches.round() };
+    preview.turned += notches;
+    let steps = preview.turned.trunc();
+    preview.turned -= steps;
+    if steps == 0.0 {
+        return;
+    }
     let count = (count as f32 + steps).clamp(2.0, MAX_JOINTS as f32);
     preview.request.choice = ChainChoice::Joints(count as usize);
 }

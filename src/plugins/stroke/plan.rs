@@ -77,6 +77,7 @@ pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<F
                 }
                 _ => along,
             };
+            let position = rig.rest_from_pose(parent).transform_point3(position);
             let operation = Operation::Insert { child, position };
             StrokePlan::Ready { operation: Some(operation), result: StrokeResult::Inserted { child } }
         }
@@ -97,6 +98,9 @@ pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<F
                 Some(from) => (Some(from), ParentReason::StartsOn),
                 None => stroke_parent(request.parent, rig, selection, tips, symmetry.0, posed, *first),
             };
+            // What is drawn on a posed mesh rests where the pose brings it to the line.
+            let to_rest = rig.rest_from_pose(parent);
+            let positions = positions.into_iter().map(|position| to_rest.transform_point3(position)).collect();
             let operation = Operation::Chain { positions, parent };
             StrokePlan::Ready { operation: Some(operation), result: StrokeResult::Chain { chain, parent, why } }
         }
