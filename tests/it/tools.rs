@@ -431,6 +431,7 @@ fn what_is_previewed_is_what_is_taken() {
 fn a_preview_is_dropped_or_kept_never_lost() {
     let table: &[(&str, fn(&mut Bench), usize)] = &[
         ("Escape", |bench| bench.act(Action::Cancel), 0),
+        ("undo", |bench| bench.act(Action::Undo), 0),
         ("Enter", |bench| bench.act(Action::Accept), 1),
         ("another mode", |bench| bench.mode(Mode::Select), 1),
         ("saving", |bench| bench.act(Action::Save), 1),

@@ -62,6 +62,8 @@ impl PlaceTool {
 struct Press {
     at: Vec2,
     depth: f32,
+    /// True if it selects.
+    picks: bool,
 }
 
 /// A joint that a click would place, in the rig's space.
@@ -173,15 +175,18 @@ pub(super) fn place(
             continue;
         }
         let before = tool.picks;
-        tool.picks = pointer.held.control && tool.press.is_none();
+        // A press decides for the whole drag.
+        tool.picks = tool.press.map_or(pointer.held.control, |press| press.picks);
         tool.pointer = Some(pointer.at);
         match pointer.act {
             PointerAct::Left => tool.pointer = None,
             PointerAct::Moved => {}
-            PointerAct::Pressed => tool.press = Some(Press { at: pointer.at, depth: tool.settings.depth() }),
+            PointerAct::Pressed => {
+                tool.press = Some(Press { at: pointer.at, depth: tool.settings.depth(), picks: tool.picks })
+            }
             PointerAct::Dragged => {
                 let span = found.as_ref().and_then(|(_, sight)| drag_span(&tool, sight)).unwrap_or(DRAG_SPAN[0]);
-                if let Some(press) = tool.press {
+                if let Some(press) = tool.press.filter(|press| !press.picks) {
                     tool.settings.depth = (press.depth + (press.at.y - pointer.at.y) / span).clamp(0.0, 1.0);
                 }
             }
@@ -190,7 +195,7 @@ pub(super) fn place(
             }
             PointerAct::Released { dragged, count } => {
                 let (Some(press), Some((rig, sight))) = (tool.press.take(), &found) else { continue };
-                if pointer.held.control && !dragged {
+                if press.picks {
                     let what = select::click(&scene, rig, sight, press.at).unwrap_or(Pick::None);
                     picks.write(PickRequest { rig: rig.entity, what, add: pointer.held.shift });
                     continue;

@@ -53,6 +53,7 @@ impl Plugin for StrokeToolPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<StrokeTool>()
             .add_message::<StrokeTune>()
+            .add_systems(RunFixedMainLoop, drop_instead_of_undo.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop))
             .add_systems(Update, draw.in_set(ToolSystems::Tools).after(super::place::place))
             .add_systems(PostUpdate, (show, answer).chain().in_set(ToolSystems::Show).after(super::place::show))
             .add_painter(bar::StrokeBar);
@@ -116,6 +117,11 @@ pub struct StrokePreview {
 }
 
 impl StrokePreview {
+    /// True while the stroke is being followed through the mesh.
+    pub fn is_followed(&self) -> bool {
+        self.task.is_some() || self.on.is_none()
+    }
+
     /// What taking it would do to the rig, as far as that is known.
     pub fn operation(&self) -> Option<&Operation> {
         match self.plan.as_ref()? {
@@ -157,6 +163,17 @@ fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequ
         reach: REACH * sight.pixel,
         parent: StrokeParent::Natural,
         chain: None,
+    }
+}
+
+/// What is being drawn is the last step to whoever draws it: undo drops that and leaves the step before alone. Runs after
+/// keys are read and before anything is carried out.
+fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<ActionRequest>) {
+    if matches!(tool.state, StrokeState::Idle) {
+        return;
+    }
+    for request in actions.read().filter(|request| request.0 == Action::Undo) {
+        request.0 = Action::Cancel;
     }
 }
 
@@ -282,7 +299,7 @@ fn take(tool: &mut ResMut<StrokeTool>, strokes: &mut MessageWriter<StrokeRequest
     }
     let StrokeState::Preview(preview) = std::mem::take(&mut tool.state) else { return };
     // Where the stroke is still being followed, the engine waits for the same.
-    let chain = preview.chain().cloned();
+    let chain = preview.chain().filter(|_| !preview.is_followed()).cloned();
     strokes.write(StrokeRequest { chain, ..preview.request });
 }
 
