@@ -50,7 +50,13 @@ pub struct RigBundle {
     pub history: RigHistory,
     /// The entities of its joints.
     pub entities: JointEntities,
+    /// Whether its pose is shown.
+    pub show_rest: ShowRest,
 }
+
+/// True to show a rig at rest whatever its pose, which stays in the document: while the rest pose is edited.
+#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ShowRest(pub bool);
 
 /// The plane of live mirroring of a rig; `None` while it is off.
 #[derive(Component, Debug, Clone, Copy, PartialEq, Default)]
@@ -119,6 +125,13 @@ pub enum Change {
     Undo,
     /// Does the last undone step again.
     Redo,
+    /// Shows what an operation would do, for as long as a drag lasts: in the rig, but in neither history nor journal. The
+    /// next preview starts from the rig as it was before this one; any other change takes it back first.
+    Preview(Operation),
+    /// Makes what is previewed one step of the history; does nothing if nothing is.
+    Commit,
+    /// Takes back what is previewed; does nothing if nothing is.
+    CancelPreview,
 }
 
 impl EditRequest {
@@ -135,8 +148,10 @@ pub struct Edited {
     pub rig: Entity,
     /// What was done, undone or redone, in a few words.
     pub name: Cow<'static, str>,
-    /// The change; `None` if the operation had nothing to do.
+    /// The change; `None` if the operation had nothing to do, or is only previewed.
     pub committed: Option<Committed>,
+    /// True if something is only previewed, or was and no longer is.
+    pub preview: bool,
 }
 
 /// A change was refused; the rig is as it was.
@@ -157,46 +172,65 @@ fn apply_edits(
     mut refused: MessageWriter<EditRefused>,
 ) {
     for EditRequest { rig: entity, change } in requests.read() {
-        let result = match rigs.get_mut(*entity) {
-            Ok((mut rig, mut selection, mut history, symmetry)) => match change {
-                Change::Do(operation) => history
-                    .edit(&mut rig, &mut selection, &mut uids, symmetry.0, operation)
-                    .map(|recorded| (recorded.name, recorded.step.map(Committed::Done)))
-                    .map_err(|error| error.to_string()),
-                Change::Undo => history
-                    .undo(&mut rig, &mut selection)
-                    .unwrap_or_else(|| Err("there is nothing to undo".to_owned()))
-                    .map(|step| (step.name.clone(), Some(Committed::Undone(step)))),
-                Change::Redo => history
-                    .redo(&mut rig, &mut selection)
-                    .unwrap_or_else(|| Err("there is nothing to redo".to_owned()))
-                    .map(|step| (step.name.clone(), Some(Committed::Redone(step)))),
-            },
-            Err(_) => Err(format!("entity {entity} is no rig; it may have been closed")),
+        let rig = *entity;
+        let Ok((mut document, mut selection, mut history, symmetry)) = rigs.get_mut(rig) else {
+            refused.write(EditRefused { rig, reason: format!("entity {rig} is no rig; it may have been closed") });
+            continue;
+        };
+        let done = |name, committed| Edited { rig, name, committed, preview: false };
+        let previewed = |name: &'static str| Edited { rig, name: name.into(), committed: None, preview: true };
+        let result = match change {
+            Change::Do(operation) => history
+                .edit(&mut document, &mut selection, &mut uids, symmetry.0, operation)
+                .map(|recorded| done(recorded.name, recorded.step.map(Committed::Done)))
+                .map_err(|error| error.to_string()),
+            Change::Undo => history
+                .undo(&mut document, &mut selection)
+                .unwrap_or_else(|| Err("there is nothing to undo".to_owned()))
+                .map(|step| done(step.name.clone(), Some(Committed::Undone(step)))),
+            Change::Redo => history
+                .redo(&mut document, &mut selection)
+                .unwrap_or_else(|| Err("there is nothing to redo".to_owned()))
+                .map(|step| done(step.name.clone(), Some(Committed::Redone(step)))),
+            Change::Preview(operation) => history
+                .preview(&mut document, &mut uids, symmetry.0, operation)
+                .map(previewed)
+                .map_err(|error| error.to_string()),
+            Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
+            Change::Commit => {
+                let Some(recorded) = history.commit_preview(&mut document, &mut selection) else { continue };
+                Ok(done(recorded.name, recorded.step.map(Committed::Done)))
+            }
+            Change::CancelPreview => {
+                history.cancel_preview(&mut document);
+                Ok(previewed("Cancel"))
+            }
         };
         match result {
-            Ok((name, committed)) => {
-                edited.write(Edited { rig: *entity, name, committed });
+            Ok(message) => {
+                edited.write(message);
             }
             Err(reason) => {
-                refused.write(EditRefused { rig: *entity, reason });
+                refused.write(EditRefused { rig, reason });
             }
         }
     }
 }
 
 /// Makes the joint entities equal to their rig: spawns, despawns, reparents, moves what moved at rest, and poses what
-/// the document poses otherwise than before. As long as the document's pose stays, so does what an animation, a game or
+/// the document poses otherwise than before (at rest while [`ShowRest`] says so). As long as the document's pose stays, so does what an animation, a game or
 /// a drag under way put on top of the rest pose.
 fn follow_rigs(
     mut commands: Commands,
-    mut rigs: Query<(Entity, &Rig, &mut JointEntities), Changed<Rig>>,
+    mut rigs: Query<(Entity, &Rig, &mut JointEntities, Option<&ShowRest>), Or<(Changed<Rig>, Changed<ShowRest>)>>,
     mut joints: Query<
         (&mut Transform, &mut RestTransform, Option<&ChildOf>, Option<&NodeLabel>, Option<&InGroup>),
         With<Joint>,
     >,
 ) {
-    for (rig_entity, rig, mut known) in &mut rigs {
+    for (rig_entity, rig, mut known, show_rest) in &mut rigs {
+        let is_posed = !show_rest.is_some_and(|show_rest| show_rest.0);
+        let offset_of = |joint: Uid| rig.offset(joint).filter(|_| is_posed);
         let mut gone: Vec<(Uid, Entity)> =
             known.entities.iter().filter(|(uid, _)| rig.joint(**uid).is_none()).map(|(u, e)| (*u, *e)).collect();
         gone.sort_unstable();
@@ -212,10 +246,12 @@ fn follow_rigs(
             let entity = match known.get(data.uid) {
                 Some(entity) => entity,
                 None => {
-                    let bundle = (Joint, data.uid, data.rest, rig.posed_local(data.uid), JointOf(rig_entity));
+                    let offset = offset_of(data.uid);
+                    let posed = offset.copied().unwrap_or_default().on(&data.rest);
+                    let bundle = (Joint, data.uid, data.rest, posed, JointOf(rig_entity));
                     let entity = commands.spawn((bundle, ChildOf(parent))).id();
                     known.entities.insert(data.uid, entity);
-                    known.set_posed(data.uid, rig.offset(data.uid));
+                    known.set_posed(data.uid, offset);
                     entity
                 }
             };
@@ -223,9 +259,9 @@ fn follow_rigs(
                 describe(&mut commands.entity(entity), data.label.as_deref(), data.group, None, None);
                 continue;
             };
-            let offset = rig.offset(data.uid);
+            let offset = offset_of(data.uid);
             if known.posed.get(&data.uid) != offset {
-                *pose = rig.posed_local(data.uid);
+                *pose = offset.copied().unwrap_or_default().on(&data.rest);
                 known.set_posed(data.uid, offset);
             } else if *rest != data.rest {
                 let before = offset.copied().unwrap_or_default();

@@ -8,7 +8,7 @@ use undo::{Edit, Record};
 use super::selection::Selection;
 use crate::rig::{
     Rig, RigEdit, Uid, UidSource,
-    operations::{MirrorPlane, Operation, OperationError},
+    operations::{MirrorPlane, Operation, OperationError, Outcome},
     step::{Step, Timeline},
 };
 
@@ -16,6 +16,13 @@ use crate::rig::{
 #[derive(Component, Default)]
 pub struct RigHistory {
     record: Record<Entry>,
+    preview: Option<Preview>,
+}
+
+/// What a drag under way has done to a rig: in the rig already, not in the record.
+struct Preview {
+    name: &'static str,
+    outcome: Outcome,
 }
 
 /// What an operation did.
@@ -79,10 +86,11 @@ impl RigHistory {
         for _ in &timeline.undone {
             let _ = record.undo(&mut target);
         }
-        Self { record }
+        Self { record, preview: None }
     }
 
-    /// Runs an operation and records it as one step. Joints that the operation deleted leave the selection.
+    /// Runs an operation and records it as one step. Joints that the operation deleted leave the selection. A preview is
+    /// taken back before.
     pub fn edit(
         &mut self,
         rig: &mut Rig,
@@ -91,31 +99,85 @@ impl RigHistory {
         symmetry: Option<MirrorPlane>,
         operation: &Operation,
     ) -> Result<Recorded, OperationError> {
-        let before = selection.0.clone();
+        self.cancel_preview(rig);
         let outcome = operation.run(rig, uids, symmetry)?;
+        Ok(self.record(rig, selection, operation.name(), outcome))
+    }
+
+    /// Shows what an operation would do: the rig changes, its history does not. What was previewed before is taken back
+    /// first, so each preview starts from the rig as it was before the first.
+    ///
+    /// # Errors
+    /// If the operation is refused; then nothing is previewed any more.
+    pub fn preview(
+        &mut self,
+        rig: &mut Rig,
+        uids: &mut UidSource,
+        symmetry: Option<MirrorPlane>,
+        operation: &Operation,
+    ) -> Result<&'static str, OperationError> {
+        self.cancel_preview(rig);
+        let (name, outcome) = (operation.name(), operation.run(rig, uids, symmetry)?);
+        self.preview = Some(Preview { name, outcome });
+        Ok(name)
+    }
+
+    /// Records what is previewed as one step; `None` if nothing is.
+    pub fn commit_preview(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Recorded> {
+        let Preview { name, outcome } = self.preview.take()?;
+        Some(self.record(rig, selection, name, outcome))
+    }
+
+    /// Takes back what is previewed, to the bit; false if nothing is.
+    pub fn cancel_preview(&mut self, rig: &mut Rig) -> bool {
+        let Some(preview) = self.preview.take() else { return false };
+        let undone = apply_all(rig, &preview.outcome.inverses);
+        debug_assert!(undone.is_ok(), "a preview could not be taken back: {undone:?}");
+        true
+    }
+
+    /// True while the rig shows what is not in its history.
+    pub fn is_previewing(&self) -> bool {
+        self.preview.is_some()
+    }
+
+    /// The rig without what is only previewed: what is saved.
+    pub fn settled<'a>(&self, rig: &'a Rig) -> Cow<'a, Rig> {
+        let Some(preview) = &self.preview else { return Cow::Borrowed(rig) };
+        let mut rig = rig.clone();
+        let undone = apply_all(&mut rig, &preview.outcome.inverses);
+        debug_assert!(undone.is_ok(), "a preview could not be taken back: {undone:?}");
+        Cow::Owned(rig)
+    }
+
+    /// Records what has been applied already.
+    fn record(&mut self, rig: &mut Rig, selection: &mut Selection, name: &'static str, outcome: Outcome) -> Recorded {
+        let before = selection.0.clone();
         let after = outcome
             .selected
             .unwrap_or_else(|| before.iter().copied().filter(|joint| rig.joint(*joint).is_some()).collect());
-        let name = Cow::Borrowed(operation.name());
+        let name = Cow::Borrowed(name);
         // What changed nothing is no step: undoing it would seem to do nothing.
         if outcome.edits.is_empty() && after == before {
-            return Ok(Recorded { name, step: None });
+            return Recorded { name, step: None };
         }
         let step = Step { name: name.clone(), forward: outcome.edits, backward: outcome.inverses, before, after };
         let step = Arc::new(step);
         let entry = Entry { step: step.clone(), applied: true };
         let recorded = self.with(rig, selection, |record, target| record.edit(target, entry));
         debug_assert!(recorded.is_ok(), "a step that was applied already cannot fail");
-        Ok(Recorded { name, step: Some(step) })
+        Recorded { name, step: Some(step) }
     }
 
-    /// Takes the last step back and returns it, or `None` if there is none.
+    /// Takes the last step back and returns it, or `None` if there is none. A preview is taken back before.
     pub fn undo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
+        self.cancel_preview(rig);
         self.with(rig, selection, Record::undo)
     }
 
-    /// Does the last undone step again and returns it, or `None` if there is none.
+    /// Does the last undone step again and returns it, or `None` if there is none. A preview is taken back before.
     pub fn redo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
+        self.cancel_preview(rig);
         self.with(rig, selection, Record::redo)
     }
 

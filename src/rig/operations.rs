@@ -75,8 +75,10 @@ pub enum Operation {
     Scale {
         /// Which.
         joints: Vec<Uid>,
-        /// Factors along the rig's axes, none zero.
+        /// Factors along the axes, none zero.
         scale: Vec3,
+        /// The axes, as a rotation of the rig's.
+        axes: Quat,
         /// About which point; each joint about itself for `None`.
         pivot: Option<Vec3>,
         /// True to take along what hangs below; else it stays in place.
@@ -216,13 +218,21 @@ impl Operation {
                 }
                 transform::about(draft, joints, Affine3::from_quat(*rotation), *pivot, *with_children)
             }
-            Self::Scale { joints, scale, pivot, with_children } => {
+            Self::Scale { joints, scale, axes, pivot, with_children } => {
+                if !axes.is_finite() || (axes.length_squared() - 1.0).abs() > 1e-3 {
+                    return Err(OperationError::BadNumber("the axes are no unit quaternion; normalise it first"));
+                }
                 if !scale.is_finite() || scale.min_element() <= 0.0 && scale.max_element() >= 0.0 {
                     return Err(OperationError::BadNumber(
                         "a scale of zero or of mixed signs cannot be undone by hand",
                     ));
                 }
-                transform::about(draft, joints, Affine3::from_scale(*scale), *pivot, *with_children)
+                let (there, back) = (Affine3::from_quat(*axes), Affine3::from_quat(axes.inverse()));
+                let change = match *axes == Quat::IDENTITY {
+                    true => Affine3::from_scale(*scale),
+                    false => there * Affine3::from_scale(*scale) * back,
+                };
+                transform::about(draft, joints, change, *pivot, *with_children)
             }
             Self::Rest { to, with_children } => transform::rest(draft, to, *with_children),
             Self::Labels(labels) => labels.iter().try_for_each(|(joint, label)| label_joint(draft, *joint, label)),

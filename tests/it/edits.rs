@@ -83,6 +83,7 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
         8 => Operation::Scale {
             joints: vec![x],
             scale: place.abs() + 0.1,
+            axes: Quat::IDENTITY,
             pivot: odd.then_some(place),
             with_children: a % 2 == 0,
         },
@@ -300,7 +301,13 @@ fn tree() -> (Bench, Vec<Uid>) {
         pivot: None,
         with_children: true,
     });
-    bench.run(Operation::Scale { joints: vec![root], scale: Vec3::splat(2.0), pivot: None, with_children: true });
+    bench.run(Operation::Scale {
+        joints: vec![root],
+        scale: Vec3::splat(2.0),
+        axes: Quat::IDENTITY,
+        pivot: None,
+        with_children: true,
+    });
     let mut joints = vec![root];
     joints.extend(bench.chain(&[[1.0, 1.0, 0.0], [1.0, 2.0, 0.5], [1.5, 3.0, 0.0]], Some(root)));
     joints.push(bench.place([-1.0, 0.0, 0.0], Some(root)));
@@ -391,7 +398,13 @@ fn rotating_and_scaling_go_about_the_pivot() {
 
     let mut bench = Bench::new();
     let joints = bench.chain(&[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], None);
-    let scale = |scale: Vec3, pivot| Operation::Scale { joints: vec![joints[0]], scale, pivot, with_children: true };
+    let scale = |scale: Vec3, pivot| Operation::Scale {
+        joints: vec![joints[0]],
+        scale,
+        axes: Quat::IDENTITY,
+        pivot,
+        with_children: true,
+    };
     bench.run(scale(Vec3::splat(2.0), Some(Vec3::ZERO)));
     assert_at(&bench, joints[0], [2.0, 0.0, 0.0]);
     assert_at(&bench, joints[1], [4.0, 0.0, 0.0]);
@@ -524,7 +537,13 @@ fn what_could_not_be_saved_is_refused() {
         Operation::Move { to: vec![(joints[0], Vec3::ZERO), (joint, nan)], with_children: true },
         Operation::Rotate { joints: vec![joint], rotation: turn, pivot: None, with_children: true },
         Operation::Rotate { joints: vec![joint], rotation: Quat::IDENTITY, pivot: Some(nan), with_children: true },
-        Operation::Scale { joints: vec![joint], scale: Vec3::ONE, pivot: Some(nan), with_children: false },
+        Operation::Scale {
+            joints: vec![joint],
+            scale: Vec3::ONE,
+            axes: Quat::IDENTITY,
+            pivot: Some(nan),
+            with_children: false,
+        },
         Operation::Group { joints: vec![joint], name: "n".into(), color: Some([f32::NAN; 3]) },
     ] {
         assert!(bench.try_run(operation.clone()).is_err(), "{operation:?}");

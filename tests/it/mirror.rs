@@ -135,7 +135,13 @@ fn changes_of_one_side_reach_the_other() {
     let rotation = Quat::from_rotation_z(0.4) * Quat::from_rotation_y(0.3);
     bench.run(Operation::Rotate { joints: vec![arm[0]], rotation, pivot: None, with_children: true });
     symmetric(&bench, "rotate");
-    bench.run(Operation::Scale { joints: vec![arm[1]], scale: Vec3::splat(1.5), pivot: None, with_children: true });
+    bench.run(Operation::Scale {
+        joints: vec![arm[1]],
+        scale: Vec3::splat(1.5),
+        axes: Quat::IDENTITY,
+        pivot: None,
+        with_children: true,
+    });
     symmetric(&bench, "scale");
     bench.run(Operation::Orient { joints: arm.clone(), along: Axis::Y });
     symmetric(&bench, "orient");

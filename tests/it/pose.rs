@@ -147,7 +147,7 @@ proptest! {
         let plane = bench.plane.take().unwrap();
         let euler = |[x, y, z]: [i8; 3]| Quat::from_euler(EulerRot::YXZ, f32::from(x) / 40.0, f32::from(y) / 40.0, f32::from(z) / 40.0);
         let scale = if scaled { Vec3::splat(1.25) } else { Vec3::ONE };
-        bench.run(Operation::Scale { joints: vec![hips], scale: scale * scale, pivot: None, with_children: true });
+        bench.run(Operation::Scale { joints: vec![hips], scale: scale * scale, axes: Quat::IDENTITY, pivot: None, with_children: true });
         for (number, joint) in right.iter().enumerate() {
             let rotation = euler(numbers[number]);
             bench.run(Operation::Rotate { joints: vec![*joint], rotation, pivot: None, with_children: false });

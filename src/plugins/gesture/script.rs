@@ -188,7 +188,7 @@ impl Answers<'_, '_> {
             }
             script.pending = false;
         }
-        for Edited { rig: entity, name, .. } in self.edited.read() {
+        for Edited { rig: entity, name, .. } in self.edited.read().filter(|edited| !edited.preview) {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             if script.pending {
                 script.note_added(rig);
@@ -368,9 +368,13 @@ impl Act<'_, '_> {
                 pivot: Some(here),
                 with_children: true,
             },
-            Gesture::Scale(factor) => {
-                Operation::Scale { joints, scale: Vec3::splat(factor), pivot: Some(here), with_children: true }
-            }
+            Gesture::Scale(factor) => Operation::Scale {
+                joints,
+                scale: Vec3::splat(factor),
+                axes: Quat::IDENTITY,
+                pivot: Some(here),
+                with_children: true,
+            },
             Gesture::Insert(at) => Operation::Insert { child: active, position: at_depth_of_active(at) },
             Gesture::Delete => Operation::Delete { joints, keep_children: true },
             Gesture::DeleteHierarchy => Operation::Delete { joints, keep_children: false },
