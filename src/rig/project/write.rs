@@ -79,7 +79,7 @@ fn write_indented(out: &mut String, text: &str, indent: &str) {
     let mut at = 0;
     for line in text.split_inclusive('\n') {
         while fixed.next_if(|range| range.end <= at).is_some() {}
-        if at > 0 && !fixed.peek().is_some_and(|range| range.start < at) {
+        if at > 0 && fixed.peek().is_none_or(|range| range.start >= at) {
             out.push_str(indent);
         }
         out.push_str(line);
