@@ -29,7 +29,8 @@ pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use load::{FileKind, LoadError, load_gestures, load_model, load_rig_text, load_skin, load_template, stem};
 pub use project::{
-    LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectToSave, load_project, store_project,
+    LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectToSave, load_project,
+    project_files, store_project,
 };
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use store::{StoreError, store_model, store_rig, store_skin};

@@ -8,8 +8,8 @@
 //! [`recover`] reads one up to the first record that is torn or damaged, [`Recovered::replay`] makes the rig again, and
 //! [`Journal::resume`] goes on with it.
 //!
-//! **Saving.** [`Journal::saving`] notes which content the project file is about to get and which changes are in it;
-//! after the file is in place, [`Journal::saved`] starts the journal anew on it, beside it. A crash between any two of
+//! **Saving.** [`Journal::saving`] notes which content the project file is about to get (the hash of its
+//! [`project_files`](crate::files::project_files)) and which changes are in it; after the file is in place, [`Journal::saved`] starts the journal anew on it, beside it. A crash between any two of
 //! these steps recovers the same document: whether the project file has the noted content tells which changes it holds.
 //!
 //! **Trouble.** Where a folder cannot be written the next place is tried: beside the project, the caller's folder for
@@ -33,7 +33,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 pub use frame::{JOURNAL_FORMAT, MAX_RECORD};
-pub use place::{JournalPlaces, PendingJournal, journal_beside, pending_journal, pending_journals};
+pub use place::{JournalPlaces, PendingJournal, file_hash_at, journal_beside, pending_journal, pending_journals};
 pub use read::{Basis, Ending, JournalError, MAX_JOURNAL, Recovered, recover};
 pub use writer::{Journal, JournalStart};
 

@@ -9,7 +9,7 @@ use std::{path::PathBuf, sync::Arc};
 use glam::Vec3;
 
 pub use open::load_project;
-pub use save::store_project;
+pub use save::{ProjectFiles, project_files, store_project};
 
 use super::LoadError;
 use crate::{

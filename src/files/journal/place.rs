@@ -108,7 +108,7 @@ pub fn pending_journal(disk: &dyn Disk, path: &Path) -> Option<PendingJournal> {
 
 /// How many changes are in no saved file, and whether the project is another one by now.
 fn unsaved(disk: &dyn Disk, summary: &Summary) -> (usize, bool) {
-    let is = |path: &Path, hash: u64| hash_of(disk, path) == Some(hash);
+    let is = |path: &Path, hash: u64| file_hash_at(disk, path) == Some(hash);
     if let Some(mark) = summary.marks.iter().rev().find(|mark| is(&mark.path, mark.hash)) {
         let contained = usize::try_from(mark.position.saturating_sub(summary.first)).unwrap_or(usize::MAX);
         return (summary.changes.saturating_sub(contained), false);
@@ -120,8 +120,8 @@ fn unsaved(disk: &dyn Disk, summary: &Summary) -> (usize, bool) {
     (summary.changes, changed)
 }
 
-/// The hash of a file as it is now.
-pub(super) fn hash_of(disk: &dyn Disk, path: &Path) -> Option<u64> {
+/// The [`file_hash`] of a file as it is now; `None` if it cannot be read. For [`Recovered::basis`](super::Recovered::basis).
+pub fn file_hash_at(disk: &dyn Disk, path: &Path) -> Option<u64> {
     read_capped(disk, path, MAX_PROJECT).ok().map(|bytes| file_hash(&bytes))
 }
 

@@ -12,7 +12,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use super::{Content, JournalPlaces, Origin, Recovered, SaveMark, place::hash_of, sync::Synced, thread::Writer};
+use super::{Content, JournalPlaces, Origin, Recovered, SaveMark, place::file_hash_at, sync::Synced, thread::Writer};
 use crate::{
     files::Disk,
     rig::{
@@ -140,7 +140,7 @@ impl Journal {
             let _ = disk.rename(&old, Path::new(&kept));
             old = PathBuf::new();
         }
-        let saved = recovered.saved(&mut |path| hash_of(disk.as_ref(), path)).cloned();
+        let saved = recovered.saved(&mut |path| file_hash_at(disk.as_ref(), path)).cloned();
         if let Some(mark) = saved {
             content.rebase(&mark);
         }

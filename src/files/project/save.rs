@@ -12,14 +12,41 @@ use crate::{
     },
 };
 
+/// The files of a project, ready to be saved: together by [`save_all_atomic`], in this order.
+#[derive(Debug, Clone, Default)]
+pub struct ProjectFiles {
+    /// Paths and contents; the last one is the project itself.
+    pub files: Vec<(PathBuf, Vec<u8>)>,
+    /// What could not be kept, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl ProjectFiles {
+    /// The [`content_hash`] of the project itself, by which a [journal](crate::files::journal::SaveMark) knows it.
+    pub fn hash(&self) -> u64 {
+        self.files.last().map_or(0, |(_, bytes)| content_hash(bytes))
+    }
+}
+
 /// Saves a project with the weights of its meshes beside it, whole or not at all. Returns what could not be kept, a
 /// sentence each.
-///
-/// Meshes are named relative to the project's folder; where they have no folder in common, by their absolute path.
 ///
 /// # Errors
 /// [`StoreError`]; what was there before is still there.
 pub fn store_project(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> Result<Vec<String>, StoreError> {
+    let ProjectFiles { files, notes } = project_files(disk, path, project)?;
+    save_all_atomic(disk, &files)?;
+    Ok(notes)
+}
+
+/// Makes the files of a project that is to be saved at `path`, and writes nothing: for those who note what they are
+/// about to save before they do.
+///
+/// Meshes are named relative to the project's folder; where they have no folder in common, by their absolute path.
+///
+/// # Errors
+/// [`StoreError`] if a file cannot hold what it should.
+pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> Result<ProjectFiles, StoreError> {
     let mut notes = Vec::new();
     let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     let mut rigs = Vec::with_capacity(project.rigs.len());
@@ -55,8 +82,7 @@ pub fn store_project(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
         return Err(StoreError::ProjectTooLarge { path: path.into(), mebibytes: text.len() >> 20 });
     }
     files.push((path.into(), text.into_bytes()));
-    save_all_atomic(disk, &files)?;
-    Ok(notes)
+    Ok(ProjectFiles { files, notes })
 }
 
 /// The bytes of the file with a mesh's weights; `None` if nothing is known about the mesh.
