@@ -99,6 +99,8 @@ fn work(folder: &Path, disk: &Arc<FaultyDisk>) -> (Vec<Rig>, usize) {
         // Found again by the one that started it; other tests use that folder, too.
         let _ = fs::copy(path, folder.join("moved.journal"));
     }
+    // What it could not write before it tries again at its end.
+    drop(desk);
     for name in names.iter().filter_map(|path| path.file_name()) {
         let _ = fs::remove_file(std::env::temp_dir().join(name));
     }
