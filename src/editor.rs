@@ -18,6 +18,7 @@ pub mod panel;
 pub mod panels;
 pub mod pointer;
 pub mod probe;
+pub mod report;
 pub mod screen;
 pub mod settings;
 mod status;

@@ -30,6 +30,7 @@ use super::{
     mode::Mode,
     notice::{Notice, StatusLine},
     pointer::PointerPlugin,
+    report::ReportPlugin,
     screen::ScreenPlugin,
     settings::SettingsPlugin,
 };
@@ -138,6 +139,7 @@ impl Plugin for EditorPlugin {
             ScreenPlugin,
             HelpPlugin,
             LabelsPlugin,
+            ReportPlugin,
             FilesPlugin,
         ))
         .insert_resource(WinitSettings {

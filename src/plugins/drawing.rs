@@ -17,7 +17,7 @@ pub mod skeleton;
 mod systems;
 pub mod theme;
 
-use bevy::{camera::CameraUpdateSystems, camera::visibility::VisibilitySystems, prelude::*};
+use bevy::{asset::AssetEventSystems, camera::CameraUpdateSystems, camera::visibility::VisibilitySystems, prelude::*};
 
 pub use ghosts::{GhostJoint, Ghosts};
 pub use labels::{LETTER, LabelWish, label_places};
@@ -43,6 +43,8 @@ impl Plugin for DrawingPlugin {
                     .after(TransformSystems::Propagate)
                     .after(CameraUpdateSystems)
                     .after(RigSystems::Surface)
+                    // The renderer takes a picture's data once: a change must be told in the frame in which it is made.
+                    .before(AssetEventSystems)
                     .before(VisibilitySystems::VisibilityPropagate),
             )
             .add_systems(
