@@ -55,3 +55,5 @@ mod tools;
 mod transfer;
 mod voxels;
 mod weights;
+#[cfg(all(feature = "editor", feature = "cli"))]
+mod window;

@@ -1,0 +1,329 @@
+//! The whole job by hand: a real window under a virtual display, a real mouse and a real keyboard.
+//!
+//! Needs `Xvfb`, `xdotool` and a graphics adapter (a software one will do); it says what is missing, and fails for it
+//! where `RIGSMITH_REQUIRE_GPU=1`. `RIGSMITH_SHOTS` names a folder for pictures of the window on the way.
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use rigsmith::{editor::report::WindowReport, files::FileKind, render::adapter};
+
+/// A display of its own, gone with the test.
+struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    fn start() -> Option<Self> {
+        for number in 90..120 {
+            if Path::new(&format!("/tmp/.X11-unix/X{number}")).exists() {
+                continue;
+            }
+            let name = format!(":{number}");
+            let server = Command::new("Xvfb")
+                .args([&name, "-screen", "0", "1280x720x24", "-nolisten", "tcp"])
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .ok()?;
+            sleep(Duration::from_millis(1500));
+            return Some(Self { server, name });
+        }
+        None
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// A running window and the hands on it.
+struct Hands<'a> {
+    display: &'a Display,
+    folder: &'a Path,
+    program: Child,
+}
+
+impl Drop for Hands<'_> {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+const PATIENCE: Duration = Duration::from_secs(120);
+
+impl<'a> Hands<'a> {
+    fn open(display: &'a Display, folder: &'a Path, file: &Path) -> Self {
+        let _ = std::fs::remove_file(folder.join("report.json"));
+        let log = std::fs::File::create(folder.join("window.log")).unwrap();
+        let program = Command::new(env!("CARGO_BIN_EXE_rigsmith"))
+            .arg("edit")
+            .arg(file)
+            .current_dir(folder)
+            .env("DISPLAY", &display.name)
+            .env("RIGSMITH_WINDOW_REPORT", folder.join("report.json"))
+            .env("RIGSMITH_CONFIG", folder.join("config"))
+            .env("RIGSMITH_STATE", folder.join("state"))
+            .env_remove("WAYLAND_DISPLAY")
+            .stdout(Stdio::null())
+            .stderr(log)
+            .spawn()
+            .unwrap();
+        let hands = Self { display, folder, program };
+        hands.until("the file is open", |report| !report.busy && report.viewport[2] > 0.0);
+        let window = hands.xdotool(&["search", "--name", "Rigsmith"]);
+        let window = window.split_whitespace().next().unwrap_or_else(|| panic!("there is no window"));
+        hands.xdotool(&["windowfocus", window]);
+        hands
+    }
+
+    fn xdotool(&self, words: &[&str]) -> String {
+        let run = Command::new("xdotool").args(words).env("DISPLAY", &self.display.name).output().unwrap();
+        sleep(Duration::from_millis(60));
+        String::from_utf8_lossy(&run.stdout).into_owned()
+    }
+
+    fn report(&self) -> Option<WindowReport> {
+        serde_json::from_slice(&std::fs::read(self.folder.join("report.json")).ok()?).ok()
+    }
+
+    /// Waits until the window shows what is expected.
+    fn until(&self, what: &str, expected: impl Fn(&WindowReport) -> bool) -> WindowReport {
+        let start = Instant::now();
+        loop {
+            let report = self.report();
+            if let Some(report) = report.as_ref().filter(|report| expected(report)) {
+                return report.clone();
+            }
+            if start.elapsed() > PATIENCE {
+                let log = std::fs::read_to_string(self.folder.join("window.log")).unwrap_or_default();
+                let tail: Vec<&str> = log.lines().rev().take(12).collect();
+                self.shot("failed");
+                panic!("waited in vain until {what}; the window shows {report:#?}\n{}", tail.join("\n"));
+            }
+            sleep(Duration::from_millis(50));
+        }
+    }
+
+    fn key(&self, key: &str) {
+        self.xdotool(&["key", "--clearmodifiers", key]);
+    }
+
+    fn write(&self, text: &str) {
+        self.xdotool(&["type", "--delay", "25", text]);
+    }
+
+    fn drag(&self, line: &[[f32; 2]]) {
+        let place = |at: [f32; 2]| [at[0].round().to_string(), at[1].round().to_string()];
+        let [x, y] = place(line[0]);
+        self.xdotool(&["mousemove", &x, &y]);
+        sleep(Duration::from_millis(200));
+        self.xdotool(&["mousedown", "1"]);
+        for w in line.windows(2) {
+            for step in 1..=6 {
+                let t = step as f32 / 6.0;
+                let [x, y] = place([w[0][0] + (w[1][0] - w[0][0]) * t, w[0][1] + (w[1][1] - w[0][1]) * t]);
+                self.xdotool(&["mousemove", &x, &y]);
+            }
+        }
+        sleep(Duration::from_millis(200));
+        self.xdotool(&["mouseup", "1"]);
+    }
+
+    fn click(&self, at: [f32; 2]) {
+        self.xdotool(&["mousemove", &at[0].round().to_string(), &at[1].round().to_string()]);
+        sleep(Duration::from_millis(300));
+        self.xdotool(&["click", "1"]);
+    }
+
+    /// Keeps a picture of the window if that was asked for.
+    fn shot(&self, name: &str) {
+        if let Some(folder) = std::env::var_os("RIGSMITH_SHOTS") {
+            let path = PathBuf::from(folder).join(format!("{name}.png"));
+            let _ =
+                Command::new("import").args(["-window", "root"]).arg(path).env("DISPLAY", &self.display.name).status();
+        }
+    }
+}
+
+fn there(tool: &str) -> bool {
+    Command::new(tool).arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok()
+}
+
+/// What is missing to drive a window.
+fn missing() -> Option<&'static str> {
+    if cfg!(not(target_os = "linux")) {
+        Some("windows are driven on Linux only")
+    } else if !there("Xvfb") {
+        Some("Xvfb is not installed")
+    } else if !there("xdotool") {
+        Some("xdotool is not installed")
+    } else if adapter().is_none() {
+        Some("there is no graphics adapter, not even a software one")
+    } else {
+        None
+    }
+}
+
+/// A mesh and the places of joints that strokes are drawn along: pelvis, head, shoulder, elbow, hand, hip, knee, ankle.
+fn subject(folder: &Path) -> (PathBuf, [[f32; 3]; 8]) {
+    let data = std::env::var_os("RIGSMITH_DATA").map(|data| Path::new(&data).join("bodies/female_young"));
+    if let Some(body) = data.filter(|body| body.join("joints.json").exists()) {
+        let text = std::fs::read_to_string(body.join("joints.json")).unwrap();
+        let all: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let at = |name: &str| [0, 1, 2].map(|i| all["game_engine"][name]["head"][i].as_f64().unwrap() as f32);
+        let names = ["pelvis", "head", "upperarm_l", "lowerarm_l", "hand_l", "thigh_l", "calf_l", "foot_l"];
+        return (body.join("body.obj"), names.map(at));
+    }
+    println!("RIGSMITH_DATA is not set: the bundled character stands in for the body");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models");
+    let text = std::fs::read_to_string(root.join("biped.rig")).unwrap();
+    let at = |name: &str| {
+        let line = text.lines().find(|line| line.split_whitespace().nth(6) == Some(name)).unwrap();
+        let words: Vec<&str> = line.split_whitespace().collect();
+        [3, 4, 5].map(|i| words[i].parse().unwrap())
+    };
+    let copy = folder.join("biped.obj");
+    std::fs::copy(root.join("biped.obj"), &copy).unwrap();
+    let names = ["hips", "head", "upper_arm_l", "forearm_l", "hand_l", "thigh_l", "shin_l", "foot_l"];
+    (copy, names.map(at))
+}
+
+/// Pixels of a place in an orthographic view, from where the corners of the unit cube appear.
+fn pixel(report: &WindowReport, place: [f32; 3]) -> [f32; 2] {
+    let [origin, axes @ ..] = report.axes.map(|corner| corner.unwrap());
+    let mut at = origin;
+    for (axis, along) in axes.iter().zip(place) {
+        at[0] += (axis[0] - origin[0]) * along;
+        at[1] += (axis[1] - origin[1]) * along;
+    }
+    at
+}
+
+#[test]
+fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
+    if let Some(reason) = missing() {
+        let required = std::env::var("RIGSMITH_REQUIRE_GPU").is_ok_and(|value| value == "1");
+        assert!(!required, "RIGSMITH_REQUIRE_GPU=1, but {reason}");
+        println!("skipped: {reason}");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let display = Display::start().expect("Xvfb did not start");
+    let (mesh, [pelvis, head, shoulder, elbow, hand, hip, knee, ankle]) = subject(folder);
+
+    let hands = Hands::open(&display, folder, &mesh);
+    hands.shot("opened");
+    // The corners of the unit cube are rounded to whole pixels: a model one or two units high keeps that fine enough.
+    hands.key("1");
+    hands.key("5");
+    let aim = hands.until("the view is flat", |report| {
+        report.axes[3].is_some() && report.axes[0].is_some() && report.axes[3] == report.axes[0]
+    });
+    let at = |place: [f32; 3]| pixel(&aim, place);
+
+    hands.key("m");
+    hands.key("s");
+    hands.until("strokes are drawn", |report| report.mode == "Stroke");
+    let strokes = [vec![pelvis, head], vec![shoulder, elbow, hand], vec![hip, knee, ankle]];
+    for (number, stroke) in strokes.iter().enumerate() {
+        let line: Vec<[f32; 2]> = stroke.iter().map(|place| at(*place)).collect();
+        hands.drag(&line);
+        sleep(Duration::from_millis(800));
+        hands.shot(&format!("stroke_{number}"));
+        hands.key("Return");
+        hands.until("the stroke is taken", |report| report.steps.len() == number + 1 && !report.busy);
+    }
+    let sketched = hands.until("there is a biped", |report| report.joints >= 12);
+    hands.shot("sketched");
+
+    hands.key("b");
+    hands.until("it is skinned", |report| report.skinned == 1 && !report.busy);
+    hands.shot("skinned");
+
+    hands.key("p");
+    hands.until("joints are posed", |report| report.mode == "Pose");
+    let nearest = |report: &WindowReport, to: [f32; 2]| {
+        let apart = |at: &[f32; 2]| (at[0] - to[0]).hypot(at[1] - to[1]);
+        report.places.values().copied().min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap()
+    };
+    let joint = nearest(&sketched, at(elbow));
+    hands.click(joint);
+    hands.until("a joint is selected", |report| report.selected == 1);
+    sleep(Duration::from_millis(500));
+    let ring = 90.0;
+    hands.drag(&[[joint[0] + ring, joint[1]], [joint[0] + 0.8 * ring, joint[1] - 0.6 * ring]]);
+    let posed = hands.until("the joint is turned", |report| report.posed > 0 && !report.busy);
+    hands.shot("posed");
+
+    let steps = posed.steps.len();
+    for _ in 0..steps {
+        hands.key("ctrl+z");
+    }
+    hands.until("everything is undone", |report| report.head == 0 && report.joints == 0);
+    for _ in 0..steps {
+        hands.key("ctrl+shift+z");
+    }
+    let again = hands.until("everything is done again", |report| report.head == steps && !report.busy);
+    assert_eq!((again.joints, again.skinned, again.posed), (posed.joints, posed.skinned, posed.posed));
+
+    let project = folder.join("work.rigsmith.ron");
+    hands.key("ctrl+s");
+    sleep(Duration::from_millis(800));
+    hands.key("ctrl+a");
+    hands.write(project.to_str().unwrap());
+    hands.shot("saving");
+    hands.key("Return");
+    let start = Instant::now();
+    while !project.exists() && start.elapsed() < PATIENCE {
+        sleep(Duration::from_millis(100));
+    }
+    assert_eq!(FileKind::of(&project), Some(FileKind::Project));
+    assert!(project.exists(), "nothing was saved");
+
+    // One more change that is not saved, and then the process is gone.
+    hands.key("q");
+    hands.until("joints are selected", |report| report.mode == "Select");
+    hands.key("shift+p");
+    hands.until("the pose is taken back", |report| report.posed == 0);
+    sleep(Duration::from_millis(300));
+    drop(hands);
+
+    let hands = Hands::open(&display, folder, &project);
+    sleep(Duration::from_millis(1500));
+    hands.shot("offered");
+    hands.key("Return");
+    let recovered = hands.until("the work is back", |report| {
+        report.posed == 0 && report.joints == posed.joints && report.skinned == 1 && !report.busy
+    });
+    assert_eq!(recovered.joints, posed.joints);
+
+    let character = folder.join("character.glb");
+    hands.key("ctrl+e");
+    sleep(Duration::from_millis(800));
+    hands.key("ctrl+a");
+    hands.write(character.to_str().unwrap());
+    hands.key("Return");
+    let start = Instant::now();
+    while !character.exists() && start.elapsed() < PATIENCE {
+        sleep(Duration::from_millis(100));
+    }
+    let bytes = std::fs::read(&character).expect("nothing was exported");
+    let file = gltf::Gltf::from_slice(&bytes).unwrap();
+    let skin = file.skins().next().expect("the character has no skin");
+    assert!(skin.joints().count() >= 12, "{} joints", skin.joints().count());
+    if let Some(exports) = std::env::var_os("RIGSMITH_EXPORTS") {
+        std::fs::write(Path::new(&exports).join("by_hand.glb"), &bytes).unwrap();
+    }
+    hands.shot("exported");
+}
