@@ -20,7 +20,7 @@ pub mod stroke;
 pub mod symmetry;
 pub mod weights;
 
-use bevy::{prelude::*, window::RequestRedraw};
+use bevy::prelude::*;
 
 use super::{
     actions::ActionRequest,
@@ -50,7 +50,6 @@ impl Plugin for ToolsPlugin {
             .add_message::<ToolPointer>()
             .add_message::<ActionRequest>()
             .add_message::<Notice>()
-            .add_message::<RequestRedraw>()
             .configure_sets(
                 Update,
                 (ToolSystems::Route, ToolSystems::Actions, ToolSystems::Tools).chain().before(RigSystems::Script),
@@ -58,7 +57,6 @@ impl Plugin for ToolsPlugin {
             .configure_sets(PostUpdate, ToolSystems::Show.after(RigSystems::Surface).before(DrawingSystems))
             .add_systems(Update, route.in_set(ToolSystems::Route))
             .add_systems(PostUpdate, give_wheel.in_set(ToolSystems::Show).after(stroke::show))
-            .add_systems(PostUpdate, redraw.after(ToolSystems::Show))
             .add_plugins((
                 actions::ToolActionsPlugin,
                 symmetry::SymmetryPlugin,
@@ -159,25 +157,4 @@ fn give_wheel(
         _ => false,
     };
     wheel.set_if_neq(if wanted { WheelUse::Tool } else { WheelUse::Zoom });
-}
-
-/// Asks for another frame while a tool waits for something in the background, and when it has something else to say: a
-/// window sleeps otherwise.
-fn redraw(
-    scene: scene::Scene,
-    place: Res<place::PlaceTool>,
-    stroke: Res<stroke::StrokeTool>,
-    status: Res<StatusLine>,
-    ghosts: Res<Ghosts>,
-    mut redraw: MessageWriter<RequestRedraw>,
-) {
-    let follows = matches!(&stroke.state, stroke::StrokeState::Preview(preview) if preview.is_followed());
-    let prepares = scene.rig().is_some_and(|rig| {
-        let surface = rig.surface.as_ref();
-        rig.has_mesh && surface.is_none_or(|surface| surface.ready().is_none() || surface.is_stale())
-    });
-    let says = status.is_changed() || ghosts.is_changed() || place.is_changed() || stroke.is_changed();
-    if follows || prepares || says {
-        redraw.write(RequestRedraw);
-    }
 }

@@ -13,7 +13,7 @@ use crate::{
         actions::{Action, ActionRequest},
         mode::Mode,
         notice::{Notice, StatusLine},
-        pointer::PointerAct,
+        pointer::{PointerAct, ViewportArea},
     },
     mesh::ray::Ray,
     plugins::{
@@ -264,7 +264,13 @@ fn drag_span(tool: &PlaceTool, sight: &Sight) -> Option<f32> {
 }
 
 /// Keeps the ghost and the status line true.
-pub(super) fn show(mut tool: ResMut<PlaceTool>, mode: Res<Mode>, scene: Scene, mut status: ResMut<StatusLine>) {
+pub(super) fn show(
+    mut tool: ResMut<PlaceTool>,
+    mode: Res<Mode>,
+    area: Res<ViewportArea>,
+    scene: Scene,
+    mut status: ResMut<StatusLine>,
+) {
     let is_on = *mode == Mode::Place || tool.press.is_some();
     if !is_on {
         if tool.ghost.is_some() || tool.pointer.is_some() {
@@ -276,11 +282,13 @@ pub(super) fn show(mut tool: ResMut<PlaceTool>, mode: Res<Mode>, scene: Scene, m
     if !(tool.is_changed() || mode.is_changed() || scene.is_changed()) {
         return;
     }
-    let at = tool.press.map(|press| press.at).or(tool.pointer).filter(|_| !tool.picks);
+    // The mode may have come by a key, under a pointer that rests.
+    let pointer = tool.pointer.or(area.pointer);
+    let at = tool.press.map(|press| press.at).or(pointer).filter(|_| !tool.picks);
     let found = match (scene.rig(), scene.sight(), at) {
-        (None, ..) | (_, None, _) => Some(Err(PlaceObstacle::NoRig)),
+        (None, ..) => Some(Err(PlaceObstacle::NoRig)),
         (Some(rig), Some(sight), Some(at)) => Some(ghost_at(&scene, &rig, &sight, at, tool.settings)),
-        (Some(_), Some(_), None) => None,
+        _ => None,
     };
     let ghost = found.and_then(Result::ok);
     if tool.ghost != ghost {

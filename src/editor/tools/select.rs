@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 
 use super::{
-    Tool, ToolPointer, ToolSystems,
+    GizmoHover, Tool, ToolPointer, ToolSystems,
     scene::{EditedRig, Scene, joints},
 };
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
         mode::Mode,
         notice::StatusLine,
         panel::{PanelApp, ViewportPainter},
-        pointer::{Held, PointerAct},
+        pointer::{Held, PointerAct, ViewportArea},
     },
     plugins::{
         document::Hovered,
@@ -77,6 +77,7 @@ pub(super) fn select(
     mut shown: ResMut<SelectTool>,
     mut pointers: MessageReader<ToolPointer>,
     scene: Scene,
+    (mode, area, gizmo): (Res<Mode>, Res<ViewportArea>, Res<GizmoHover>),
     hovered: Query<&Hovered>,
     mut picks: MessageWriter<PickRequest>,
     mut hovers: MessageWriter<HoverRequest>,
@@ -110,7 +111,9 @@ pub(super) fn select(
             PointerAct::Moved | PointerAct::Wheel(_) => {}
         }
     }
-    let at = tool.pointer.filter(|_| tool.press.is_none());
+    // The mode may have come by a key, under a pointer that rests.
+    let resting = area.pointer.filter(|_| Tool::of(*mode) == Tool::Select && !gizmo.0);
+    let at = tool.pointer.or(resting).filter(|_| tool.press.is_none());
     let asked = at.map(|at| (rig.entity, sight, at));
     if asked != tool.asked {
         // Nothing is asked for again and again where the pointer is not this tool's: another may have asked.

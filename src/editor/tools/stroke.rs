@@ -78,7 +78,7 @@ impl Default for StrokeTool {
 impl StrokeTool {
     /// True while a stroke is being followed in the background.
     pub fn is_busy(&self) -> bool {
-        matches!(&self.state, StrokeState::Preview(preview) if preview.plan.is_none())
+        matches!(&self.state, StrokeState::Preview(preview) if preview.is_followed() || preview.plan.is_none())
     }
 }
 
@@ -225,7 +225,7 @@ fn draw(
     }
     if *mode != Mode::Stroke && matches!(tool.state, StrokeState::Preview(_)) {
         take(&mut tool, &mut out.strokes);
-        out.notices.write(Notice::info("The stroke was taken as you left its mode; Ctrl+Z takes it back."));
+        out.notices.write(Notice::info("The stroke was accepted as you left its mode; Ctrl+Z takes it back."));
     }
     for change in tunes.read() {
         tune(&mut tool, *change, scene.rig());
@@ -476,12 +476,9 @@ fn describe(
 }
 
 fn describe_preview(preview: &StrokePreview, rig: &EditedRig) -> (String, Option<String>) {
-    let keys = "Wheel: more or fewer. Enter takes it, Esc drops it.";
+    let keys = "Wheel: more or fewer. Enter accepts, Esc cancels.";
     let Some(StrokePlan::Ready { operation, result }) = &preview.plan else {
-        return (
-            "The stroke is being followed through the mesh\u{2026} Enter takes it, Esc drops it.".to_owned(),
-            None,
-        );
+        return ("The stroke is being followed through the mesh\u{2026} Enter accepts, Esc cancels.".to_owned(), None);
     };
     match result {
         StrokeResult::Chain { chain, parent, why } => {

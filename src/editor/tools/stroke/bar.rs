@@ -1,4 +1,4 @@
-//! The bar under a previewed stroke: how many joints, how far it may stray, take it or drop it.
+//! The bar under a previewed stroke: how many joints, how far it may stray, accept or cancel.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -34,8 +34,9 @@ impl ViewportPainter for StrokeBar {
         });
         egui::Area::new(egui::Id::new("stroke bar"))
             .order(egui::Order::Middle)
-            .pivot(egui::Align2::CENTER_BOTTOM)
-            .fixed_pos(area.center_bottom() - egui::vec2(0.0, 14.0))
+            // In a corner, where it hides no limb.
+            .pivot(egui::Align2::LEFT_BOTTOM)
+            .fixed_pos(area.left_bottom() + egui::vec2(12.0, -12.0))
             .constrain_to(area)
             .show(ui.ctx(), |ui| {
                 egui::Frame::popup(ui.style()).show(ui, |ui| {
@@ -76,10 +77,10 @@ fn contents(ui: &mut egui::Ui, preview: &StrokePreview, size: f32, requests: &mu
         }
     }
     ui.separator();
-    if ui.button("Take").on_hover_text("Enter").clicked() {
+    if ui.button("Accept").on_hover_text("Enter").clicked() {
         requests.send(ActionRequest(Action::Accept));
     }
-    if ui.button("Drop").on_hover_text("Esc").clicked() {
+    if ui.button("Cancel").on_hover_text("Esc").clicked() {
         requests.send(ActionRequest(Action::Cancel));
     }
 }
