@@ -1,6 +1,7 @@
 //! Placing: a ghost shows where the joint would go, a click puts it exactly there.
 
 use bevy::prelude::*;
+use bevy_egui::egui;
 
 use super::{
     Tool, ToolPointer, ToolSystems,
@@ -11,8 +12,10 @@ use crate::{
     algo::placement::{PlaceSettings, Placement, place_hits},
     editor::{
         actions::{Action, ActionRequest},
+        camera::ViewportSight,
         mode::Mode,
         notice::{Notice, StatusLine},
+        panel::{PanelApp, ViewportPainter},
         pointer::{PointerAct, ViewportArea},
     },
     mesh::ray::Ray,
@@ -31,7 +34,8 @@ impl Plugin for PlacePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<PlaceTool>()
             .add_systems(Update, place.in_set(ToolSystems::Tools).after(select::select))
-            .add_systems(PostUpdate, show.in_set(ToolSystems::Show).after(select::say));
+            .add_systems(PostUpdate, show.in_set(ToolSystems::Show).after(select::say))
+            .add_painter(DepthPainter);
     }
 }
 
@@ -323,5 +327,36 @@ fn describe(ghost: &PlaceGhost, rig: &EditedRig, settings: PlaceSettings) -> Str
         }
         Placement::Between { .. } => format!("{what}. Wheel, or drag up and down: depth ({depth} %)."),
         _ => format!("{what}, on the surface: the mesh has no other side here."),
+    }
+}
+
+/// Writes depth and volume beside the ghost where they are not as usual.
+struct DepthPainter;
+
+impl ViewportPainter for DepthPainter {
+    fn paint(&mut self, painter: &egui::Painter, area: egui::Rect, world: &World) {
+        let Some(tool) = world.get_resource::<PlaceTool>() else { return };
+        let Some(ghost) = tool.ghost else { return };
+        let sight = world.get_resource::<ViewportSight>().and_then(|sight| sight.0);
+        let Some(at) = sight.and_then(|sight| sight.project(ghost.position)) else { return };
+        let Placement::Between { volume, volumes, .. } = ghost.placement else { return };
+        let mut words = Vec::new();
+        match volume {
+            None if volumes > 1 => words.push(format!("{volumes} volumes: Tab")),
+            Some(number) if volumes > 1 => words.push(format!("volume {number} of {volumes}")),
+            _ => {}
+        }
+        if tool.settings.depth != 0.5 {
+            words.push(format!("depth {:.0} %", 100.0 * tool.settings.depth()));
+        }
+        if words.is_empty() {
+            return;
+        }
+        let color = egui::Color32::from_rgb(236, 238, 242);
+        let text = painter.layout_no_wrap(words.join(", "), egui::FontId::proportional(13.0), color);
+        let corner = area.min + egui::vec2(at.x + 16.0, at.y - 14.0 - text.size().y);
+        let back = egui::Rect::from_min_size(corner, text.size()).expand2(egui::vec2(5.0, 2.0));
+        painter.rect_filled(back, 3.0, egui::Color32::from_black_alpha(170));
+        painter.galley(corner, text, color);
     }
 }

@@ -84,7 +84,7 @@ impl Scene<'_, '_> {
 }
 
 impl EditedRig<'_> {
-    /// A joint's name for people: its label, or the end of its uid.
+    /// A joint's name for people: its label, or the first digits of its uid.
     pub fn name(&self, joint: Uid) -> String {
         joint_name(&self.rig, joint)
     }
@@ -120,10 +120,10 @@ impl EditedRig<'_> {
     }
 }
 
-/// A joint's name for people: its label, or the end of its uid.
+/// A joint's name for people: its label, or the first digits of its uid.
 pub fn joint_name(rig: &Rig, joint: Uid) -> String {
     let label = rig.joint(joint).and_then(|joint| joint.data.label.clone());
-    label.unwrap_or_else(|| format!("joint {:04x}", joint.0 & 0xffff))
+    label.unwrap_or_else(|| format!("joint {:04x}", joint.0 >> 48))
 }
 
 /// `1 joint`, `2 joints`.
