@@ -196,6 +196,18 @@ fn a_field_is_one_step() {
     assert_eq!(desk.steps().0, before + 1, "a drag of many pixels");
     assert!(desk.rig().position(joints[2]).distance(child) < 1e-5, "children stay");
 
+    // The rig shows it before it is let go, and Escape takes it back.
+    let steps = desk.steps();
+    desk.time += 1.0;
+    desk.press(at);
+    desk.move_to(at + egui::vec2(20.0, 0.0));
+    desk.move_to(at + egui::vec2(60.0, 0.0));
+    assert!((desk.rig().position(joints[1]).x - x).abs() > 0.01);
+    assert_eq!(desk.steps(), steps);
+    desk.key(Key::Escape);
+    desk.release(at);
+    assert_eq!((desk.rig().position(joints[1]).x, desk.steps()), (x, steps));
+
     let typed = [
         ("Position Y", "1.25", 1.25),
         ("Local position Z", "-0,5", -0.5),
@@ -431,7 +443,7 @@ fn toasts_are_few_and_errors_stay() {
 #[test]
 fn symbols_are_in_the_fonts() {
     let ctx = egui::Context::default();
-    let _ = ctx.run_ui(egui::RawInput::default(), |_| {});
+    ctx.run_ui(egui::RawInput::default(), |_| {}).textures_delta.clear();
     let missing: Vec<char> = "✖⏷⏵📋🗑✏🔒ℹ✔⚠⮪⮫×°…"
         .chars()
         .filter(|c| !ctx.fonts_mut(|fonts| fonts.has_glyph(&egui::FontId::proportional(13.0), *c)))

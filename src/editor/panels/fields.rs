@@ -80,10 +80,31 @@ pub(super) fn rename(ui: &mut Ui, rect: Rect, id: Id, said: &str, text: &mut Str
     }
 }
 
-/// Numbers while they are dragged: the rig gets the last one, as one step.
+/// Numbers while they are dragged: the rig shows them, and takes the last one as one step.
 #[derive(Default)]
 pub(super) struct Numbers {
-    dragged: Option<(Id, f64)>,
+    dragged: Option<Dragged>,
+}
+
+/// The number that is being dragged.
+#[derive(Debug, Clone, Copy)]
+struct Dragged {
+    id: Id,
+    from: f64,
+    value: f64,
+}
+
+/// What is done to a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum NumberEdit {
+    /// Typed.
+    Set(f32),
+    /// Dragged so far.
+    Preview(f32),
+    /// Let go after a drag.
+    Commit,
+    /// Dragged, and not meant.
+    Cancel,
 }
 
 /// How a number is shown and dragged.
@@ -96,11 +117,17 @@ pub(super) struct Look {
 }
 
 impl Numbers {
-    /// Three fields, X, Y and Z, beside each other or below each other where it is narrow. Returns the axis and the
-    /// number once one is committed.
-    pub fn vector(&mut self, ui: &mut Ui, name: &str, shown: [Shared<f32>; 3], look: Look) -> Option<(usize, f32)> {
+    /// Three fields, X, Y and Z, beside each other or below each other where it is narrow. Returns the axis and what is
+    /// done to it.
+    pub fn vector(
+        &mut self,
+        ui: &mut Ui,
+        name: &str,
+        shown: [Shared<f32>; 3],
+        look: Look,
+    ) -> Option<(usize, NumberEdit)> {
         ui.label(name);
-        let mut committed = None;
+        let mut edited = None;
         let narrow = ui.available_width() < 170.0;
         let height = ui.spacing().interact_size.y;
         let mut fields = |ui: &mut Ui| {
@@ -109,8 +136,8 @@ impl Numbers {
             for (axis, (letter, color)) in AXES.into_iter().enumerate() {
                 let prefix = RichText::new(format!("{letter} ")).color(color);
                 let said = format!("{name} {letter}");
-                if let Some(number) = self.field(ui, &said, prefix, shown[axis], look, vec2(width, height)) {
-                    committed = Some((axis, number));
+                if let Some(edit) = self.field(ui, &said, prefix, shown[axis], look, vec2(width, height)) {
+                    edited = Some((axis, edit));
                 }
             }
         };
@@ -120,10 +147,10 @@ impl Numbers {
             ui.horizontal(|ui| fields(ui))
         };
         ui.add_space(2.0);
-        committed
+        edited
     }
 
-    /// One field; the number once it is committed: typed, or let go after a drag. Escape drops it.
+    /// One field. Escape drops what is typed or dragged.
     fn field(
         &mut self,
         ui: &mut Ui,
@@ -132,10 +159,10 @@ impl Numbers {
         shown: Shared<f32>,
         look: Look,
         size: egui::Vec2,
-    ) -> Option<f32> {
+    ) -> Option<NumberEdit> {
         let id = ui.id().with(said);
-        let dragged = self.dragged.filter(|(other, _)| *other == id).map(|(_, value)| value);
-        let mut value = dragged.unwrap_or(f64::from(shown.value));
+        let dragged = self.dragged.filter(|dragged| dragged.id == id);
+        let mut value = dragged.map_or(f64::from(shown.value), |dragged| dragged.value);
         let typed: Cell<Option<f64>> = Cell::new(None);
         let mixed = shown.mixed && dragged.is_none();
         let field = DragValue::new(&mut value)
@@ -153,22 +180,19 @@ impl Numbers {
         let response = ui.push_id(said, |ui| ui.add_sized(size, field)).inner;
         ui.ctx().accesskit_node_builder(response.id, |node| node.set_label(said));
         let escaped = ui.input(|input| input.key_pressed(Key::Escape));
-        let number = if response.drag_stopped() {
-            self.dragged.take().map(|(_, value)| value).filter(|_| !escaped)
-        } else if response.dragged() {
-            if response.changed() || dragged.is_some() {
-                self.dragged = Some((id, value));
-            }
-            None
-        } else if dragged.is_some() {
-            // Something else took the pointer.
+        if response.dragged() && response.changed() && value.is_finite() {
+            let from = dragged.map_or(f64::from(shown.value), |dragged| dragged.from);
+            self.dragged = Some(Dragged { id, from, value });
+            return Some(NumberEdit::Preview(value as f32));
+        }
+        if let Some(Dragged { from, value, .. }) = dragged.filter(|_| !response.dragged()) {
             self.dragged = None;
-            None
-        } else {
-            typed.get().or(response.changed().then_some(value))
-        };
-        let number = number.map(|number| number as f32).filter(|number| number.is_finite())?;
-        (shown.mixed || number != shown.value).then_some(number)
+            // Escape, or something else took the pointer, or it is back where it was.
+            let dropped = escaped || !response.drag_stopped() || value == from;
+            return Some(if dropped { NumberEdit::Cancel } else { NumberEdit::Commit });
+        }
+        let number = typed.get().or(response.changed().then_some(value))? as f32;
+        (number.is_finite() && (shown.mixed || number != shown.value)).then_some(NumberEdit::Set(number))
     }
 }
 

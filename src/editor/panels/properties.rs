@@ -1,6 +1,6 @@
 //! The selected joints: label, group, rest pose, weights' lock. Several at once where they have a field in common.
 //!
-//! A field that is typed or dragged is one step of the history: it reaches the rig when it is left or let go.
+//! A field that is typed or dragged is one step of the history. The rig shows a number while it is dragged.
 
 mod values;
 
@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Checkbox, ComboBox, Key, ScrollArea, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use super::{
-    fields::{Look, MIXED, Numbers, Shared, labelled, short},
+    fields::{Look, MIXED, NumberEdit, Numbers, Shared, labelled, short},
     groups, list,
     shown::{Shown, color},
 };
@@ -19,7 +19,7 @@ use crate::{
         settings::EditorSettings,
     },
     plugins::{
-        document::EditRequest,
+        document::{Change, EditRequest},
         picking::{Pick, PickRequest},
     },
     rig::{NodeKind, Uid, operations::Operation},
@@ -226,8 +226,8 @@ impl PropertiesPanel {
         });
         let mut edit = None;
         for (part, name, look) in if posing { &pose[..] } else { &rest[..] } {
-            if let Some((axis, number)) = self.numbers.vector(ui, name, self.values.vector(*part), *look) {
-                edit = Some((*part, axis, number));
+            if let Some((axis, done)) = self.numbers.vector(ui, name, self.values.vector(*part), *look) {
+                edit = Some((*part, axis, done));
             }
         }
         if posing {
@@ -239,11 +239,15 @@ impl PropertiesPanel {
             labelled(ui, "Bone length", |ui| ui.add(egui::Label::new(lengths(&self.values.lengths)).truncate()));
         }
         let with_children = world.get_resource::<EditorSettings>().is_some_and(|settings| settings.move_children);
-        if let Some((part, axis, number)) = edit
-            && let Some(operation) = self.values.set(&shown.rig, part, axis, number, with_children)
-        {
-            self.send(operation, shown, requests);
-        }
+        let Some((part, axis, edit)) = edit else { return };
+        let mut to = |number| self.values.set(&shown.rig, part, axis, number, with_children);
+        let change = match edit {
+            NumberEdit::Set(number) => Change::Do(to(number)),
+            NumberEdit::Preview(number) => Change::Preview(to(number)),
+            NumberEdit::Commit => Change::Commit,
+            NumberEdit::Cancel => Change::CancelPreview,
+        };
+        requests.send(EditRequest { rig: shown.entity, change });
     }
 }
 

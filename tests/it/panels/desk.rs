@@ -94,11 +94,12 @@ impl Desk {
         let mut requests = Requests::default();
         let (sheet, world) = (&mut self.sheet, self.app.world());
         let started = std::time::Instant::now();
-        let output = self.ctx.run_ui(input, |ui| match sheet {
+        let mut output = self.ctx.run_ui(input, |ui| match sheet {
             Sheet::Panel(panel) => panel.show(ui, world, &mut requests),
             Sheet::Overlay(overlay) => overlay.show(&ui.ctx().clone(), world, &mut requests),
         });
         self.drawing = started.elapsed();
+        output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {
             self.seen = update.nodes.iter().filter_map(|(_, node)| seen(node)).collect();
         }

@@ -125,7 +125,7 @@ impl Values {
     }
 
     /// The operation that gives all selected joints a number on an axis of one of their vectors.
-    pub fn set(&mut self, rig: &Rig, part: Part, axis: usize, number: f32, with_children: bool) -> Option<Operation> {
+    pub fn set(&mut self, rig: &Rig, part: Part, axis: usize, number: f32, with_children: bool) -> Operation {
         let joints: Vec<&JointData> =
             self.joints.iter().filter_map(|uid| rig.joint(*uid)).map(|joint| &joint.data).collect();
         let changed = |joint: &JointData| {
@@ -143,7 +143,7 @@ impl Values {
             _ => {}
         }
         let pairs = joints.into_iter().zip(to);
-        Some(match part {
+        match part {
             Part::Position => Operation::Move { to: pairs.map(|(_, to)| to).collect(), with_children },
             Part::Local | Part::Rotation | Part::Scale => {
                 let rest = |(joint, (uid, to)): (&JointData, (Uid, Vec3))| {
@@ -169,7 +169,7 @@ impl Values {
                 };
                 Operation::Pose(pairs.map(offset).collect())
             }
-        })
+        }
     }
 
     /// How far a pixel of a drag goes, in model units.
