@@ -40,6 +40,9 @@ const EDGE: f32 = 0.5;
 /// How much of the volume, in depth, lies between a joint and either side of it at least.
 const MARGIN: f32 = 0.15;
 
+/// The fewest joints of a [limb](ChainChoice::Limb).
+const LIMB_JOINTS: usize = 3;
+
 /// How a stroke is placed in depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrokeSettings {
@@ -64,6 +67,9 @@ pub enum ChainChoice {
     /// Joints wherever the stroke strays further than this from the line between two neighbours; model units on the
     /// view plane. Zero, negative or NaN makes a joint of every point of the stroke.
     Threshold(f32),
+    /// As [`ChainChoice::Threshold`], but never fewer than three joints: a limb that is drawn straight has a joint to bend
+    /// at all the same, where it fits the limb best.
+    Limb(f32),
     /// Exactly this many joints, where they fit the stroke and the limb best; fewer than two count as two, more than
     /// [`MAX_JOINTS`] as that many.
     Joints(usize),
@@ -193,6 +199,11 @@ impl StrokeSamples {
     pub fn chain(&self, surface: &Surface, choice: ChainChoice) -> StrokeChain {
         let places = match choice {
             ChainChoice::Threshold(threshold) => split::by_threshold(&self.path, threshold),
+            ChainChoice::Limb(threshold) => {
+                let strays = split::by_threshold(&self.path, threshold);
+                let straight = strays.len() < LIMB_JOINTS;
+                if straight { corners::choose(&self.track, self.axis.as_ref(), LIMB_JOINTS) } else { strays }
+            }
             ChainChoice::Joints(count) => corners::choose(&self.track, self.axis.as_ref(), count.clamp(2, MAX_JOINTS)),
         };
         let [first, last] = self.track.covered();

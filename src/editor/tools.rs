@@ -29,10 +29,7 @@ use super::{
     notice::{Notice, StatusLine},
     pointer::{PointerAct, ViewportArea, ViewportPointer, WheelUse},
 };
-use crate::plugins::{
-    RigSystems,
-    drawing::{DrawingSystems, Ghosts},
-};
+use crate::plugins::{RigSystems, drawing::DrawingSystems};
 
 /// Adds the tools for selecting and sketching.
 pub struct ToolsPlugin;

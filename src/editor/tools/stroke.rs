@@ -157,7 +157,7 @@ fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequ
         rig: rig.entity,
         plane: sight.plane,
         points: vec![sight.point(at)],
-        choice: ChainChoice::Threshold(threshold * rig.size()),
+        choice: ChainChoice::Limb(threshold * rig.size()),
         settings: StrokeSettings::default(),
         chain_only: false,
         reach: REACH * sight.pixel,
@@ -337,7 +337,7 @@ fn wheel(tool: &mut ResMut<StrokeTool>, notches: f32) {
     let StrokeState::Preview(preview) = &mut tool.state else { return };
     let count = match preview.request.choice {
         ChainChoice::Joints(count) => count,
-        ChainChoice::Threshold(_) => preview.chain().map_or(2, |chain| chain.joints.len()),
+        ChainChoice::Threshold(_) | ChainChoice::Limb(_) => preview.chain().map_or(2, |chain| chain.joints.len()),
     };
     preview.turned += notches;
     let steps = preview.turned.trunc();

@@ -50,7 +50,7 @@ fn contents(ui: &mut egui::Ui, preview: &StrokePreview, size: f32, requests: &mu
     let chain = preview.chain();
     let mut count = match preview.request.choice {
         ChainChoice::Joints(count) => count,
-        ChainChoice::Threshold(_) => chain.map_or(2, |chain| chain.joints.len()),
+        ChainChoice::Threshold(_) | ChainChoice::Limb(_) => chain.map_or(2, |chain| chain.joints.len()),
     };
     let most = MOST.max(count);
     let drag = egui::DragValue::new(&mut count).range(2..=most).speed(0.05).suffix(" joints");
@@ -59,7 +59,7 @@ fn contents(ui: &mut egui::Ui, preview: &StrokePreview, size: f32, requests: &mu
     }
     ui.separator();
     let mut share = match preview.request.choice {
-        ChainChoice::Threshold(threshold) => 100.0 * threshold / size,
+        ChainChoice::Threshold(threshold) | ChainChoice::Limb(threshold) => 100.0 * threshold / size,
         ChainChoice::Joints(_) => 2.0,
     };
     let slider =
