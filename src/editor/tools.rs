@@ -5,6 +5,7 @@
 //! | [`select`] | all but Place and Stroke | picks joints, a box of joints, a hierarchy |
 //! | [`place`] | Place | shows where a joint would go, and puts it there |
 //! | [`stroke`] | Stroke | draws, previews, accepts |
+//! | [`transform`] | Move, Rotate, Scale, Pose | drags the handles of a [`gizmo`] |
 //! | [`weights`] | Weights | shows what the selected joint moves |
 //! | [`symmetry`] | all | the plane of live mirroring |
 //!
@@ -13,11 +14,14 @@
 
 pub mod actions;
 pub mod ghosts;
+pub mod gizmo;
 pub mod place;
+pub mod pose;
 pub mod scene;
 pub mod select;
 pub mod stroke;
 pub mod symmetry;
+pub mod transform;
 pub mod weights;
 
 use bevy::prelude::*;
@@ -61,6 +65,7 @@ impl Plugin for ToolsPlugin {
                 place::PlacePlugin,
                 stroke::StrokeToolPlugin,
                 weights::WeightsPlugin,
+                transform::TransformPlugin,
                 ghosts::GhostsPlugin,
             ));
     }

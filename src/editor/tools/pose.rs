@@ -1,0 +1,78 @@
+//! Posing with gizmos: what a turn or a movement in the rig's space is as offsets from rest.
+
+use bevy::{
+    math::{Affine3, Quat, Vec3},
+    prelude::*,
+};
+
+use super::gizmo::Delta;
+use crate::rig::{PoseOffset, RestTransform, Rig, Uid};
+
+/// A joint as it was posed when a drag began.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PosedJoint {
+    /// The joint.
+    pub joint: Uid,
+    rest: RestTransform,
+    offset: PoseOffset,
+    /// From the parent's space to the rig's, as posed.
+    parent: Affine3,
+    /// Its own axes in the rig's space, as posed.
+    axes: [Vec3; 3],
+    /// True if a joint above it is dragged, too, and takes it along.
+    carried: bool,
+}
+
+impl PosedJoint {
+    /// Joints as they are posed now. Joints that are not in the rig are left out.
+    pub fn gather(rig: &Rig, joints: &[Uid]) -> Vec<Self> {
+        let posed = |&joint: &Uid| {
+            let found = rig.joint(joint)?;
+            Some(Self {
+                joint,
+                rest: found.data.rest,
+                offset: rig.offset(joint).copied().unwrap_or_default(),
+                parent: found.parent.map_or(Affine3::IDENTITY, |parent| rig.posed_global(parent)),
+                axes: own_axes(&rig.posed_global(joint)),
+                carried: rig.ancestors(joint).any(|above| joints.contains(&above.data.uid)),
+            })
+        };
+        joints.iter().filter_map(posed).collect()
+    }
+
+    /// The offset that a drag gives it. Every joint turns about itself, about its own axis number `own` if there is one;
+    /// what hangs below a dragged joint is moved by it already.
+    pub fn dragged(&self, delta: &Delta, own: Option<usize>) -> PoseOffset {
+        match delta {
+            Delta::Turn { axis, angle } => {
+                let axis = own.map_or(*axis, |own| self.axes[own]);
+                PoseOffset { rotation: self.turned(axis, *angle), ..self.offset }
+            }
+            Delta::Move(by) if !self.carried => {
+                let turned = Affine3::from_scale_rotation_translation(self.rest.scale, self.rest.rotation, Vec3::ZERO);
+                let moved = (self.parent.matrix3 * turned.matrix3).inverse() * *by;
+                let translation = self.offset.translation + if moved.is_finite() { moved } else { Vec3::ZERO };
+                PoseOffset { translation, ..self.offset }
+            }
+            Delta::Move(_) | Delta::Scale(_) => self.offset,
+        }
+    }
+
+    fn turned(&self, axis: Vec3, angle: f32) -> Quat {
+        let linear = self.parent.matrix3;
+        // A parent turned inside out turns the other way round.
+        let angle = if linear.determinant() < 0.0 { -angle } else { angle };
+        let Some(axis) = (linear.inverse() * axis).try_normalize() else { return self.offset.rotation };
+        let local = (self.rest.rotation * self.offset.rotation).normalize();
+        (self.rest.rotation.inverse() * (Quat::from_axis_angle(axis, angle) * local)).normalize()
+    }
+}
+
+/// The axes of a transform: unit length, perpendicular, right-handed, the first one kept in its direction.
+pub fn own_axes(global: &Affine3) -> [Vec3; 3] {
+    let columns = global.matrix3;
+    let x = columns.x_axis.normalize_or(Vec3::X);
+    let aside = columns.y_axis - x * x.dot(columns.y_axis);
+    let y = aside.try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
+    [x, y, x.cross(y)]
+}

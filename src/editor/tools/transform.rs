@@ -1,0 +1,312 @@
+//! Moving, turning and scaling joints with the handles of a gizmo: the rest pose, or the pose.
+//!
+//! A drag only previews; the release makes it one step of the history, Escape takes it back to the bit. A press on a
+//! handle that does not become a drag is a click like any other: a handle never hides the next joint.
+
+mod aim;
+mod paint;
+mod show;
+
+use bevy::{prelude::*, window::RequestRedraw};
+
+pub use aim::Aim;
+
+use super::{
+    GizmoHover, PointerOwner, Tool, ToolPointer, ToolSystems,
+    gizmo::{Delta, GizmoDrag, Handle, HandleShape, handle_at},
+    place,
+    pose::PosedJoint,
+    scene::{EditedRig, Scene, joints},
+    select::REACH,
+};
+use crate::{
+    editor::{
+        actions::{Action, ActionRequest},
+        mode::Mode,
+        notice::StatusLine,
+        panel::PanelApp,
+        pointer::{Held, PointerAct, ViewportPointer},
+        settings::{EditorSettings, GizmoSpace},
+    },
+    plugins::{
+        document::{Change, EditRequest, Edited},
+        picking::{Pick, PickRequest},
+    },
+    rig::{
+        Uid,
+        operations::{MirrorPlane, Operation},
+    },
+};
+
+/// Adds gizmos for the modes Move, Rotate, Scale and Pose.
+pub struct TransformPlugin;
+
+impl Plugin for TransformPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<GizmoTool>()
+            .init_resource::<PoseMoves>()
+            .init_resource::<EditorSettings>()
+            .add_message::<RequestRedraw>()
+            .add_systems(Update, hover.before(ToolSystems::Route))
+            .add_systems(Update, drag.in_set(ToolSystems::Tools).after(place::place))
+            .add_systems(
+                PostUpdate,
+                (show::show_rest, show::show).chain().in_set(ToolSystems::Show).after(super::stroke::show),
+            )
+            .add_painter(paint::GizmoPainter);
+    }
+}
+
+/// What the gizmo is about.
+#[derive(Resource, Debug, Clone, PartialEq, Default)]
+pub struct GizmoTool {
+    /// Its handles on the screen, those painted first before the others.
+    pub shapes: Vec<HandleShape>,
+    /// The handle under the pointer.
+    pub hovered: Option<Handle>,
+    pointer: Option<Vec2>,
+    drag: Option<Drag>,
+    /// True while the banner is about a drag.
+    told: bool,
+}
+
+impl GizmoTool {
+    /// The handle that is being dragged.
+    pub fn dragged(&self) -> Option<Handle> {
+        self.drag.as_ref().map(|drag| drag.gizmo.handle)
+    }
+}
+
+/// True to have arrows beside the rings in Pose mode for every joint, not only for roots.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PoseMoves(pub bool);
+
+/// A press on a handle, and what became of it.
+#[derive(Debug, Clone, PartialEq)]
+struct Drag {
+    rig: Entity,
+    gizmo: GizmoDrag,
+    /// The joint's own axis that every joint turns about, for local rings in Pose mode.
+    own: Option<usize>,
+    name: String,
+    from: Start,
+}
+
+/// The dragged joints at the press.
+#[derive(Debug, Clone, PartialEq)]
+enum Start {
+    /// At rest, with their places.
+    Rest(Vec<(Uid, Vec3)>),
+    /// As posed.
+    Pose(Vec<PosedJoint>),
+}
+
+/// Step of movements while snapping, as a share of the model's height.
+const MOVE_STEP: f32 = 0.01;
+
+/// True for the modes that edit the rest pose with a gizmo.
+pub fn edits_rest(mode: Mode) -> bool {
+    matches!(mode, Mode::Move | Mode::Rotate | Mode::Scale)
+}
+
+/// Keeps [`GizmoHover`] true for the presses of this frame.
+fn hover(
+    mut pointers: MessageReader<ViewportPointer>,
+    mode: Res<Mode>,
+    settings: Res<EditorSettings>,
+    moves: Res<PoseMoves>,
+    owner: Res<PointerOwner>,
+    scene: Scene,
+    mut tool: ResMut<GizmoTool>,
+    mut hover: ResMut<GizmoHover>,
+) {
+    if pointers.is_empty() {
+        return;
+    }
+    let mut press = None;
+    let mut last = tool.pointer;
+    for pointer in pointers.read() {
+        last = (pointer.act != PointerAct::Left).then_some(pointer.at);
+        if pointer.act == PointerAct::Pressed && press.is_none() {
+            press = Some(pointer.at);
+        }
+    }
+    if tool.pointer != last {
+        tool.pointer = last;
+    }
+    if tool.drag.is_some() || owner.0.is_some() && press.is_none() {
+        return;
+    }
+    let aim = Aim::new(*mode, settings.gizmo_space, moves.0, &scene);
+    let shapes = aim.zip(scene.sight()).map(|(aim, sight)| aim.frame.shapes(aim.parts, &sight));
+    let handle = shapes.zip(press.or(last)).and_then(|(shapes, at)| handle_at(&shapes, at));
+    if tool.hovered != handle {
+        tool.hovered = handle;
+    }
+    hover.set_if_neq(GizmoHover(handle.is_some()));
+}
+
+fn drag(
+    mut pointers: MessageReader<ToolPointer>,
+    mut actions: MessageReader<ActionRequest>,
+    mut edited: MessageReader<Edited>,
+    (mode, settings, moves): (Res<Mode>, Res<EditorSettings>, Res<PoseMoves>),
+    scene: Scene,
+    mut tool: ResMut<GizmoTool>,
+    mut status: ResMut<StatusLine>,
+    mut edits: MessageWriter<EditRequest>,
+    mut picks: MessageWriter<PickRequest>,
+) {
+    let rig = scene.rig();
+    // What changed the rig meanwhile has taken the preview back; the drag began with another rig.
+    let overtaken: Vec<Entity> = edited.read().filter(|edit| edit.committed.is_some()).map(|edit| edit.rig).collect();
+    let cancelled = actions.read().filter(|action| action.0 == Action::Cancel).count() > 0;
+    if let Some(drag) = &tool.drag
+        && (cancelled || overtaken.contains(&drag.rig) || rig.as_ref().is_none_or(|rig| rig.entity != drag.rig))
+    {
+        edits.write(EditRequest { rig: drag.rig, change: Change::CancelPreview });
+        tool.drag = None;
+    }
+    let mut preview = None;
+    for ToolPointer { tool: who, pointer } in pointers.read() {
+        if *who != Tool::Gizmo {
+            continue;
+        }
+        match pointer.act {
+            PointerAct::Pressed => {
+                tool.drag = press(&scene, *mode, settings.gizmo_space, moves.0, pointer.at);
+            }
+            PointerAct::Dragged => {
+                let (Some(drag), Some(rig)) = (&mut tool.drag, &rig) else { continue };
+                drag.gizmo.to(pointer.at, snap(rig, pointer.held));
+                preview = Some(drag.preview(settings.move_children));
+            }
+            PointerAct::Released { dragged, .. } => {
+                let (Some(mut drag), Some(rig)) = (tool.drag.take(), &rig) else { continue };
+                let commit = if dragged {
+                    drag.gizmo.to(pointer.at, snap(rig, pointer.held));
+                    edits.write(EditRequest { rig: drag.rig, change: drag.preview(settings.move_children) });
+                    Change::Commit
+                } else {
+                    picks.write_batch(clicked(&scene, rig, pointer.at, pointer.held));
+                    Change::CancelPreview
+                };
+                edits.write(EditRequest { rig: drag.rig, change: commit });
+                preview = None;
+            }
+            PointerAct::Moved | PointerAct::Left | PointerAct::Wheel(_) => {}
+        }
+    }
+    if let (Some(change), Some(drag)) = (preview, &tool.drag) {
+        edits.write(EditRequest { rig: drag.rig, change });
+    }
+    let banner = tool.drag.as_ref().filter(|drag| !drag.gizmo.delta().is_none()).map(Drag::banner);
+    if (tool.told || banner.is_some()) && status.banner != banner {
+        tool.told = banner.is_some();
+        status.banner = banner;
+    }
+}
+
+/// A press on a handle.
+fn press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) -> Option<Drag> {
+    let (rig, sight) = (scene.rig()?, scene.sight()?);
+    let aim = Aim::new(mode, space, moves, scene)?;
+    let handle = handle_at(&aim.frame.shapes(aim.parts, &sight), at)?;
+    let name = match aim.joints.as_slice() {
+        [only] => rig.name(*only),
+        several => joints(several.len()),
+    };
+    let from = if mode == Mode::Pose {
+        Start::Pose(PosedJoint::gather(&rig.rig, &aim.joints))
+    } else {
+        Start::Rest(aim.joints.iter().map(|joint| (*joint, rig.rig.position(*joint))).collect())
+    };
+    let own = handle.axis().filter(|_| space == GizmoSpace::Local);
+    Some(Drag { rig: rig.entity, gizmo: GizmoDrag::new(handle, aim.frame, sight, at), own, name, from })
+}
+
+/// The step of movements while Control is held.
+fn snap(rig: &EditedRig, held: Held) -> Option<f32> {
+    let [low, high] = rig.bounds();
+    let height = if high.y > low.y { high.y - low.y } else { rig.size() };
+    held.control.then_some(height * MOVE_STEP)
+}
+
+/// What a click on a handle picks: a joint that is right there.
+fn clicked(scene: &Scene, rig: &EditedRig, at: Vec2, held: Held) -> Option<PickRequest> {
+    let sight = scene.sight()?;
+    let near = scene.posed(rig).into_iter().filter_map(|(joint, place)| {
+        let distance = sight.project(place)?.distance(at);
+        (distance <= REACH && rig.selection.active() != Some(joint)).then_some((joint, distance))
+    });
+    let (joint, _) = near.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let selected = &rig.selection.0;
+    let (what, add) = if held.control && selected.contains(&joint) {
+        (selected.iter().copied().filter(|other| *other != joint).collect(), false)
+    } else {
+        (vec![joint], held.shift || held.control)
+    };
+    Some(PickRequest { rig: rig.entity, what: Pick::Joints(what), add })
+}
+
+impl Drag {
+    /// The preview of what it has come to.
+    fn preview(&self, with_children: bool) -> Change {
+        let delta = self.gizmo.delta();
+        if delta.is_none() {
+            return Change::CancelPreview;
+        }
+        Change::Preview(match &self.from {
+            Start::Rest(places) => rest_operation(places, &self.gizmo, &delta, with_children),
+            Start::Pose(starts) => {
+                Operation::Pose(starts.iter().map(|start| (start.joint, start.dragged(&delta, self.own))).collect())
+            }
+        })
+    }
+
+    /// What moves and how far, in a few words.
+    fn banner(&self) -> String {
+        let name = &self.name;
+        match self.gizmo.delta() {
+            Delta::Move(by) => format!("Moving {name}: {:.2}, {:.2}, {:.2}", by.x, by.y, by.z),
+            Delta::Turn { angle, .. } => format!("Turning {name}: {:.1}°", angle.to_degrees()),
+            Delta::Scale(by) if by.x == by.y && by.y == by.z => format!("Scaling {name}: {:.2}", by.x),
+            Delta::Scale(by) => format!("Scaling {name}: {:.2}, {:.2}, {:.2}", by.x, by.y, by.z),
+        }
+    }
+}
+
+fn rest_operation(places: &[(Uid, Vec3)], gizmo: &GizmoDrag, delta: &Delta, with_children: bool) -> Operation {
+    let joints = places.iter().map(|(joint, _)| *joint).collect();
+    let pivot = Some(gizmo.frame.origin);
+    match *delta {
+        Delta::Move(by) => {
+            let to = places.iter().map(|(joint, place)| (*joint, *place + by)).collect();
+            Operation::Move { to, with_children }
+        }
+        Delta::Turn { axis, angle } => {
+            let rotation = Quat::from_axis_angle(axis, angle).normalize();
+            Operation::Rotate { joints, rotation, pivot, with_children }
+        }
+        Delta::Scale(scale) => {
+            let [x, y, z] = gizmo.frame.axes;
+            let is_even = scale.x == scale.y && scale.y == scale.z;
+            let axes = if is_even { Quat::IDENTITY } else { Quat::from_mat3(&Mat3::from_cols(x, y, z)).normalize() };
+            Operation::Scale { joints, scale, axes, pivot, with_children }
+        }
+    }
+}
+
+/// The selected joints that a gizmo moves: with live mirroring only one side, the active joint's; the other follows.
+fn one_side(rig: &EditedRig, plane: Option<&MirrorPlane>) -> Vec<Uid> {
+    let selected: Vec<Uid> = rig.selection.0.iter().copied().filter(|joint| rig.rig.joint(*joint).is_some()).collect();
+    let (Some(plane), Some(active)) = (plane, rig.selection.active()) else { return selected };
+    let side = |joint: Uid| plane.distance(rig.rig.position(joint));
+    let sign = if side(active) < -plane.tolerance { -1.0 } else { 1.0 };
+    let is_kept = |joint: &Uid| {
+        let partner = rig.rig.joint(*joint).and_then(|found| found.data.mirror);
+        partner.is_none_or(|partner| !selected.contains(&partner) || side(*joint) * sign > 0.0)
+    };
+    let kept: Vec<Uid> = selected.iter().copied().filter(is_kept).collect();
+    if kept.is_empty() { selected } else { kept }
+}

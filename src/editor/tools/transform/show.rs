@@ -1,0 +1,123 @@
+//! What the gizmo looks like now, and what the status line says of it.
+
+use bevy::{prelude::*, window::RequestRedraw};
+
+use super::{Aim, GizmoTool, PoseMoves, Start, edits_rest};
+use crate::{
+    editor::{
+        ActiveRig,
+        mode::Mode,
+        notice::StatusLine,
+        settings::EditorSettings,
+        tools::{
+            gizmo::{Handle, handle_at},
+            scene::{EditedRig, Scene, joints},
+        },
+    },
+    plugins::document::ShowRest,
+};
+
+/// Shows the rest pose for as long as it is edited.
+pub(super) fn show_rest(
+    mode: Res<Mode>,
+    tool: Res<GizmoTool>,
+    active: Option<Res<ActiveRig>>,
+    mut rigs: Query<(Entity, &mut ShowRest)>,
+    mut redraw: MessageWriter<RequestRedraw>,
+) {
+    let is_dragged = tool.drag.as_ref().map(|drag| matches!(drag.from, Start::Rest(_)));
+    let wanted = is_dragged.unwrap_or(edits_rest(*mode));
+    for (rig, mut show_rest) in &mut rigs {
+        let is_active = active.as_ref().is_some_and(|active| active.0 == rig);
+        if show_rest.set_if_neq(ShowRest(wanted && is_active)) {
+            // Joints follow in the next frame; without this it would come with the next movement of the pointer.
+            redraw.write(RequestRedraw);
+        }
+    }
+}
+
+/// Keeps handles and the status line true.
+pub(super) fn show(
+    mode: Res<Mode>,
+    settings: Res<EditorSettings>,
+    moves: Res<PoseMoves>,
+    scene: Scene,
+    mut tool: ResMut<GizmoTool>,
+    mut status: ResMut<StatusLine>,
+) {
+    let is_on = edits_rest(*mode) || *mode == Mode::Pose;
+    if !is_on {
+        if !tool.shapes.is_empty() || tool.hovered.is_some() {
+            tool.shapes = Vec::new();
+            tool.hovered = None;
+        }
+        return;
+    }
+    let is_stale = mode.is_changed() || settings.is_changed() || moves.is_changed() || scene.is_changed();
+    if !is_stale && !tool.is_changed() {
+        return;
+    }
+    let aim = Aim::new(*mode, settings.gizmo_space, moves.0, &scene);
+    let shapes = aim.as_ref().zip(scene.sight()).map(|(aim, sight)| aim.frame.shapes(aim.parts, &sight));
+    let shapes = shapes.unwrap_or_default();
+    let tool = tool.bypass_change_detection();
+    if tool.drag.is_none() {
+        tool.hovered = tool.pointer.and_then(|at| handle_at(&shapes, at));
+    }
+    tool.shapes = shapes;
+    let Some(rig) = scene.rig() else { return };
+    let handle = tool.dragged().or(tool.hovered);
+    let hint = match &aim {
+        Some(aim) => describe(&rig, *mode, aim, handle, &settings),
+        None if rig.rig.is_empty() => "There are no joints yet: press A to place one, S to draw a stroke.".to_owned(),
+        None => format!("Click a joint to {} it.", verb(*mode)),
+    };
+    let mut notes = Vec::new();
+    if edits_rest(*mode) && !rig.rig.pose().is_empty() {
+        notes.push("Rest pose: the pose is kept, and shown again in other modes.");
+    }
+    if *mode == Mode::Pose && rig.has_mesh && rig.rig.skins().next().is_none() {
+        notes.push("Not skinned yet, so the mesh stays: B skins.");
+    }
+    notes.push(&hint);
+    let hint = notes.join(" ");
+    let banner = status.banner.clone();
+    status.set_if_neq(StatusLine { hint, obstacle: None, banner });
+}
+
+fn verb(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Rotate => "turn",
+        Mode::Scale => "scale",
+        Mode::Pose => "pose",
+        _ => "move",
+    }
+}
+
+/// What a drag would do now.
+fn describe(rig: &EditedRig, mode: Mode, aim: &Aim, handle: Option<Handle>, settings: &EditorSettings) -> String {
+    let what = match aim.joints.as_slice() {
+        [only] => rig.name(*only),
+        several => joints(several.len()),
+    };
+    let axis = |number: usize| ["X", "Y", "Z"][number % 3];
+    let space = settings.gizmo_space.name().to_lowercase();
+    let drag = match handle {
+        Some(Handle::MoveAxis(number)) => format!("Drag moves {what} along {space} {}.", axis(number)),
+        Some(Handle::MovePlane(number)) => {
+            format!("Drag moves {what} along {space} {} and {}.", axis(number + 1), axis(number + 2))
+        }
+        Some(Handle::MoveView) => format!("Drag moves {what} as you see it; its depth stays."),
+        Some(Handle::Ring(number)) => format!("Drag turns {what} about {space} {}.", axis(number)),
+        Some(Handle::ViewRing) => format!("Drag turns {what} as you see it."),
+        Some(Handle::ScaleAxis(number)) => format!("Drag scales {what} along {space} {}.", axis(number)),
+        Some(Handle::ScaleAll) => format!("Drag right or up scales {what} evenly, left or down makes it smaller."),
+        None => format!("Drag a handle to {} {what} ({space} axes: V).", verb(mode)),
+    };
+    let children = match (mode, settings.move_children) {
+        (Mode::Pose, _) => "",
+        (_, true) => " What hangs below comes along (C).",
+        (_, false) => " What hangs below stays (C).",
+    };
+    format!("{drag} Ctrl: in steps.{children} Esc: as before.")
+}
