@@ -18,6 +18,8 @@ pub mod panel;
 pub mod panels;
 pub mod pointer;
 pub mod probe;
+pub mod recovery;
+pub mod render_errors;
 pub mod report;
 pub mod screen;
 pub mod settings;

@@ -141,6 +141,7 @@ impl Plugin for EditorPlugin {
             LabelsPlugin,
             ReportPlugin,
             FilesPlugin,
+            super::render_errors::RenderErrorsPlugin,
         ))
         .insert_resource(WinitSettings {
             focused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),

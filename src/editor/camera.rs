@@ -27,7 +27,7 @@ use crate::{
         surface::RigSurface,
         viewport::{FIELD_OF_VIEW, RigViewport, Sight, framing},
     },
-    rig::Rig,
+    rig::{Rig, project::ProjectCamera},
 };
 
 /// Adds the viewport's camera.
@@ -114,15 +114,7 @@ fn carry_out(
             Action::ViewTop => turn(&mut camera, View::Top),
             Action::ViewBottom => turn(&mut camera, View::Bottom),
             Action::Projection => {
-                *projection = match &*projection {
-                    Projection::Perspective(_) => Projection::Orthographic(OrthographicProjection {
-                        scaling_mode: bevy::camera::ScalingMode::FixedVertical {
-                            viewport_height: 2.0 * bevy::math::ops::tan(FIELD_OF_VIEW * 0.5),
-                        },
-                        ..OrthographicProjection::default_3d()
-                    }),
-                    _ => Projection::Perspective(PerspectiveProjection { fov: FIELD_OF_VIEW, ..default() }),
-                };
+                *projection = projected(matches!(&*projection, Projection::Perspective(_)));
                 camera.force_update = true;
             }
             Action::FrameSelected | Action::FrameAll => {
@@ -141,6 +133,44 @@ fn carry_out(
             }
             _ => {}
         }
+    }
+}
+
+/// The projection, without perspective or with it.
+fn projected(orthographic: bool) -> Projection {
+    if orthographic {
+        Projection::Orthographic(OrthographicProjection {
+            scaling_mode: bevy::camera::ScalingMode::FixedVertical {
+                viewport_height: 2.0 * bevy::math::ops::tan(FIELD_OF_VIEW * 0.5),
+            },
+            ..OrthographicProjection::default_3d()
+        })
+    } else {
+        Projection::Perspective(PerspectiveProjection { fov: FIELD_OF_VIEW, ..default() })
+    }
+}
+
+/// Where the camera stands, as projects keep it.
+pub fn kept(orbit: &PanOrbitCamera, projection: &Projection) -> ProjectCamera {
+    ProjectCamera {
+        yaw: orbit.target_yaw,
+        pitch: orbit.target_pitch,
+        distance: orbit.target_radius,
+        focus: orbit.target_focus,
+        orthographic: matches!(projection, Projection::Orthographic(_)),
+    }
+}
+
+/// Puts the camera where a project has it.
+pub fn take(kept: &ProjectCamera, orbit: &mut PanOrbitCamera, projection: &mut Projection) {
+    orbit.target_yaw = kept.yaw;
+    orbit.target_pitch = kept.pitch;
+    orbit.target_radius = kept.distance.max(1e-3);
+    orbit.target_focus = kept.focus;
+    orbit.zoom_upper_limit = Some(orbit.target_radius * 50.0);
+    orbit.force_update = true;
+    if matches!(projection, Projection::Orthographic(_)) != kept.orthographic {
+        *projection = projected(kept.orthographic);
     }
 }
 

@@ -1,30 +1,67 @@
-//! Opening files into the window, in the background.
+//! Files in the window: opening, saving and exporting, and never losing work on the way.
+//!
+//! Everything that reads or writes a file does so in the background, from a snapshot or into a document that takes the
+//! place of the open one only when it is whole. What would lose unsaved changes asks first; see [`dialog`] for the
+//! questions. Every document has a journal from its first frame; see [`recovery`](super::recovery) for what a crash left.
 
-use std::path::PathBuf;
+pub mod dialog;
+mod dialog_view;
+mod document;
+mod open;
+mod save;
+mod template;
+mod view;
+
+use std::path::{Path, PathBuf};
 
 use bevy::{
+    ecs::system::SystemState,
     prelude::*,
-    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+    window::{FileDragAndDrop, PrimaryWindow, RequestRedraw, WindowCloseRequested},
 };
 
-use super::{ActiveRig, camera::FrameWhenReady, notice::Notice, settings::EditorSettings};
-use crate::{
-    files::{FileKind, RealDisk, load_model, load_template},
-    mesh::obj::{ObjSettings, read_model},
-    plugins::{
-        document::RigBundle,
-        history::RigHistory,
-        surface::{RigMesh, SkinOf},
-    },
-    rig::{Rig, RigEdit, UidSource, character::import_skeleton},
+use self::{
+    dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
+    document::is_unsaved,
 };
+pub use self::{
+    document::{MeshSource, OpenDocument, StateFolder},
+    open::Loading,
+    save::Saving,
+};
+use super::{
+    ActiveRig,
+    actions::{Action, ActionRequest},
+    camera::FrameWhenReady,
+    notice::Notice,
+    panel::PanelApp,
+    recovery,
+    settings::EditorSettings,
+};
+use crate::plugins::{RigSystems, journal::JournalTrouble};
 
-/// Opens files.
+/// Opens, saves and exports files.
 pub struct FilesPlugin;
 
 impl Plugin for FilesPlugin {
     fn build(&self, app: &mut App) {
-        app.add_message::<OpenRequest>().init_resource::<Loading>().add_systems(Update, (start_opening, land).chain());
+        app.add_message::<OpenRequest>()
+            .add_message::<DialogAnswer>()
+            .add_message::<ActionRequest>()
+            .add_message::<Notice>()
+            .add_message::<JournalTrouble>()
+            .add_message::<WindowCloseRequested>()
+            .add_message::<FileDragAndDrop>()
+            .init_resource::<Loading>()
+            .init_resource::<Saving>()
+            .init_resource::<Dialog>()
+            .init_resource::<StateFolder>()
+            .init_resource::<recovery::Recovery>()
+            .init_resource::<EditorSettings>()
+            .init_resource::<FrameWhenReady>()
+            .add_overlay(dialog_view::DialogView::default())
+            .add_systems(Startup, recovery::look)
+            .add_systems(Update, attend.before(RigSystems::Script));
     }
 }
 
@@ -39,130 +76,222 @@ pub enum OpenRequest {
     File(PathBuf),
 }
 
-/// What is being opened.
-#[derive(Resource, Default)]
-pub struct Loading {
-    job: Option<(String, Task<Result<Opened, String>>)>,
+/// What goes on once unsaved changes are out of the way.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Then {
+    /// Something else is opened.
+    Open(OpenRequest),
+    /// What was opened in the meantime takes the document's place.
+    Land,
+    /// A crashed session's work is recovered from its journal.
+    Recover(PathBuf),
+    /// The window closes.
+    Quit,
 }
 
-impl Loading {
-    /// The name of what is being opened.
-    pub fn what(&self) -> Option<&str> {
-        self.job.as_ref().map(|(name, _)| name.as_str())
-    }
+/// What [`recovery`] and [`render_errors`](super::render_errors) need of the parts.
+pub(super) mod parts {
+    pub(in crate::editor) use super::{
+        document::{Context, MeshSource, places},
+        open::{Landing, Opened, Work, begin, bundled_model, document, hash_of, project, spawn},
+        save::{place_bundled, snapshot},
+    };
 }
 
-/// What was opened: a rig and its mesh.
-struct Opened {
-    name: String,
-    rig: Option<Rig>,
-    edits: Vec<RigEdit>,
-    mesh: Option<RigMesh>,
-    notes: Vec<String>,
-}
+type Inbox<'w, 's> = (
+    MessageReader<'w, 's, OpenRequest>,
+    MessageReader<'w, 's, ActionRequest>,
+    MessageReader<'w, 's, DialogAnswer>,
+    MessageReader<'w, 's, WindowCloseRequested>,
+    MessageReader<'w, 's, FileDragAndDrop>,
+    MessageReader<'w, 's, JournalTrouble>,
+);
 
-const BUNDLED: &[u8] = include_bytes!("../../assets/models/biped.obj");
-
-fn start_opening(
-    mut requests: MessageReader<OpenRequest>,
-    mut loading: ResMut<Loading>,
-    mut uids: ResMut<UidSource>,
-    mut settings: ResMut<EditorSettings>,
-) {
-    for request in requests.read() {
-        let mut source = UidSource::seeded(uids.next_uid().0);
-        let (name, task) = match request.clone() {
-            OpenRequest::Bundled => ("the bundled character".to_owned(), spawn(move || bundled(&mut source))),
-            OpenRequest::Empty => ("nothing".to_owned(), spawn(|| Ok(Opened::named("untitled")))),
-            OpenRequest::File(path) => {
-                settings.remember(path.clone());
-                let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-                (name, spawn(move || file(&path, &mut source)))
-            }
-        };
-        loading.job = Some((name, task));
-    }
-}
-
-fn spawn<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Task<T> {
-    AsyncComputeTaskPool::get().spawn(async move { work() })
-}
-
-impl Opened {
-    fn named(name: &str) -> Self {
-        Self { name: name.to_owned(), rig: None, edits: Vec::new(), mesh: None, notes: Vec::new() }
-    }
-
-    fn model(model: crate::mesh::model::Model, uids: &mut UidSource) -> Self {
-        let uid = uids.next_uid();
-        let skeleton = import_skeleton(&model, uids);
-        let mut edits = skeleton.edits;
-        edits.extend(skeleton.skin.map(|skin| RigEdit::SetSkin(uid, Some(skin))));
-        let name = model.name.clone();
-        let notes = model.notes.clone();
-        Self { name, rig: None, edits, mesh: Some(RigMesh::new(uid, model, skeleton.nodes)), notes }
-    }
-}
-
-fn bundled(uids: &mut UidSource) -> Result<Opened, String> {
-    let model = read_model(BUNDLED, "biped", &ObjSettings::default(), &mut |_| None).map_err(|e| e.to_string())?;
-    Ok(Opened::model(model, uids))
-}
-
-fn file(path: &std::path::Path, uids: &mut UidSource) -> Result<Opened, String> {
-    match FileKind::of(path) {
-        Some(FileKind::Template) => {
-            let template = load_template(&RealDisk, path).map_err(|error| error.to_string())?;
-            Ok(Opened { rig: Some(template.rig), ..Opened::named("template") })
-        }
-        _ => {
-            let model = load_model(&RealDisk, path).map_err(|error| error.to_string())?;
-            Ok(Opened::model(model, uids))
-        }
-    }
-}
-
-fn land(
-    mut commands: Commands,
-    mut loading: ResMut<Loading>,
-    active: Option<Res<ActiveRig>>,
-    mut uids: ResMut<UidSource>,
-    mut frame: ResMut<FrameWhenReady>,
-    mut notices: MessageWriter<Notice>,
-) {
-    let Some((name, result)) = loading
-        .bypass_change_detection()
-        .job
-        .as_mut()
-        .and_then(|(name, task)| Some((name.clone(), check_ready(task)?)))
-    else {
+/// Does everything about files, before this frame's edits: what is saved and what the journal counts agree then.
+fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
+    let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles)) = inbox.get_mut(world) else {
         return;
     };
-    loading.job = None;
-    match result {
-        Ok(opened) => {
-            if let Some(active) = active {
-                commands.entity(active.0).despawn();
-            }
-            let mut rig = opened.rig.unwrap_or_else(|| Rig::new(uids.next_uid(), opened.name));
-            for edit in &opened.edits {
-                if let Err(error) = rig.apply(edit) {
-                    notices.write(Notice::warning(error.to_string()));
-                }
-            }
-            let entity = commands.spawn(RigBundle { rig, history: RigHistory::default(), ..default() }).id();
-            if let Some(mesh) = opened.mesh {
-                commands.spawn((mesh, SkinOf(entity)));
-            }
-            commands.insert_resource(ActiveRig(entity));
-            frame.0 = true;
-            notices.write(Notice::done(format!("Opened {name}")));
-            for note in opened.notes {
-                notices.write(Notice::info(note).quiet());
-            }
-        }
-        Err(reason) => {
-            notices.write(Notice::error(format!("Could not open {name}: {reason}")));
+    let mut opens: Vec<OpenRequest> = opens.read().cloned().collect();
+    let mut actions: Vec<Action> = actions.read().map(|request| request.0).collect();
+    let answers: Vec<Answer> = answers.read().map(|answer| answer.0.clone()).collect();
+    actions.extend(closes.read().map(|_| Action::Quit));
+    opens.extend(drops.read().filter_map(|drop| match drop {
+        FileDragAndDrop::DroppedFile { path_buf, .. } => Some(OpenRequest::File(path_buf.clone())),
+        _ => None,
+    }));
+    let troubles: Vec<JournalTrouble> = troubles.read().cloned().collect();
+    for trouble in troubles {
+        world.write_message(match trouble.reason {
+            Some(reason) => Notice::warning(reason.to_string()),
+            None => Notice::done("Changes are kept safe again"),
+        });
+    }
+    for answer in answers {
+        let question = world.resource_mut::<Dialog>().take();
+        if let Some(question) = question {
+            dialog_answered(world, question, answer);
         }
     }
+    for request in opens {
+        request_open(world, request);
+    }
+    for action in actions {
+        act(world, action);
+    }
+    save::poll(world);
+    open::poll(world);
+    recovery::poll(world);
+    document::watch_places(world);
+    show_title(world);
+    let busy = world.resource::<Loading>().what().is_some()
+        || world.resource::<Saving>().what().is_some()
+        || world.resource::<recovery::Recovery>().is_looking();
+    if busy && let Some(mut redraw) = world.get_resource_mut::<Messages<RequestRedraw>>() {
+        redraw.write(RequestRedraw);
+    }
+}
+
+/// The open document's entity.
+fn active(world: &World) -> Option<Entity> {
+    world.get_resource::<ActiveRig>().map(|rig| rig.0).filter(|rig| world.get::<OpenDocument>(*rig).is_some())
+}
+
+/// The name of a file, for people.
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+fn act(world: &mut World, action: Action) {
+    match action {
+        Action::New => request_open(world, OpenRequest::Empty),
+        Action::Open => world.resource_mut::<Dialog>().ask(Question::Open),
+        Action::Save => save(world, None),
+        Action::SaveAs => ask_path(world, Purpose::Save, None),
+        Action::Export => ask_path(world, Purpose::Export, None),
+        Action::Quit => after_asking(world, Then::Quit),
+        _ => {}
+    }
+}
+
+/// Opens something, after asking about unsaved changes where it would take the document's place.
+fn request_open(world: &mut World, request: OpenRequest) {
+    if let OpenRequest::File(path) = &request {
+        if let Err(reason) = open::recognise(path) {
+            world.write_message(Notice::error(reason));
+            return;
+        }
+        if open::is_rig_file(path) && template::has_mesh(world) {
+            // It is put onto the mesh, which undo takes back.
+            open::start(world, request);
+            return;
+        }
+    }
+    after_asking(world, Then::Open(request));
+}
+
+/// Goes on at once if nothing would be lost, else asks.
+pub(super) fn after_asking(world: &mut World, then: Then) {
+    match active(world).filter(|rig| is_unsaved(world, *rig)) {
+        Some(rig) => {
+            let name = world.get::<OpenDocument>(rig).map(|document| document.name.clone()).unwrap_or_default();
+            world.resource_mut::<Dialog>().ask(Question::Unsaved { name, then });
+        }
+        None => proceed(world, then),
+    }
+}
+
+/// Goes on; changes that are unsaved now are not wanted.
+fn proceed(world: &mut World, then: Then) {
+    match then {
+        Then::Open(request) => open::start(world, request),
+        Then::Land => open::land_held(world),
+        Then::Recover(journal) => recovery::start(world, journal),
+        Then::Quit => quit(world),
+    }
+}
+
+/// Ends the journal, so that nothing is offered the next time, and closes the window.
+fn quit(world: &mut World) {
+    if world.resource_mut::<Saving>().wait_for(Then::Quit) {
+        return;
+    }
+    document::close_journal(world, true);
+    world.write_message(AppExit::Success);
+}
+
+/// Saves the project where it was saved before, or asks where.
+fn save(world: &mut World, then: Option<Then>) {
+    let Some(rig) = active(world) else { return };
+    match world.get::<OpenDocument>(rig).and_then(|document| document.project.clone()) {
+        Some(path) => save::project(world, path, then),
+        None => ask_path(world, Purpose::Save, then),
+    }
+}
+
+fn ask_path(world: &mut World, purpose: Purpose, then: Option<Then>) {
+    let Some(rig) = active(world) else { return };
+    let suggestion = save::suggestion(world, rig, purpose);
+    world.resource_mut::<Dialog>().ask(Question::Path { purpose, suggestion, then });
+}
+
+fn dialog_answered(world: &mut World, question: Question, answer: Answer) {
+    match (question, answer) {
+        (Question::Unsaved { then, .. }, Answer::Save) => save(world, Some(then)),
+        (Question::Unsaved { then, .. }, Answer::Discard) => proceed(world, then),
+        (Question::Unsaved { then: Then::Land, .. }, _) => open::drop_held(world),
+        (Question::Open, Answer::Path(path)) => request_open(world, OpenRequest::File(path)),
+        (Question::Path { purpose, suggestion, then }, Answer::Path(path)) => {
+            let path = save::completed(&path, purpose);
+            let known = active(world).and_then(|rig| world.get::<OpenDocument>(rig)?.project.clone());
+            if path.parent().is_none_or(|folder| !folder.is_dir()) {
+                let folder = path.parent().map(|folder| folder.display().to_string()).unwrap_or_default();
+                world.write_message(Notice::error(format!(
+                    "There is no folder {folder}; create it first, or choose another place"
+                )));
+                world.resource_mut::<Dialog>().ask(Question::Path { purpose, suggestion: path, then });
+            } else if path.exists() && known.as_ref() != Some(&path) {
+                let _ = suggestion;
+                world.resource_mut::<Dialog>().ask(Question::Replace { purpose, path, then });
+            } else {
+                save::to(world, purpose, path, then);
+            }
+        }
+        (Question::Replace { purpose, path, then }, Answer::Save) => save::to(world, purpose, path, then),
+        (Question::Replace { purpose, path, then }, _) => {
+            world.resource_mut::<Dialog>().ask(Question::Path { purpose, suggestion: path, then });
+        }
+        (Question::Fit(fit), Answer::Fit) => template::put(world, &fit, fit.ratio()),
+        (Question::Fit(fit), Answer::AsItIs) => template::put(world, &fit, 1.0),
+        (Question::Recover(list), answer) => recovery::answered(world, list, answer),
+        (Question::Path { then: Some(Then::Land), .. }, _) => open::drop_held(world),
+        _ => {}
+    }
+}
+
+/// `name* - Rigsmith`, the star while there are unsaved changes.
+fn show_title(world: &mut World) {
+    let mut windows = world.query_filtered::<&mut Window, With<PrimaryWindow>>();
+    if windows.iter(world).next().is_none() {
+        return;
+    }
+    let title = title(world);
+    if let Ok(mut window) = windows.single_mut(world)
+        && window.title != title
+    {
+        window.title = title;
+    }
+}
+
+/// What the window's title says.
+pub fn title(world: &World) -> String {
+    let Some(rig) = active(world) else { return "Rigsmith".to_owned() };
+    let name = world.get::<OpenDocument>(rig).map(|document| document.name.as_str()).unwrap_or_default();
+    let star = if is_unsaved(world, rig) { "*" } else { "" };
+    format!("{name}{star} - Rigsmith")
+}
+
+/// True if the open document has changes that are in no file.
+pub fn has_unsaved_changes(world: &World) -> bool {
+    active(world).is_some_and(|rig| is_unsaved(world, rig))
 }

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     actions::{Action, ActionRequest},
+    files::dialog::Dialog,
     mode::Mode,
     pointer::Held,
 };
@@ -186,6 +187,7 @@ fn press_keys(
     mut lost: MessageReader<WindowFocused>,
     mut held: Local<Held>,
     bindings: Res<KeyBindings>,
+    dialog: Option<Res<Dialog>>,
     mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>,
     mut actions: MessageWriter<ActionRequest>,
 ) {
@@ -196,8 +198,9 @@ fn press_keys(
         return;
     }
     let typing = contexts.iter_mut().any(|mut context| context.get_mut().egui_wants_keyboard_input());
+    let is_asked = dialog.is_some_and(|dialog| dialog.question().is_some());
     for input in keys.read() {
-        if held.follow(input) || input.state == ButtonState::Released || input.repeat {
+        if held.follow(input) || is_asked || input.state == ButtonState::Released || input.repeat {
             continue;
         }
         let Some(key) = key_name(input) else { continue };

@@ -186,6 +186,12 @@ impl RigHistory {
         (self.record.entries().map(|entry| entry.as_ref().step.name.as_ref()).collect(), self.record.head())
     }
 
+    /// The last step in effect; the same one again after undo and redo, and after nothing else.
+    pub fn last(&self) -> Option<&Arc<Step>> {
+        let before = self.record.head().checked_sub(1)?;
+        self.record.entries().nth(before).map(|entry| &entry.as_ref().step)
+    }
+
     fn with<T>(
         &mut self,
         rig: &mut Rig,

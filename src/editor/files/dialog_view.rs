@@ -1,0 +1,281 @@
+//! The questions about files as they are drawn. Keys work in all of them: Enter takes the marked answer, Escape none.
+
+use std::{
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+use egui_file_dialog::{DialogState, FileDialog, Filter};
+
+use super::{
+    dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
+    file_name,
+    template::{Fit, number},
+};
+use crate::{
+    editor::{
+        panel::{EditorOverlay, Requests},
+        recovery, style,
+    },
+    files::{FileKind, journal::PendingJournal},
+};
+
+/// Draws the question that is asked.
+#[derive(Default)]
+pub(super) struct DialogView {
+    /// The question that the rest belongs to.
+    number: u64,
+    text: String,
+    /// Frames since the question was asked; widgets get the keyboard in the first ones.
+    age: u32,
+    chosen: usize,
+    browser: Option<FileDialog>,
+}
+
+/// Everything that can be opened, by name and kinds.
+const OPENED: &[(&str, &[FileKind])] = &[
+    (
+        "Meshes, templates, projects",
+        &[FileKind::Obj, FileKind::Gltf, FileKind::Glb, FileKind::Template, FileKind::RigText, FileKind::Project],
+    ),
+    ("Meshes (.obj, .gltf, .glb)", &[FileKind::Obj, FileKind::Gltf, FileKind::Glb]),
+    ("Templates (.rig.ron, .rig)", &[FileKind::Template, FileKind::RigText]),
+    ("Projects (.rigsmith.ron)", &[FileKind::Project]),
+];
+
+impl EditorOverlay for DialogView {
+    fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
+        let Some(dialog) = world.get_resource::<Dialog>() else { return };
+        let Some(question) = dialog.question() else {
+            self.browser = None;
+            return;
+        };
+        if self.number != dialog.number() {
+            *self = Self { number: dialog.number(), ..Self::default() };
+            match question {
+                Question::Path { suggestion, .. } => self.text = suggestion.display().to_string(),
+                Question::Open => self.browser = Some(browser(world)),
+                _ => {}
+            }
+        }
+        self.age = self.age.saturating_add(1);
+        if let Some(answer) = self.ask(ctx, question) {
+            self.browser = None;
+            requests.send(DialogAnswer(answer));
+        }
+    }
+}
+
+/// Where people look for files first: where the last one was.
+fn folder(world: &World) -> Option<PathBuf> {
+    let settings = world.get_resource::<crate::editor::settings::EditorSettings>()?;
+    settings.recent.first()?.parent().filter(|folder| folder.is_dir()).map(Path::to_path_buf)
+}
+
+fn file_dialog(folder: Option<PathBuf>) -> FileDialog {
+    let dialog = FileDialog::new().default_size([680.0, 420.0]).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]);
+    match folder {
+        Some(folder) => dialog.initial_directory(folder),
+        None => dialog,
+    }
+}
+
+fn browser(world: &World) -> FileDialog {
+    let mut dialog = file_dialog(folder(world)).title("Open");
+    for (name, kinds) in OPENED {
+        let matches = move |path: &Path| FileKind::of(path).is_some_and(|kind| kinds.contains(&kind));
+        dialog = dialog.add_file_filter(name, Filter::new(matches));
+    }
+    if let Some((name, _)) = OPENED.first() {
+        dialog = dialog.default_file_filter(name);
+    }
+    dialog.pick_file();
+    dialog
+}
+
+impl DialogView {
+    fn ask(&mut self, ctx: &egui::Context, question: &Question) -> Option<Answer> {
+        if let Some(browser) = &mut self.browser {
+            browser.update(ctx);
+            let picked = browser.take_picked();
+            let is_open = *browser.state() == DialogState::Open;
+            return match (question, picked) {
+                (Question::Open, Some(path)) => Some(Answer::Path(path)),
+                (Question::Open, None) => (!is_open).then_some(Answer::Cancel),
+                (_, picked) => {
+                    if let Some(path) = picked {
+                        self.text = path.display().to_string();
+                    }
+                    if !is_open {
+                        self.browser = None;
+                        self.age = 0;
+                    }
+                    None
+                }
+            };
+        }
+        let shown = egui::Modal::new(egui::Id::new(("question", self.number))).frame(frame(ctx)).show(ctx, |ui| {
+            ui.set_width(460.0_f32.min(ctx.viewport_rect().width() - 60.0));
+            ui.spacing_mut().item_spacing = egui::vec2(8.0, 8.0);
+            match question {
+                Question::Unsaved { name, .. } => self.unsaved(ui, name),
+                Question::Path { purpose, .. } => self.path(ui, *purpose),
+                Question::Replace { path, .. } => self.replace(ui, path),
+                Question::Fit(fit) => self.fit(ui, fit),
+                Question::Recover(list) => self.recover(ui, list),
+                Question::Open => None,
+            }
+        });
+        let escaped = ctx.input(|input| input.key_pressed(egui::Key::Escape));
+        shown.inner.or(escaped.then_some(Answer::Cancel))
+    }
+
+    /// Buttons at the right; the first one stands outermost and takes Enter.
+    fn buttons(&self, ui: &mut egui::Ui, answers: &[(&str, Answer)]) -> Option<Answer> {
+        let mut taken = None;
+        ui.add_space(4.0);
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            for (place, (name, answer)) in answers.iter().enumerate() {
+                let mut text = egui::RichText::new(*name);
+                if place == 0 {
+                    text = text.strong();
+                }
+                let button = ui.add(egui::Button::new(text).min_size(egui::vec2(76.0, 24.0)));
+                if place == 0 && self.age <= 2 {
+                    button.request_focus();
+                }
+                if button.clicked() {
+                    taken = Some(answer.clone());
+                }
+            }
+        });
+        taken
+    }
+
+    fn unsaved(&self, ui: &mut egui::Ui, name: &str) -> Option<Answer> {
+        ui.heading(format!("Save the changes to {name}?"));
+        ui.label("They are in no file yet, and would be lost.");
+        let answers = [("Save", Answer::Save), ("Cancel", Answer::Cancel), ("Don't save", Answer::Discard)];
+        self.buttons(ui, &answers)
+    }
+
+    fn replace(&self, ui: &mut egui::Ui, path: &Path) -> Option<Answer> {
+        ui.heading(format!("Replace {}?", file_name(path)));
+        ui.label(format!("There is a file of that name in {}.", path.parent().unwrap_or(path).display()));
+        self.buttons(ui, &[("Replace", Answer::Save), ("Cancel", Answer::Cancel)])
+    }
+
+    fn path(&mut self, ui: &mut egui::Ui, purpose: Purpose) -> Option<Answer> {
+        let (title, verb, hint) = match purpose {
+            Purpose::Save => {
+                ("Save the project as", "Save", "A project ends in .rigsmith.ron; its weights lie beside it.")
+            }
+            Purpose::Export => (
+                "Export",
+                "Export",
+                "The ending says what: .glb, .gltf or .obj the character at rest, .rig.ron the template, .rig the \
+                 skeleton, .skin the weights.",
+            ),
+        };
+        ui.heading(title);
+        let mut browse = false;
+        let field = ui
+            .horizontal(|ui| {
+                let width = ui.available_width() - 90.0;
+                let field = ui.add(egui::TextEdit::singleline(&mut self.text).desired_width(width));
+                browse = ui.button("Browse…").clicked();
+                field
+            })
+            .inner;
+        if self.age <= 2 {
+            field.request_focus();
+            select_stem(ui.ctx(), field.id, &self.text);
+        }
+        ui.label(egui::RichText::new(hint).color(style::QUIET));
+        let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        let path = PathBuf::from(self.text.trim());
+        if browse {
+            let folder = path.parent().filter(|folder| folder.is_dir()).map(Path::to_path_buf);
+            let mut dialog = file_dialog(folder).title(title).default_file_name(&file_name(&path));
+            dialog.save_file();
+            self.browser = Some(dialog);
+            return None;
+        }
+        let accept = Answer::Path(path);
+        let has_name = !self.text.trim().is_empty();
+        let answers = [(verb, accept.clone()), ("Cancel", Answer::Cancel)];
+        // The field has the keyboard here, not the first button.
+        let view = Self { age: u32::MAX, ..Self::default() };
+        let clicked = view.buttons(ui, &answers);
+        match clicked.or(entered.then_some(accept)) {
+            Some(Answer::Path(_)) if !has_name => None,
+            answer => answer,
+        }
+    }
+
+    fn fit(&self, ui: &mut egui::Ui, fit: &Fit) -> Option<Answer> {
+        ui.heading(format!("{} is for a mesh of another size", fit.name));
+        ui.label(format!(
+            "Its joints are {} tall, this mesh is {}. To fit, they are scaled by {:.3}.",
+            number(fit.rig_height),
+            number(fit.mesh_height),
+            fit.ratio()
+        ));
+        let answers = [("Fit to this mesh", Answer::Fit), ("As it is", Answer::AsItIs), ("Cancel", Answer::Cancel)];
+        self.buttons(ui, &answers)
+    }
+
+    fn recover(&mut self, ui: &mut egui::Ui, list: &[PendingJournal]) -> Option<Answer> {
+        ui.heading("There is unsaved work from before");
+        ui.label("Rigsmith ended without closing its document. Recover it with all its steps?");
+        egui::ScrollArea::vertical().max_height(220.0).show(ui, |ui| {
+            for (number, pending) in list.iter().enumerate() {
+                let changes =
+                    if pending.changes == 1 { "1 edit".to_owned() } else { format!("{} edits", pending.changes) };
+                let mut text = format!("{}: {changes}, {}", recovery::describe(pending), when(pending.modified));
+                if pending.project_changed {
+                    text.push_str("; its project was changed since");
+                }
+                ui.radio_value(&mut self.chosen, number, text).on_hover_text(pending.path.display().to_string());
+            }
+        });
+        let path = list.get(self.chosen).or(list.first()).map(|pending| pending.path.clone())?;
+        let answers =
+            [("Recover", Answer::Recover(path.clone())), ("Later", Answer::Cancel), ("Discard", Answer::Forget(path))];
+        self.buttons(ui, &answers)
+    }
+}
+
+/// Marks the name without folder and ending, which is what people want to change.
+fn select_stem(ctx: &egui::Context, id: egui::Id, text: &str) {
+    let name_at = text.rfind(['/', '\\']).map_or(0, |at| at + 1);
+    let stem = crate::files::stem(Path::new(&text[name_at..]));
+    let start = text[..name_at].chars().count();
+    let range = egui::text::CCursorRange::two(
+        egui::text::CCursor::new(start),
+        egui::text::CCursor::new(start + stem.chars().count()),
+    );
+    let mut state = egui::TextEdit::load_state(ctx, id).unwrap_or_default();
+    state.cursor.set_char_range(Some(range));
+    egui::TextEdit::store_state(ctx, id, state);
+}
+
+fn frame(ctx: &egui::Context) -> egui::Frame {
+    egui::Frame::popup(&ctx.global_style()).inner_margin(16)
+}
+
+/// How long ago something was, in words.
+fn when(time: Option<SystemTime>) -> String {
+    let Some(seconds) = time.and_then(|time| time.elapsed().ok()).map(|age| age.as_secs()) else {
+        return "at an unknown time".to_owned();
+    };
+    let counted = |number: u64, unit: &str| format!("{number} {unit}{} ago", if number == 1 { "" } else { "s" });
+    match seconds {
+        0..60 => "just now".to_owned(),
+        60..3600 => counted(seconds / 60, "minute"),
+        3600..86_400 => counted(seconds / 3600, "hour"),
+        _ => counted(seconds / 86_400, "day"),
+    }
+}

@@ -1,0 +1,377 @@
+//! Opening, in the background; what is open stays until the whole of it is there.
+
+use std::{path::Path, sync::Arc};
+
+use bevy::{
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
+
+use super::{
+    OpenRequest, Then, active,
+    dialog::{Dialog, Question},
+    document::{
+        Context, ContextMesh, MeshSource, OpenDocument, SavedAt, close_journal, disk, is_same, is_unsaved, last_step,
+        places,
+    },
+    file_name, template, view,
+};
+use crate::{
+    editor::{
+        ActiveRig, camera::FrameWhenReady, notice::Notice, recovery::Recovery, render_errors::watched,
+        settings::EditorSettings,
+    },
+    files::{
+        Disk, FileKind, MeshState, MeshToSave, RealDisk,
+        journal::{
+            Journal, JournalStart, Origin, PendingJournal, Recovered, file_hash, journal_beside, pending_journal,
+        },
+        load_model, load_project, load_rig_text, load_template, read_capped, stem,
+    },
+    mesh::{
+        model::Model,
+        obj::{ObjSettings, read_model},
+    },
+    plugins::{
+        document::RigBundle,
+        journal::replayed_bundle,
+        surface::{RigMesh, SkinOf},
+    },
+    rig::{
+        Rig, RigEdit, UidSource,
+        character::{import_rig_text, import_skeleton},
+        project::ProjectView,
+        step::{Replayed, Step},
+    },
+};
+
+/// The bytes of the character that comes with Rigsmith.
+pub(super) const BUNDLED: &[u8] = include_bytes!("../../../assets/models/biped.obj");
+/// Bytes of a file that are hashed, at most.
+const MAX_HASHED: u64 = 1 << 30;
+
+/// What is being opened.
+#[derive(Resource, Default)]
+pub struct Loading {
+    job: Option<Job>,
+    /// What is there and waits for an answer about changes that were made while it loaded.
+    held: Option<(String, Box<Opened>)>,
+}
+
+struct Job {
+    name: String,
+    task: Task<Result<Landing, String>>,
+    /// The step that the open document stood after when nobody minded losing it.
+    confirmed: Option<Arc<Step>>,
+}
+
+impl Loading {
+    /// The name of what is being opened.
+    pub fn what(&self) -> Option<&str> {
+        self.job.as_ref().map(|job| job.name.as_str())
+    }
+}
+
+/// What a file turned out to be.
+pub(in crate::editor) enum Landing {
+    /// Something to take the document's place.
+    Document(Box<Opened>),
+    /// A rig: for the mesh that is open, or a document of its own.
+    Template(Box<Opened>),
+}
+
+/// What was opened.
+pub(in crate::editor) struct Opened {
+    pub name: String,
+    pub rig: Rig,
+    pub meshes: Vec<(RigMesh, MeshSource)>,
+    pub missing: Vec<MeshToSave>,
+    pub view: Option<ProjectView>,
+    pub project: Option<std::path::PathBuf>,
+    pub origin: Origin,
+    pub notes: Vec<String>,
+    /// What a crash left, to go on with.
+    pub work: Option<Box<Work>>,
+    /// What a crash left beside the project.
+    pub pending: Option<PendingJournal>,
+}
+
+/// Work that was recovered.
+pub(in crate::editor) struct Work {
+    pub recovered: Recovered,
+    pub replayed: Replayed,
+    pub journal: std::path::PathBuf,
+}
+
+impl Opened {
+    pub fn named(name: impl Into<String>, rig: Rig) -> Self {
+        Self {
+            name: name.into(),
+            rig,
+            meshes: Vec::new(),
+            missing: Vec::new(),
+            view: None,
+            project: None,
+            origin: Origin::Empty,
+            notes: Vec::new(),
+            work: None,
+            pending: None,
+        }
+    }
+
+    fn model(model: Model, source: MeshSource, origin: Origin, uids: &mut UidSource) -> Self {
+        let uid = uids.next_uid();
+        let skeleton = import_skeleton(&model, uids);
+        let mut edits = skeleton.edits;
+        edits.extend(skeleton.skin.map(|skin| RigEdit::SetSkin(uid, Some(skin))));
+        let mut opened = Self::named(&model.name, Rig::new(uids.next_uid(), &model.name));
+        opened.notes.clone_from(&model.notes);
+        for edit in &edits {
+            opened.notes.extend(opened.rig.apply(edit).err().map(|error| error.to_string()));
+        }
+        opened.meshes.push((RigMesh::new(uid, model, skeleton.nodes), source));
+        Self { origin, ..opened }
+    }
+}
+
+/// Says why a file cannot be opened, if its name tells that already.
+pub(super) fn recognise(path: &Path) -> Result<(), String> {
+    match FileKind::of(path) {
+        Some(
+            FileKind::Obj | FileKind::Gltf | FileKind::Glb | FileKind::RigText | FileKind::Template | FileKind::Project,
+        ) => Ok(()),
+        Some(FileKind::Skin) => {
+            Err(format!("{} has only weights; open the project or the .glb that they belong to", file_name(path)))
+        }
+        Some(FileKind::Gestures) => {
+            Err(format!("{} is neither template nor project; those end in .rig.ron and .rigsmith.ron", file_name(path)))
+        }
+        None => Err(format!(
+            "{} is nothing that can be opened; a mesh ends in .obj, .gltf or .glb, a template in .rig.ron or .rig, \
+             a project in .rigsmith.ron",
+            file_name(path)
+        )),
+    }
+}
+
+/// True for files that hold a rig without a mesh.
+pub(super) fn is_rig_file(path: &Path) -> bool {
+    matches!(FileKind::of(path), Some(FileKind::Template | FileKind::RigText))
+}
+
+/// Opens in the background; what was being opened before is forgotten.
+pub(super) fn start(world: &mut World, request: OpenRequest) {
+    let mut uids = UidSource::seeded(world.resource_mut::<UidSource>().next_uid().0);
+    let (name, task) = match request {
+        OpenRequest::Bundled => ("the bundled character".to_owned(), spawn(move || bundled(&mut uids))),
+        OpenRequest::Empty => {
+            let open = move || Ok(document(Opened::named("untitled", Rig::new(uids.next_uid(), "untitled"))));
+            ("an empty rig".to_owned(), spawn(open))
+        }
+        OpenRequest::File(path) => {
+            let path = std::path::absolute(&path).unwrap_or(path);
+            (file_name(&path), spawn(move || file(&path, &mut uids)))
+        }
+    };
+    begin(world, name, task);
+}
+
+/// Waits for `task` to land.
+pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<Landing, String>>) {
+    let confirmed = active(world).and_then(|rig| last_step(world, rig));
+    let mut loading = world.resource_mut::<Loading>();
+    loading.job = Some(Job { name, task, confirmed });
+    loading.held = None;
+}
+
+/// Runs work that takes long.
+pub(in crate::editor) fn spawn<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Task<T> {
+    AsyncComputeTaskPool::get().spawn(async move { work() })
+}
+
+pub(in crate::editor) fn document(opened: Opened) -> Landing {
+    Landing::Document(Box::new(opened))
+}
+
+/// Reads the character that comes with Rigsmith.
+pub(in crate::editor) fn bundled_model() -> Result<Model, String> {
+    read_model(BUNDLED, "biped", &ObjSettings::default(), &mut |_| None).map_err(|error| error.to_string())
+}
+
+fn bundled(uids: &mut UidSource) -> Result<Landing, String> {
+    let origin = Origin::Bundled("biped".to_owned());
+    Ok(document(Opened::model(bundled_model()?, MeshSource::Bundled, origin, uids)))
+}
+
+/// The hash of a file's bytes; 0 if it cannot be read.
+pub(in crate::editor) fn hash_of(path: &Path) -> Option<u64> {
+    read_capped(&RealDisk, path, MAX_HASHED).ok().map(|bytes| file_hash(&bytes))
+}
+
+fn file(path: &Path, uids: &mut UidSource) -> Result<Landing, String> {
+    let origin_of = |path: &Path| (path.to_owned(), hash_of(path).unwrap_or_default());
+    match FileKind::of(path) {
+        Some(FileKind::Project) => Ok(document(project(path)?)),
+        Some(FileKind::Template) => {
+            let template = load_template(&RealDisk, path).map_err(|error| error.to_string())?;
+            let (path, hash) = origin_of(path);
+            let mut opened = Opened::named(stem(&path), template.rig);
+            opened.notes = template.notes;
+            opened.origin = Origin::Template { path, hash };
+            Ok(Landing::Template(Box::new(opened)))
+        }
+        Some(FileKind::RigText) => {
+            let text = load_rig_text(&RealDisk, path).map_err(|error| error.to_string())?;
+            let (path, hash) = origin_of(path);
+            let mut opened = Opened::named(stem(&path), Rig::new(uids.next_uid(), stem(&path)));
+            for edit in &import_rig_text(&text, uids).0 {
+                opened.rig.apply(edit).map_err(|error| error.to_string())?;
+            }
+            opened.origin = Origin::Template { path, hash };
+            Ok(Landing::Template(Box::new(opened)))
+        }
+        _ => {
+            let model = load_model(&RealDisk, path).map_err(|error| error.to_string())?;
+            let (path, hash) = origin_of(path);
+            let source = MeshSource::File(path.clone());
+            Ok(document(Opened::model(model, source, Origin::Mesh { path, hash }, uids)))
+        }
+    }
+}
+
+/// Opens a project; of several rigs the first.
+pub(in crate::editor) fn project(path: &Path) -> Result<Opened, String> {
+    let hash = hash_of(path).unwrap_or_default();
+    let loaded = load_project(&RealDisk, path).map_err(|error| error.to_string())?;
+    let mut notes = loaded.notes;
+    let mut rigs = loaded.rigs.into_iter();
+    let rig = rigs.next().ok_or_else(|| format!("`{}` has no rig; open its mesh instead", path.display()))?;
+    if rigs.next().is_some() {
+        return Err(format!(
+            "`{}` has several rigs, and the window edits one; split it into one project a rig",
+            path.display()
+        ));
+    }
+    let mut opened = Opened::named(stem(path), rig);
+    for mesh in loaded.meshes {
+        match mesh.state {
+            MeshState::Open { model, .. } => {
+                opened.meshes.push((RigMesh::new(mesh.uid, *model, mesh.nodes), MeshSource::File(mesh.path)));
+            }
+            MeshState::Missing { shape, .. } => opened.missing.push(MeshToSave {
+                uid: mesh.uid,
+                rig: mesh.rig,
+                path: mesh.path,
+                nodes: mesh.nodes.into(),
+                shape,
+            }),
+        }
+    }
+    opened.notes.append(&mut notes);
+    opened.view = Some(loaded.view);
+    opened.project = Some(path.to_owned());
+    opened.origin = Origin::Project { path: path.to_owned(), hash };
+    opened.pending = pending_journal(&RealDisk as &dyn Disk, &journal_beside(path));
+    Ok(opened)
+}
+
+/// Lands what is done.
+pub(super) fn poll(world: &mut World) {
+    if world.resource::<Recovery>().is_looking() {
+        // A journal that begins while others are looked through could be taken for one of them.
+        return;
+    }
+    let mut loading = world.resource_mut::<Loading>();
+    let Some(job) = &mut loading.bypass_change_detection().job else { return };
+    let Some(result) = check_ready(&mut job.task) else { return };
+    let Some(Job { name, confirmed, .. }) = loading.job.take() else { return };
+    match result {
+        Err(reason) => {
+            world.write_message(Notice::error(format!("Could not open {name}: {reason}")));
+            if active(world).is_none() {
+                start(world, OpenRequest::Empty);
+            }
+        }
+        Ok(Landing::Template(opened)) if template::has_mesh(world) => template::consider(world, *opened),
+        Ok(Landing::Document(opened) | Landing::Template(opened)) => {
+            let changed = active(world)
+                .filter(|rig| is_unsaved(world, *rig) && !is_same(&last_step(world, *rig), &confirmed))
+                .and_then(|rig| world.get::<OpenDocument>(rig));
+            match changed.map(|document| document.name.clone()) {
+                Some(document) => {
+                    world.resource_mut::<Loading>().held = Some((name, opened));
+                    world.resource_mut::<Dialog>().ask(Question::Unsaved { name: document, then: Then::Land });
+                }
+                None => land(world, &name, *opened),
+            }
+        }
+    }
+}
+
+/// Lands what was held back; what is open may be lost.
+pub(super) fn land_held(world: &mut World) {
+    if let Some((name, opened)) = world.resource_mut::<Loading>().held.take() {
+        land(world, &name, *opened);
+    }
+}
+
+/// Forgets what was held back.
+pub(super) fn drop_held(world: &mut World) {
+    world.resource_mut::<Loading>().held = None;
+}
+
+fn land(world: &mut World, name: &str, opened: Opened) {
+    let Opened { name: title, rig, meshes, missing, view: kept, project, origin, notes, work, pending } = opened;
+    if let Some(old) = world.get_resource::<ActiveRig>().map(|rig| rig.0) {
+        // The next journal may lie in the same place.
+        let same = project.is_some() && world.get::<OpenDocument>(old).is_some_and(|old| old.project == project);
+        close_journal(world, same);
+        world.despawn(old);
+    }
+    if let Some(path) = origin.path() {
+        world.resource_mut::<EditorSettings>().remember(path.to_owned());
+    }
+    let context = Context {
+        name: title.clone(),
+        meshes: meshes
+            .iter()
+            .map(|(mesh, source)| ContextMesh { uid: mesh.uid, source: source.clone(), nodes: mesh.nodes.to_vec() })
+            .collect(),
+    };
+    // What a crash left beside the project stays there until somebody says what becomes of it.
+    let places = places(world, project.clone().filter(|_| pending.is_none()));
+    let is_recovered = work.is_some();
+    let (bundle, journal) = match work {
+        Some(work) => {
+            let journal = Journal::resume(disk(), places, &work.recovered, work.replayed.applied, &work.journal);
+            journal.context(context.text());
+            (replayed_bundle(&work.replayed), journal)
+        }
+        None => {
+            let base = project.is_none().then(|| rig.clone());
+            let start = JournalStart { places, origin, rig: base, context: context.text() };
+            (RigBundle { rig, ..default() }, Journal::start(disk(), start))
+        }
+    };
+    let sink = watched(journal.clone());
+    let saved = if is_recovered { SavedAt::Nowhere } else { SavedAt::Step(None) };
+    let document = OpenDocument { name: title.clone(), project, saved, journal, missing, is_placed: false };
+    let entity = world.spawn((bundle, sink, document)).id();
+    for (mesh, source) in meshes {
+        world.spawn((mesh, source, SkinOf(entity)));
+    }
+    world.insert_resource(ActiveRig(entity));
+    let restored = kept.is_some_and(|kept| view::restore(world, &kept));
+    world.resource_mut::<FrameWhenReady>().0 = !restored;
+    world.write_message(match is_recovered {
+        true => Notice::done(format!("Recovered {title}; save it to keep it")),
+        false => Notice::done(format!("Opened {name}")),
+    });
+    for note in notes {
+        let is_serious = note.starts_with("a mesh of the project is not there") || note.starts_with("the weights");
+        world.write_message(if is_serious { Notice::warning(note) } else { Notice::info(note).quiet() });
+    }
+    if let Some(pending) = pending {
+        world.resource_mut::<Recovery>().offer(pending);
+    }
+}

@@ -1,0 +1,338 @@
+//! Saving and exporting, in the background, from a snapshot of the document.
+
+use std::{
+    collections::VecDeque,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use bevy::{
+    prelude::*,
+    tasks::{Task, futures::check_ready},
+};
+
+use super::{
+    Then, active, after_asking,
+    dialog::Purpose,
+    document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
+    file_name,
+    open::{BUNDLED, spawn},
+    view,
+};
+use crate::{
+    editor::{notice::Notice, settings::EditorSettings},
+    files::{
+        Disk, FileKind, MeshShape, MeshToSave, ProjectToSave, RealDisk, project_files,
+        journal::{Journal, SaveMark},
+        read_capped, save_all_atomic, save_atomic, stem, store_model, store_rig, store_skin,
+    },
+    mesh::{gltf::GltfWriteSettings, model::Model},
+    plugins::{history::RigHistory, surface::RigMesh},
+    rig::{
+        Rig,
+        character::{Character, character},
+        skin::{SkinFile, SkinJoint},
+        step::Step,
+    },
+};
+
+/// What is being saved.
+#[derive(Resource, Default)]
+pub struct Saving {
+    job: Option<Job>,
+    waiting: VecDeque<(Purpose, PathBuf, Option<Then>)>,
+}
+
+impl Saving {
+    /// The name of what is being saved.
+    pub fn what(&self) -> Option<&str> {
+        self.job.as_ref().map(|job| job.name.as_str())
+    }
+
+    /// Goes on with `then` when everything is saved; false if nothing is being saved.
+    pub(super) fn wait_for(&mut self, then: Then) -> bool {
+        let Some(job) = &mut self.job else { return false };
+        match self.waiting.back_mut() {
+            Some((_, _, last)) => *last = Some(then),
+            None => job.then = Some(then),
+        }
+        true
+    }
+}
+
+struct Job {
+    name: String,
+    rig: Entity,
+    /// The step that the snapshot was taken after.
+    step: Option<Arc<Step>>,
+    task: Task<Result<Stored, String>>,
+    then: Option<Then>,
+}
+
+/// What was written.
+enum Stored {
+    Project { mark: SaveMark, notes: Vec<String>, bundled: Option<PathBuf> },
+    Export { notes: Vec<String> },
+}
+
+/// What stands in the field for a path at first.
+pub(super) fn suggestion(world: &World, rig: Entity, purpose: Purpose) -> PathBuf {
+    let Some(document) = world.get::<OpenDocument>(rig) else { return PathBuf::new() };
+    let beside = meshes(world, rig).into_iter().find_map(|(_, _, source)| match source {
+        Some(MeshSource::File(path)) => path.parent().map(Path::to_path_buf),
+        _ => None,
+    });
+    let folder = document.project.as_ref().and_then(|project| project.parent().map(Path::to_path_buf)).or(beside);
+    let folder = folder.or_else(|| std::env::current_dir().ok()).unwrap_or_default();
+    match (purpose, &document.project) {
+        (Purpose::Save, Some(project)) => project.clone(),
+        (Purpose::Save, None) => folder.join(format!("{}.rigsmith.ron", document.name)),
+        (Purpose::Export, _) => folder.join(format!("{}.glb", document.name)),
+    }
+}
+
+/// A path as somebody typed it, made whole: absolute, and with an ending.
+pub(super) fn completed(path: &Path, purpose: Purpose) -> PathBuf {
+    let home = std::env::var_os("HOME").map(PathBuf::from);
+    let path = match (path.strip_prefix("~"), home) {
+        (Ok(rest), Some(home)) => home.join(rest),
+        _ => path.to_owned(),
+    };
+    let mut path = std::path::absolute(&path).unwrap_or(path);
+    let kind = FileKind::of(&path);
+    let ending = match purpose {
+        Purpose::Save if kind == Some(FileKind::Project) => "",
+        Purpose::Save => ".rigsmith.ron",
+        Purpose::Export if kind.is_some() => "",
+        Purpose::Export => ".glb",
+    };
+    if let (false, Some(name)) = (ending.is_empty(), path.file_name().map(|name| name.to_string_lossy().into_owned())) {
+        let name = name.strip_suffix(".ron").filter(|_| purpose == Purpose::Save).unwrap_or(&name).to_owned();
+        path.set_file_name(format!("{name}{ending}"));
+    }
+    path
+}
+
+/// Saves or exports.
+pub(super) fn to(world: &mut World, purpose: Purpose, path: PathBuf, then: Option<Then>) {
+    match purpose {
+        Purpose::Save => project(world, path, then),
+        Purpose::Export => export(world, path),
+    }
+}
+
+/// The rig without what a drag under way has not made sure of.
+fn settled(world: &World, rig: Entity) -> Option<Rig> {
+    let data = world.get::<Rig>(rig)?;
+    Some(world.get::<RigHistory>(rig).map_or_else(|| data.clone(), |history| history.settled(data).into_owned()))
+}
+
+/// The document as it is now.
+pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(ProjectToSave, bool)> {
+    let view = view::now(world);
+    let document = world.get::<OpenDocument>(rig)?;
+    let data = settled(world, rig)?;
+    let mut is_bundled = false;
+    let mut open: Vec<MeshToSave> = Vec::new();
+    for (_, mesh, source) in meshes(world, rig) {
+        let path = match source {
+            Some(MeshSource::File(path)) => path.clone(),
+            // Where it will be is known when there is a folder for it.
+            _ => {
+                is_bundled = true;
+                PathBuf::new()
+            }
+        };
+        let shape = MeshShape::Open { rest: mesh.rest.clone(), triangles: mesh.triangles.clone() };
+        open.push(MeshToSave { uid: mesh.uid, rig: data.uid(), path, nodes: mesh.nodes.clone(), shape });
+    }
+    open.extend(document.missing.iter().cloned());
+    let name = document.name.clone();
+    Some((ProjectToSave { name, rigs: vec![data], meshes: open, view, journal: None }, is_bundled))
+}
+
+/// Saves the project.
+pub(super) fn project(world: &mut World, path: PathBuf, then: Option<Then>) {
+    if world.resource::<Saving>().job.is_some() {
+        world.resource_mut::<Saving>().waiting.push_back((Purpose::Save, path, then));
+        return;
+    }
+    let Some(rig) = active(world) else { return };
+    let Some((mut snapshot, is_bundled)) = snapshot(world, rig) else { return };
+    let Some(journal) = world.get::<OpenDocument>(rig).map(|document| document.journal.clone()) else { return };
+    snapshot.name = stem(&path);
+    let position = journal.position();
+    let (step, name) = (last_step(world, rig), file_name(&path));
+    let task = spawn(move || store(snapshot, is_bundled, path, &journal, position));
+    world.resource_mut::<Saving>().job = Some(Job { name, rig, step, task, then });
+}
+
+fn store(
+    mut project: ProjectToSave,
+    is_bundled: bool,
+    path: PathBuf,
+    journal: &Journal,
+    position: u64,
+) -> Result<Stored, String> {
+    let bundled = if is_bundled { Some(place_bundled(&path)?) } else { None };
+    if let Some(bundled) = &bundled {
+        for mesh in project.meshes.iter_mut().filter(|mesh| mesh.path.as_os_str().is_empty()) {
+            mesh.path.clone_from(bundled);
+        }
+    }
+    let files = project_files(&RealDisk, &path, &project).map_err(|error| error.to_string())?;
+    let mark = SaveMark { path, hash: files.hash(), position };
+    if let Err(reason) = journal.saving(mark.clone(), Duration::from_secs(2)) {
+        debug!("the save is not noted in the journal: {reason}");
+    }
+    save_all_atomic(&RealDisk, &files.files).map_err(|error| error.to_string())?;
+    Ok(Stored::Project { mark, notes: files.notes, bundled })
+}
+
+/// Puts the character that comes with Rigsmith beside a project, so that the project has a mesh to name.
+pub(in crate::editor) fn place_bundled(project: &Path) -> Result<PathBuf, String> {
+    let names = ["biped.obj".to_owned(), format!("{}.biped.obj", stem(project))];
+    let limit = BUNDLED.len() as u64 + 1;
+    for name in &names {
+        let path = project.with_file_name(name);
+        let disk: &dyn Disk = &RealDisk;
+        match disk.entry(&path, true) {
+            Err(_) => {
+                save_atomic(disk, &path, BUNDLED).map_err(|error| error.to_string())?;
+                return Ok(path);
+            }
+            Ok(_) if read_capped(disk, &path, limit).is_ok_and(|bytes| bytes == BUNDLED) => return Ok(path),
+            Ok(_) => {}
+        }
+    }
+    Err(format!("there is another {} in that folder already; choose another name or folder", names.join(" and ")))
+}
+
+/// Exports what the ending of the path asks for.
+fn export(world: &mut World, path: PathBuf) {
+    if world.resource::<Saving>().job.is_some() {
+        world.resource_mut::<Saving>().waiting.push_back((Purpose::Export, path, None));
+        return;
+    }
+    let Some(rig) = active(world) else { return };
+    let Some(data) = settled(world, rig) else { return };
+    let open = meshes(world, rig);
+    let more = open.len().saturating_sub(1);
+    let mesh = open.into_iter().next().map(|(_, mesh, _)| mesh.clone());
+    let (step, name) = (last_step(world, rig), file_name(&path));
+    let task = spawn(move || {
+        let mut notes = export_to(&path, &data, mesh.as_ref())?;
+        if more > 0 {
+            notes.push(format!("only the first mesh was exported; {more} more are open"));
+        }
+        Ok(Stored::Export { notes })
+    });
+    world.resource_mut::<Saving>().job = Some(Job { name, rig, step, task, then: None });
+}
+
+fn export_to(path: &Path, rig: &Rig, mesh: Option<&RigMesh>) -> Result<Vec<String>, String> {
+    match FileKind::of(path) {
+        Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
+            let empty = Model { name: rig.about().name.clone(), ..default() };
+            let skin = mesh.and_then(|mesh| rig.skin(mesh.uid));
+            let model = character(&Character {
+                rig,
+                file: mesh.map_or(&empty, |mesh| &mesh.file),
+                rest: mesh.map_or(&empty, |mesh| &mesh.rest),
+                nodes: mesh.map_or(&[], |mesh| &mesh.nodes),
+                skin: skin.map(Arc::as_ref),
+            });
+            // Without weights no joint deforms, and none of them would be written.
+            let settings = GltfWriteSettings { all_joints: skin.is_none(), ..default() };
+            store_model(&RealDisk, path, &model, &settings).map_err(|error| error.to_string())
+        }
+        Some(FileKind::Template | FileKind::RigText) => {
+            store_rig(&RealDisk, path, rig).map_err(|error| error.to_string())
+        }
+        Some(FileKind::Skin) => {
+            let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
+            let (mesh, skin) = both.ok_or("there are no weights to export; skin the mesh first")?;
+            let joints = skin.joints.iter().map(|uid| {
+                let label = rig.joint(*uid).and_then(|joint| joint.data.label.clone()).unwrap_or_default();
+                SkinJoint { uid: uid.0, label }
+            });
+            let file = SkinFile::new(joints.collect(), skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true);
+            let file = file.map_err(|error| error.to_string())?;
+            store_skin(&RealDisk, path, &file).map_err(|error| error.to_string())?;
+            Ok(Vec::new())
+        }
+        _ => Err("a character is exported as .glb, .gltf or .obj, a rig as .rig.ron or .rig, weights as .skin; \
+                  choose one of these endings"
+            .to_owned()),
+    }
+}
+
+/// Tells what became of what was being saved, and goes on.
+pub(super) fn poll(world: &mut World) {
+    let mut saving = world.resource_mut::<Saving>();
+    let Some(job) = &mut saving.bypass_change_detection().job else { return };
+    let Some(result) = check_ready(&mut job.task) else { return };
+    let Some(Job { name, rig, step, then, .. }) = saving.job.take() else { return };
+    let next = saving.waiting.pop_front();
+    let is_done = result.is_ok();
+    match result {
+        Ok(Stored::Project { mark, notes, bundled }) => {
+            saved(world, rig, step, mark, bundled);
+            world.write_message(Notice::done(format!("Saved {name}")));
+            tell(world, notes);
+        }
+        Ok(Stored::Export { notes }) => {
+            world.write_message(Notice::done(format!("Exported {name}")));
+            tell(world, notes);
+        }
+        Err(reason) => {
+            world.write_message(Notice::error(format!("Could not write {name}: {reason}")));
+        }
+    }
+    if let Some((purpose, path, then)) = next {
+        to(world, purpose, path, then);
+    }
+    if let Some(then) = then.filter(|_| is_done) {
+        // Somebody may have gone on while it was being saved.
+        after_asking(world, then);
+    }
+}
+
+fn tell(world: &mut World, notes: Vec<String>) {
+    for note in notes {
+        world.write_message(Notice::warning(note));
+    }
+}
+
+/// The project is in its file: the journal starts again from there.
+fn saved(world: &mut World, rig: Entity, step: Option<Arc<Step>>, mark: SaveMark, bundled: Option<PathBuf>) {
+    let open: Vec<Entity> = meshes(world, rig).into_iter().map(|(entity, ..)| entity).collect();
+    if let Some(path) = bundled {
+        for entity in open {
+            if let Some(mut source) =
+                world.get_mut::<MeshSource>(entity).filter(|source| **source == MeshSource::Bundled)
+            {
+                *source = MeshSource::File(path.clone());
+            }
+        }
+    }
+    let places = places(world, Some(mark.path.clone()));
+    let context = Context {
+        name: stem(&mark.path),
+        meshes: meshes(world, rig)
+            .into_iter()
+            .filter_map(|(_, mesh, source)| {
+                Some(ContextMesh { uid: mesh.uid, source: source?.clone(), nodes: mesh.nodes.to_vec() })
+            })
+            .collect(),
+    };
+    world.resource_mut::<EditorSettings>().remember(mark.path.clone());
+    let Some(mut document) = world.get_mut::<OpenDocument>(rig) else { return };
+    document.saved = SavedAt::Step(step);
+    document.name = stem(&mark.path);
+    document.project = Some(mark.path.clone());
+    document.is_placed = false;
+    document.journal.saved(mark, places);
+    document.journal.context(context.text());
+}

@@ -1,0 +1,129 @@
+//! A template on the mesh that is open: one step that undo takes back.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+
+use super::{
+    active,
+    dialog::{Dialog, Question},
+    document::meshes,
+    open::Opened,
+};
+use crate::{
+    editor::notice::Notice,
+    plugins::document::EditRequest,
+    rig::{PoseOffset, Rig, RigEdit, operations::Operation, step::edits_from_empty},
+};
+
+/// How much larger or smaller than the mesh a template may be before somebody is asked.
+const ALLOWED: f32 = 1.6;
+
+/// A template, and a mesh of another size.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The template's name.
+    pub name: String,
+    /// The height of its joints, in its own units.
+    pub rig_height: f32,
+    /// The height of the mesh at rest.
+    pub mesh_height: f32,
+    pub(super) rig: Arc<Rig>,
+}
+
+impl Fit {
+    /// The factor that makes the template as tall as the mesh.
+    pub fn ratio(&self) -> f32 {
+        self.mesh_height / self.rig_height
+    }
+}
+
+/// True if a mesh is open.
+pub(super) fn has_mesh(world: &World) -> bool {
+    active(world).is_some_and(|rig| !meshes(world, rig).is_empty())
+}
+
+/// Puts a template onto the mesh, or asks what to do about their sizes.
+pub(super) fn consider(world: &mut World, opened: Opened) {
+    let Some(active) = active(world) else { return };
+    for note in &opened.notes {
+        world.write_message(Notice::info(note.clone()).quiet());
+    }
+    let points = meshes(world, active);
+    let mesh_height = height(points.iter().flat_map(|(_, mesh, _)| mesh.rest.points.iter().copied()));
+    let rig_height = height(opened.rig.walk().map(|joint| opened.rig.position(joint.data.uid)));
+    let fit = Fit { name: opened.name, rig_height, mesh_height, rig: Arc::new(opened.rig) };
+    let ratio = fit.ratio();
+    if ratio.is_finite() && ratio > 0.0 && !(1.0 / ALLOWED..=ALLOWED).contains(&ratio) {
+        world.write_message(Notice::warning(format!(
+            "{} is for a mesh of another size: its joints are {} tall, this mesh {}. Scale it to the mesh, or take it as it is",
+            fit.name,
+            number(rig_height),
+            number(mesh_height)
+        )));
+        world.resource_mut::<Dialog>().ask(Question::Fit(fit));
+    } else {
+        put(world, &fit, 1.0);
+    }
+}
+
+/// A height in three figures.
+pub(super) fn number(height: f32) -> String {
+    match height {
+        large if large >= 100.0 => format!("{large:.0}"),
+        middle if middle >= 10.0 => format!("{middle:.1}"),
+        small => format!("{small:.3}"),
+    }
+}
+
+fn height(points: impl Iterator<Item = Vec3>) -> f32 {
+    let (low, high) = points.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), p| (low.min(p.y), high.max(p.y)));
+    (high - low).max(0.0)
+}
+
+/// Replaces the rig that is open by the template, `scale` times as large, as one step.
+pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
+    let Some(entity) = active(world) else { return };
+    let Some(rig) = world.get::<Rig>(entity) else { return };
+    let had = rig.len();
+    let mut edits = clearing(rig);
+    edits.extend(
+        edits_from_empty(&fit.rig)
+            .into_iter()
+            .filter(|edit| !matches!(edit, RigEdit::SetSkin(..)))
+            .map(|edit| if scale == 1.0 { edit } else { scaled(edit, scale) }),
+    );
+    world.write_message(EditRequest::operation(entity, Operation::Edits(edits)));
+    let joints = fit.rig.len();
+    let replaced =
+        if had > 0 { format!(" instead of the {had} that were there; undo brings them back") } else { String::new() };
+    let sized = if scale == 1.0 { String::new() } else { format!(", scaled by {scale:.3}") };
+    world.write_message(Notice::done(format!("Put {} onto the mesh: {joints} joints{sized}{replaced}", fit.name)));
+}
+
+/// The edits that empty a rig.
+fn clearing(rig: &Rig) -> Vec<RigEdit> {
+    let mut edits: Vec<RigEdit> = rig.skins().map(|(mesh, _)| RigEdit::SetSkin(mesh, None)).collect();
+    edits.extend(rig.stored_poses().iter().map(|pose| RigEdit::RemoveStoredPose(pose.uid)));
+    let mut joints: Vec<RigEdit> = rig.walk().map(|joint| RigEdit::RemoveJoint(joint.data.uid)).collect();
+    joints.reverse();
+    edits.append(&mut joints);
+    edits.extend(rig.groups().iter().map(|group| RigEdit::RemoveLocalGroup(group.uid)));
+    edits
+}
+
+fn scaled(edit: RigEdit, scale: f32) -> RigEdit {
+    let offset = |offset: PoseOffset| PoseOffset { translation: offset.translation * scale, ..offset };
+    match edit {
+        RigEdit::AddJoint { mut joint, parent, index } => {
+            joint.rest.translation *= scale;
+            RigEdit::AddJoint { joint, parent, index }
+        }
+        RigEdit::SetOffset(joint, Some(posed)) => RigEdit::SetOffset(joint, Some(offset(posed))),
+        RigEdit::AddStoredPose(mut pose, index) => {
+            pose.offsets.values_mut().for_each(|posed| *posed = offset(*posed));
+            RigEdit::AddStoredPose(pose, index)
+        }
+        other => other,
+    }
+}

@@ -1,0 +1,78 @@
+//! How a document is looked at: kept in its project, and back again.
+
+use bevy::{ecs::system::SystemState, prelude::*};
+use bevy_panorbit_camera::PanOrbitCamera;
+
+use crate::{
+    editor::{camera, mode::Mode},
+    plugins::{
+        display::{MeshDisplay, Shading},
+        drawing::{LabelChoice, RigDrawing},
+    },
+    rig::project::ProjectView,
+};
+
+/// How the document is looked at now.
+pub(in crate::editor) fn now(world: &mut World) -> ProjectView {
+    let mut cameras = world.query::<(&PanOrbitCamera, &Projection)>();
+    let camera = cameras.iter(world).next().map(|(orbit, projection)| camera::kept(orbit, projection));
+    let mut view = ProjectView { camera, ..default() };
+    if let Some(mode) = world.get_resource::<Mode>() {
+        view.mode = mode.name().to_owned();
+    }
+    if let Some(display) = world.get_resource::<MeshDisplay>() {
+        view.shading = match display.shading {
+            Shading::Shaded => "Shaded",
+            Shading::Clay => "Clay",
+        }
+        .to_owned();
+        view.switches.insert("xray".to_owned(), display.xray);
+        view.switches.insert("wireframe".to_owned(), display.wireframe);
+    }
+    if let Some(drawing) = world.get_resource::<RigDrawing>() {
+        view.switches.insert("labels".to_owned(), drawing.labels == LabelChoice::All);
+        view.switches.insert("axes".to_owned(), drawing.axes);
+        view.switches.insert("grid".to_owned(), drawing.grid);
+    }
+    view
+}
+
+/// Looks at the document as it was looked at. Returns true if that says where the camera stands.
+pub(super) fn restore(world: &mut World, view: &ProjectView) -> bool {
+    let mut state: SystemState<(
+        Option<ResMut<Mode>>,
+        Option<ResMut<MeshDisplay>>,
+        Option<ResMut<RigDrawing>>,
+        Query<(&mut PanOrbitCamera, &mut Projection)>,
+    )> = SystemState::new(world);
+    let Ok((mode, display, drawing, mut cameras)) = state.get_mut(world) else { return false };
+    let switch = |name: &str| view.switches.get(name).copied();
+    if let (Some(mut mode), Some(kept)) = (mode, Mode::ALL.into_iter().find(|mode| mode.name() == view.mode)) {
+        mode.set_if_neq(kept);
+    }
+    if let Some(mut display) = display {
+        let mut next = *display;
+        next.shading = match view.shading.as_str() {
+            "Shaded" => Shading::Shaded,
+            "Clay" => Shading::Clay,
+            _ => next.shading,
+        };
+        next.xray = switch("xray").unwrap_or(next.xray);
+        next.wireframe = switch("wireframe").unwrap_or(next.wireframe);
+        display.set_if_neq(next);
+    }
+    if let Some(mut drawing) = drawing {
+        match switch("labels") {
+            Some(true) => drawing.labels = LabelChoice::All,
+            Some(false) if drawing.labels == LabelChoice::All => drawing.labels = LabelChoice::None,
+            _ => {}
+        }
+        drawing.axes = switch("axes").unwrap_or(drawing.axes);
+        drawing.grid = switch("grid").unwrap_or(drawing.grid);
+    }
+    let Some(kept) = &view.camera else { return false };
+    for (mut orbit, mut projection) in &mut cameras {
+        camera::take(kept, &mut orbit, &mut projection);
+    }
+    true
+}
