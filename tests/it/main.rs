@@ -9,6 +9,8 @@ mod drawing;
 #[cfg(feature = "draw")]
 mod drawing_pictures;
 mod edit_text;
+#[cfg(feature = "editor")]
+mod editor_files;
 mod edits;
 mod exports;
 mod files;

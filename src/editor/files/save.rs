@@ -23,9 +23,9 @@ use super::{
 use crate::{
     editor::{notice::Notice, settings::EditorSettings},
     files::{
-        Disk, FileKind, MeshShape, MeshToSave, ProjectToSave, RealDisk, project_files,
+        Disk, FileKind, MeshShape, MeshToSave, ProjectToSave, RealDisk,
         journal::{Journal, SaveMark},
-        read_capped, save_all_atomic, save_atomic, stem, store_model, store_rig, store_skin,
+        project_files, read_capped, save_all_atomic, save_atomic, stem, store_model, store_rig, store_skin,
     },
     mesh::{gltf::GltfWriteSettings, model::Model},
     plugins::{history::RigHistory, surface::RigMesh},
@@ -332,7 +332,6 @@ fn saved(world: &mut World, rig: Entity, step: Option<Arc<Step>>, mark: SaveMark
     document.saved = SavedAt::Step(step);
     document.name = stem(&mark.path);
     document.project = Some(mark.path.clone());
-    document.is_placed = false;
     document.journal.saved(mark, places);
     document.journal.context(context.text());
 }

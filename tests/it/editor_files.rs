@@ -1,0 +1,480 @@
+//! Files in the window, without the window: opening, saving, asking, recovering.
+
+use std::{
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use bevy::{ecs::message::MessageCursor, prelude::*, window::FileDragAndDrop};
+use rigsmith::{
+    editor::{
+        ActiveRig,
+        actions::{Action, ActionRequest},
+        files::{
+            FilesPlugin, Loading, OpenDocument, OpenRequest, Saving, StateFolder,
+            dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
+            has_unsaved_changes, title,
+        },
+        notice::{Notice, Severity},
+        recovery::Recovery,
+    },
+    files::{RealDisk, load_model, load_template, store_rig},
+    headless::headless_app,
+    plugins::{
+        document::{Change, EditRequest},
+        history::RigHistory,
+        surface::{RigMesh, RigMeshes},
+    },
+    prelude::*,
+    rig::operations::Operation,
+};
+
+struct Window {
+    app: App,
+    folder: PathBuf,
+    cursor: MessageCursor<Notice>,
+    notices: Vec<Notice>,
+}
+
+impl Window {
+    /// A window without anything open; journals lie in `folder/state`.
+    fn new(folder: &Path) -> Self {
+        Self::with_state(folder, folder.join("state"))
+    }
+
+    fn with_state(folder: &Path, state: PathBuf) -> Self {
+        let mut app = headless_app(7);
+        app.insert_resource(StateFolder(Some(state))).add_plugins(FilesPlugin).add_message::<bevy::app::AppExit>();
+        app.finish();
+        app.cleanup();
+        let mut window = Self { app, folder: folder.to_owned(), cursor: MessageCursor::default(), notices: Vec::new() };
+        window.settle();
+        window
+    }
+
+    fn bundled(folder: &Path) -> Self {
+        let mut window = Self::new(folder);
+        window.open(OpenRequest::Bundled);
+        window
+    }
+
+    fn world(&self) -> &World {
+        self.app.world()
+    }
+
+    fn update(&mut self) {
+        self.app.update();
+        let messages = self.app.world().resource::<Messages<Notice>>();
+        self.notices.extend(self.cursor.read(messages).cloned());
+        // Work that other tests left in the system's folder for temporary files is none of ours.
+        let foreign = match self.question() {
+            Some(Question::Recover(list)) => list.iter().all(|pending| !pending.path.starts_with(&self.folder)),
+            _ => false,
+        };
+        if foreign {
+            self.app.world_mut().write_message(DialogAnswer(Answer::Cancel));
+        }
+    }
+
+    /// Runs frames until nothing goes on in the background.
+    fn settle(&mut self) {
+        let start = Instant::now();
+        for _ in 0..3 {
+            self.update();
+        }
+        while self.world().resource::<Loading>().what().is_some()
+            || self.world().resource::<Saving>().what().is_some()
+            || self.world().resource::<Recovery>().is_looking()
+        {
+            assert!(start.elapsed() < Duration::from_secs(60), "something never ends");
+            std::thread::sleep(Duration::from_millis(2));
+            self.update();
+        }
+        for _ in 0..3 {
+            self.update();
+        }
+    }
+
+    fn send<M: Message>(&mut self, message: M) {
+        self.app.world_mut().write_message(message);
+        self.settle();
+    }
+
+    fn open(&mut self, request: OpenRequest) {
+        self.send(request);
+    }
+
+    fn open_file(&mut self, path: &Path) {
+        self.open(OpenRequest::File(path.to_owned()));
+    }
+
+    fn act(&mut self, action: Action) {
+        self.send(ActionRequest(action));
+    }
+
+    fn answer(&mut self, answer: Answer) {
+        self.send(DialogAnswer(answer));
+    }
+
+    fn question(&self) -> Option<&Question> {
+        self.world().resource::<Dialog>().question()
+    }
+
+    fn rig_entity(&self) -> Entity {
+        self.world().resource::<ActiveRig>().0
+    }
+
+    fn rig(&self) -> Rig {
+        self.world().get::<Rig>(self.rig_entity()).expect("a rig is open").clone()
+    }
+
+    fn change(&mut self, change: Change) {
+        let rig = self.rig_entity();
+        self.send(EditRequest { rig, change });
+    }
+
+    fn place(&mut self, height: f32) {
+        self.change(Change::Do(Operation::Place { position: Vec3::new(0.0, height, 0.0), parent: None }));
+    }
+
+    fn save_as(&mut self, name: &str) -> PathBuf {
+        let path = self.folder.join(name);
+        self.act(Action::SaveAs);
+        self.answer(Answer::Path(path.clone()));
+        path
+    }
+
+    fn export(&mut self, name: &str) -> PathBuf {
+        let path = self.folder.join(name);
+        self.act(Action::Export);
+        self.answer(Answer::Path(path.clone()));
+        path
+    }
+
+    fn is_unsaved(&self) -> bool {
+        has_unsaved_changes(self.world())
+    }
+
+    fn mesh(&self) -> Option<&RigMesh> {
+        let entity = self.world().get::<RigMeshes>(self.rig_entity())?.iter().next()?;
+        self.world().get::<RigMesh>(entity)
+    }
+
+    fn said(&self, severity: Severity, part: &str) -> bool {
+        self.notices.iter().any(|notice| notice.severity == severity && notice.text.contains(part))
+    }
+
+    fn journal(&self) -> PathBuf {
+        let document = self.world().get::<OpenDocument>(self.rig_entity()).expect("a document is open");
+        let start = Instant::now();
+        loop {
+            if let Some(path) = document.journal().path() {
+                return path;
+            }
+            assert!(start.elapsed() < Duration::from_secs(10), "the journal never begins");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder for the test")
+}
+
+#[test]
+fn changes_are_unsaved_until_saved_and_clean_again_after_undo() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    assert_eq!(title(window.world()), "biped - Rigsmith");
+    window.place(1.0);
+    assert_eq!(title(window.world()), "biped* - Rigsmith");
+    window.change(Change::Undo);
+    assert!(!window.is_unsaved(), "undone to what was opened");
+    window.change(Change::Redo);
+    assert!(window.is_unsaved());
+    let path = window.save_as("guy");
+    assert_eq!(title(window.world()), "guy - Rigsmith", "{:?}", window.notices);
+    assert!(!path.exists(), "the ending is added");
+    let path = folder.path().join("guy.rigsmith.ron");
+    assert!(path.exists() && folder.path().join("biped.obj").exists());
+    window.change(Change::Undo);
+    assert!(window.is_unsaved(), "before what was saved");
+    window.change(Change::Redo);
+    assert!(!window.is_unsaved(), "as it was saved");
+    window.change(Change::Undo);
+    window.place(0.5);
+    assert!(window.is_unsaved(), "as many steps as were saved, but others");
+    window.act(Action::Save);
+    assert!(!window.is_unsaved() && window.question().is_none());
+}
+
+#[test]
+fn what_was_saved_opens_the_same() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    window.place(0.5);
+    let path = window.save_as("guy.rigsmith.ron");
+    let (rig, mesh) = (window.rig(), window.mesh().map(|mesh| (mesh.uid, mesh.rest.points.clone())));
+    let bytes = std::fs::read(&path).expect("the project was saved");
+    let mut other = Window::new(folder.path());
+    other.open_file(&path);
+    assert_eq!(other.rig(), rig);
+    assert_eq!(other.mesh().map(|mesh| (mesh.uid, mesh.rest.points.clone())), mesh);
+    assert!(!other.is_unsaved());
+    other.act(Action::Save);
+    assert_eq!(std::fs::read(&path).expect("still there"), bytes);
+}
+
+#[test]
+fn a_crash_loses_nothing() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    window.place(0.5);
+    window.change(Change::Undo);
+    let (rig, points) = (window.rig(), window.mesh().map(|mesh| mesh.rest.points.clone()));
+    let journal = window.journal();
+    assert!(journal.starts_with(folder.path().join("state")));
+    drop(window);
+
+    let mut window = Window::bundled(folder.path());
+    let Some(Question::Recover(list)) = window.question() else { panic!("nothing is offered") };
+    let pending = list.iter().find(|pending| pending.path == journal).expect("our work is offered");
+    assert_eq!(pending.changes, 3);
+    let start = Instant::now();
+    window.answer(Answer::Recover(journal.clone()));
+    assert!(start.elapsed() < Duration::from_secs(2), "recovery took {:?}", start.elapsed());
+    assert_eq!(window.rig(), rig, "{:?}", window.notices);
+    assert_eq!(window.mesh().map(|mesh| mesh.rest.points.clone()), points);
+    assert!(window.is_unsaved(), "recovered work is in no file");
+    window.change(Change::Redo);
+    assert_eq!(window.rig().len(), rig.len() + 1, "what was undone can be done again");
+    window.change(Change::Undo);
+    window.change(Change::Undo);
+    assert_eq!(window.rig().len(), rig.len() - 1);
+    // A second crash.
+    drop(window);
+    let mut window = Window::bundled(folder.path());
+    let offered = match window.question() {
+        Some(Question::Recover(list)) => list.iter().find(|p| p.path.starts_with(folder.path())).cloned(),
+        _ => None,
+    };
+    let offered = offered.expect("the work that went on is offered");
+    window.answer(Answer::Forget(offered.path.clone()));
+    assert!(!offered.path.exists());
+}
+
+#[test]
+fn a_crash_after_saving_recovers_what_came_later() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    let path = window.save_as("guy.rigsmith.ron");
+    window.place(0.5);
+    let rig = window.rig();
+    drop(window);
+    let mut window = Window::new(folder.path());
+    window.open_file(&path);
+    let Some(Question::Recover(list)) = window.question() else {
+        panic!("nothing is offered beside the project: {:?}", window.notices)
+    };
+    let ours: Vec<_> = list.iter().filter(|pending| pending.path.starts_with(folder.path())).cloned().collect();
+    assert_eq!(ours.iter().map(|pending| pending.changes).collect::<Vec<_>>(), [1]);
+    window.answer(Answer::Recover(ours[0].path.clone()));
+    assert_eq!(window.rig(), rig);
+    assert_eq!(title(window.world()), "guy* - Rigsmith");
+    window.act(Action::Save);
+    assert!(!window.is_unsaved() && window.question().is_none(), "it knows where it was saved");
+}
+
+#[test]
+fn quitting_asks_about_unsaved_changes_and_leaves_no_journal() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    let journal = window.journal();
+    assert!(journal.exists(), "there is a journal before the first edit");
+    window.place(1.0);
+    window.act(Action::Quit);
+    assert!(matches!(window.question(), Some(Question::Unsaved { .. })));
+    assert!(window.app.should_exit().is_none());
+    window.answer(Answer::Cancel);
+    assert!(window.question().is_none() && window.app.should_exit().is_none() && journal.exists());
+    window.app.world_mut().write_message(ActionRequest(Action::Quit));
+    window.update();
+    window.app.world_mut().write_message(DialogAnswer(Answer::Save));
+    window.update();
+    assert!(matches!(window.question(), Some(Question::Path { purpose: Purpose::Save, .. })));
+    let path = folder.path().join("guy.rigsmith.ron");
+    window.app.world_mut().write_message(DialogAnswer(Answer::Path(path.clone())));
+    let start = Instant::now();
+    while window.app.should_exit().is_none() {
+        assert!(start.elapsed() < Duration::from_secs(20), "it never quits: {:?}", window.notices);
+        window.update();
+    }
+    assert!(path.exists() && !journal.exists());
+    drop(window);
+    let left: Vec<_> = std::fs::read_dir(folder.path().join("state")).into_iter().flatten().flatten().collect();
+    assert!(left.is_empty(), "{left:?}");
+    assert!(!folder.path().join("guy.rigsmith.journal").exists());
+}
+
+#[test]
+fn opening_something_else_asks_first() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    let rig = window.rig();
+    for request in [OpenRequest::Empty, OpenRequest::Bundled] {
+        window.open(request);
+        assert!(matches!(window.question(), Some(Question::Unsaved { .. })));
+        window.answer(Answer::Cancel);
+        assert_eq!(window.rig(), rig);
+    }
+    window.act(Action::New);
+    window.answer(Answer::Discard);
+    assert!(window.rig().is_empty() && !window.is_unsaved());
+    // The last one wins.
+    window.app.world_mut().write_message(OpenRequest::Bundled);
+    window.app.world_mut().write_message(OpenRequest::Empty);
+    window.settle();
+    assert!(window.mesh().is_none());
+}
+
+#[test]
+fn files_that_are_nothing_lose_nothing() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    let rig = window.rig();
+    let cases: &[(&str, &[u8], &str)] = &[
+        ("notes.txt", b"hello", ".obj, .gltf or .glb"),
+        ("weights.skin", b"hello", "only weights"),
+        ("strokes.ron", b"[]", "neither template nor project"),
+    ];
+    for (name, bytes, said) in cases {
+        let path_buf = folder.path().join(name);
+        std::fs::write(&path_buf, bytes).expect("written");
+        let entity = window.rig_entity();
+        window.send(FileDragAndDrop::DroppedFile { window: entity, path_buf });
+        assert!(window.said(Severity::Error, said), "{name}: {:?}", window.notices);
+        assert_eq!(window.rig(), rig, "{name}");
+        assert!(window.question().is_none(), "{name}: nothing to ask about");
+    }
+    // By their names these could be something: what they hold is told after asking.
+    window.change(Change::Undo);
+    for (name, bytes) in
+        [("a.glb", &b"hello"[..]), ("b.rigsmith.ron", b"hello"), ("c.rig.ron", b"hello"), ("d.obj", b"")]
+    {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("written");
+        window.notices.clear();
+        window.open_file(&path);
+        assert!(window.said(Severity::Error, name), "{name}: {:?}", window.notices);
+        assert!(window.mesh().is_some(), "{name}: the character is still open");
+    }
+    window.open_file(&folder.path().join("gone.obj"));
+    assert!(window.said(Severity::Error, "gone.obj"));
+}
+
+#[test]
+fn a_template_is_put_onto_the_mesh() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    let height = |window: &Window| {
+        let rig = window.rig();
+        rig.walk().map(|joint| rig.position(joint.data.uid).y).fold(f32::NEG_INFINITY, f32::max)
+    };
+    let mesh = window.mesh().map(|mesh| mesh.rest.points.iter().map(|p| p.y).fold(0.0, f32::max)).unwrap_or_default();
+    for (name, scale) in [("fitting.rig.ron", 1.0), ("giant.rig.ron", 100.0)] {
+        let mut rig = Rig::new(Uid(1), "template");
+        for (number, at) in [0.0, 0.5, 1.0].into_iter().enumerate() {
+            let mut joint = rigsmith::rig::JointData { uid: Uid(10 + number as u64), ..default() };
+            joint.rest.translation = Vec3::Y * at * mesh * scale;
+            let index = usize::MAX;
+            rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent: None, index }).expect("a joint");
+        }
+        store_rig(&RealDisk, &folder.path().join(name), &rig).expect("written");
+    }
+    window.place(0.2);
+    window.open_file(&folder.path().join("fitting.rig.ron"));
+    assert!(window.question().is_none(), "it fits");
+    assert_eq!(window.rig().len(), 3);
+    window.change(Change::Undo);
+    assert_eq!(window.rig().len(), 1, "one step, which can be taken back");
+    let giant = folder.path().join("giant.rig.ron");
+    window.open_file(&giant);
+    assert!(matches!(window.question(), Some(Question::Fit(_))));
+    assert!(window.said(Severity::Warning, "another size"));
+    window.answer(Answer::Cancel);
+    assert_eq!(window.rig().len(), 1);
+    window.open_file(&giant);
+    window.answer(Answer::Fit);
+    assert!((height(&window) / mesh - 1.0).abs() < 1e-4, "{} of {mesh}", height(&window));
+    window.change(Change::Undo);
+    window.open_file(&giant);
+    window.answer(Answer::AsItIs);
+    assert!((height(&window) / mesh / 100.0 - 1.0).abs() < 1e-4);
+    assert!(window.mesh().is_some());
+}
+
+#[test]
+fn exports_can_be_read_back() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    let model = load_model(&RealDisk, &window.export("out.glb")).expect("a model");
+    assert_eq!(model.nodes.len(), 1, "the joint is written though nothing is skinned");
+    let template = load_template(&RealDisk, &window.export("out.rig.ron")).expect("a template");
+    assert_eq!(template.rig.len(), 1);
+    window.export("out.rig");
+    window.export("out.obj");
+    assert!(["out.rig", "out.obj"].iter().all(|name| folder.path().join(name).exists()));
+    window.export("out.skin");
+    assert!(window.said(Severity::Error, "skin the mesh first"));
+    window.export("out.glb");
+    assert!(matches!(window.question(), Some(Question::Replace { .. })), "it is there already");
+    window.answer(Answer::Save);
+    assert!(window.is_unsaved(), "an export is no save");
+}
+
+#[test]
+fn a_failed_save_keeps_everything() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    window.save_as("missing/guy.rigsmith.ron");
+    assert!(window.said(Severity::Error, "There is no folder"));
+    window.answer(Answer::Cancel);
+    let path = window.save_as("guy.rigsmith.ron");
+    window.place(0.5);
+    // A folder where the file was: nothing can take its place.
+    std::fs::remove_file(&path).expect("removed");
+    std::fs::create_dir_all(path.join("in the way")).expect("made");
+    window.act(Action::Save);
+    assert!(window.said(Severity::Error, "Could not write guy.rigsmith.ron"), "{:?}", window.notices);
+    assert!(window.is_unsaved());
+    assert!(window.journal().exists());
+}
+
+#[test]
+fn an_unwritable_folder_for_journals_is_told_and_work_goes_on() {
+    let folder = folder();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "in the way").expect("written");
+    let mut window = Window::with_state(folder.path(), file.join("state"));
+    window.open(OpenRequest::Bundled);
+    window.place(1.0);
+    let journal = window.journal();
+    assert!(journal.starts_with(std::env::temp_dir()), "{}", journal.display());
+    window.settle();
+    let told = |window: &Window| window.notices.iter().filter(|n| n.text.contains("RIGSMITH_STATE")).count();
+    assert_eq!(told(&window), 1, "{:?}", window.notices);
+    let path = window.save_as("guy.rigsmith.ron");
+    assert!(path.exists() && !window.is_unsaved());
+    assert_eq!(told(&window), 1, "told once");
+    let steps = window.world().get::<RigHistory>(window.rig_entity()).map(|history| history.steps().1);
+    assert_eq!(steps, Some(1));
+    window.act(Action::Quit);
+    assert!(!journal.exists());
+}
