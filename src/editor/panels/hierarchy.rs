@@ -10,7 +10,7 @@ pub mod rows;
 use std::collections::HashSet;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, DragAndDrop, Rect, Sense, TextEdit, Ui, WidgetInfo, WidgetType};
+use bevy_egui::egui::{self, DragAndDrop, Rect, Sense, Ui};
 
 use super::{
     list::{self, List},
@@ -100,29 +100,21 @@ impl EditorPanel for HierarchyPanel {
 impl HierarchyPanel {
     /// The filter, and buttons that fold.
     fn bar(&mut self, ui: &mut Ui, shown: &Shown) {
-        ui.horizontal(|ui| {
-            let side = ui.spacing().interact_size.y + ui.spacing().item_spacing.x;
-            let buttons = if self.filter.is_empty() { 2.0 } else { 1.0 };
-            let width = (ui.available_width() - buttons * side - 4.0).max(40.0);
-            let field = TextEdit::singleline(&mut self.filter).hint_text("Filter").desired_width(width);
-            let response = ui.add(field).on_hover_text("Joints whose label or group contains all of these words");
-            response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Filter"));
-            if !self.filter.is_empty() {
-                if list::symbol_button(ui, "✖", "Clear filter") {
-                    self.filter.clear();
-                }
-                return;
+        let mut fold: Option<bool> = None;
+        let tip = "Joints whose label or group contains all of these words";
+        list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
+            if list::symbol_button(ui, "⏵", "Fold all") {
+                fold = Some(true);
             }
             if list::symbol_button(ui, "⏷", "Unfold all") {
-                self.folded.clear();
-                self.stale = true;
-            }
-            if list::symbol_button(ui, "⏵", "Fold all") {
-                let parents = shown.rig.walk().filter(|joint| !joint.children.is_empty());
-                self.folded = parents.map(|joint| joint.data.uid).collect();
-                self.stale = true;
+                fold = Some(false);
             }
         });
+        if let Some(fold) = fold {
+            let parents = shown.rig.walk().filter(|joint| fold && !joint.children.is_empty());
+            self.folded = parents.map(|joint| joint.data.uid).collect();
+            self.stale = true;
+        }
         if !self.filter.trim().is_empty() {
             let found = self.tree.rows.iter().filter(|row| row.matches).count();
             ui.weak(format!("{found} of {} joints", shown.rig.len()));

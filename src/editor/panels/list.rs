@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use bevy_egui::egui::{
-    Align2, Button, Color32, FontId, Pos2, Rect, ScrollArea, TextStyle, Ui, Vec2, WidgetInfo, WidgetType,
+    Align, Align2, Button, Color32, FontId, Layout, Pos2, Rect, ScrollArea, TextEdit, TextStyle, Ui, Vec2, WidgetInfo,
+    WidgetType,
     scroll_area::ScrollBarVisibility,
     style::ScrollAnimation,
     text::{LayoutJob, TextWrapping},
@@ -85,4 +86,21 @@ pub(super) fn symbol_button(ui: &mut Ui, text: &str, tip: &str) -> bool {
     let response = ui.add(button).on_hover_text(tip);
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tip));
     response.clicked()
+}
+
+/// A field that narrows a list down, and what `buttons` adds to its right, from right to left.
+pub(super) fn search_bar(ui: &mut Ui, name: &str, tip: &str, text: &mut String, buttons: impl FnOnce(&mut Ui)) {
+    let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+    ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
+        ui.spacing_mut().button_padding.x = 4.0;
+        ui.spacing_mut().item_spacing.x = 3.0;
+        buttons(ui);
+        if !text.is_empty() && symbol_button(ui, "✖", &format!("Clear {}", name.to_lowercase())) {
+            text.clear();
+        }
+        let width = ui.available_width() - 8.0;
+        let response = ui.add(TextEdit::singleline(text).hint_text(name).desired_width(width));
+        response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, name));
+        response.on_hover_text(tip);
+    });
 }

@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, time::Duration};
 
 use bevy::{prelude::*, window::RequestRedraw};
-use bevy_egui::egui::{self, Color32, Label, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, WidgetInfo, WidgetType};
+use bevy_egui::egui::{self, Color32, Label, Rect, RichText, ScrollArea, Sense, Ui, WidgetInfo, WidgetType};
 
 use super::list::{self, List};
 use crate::{
@@ -187,19 +187,18 @@ impl LogPanel {
     }
 
     fn bar(&mut self, ui: &mut Ui, book: &LogBook, requests: &mut Requests) {
-        ui.horizontal(|ui| {
-            let side = ui.spacing().interact_size.y + ui.spacing().item_spacing.x;
-            let width = (ui.available_width() - 2.0 * side - 4.0).max(40.0);
-            let field = ui.add(TextEdit::singleline(&mut self.search).hint_text("Search").desired_width(width));
-            field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Search"));
-            if list::symbol_button(ui, "📋", "Copy what is listed") {
-                let lines = self.listed.places.iter().filter_map(|place| book.entries.get(*place)).map(LogEntry::line);
-                ui.ctx().copy_text(lines.collect::<Vec<_>>().join("\n"));
-            }
-            if list::symbol_button(ui, "🗑", "Clear the log") {
-                requests.send(ClearLog);
-            }
+        let (mut copy, mut clear) = (false, false);
+        list::search_bar(ui, "Search", "Entries that contain all of these words", &mut self.search, |ui| {
+            clear = ui.button("Clear").on_hover_text("Forget all entries").clicked();
+            copy = ui.button("Copy").on_hover_text("Copy what is listed").clicked();
         });
+        if copy {
+            let lines = self.listed.places.iter().filter_map(|place| book.entries.get(*place)).map(LogEntry::line);
+            ui.ctx().copy_text(lines.collect::<Vec<_>>().join("\n"));
+        }
+        if clear {
+            requests.send(ClearLog);
+        }
     }
 
     fn entries(&mut self, ui: &mut Ui, book: &LogBook) {
@@ -229,8 +228,8 @@ fn entry_row(ui: &mut Ui, rect: Rect, entry: &LogEntry, chosen: &mut Option<u64>
     list::symbol(ui, icon, symbol, color);
     let mut text = rect.with_min_x(icon.right() + 2.0);
     if rect.width() > 240.0 {
-        list::line(ui, text.with_max_x(text.left() + 52.0), &clock(entry.at), ui.visuals().weak_text_color());
-        text.min.x += 54.0;
+        list::line(ui, text.with_max_x(text.left() + 42.0), &clock(entry.at), ui.visuals().weak_text_color());
+        text.min.x += 44.0;
     }
     let times = if entry.times > 1 { format!("{}× ", entry.times) } else { String::new() };
     // Line breaks would show as boxes in a single line.

@@ -63,10 +63,11 @@ impl EditorPanel for PropertiesPanel {
             }
             self.label_field(ui, &shown, requests);
             self.group_field(ui, &shown, requests);
-            self.relations(ui, &shown, requests);
-            self.lock_field(ui, &shown, requests);
             ui.separator();
             self.transform(ui, world, &shown, requests);
+            ui.separator();
+            self.relations(ui, &shown, requests);
+            self.lock_field(ui, &shown, requests);
         });
     }
 }
@@ -162,7 +163,7 @@ impl PropertiesPanel {
         }
     }
 
-    /// Kind, parent and other side, each a click away.
+    /// Kind and bones, and parent and other side, each a click away.
     fn relations(&self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
         let kind = match (self.values.kind.mixed, self.values.kind.value) {
             (true, _) => MIXED,
@@ -170,6 +171,7 @@ impl PropertiesPanel {
             (false, NodeKind::Null) => "Null (no weights)",
         };
         labelled(ui, "Kind", |ui| ui.add(egui::Label::new(kind).truncate()));
+        labelled(ui, "Bone length", |ui| ui.add(egui::Label::new(lengths(&self.values.lengths)).truncate()));
         let [joint] = self.values.joints[..] else { return };
         let Some(data) = shown.rig.joint(joint) else { return };
         let mirror = data.data.mirror.filter(|other| shown.rig.joint(*other).is_some());
@@ -235,8 +237,6 @@ impl PropertiesPanel {
             if reset.clicked() {
                 self.send(Operation::ResetPose(self.values.joints.clone()), shown, requests);
             }
-        } else {
-            labelled(ui, "Bone length", |ui| ui.add(egui::Label::new(lengths(&self.values.lengths)).truncate()));
         }
         let with_children = world.get_resource::<EditorSettings>().is_some_and(|settings| settings.move_children);
         let Some((part, axis, edit)) = edit else { return };
