@@ -31,7 +31,11 @@ use rigsmith::{
     rig::{operations::MirrorPlane, template::read_template},
 };
 
-const SIZE: UVec2 = UVec2::new(960, 720);
+/// Size of the pictures: small, unless somebody wants to look at them.
+fn size() -> UVec2 {
+    let kept = std::env::var_os("RIGSMITH_PICTURES").is_some();
+    if kept { UVec2::new(960, 720) } else { UVec2::new(480, 360) }
+}
 
 /// The last picture taken.
 #[derive(Resource, Default)]
@@ -63,7 +67,7 @@ impl Studio {
         let world = app.world_mut();
         let template = read_template(include_bytes!("../../assets/templates/biped.rig.ron")).unwrap();
         let rig = world.spawn(RigBundle { rig: template.rig, ..default() }).id();
-        let target = Image::new_target_texture(SIZE.x, SIZE.y, TextureFormat::Rgba8UnormSrgb, None);
+        let target = Image::new_target_texture(size().x, size().y, TextureFormat::Rgba8UnormSrgb, None);
         let target = world.resource_mut::<Assets<Image>>().add(target);
         let camera = (
             Camera3d::default(),
@@ -142,7 +146,7 @@ impl Studio {
         let world = self.app.world();
         let camera = world.entity(self.camera);
         let (eye, projection) = (camera.get::<GlobalTransform>().unwrap(), camera.get::<Projection>().unwrap());
-        Sight::new(eye, projection, camera.get().unwrap(), SIZE.as_vec2(), &GlobalTransform::IDENTITY).unwrap()
+        Sight::new(eye, projection, camera.get().unwrap(), size().as_vec2(), &GlobalTransform::IDENTITY).unwrap()
     }
 }
 

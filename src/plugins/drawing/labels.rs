@@ -13,7 +13,7 @@ use super::{
 use crate::plugins::viewport::Sight;
 
 /// Width and height in pixels that a letter takes, for [`label_places`].
-pub const LETTER: Vec2 = Vec2::new(7.0, 15.0);
+pub const LETTER: Vec2 = Vec2::new(8.0, 15.0);
 
 /// A label that wants to be shown.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,7 @@ use bevy::{math::Affine3A, prelude::*};
 
 use super::{
     RigDrawing,
-    ink::{Ink, Pen},
+    ink::{Ink, Layer, Pen},
     labels::write_label,
     shapes::{Octahedron, ball_radius},
     theme::{Theme, Tint, group_tint, mix, shade},
@@ -314,8 +314,12 @@ impl Artist<'_> {
         let axes = [joint.axes.x_axis, joint.axes.y_axis, joint.axes.z_axis];
         for (axis, tint) in axes.into_iter().zip(self.theme.axes) {
             let ends = [joint.position + axis * start, joint.position + axis * end];
-            self.pen.line(ends, 4.0, (radius + 3.0) * pixel, self.theme.outline);
-            self.pen.line(ends, 2.2, (radius + 4.0) * pixel, tint);
+            // One of them usually runs inside the bone.
+            self.pen.layer = Layer::Fixed(0.999_86);
+            self.pen.line(ends, 4.0, 0.0, self.theme.outline);
+            self.pen.layer = Layer::Fixed(0.999_88);
+            self.pen.line(ends, 2.2, 0.0, tint);
         }
+        self.pen.layer = Layer::Over;
     }
 }
