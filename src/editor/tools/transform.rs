@@ -14,10 +14,9 @@ pub use aim::Aim;
 use super::{
     GizmoHover, PointerOwner, Tool, ToolPointer, ToolSystems,
     gizmo::{Delta, GizmoDrag, Handle, HandleShape, handle_at},
-    place,
     pose::PosedJoint,
     scene::{EditedRig, Scene, joints},
-    select::REACH,
+    select::{self, REACH},
 };
 use crate::{
     editor::{
@@ -48,7 +47,7 @@ impl Plugin for TransformPlugin {
             .init_resource::<EditorSettings>()
             .add_message::<RequestRedraw>()
             .add_systems(Update, hover.before(ToolSystems::Route))
-            .add_systems(Update, drag.in_set(ToolSystems::Tools).after(place::place))
+            .add_systems(Update, drag.in_set(ToolSystems::Tools).before(select::select))
             .add_systems(
                 PostUpdate,
                 (show::show_rest, show::show).chain().in_set(ToolSystems::Show).after(super::stroke::show),
