@@ -192,7 +192,9 @@ impl Numbers {
             return Some(if dropped { NumberEdit::Cancel } else { NumberEdit::Commit });
         }
         let number = typed.get().or(response.changed().then_some(value))? as f32;
-        (number.is_finite() && (shown.mixed || number != shown.value)).then_some(NumberEdit::Set(number))
+        // Digits that are not shown are not changed by confirming those that are.
+        let same = !shown.mixed && short(number.into(), look.decimals) == short(shown.value.into(), look.decimals);
+        (number.is_finite() && !same).then_some(NumberEdit::Set(number))
     }
 }
 

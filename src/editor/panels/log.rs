@@ -148,7 +148,10 @@ impl EditorPanel for LogPanel {
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
         let Some(book) = world.get_resource::<LogBook>() else { return };
-        self.refresh(book);
+        if self.refresh(book) {
+            // The list stays at its end one frame after it has grown.
+            ui.ctx().request_repaint();
+        }
         self.bar(ui, book, requests);
         if book.entries.is_empty() {
             return list::nothing(ui, "Nothing has been told yet.");
@@ -170,10 +173,11 @@ impl EditorPanel for LogPanel {
 }
 
 impl LogPanel {
-    fn refresh(&mut self, book: &LogBook) {
+    /// Searches again if the entries or the search changed; true if so.
+    fn refresh(&mut self, book: &LogBook) -> bool {
         let key = (book.next, book.entries.len(), self.search.clone());
         if self.listed.made_from.as_ref() == Some(&key) {
-            return;
+            return false;
         }
         let words: Vec<String> = self.search.split_whitespace().map(str::to_lowercase).collect();
         let found = |entry: &LogEntry| {
@@ -184,6 +188,7 @@ impl LogPanel {
         self.listed.places =
             book.entries().enumerate().filter(|(_, entry)| found(entry)).map(|(place, _)| place).collect();
         self.listed.made_from = Some(key);
+        true
     }
 
     fn bar(&mut self, ui: &mut Ui, book: &LogBook, requests: &mut Requests) {

@@ -134,29 +134,26 @@ impl PropertiesPanel {
         let mut operation = None;
         let joints = self.values.joints.clone();
         labelled(ui, "Group", |ui| {
-            let room = if group.is_some() { ui.spacing().interact_size.x + ui.spacing().item_spacing.x } else { 0.0 };
+            if let Some(group) = &group {
+                let stored = color(group.color);
+                let kept = self.color.as_ref().filter(|(name, _)| *name == group.name).map(|(_, color)| *color);
+                let mut rgb = kept.unwrap_or([stored.r(), stored.g(), stored.b()]);
+                if ui.color_edit_button_srgb(&mut rgb).on_hover_text("Colour of the group").changed() {
+                    self.color = Some((group.name.clone(), rgb));
+                }
+                let holding = ui.input(|input| input.pointer.any_down()) || ui.ctx().egui_wants_keyboard_input();
+                if let Some((name, rgb)) = self.color.take_if(|_| !holding) {
+                    let color = Some(rgb.map(|byte| f32::from(byte) / 255.0));
+                    operation = Some(Operation::Group { joints: joints.clone(), name, color });
+                }
+            }
             let current = if mixed { None } else { Some(group.as_ref().map_or("", |group| group.name.as_str())) };
-            let combo = ComboBox::from_id_salt("group").selected_text(text).truncate();
-            let combo = combo
-                .width((ui.available_width() - room).max(40.0))
-                .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
-            combo.show_ui(ui, |ui| {
+            let combo = ComboBox::from_id_salt("group").selected_text(text).truncate().width(ui.available_width());
+            combo.close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside).show_ui(ui, |ui| {
                 if let Some(name) = groups::choose(ui, &shown.rig, current, &mut self.group) {
                     operation = Some(Operation::Group { joints: joints.clone(), name, color: None });
                 }
             });
-            let Some(group) = &group else { return };
-            let stored = color(group.color);
-            let kept = self.color.as_ref().filter(|(name, _)| *name == group.name).map(|(_, color)| *color);
-            let mut rgb = kept.unwrap_or([stored.r(), stored.g(), stored.b()]);
-            if ui.color_edit_button_srgb(&mut rgb).on_hover_text("Colour of the group").changed() {
-                self.color = Some((group.name.clone(), rgb));
-            }
-            let holding = ui.input(|input| input.pointer.any_down()) || ui.ctx().egui_wants_keyboard_input();
-            if let Some((name, rgb)) = self.color.take_if(|_| !holding) {
-                let color = Some(rgb.map(|byte| f32::from(byte) / 255.0));
-                operation = Some(Operation::Group { joints: joints.clone(), name, color });
-            }
         });
         if let Some(operation) = operation {
             self.send(operation, shown, requests);
