@@ -98,7 +98,7 @@ pub(super) fn search_bar(ui: &mut Ui, name: &str, tip: &str, text: &mut String, 
         if !text.is_empty() && symbol_button(ui, "✖", &format!("Clear {}", name.to_lowercase())) {
             text.clear();
         }
-        let width = ui.available_width() - 8.0;
+        let width = ui.available_width();
         let response = ui.add(TextEdit::singleline(text).hint_text(name).desired_width(width));
         response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, name));
         response.on_hover_text(tip);
