@@ -183,7 +183,10 @@ impl Operation {
             Self::ApplyPose(..) => "Apply pose",
             Self::RenamePose(..) => "Rename pose",
             Self::DeletePose(..) => "Delete pose",
-            Self::Edits(..) => "Edit rig",
+            Self::Edits(edits) => match edits[..] {
+                [RigEdit::SetSkin(_, Some(_))] => "Skin mesh",
+                _ => "Edit rig",
+            },
         }
     }
 

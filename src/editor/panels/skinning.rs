@@ -196,9 +196,9 @@ fn skin_button(ui: &mut Ui, shown: &Shown, meshes: usize, running: &[&SkinningJo
     let size = egui::vec2(ui.available_width(), 34.0);
     if running.is_empty() {
         let obstacle = obstacle(&shown.rig, meshes);
-        let button = Button::new(RichText::new("Skin").size(16.0).strong()).min_size(size);
-        let tip = "Compute weights of all meshes in the background";
-        let response = ui.add_enabled(obstacle.is_none(), button).on_hover_text(tip);
+        let button = Button::new(RichText::new("Skin").size(16.0).strong());
+        let response = ui.add_enabled_ui(obstacle.is_none(), |ui| ui.add_sized(size, button)).inner;
+        let response = response.on_hover_text("Compute weights of all meshes in the background");
         if response.clicked() {
             requests.send(ActionRequest(Action::Skin));
         }
@@ -209,7 +209,7 @@ fn skin_button(ui: &mut Ui, shown: &Shown, meshes: usize, running: &[&SkinningJo
     }
     let progress = running.iter().map(|job| job.progress()).sum::<f32>() / running.len() as f32;
     ui.add(ProgressBar::new(progress).text(format!("{:.0} %", progress * 100.0)).desired_height(20.0));
-    if ui.add(Button::new("Cancel").min_size(egui::vec2(ui.available_width(), 24.0))).clicked() {
+    if ui.add_sized(egui::vec2(ui.available_width(), 24.0), Button::new("Cancel")).clicked() {
         requests.send(CancelSkinning);
     }
     ui.ctx().request_repaint_after_secs(0.1);
@@ -317,7 +317,11 @@ fn notes(report: &WeightReport) -> Vec<String> {
         (report.by_nearest, "by the nearest bone alone: look at them"),
         (report.given, "given"),
     ];
-    kinds.iter().filter(|(count, _)| *count > 0).map(|(count, how)| format!("{:.1} % {how}", share(*count))).collect()
+    kinds
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, how)| format!("{} % {how}", fields::short(share(*count), 1)))
+        .collect()
 }
 
 /// Joints that were added since, and move nothing yet.
