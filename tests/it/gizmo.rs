@@ -67,7 +67,6 @@ struct Bench {
     app: App,
     rig: Entity,
     sink: Sink,
-    sight: Sight,
 }
 
 impl Bench {
@@ -81,7 +80,7 @@ impl Bench {
         let rig = app.world_mut().spawn((bundle, RigJournal::new(sink.clone()))).id();
         app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
         app.update();
-        Self { app, rig, sink, sight }
+        Self { app, rig, sink }
     }
 
     fn edit(&mut self, operation: Operation) {
@@ -411,7 +410,7 @@ fn poses_leave_the_rest_pose_alone_and_follow_the_pointer() {
         let axis = sight.towards(before.position(middle));
         let arm = old - before.position(middle);
         let wanted = before.position(middle) + Quat::from_axis_angle(axis, -0.5) * arm;
-        assert!(new.distance(wanted) < 2e-3, "{new} is not {wanted}");
+        assert!(new.distance(wanted) < 1e-2, "{new} is not {wanted}");
 
         // A root can be moved as well, by its arrows or its middle.
         bench.select(&[root]);

@@ -25,6 +25,8 @@ mod fuzz_project;
 mod fuzz_rig_text;
 mod fuzz_template;
 mod gestures;
+#[cfg(feature = "editor")]
+mod gizmo;
 mod gltf;
 mod gltf_torture;
 mod journal;
