@@ -7,7 +7,14 @@ use std::{collections::BTreeMap, path::PathBuf};
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{ActiveRig, camera::ViewportSight, files::Loading, mode::Mode, notice::StatusLine, pointer::ViewportArea};
+use super::{
+    ActiveRig,
+    camera::ViewportSight,
+    files::{Loading, dialog::Dialog},
+    mode::Mode,
+    notice::StatusLine,
+    pointer::ViewportArea,
+};
 use crate::{
     plugins::{
         document::{JointEntities, Selection},
@@ -37,6 +44,8 @@ pub struct WindowReport {
     pub mode: String,
     /// True while a file is being opened, weights are computed or the surface is being prepared.
     pub busy: bool,
+    /// True while a question is asked: where to save, what to do with unsaved work.
+    pub asked: bool,
     /// Joints of the rig.
     pub joints: usize,
     /// How many joints are selected.
@@ -74,10 +83,11 @@ fn write(
     places: Query<&GlobalTransform>,
     jobs: Query<(), With<SkinningJob>>,
     (mode, loading, status): (Res<Mode>, Res<Loading>, Res<StatusLine>),
-    (area, sight): (Res<ViewportArea>, Res<ViewportSight>),
+    (area, sight, dialog): (Res<ViewportArea>, Res<ViewportSight>, Res<Dialog>),
 ) {
     let mut report = WindowReport {
         mode: mode.name().to_owned(),
+        asked: dialog.question().is_some(),
         viewport: [area.min.x, area.min.y, area.size.x, area.size.y],
         status: status.obstacle.clone().unwrap_or_else(|| status.hint.clone()),
         ..default()

@@ -122,6 +122,19 @@ impl<'a> Hands<'a> {
         self.xdotool(&["type", "--delay", "25", text]);
     }
 
+    /// Answers where to write with a whole path.
+    fn answer_with(&self, path: &Path) {
+        self.until("a path is asked for", |report| report.asked);
+        // The question may be known before it is drawn and its field has the keyboard.
+        sleep(Duration::from_millis(2500));
+        self.key("ctrl+a");
+        self.write(path.to_str().unwrap());
+        sleep(Duration::from_millis(500));
+        self.shot("answered");
+        self.key("Return");
+        self.until("the question is answered", |report| !report.asked);
+    }
+
     fn drag(&self, line: &[[f32; 2]]) {
         let place = |at: [f32; 2]| [at[0].round().to_string(), at[1].round().to_string()];
         let [x, y] = place(line[0]);
@@ -279,11 +292,7 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
 
     let project = folder.join("work.rigsmith.ron");
     hands.key("ctrl+s");
-    sleep(Duration::from_millis(800));
-    hands.key("ctrl+a");
-    hands.write(project.to_str().unwrap());
-    hands.shot("saving");
-    hands.key("Return");
+    hands.answer_with(&project);
     let start = Instant::now();
     while !project.exists() && start.elapsed() < PATIENCE {
         sleep(Duration::from_millis(100));
@@ -300,6 +309,7 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
     drop(hands);
 
     let hands = Hands::open(&display, folder, &project);
+    hands.until("the work is offered back", |report| report.asked);
     sleep(Duration::from_millis(1500));
     hands.shot("offered");
     hands.key("Return");
@@ -310,10 +320,7 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
 
     let character = folder.join("character.glb");
     hands.key("ctrl+e");
-    sleep(Duration::from_millis(800));
-    hands.key("ctrl+a");
-    hands.write(character.to_str().unwrap());
-    hands.key("Return");
+    hands.answer_with(&character);
     let start = Instant::now();
     while !character.exists() && start.elapsed() < PATIENCE {
         sleep(Duration::from_millis(100));
