@@ -6,11 +6,7 @@ use bevy::{
     asset::UnapprovedPathMode,
     camera::{CameraOutputMode, visibility::RenderLayers},
     prelude::*,
-    render::{
-        RenderPlugin,
-        renderer::RenderAdapterInfo,
-        settings::{RenderCreation, WgpuSettings},
-    },
+    render::{RenderPlugin, renderer::RenderAdapterInfo, settings::RenderCreation},
     window::{ExitCondition, RequestRedraw, WindowEvent, WindowResolution},
     winit::{UpdateMode, WinitSettings},
 };
@@ -120,10 +116,7 @@ impl Plugin for EditorPlugin {
                     ..default()
                 })
                 .set(task_pools())
-                .set(RenderPlugin {
-                    render_creation: RenderCreation::Automatic(Box::new(WgpuSettings::default())),
-                    ..default()
-                })
+                .set(RenderPlugin { render_creation: RenderCreation::Automatic(Box::default()), ..default() })
                 .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Deny, ..default() }),
         )
         .add_plugins(EguiPlugin::default())

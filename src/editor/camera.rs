@@ -320,7 +320,7 @@ fn keep_depths(
         if viewport.focus != focus {
             viewport.focus = focus;
         }
-        let changed = |now: f32, wanted: f32| !((now / wanted - 1.0).abs() < 0.3);
+        let changed = |now: f32, wanted: f32| now < 0.7 * wanted || now > 1.3 * wanted;
         let next = match &*projection {
             Projection::Perspective(perspective) => {
                 let near = (focus * 0.01).clamp(1e-5, 0.1);

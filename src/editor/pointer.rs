@@ -199,10 +199,11 @@ pub(super) fn follow_pointer(
                     None => {}
                 }
             }
-            WindowEvent::CursorLeft(left) if left.window == window && state.pressed.is_none() => {
-                if area.pointer.take().is_some() {
-                    send(state.at, PointerAct::Left, *modifiers, &area);
-                }
+            WindowEvent::CursorLeft(left)
+                if left.window == window && state.pressed.is_none() && area.pointer.is_some() =>
+            {
+                area.pointer = None;
+                send(state.at, PointerAct::Left, *modifiers, &area);
             }
             WindowEvent::MouseButtonInput(input) if input.window == window => {
                 let down = input.state == ButtonState::Pressed;

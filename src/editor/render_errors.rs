@@ -10,7 +10,7 @@ use bevy::{
     prelude::*,
     render::{
         error_handler::{RenderError, RenderErrorHandler, RenderErrorPolicy},
-        settings::{RenderCreation, WgpuSettings},
+        settings::RenderCreation,
     },
 };
 
@@ -74,7 +74,7 @@ fn handle(error: &RenderError, world: &mut World, _render_world: &mut World) -> 
     if trouble.failures <= TRIES {
         warn!("drawing failed ({reason}) and is tried again; {safe}");
         world.write_message(Notice::warning(format!("Drawing failed and was started again; {safe}")));
-        return RenderErrorPolicy::Recover(RenderCreation::Automatic(Box::new(WgpuSettings::default())));
+        return RenderErrorPolicy::Recover(RenderCreation::Automatic(Box::default()));
     }
     trouble.has_stopped = true;
     // The window can show nothing any more.

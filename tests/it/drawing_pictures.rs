@@ -177,8 +177,7 @@ fn studio() -> Option<Studio> {
 }
 
 fn at(image: &Image, pixel: Vec2) -> [u8; 4] {
-    let colour = image.get_color_at(pixel.x as u32, pixel.y as u32).unwrap().to_srgba().to_u8_array();
-    colour
+    image.get_color_at(pixel.x as u32, pixel.y as u32).unwrap().to_srgba().to_u8_array()
 }
 
 #[test]

@@ -18,7 +18,7 @@ use rigsmith::{
         notice::{Notice, Severity},
         recovery::Recovery,
     },
-    files::{RealDisk, load_model, load_template, store_rig},
+    files::{RealDisk, load_template, store_rig},
     headless::headless_app,
     plugins::{
         document::{Change, EditRequest},

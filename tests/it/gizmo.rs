@@ -288,7 +288,7 @@ fn drags_move_joints_in_every_space_and_are_one_step() {
                     let moved = bench.rig().position(middle) - before.position(middle);
                     let along = match space {
                         GizmoSpace::World => place.rotation.inverse() * Vec3::AXES[axis],
-                        GizmoSpace::Local => Vec3::from(before.rest_global(middle).matrix3.col(axis)).normalize(),
+                        GizmoSpace::Local => before.rest_global(middle).matrix3.col(axis).normalize(),
                         GizmoSpace::View => [sight.plane.right, sight.plane.up, sight.plane.towards()][axis],
                     };
                     assert!(moved.reject_from(along).length() < 1e-4, "{space:?} {axis}: {moved} along {along}");

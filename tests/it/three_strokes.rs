@@ -424,7 +424,13 @@ fn sketches() -> Vec<Sketch> {
             for (number, joints) in counts.into_iter().enumerate() {
                 let turn = seed as usize + number;
                 let spine_to = turn % 3;
-                all.push(Sketch { camera, spine_to, to_hand: turn % 2 == 0, joints, seed: 31 * seed + number as u64 });
+                all.push(Sketch {
+                    camera,
+                    spine_to,
+                    to_hand: turn.is_multiple_of(2),
+                    joints,
+                    seed: 31 * seed + number as u64,
+                });
             }
         }
     }

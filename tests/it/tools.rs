@@ -185,7 +185,7 @@ impl Bench {
     }
 
     fn places(&self) -> Vec<Vec3> {
-        self.rig().rest_globals().iter().map(|(_, joint)| Vec3::from(joint.translation)).collect()
+        self.rig().rest_globals().iter().map(|(_, joint)| joint.translation).collect()
     }
 
     fn selected(&self) -> Vec<Uid> {

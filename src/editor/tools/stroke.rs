@@ -19,14 +19,13 @@ use words::{answer, describe};
 
 use super::{
     Tool, ToolPointer, ToolSystems,
-    scene::{EditedRig, Scene, joints},
+    scene::{EditedRig, Scene},
 };
 use crate::{
     algo::stroke::{
         ChainChoice, MAX_JOINTS, StrokeChain, StrokeError, StrokeKind, StrokeNote, StrokeSettings, joint_at,
     },
     editor::{
-        ActiveRig,
         actions::{Action, ActionRequest},
         mode::Mode,
         notice::{Notice, StatusLine},
@@ -38,7 +37,7 @@ use crate::{
         document::Hovered,
         picking::{Pick, PickRequest},
         stroke::{
-            FollowedStroke, StrokeDone, StrokeParent, StrokePlan, StrokeRequest, StrokeResult, StrokeScene, StrokeTips,
+            FollowedStroke, StrokeParent, StrokePlan, StrokeRequest, StrokeResult, StrokeScene, StrokeTips,
             plan_stroke, stroke_kind,
         },
         viewport::Sight,
