@@ -135,6 +135,22 @@ impl<'a> Hands<'a> {
         self.until("the question is answered", |report| !report.asked);
     }
 
+    /// Pictures of every mode: the joint at one pixel selected, the pointer over the mesh at another.
+    fn tour(&self, joint: [f32; 2], over: [f32; 2]) {
+        let modes = [("q", "select"), ("a", "place"), ("w", "move"), ("e", "rotate"), ("r", "scale"), ("g", "weights")];
+        for (key, name) in modes {
+            self.key(key);
+            let place = if name == "place" { [over[0], over[1] - 30.0] } else { [joint[0] + 60.0, joint[1] - 90.0] };
+            self.xdotool(&["mousemove", &place[0].round().to_string(), &place[1].round().to_string()]);
+            // Toasts go, colours come.
+            sleep(Duration::from_millis(4000));
+            self.shot(name);
+        }
+        self.key("p");
+        sleep(Duration::from_millis(3000));
+        self.shot("pose");
+    }
+
     fn drag(&self, line: &[[f32; 2]]) {
         let place = |at: [f32; 2]| [at[0].round().to_string(), at[1].round().to_string()];
         let [x, y] = place(line[0]);
@@ -253,7 +269,7 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
         let line: Vec<[f32; 2]> = stroke.iter().map(|place| at(*place)).collect();
         hands.drag(&line);
         sleep(Duration::from_millis(800));
-        hands.shot(&format!("stroke_{number}"));
+        hands.shot(["stroke_spine", "stroke", "stroke_leg"][number]);
         hands.key("Return");
         hands.until("the stroke is taken", |report| report.steps.len() == number + 1 && !report.busy);
     }
@@ -278,6 +294,10 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
     hands.drag(&[[joint[0] + ring, joint[1]], [joint[0] + 0.8 * ring, joint[1] - 0.6 * ring]]);
     let posed = hands.until("the joint is turned", |report| report.posed > 0 && !report.busy);
     hands.shot("posed");
+
+    if std::env::var_os("RIGSMITH_SHOTS").is_some() {
+        hands.tour(joint, at(knee));
+    }
 
     let steps = posed.steps.len();
     for _ in 0..steps {
