@@ -473,7 +473,8 @@ fn nothing_is_cut_off_in_a_narrow_panel() {
         desk.select(&joints[1..2]);
         for width in [180.0, 260.0, 700.0] {
             desk.resize(width, 400.0);
-            for seen in &desk.seen {
+            // The text in a field may be longer than the field, which cuts it off and scrolls: it has no label.
+            for seen in desk.seen.iter().filter(|seen| !seen.label.is_empty()) {
                 assert!(seen.rect.right() <= width + 0.5, "{name} at {width}: {seen:?}");
             }
         }

@@ -191,6 +191,9 @@ impl Numbers {
             let dropped = escaped || !response.drag_stopped() || value == from;
             return Some(if dropped { NumberEdit::Cancel } else { NumberEdit::Commit });
         }
+        if escaped {
+            return None;
+        }
         let number = typed.get().or(response.changed().then_some(value))? as f32;
         // Digits that are not shown are not changed by confirming those that are.
         let same = !shown.mixed && short(number.into(), look.decimals) == short(shown.value.into(), look.decimals);

@@ -89,6 +89,14 @@ struct Drag {
     own: Option<usize>,
     name: String,
     from: Start,
+    /// The step of movements while Control is held: of the model as it was at the press, which a drag may make higher.
+    step: f32,
+}
+
+impl Drag {
+    fn snap(&self, held: Held) -> Option<f32> {
+        held.control.then_some(self.step)
+    }
 }
 
 /// The dragged joints at the press.
@@ -176,14 +184,14 @@ fn drag(
                 tool.drag = press(&scene, *mode, settings.gizmo_space, moves.0, pointer.at);
             }
             PointerAct::Dragged => {
-                let (Some(drag), Some(rig)) = (&mut tool.drag, &rig) else { continue };
-                drag.gizmo.to(pointer.at, snap(rig, pointer.held));
+                let Some(drag) = &mut tool.drag else { continue };
+                drag.gizmo.to(pointer.at, drag.snap(pointer.held));
                 preview = Some(drag.preview(settings.move_children));
             }
             PointerAct::Released { dragged, .. } => {
                 let (Some(mut drag), Some(rig)) = (tool.drag.take(), &rig) else { continue };
                 let commit = if dragged {
-                    drag.gizmo.to(pointer.at, snap(rig, pointer.held));
+                    drag.gizmo.to(pointer.at, drag.snap(pointer.held));
                     edits.write(EditRequest { rig: drag.rig, change: drag.preview(settings.move_children) });
                     Change::Commit
                 } else {
@@ -221,14 +229,21 @@ fn press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) ->
         Start::Rest(aim.joints.iter().map(|joint| (*joint, rig.rig.position(*joint))).collect())
     };
     let own = handle.axis().filter(|_| space == GizmoSpace::Local);
-    Some(Drag { rig: rig.entity, gizmo: GizmoDrag::new(handle, aim.frame, sight, at), own, name, from })
+    Some(Drag {
+        rig: rig.entity,
+        gizmo: GizmoDrag::new(handle, aim.frame, sight, at),
+        own,
+        name,
+        from,
+        step: step(&rig),
+    })
 }
 
-/// The step of movements while Control is held.
-fn snap(rig: &EditedRig, held: Held) -> Option<f32> {
+/// The step of movements while snapping, in the rig's units.
+fn step(rig: &EditedRig) -> f32 {
     let [low, high] = rig.bounds();
     let height = if high.y > low.y { high.y - low.y } else { rig.size() };
-    held.control.then_some(height * MOVE_STEP)
+    height * MOVE_STEP
 }
 
 /// What a click on a handle picks: a joint that is right there.
