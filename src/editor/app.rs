@@ -224,7 +224,9 @@ fn keep_drawing(
     let happened = events.read().any(|event| !matches!(event, WindowEvent::RequestRedraw(_)));
     let told = edited.read().count() + notices.read().count() > 0;
     let surface = surfaces.iter().any(|surface| surface.is_stale() || surface.ready().is_none());
-    if happened || told || loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy() {
+    let busy = loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy();
+    if happened || told || busy {
+        trace!("drawing on: events {happened}, notices {told}, background {busy}");
         *left = FRAMES_AFTER;
     }
     if *left > 0 {

@@ -83,6 +83,9 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
     };
     let Some(ctx) = context else { return };
     style::apply(&ctx);
+    if ctx.has_requested_repaint() {
+        trace!("drawing on: {:?}", ctx.repaint_causes());
+    }
     let (Some(mut panels), Some(mut layout)) = (world.remove_resource::<Panels>(), world.remove_resource::<Layout>())
     else {
         return;
@@ -115,6 +118,7 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
     world.insert_resource(layout);
     remember_area(world, viewport);
     if !requests.is_empty() {
+        trace!("drawing on: panels asked for something");
         // What was asked for is done in the next frame, which nothing else may bring about.
         world.write_message(bevy::window::RequestRedraw);
     }

@@ -122,13 +122,20 @@ impl<'a> Hands<'a> {
         self.xdotool(&["type", "--delay", "25", text]);
     }
 
-    /// Answers where to write with a whole path.
-    fn answer_with(&self, path: &Path) {
+    /// Presses a key for each number of steps to be in effect, one after the other.
+    fn steps(&self, key: &str, heads: impl Iterator<Item = usize>) {
+        for head in heads {
+            self.key(key);
+            self.until("the step shows", |report| report.head == head);
+        }
+    }
+
+    /// Answers where to write with a name: it is what is selected in the path that is proposed.
+    fn answer_with(&self, name: &str) {
         self.until("a path is asked for", |report| report.asked);
         // The question may be known before it is drawn and its field has the keyboard.
         sleep(Duration::from_millis(2500));
-        self.key("ctrl+a");
-        self.write(path.to_str().unwrap());
+        self.write(name);
         sleep(Duration::from_millis(500));
         self.shot("answered");
         self.key("Return");
@@ -211,7 +218,9 @@ fn subject(folder: &Path) -> (PathBuf, [[f32; 3]; 8]) {
         let all: serde_json::Value = serde_json::from_str(&text).unwrap();
         let at = |name: &str| [0, 1, 2].map(|i| all["game_engine"][name]["head"][i].as_f64().unwrap() as f32);
         let names = ["pelvis", "head", "upperarm_l", "lowerarm_l", "hand_l", "thigh_l", "calf_l", "foot_l"];
-        return (body.join("body.obj"), names.map(at));
+        let copy = folder.join("body.obj");
+        std::fs::copy(body.join("body.obj"), &copy).unwrap();
+        return (copy, names.map(at));
     }
     println!("RIGSMITH_DATA is not set: the bundled character stands in for the body");
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models");
@@ -292,7 +301,9 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
     sleep(Duration::from_millis(500));
     let ring = 90.0;
     hands.drag(&[[joint[0] + ring, joint[1]], [joint[0] + 0.8 * ring, joint[1] - 0.6 * ring]]);
-    let posed = hands.until("the joint is turned", |report| report.posed > 0 && !report.busy);
+    // A drag shows before it is a step.
+    let posed =
+        hands.until("the joint is turned", |report| report.posed > 0 && report.steps.len() == 5 && !report.busy);
     hands.shot("posed");
 
     if std::env::var_os("RIGSMITH_SHOTS").is_some() {
@@ -300,19 +311,15 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
     }
 
     let steps = posed.steps.len();
-    for _ in 0..steps {
-        hands.key("ctrl+z");
-    }
+    hands.steps("ctrl+z", (0..steps).rev());
     hands.until("everything is undone", |report| report.head == 0 && report.joints == 0);
-    for _ in 0..steps {
-        hands.key("ctrl+shift+z");
-    }
+    hands.steps("ctrl+shift+z", 1..=steps);
     let again = hands.until("everything is done again", |report| report.head == steps && !report.busy);
     assert_eq!((again.joints, again.skinned, again.posed), (posed.joints, posed.skinned, posed.posed));
 
     let project = folder.join("work.rigsmith.ron");
     hands.key("ctrl+s");
-    hands.answer_with(&project);
+    hands.answer_with("work");
     let start = Instant::now();
     while !project.exists() && start.elapsed() < PATIENCE {
         sleep(Duration::from_millis(100));
@@ -340,7 +347,7 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
 
     let character = folder.join("character.glb");
     hands.key("ctrl+e");
-    hands.answer_with(&character);
+    hands.answer_with("character");
     let start = Instant::now();
     while !character.exists() && start.elapsed() < PATIENCE {
         sleep(Duration::from_millis(100));
