@@ -5,12 +5,13 @@ use std::{path::PathBuf, time::Duration};
 use bevy::{
     asset::UnapprovedPathMode,
     camera::{CameraOutputMode, visibility::RenderLayers},
+    ecs::message::MessageCursor,
     prelude::*,
     render::{RenderPlugin, renderer::RenderAdapterInfo, settings::RenderCreation},
     window::{ExitCondition, RequestRedraw, WindowEvent, WindowResolution},
     winit::{UpdateMode, WinitSettings},
 };
-use bevy_egui::{EguiGlobalSettings, EguiPlugin, PrimaryEguiContext};
+use bevy_egui::{EguiGlobalSettings, EguiPlugin, EguiPostUpdateSet, PrimaryEguiContext};
 use wgpu::BlendState;
 
 use super::tools::stroke::StrokeTool;
@@ -146,6 +147,8 @@ impl Plugin for EditorPlugin {
         .add_message::<Notice>()
         .add_systems(Startup, (spawn_interface, open_first, say_adapter))
         .add_systems(Update, carry_out)
+        .init_resource::<Redraws>()
+        .add_systems(PostUpdate, note_redraws.before(EguiPostUpdateSet::ProcessOutput))
         .add_systems(Last, keep_drawing);
     }
 }
@@ -204,9 +207,24 @@ fn carry_out(
     }
 }
 
-/// Frames drawn after the last event: what a click did is on the screen one frame after it, and the renderer works one
-/// frame behind.
-const FRAMES_AFTER: u8 = 3;
+/// How long the window draws on after the last event: what a click did is on the screen some frames after it, and panels
+/// fold and scroll that long.
+const AFTERGLOW: Duration = Duration::from_millis(600);
+
+/// Which requests for frames have been looked at.
+#[derive(Resource, Default)]
+struct Redraws {
+    cursor: MessageCursor<RequestRedraw>,
+    /// True if somebody else than the panels asked for a frame.
+    wanted: bool,
+}
+
+/// Sees who asks for frames before the panels do: they ask for one after every event that they are told of, and under some
+/// window systems they are told of one in every frame.
+fn note_redraws(mut redraws: ResMut<Redraws>, messages: Res<Messages<RequestRedraw>>) {
+    let redraws = &mut *redraws;
+    redraws.wanted = redraws.cursor.read(&messages).count() > 0;
+}
 
 /// Draws on after something happened, and as long as something goes on in the background; else the window sleeps until
 /// somebody does something.
@@ -218,19 +236,23 @@ fn keep_drawing(
     jobs: Query<(), Or<(With<SkinningJob>, With<DisplayJob>)>>,
     surfaces: Query<&RigSurface>,
     stroke: Res<StrokeTool>,
-    mut left: Local<u8>,
-    mut redraw: MessageWriter<RequestRedraw>,
+    time: Res<Time<Real>>,
+    mut last: Local<Duration>,
+    mut redraws: ResMut<Redraws>,
+    mut messages: ResMut<Messages<RequestRedraw>>,
 ) {
     let happened = events.read().any(|event| !matches!(event, WindowEvent::RequestRedraw(_)));
     let told = edited.read().count() + notices.read().count() > 0;
     let surface = surfaces.iter().any(|surface| surface.is_stale() || surface.ready().is_none());
-    let busy = loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy();
+    let busy = loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy() || redraws.wanted;
     if happened || told || busy {
         trace!("drawing on: events {happened}, notices {told}, background {busy}");
-        *left = FRAMES_AFTER;
+        *last = time.elapsed();
     }
-    if *left > 0 {
-        *left -= 1;
-        redraw.write(RequestRedraw);
+    if time.elapsed().saturating_sub(*last) <= AFTERGLOW {
+        messages.write(RequestRedraw);
+    } else {
+        messages.clear();
     }
+    redraws.cursor.clear(&messages);
 }
