@@ -2,7 +2,7 @@
 //!
 //! Everything that reads or writes a file does so in the background, from a snapshot or into a document that takes the
 //! place of the open one only when it is whole. What would lose unsaved changes asks first; see [`dialog`] for the
-//! questions. Every document has a journal from its first frame; see [`recovery`](super::recovery) for what a crash left.
+//! questions. Every document has a journal from its first frame; see [`recovery`] for what a crash left.
 
 pub mod dialog;
 mod dialog_view;

@@ -5,7 +5,7 @@
 //! | [`select`] | all but Place and Stroke | picks joints, a box of joints, a hierarchy |
 //! | [`place`] | Place | shows where a joint would go, and puts it there |
 //! | [`stroke`] | Stroke | draws, previews, accepts |
-//! | [`transform`] | Move, Rotate, Scale, Pose | drags the handles of a [`gizmo`] |
+//! | [`transform`] | Move, Rotate, Scale, Pose | drags the handles of a [`gizmo`](mod@gizmo) |
 //! | [`weights`] | Weights | shows what the selected joint moves |
 //! | [`symmetry`] | all | the plane of live mirroring |
 //!
