@@ -40,6 +40,10 @@ fn wake_for_toasts(
     settings: Option<ResMut<WinitSettings>>,
     mut usual: Local<Option<(UpdateMode, UpdateMode)>>,
 ) {
+    // Another wait is another frame at once: it is set when a toast comes or goes, not in every frame.
+    if !next.is_changed() {
+        return;
+    }
     let Some(mut settings) = settings else { return };
     let Some(until) = next.0 else {
         if let Some((focused, unfocused)) = usual.take() {
