@@ -228,6 +228,16 @@ fn a_field_is_one_step() {
     assert!((position.y - 1.25).abs() < 1e-5 && (position.z + 0.5).abs() < 1e-5, "{position}");
 
     let steps = desk.steps();
+    desk.click("Scale X");
+    desk.type_text("7");
+    desk.key(Key::Escape);
+    desk.click("Scale X");
+    desk.type_text("seven");
+    desk.key(Key::Enter);
+    desk.click("Scale X");
+    desk.key(Key::Enter);
+    assert_eq!(desk.steps(), steps, "Escape, no number, the same number");
+
     desk.click("Label");
     desk.type_text("x");
     desk.key(Key::Enter);
