@@ -5,13 +5,15 @@ use std::{path::PathBuf, time::Duration};
 use bevy::{
     asset::UnapprovedPathMode,
     camera::{CameraOutputMode, visibility::RenderLayers},
-    ecs::message::MessageCursor,
     prelude::*,
     render::{RenderPlugin, renderer::RenderAdapterInfo, settings::RenderCreation},
     window::{ExitCondition, RequestRedraw, WindowEvent, WindowResolution},
     winit::{UpdateMode, WinitSettings},
 };
-use bevy_egui::{EguiGlobalSettings, EguiPlugin, EguiPostUpdateSet, PrimaryEguiContext};
+use bevy_egui::{
+    EguiGlobalSettings, EguiInput, EguiPlugin, EguiPreUpdateSet, PrimaryEguiContext,
+    egui::{Event, Modifiers},
+};
 use wgpu::BlendState;
 
 use super::tools::stroke::StrokeTool;
@@ -147,8 +149,10 @@ impl Plugin for EditorPlugin {
         .add_message::<Notice>()
         .add_systems(Startup, (spawn_interface, open_first, say_adapter))
         .add_systems(Update, carry_out)
-        .init_resource::<Redraws>()
-        .add_systems(PostUpdate, note_redraws.before(EguiPostUpdateSet::ProcessOutput))
+        .add_systems(
+            PreUpdate,
+            drop_old_modifiers.after(EguiPreUpdateSet::ProcessInput).before(EguiPreUpdateSet::BeginPass),
+        )
         .add_systems(Last, keep_drawing);
     }
 }
@@ -211,19 +215,15 @@ fn carry_out(
 /// fold and scroll that long.
 const AFTERGLOW: Duration = Duration::from_millis(600);
 
-/// Which requests for frames have been looked at.
-#[derive(Resource, Default)]
-struct Redraws {
-    cursor: MessageCursor<RequestRedraw>,
-    /// True if somebody else than the panels asked for a frame.
-    wanted: bool,
-}
-
-/// Sees who asks for frames before the panels do: they ask for one after every event that they are told of, and under some
-/// window systems they are told of one in every frame.
-fn note_redraws(mut redraws: ResMut<Redraws>, messages: Res<Messages<RequestRedraw>>) {
-    let redraws = &mut *redraws;
-    redraws.wanted = redraws.cursor.read(&messages).count() > 0;
+/// Panels are told of Shift, Ctrl and Alt before every frame, and draw another frame after whatever they are told: they are
+/// told only when one of them changes, or the window would never sleep.
+fn drop_old_modifiers(mut inputs: Query<&mut EguiInput>, mut last: Local<Option<Modifiers>>) {
+    for mut input in &mut inputs {
+        input.events.retain(|event| match event {
+            Event::ModifiersChanged(modifiers) => last.replace(*modifiers) != Some(*modifiers),
+            _ => true,
+        });
+    }
 }
 
 /// Draws on after something happened, and as long as something goes on in the background; else the window sleeps until
@@ -238,21 +238,17 @@ fn keep_drawing(
     stroke: Res<StrokeTool>,
     time: Res<Time<Real>>,
     mut last: Local<Duration>,
-    mut redraws: ResMut<Redraws>,
-    mut messages: ResMut<Messages<RequestRedraw>>,
+    mut redraw: MessageWriter<RequestRedraw>,
 ) {
     let happened = events.read().any(|event| !matches!(event, WindowEvent::RequestRedraw(_)));
     let told = edited.read().count() + notices.read().count() > 0;
     let surface = surfaces.iter().any(|surface| surface.is_stale() || surface.ready().is_none());
-    let busy = loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy() || redraws.wanted;
+    let busy = loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy();
     if happened || told || busy {
         trace!("drawing on: events {happened}, notices {told}, background {busy}");
         *last = time.elapsed();
     }
     if time.elapsed().saturating_sub(*last) <= AFTERGLOW {
-        messages.write(RequestRedraw);
-    } else {
-        messages.clear();
+        redraw.write(RequestRedraw);
     }
-    redraws.cursor.clear(&messages);
 }

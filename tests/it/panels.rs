@@ -231,9 +231,11 @@ fn a_field_is_one_step() {
     desk.click("Scale X");
     desk.type_text("7");
     desk.key(Key::Escape);
+    assert_eq!(desk.steps(), steps, "Escape");
     desk.click("Scale X");
     desk.type_text("seven");
     desk.key(Key::Enter);
+    assert_eq!(desk.steps(), steps, "no number");
     desk.click("Scale X");
     desk.key(Key::Enter);
     assert_eq!(desk.steps(), steps, "Escape, no number, the same number");

@@ -84,6 +84,8 @@ pub(super) fn rename(ui: &mut Ui, rect: Rect, id: Id, said: &str, text: &mut Str
 #[derive(Default)]
 pub(super) struct Numbers {
     dragged: Option<Dragged>,
+    /// The field that Escape has left: egui hands out what was typed once more in the next frame.
+    dropped: Option<Id>,
 }
 
 /// The number that is being dragged.
@@ -191,7 +193,11 @@ impl Numbers {
             let dropped = escaped || !response.drag_stopped() || value == from;
             return Some(if dropped { NumberEdit::Cancel } else { NumberEdit::Commit });
         }
-        if escaped {
+        let dropped = self.dropped.take_if(|dropped| *dropped == id).is_some();
+        if escaped && response.lost_focus() {
+            self.dropped = Some(id);
+        }
+        if escaped || dropped {
             return None;
         }
         let number = typed.get().or(response.changed().then_some(value))? as f32;
