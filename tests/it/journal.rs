@@ -106,7 +106,8 @@ impl Desk {
             save_atomic(&RealDisk, project, text.as_bytes()).unwrap();
         }
         if moment >= Moment::Rotated {
-            self.journal.saved(mark, JournalPlaces { project: Some(project.into()), ..start(project).places });
+            let places = start(project.parent().unwrap()).places;
+            self.journal.saved(mark, JournalPlaces { project: Some(project.into()), ..places });
             self.flush();
         }
     }

@@ -73,6 +73,7 @@ impl<'a> Hands<'a> {
             .env("RIGSMITH_WINDOW_REPORT", folder.join("report.json"))
             .env("RIGSMITH_CONFIG", folder.join("config"))
             .env("RIGSMITH_STATE", folder.join("state"))
+            .env("TMPDIR", folder)
             .env_remove("WAYLAND_DISPLAY")
             .stdout(Stdio::null())
             .stderr(log)
@@ -181,6 +182,25 @@ impl<'a> Hands<'a> {
         self.xdotool(&["click", "1"]);
     }
 
+    /// Time of processors that the program has used, in hundredths of a second.
+    fn worked(&self) -> u64 {
+        let text = std::fs::read_to_string(format!("/proc/{}/stat", self.program.id())).unwrap();
+        let fields: Vec<&str> = text[text.rfind(')').unwrap()..].split_whitespace().collect();
+        fields[12].parse::<u64>().unwrap() + fields[13].parse::<u64>().unwrap()
+    }
+
+    /// Waits until the program sleeps: toasts go first.
+    fn rests(&self) {
+        let start = Instant::now();
+        let mut used = Vec::new();
+        while used.last() != Some(&0) && used.last() != Some(&1) {
+            assert!(start.elapsed() < PATIENCE, "the window never rests; hundredths of a second in 2 s: {used:?}");
+            let before = self.worked();
+            sleep(Duration::from_secs(2));
+            used.push(self.worked() - before);
+        }
+    }
+
     /// Keeps a picture of the window if that was asked for.
     fn shot(&self, name: &str) {
         if let Some(folder) = std::env::var_os("RIGSMITH_SHOTS") {
@@ -262,6 +282,7 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
 
     let hands = Hands::open(&display, folder, &mesh);
     hands.shot("opened");
+    hands.rests();
     // The corners of the unit cube are rounded to whole pixels: a model one or two units high keeps that fine enough.
     hands.key("1");
     hands.key("5");
