@@ -215,6 +215,10 @@ fn carry_out(
 /// fold and scroll that long.
 const AFTERGLOW: Duration = Duration::from_millis(600);
 
+/// How many frames are drawn after the last event, where frames take long: panels find their places, the viewport follows
+/// them, the camera follows the viewport, and the skeleton is drawn anew for it.
+const AFTER_FRAMES: u32 = 8;
+
 /// Panels are told of Shift, Ctrl and Alt before every frame, and draw another frame after whatever they are told: they are
 /// told only when one of them changes, or the window would never sleep.
 fn drop_old_modifiers(mut inputs: Query<&mut EguiInput>, mut last: Local<Option<Modifiers>>) {
@@ -237,7 +241,7 @@ fn keep_drawing(
     surfaces: Query<&RigSurface>,
     stroke: Res<StrokeTool>,
     time: Res<Time<Real>>,
-    mut last: Local<Duration>,
+    mut last: Local<(Duration, u32)>,
     mut redraw: MessageWriter<RequestRedraw>,
 ) {
     let happened = events.read().any(|event| !matches!(event, WindowEvent::RequestRedraw(_)));
@@ -246,9 +250,10 @@ fn keep_drawing(
     let busy = loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy();
     if happened || told || busy {
         trace!("drawing on: events {happened}, notices {told}, background {busy}");
-        *last = time.elapsed();
+        *last = (time.elapsed(), 0);
     }
-    if time.elapsed().saturating_sub(*last) <= AFTERGLOW {
+    last.1 = last.1.saturating_add(1);
+    if last.1 <= AFTER_FRAMES || time.elapsed().saturating_sub(last.0) <= AFTERGLOW {
         redraw.write(RequestRedraw);
     }
 }

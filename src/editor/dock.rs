@@ -183,6 +183,15 @@ impl TabViewer for Tabs<'_> {
         }
     }
 
+    /// The viewport reaches the edges of its place.
+    fn tab_style_override(&self, tab: &String, style: &egui_dock::TabStyle) -> Option<egui_dock::TabStyle> {
+        (tab == VIEWPORT).then(|| {
+            let mut style = style.clone();
+            style.tab_body.inner_margin = egui::Margin::ZERO;
+            style
+        })
+    }
+
     fn on_close(&mut self, _tab: &mut String) -> OnCloseResponse {
         OnCloseResponse::Close
     }
