@@ -2,7 +2,9 @@
 //!
 //! [`Rig`] is the whole document; [`RigEdit`] is the only way it changes, each edit with its exact inverse.
 
+mod built;
 pub mod character;
+mod constraint;
 mod document;
 pub mod edit;
 mod format;
@@ -21,6 +23,11 @@ pub mod template;
 pub mod text;
 mod uid;
 
+pub use built::{
+    Attribute, AttributeKind, BuiltConstraint, BuiltNode, BuiltRig, Channels, ControlData, LayerData, LayerDisplay,
+    Limits, NodeType, Origin,
+};
+pub use constraint::{AimUp, AngleLimits, ChainSolver, Channel, Constraint, KeyEase, Output, Scalar, Target};
 pub use document::{Rig, RigAbout, SkinData};
 pub use edit::{EditError, RigEdit};
 pub use group::GroupData;

@@ -149,7 +149,8 @@ pub struct Image {
 }
 
 /// A transform relative to its parent: scale first, then rotation, then translation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Trs {
     /// Translation.
     pub translation: Vec3,
