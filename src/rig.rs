@@ -27,7 +27,9 @@ pub use built::{
     Attribute, AttributeKind, BuiltConstraint, BuiltNode, BuiltRig, Channels, ControlData, LayerData, LayerDisplay,
     Limits, NodeType, Origin,
 };
-pub use constraint::{AimUp, AngleLimits, ChainSolver, Channel, Constraint, KeyEase, Output, Scalar, Target};
+pub use constraint::{
+    AimUp, AngleLimits, ChainSolver, Channel, Constraint, Dependency, KeyEase, Output, Scalar, Target,
+};
 pub use document::{Rig, RigAbout, SkinData};
 pub use edit::{EditError, RigEdit};
 pub use group::GroupData;

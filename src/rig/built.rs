@@ -15,6 +15,45 @@ pub struct BuiltRig {
     pub nodes: Vec<BuiltNode>,
     /// What drives them, in the order of creation: constraints on one node run in this order.
     pub constraints: Vec<BuiltConstraint>,
+    /// Switches that can be thrown without a jump.
+    pub switches: Vec<Arc<SwitchData>>,
+}
+
+/// A switch between two ways of moving the same nodes, with what is needed to throw it without a jump: see
+/// `solve::matching`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SwitchData {
+    /// The command tag that made it.
+    pub command: Uid,
+    /// The node that carries the attribute.
+    pub control: Uid,
+    /// The attribute that is switched.
+    pub attribute: Arc<str>,
+    /// What is matched.
+    pub matching: Matching,
+}
+
+/// What stays in place while a switch is thrown.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Matching {
+    /// A limb between forward (0) and inverse (1) kinematics.
+    IkFk {
+        /// Joints of the limb from the root to the end.
+        joints: Vec<Uid>,
+        /// The forward control of each joint, in the same order.
+        fk: Vec<Uid>,
+        /// The goal of the inverse kinematics.
+        goal: Uid,
+        /// Where the end stands in the goal's space.
+        goal_offset: Trs,
+        /// The pole, if there is one.
+        pole: Option<Uid>,
+    },
+    /// A control between several spaces: it stays where it is.
+    Space {
+        /// The control that must not move.
+        control: Uid,
+    },
 }
 
 /// One node of a built rig.
@@ -22,13 +61,15 @@ pub struct BuiltRig {
 pub struct BuiltNode {
     /// Identity: a joint's own uid, or one that follows from the command, the role and the subject.
     pub uid: Uid,
+    /// The name in files and lists; need not be unique.
+    pub name: Arc<str>,
     /// What it is.
     pub kind: NodeType,
     /// Index of the parent in [`BuiltRig::nodes`], smaller than the node's own; `None` below the rig itself.
     pub parent: Option<usize>,
     /// Where it stands relative to its parent before any pose: the built base.
     pub base: Trs,
-    /// The name people see.
+    /// The label that references find it by.
     pub label: Option<Arc<str>>,
     /// The local group.
     pub group: Option<Uid>,

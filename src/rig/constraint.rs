@@ -344,3 +344,94 @@ pub enum Constraint {
         swivel: Scalar,
     },
 }
+
+/// Something that a constraint depends on or changes.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Dependency {
+    /// Where a node ends up.
+    Node(Uid),
+    /// The value of an attribute.
+    Attribute(Uid, Arc<str>),
+}
+
+impl Constraint {
+    /// What it reads, besides the nodes that it drives and their parents; with repetitions.
+    pub fn reads(&self) -> Vec<Dependency> {
+        let mut reads = Vec::new();
+        let scalar = |reads: &mut Vec<Dependency>, scalar: &Scalar| match scalar {
+            Scalar::Attribute { node, name, .. } | Scalar::Choice { node, name, .. } => {
+                reads.push(Dependency::Attribute(*node, name.clone()));
+            }
+            // A pose offset is an input: nothing in the rig changes it.
+            Scalar::Value(_) | Scalar::Channel { .. } => {}
+        };
+        match self {
+            Self::Transform { targets, weight, .. } | Self::Aim { targets, weight, .. } => {
+                for target in targets {
+                    reads.push(Dependency::Node(target.node));
+                    scalar(&mut reads, &target.weight);
+                }
+                scalar(&mut reads, weight);
+                if let Self::Aim { world_up: AimUp::Node(node) | AimUp::Axis(node, _), .. } = self {
+                    reads.push(Dependency::Node(*node));
+                }
+            }
+            Self::TwoBone { goal, pole, weight, soft, stretch, twist, .. } => {
+                reads.extend([Some(*goal), *pole].into_iter().flatten().map(Dependency::Node));
+                [weight, soft, stretch, twist].into_iter().for_each(|number| scalar(&mut reads, number));
+            }
+            Self::Chain { goal, pole, weight, .. } => {
+                reads.extend([Some(*goal), *pole].into_iter().flatten().map(Dependency::Node));
+                scalar(&mut reads, weight);
+            }
+            Self::Spline { points, stretch, twist, weight, .. } => {
+                reads.extend(points.iter().copied().map(Dependency::Node));
+                [stretch, twist, weight].into_iter().for_each(|number| scalar(&mut reads, number));
+            }
+            Self::Twist { source, reference, driven, .. } => {
+                reads.extend([Some(*source), *reference].into_iter().flatten().map(Dependency::Node));
+                driven.iter().for_each(|(_, share)| scalar(&mut reads, share));
+            }
+            Self::Stretch { start, end, volume, weight, .. } => {
+                reads.extend([*start, *end].map(Dependency::Node));
+                [volume, weight].into_iter().for_each(|number| scalar(&mut reads, number));
+            }
+            Self::Limit { .. } => {}
+            Self::Spring { frequency, damping, weight, .. } => {
+                [frequency, damping, weight].into_iter().for_each(|number| scalar(&mut reads, number));
+            }
+            Self::DrivenKey { driver, .. } => scalar(&mut reads, driver),
+            Self::Expression { inputs, .. } => inputs.iter().for_each(|(_, number)| scalar(&mut reads, number)),
+            Self::Foot { roll, break_angle, bank, toes, swivel, .. } => {
+                [roll, break_angle, bank, swivel].into_iter().for_each(|number| scalar(&mut reads, number));
+                toes.iter().for_each(|(_, number)| scalar(&mut reads, number));
+            }
+        }
+        reads
+    }
+
+    /// The nodes and attributes that it changes.
+    pub fn drives(&self) -> Vec<Dependency> {
+        let nodes = |nodes: &[Uid]| nodes.iter().copied().map(Dependency::Node).collect();
+        match self {
+            Self::Transform { driven, .. }
+            | Self::Aim { driven, .. }
+            | Self::Limit { driven, .. }
+            | Self::Spring { driven, .. } => nodes(&[*driven]),
+            Self::TwoBone { root, mid, end, .. } => nodes(&[*root, *mid, *end]),
+            Self::Chain { joints, .. } | Self::Spline { joints, .. } => nodes(joints),
+            Self::Twist { driven, .. } => driven.iter().map(|(node, _)| Dependency::Node(*node)).collect(),
+            Self::Stretch { driven, .. } => nodes(driven),
+            Self::DrivenKey { output, .. } | Self::Expression { output, .. } => match output {
+                Output::Channel(node, _) => nodes(&[*node]),
+                Output::Attribute(node, name) => vec![Dependency::Attribute(*node, name.clone())],
+                Output::Morph(_) => Vec::new(),
+            },
+            Self::Foot { heel, toe, ball, inner, outer, toes, .. } => {
+                let lifted = toes.as_ref().map(|(node, _)| *node);
+                let all = [Some(*heel), Some(*toe), Some(*ball), *inner, *outer, lifted];
+                all.into_iter().flatten().map(Dependency::Node).collect()
+            }
+        }
+    }
+}
