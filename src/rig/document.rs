@@ -1,7 +1,7 @@
 //! The rig as one document: joints in a hierarchy, groups, tags and weights.
 
 use std::{
-    collections::{BTreeMap, HashMap, HashSet},
+    collections::{BTreeMap, HashMap},
     sync::Arc,
 };
 
@@ -9,7 +9,7 @@ use bevy::{math::Affine3, prelude::*};
 
 use crate::{
     mesh::model::Weights,
-    rig::{GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, Uid},
+    rig::{GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, Tag, Uid},
 };
 
 /// A rig (= global group). Reading is free; changing goes through [`Rig::apply`](crate::rig::edit) only.
@@ -20,8 +20,8 @@ pub struct Rig {
     pub(super) groups: Vec<GroupData>,
     pub(super) joints: HashMap<Uid, RigJoint>,
     pub(super) roots: Vec<Uid>,
-    /// Uids of all tags, so that adding one needs no search.
-    pub(super) tags: HashSet<Uid>,
+    /// The joint of every tag, so that neither adding nor finding one needs a search.
+    pub(super) tags: HashMap<Uid, Uid>,
     pub(super) skins: BTreeMap<Uid, Arc<SkinData>>,
     /// The current pose; only joints of the rig that do not stand as they rest.
     pub(super) pose: BTreeMap<Uid, PoseOffset>,
@@ -93,10 +93,17 @@ impl Rig {
         self.joints.get(&uid)
     }
 
+    /// The tag with that uid, and the joint that carries it.
+    pub fn find_tag(&self, uid: Uid) -> Option<(&RigJoint, &Tag)> {
+        let joint = self.joints.get(self.tags.get(&uid)?)?;
+        let tag = joint.data.tags.iter().find(|tag| tag.uid == uid)?;
+        Some((joint, tag))
+    }
+
     /// True if a joint, group, tag or stored pose has that uid.
     pub fn is_taken(&self, uid: Uid) -> bool {
         self.joints.contains_key(&uid)
-            || self.tags.contains(&uid)
+            || self.tags.contains_key(&uid)
             || self.group(uid).is_some()
             || self.stored_pose(uid).is_some()
     }

@@ -173,7 +173,7 @@ impl Rig {
                 let added = checked(tag)?;
                 let tags = &mut self.joint_mut(*joint)?.data.tags;
                 tags.insert((*index).min(tags.len()), added);
-                self.tags.insert(tag.uid);
+                self.tags.insert(tag.uid, *joint);
                 RigEdit::RemoveTag(*joint, tag.uid)
             }
             RigEdit::RemoveTag(joint, tag) => {
@@ -285,7 +285,7 @@ impl Rig {
         self.check_group(data.group)?;
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), data.uid);
-        self.tags.extend(data.tags.iter().map(|tag| tag.uid));
+        self.tags.extend(data.tags.iter().map(|tag| (tag.uid, data.uid)));
         let data = JointData { tags, ..data.clone() };
         let uid = data.uid;
         self.joints.insert(uid, RigJoint { data, parent, children: Vec::new() });

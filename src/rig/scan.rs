@@ -98,9 +98,9 @@ pub(crate) fn elements(text: &str) -> Vec<usize> {
     starts
 }
 
-struct Token<'a> {
-    text: &'a str,
-    start: usize,
+pub(super) struct Token<'a> {
+    pub text: &'a str,
+    pub start: usize,
 }
 
 impl Token<'_> {
@@ -110,7 +110,7 @@ impl Token<'_> {
 }
 
 /// Strings, characters, words and single punctuation marks; comments are passed over.
-fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
+pub(super) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
     let bytes = text.as_bytes();
     let mut at = 0;
     std::iter::from_fn(move || {

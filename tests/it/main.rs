@@ -45,6 +45,7 @@ mod placement;
 mod plugins;
 mod pose;
 mod project;
+mod references;
 #[cfg(feature = "render")]
 mod render;
 mod rig_text;

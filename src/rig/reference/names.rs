@@ -1,0 +1,199 @@
+//! Names for uids and uids for names, where references are written and read.
+
+use std::{borrow::Cow, fmt};
+
+use super::{GroupScope, RigScope, params::text_field};
+use crate::rig::{Rig, RigJoint, Tag, TagKind, Uid};
+
+/// What a uid of a reference names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum NameKind {
+    /// A rig, by its name.
+    Rig,
+    /// A local group, by its name.
+    Group,
+    /// A joint, by its label.
+    Joint,
+    /// The joint or command that bears a label, by that label.
+    Label,
+    /// A command tag, by its module, and the label of its joint after a `/` where that is needed.
+    Command,
+}
+
+impl fmt::Display for NameKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Rig => "rig",
+            Self::Group => "local group",
+            Self::Joint => "joint",
+            Self::Label => "node label",
+            Self::Command => "command",
+        })
+    }
+}
+
+/// Where to look a name up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct NameScope {
+    /// The rig.
+    pub rig: RigScope,
+    /// The local group that the reference names; decides between bearers of one label.
+    pub group: GroupScope,
+}
+
+/// Looks names and uids up.
+pub trait Names {
+    /// The current name of what that uid names; `None` if there is none, or it has no name.
+    fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>>;
+
+    /// Who has that name, in the order of the document.
+    fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid>;
+
+    /// All names of that kind, for the nearest matches in errors.
+    fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>>;
+}
+
+impl Names for Rig {
+    fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
+        match kind {
+            NameKind::Rig => (self.uid() == uid).then(|| Cow::Borrowed(self.about().name.as_str())),
+            NameKind::Group => self.group(uid).map(|group| Cow::Borrowed(group.name.as_str())),
+            NameKind::Joint => self.joint(uid)?.data.label.as_deref().map(Cow::Borrowed),
+            NameKind::Label => label_text(self, uid),
+            NameKind::Command => {
+                let (joint, tag) = self.find_tag(uid)?;
+                command_name(joint, tag)
+            }
+        }
+    }
+
+    fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
+        match kind {
+            NameKind::Rig => (self.about().name == name).then_some(self.uid()).into_iter().collect(),
+            NameKind::Group => self.groups().iter().filter(|group| group.name == name).map(|group| group.uid).collect(),
+            NameKind::Joint => labelled(self, name).map(|joint| joint.data.uid).collect(),
+            NameKind::Label => bearer(self, scope.group, name).into_iter().collect(),
+            NameKind::Command => commands(self)
+                .filter(|(joint, tag)| {
+                    module(tag) == Some(name) || command_name(joint, tag).is_some_and(|own| own == name)
+                })
+                .map(|(_, tag)| tag.uid)
+                .collect(),
+        }
+    }
+
+    fn all(&self, _scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {
+        let labels = || self.walk().filter_map(|joint| joint.data.label.as_deref()).map(Cow::Borrowed);
+        match kind {
+            NameKind::Rig => vec![Cow::Borrowed(self.about().name.as_str())],
+            NameKind::Group => self.groups().iter().map(|group| Cow::Borrowed(group.name.as_str())).collect(),
+            NameKind::Joint => labels().collect(),
+            NameKind::Label => labels().chain(commands(self).filter_map(|(_, tag)| given_label(tag))).collect(),
+            NameKind::Command => commands(self).filter_map(|(joint, tag)| command_name(joint, tag)).collect(),
+        }
+    }
+}
+
+/// Names in several rigs: the rig of the tag first.
+#[derive(Debug, Clone, Copy)]
+pub struct RigNames<'a> {
+    /// The rig that holds the tags.
+    pub own: &'a Rig,
+    /// Other rigs that references may name.
+    pub others: &'a [&'a Rig],
+}
+
+impl<'a> RigNames<'a> {
+    fn rigs(self) -> impl Iterator<Item = &'a Rig> {
+        std::iter::once(self.own).chain(self.others.iter().copied())
+    }
+
+    fn scope(self, scope: NameScope) -> Option<&'a Rig> {
+        match scope.rig {
+            RigScope::Own => Some(self.own),
+            RigScope::Rig(uid) => self.rigs().find(|rig| rig.uid() == uid),
+        }
+    }
+}
+
+impl Names for RigNames<'_> {
+    fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
+        self.rigs().find_map(|rig| rig.name_of(kind, uid))
+    }
+
+    fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
+        match kind {
+            NameKind::Rig => self.rigs().flat_map(|rig| rig.find(scope, kind, name)).collect(),
+            _ => self.scope(scope).map(|rig| rig.find(scope, kind, name)).unwrap_or_default(),
+        }
+    }
+
+    fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {
+        match kind {
+            NameKind::Rig => self.rigs().flat_map(|rig| rig.all(scope, kind)).collect(),
+            _ => self.scope(scope).map(|rig| rig.all(scope, kind)).unwrap_or_default(),
+        }
+    }
+}
+
+/// The label that a joint has, or that a command tag gives its nodes; `None` if it bears none.
+///
+/// A command gives a label if its parameters have a field `label` that is a text and not empty, at most one bracket
+/// deep (`creation: (label: "elbow")`). A command that gives none lets its nodes have the label of its joint.
+pub fn label_text(rig: &Rig, bearer: Uid) -> Option<Cow<'_, str>> {
+    match rig.joint(bearer) {
+        Some(joint) => joint.data.label.as_deref().map(Cow::Borrowed),
+        None => {
+            let (joint, tag) = rig.find_tag(bearer)?;
+            match tag.kind {
+                TagKind::Command { .. } => given_label(tag).or_else(|| joint.data.label.as_deref().map(Cow::Borrowed)),
+                TagKind::Feature { .. } => None,
+            }
+        }
+    }
+}
+
+/// The first bearer of a label, in the group if one is named; joints before commands.
+fn bearer(rig: &Rig, group: GroupScope, label: &str) -> Option<Uid> {
+    let joints = labelled(rig, label).map(|joint| (joint.data.group, joint.data.uid));
+    let given = commands(rig).filter(|(_, tag)| given_label(tag).is_some_and(|given| given == label));
+    let all: Vec<_> = joints.chain(given.map(|(joint, tag)| (joint.data.group, tag.uid))).collect();
+    let in_group = |(own, _): &&(Option<Uid>, Uid)| match group {
+        GroupScope::Group(group) => *own == Some(group),
+        _ => true,
+    };
+    all.iter().find(in_group).or(all.first()).map(|(_, uid)| *uid)
+}
+
+fn labelled<'a>(rig: &'a Rig, label: &'a str) -> impl Iterator<Item = &'a RigJoint> {
+    rig.walk().filter(move |joint| joint.data.label.as_deref() == Some(label))
+}
+
+fn commands(rig: &Rig) -> impl Iterator<Item = (&RigJoint, &Tag)> {
+    let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(move |tag| (joint, tag)));
+    tags.filter(|(_, tag)| matches!(tag.kind, TagKind::Command { .. }))
+}
+
+fn module(tag: &Tag) -> Option<&str> {
+    match &tag.kind {
+        TagKind::Command { module, .. } => Some(module),
+        TagKind::Feature { .. } => None,
+    }
+}
+
+fn command_name<'a>(joint: &'a RigJoint, tag: &'a Tag) -> Option<Cow<'a, str>> {
+    let module = module(tag)?;
+    Some(match &joint.data.label {
+        Some(label) => Cow::Owned(format!("{module}/{label}")),
+        None => Cow::Borrowed(module),
+    })
+}
+
+fn given_label(tag: &Tag) -> Option<Cow<'_, str>> {
+    let TagKind::Command { params, .. } = &tag.kind else { return None };
+    if !params.contains("label") {
+        return None;
+    }
+    let text = text_field(params, "label")?;
+    (!text.is_empty()).then_some(Cow::Owned(text))
+}

@@ -1,0 +1,206 @@
+//! References in the parameters of any tag, whether its module is installed or not.
+//!
+//! Parameters are RON text, and a reference in them is a string literal whose text begins with `@`. So they can be
+//! found, changed and named anew without knowing what else the parameters mean.
+
+use std::{borrow::Cow, collections::HashMap, ops::Range};
+
+use super::{
+    NameKind, NameScope, Names, NodeRef, NodeRefs, ReferenceError, ReferenceProblem, Source,
+    text::{Written, read_with},
+    write::{name_text, written},
+};
+use crate::rig::{
+    Uid,
+    scan::{Token, fields, tokens},
+    template::quoted,
+};
+
+/// A reference found in parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundReference {
+    /// Where its string literal stands, quotation marks included, in bytes.
+    pub range: Range<usize>,
+    /// The text, without quotation marks and escapes.
+    pub text: String,
+    /// What it means; an error if it is no reference after all, or has a name without a uid.
+    pub references: Result<NodeRefs, ReferenceError>,
+}
+
+/// A reference in parameters that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{error}")]
+pub struct BadReference {
+    /// Where its string literal stands in the parameters, in bytes.
+    pub range: Range<usize>,
+    /// What is wrong with it.
+    pub error: ReferenceError,
+}
+
+/// The references in a tag's parameters, in order: string literals whose text begins with `@`. Comments, characters
+/// and byte strings are passed over.
+pub fn references_in(params: &str) -> impl Iterator<Item = FoundReference> {
+    literals(params).map(|Literal { range, text, .. }| {
+        let references = text.parse();
+        FoundReference { range, text, references }
+    })
+}
+
+/// The parameters with every reference changed as `change` says. What it leaves as it is stays as it is written, to the
+/// byte, and so does all around the references. Names stay beside the uids that they stood beside; other uids have
+/// none until [`refresh_names`]. What cannot be read as a reference is left alone.
+pub fn map_references(params: &str, mut change: impl FnMut(&mut NodeRef)) -> String {
+    let rewritten = rewritten(params, |text| {
+        let mut places = Vec::new();
+        let before = read_with(text, None, &mut places).ok()?;
+        let mut after = before.clone();
+        after.iter_mut().for_each(&mut change);
+        (after != before).then(|| written(&after, Some(&KeptNames::new(text, &places))))
+    });
+    rewritten.into_owned()
+}
+
+/// The parameters with the current name beside every uid. The name beside a uid that nothing has stays, as a trace of
+/// what was meant. Names that stand alone stay as they are; see [`bind_names`].
+pub fn refresh_names<'a>(params: &'a str, names: &dyn Names) -> Cow<'a, str> {
+    rewritten(params, |text| {
+        let mut places = Vec::new();
+        // With names at hand, a name that stands alone does not keep the others from being refreshed.
+        read_with(text, Some(names), &mut places).ok()?;
+        places.retain(|place| place.has_uid);
+        renamed(text, &places, names)
+    })
+}
+
+/// The parameters with the uid beside every name, and what could not be bound: names that nothing or several have, and
+/// texts that are no references. Those stay as they are.
+pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<BadReference>) {
+    let bad = literals(params).filter_map(|Literal { range, text, .. }| {
+        let error = read_with(&text, Some(names), &mut Vec::new()).err()?;
+        // A text of some other meaning may begin with the same sign.
+        let other = matches!(&error.problem, ReferenceProblem::UnknownWord { what: "source", .. });
+        (!other).then_some(BadReference { range, error })
+    });
+    let bad = bad.collect();
+    let bound = rewritten(params, |text| {
+        let mut places = Vec::new();
+        read_with(text, Some(names), &mut places).ok()?;
+        renamed(text, &places, names)
+    });
+    (bound, bad)
+}
+
+/// The text of the first field with that name, at most two brackets deep, whose value is a string literal.
+pub(super) fn text_field(params: &str, name: &str) -> Option<String> {
+    fields(params).into_iter().filter(|field| field.depth <= 2 && field.name == name).find_map(|field| {
+        let value = params.get(field.value..field.end)?;
+        let mut tokens = tokens(value).skip_while(|token| matches!(token.text, "Some" | "("));
+        decoded(value, &tokens.next()?).map(|literal| literal.text)
+    })
+}
+
+struct Literal {
+    range: Range<usize>,
+    text: String,
+    raw: bool,
+}
+
+/// String literals whose text begins with `@`.
+fn literals(params: &str) -> impl Iterator<Item = Literal> {
+    // Most parameters have none, and need not be cut into tokens.
+    let params = if params.contains('@') || params.contains("\\u") || params.contains("\\x") { params } else { "" };
+    tokens(params).filter_map(|token| decoded(params, &token)).filter(|literal| literal.text.starts_with('@'))
+}
+
+/// The text of a string literal; `None` for any other token.
+fn decoded(params: &str, token: &Token) -> Option<Literal> {
+    let before = &params.as_bytes()[..token.start];
+    let raw = before.last() == Some(&b'r') && token.text.starts_with(['"', '#']);
+    if before.last() == Some(&b'b') || raw && before.iter().rev().nth(1) == Some(&b'b') {
+        return None;
+    }
+    if !raw && !token.text.starts_with('"') {
+        return None;
+    }
+    let range = token.start - usize::from(raw)..token.start + token.text.len();
+    let text = ron::from_str(&params[range.clone()]).ok()?;
+    Some(Literal { range, text, raw })
+}
+
+/// The parameters with the texts of references replaced where `replace` has something else.
+fn rewritten<'a>(params: &'a str, mut replace: impl FnMut(&str) -> Option<String>) -> Cow<'a, str> {
+    let mut out = String::new();
+    let mut at = 0;
+    for Literal { range, text, raw } in literals(params) {
+        let Some(next) = replace(&text).filter(|next| *next != text) else { continue };
+        out.push_str(&params[at..range.start]);
+        if raw && !next.contains('"') {
+            let old = &params[range.clone()];
+            let (open, close) = (old.find('"').unwrap_or_default() + 1, old.rfind('"').unwrap_or_default());
+            out.push_str(&old[..open]);
+            out.push_str(&next);
+            out.push_str(&old[close..]);
+        } else {
+            out.push_str(&quoted(&next));
+        }
+        at = range.end;
+    }
+    if at == 0 {
+        return Cow::Borrowed(params);
+    }
+    out.push_str(&params[at..]);
+    Cow::Owned(out)
+}
+
+/// The text with current names at these places, and a uid beside each.
+fn renamed(text: &str, places: &[Written], names: &dyn Names) -> Option<String> {
+    let mut places: Vec<&Written> = places.iter().collect();
+    places.sort_unstable_by_key(|place| place.name.start);
+    let mut out = String::with_capacity(text.len());
+    let mut at = 0;
+    for place in places {
+        out.push_str(&text[at..place.name.start]);
+        match names.name_of(place.kind, place.uid) {
+            Some(name) => out.push_str(&name_text(&name)),
+            None => out.push_str(&text[place.name.clone()]),
+        }
+        if !place.has_uid {
+            out.push_str(&format!("#{}", place.uid));
+        }
+        at = place.name.end;
+    }
+    out.push_str(&text[at..]);
+    Some(out)
+}
+
+/// The names that stand in a text beside uids.
+struct KeptNames(HashMap<(NameKind, Uid), String>);
+
+impl KeptNames {
+    fn new(text: &str, places: &[Written]) -> Self {
+        let named = places.iter().filter(|place| !place.name.is_empty());
+        Self(named.filter_map(|place| Some(((place.kind, place.uid), unquoted(&text[place.name.clone()])?))).collect())
+    }
+}
+
+/// A name as written, read as the name of a module.
+fn unquoted(name: &str) -> Option<String> {
+    match read_with(&format!("@module {name}"), None, &mut Vec::new()).ok()?.pop()?.source {
+        Source::Module(name) => Some(name),
+        _ => None,
+    }
+}
+
+impl Names for KeptNames {
+    fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
+        self.0.get(&(kind, uid)).map(|name| Cow::Borrowed(name.as_str()))
+    }
+
+    fn find(&self, _scope: NameScope, _kind: NameKind, _name: &str) -> Vec<Uid> {
+        Vec::new()
+    }
+
+    fn all(&self, _scope: NameScope, _kind: NameKind) -> Vec<Cow<'_, str>> {
+        Vec::new()
+    }
+}
