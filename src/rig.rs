@@ -27,7 +27,7 @@ mod uid;
 
 pub use built::{
     Attribute, AttributeKind, BuiltConstraint, BuiltNode, BuiltRig, Channels, ControlData, LayerData, LayerDisplay,
-    Limits, NodeType, Origin,
+    Limits, Matching, NodeType, Origin, SwitchData,
 };
 pub use constraint::{
     AimUp, AngleLimits, ChainSolver, Channel, Constraint, Dependency, KeyEase, Output, Scalar, Target,
@@ -40,6 +40,6 @@ pub use pose::{PoseOffset, StoredPose};
 pub use reference::{NodeRef, NodeRefs};
 pub(crate) use scan::elements;
 pub use source::SourceError;
-pub(crate) use source::{parse_ron, utf8};
+pub(crate) use source::{parse_ron, ron_options, utf8};
 pub use tag::{Tag, TagKind};
 pub use uid::{Uid, UidError, UidSource};

@@ -174,6 +174,39 @@ impl Trs {
     pub fn affine(&self) -> Affine3A {
         Affine3A::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
     }
+
+    /// A place in this transform's space, in the space around it.
+    pub fn transform_point(&self, point: Vec3) -> Vec3 {
+        self.translation + self.rotation * (self.scale * point)
+    }
+
+    /// What has to be multiplied to `parent` to give this transform. A direction in which the parent has no size is
+    /// taken as it is.
+    pub fn relative_to(&self, parent: &Self) -> Self {
+        let back = parent.rotation.inverse();
+        let divided = |a: f32, by: f32| if by == 0.0 { a } else { a / by };
+        let by = |v: Vec3| {
+            Vec3::new(divided(v.x, parent.scale.x), divided(v.y, parent.scale.y), divided(v.z, parent.scale.z))
+        };
+        Self {
+            translation: by(back * (self.translation - parent.translation)),
+            rotation: (back * self.rotation).normalize(),
+            scale: by(self.scale),
+        }
+    }
+}
+
+/// One after the other, as Bevy multiplies two transforms: scales axis by axis, so that there is never any shear.
+impl std::ops::Mul for Trs {
+    type Output = Self;
+
+    fn mul(self, inner: Self) -> Self {
+        Self {
+            translation: self.transform_point(inner.translation),
+            rotation: (self.rotation * inner.rotation).normalize(),
+            scale: self.scale * inner.scale,
+        }
+    }
 }
 
 /// A node of the file's hierarchy that the rig needs.

@@ -74,7 +74,7 @@ pub struct BuiltNode {
     /// The local group.
     pub group: Option<Uid>,
     /// Who made it; `None` for joints of the document.
-    pub origin: Option<Origin>,
+    pub origin: Option<Arc<Origin>>,
     /// How it is drawn and moved, if people move it.
     pub control: Option<Arc<ControlData>>,
     /// The layer it is shown in.

@@ -1,0 +1,27 @@
+//! The command processor: from tags on joints to a built rig, stepwise, reversibly, and only where something changed.
+//!
+//! A [`Builder`] follows one rig. [`Builder::sync`] takes over what the document says, [`Builder::run_to`] carries out
+//! commands up to a place in the list. The built world keeps what every command wrote side by side with what stood
+//! there before, so looking at it as of an earlier command (rolling back, stepping) is exact and costs nothing; and as
+//! what every command read is kept, too, a command runs again only if its parameters, its place or something that it
+//! read has changed. When it writes the same as before, nothing after it runs (early cut-off).
+//!
+//! Modules see the world through a [`BuildScope`] only. Nothing here knows an `App`.
+
+mod creation;
+mod error;
+mod list;
+mod module;
+mod processor;
+mod resolve;
+mod scope;
+mod snapshot;
+mod world;
+
+pub use creation::Creation;
+pub use error::{BuildError, BuildProblem, ModuleError};
+pub use list::{BuildRange, ListEntry};
+pub use module::{DynModule, ModuleInfo, Modules, Parameter, RigModule};
+pub use processor::{Builder, CommandState, CommandStatus, RunReport};
+pub use scope::{BuildScope, Side};
+pub use world::{Aspect, NodeId, Value};

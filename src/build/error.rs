@@ -1,0 +1,84 @@
+//! What goes wrong in a build: which tag, what, and what to do.
+
+use crate::rig::{SourceError, Uid, reference::NodeRefs};
+
+/// Why a module could not do its work.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ModuleError {
+    /// A reference found nothing, or not what is needed.
+    #[error("{parameter}: {reference}: {problem}")]
+    Reference {
+        /// The parameter.
+        parameter: String,
+        /// The reference as text.
+        reference: String,
+        /// What is wrong, and the nearest matches.
+        problem: String,
+    },
+    /// A parameter that is out of its range or makes no sense with the others.
+    #[error("{parameter}: {problem}")]
+    Parameter {
+        /// The parameter.
+        parameter: String,
+        /// What is wrong and what to write.
+        problem: String,
+    },
+    /// Anything else.
+    #[error("{0}")]
+    Other(String),
+    /// Nodes and constraints that drive each other in a circle.
+    #[error("these drive each other in a circle: {0}; remove one of the constraints, or let it follow something else")]
+    Cycle(String),
+}
+
+impl ModuleError {
+    /// A parameter that is out of its range or makes no sense with the others; `problem` says what to write.
+    pub fn parameter(parameter: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::Parameter { parameter: parameter.into(), problem: problem.into() }
+    }
+
+    /// A reference that cannot be used.
+    pub fn reference(parameter: impl Into<String>, references: &NodeRefs, problem: impl Into<String>) -> Self {
+        Self::Reference { parameter: parameter.into(), reference: references.to_string(), problem: problem.into() }
+    }
+
+    /// Anything else.
+    pub fn other(problem: impl Into<String>) -> Self {
+        Self::Other(problem.into())
+    }
+}
+
+/// What is wrong with a command.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BuildProblem {
+    /// Nobody registered the module.
+    #[error("there is no module \"{module}\"{nearest}; register it, or disable the tag")]
+    NoModule {
+        /// The name.
+        module: String,
+        /// The nearest names, as the rest of a sentence; may be empty.
+        nearest: String,
+    },
+    /// Its parameters cannot be read.
+    #[error("parameters, {0}")]
+    Parameters(#[from] SourceError),
+    /// The module says no.
+    #[error(transparent)]
+    Module(#[from] ModuleError),
+}
+
+/// A command that failed. What stood before it stands; nothing after it ran.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{module} on {joint_label}: {problem}")]
+pub struct BuildError {
+    /// The tag.
+    pub command: Uid,
+    /// The joint that carries it.
+    pub joint: Uid,
+    /// The joint's label, or its uid where it has none.
+    pub joint_label: String,
+    /// The module.
+    pub module: String,
+    /// What is wrong.
+    pub problem: BuildProblem,
+}

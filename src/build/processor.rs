@@ -1,0 +1,663 @@
+//! The processor: follows a document, carries out what has to be carried out, and knows how far it has come.
+
+use std::{
+    cmp::Reverse,
+    collections::{BinaryHeap, HashSet},
+    sync::Arc,
+    time::Instant,
+};
+
+use super::{
+    BuildError, BuildProblem, BuildRange, BuildScope, DynModule, ListEntry, ModuleError, Modules,
+    list::{features, groups_off, is_on, joints_in},
+    resolve::Asker,
+    scope::Trace,
+    snapshot,
+    world::{Aspect, Birth, NOWHERE, NodeId, Value, World, same},
+};
+use crate::{
+    mesh::model::Trs,
+    rig::{BuiltRig, Dependency, NodeKind, NodeType, Rig, RigEdit, TagKind, Uid},
+};
+
+/// Where a command stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CommandState {
+    /// Not carried out yet, or rolled back.
+    Pending,
+    /// Carried out.
+    Done,
+    /// Passed over: its tag, its feature or its joint's group is off.
+    Skipped,
+    /// It failed and the build stands before it.
+    Failed,
+}
+
+/// What is known about a command.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommandStatus {
+    /// Where it stands.
+    pub state: CommandState,
+    /// How long it took when it ran last, in microseconds.
+    pub micros: f32,
+    /// How often it ran since the builder was made.
+    pub runs: u32,
+    /// Why it failed, if it did.
+    pub error: Option<BuildProblem>,
+}
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RunReport {
+    /// Commands that were executed, in order.
+    pub executed: Vec<Uid>,
+    /// The command that stopped it.
+    pub error: Option<BuildError>,
+    /// How many commands are in effect now.
+    pub cursor: usize,
+}
+
+/// What has to be done about a command before it counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Due {
+    Nothing,
+    /// Something that it read may have changed.
+    Check,
+    Run,
+}
+
+struct Command {
+    joint: Uid,
+    module: Arc<str>,
+    params: Arc<str>,
+    loaded: Option<Result<Arc<dyn DynModule>, BuildProblem>>,
+    active: bool,
+    trace: Trace,
+    due: Due,
+    error: Option<BuildProblem>,
+    micros: f32,
+    runs: u32,
+}
+
+/// Builds one rig, and keeps what it takes to build it again where something changed.
+pub struct Builder {
+    modules: Arc<Modules>,
+    range: BuildRange,
+    rig: Uid,
+    world: World,
+    commands: Vec<Command>,
+    list: Vec<u32>,
+    due: BinaryHeap<Reverse<(u32, u32)>>,
+    cursor: u32,
+    failed: Option<u32>,
+    breakpoints: HashSet<Uid>,
+    /// Whether something that can close a circle of constraints has changed, and from which place on.
+    graph_changed: Option<u32>,
+}
+
+impl Builder {
+    /// A builder that knows these modules.
+    pub fn new(modules: Arc<Modules>) -> Self {
+        Self {
+            modules,
+            range: BuildRange::Rig,
+            rig: Uid(0),
+            world: World::default(),
+            commands: Vec::new(),
+            list: Vec::new(),
+            due: BinaryHeap::new(),
+            cursor: 0,
+            failed: None,
+            breakpoints: HashSet::new(),
+            graph_changed: None,
+        }
+    }
+
+    /// Builds all of a rig from nothing.
+    ///
+    /// # Errors
+    /// The first command that fails.
+    pub fn build(rig: &Rig, modules: &Arc<Modules>) -> Result<BuiltRig, BuildError> {
+        let mut builder = Self::new(modules.clone());
+        builder.sync(rig);
+        match builder.run_all().error {
+            Some(error) => Err(error),
+            None => Ok(builder.built()),
+        }
+    }
+
+    /// Commands of other joints are left out of the list from the next [`Builder::sync`] on.
+    pub fn set_range(&mut self, range: BuildRange) {
+        self.range = range;
+    }
+
+    /// Takes over what the document says now. Nothing is carried out: see [`Builder::run_to`].
+    pub fn sync(&mut self, rig: &Rig) {
+        self.rig = rig.uid();
+        self.sync_joints(rig);
+        self.sync_list(rig);
+    }
+
+    /// Takes over one edit that was applied to the document since the last [`Builder::sync`]. What concerns one tag or
+    /// one transform takes no look at anything else.
+    pub fn touch(&mut self, rig: &Rig, edit: &RigEdit) {
+        if !self.touch_one(rig, edit) {
+            self.sync(rig);
+        }
+    }
+
+    /// True if that was all there is to do.
+    fn touch_one(&mut self, rig: &Rig, edit: &RigEdit) -> bool {
+        match edit {
+            RigEdit::SetTag(joint, tag) => {
+                let TagKind::Command { module, params, .. } = &tag.kind else { return false };
+                let tags = rig.joint(*joint).map(|joint| &joint.data.tags);
+                let Some(tag) = tags.and_then(|tags| tags.iter().find(|now| now.uid == tag.uid)) else { return false };
+                let Some(number) = self.world.creator_of(tag.uid) else { return false };
+                let TagKind::Command { feature, .. } = &tag.kind else { return false };
+                let command = &mut self.commands[number as usize];
+                // Without a feature, its own switch and that of its group decide; the latter has not changed.
+                if feature.is_some() || tag.enabled != command.active || **module != *command.module {
+                    return false;
+                }
+                if *params != *command.params {
+                    command.params = params.as_str().into();
+                    command.loaded = None;
+                    self.mark(number, Due::Run);
+                }
+                true
+            }
+            RigEdit::SetOffset(..) | RigEdit::SetSkin(..) => true,
+            _ => false,
+        }
+    }
+
+    fn sync_joints(&mut self, rig: &Rig) {
+        let off = groups_off(rig);
+        let before = std::mem::take(&mut self.world.joints);
+        let mut seen = HashSet::with_capacity(rig.len());
+        // Joints that are left out: their children hang on what is above, and stay where they are.
+        let mut left_out: std::collections::HashMap<Uid, (Option<NodeId>, Trs)> = std::collections::HashMap::new();
+        for (order, joint) in rig.walk().enumerate() {
+            let data = &joint.data;
+            let rest: Trs = data.rest.into();
+            let (parent, base) = match joint.parent {
+                Some(parent) => match left_out.get(&parent) {
+                    Some((above, between)) => (*above, *between * rest),
+                    None => (self.world.id(parent), rest),
+                },
+                None => (None, rest),
+            };
+            if data.group.is_some_and(|group| off.contains(&group)) {
+                left_out.insert(data.uid, (parent, base));
+                continue;
+            }
+            let node = self.world.slot(data.uid, None);
+            seen.insert(node);
+            self.world.joints.push(node);
+            let kind = match data.kind {
+                NodeKind::Joint => NodeType::Joint,
+                NodeKind::Null => NodeType::Null,
+            };
+            let label: Option<Arc<str>> = data.label.as_deref().map(Into::into);
+            let name = label.clone().unwrap_or_else(|| data.uid.to_string().into());
+            let birth = Birth { kind, name, origin: None, order: order as u32 };
+            self.set_document(node, Aspect::Birth, Some(Value::Birth(Arc::new(birth))));
+            self.set_document(node, Aspect::Parent, Some(Value::Parent(parent)));
+            self.set_document(node, Aspect::Base, Some(Value::Base(base)));
+            self.set_document(node, Aspect::Label, Some(Value::Label(label)));
+            self.set_document(node, Aspect::Group, Some(Value::Group(data.group)));
+        }
+        for node in before.into_iter().filter(|node| !seen.contains(node)) {
+            for aspect in [Aspect::Birth, Aspect::Parent, Aspect::Base, Aspect::Label, Aspect::Group] {
+                self.set_document(node, aspect, None);
+            }
+        }
+    }
+
+    fn set_document(&mut self, node: NodeId, aspect: Aspect, value: Option<Value>) {
+        let cell = self.world.cell_mut(node, aspect);
+        if !same(cell.document.as_ref(), value.as_ref()) {
+            cell.document = value;
+            self.changed(node, aspect, None);
+        }
+    }
+
+    fn sync_list(&mut self, rig: &Rig) {
+        let features = features(rig);
+        let off = groups_off(rig);
+        let mut list = Vec::with_capacity(self.list.len());
+        for uid in joints_in(rig, &self.range) {
+            let Some(joint) = rig.joint(uid) else { continue };
+            let built = !joint.data.group.is_some_and(|group| off.contains(&group));
+            for tag in &joint.data.tags {
+                let TagKind::Command { module, params, .. } = &tag.kind else { continue };
+                let number = self.world.command(tag.uid);
+                let active = built && is_on(tag, &features);
+                if number as usize == self.commands.len() {
+                    self.commands.push(Command {
+                        joint: uid,
+                        module: module.as_str().into(),
+                        params: params.as_str().into(),
+                        loaded: None,
+                        active,
+                        trace: Trace::default(),
+                        due: Due::Nothing,
+                        error: None,
+                        micros: 0.0,
+                        runs: 0,
+                    });
+                    self.mark(number, Due::Run);
+                } else {
+                    let command = &mut self.commands[number as usize];
+                    let reads_anew = *command.module != **module || *command.params != **params;
+                    if reads_anew {
+                        command.module = module.as_str().into();
+                        command.params = params.as_str().into();
+                        command.loaded = None;
+                    }
+                    if reads_anew || command.active != active || command.joint != uid {
+                        (command.active, command.joint) = (active, uid);
+                        self.mark(number, Due::Run);
+                    }
+                }
+                list.push(number);
+            }
+        }
+        if list == self.list {
+            return;
+        }
+        // With other places, everything may read something else, and everything has to be looked at.
+        let reached = self.list.get(self.cursor as usize).copied();
+        for number in std::mem::replace(&mut self.list, list) {
+            self.world.places[number as usize] = NOWHERE;
+        }
+        self.due.clear();
+        for at in 0..self.list.len() {
+            let number = self.list[at];
+            self.world.places[number as usize] = at as u32;
+            let command = &mut self.commands[number as usize];
+            command.due = command.due.max(Due::Check);
+            self.due.push(Reverse((at as u32, number)));
+        }
+        self.graph_changed = Some(0);
+        let still = reached.map(|number| self.world.places[number as usize]).filter(|place| *place != NOWHERE);
+        self.cursor = still.unwrap_or(self.list.len() as u32).min(self.list.len() as u32);
+        if self.failed.is_some_and(|number| self.world.places[number as usize] == NOWHERE) {
+            self.failed = None;
+        }
+    }
+
+    fn mark(&mut self, number: u32, due: Due) {
+        let command = &mut self.commands[number as usize];
+        if command.due < due {
+            command.due = due;
+            let place = self.world.places[number as usize];
+            if place != NOWHERE {
+                self.due.push(Reverse((place, number)));
+            }
+        }
+    }
+
+    /// Somebody (`None`: the document) changed what a cell holds: whoever read it later has to be looked at.
+    fn changed(&mut self, node: NodeId, aspect: Aspect, writer: Option<u32>) {
+        let from = writer.map(|writer| self.world.places[writer as usize]);
+        let later = |world: &World, number: u32| {
+            let place = world.places[number as usize];
+            place != NOWHERE && from.is_none_or(|from| place > from)
+        };
+        let readers: Vec<u32> = self.world.cell(node, aspect).readers.clone();
+        for number in readers {
+            if later(&self.world, number) {
+                self.mark(number, Due::Check);
+            }
+        }
+        if aspect.is_structure() {
+            for number in 0..self.commands.len() as u32 {
+                if later(&self.world, number) && self.commands[number as usize].trace.asks() {
+                    self.mark(number, Due::Check);
+                }
+            }
+        }
+        if matches!(aspect, Aspect::Parent | Aspect::Constraint | Aspect::Birth) {
+            let from = from.unwrap_or(0);
+            self.graph_changed = Some(self.graph_changed.map_or(from, |before| before.min(from)));
+        }
+    }
+
+    /// The commands in order.
+    pub fn list(&self) -> Vec<ListEntry> {
+        let entry = |number: &u32| {
+            let command = &self.commands[*number as usize];
+            ListEntry {
+                command: self.world.commands[*number as usize],
+                joint: command.joint,
+                module: command.module.clone(),
+                active: command.active,
+            }
+        };
+        self.list.iter().map(entry).collect()
+    }
+
+    /// The number of commands in the list.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// True if there is no command.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// How many commands are in effect: those before this place in the list.
+    pub fn cursor(&self) -> usize {
+        self.cursor as usize
+    }
+
+    /// What is known about a command; `None` if it is not in the list.
+    pub fn status(&self, tag: Uid) -> Option<CommandStatus> {
+        let number = self.world.creator_of(tag)?;
+        let place = Some(self.world.places[number as usize]).filter(|place| *place != NOWHERE)?;
+        let command = &self.commands[number as usize];
+        let state = match () {
+            () if self.failed == Some(number) && place == self.cursor => CommandState::Failed,
+            () if place >= self.cursor => CommandState::Pending,
+            () if !command.active => CommandState::Skipped,
+            () => CommandState::Done,
+        };
+        let error = command.error.clone().filter(|_| state == CommandState::Failed);
+        Some(CommandStatus { state, micros: command.micros, runs: command.runs, error })
+    }
+
+    /// A run with [`Builder::run`] stops before commands with a breakpoint.
+    pub fn set_breakpoint(&mut self, tag: Uid, on: bool) {
+        if on {
+            self.breakpoints.insert(tag);
+        } else {
+            self.breakpoints.remove(&tag);
+        }
+    }
+
+    /// Tags with a breakpoint.
+    pub fn breakpoints(&self) -> &HashSet<Uid> {
+        &self.breakpoints
+    }
+
+    /// Carries out all commands, whatever the breakpoints.
+    pub fn run_all(&mut self) -> RunReport {
+        self.run_to(self.list.len())
+    }
+
+    /// Goes on to the next breakpoint, or to the end. Starts over a breakpoint that it stands at.
+    pub fn run(&mut self) -> RunReport {
+        let from = (self.cursor as usize + 1).min(self.list.len());
+        let stop = self.list[from..]
+            .iter()
+            .position(|number| self.breakpoints.contains(&self.world.commands[*number as usize]));
+        self.run_to(stop.map_or(self.list.len(), |at| from + at))
+    }
+
+    /// Carries out the next command.
+    pub fn step_forward(&mut self) -> RunReport {
+        self.run_to(self.cursor as usize + 1)
+    }
+
+    /// Rolls the last command back.
+    pub fn step_back(&mut self) -> RunReport {
+        self.run_to((self.cursor as usize).saturating_sub(1))
+    }
+
+    /// Carries out the rest of the commands of the joint whose turn it is.
+    pub fn joint_forward(&mut self) -> RunReport {
+        let at = self.cursor as usize;
+        let joint = self.list.get(at).map(|number| self.commands[*number as usize].joint);
+        let same = |number: &&u32| Some(self.commands[**number as usize].joint) == joint;
+        let count = self.list.get(at..).unwrap_or_default().iter().take_while(same).count();
+        self.run_to(at + count)
+    }
+
+    /// Rolls back the commands of the joint that was last.
+    pub fn joint_back(&mut self) -> RunReport {
+        let at = self.cursor as usize;
+        let joint = at.checked_sub(1).map(|at| self.commands[self.list[at] as usize].joint);
+        let same = |number: &&u32| Some(self.commands[**number as usize].joint) == joint;
+        let count = self.list[..at].iter().rev().take_while(same).count();
+        self.run_to(at - count)
+    }
+
+    /// Rolls everything back.
+    pub fn roll_back(&mut self) -> RunReport {
+        self.run_to(0)
+    }
+
+    /// Goes to a place in the list, forwards or backwards: commands before it are in effect then, unless one of them
+    /// fails. Executes only what has not been executed as things stand now.
+    pub fn run_to(&mut self, place: usize) -> RunReport {
+        let target = place.min(self.list.len()) as u32;
+        let mut report = RunReport::default();
+        let mut failed = None;
+        while let Some(Reverse((place, number))) = self.due.peek().copied() {
+            if place >= target {
+                break;
+            }
+            self.due.pop();
+            let due = self.commands[number as usize].due;
+            if due == Due::Nothing || self.world.places[number as usize] != place {
+                continue;
+            }
+            if due == Due::Check && self.holds(number) {
+                self.commands[number as usize].due = Due::Nothing;
+                continue;
+            }
+            self.commands[number as usize].due = Due::Nothing;
+            let result = self.execute(number);
+            if self.commands[number as usize].active {
+                report.executed.push(self.world.commands[number as usize]);
+            }
+            if let Err(problem) = result {
+                failed = Some((number, problem));
+                break;
+            }
+        }
+        if failed.is_none() {
+            failed = self.loop_before(target);
+        }
+        self.failed = None;
+        self.cursor = target;
+        if let Some((number, problem)) = failed {
+            // It is tried again in the next run: whatever made it fail may be gone.
+            self.mark(number, Due::Run);
+            self.cursor = self.world.places[number as usize];
+            self.failed = Some(number);
+            self.commands[number as usize].error = Some(problem.clone());
+            report.error = Some(self.error(number, problem));
+        }
+        report.cursor = self.cursor as usize;
+        report
+    }
+
+    fn error(&self, number: u32, problem: BuildProblem) -> BuildError {
+        let command = &self.commands[number as usize];
+        let joint = self.world.id(command.joint);
+        let label = joint.and_then(|joint| self.world.label(joint, self.world.places[number as usize]));
+        BuildError {
+            command: self.world.commands[number as usize],
+            joint: command.joint,
+            joint_label: label.map_or_else(|| command.joint.to_string(), |label| label.to_string()),
+            module: command.module.to_string(),
+            problem,
+        }
+    }
+
+    fn asker(&self, number: u32) -> Option<Asker> {
+        let joint = self.world.id(self.commands[number as usize].joint)?;
+        Some(Asker { rig: self.rig, joint, place: self.world.places[number as usize] })
+    }
+
+    /// True if the command would read the same as before.
+    fn holds(&self, number: u32) -> bool {
+        let command = &self.commands[number as usize];
+        command.error.is_none() && self.asker(number).is_some_and(|asker| command.trace.holds(&self.world, asker))
+    }
+
+    fn execute(&mut self, number: u32) -> Result<(), BuildProblem> {
+        let old = std::mem::take(&mut self.commands[number as usize].trace);
+        let before = self.take_back(number, &old);
+        let mut trace = Trace::default();
+        let started = Instant::now();
+        let result = if self.commands[number as usize].active { self.construct(number, &mut trace) } else { Ok(()) };
+        if result.is_err() {
+            let reads = std::mem::take(&mut trace.reads);
+            self.take_back(number, &trace);
+            trace = Trace { reads, ..Trace::default() };
+        }
+        for read in &trace.reads {
+            if let super::scope::Read::Cell(node, aspect, _) = read {
+                let readers = &mut self.world.cell_mut(*node, *aspect).readers;
+                if let Err(at) = readers.binary_search(&number) {
+                    readers.insert(at, number);
+                }
+            }
+        }
+        // Early cut-off: only what is not as before concerns others.
+        let own = |world: &World, node: NodeId, aspect: Aspect| {
+            let writes = &world.cell(node, aspect).writes;
+            writes.iter().find(|(writer, _)| *writer == number).map(|(_, value)| value.clone())
+        };
+        for (node, aspect) in &trace.writes {
+            let was = before.iter().find(|(old, which, _)| old == node && which == aspect).map(|(_, _, value)| value);
+            if !same(own(&self.world, *node, *aspect).as_ref(), was) {
+                self.changed(*node, *aspect, Some(number));
+            }
+        }
+        for (node, aspect, _) in &before {
+            if !trace.writes.contains(&(*node, *aspect)) {
+                self.changed(*node, *aspect, Some(number));
+            }
+        }
+        let command = &mut self.commands[number as usize];
+        command.trace = trace;
+        if command.active {
+            command.runs += 1;
+            command.micros = started.elapsed().as_nanos() as f32 / 1000.0;
+        }
+        command.error = result.clone().err();
+        result
+    }
+
+    fn construct(&mut self, number: u32, trace: &mut Trace) -> Result<(), BuildProblem> {
+        let Some(asker) = self.asker(number) else {
+            return Err(ModuleError::other("the joint of the tag is not in the built rig").into());
+        };
+        let command = &mut self.commands[number as usize];
+        let modules = &self.modules;
+        let loaded = command.loaded.get_or_insert_with(|| modules.load(&command.module, &command.params));
+        let module = loaded.clone()?;
+        let name = command.module.clone();
+        let mut scope = BuildScope { world: &mut self.world, trace, asker, command: number, module: name };
+        module.construct(&mut scope)?;
+        let made = trace.writes.iter().filter(|(_, aspect)| *aspect == Aspect::Constraint);
+        let made: Vec<NodeId> = made.map(|(node, _)| *node).collect();
+        for constraint in made {
+            self.check_loop(constraint, asker.place + 1)?;
+        }
+        Ok(())
+    }
+
+    /// Removes what a command wrote, and returns it; unregisters what it read.
+    fn take_back(&mut self, number: u32, trace: &Trace) -> Vec<(NodeId, Aspect, Value)> {
+        for read in &trace.reads {
+            if let super::scope::Read::Cell(node, aspect, _) = read {
+                let readers = &mut self.world.cell_mut(*node, *aspect).readers;
+                if let Ok(at) = readers.binary_search(&number) {
+                    readers.remove(at);
+                }
+            }
+        }
+        let mut values = Vec::with_capacity(trace.writes.len());
+        for (node, aspect) in &trace.writes {
+            let writes = &mut self.world.cell_mut(*node, *aspect).writes;
+            if let Some(at) = writes.iter().position(|(writer, _)| *writer == number) {
+                values.push((*node, *aspect, writes.swap_remove(at).1));
+            }
+        }
+        values
+    }
+
+    /// The first command before `target` that closes a circle which was not there when it ran.
+    fn loop_before(&mut self, target: u32) -> Option<(u32, BuildProblem)> {
+        let from = self.graph_changed.take()?;
+        let mut constraints: Vec<(u32, u32, NodeId)> = Vec::new();
+        for place in from..target {
+            let number = self.list[place as usize];
+            let writes = self.commands[number as usize].trace.writes.iter();
+            let own = writes.filter(|(_, aspect)| *aspect == Aspect::Constraint);
+            constraints.extend(own.map(|(node, _)| (place, number, *node)));
+        }
+        for (place, number, constraint) in constraints {
+            if let Err(problem) = self.check_loop(constraint, place + 1) {
+                self.graph_changed = Some(from);
+                return Some((number, problem.into()));
+            }
+        }
+        None
+    }
+
+    /// Refuses a constraint whose input depends on what it drives.
+    fn check_loop(&self, constraint: NodeId, place: u32) -> Result<(), ModuleError> {
+        let Some(Value::Constraint(_, data)) = self.world.read_at(constraint, Aspect::Constraint, place) else {
+            return Ok(());
+        };
+        let drives = data.drives();
+        let mut seen: HashSet<Dependency> = HashSet::new();
+        let mut path: Vec<(Dependency, usize)> = data.reads().into_iter().map(|read| (read, 0)).collect();
+        let mut trail: Vec<Dependency> = Vec::new();
+        while let Some((at, depth)) = path.pop() {
+            trail.truncate(depth);
+            if drives.contains(&at) {
+                trail.push(at);
+                let names: Vec<String> = trail.iter().map(|at| self.dependency_name(at, place)).collect();
+                let first = drives.first().map(|at| self.dependency_name(at, place)).unwrap_or_default();
+                let shown = if names.first() == Some(&first) { String::new() } else { format!("{first} \u{2192} ") };
+                return Err(ModuleError::Cycle(format!("{shown}{}", names.join(" \u{2192} "))));
+            }
+            if !seen.insert(at.clone()) {
+                continue;
+            }
+            trail.push(at.clone());
+            let depth = trail.len();
+            let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = &at;
+            let Some(node) = self.world.id(*uid) else { continue };
+            if matches!(at, Dependency::Node(_))
+                && let Some(parent) = self.world.parent(node, place)
+            {
+                path.push((Dependency::Node(self.world.uid(parent)), depth));
+            }
+            for driver in &self.world.slots[node.0 as usize].driven_by {
+                if let Some(Value::Constraint(_, other)) = self.world.read_at(*driver, Aspect::Constraint, place)
+                    && *driver != constraint
+                    && other.drives().contains(&at)
+                {
+                    path.extend(other.reads().into_iter().map(|read| (read, depth)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn dependency_name(&self, dependency: &Dependency, place: u32) -> String {
+        let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = dependency;
+        let birth = self.world.id(*uid).and_then(|node| self.world.birth(node, place));
+        let name = birth.map_or_else(|| uid.to_string(), |birth| birth.name.to_string());
+        match dependency {
+            Dependency::Node(_) => name,
+            Dependency::Attribute(_, attribute) => format!("{name}.{attribute}"),
+        }
+    }
+
+    /// The built rig as the commands before the cursor made it.
+    pub fn built(&self) -> BuiltRig {
+        snapshot::snapshot(&self.world, self.cursor)
+    }
+}

@@ -1,0 +1,552 @@
+//! What a module may do: the only way it touches the built world.
+
+use std::sync::Arc;
+
+use super::{
+    Creation, ModuleError,
+    resolve::{self, Asker},
+    world::{Aspect, Birth, NodeId, Value, World, same},
+};
+use crate::{
+    mesh::model::Trs,
+    rig::{
+        Attribute, AttributeKind, Constraint, ControlData, Dependency, LayerData, NodeType, Origin, Scalar, SwitchData,
+        Uid, reference::NodeRefs,
+    },
+};
+
+/// The side of the body that a node is on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Side {
+    /// The character's left: towards +X.
+    Left,
+    /// The character's right: towards -X.
+    Right,
+    /// On the middle plane.
+    Middle,
+}
+
+/// Something that a command read, with what it found.
+#[derive(Debug, Clone)]
+pub(super) enum Read {
+    Cell(NodeId, Aspect, Option<Value>),
+    References(NodeRefs, Option<Vec<NodeId>>),
+    Children(NodeId, Vec<NodeId>),
+}
+
+/// What a command read and wrote.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Trace {
+    pub reads: Vec<Read>,
+    pub writes: Vec<(NodeId, Aspect)>,
+    /// How many nodes and constraints it made.
+    pub made: u32,
+}
+
+impl Trace {
+    pub fn asks(&self) -> bool {
+        self.reads.iter().any(|read| !matches!(read, Read::Cell(..)))
+    }
+
+    /// True if everything that was read is still so.
+    pub fn holds(&self, world: &World, asker: Asker) -> bool {
+        self.reads.iter().all(|read| match read {
+            Read::Cell(node, aspect, value) => same(world.read_at(*node, *aspect, asker.place), value.as_ref()),
+            Read::References(references, nodes) => {
+                resolve::resolve(world, asker, references).ok().as_ref() == nodes.as_ref()
+            }
+            Read::Children(node, children) => world_children(world, *node, asker.place) == *children,
+        })
+    }
+}
+
+fn world_children(world: &World, node: NodeId, place: u32) -> Vec<NodeId> {
+    let all = (0..world.slots.len() as u32).map(NodeId);
+    let mut children: Vec<NodeId> =
+        all.filter(|child| world.parent(*child, place) == Some(node) && world.exists(*child, place)).collect();
+    resolve::sort(world, &mut children, place);
+    children
+}
+
+/// The built world as one command sees it: as the commands before it left it, and what it does itself.
+///
+/// Everything that is read through it is noted, so that the command runs again when it changes; everything that is
+/// written is taken back when the command is rolled back. Transforms are local (relative to the parent) or in the rig's
+/// space, as each method says.
+pub struct BuildScope<'a> {
+    pub(super) world: &'a mut World,
+    pub(super) trace: &'a mut Trace,
+    pub(super) asker: Asker,
+    pub(super) command: u32,
+    pub(super) module: Arc<str>,
+}
+
+impl BuildScope<'_> {
+    /// The joint that carries the tag.
+    pub fn joint(&self) -> NodeId {
+        self.asker.joint
+    }
+
+    /// The command's tag.
+    pub fn command(&self) -> Uid {
+        self.world.commands[self.command as usize]
+    }
+
+    /// The rig that is built.
+    pub fn rig(&self) -> Uid {
+        self.asker.rig
+    }
+
+    /// The uid of a node.
+    pub fn uid(&self, node: NodeId) -> Uid {
+        self.world.uid(node)
+    }
+
+    /// Nodes that references stand for, in order, each once. May be none.
+    ///
+    /// # Errors
+    /// A reference to another rig, to a joint that is not there, or to a place past the end of a list.
+    pub fn resolve(&mut self, parameter: &str, references: &NodeRefs) -> Result<Vec<NodeId>, ModuleError> {
+        let found = resolve::resolve(self.world, self.asker, references);
+        self.trace.reads.push(Read::References(references.clone(), found.clone().ok()));
+        found.map_err(|problem| ModuleError::reference(parameter, references, problem))
+    }
+
+    /// Like [`BuildScope::resolve`], but at least one node.
+    ///
+    /// # Errors
+    /// See [`BuildScope::resolve`]; and nothing found, with the nearest matches.
+    pub fn resolve_some(&mut self, parameter: &str, references: &NodeRefs) -> Result<Vec<NodeId>, ModuleError> {
+        let nodes = self.resolve(parameter, references)?;
+        if nodes.is_empty() {
+            let nearest = resolve::nearest(self.world, self.asker, references);
+            let problem = if references.is_empty() {
+                "is needed; refer to a node, such as @this".to_owned()
+            } else {
+                format!("finds nothing{nearest}; refer to something that exists when this command runs")
+            };
+            return Err(ModuleError::reference(parameter, references, problem));
+        }
+        Ok(nodes)
+    }
+
+    /// The one node that references stand for.
+    ///
+    /// # Errors
+    /// See [`BuildScope::resolve_some`]; and more than one.
+    pub fn resolve_one(&mut self, parameter: &str, references: &NodeRefs) -> Result<NodeId, ModuleError> {
+        match self.resolve_some(parameter, references)?[..] {
+            [node] => Ok(node),
+            ref nodes => {
+                let names: Vec<String> = nodes.iter().take(4).map(|node| self.name(*node)).collect();
+                let more = if nodes.len() > 4 { ", ..." } else { "" };
+                let problem = format!(
+                    "finds {} nodes ({}{more}) where one is needed; narrow it down, for example with pick:START",
+                    nodes.len(),
+                    names.join(", ")
+                );
+                Err(ModuleError::reference(parameter, references, problem))
+            }
+        }
+    }
+
+    /// Like [`BuildScope::resolve_one`], but `None` for an empty parameter.
+    ///
+    /// # Errors
+    /// See [`BuildScope::resolve_one`].
+    pub fn resolve_maybe(&mut self, parameter: &str, references: &NodeRefs) -> Result<Option<NodeId>, ModuleError> {
+        if references.is_empty() { Ok(None) } else { self.resolve_one(parameter, references).map(Some) }
+    }
+
+    /// The name of a node for messages: its label, or its name.
+    pub fn name(&self, node: NodeId) -> String {
+        let place = self.asker.place + 1;
+        let label = self.world.label(node, place).map(|label| label.to_string());
+        let name = self.world.birth(node, place).map(|birth| birth.name.to_string());
+        label.or(name).unwrap_or_else(|| self.world.uid(node).to_string())
+    }
+
+    /// Joint, null or control; `None` if the node is not there.
+    pub fn kind(&mut self, node: NodeId) -> Option<NodeType> {
+        match self.read(node, Aspect::Birth) {
+            Some(Value::Birth(birth)) => Some(birth.kind),
+            _ => None,
+        }
+    }
+
+    /// The parent of a node.
+    pub fn parent(&mut self, node: NodeId) -> Option<NodeId> {
+        match self.read(node, Aspect::Parent) {
+            Some(Value::Parent(parent)) => parent,
+            _ => None,
+        }
+    }
+
+    /// The children of a node in order, those that the command itself made included.
+    pub fn children(&mut self, node: NodeId) -> Vec<NodeId> {
+        let before = world_children(self.world, node, self.asker.place);
+        let now = world_children(self.world, node, self.asker.place + 1);
+        self.trace.reads.push(Read::Children(node, before));
+        now
+    }
+
+    /// The children of a node that are joints.
+    pub fn child_joints(&mut self, node: NodeId) -> Vec<NodeId> {
+        let children = self.children(node);
+        children.into_iter().filter(|child| self.kind(*child) == Some(NodeType::Joint)).collect()
+    }
+
+    /// The nodes from `top` down to `end`, both included.
+    ///
+    /// # Errors
+    /// If `end` is not below `top`.
+    pub fn chain(&mut self, top: NodeId, end: NodeId) -> Result<Vec<NodeId>, ModuleError> {
+        let mut chain = vec![end];
+        let mut at = end;
+        while at != top {
+            let Some(parent) = self.parent(at) else {
+                return Err(ModuleError::other(format!(
+                    "{} is not below {}: choose the ends of one chain, the upper one first",
+                    self.name(end),
+                    self.name(top)
+                )));
+            };
+            chain.push(parent);
+            at = parent;
+        }
+        chain.reverse();
+        Ok(chain)
+    }
+
+    /// The transform of a node relative to its parent.
+    pub fn base(&mut self, node: NodeId) -> Trs {
+        match self.read(node, Aspect::Base) {
+            Some(Value::Base(base)) => base,
+            _ => Trs::IDENTITY,
+        }
+    }
+
+    /// The transform of a node in the rig's space.
+    pub fn global(&mut self, node: NodeId) -> Trs {
+        let mut global = self.base(node);
+        let mut at = node;
+        while let Some(parent) = self.parent(at) {
+            global = self.base(parent) * global;
+            at = parent;
+        }
+        global
+    }
+
+    /// Where a node is in the rig's space.
+    pub fn position(&mut self, node: NodeId) -> glam::Vec3 {
+        self.global(node).translation
+    }
+
+    /// The side of the body that a node stands on, with a thousandth of its distance from the ground for the middle.
+    pub fn side(&mut self, node: NodeId) -> Side {
+        let position = self.position(node);
+        let near = 1e-3 * position.length().max(1e-3);
+        match position.x {
+            x if x > near => Side::Left,
+            x if x < -near => Side::Right,
+            _ => Side::Middle,
+        }
+    }
+
+    /// The label of a node.
+    pub fn label(&mut self, node: NodeId) -> Option<Arc<str>> {
+        match self.read(node, Aspect::Label) {
+            Some(Value::Label(label)) => label,
+            _ => None,
+        }
+    }
+
+    /// The local group of a node.
+    pub fn group(&mut self, node: NodeId) -> Option<Uid> {
+        match self.read(node, Aspect::Group) {
+            Some(Value::Group(group)) => group,
+            _ => None,
+        }
+    }
+
+    /// How a control looks and moves.
+    pub fn control(&mut self, node: NodeId) -> Option<Arc<ControlData>> {
+        match self.read(node, Aspect::Control) {
+            Some(Value::Control(control)) => Some(control),
+            _ => None,
+        }
+    }
+
+    /// The attributes of a node, in order.
+    pub fn attributes(&mut self, node: NodeId) -> Arc<[Attribute]> {
+        match self.read(node, Aspect::Attributes) {
+            Some(Value::Attributes(attributes)) => attributes,
+            _ => Arc::new([]),
+        }
+    }
+
+    /// Makes a node. Its identity follows from the command, `role` (what the node is for), `subject` (the node it is
+    /// made for) and `number`: the same purpose gives the same node in every build, whatever else changes. It takes
+    /// the label and group of the joint that carries the tag unless `creation` says otherwise, and stands on `parent`
+    /// (below the rig for `None`) at `base`, which is relative to it.
+    ///
+    /// # Errors
+    /// If the command made a node for the same purpose before, or the creation parameters name another rig.
+    #[expect(clippy::too_many_arguments, reason = "each is needed for every node, and a builder would hide that")]
+    pub fn spawn(
+        &mut self,
+        kind: NodeType,
+        role: &str,
+        subject: NodeId,
+        number: u32,
+        parent: Option<NodeId>,
+        base: Trs,
+        creation: &Creation,
+    ) -> Result<NodeId, ModuleError> {
+        if let Some(rig) = creation.global_group
+            && rig != self.asker.rig
+        {
+            return Err(ModuleError::parameter(
+                "global_group",
+                format!("{rig} is another rig; leave it out, or carry the tag over to that rig"),
+            ));
+        }
+        let node = self.identity(role, subject, number)?;
+        let subject_name = self.name(subject);
+        let name = match &creation.name {
+            Some(name) if number == 0 => name.clone(),
+            Some(name) => format!("{name}_{}", number + 1),
+            None if number == 0 => format!("{subject_name}_{role}"),
+            None => format!("{subject_name}_{role}_{}", number + 1),
+        };
+        let origin = Origin {
+            command: self.command(),
+            module: self.module.clone(),
+            role: role.into(),
+            subject: self.uid(subject),
+            number,
+        };
+        let birth = Birth { kind, name: name.into(), origin: Some(Arc::new(origin)), order: self.trace.made };
+        self.trace.made += 1;
+        let joint = self.joint();
+        let label = match &creation.label {
+            Some(label) => Some(label.as_str().into()),
+            None => self.label(joint),
+        };
+        let group = match creation.local_group {
+            Some(group) => Some(group),
+            None => self.group(joint),
+        };
+        self.write(node, Aspect::Birth, Value::Birth(Arc::new(birth)));
+        self.write(node, Aspect::Parent, Value::Parent(parent));
+        self.write(node, Aspect::Base, Value::Base(base));
+        self.write(node, Aspect::Label, Value::Label(label));
+        self.write(node, Aspect::Group, Value::Group(group));
+        Ok(node)
+    }
+
+    /// Makes a node like [`BuildScope::spawn`], given where it stands in the rig's space.
+    ///
+    /// # Errors
+    /// See [`BuildScope::spawn`].
+    #[expect(clippy::too_many_arguments, reason = "as in `spawn`")]
+    pub fn spawn_at(
+        &mut self,
+        kind: NodeType,
+        role: &str,
+        subject: NodeId,
+        number: u32,
+        parent: Option<NodeId>,
+        global: Trs,
+        creation: &Creation,
+    ) -> Result<NodeId, ModuleError> {
+        let base = match parent {
+            Some(parent) => global.relative_to(&self.global(parent)),
+            None => global,
+        };
+        self.spawn(kind, role, subject, number, parent, base, creation)
+    }
+
+    /// Adds a constraint or solver. Those that drive the same node run in the order in which they are added.
+    ///
+    /// # Errors
+    /// If the command made something for the same purpose before.
+    pub fn constrain(
+        &mut self,
+        role: &str,
+        subject: NodeId,
+        number: u32,
+        constraint: Constraint,
+    ) -> Result<NodeId, ModuleError> {
+        let id = self.identity(role, subject, number)?;
+        for driven in constraint.drives() {
+            let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = driven;
+            if let Some(node) = self.world.id(uid) {
+                let driven_by = &mut self.world.slots[node.0 as usize].driven_by;
+                if !driven_by.contains(&id) {
+                    driven_by.push(id);
+                }
+            }
+        }
+        let number = self.trace.made;
+        self.trace.made += 1;
+        self.write(id, Aspect::Constraint, Value::Constraint(number, Arc::new(constraint)));
+        Ok(id)
+    }
+
+    /// Adds a switch that can be thrown without a jump.
+    ///
+    /// # Errors
+    /// If the command made something for the same purpose before.
+    pub fn switch(&mut self, role: &str, subject: NodeId, switch: SwitchData) -> Result<(), ModuleError> {
+        let id = self.identity(role, subject, 0)?;
+        let number = self.trace.made;
+        self.trace.made += 1;
+        self.write(id, Aspect::Switch, Value::Switch(number, Arc::new(switch)));
+        Ok(())
+    }
+
+    /// Puts a node elsewhere, relative to its parent.
+    pub fn set_base(&mut self, node: NodeId, base: Trs) {
+        self.write(node, Aspect::Base, Value::Base(base));
+    }
+
+    /// Puts a node elsewhere in the rig's space; what is below it moves along.
+    pub fn set_global(&mut self, node: NodeId, global: Trs) {
+        let base = match self.parent(node) {
+            Some(parent) => global.relative_to(&self.global(parent)),
+            None => global,
+        };
+        self.set_base(node, base);
+    }
+
+    /// Hangs a node below another one (below the rig for `None`); it stays where it is.
+    ///
+    /// # Errors
+    /// If the node would stand below itself.
+    pub fn set_parent(&mut self, node: NodeId, parent: Option<NodeId>) -> Result<(), ModuleError> {
+        let mut above = parent;
+        while let Some(ancestor) = above {
+            if ancestor == node {
+                let (node, parent) = (self.name(node), parent.map(|parent| self.name(parent)).unwrap_or_default());
+                return Err(ModuleError::other(format!("{node} cannot stand below {parent}, which stands below it")));
+            }
+            above = self.parent(ancestor);
+        }
+        let global = self.global(node);
+        self.write(node, Aspect::Parent, Value::Parent(parent));
+        self.set_global(node, global);
+        Ok(())
+    }
+
+    /// Makes a node look and move like this.
+    pub fn set_control(&mut self, node: NodeId, control: ControlData) {
+        self.write(node, Aspect::Control, Value::Control(Arc::new(control)));
+    }
+
+    /// Puts a node into a layer.
+    pub fn set_layer(&mut self, node: NodeId, layer: Arc<LayerData>) {
+        self.write(node, Aspect::Layer, Value::Layer(layer));
+    }
+
+    /// Gives a node a label.
+    pub fn set_label(&mut self, node: NodeId, label: Option<&str>) {
+        self.write(node, Aspect::Label, Value::Label(label.map(Into::into)));
+    }
+
+    /// Adds an attribute to a node.
+    ///
+    /// # Errors
+    /// If it has one of that name already, or the name is empty, or the ends are in the wrong order.
+    pub fn add_attribute(&mut self, node: NodeId, attribute: Attribute) -> Result<(), ModuleError> {
+        let name = &attribute.name;
+        let mut list = self.attributes(node).to_vec();
+        if name.trim().is_empty() {
+            return Err(ModuleError::other("an attribute needs a name"));
+        }
+        if list.iter().any(|known| known.name == *name) {
+            let node = self.name(node);
+            return Err(ModuleError::other(format!("{node} has an attribute \"{name}\" already; choose another name")));
+        }
+        if let AttributeKind::Number { min: Some(min), max: Some(max) } = attribute.kind
+            && min > max
+        {
+            return Err(ModuleError::other(format!("\"{name}\" goes from {min} to {max}: exchange the two")));
+        }
+        let default = attribute.clamp(attribute.default);
+        list.push(Attribute { default, ..attribute });
+        self.write(node, Aspect::Attributes, Value::Attributes(list.into()));
+        Ok(())
+    }
+
+    /// An attribute of a node as a number that constraints follow.
+    ///
+    /// # Errors
+    /// If the node has no such attribute, with the nearest names.
+    pub fn attribute(&mut self, node: NodeId, name: &str) -> Result<Scalar, ModuleError> {
+        let list = self.attributes(node);
+        if list.iter().any(|known| *known.name == *name) {
+            return Ok(Scalar::attribute(self.uid(node), name));
+        }
+        let nearest = crate::rig::nearest::did_you_mean(name, list.iter().map(|known| known.name.to_string()));
+        let node = self.name(node);
+        Err(ModuleError::other(format!("{node} has no attribute \"{name}\"{nearest}; add it before this command")))
+    }
+
+    fn read(&mut self, node: NodeId, aspect: Aspect) -> Option<Value> {
+        let place = self.asker.place;
+        let value = self.world.read_at(node, aspect, place + 1).cloned();
+        let own = self.trace.writes.contains(&(node, aspect));
+        let is_known = |read: &Read| matches!(read, Read::Cell(known, which, _) if *known == node && *which == aspect);
+        if !own && !self.trace.reads.iter().rev().take(64).any(is_known) {
+            self.trace.reads.push(Read::Cell(node, aspect, value.clone()));
+        }
+        value
+    }
+
+    fn write(&mut self, node: NodeId, aspect: Aspect, value: Value) {
+        let command = self.command;
+        let writes = &mut self.world.cell_mut(node, aspect).writes;
+        match writes.iter_mut().find(|(writer, _)| *writer == command) {
+            Some((_, old)) => *old = value,
+            None => {
+                writes.push((command, value));
+                self.trace.writes.push((node, aspect));
+            }
+        }
+    }
+
+    /// The place of something that the command makes for a purpose.
+    fn identity(&mut self, role: &str, subject: NodeId, number: u32) -> Result<NodeId, ModuleError> {
+        let uid = created_uid(self.command(), role, self.uid(subject), number);
+        let node = self.world.slot(uid, Some(self.command));
+        let mine = |aspect: Aspect| self.trace.writes.contains(&(node, aspect));
+        let foreign = self.world.slots[node.0 as usize].creator != Some(self.command);
+        if foreign || mine(Aspect::Birth) || mine(Aspect::Constraint) || mine(Aspect::Switch) {
+            let subject = self.name(subject);
+            return Err(ModuleError::other(format!(
+                "the module makes \"{role}\" number {number} for {subject} twice; it has to count them"
+            )));
+        }
+        Ok(node)
+    }
+}
+
+/// The identity of a created node: the same for the same command, role, subject and number.
+pub(super) fn created_uid(command: Uid, role: &str, subject: Uid, number: u32) -> Uid {
+    let mut hash = mix(command.0 ^ 0x5249_4753_4d49_5448);
+    for byte in role.bytes() {
+        hash = mix(hash ^ u64::from(byte));
+    }
+    hash = mix(hash ^ subject.0);
+    hash = mix(hash ^ u64::from(number));
+    Uid(hash.max(1))
+}
+
+/// One round of SplitMix64's finaliser.
+fn mix(value: u64) -> u64 {
+    let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}

@@ -1,0 +1,268 @@
+//! The built world: every value with all who wrote it, so that it can be read as of any command.
+
+use std::sync::Arc;
+
+use bevy::platform::collections::HashMap;
+
+use crate::{
+    mesh::model::Trs,
+    rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, SwitchData, Uid},
+};
+
+/// A node, as long as its builder lives: nodes that are rolled back keep their place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(pub(super) u32);
+
+/// What of a node is written and read as one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum Aspect {
+    /// That it exists, and as what.
+    Birth,
+    /// Its parent.
+    Parent,
+    /// Where it stands relative to its parent.
+    Base,
+    /// Its label.
+    Label,
+    /// Its local group.
+    Group,
+    /// How it looks and moves as a control.
+    Control,
+    /// Its layer.
+    Layer,
+    /// Its attributes.
+    Attributes,
+    /// The constraint that it is (constraints have an identity like nodes).
+    Constraint,
+    /// The switch that it is.
+    Switch,
+}
+
+impl Aspect {
+    pub(super) const COUNT: usize = 10;
+
+    /// True if a change of it can change what references resolve to.
+    pub(super) fn is_structure(self) -> bool {
+        matches!(self, Self::Birth | Self::Parent | Self::Label | Self::Group)
+    }
+}
+
+/// What a node is from its creation on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Birth {
+    /// Joint, null or control.
+    pub kind: NodeType,
+    /// Its name in files.
+    pub name: Arc<str>,
+    /// Who made it; `None` for joints of the document.
+    pub origin: Option<Arc<Origin>>,
+    /// Its place among those that the same command made, or among the document's joints.
+    pub order: u32,
+}
+
+/// A value of an aspect.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// See [`Aspect::Birth`].
+    Birth(Arc<Birth>),
+    /// See [`Aspect::Parent`].
+    Parent(Option<NodeId>),
+    /// See [`Aspect::Base`].
+    Base(Trs),
+    /// See [`Aspect::Label`].
+    Label(Option<Arc<str>>),
+    /// See [`Aspect::Group`].
+    Group(Option<Uid>),
+    /// See [`Aspect::Control`].
+    Control(Arc<ControlData>),
+    /// See [`Aspect::Layer`].
+    Layer(Arc<LayerData>),
+    /// See [`Aspect::Attributes`].
+    Attributes(Arc<[Attribute]>),
+    /// See [`Aspect::Constraint`].
+    ///
+    /// With its place among what the same command made.
+    Constraint(u32, Arc<Constraint>),
+    /// See [`Aspect::Switch`].
+    ///
+    /// With its place among what the same command made.
+    Switch(u32, Arc<SwitchData>),
+}
+
+impl Value {
+    /// True if the two are the same bit by bit where others read them (0 and -0 differ, as what follows may).
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Base(a), Self::Base(b)) => bits(a) == bits(b),
+            (Self::Attributes(a), Self::Attributes(b)) => {
+                let default = |list: &[Attribute]| list.iter().map(|a| a.default.to_bits()).collect::<Vec<_>>();
+                a == b && default(a) == default(b)
+            }
+            _ => self == other,
+        }
+    }
+}
+
+fn bits(trs: &Trs) -> [u32; 10] {
+    let (t, r, s) = (trs.translation, trs.rotation, trs.scale);
+    [t.x, t.y, t.z, r.x, r.y, r.z, r.w, s.x, s.y, s.z].map(f32::to_bits)
+}
+
+/// True if two states of one aspect are the same.
+pub(super) fn same(a: Option<&Value>, b: Option<&Value>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a.is_same(b),
+        (None, None) => true,
+        _ => false,
+    }
+}
+
+/// One aspect of one node: what the document says, and what commands made of it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Cell {
+    pub document: Option<Value>,
+    /// By command, in no order: places of commands change.
+    pub writes: Vec<(u32, Value)>,
+    /// Commands that read it, sorted.
+    pub readers: Vec<u32>,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Slot {
+    pub uid: Uid,
+    /// The command that can bring it to life; `None` for joints of the document.
+    pub creator: Option<u32>,
+    /// Constraints that drive it, now or as of some other place.
+    pub driven_by: Vec<NodeId>,
+    pub cells: [Cell; Aspect::COUNT],
+}
+
+/// Where a command that is not in the list stands.
+pub(super) const NOWHERE: u32 = u32::MAX;
+
+#[derive(Debug, Clone, Default)]
+pub(super) struct World {
+    pub slots: Vec<Slot>,
+    ids: HashMap<Uid, NodeId>,
+    /// The tag of each command.
+    pub commands: Vec<Uid>,
+    by_command: HashMap<Uid, u32>,
+    /// The place of each command in the list, [`NOWHERE`] if it is not there.
+    pub places: Vec<u32>,
+    /// Nodes that each command can create, in the order in which it first did.
+    pub created: Vec<Vec<NodeId>>,
+    /// The document's joints, in its order.
+    pub joints: Vec<NodeId>,
+}
+
+impl World {
+    pub fn id(&self, uid: Uid) -> Option<NodeId> {
+        self.ids.get(&uid).copied()
+    }
+
+    pub fn uid(&self, node: NodeId) -> Uid {
+        self.slots[node.0 as usize].uid
+    }
+
+    /// The slot for a uid, made where there is none.
+    pub fn slot(&mut self, uid: Uid, creator: Option<u32>) -> NodeId {
+        if let Some(id) = self.ids.get(&uid) {
+            return *id;
+        }
+        let id = NodeId(self.slots.len() as u32);
+        self.slots.push(Slot { uid, creator, driven_by: Vec::new(), cells: Default::default() });
+        self.ids.insert(uid, id);
+        if let Some(creator) = creator {
+            self.created[creator as usize].push(id);
+        }
+        id
+    }
+
+    /// The number of a command, made where there is none.
+    pub fn command(&mut self, uid: Uid) -> u32 {
+        let next = self.commands.len() as u32;
+        let command = *self.by_command.entry(uid).or_insert(next);
+        if command == next {
+            self.commands.push(uid);
+            self.places.push(NOWHERE);
+            self.created.push(Vec::new());
+        }
+        command
+    }
+
+    /// The number of the command with that tag.
+    pub fn creator_of(&self, tag: Uid) -> Option<u32> {
+        self.by_command.get(&tag).copied()
+    }
+
+    pub fn cell(&self, node: NodeId, aspect: Aspect) -> &Cell {
+        &self.slots[node.0 as usize].cells[aspect as usize]
+    }
+
+    pub fn cell_mut(&mut self, node: NodeId, aspect: Aspect) -> &mut Cell {
+        &mut self.slots[node.0 as usize].cells[aspect as usize]
+    }
+
+    /// The value after all commands before `place`, and who wrote it last.
+    pub fn read_at(&self, node: NodeId, aspect: Aspect, place: u32) -> Option<&Value> {
+        let cell = self.cell(node, aspect);
+        let mut best: Option<(u32, &Value)> = None;
+        for (command, value) in &cell.writes {
+            let at = self.places[*command as usize];
+            if at < place && best.is_none_or(|(place, _)| place < at) {
+                best = Some((at, value));
+            }
+        }
+        // What is not born does not have what others wrote on it either; the birth itself is asked for by name.
+        best.map(|(_, value)| value).or(cell.document.as_ref())
+    }
+
+    pub fn birth(&self, node: NodeId, place: u32) -> Option<&Arc<Birth>> {
+        match self.read_at(node, Aspect::Birth, place) {
+            Some(Value::Birth(birth)) => Some(birth),
+            _ => None,
+        }
+    }
+
+    pub fn exists(&self, node: NodeId, place: u32) -> bool {
+        self.birth(node, place).is_some()
+    }
+
+    pub fn parent(&self, node: NodeId, place: u32) -> Option<NodeId> {
+        match self.read_at(node, Aspect::Parent, place) {
+            Some(Value::Parent(parent)) => *parent,
+            _ => None,
+        }
+    }
+
+    pub fn base(&self, node: NodeId, place: u32) -> Trs {
+        match self.read_at(node, Aspect::Base, place) {
+            Some(Value::Base(base)) => *base,
+            _ => Trs::IDENTITY,
+        }
+    }
+
+    pub fn label(&self, node: NodeId, place: u32) -> Option<&Arc<str>> {
+        match self.read_at(node, Aspect::Label, place) {
+            Some(Value::Label(label)) => label.as_ref(),
+            _ => None,
+        }
+    }
+
+    pub fn group(&self, node: NodeId, place: u32) -> Option<Uid> {
+        match self.read_at(node, Aspect::Group, place) {
+            Some(Value::Group(group)) => *group,
+            _ => None,
+        }
+    }
+
+    /// Where a node stands among all others without regard to parents: the document's joints in their order, then what
+    /// commands created, in the order of commands.
+    pub fn order_key(&self, node: NodeId, birth: &Birth) -> (u32, u32) {
+        match self.slots[node.0 as usize].creator {
+            None => (0, birth.order),
+            Some(command) => (self.places[command as usize].saturating_add(1), birth.order),
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! `attribute`: a named number or choice on a node, for people to set and for other commands to follow.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, ModuleError, RigModule},
+    rig::{
+        Attribute, AttributeKind,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Adds an attribute to nodes.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::attribute::AttributeModule};
+/// let params = r#"(node: "@this", name: "follow", min: 0.0, max: 1.0, default: 0.5)"#;
+/// # assert!(rigsmith::modules::all().load(AttributeModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AttributeModule {
+    /// The nodes that get it.
+    pub node: NodeRefs,
+    /// Its name.
+    pub name: String,
+    /// Lowest value.
+    pub min: Option<f32>,
+    /// Highest value.
+    pub max: Option<f32>,
+    /// Names of choices; a number if there are none.
+    pub choices: Vec<String>,
+    /// The value until somebody sets another.
+    pub default: f32,
+}
+
+impl Default for AttributeModule {
+    fn default() -> Self {
+        Self {
+            node: NodeRef::this().into(),
+            name: "value".to_owned(),
+            min: None,
+            max: None,
+            choices: Vec::new(),
+            default: 0.0,
+        }
+    }
+}
+
+impl RigModule for AttributeModule {
+    const NAME: &'static str = "attribute";
+    const DOC: &'static str =
+        "Adds a named number or choice to nodes, for people to set and for other commands to follow.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("node", "The nodes that get it."),
+        ("name", "Its name, unique on the node."),
+        ("min", "Lowest value; open if left out."),
+        ("max", "Highest value; open if left out."),
+        ("choices", "Names of choices, of which the value is the number; a plain number if there are none."),
+        ("default", "The value until somebody sets another."),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        if ![self.min.unwrap_or(0.0), self.max.unwrap_or(0.0), self.default].iter().all(|number| number.is_finite()) {
+            return Err(ModuleError::parameter("default", "min, max and default have to be finite numbers"));
+        }
+        let kind = if self.choices.is_empty() {
+            AttributeKind::Number { min: self.min, max: self.max }
+        } else {
+            AttributeKind::Choice(self.choices.clone())
+        };
+        for node in scope.resolve_some("node", &self.node)? {
+            let attribute = Attribute { name: self.name.as_str().into(), kind: kind.clone(), default: self.default };
+            scope.add_attribute(node, attribute)?;
+        }
+        Ok(())
+    }
+}
