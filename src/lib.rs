@@ -9,6 +9,7 @@ pub mod modules;
 pub mod plugins;
 pub mod prelude;
 pub mod rig;
+pub mod solve;
 pub mod test_app;
 
 #[cfg(feature = "cli")]

@@ -1,0 +1,21 @@
+//! The solvers of the runtime: one a file, plain functions over borrowed inputs and outputs.
+//!
+//! None allocates while it solves (building a curve or an expression does), none keeps the world, and none fails: what
+//! a degenerate input (no length, parallel directions, a goal on the root, a scale of zero, a number that is not
+//! finite) comes to is part of each solver's documentation. Poses are in the rig's space and angles in radians unless
+//! said otherwise. The same input gives the same bits.
+
+pub mod aim;
+pub mod ccd;
+pub mod curve;
+pub mod expression;
+pub mod fabrik;
+pub mod foot;
+pub mod limit;
+pub mod rotate;
+pub mod spline;
+pub mod spring;
+pub mod stretch;
+pub mod twist;
+pub mod two_bone;
+pub mod weights;

@@ -1,0 +1,154 @@
+//! Two-bone inverse kinematics in closed form: arms and legs.
+//!
+//! The law of cosines places the middle joint in the plane through root, goal and pole; its height over the line from
+//! root to goal comes from Heron's formula, which keeps its digits where the limb is almost straight or folded. Soft
+//! reach is the exponential slow-down of Andy Nicholas (<http://www.softimageblog.com/archives/108>, "The IK softness
+//! problem"). The solved rotations are the posed ones turned by the rotation that takes the bone and the bend plane to
+//! where they belong, so joints may have any axes.
+
+use bevy::math::{Quat, Vec3, ops};
+
+use crate::solve::rotate::{arc, between_frames, direction, perpendicular, perpendicular_or_any};
+
+/// Sine of the bend under which a limb counts as straight.
+const STRAIGHT: f32 = 1e-4;
+
+/// A limb of two bones as it is posed, and what it shall do. All in the rig's space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwoBone {
+    /// Position of the root joint (shoulder, hip). It stays.
+    pub root: Vec3,
+    /// Position of the middle joint (elbow, knee).
+    pub mid: Vec3,
+    /// Position of the end joint (wrist, ankle).
+    pub end: Vec3,
+    /// Rotation of the root joint, a unit quaternion.
+    pub root_rotation: Quat,
+    /// Rotation of the middle joint, a unit quaternion.
+    pub mid_rotation: Quat,
+    /// Where the end joint shall be.
+    pub goal: Vec3,
+    /// The point towards which the limb bends. Without one (or with one in line with root and goal) the posed bend
+    /// plane follows the goal by the shortest rotation.
+    pub pole: Option<Vec3>,
+    /// The direction towards which a limb bends that is posed straight; any length. Zero: a direction that depends on
+    /// the limb's direction only.
+    pub preferred: Vec3,
+    /// The share of the limb's length over which the end slows down before full stretch, 0 to 1. 0: none.
+    pub soft: f32,
+    /// How far the bones lengthen towards a goal that they do not reach, 0 (not) to 1 (until they reach it).
+    pub stretch: f32,
+    /// The greatest factor by which bones lengthen; under 1 counts as 1, infinity as no limit.
+    pub max_stretch: f32,
+}
+
+/// The solved limb, in the rig's space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwoBoneSolution {
+    /// Rotation of the root joint.
+    pub root_rotation: Quat,
+    /// Rotation of the middle joint.
+    pub mid_rotation: Quat,
+    /// Position of the middle joint.
+    pub mid: Vec3,
+    /// Position of the end joint.
+    pub end: Vec3,
+    /// The factor of both bones' lengths, 1 or more.
+    pub stretch: f32,
+}
+
+impl TwoBone {
+    /// Solves the limb.
+    ///
+    /// Without softness the end is on every goal between the difference and the sum of the bones' lengths, to 1e-5 of
+    /// the limb's length; on others it is as near as it can be. With softness (and without stretch) it lags behind a
+    /// goal further than `1 - soft` of the limb's length; its place, the bend and their first derivative by the goal's
+    /// distance are continuous. The solution is finite whatever comes in: a limb without length, or with input that is
+    /// not finite, stays as posed; a goal on the root is met along the posed direction of the limb.
+    #[inline]
+    pub fn solve(&self) -> TwoBoneSolution {
+        let (upper, lower) = (self.mid - self.root, self.end - self.mid);
+        let (upper_length, lower_length) = (upper.length(), lower.length());
+        let length = upper_length + lower_length;
+        let to_goal = self.goal - self.root;
+        let distance = to_goal.length();
+        // A bone without length has no direction; comparisons are also false for NaN.
+        let usable = upper_length > 1e-6 * length && lower_length > 1e-6 * length && length < 1e18;
+        if !(usable && distance < 1e18) {
+            return self.unsolved();
+        }
+        let (u, l) = (upper / upper_length, lower / lower_length);
+
+        // The posed bend: the limb's line, and the direction in which the middle joint leaves it.
+        let line = direction(upper + lower).filter(|_| (upper + lower).length_squared() > 1e-12 * length * length);
+        let line = line.unwrap_or(u);
+        let across = l.cross(u);
+        let bend_axis = if across.length_squared() > STRAIGHT * STRAIGHT {
+            across.normalize()
+        } else {
+            // The wanted bend, turned into an axis.
+            u.cross(perpendicular_or_any(u, &[self.preferred]))
+        };
+
+        // The solved line and bend axis.
+        let aim = if distance > 1e-6 * length { to_goal / distance } else { line };
+        let poled = self.pole.and_then(|pole| perpendicular(pole - self.root, aim)).map(|bend| aim.cross(bend));
+        let solved_axis = poled.unwrap_or_else(|| {
+            let axis = arc(line, aim, bend_axis) * bend_axis;
+            perpendicular_or_any(aim, &[axis, bend_axis])
+        });
+        let bend = solved_axis.cross(aim);
+
+        let (reach, stretch) = self.reach(distance, upper_length, lower_length);
+        let shortest = (upper_length - lower_length).abs();
+        let squares = (upper_length - lower_length) * length;
+        let double = 2.0 * reach;
+        let along_upper = (reach * reach + squares) / double;
+        let along_lower = (reach * reach - squares) / double;
+        let height_squared = (length - reach) * (length + reach) * ((reach - shortest) * (reach + shortest));
+        let height = height_squared.max(0.0).sqrt() / double;
+
+        let solved_u = (aim * along_upper + bend * height) / upper_length;
+        let solved_l = (aim * along_lower - bend * height) / lower_length;
+        let mid = self.root + solved_u * (upper_length * stretch);
+        TwoBoneSolution {
+            root_rotation: (between_frames([u, bend_axis], [solved_u, solved_axis]) * self.root_rotation).normalize(),
+            mid_rotation: (between_frames([l, bend_axis], [solved_l, solved_axis]) * self.mid_rotation).normalize(),
+            mid,
+            end: mid + solved_l * (lower_length * stretch),
+            stretch,
+        }
+    }
+
+    /// The distance from root to end before bones lengthen, and the factor by which they do.
+    #[inline]
+    fn reach(&self, distance: f32, upper: f32, lower: f32) -> (f32, f32) {
+        let length = upper + lower;
+        let shortest = (upper - lower).abs().max(1e-7 * length);
+        let soft = length * self.soft.clamp(0.0, 1.0);
+        // NaN counts as none.
+        let soft = if soft > 0.0 { soft.min(length - shortest) } else { 0.0 };
+        let hard = length - soft;
+        let reach = if distance <= hard || soft <= 1e-6 * length {
+            distance.min(length)
+        } else {
+            (hard + soft * (1.0 - ops::exp((hard - distance) / soft))).min(length)
+        };
+        let reach = reach.max(shortest);
+        let wanted = if self.stretch > 0.0 { self.stretch.min(1.0) * (distance / reach - 1.0).max(0.0) } else { 0.0 };
+        (reach, (1.0 + wanted).min(self.max_stretch.max(1.0)))
+    }
+
+    /// The limb as it was posed; without a joint that is not finite.
+    #[cold]
+    fn unsolved(&self) -> TwoBoneSolution {
+        let finite = |point: Vec3| if point.is_finite() { point } else { Vec3::ZERO };
+        TwoBoneSolution {
+            root_rotation: crate::solve::rotate::unit(self.root_rotation),
+            mid_rotation: crate::solve::rotate::unit(self.mid_rotation),
+            mid: finite(self.mid),
+            end: finite(self.end),
+            stretch: 1.0,
+        }
+    }
+}
