@@ -210,14 +210,7 @@ pub struct Attribute {
 impl Attribute {
     /// The nearest value that the attribute can have.
     pub fn clamp(&self, value: f32) -> f32 {
-        let value = if value.is_finite() { value } else { self.default };
-        match &self.kind {
-            AttributeKind::Number { min, max } => {
-                let value = min.map_or(value, |min| value.max(min));
-                max.map_or(value, |max| value.min(max))
-            }
-            AttributeKind::Choice(names) => value.clamp(0.0, names.len().saturating_sub(1) as f32),
-        }
+        self.kind.clamp(value, self.default)
     }
 }
 
@@ -233,6 +226,20 @@ pub enum AttributeKind {
     },
     /// One of several names; the value is its number, and values between two blend.
     Choice(Vec<String>),
+}
+
+impl AttributeKind {
+    /// The nearest value of that kind; `otherwise` for what is not finite.
+    pub fn clamp(&self, value: f32, otherwise: f32) -> f32 {
+        let value = if value.is_finite() { value } else { otherwise };
+        match self {
+            Self::Number { min, max } => {
+                let value = min.map_or(value, |min| value.max(min));
+                max.map_or(value, |max| value.min(max))
+            }
+            Self::Choice(names) => value.clamp(0.0, names.len().saturating_sub(1) as f32),
+        }
+    }
 }
 
 impl BuiltRig {

@@ -1,0 +1,484 @@
+//! A built rig as one flat program that instances share.
+//!
+//! [`RigProgram::compile`] turns the nodes and constraints of a [`BuiltRig`] into a list of small operations, sorted so
+//! that each comes after what it reads: no maps, no names, no allocation while it runs. What differs between instances
+//! is in [`RigState`]. Transforms are multiplied as Bevy multiplies two `Transform`s: no shear.
+//!
+//! A node's local transform is its base with driven channels and its pose offset on top; constraints then change it in
+//! list order, each taking what the ones before left. What a constraint reads of *other* nodes is where they end up in
+//! the same frame. Where it needs only the origin of a node, it does not wait for what only turns or scales that node.
+
+mod cache;
+mod chains;
+mod constraints;
+mod error;
+mod graph;
+mod hash;
+mod lower;
+mod op;
+mod order;
+mod run;
+mod state;
+
+use std::{
+    collections::BTreeMap,
+    fmt,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+pub use cache::ProgramCache;
+pub use error::{ProgramError, StateError};
+pub use hash::ContentHash;
+pub use state::{Memory, RigState};
+
+use self::{
+    graph::{Graph, Step},
+    op::{N, Op, Operand, Pose, Tables, X},
+    run::{Machine, Scratch},
+    state::SpringState,
+};
+use crate::{
+    mesh::model::Trs,
+    rig::{AttributeKind, BuiltRig, NodeType, Uid},
+};
+
+/// What a program is compiled for.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct CompileOptions {
+    /// Which nodes it can be asked for.
+    pub keep: Keep,
+    /// Nodes outside the rig that constraints name, such as a steering wheel; they are set each frame.
+    pub inputs: Vec<Outside>,
+}
+
+/// Which nodes a program can be asked for; whatever only others need is left out.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum Keep {
+    /// All, and all can be posed: for editing.
+    #[default]
+    All,
+    /// Joints, and what is listed, which alone can be posed and have attributes: for games.
+    DeformAndExposed(Vec<Exposed>),
+}
+
+/// A node that a game wants to pose or to read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Exposed {
+    /// The node with that uid.
+    Uid(Uid),
+    /// All nodes with that label.
+    Label(String),
+    /// All controls.
+    Controls,
+}
+
+impl fmt::Display for Exposed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Uid(uid) => uid.fmt(f),
+            Self::Label(label) => label.fmt(f),
+            Self::Controls => "all controls".fmt(f),
+        }
+    }
+}
+
+/// A node outside the rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outside {
+    /// The uid by which constraints name it.
+    pub uid: Uid,
+    /// Where it is in the rig's space until it is set.
+    pub rest: Trs,
+}
+
+/// A node of a program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProgramNode {
+    /// Identity.
+    pub uid: Uid,
+    /// The name people see.
+    pub label: Option<Arc<str>>,
+    /// What it is.
+    pub kind: NodeType,
+    /// Slot of the parent, if the program keeps that.
+    pub parent: Option<usize>,
+    /// Where it stands relative to its parent before any pose.
+    pub base: Trs,
+    /// True if a constraint drives it.
+    pub is_driven: bool,
+    /// Slot of its pose offset.
+    pose: Pose,
+    /// Register of its local transform after all constraints, if it is driven.
+    local: Option<X>,
+}
+
+impl ProgramNode {
+    /// True if it can be posed.
+    pub fn is_posable(&self) -> bool {
+        self.pose != Pose::NONE
+    }
+}
+
+/// An attribute of a program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProgramAttribute {
+    /// The node, as a slot.
+    pub node: usize,
+    /// The name.
+    pub name: Arc<str>,
+    /// Numbers or choices.
+    pub kind: AttributeKind,
+    /// The value until another is set.
+    pub default: f32,
+    /// True if it can be set; false if a constraint gives its value.
+    pub is_settable: bool,
+}
+
+/// A compiled rig: see the [module](self). Nodes, attributes, inputs and morph targets have *slots*, their places in
+/// the lists that it gives out.
+#[derive(Debug)]
+pub struct RigProgram {
+    /// Differs between any two programs of a process.
+    serial: u64,
+    hash: ContentHash,
+    nodes: Vec<ProgramNode>,
+    /// Slots of the nodes by uid.
+    by_uid: Vec<(Uid, u32)>,
+    attributes: Vec<ProgramAttribute>,
+    morphs: Vec<Arc<str>>,
+    inputs: Vec<Uid>,
+    poses: usize,
+    ops: Vec<Op>,
+    tables: Tables,
+    /// Registers before the first run. Transforms: the rig's space, nodes by slot, inputs, others; numbers: attributes,
+    /// morph targets, others.
+    x: Vec<Trs>,
+    n: Vec<f32>,
+    /// Operations that read each pose, attribute and input, and what each operation writes.
+    pose_readers: Lists,
+    attribute_readers: Lists,
+    input_readers: Lists,
+    op_readers: Lists,
+    /// The operation of each spring.
+    spring_ops: Vec<u32>,
+}
+
+/// Lists of small numbers in one piece.
+#[derive(Debug, Default)]
+struct Lists {
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Lists {
+    fn new(lists: impl IntoIterator<Item = Vec<u32>>) -> Self {
+        let mut made = Self { starts: vec![0], items: Vec::new() };
+        for mut list in lists {
+            list.sort_unstable();
+            list.dedup();
+            made.items.extend(list);
+            made.starts.push(made.items.len() as u32);
+        }
+        made
+    }
+
+    fn get(&self, at: usize) -> &[u32] {
+        &self.items[self.starts[at] as usize..self.starts[at + 1] as usize]
+    }
+}
+
+/// Label and uid of a node, for messages.
+fn name(rig: &BuiltRig, node: usize) -> String {
+    let node = &rig.nodes[node];
+    let label = node.label.as_deref().unwrap_or(&node.name);
+    if label.is_empty() { node.uid.to_string() } else { format!("{label} ({})", node.uid) }
+}
+
+impl RigProgram {
+    /// Compiles a built rig.
+    ///
+    /// # Errors
+    ///
+    /// See [`ProgramError`]: what is named but not there, chains that are none, cycles.
+    pub fn compile(rig: &BuiltRig, options: &CompileOptions) -> Result<Self, ProgramError> {
+        let hash = ContentHash::of(rig, options);
+        let mut graph = Graph::new(rig, &options.keep, &options.inputs)?;
+        lower::lower(&mut graph)?;
+        let locals = graph.finish();
+        order::sort(&mut graph)?;
+        skip_empty(&mut graph);
+        let kept: Vec<usize> = (0..rig.nodes.len()).filter(|node| graph.is_kept(*node)).collect();
+        let slots: BTreeMap<usize, usize> = kept.iter().enumerate().map(|(slot, node)| (*node, slot)).collect();
+
+        let mut attributes = Vec::new();
+        let mut attribute_registers = Vec::new();
+        for (slot, node) in kept.iter().enumerate().filter(|(_, node)| graph.is_posable(**node)) {
+            for (number, attribute) in rig.nodes[*node].attributes.iter().enumerate() {
+                attribute_registers.push(graph.attribute(*node, number));
+                attributes.push(ProgramAttribute {
+                    node: slot,
+                    name: attribute.name.clone(),
+                    kind: attribute.kind.clone(),
+                    default: attribute.clamp(attribute.default),
+                    is_settable: graph.attributes.iter().any(|known| (known.0, known.1) == (*node, number)),
+                });
+            }
+        }
+        let settable: Vec<N> = graph.attributes.iter().map(|known| known.2).collect();
+        let results: Vec<X> = kept.iter().map(|node| graph.global(*node)).collect();
+        let morphs: Vec<N> = graph.morphs.iter().map(|morph| morph.1).collect();
+        let numbers: Vec<N> = attribute_registers.iter().chain(&morphs).copied().collect();
+        order::prune(&mut graph, &results, &numbers);
+        let fixed = order::split_fixed(&mut graph, &settable);
+        run_fixed(&mut graph, &fixed);
+
+        let mut numbering = Numbering::new(&mut graph);
+        for register in results.iter().chain(&graph.inputs) {
+            numbering.x(*register);
+        }
+        for register in &numbers {
+            numbering.n(*register);
+        }
+        let nodes: Vec<ProgramNode> = kept
+            .iter()
+            .map(|node| ProgramNode {
+                uid: rig.nodes[*node].uid,
+                label: rig.nodes[*node].label.clone(),
+                kind: rig.nodes[*node].kind,
+                parent: rig.nodes[*node].parent.and_then(|parent| slots.get(&parent)).copied(),
+                base: rig.nodes[*node].base,
+                is_driven: locals[*node].is_some(),
+                pose: numbering.pose(graph.pose(*node)),
+                local: locals[*node].map(|local| numbering.x(local)),
+            })
+            .collect();
+        let mut by_uid: Vec<(Uid, u32)> = nodes.iter().enumerate().map(|(at, node)| (node.uid, at as u32)).collect();
+        by_uid.sort_unstable();
+        let mut program = Self {
+            serial: next_serial(),
+            hash,
+            nodes,
+            by_uid,
+            attributes,
+            morphs: graph.morphs.iter().map(|morph| morph.0.clone()).collect(),
+            inputs: options.inputs.iter().map(|input| input.uid).collect(),
+            poses: 0,
+            ops: graph.steps.iter().map(|step| step.op).collect(),
+            tables: std::mem::take(&mut graph.tables),
+            x: Vec::new(),
+            n: Vec::new(),
+            pose_readers: Lists::default(),
+            attribute_readers: Lists::default(),
+            input_readers: Lists::default(),
+            op_readers: Lists::default(),
+            spring_ops: Vec::new(),
+        };
+        program.number(&mut numbering);
+        program.connect();
+        (program.x, program.n, program.poses) = (numbering.transforms, numbering.numbers, numbering.pose.len());
+        Ok(program)
+    }
+
+    /// Gives registers and poses their final numbers.
+    fn number(&mut self, numbering: &mut Numbering) {
+        for op in &mut self.ops {
+            op.visit(&mut self.tables, |operand| match operand {
+                Operand::ReadX(x) | Operand::WriteX(x) => *x = numbering.x(*x),
+                Operand::ReadN(n) | Operand::WriteN(n) => *n = numbering.n(*n),
+                Operand::Pose(pose) => *pose = numbering.pose(*pose),
+            });
+        }
+    }
+
+    /// Notes which operations read what.
+    fn connect(&mut self) {
+        let mut x_readers: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        let mut n_readers: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        let mut pose_readers: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        let mut writes = vec![(Vec::new(), Vec::new()); self.ops.len()];
+        for (at, op) in self.ops.iter_mut().enumerate() {
+            if let Op::Spring(state) = op {
+                let state = *state as usize;
+                if self.spring_ops.len() <= state {
+                    self.spring_ops.resize(state + 1, u32::MAX);
+                }
+                self.spring_ops[state] = at as u32;
+            }
+            op.visit(&mut self.tables, |operand| match operand {
+                Operand::ReadX(x) => x_readers.entry(x.0).or_default().push(at as u32),
+                Operand::ReadN(n) => n_readers.entry(n.0).or_default().push(at as u32),
+                Operand::Pose(pose) => pose_readers.entry(pose.0).or_default().push(at as u32),
+                Operand::WriteX(x) => writes[at].0.push(x.0),
+                Operand::WriteN(n) => writes[at].1.push(n.0),
+            });
+        }
+        let of = |readers: &BTreeMap<u32, Vec<u32>>, at: usize| readers.get(&(at as u32)).cloned().unwrap_or_default();
+        let poses = self.nodes.iter().filter(|node| node.is_posable()).count();
+        self.pose_readers = Lists::new((0..poses).map(|pose| of(&pose_readers, pose)));
+        self.attribute_readers = Lists::new((0..self.attributes.len()).map(|number| of(&n_readers, number)));
+        let first = self.nodes.len() + 1;
+        self.input_readers = Lists::new((0..self.inputs.len()).map(|input| of(&x_readers, first + input)));
+        self.op_readers = Lists::new(writes.iter().map(|(x, n)| {
+            let x = x.iter().filter_map(|x| x_readers.get(x));
+            x.chain(n.iter().filter_map(|n| n_readers.get(n))).flatten().copied().collect()
+        }));
+    }
+
+    /// The hash of what it was compiled from: equal for equal content, on every machine.
+    pub fn hash(&self) -> ContentHash {
+        self.hash
+    }
+
+    /// Its nodes by slot; parents before children.
+    pub fn nodes(&self) -> &[ProgramNode] {
+        &self.nodes
+    }
+
+    /// Its attributes by slot.
+    pub fn attributes(&self) -> &[ProgramAttribute] {
+        &self.attributes
+    }
+
+    /// Its morph targets by slot.
+    pub fn morphs(&self) -> &[Arc<str>] {
+        &self.morphs
+    }
+
+    /// Its inputs by slot.
+    pub fn inputs(&self) -> &[Uid] {
+        &self.inputs
+    }
+
+    /// Number of operations of a whole evaluation.
+    pub fn operations(&self) -> usize {
+        self.ops.len()
+    }
+
+    /// True if it moves by itself as time passes.
+    pub fn has_springs(&self) -> bool {
+        !self.spring_ops.is_empty()
+    }
+
+    /// Slot of a node.
+    pub fn node(&self, uid: Uid) -> Option<usize> {
+        let at = self.by_uid.binary_search_by_key(&uid, |(uid, _)| *uid).ok()?;
+        Some(self.by_uid[at].1 as usize)
+    }
+
+    /// Slot of the first node with that label.
+    pub fn find_label(&self, label: &str) -> Option<usize> {
+        self.nodes.iter().position(|node| node.label.as_deref() == Some(label))
+    }
+
+    /// Slot of an attribute.
+    pub fn attribute(&self, node: Uid, name: &str) -> Option<usize> {
+        let node = self.node(node)?;
+        self.attributes.iter().position(|attribute| attribute.node == node && *attribute.name == *name)
+    }
+
+    /// Slot of a morph target.
+    pub fn morph(&self, name: &str) -> Option<usize> {
+        self.morphs.iter().position(|known| **known == *name)
+    }
+
+    /// Slot of an input.
+    pub fn input(&self, uid: Uid) -> Option<usize> {
+        self.inputs.iter().position(|known| *known == uid)
+    }
+}
+
+/// Lets readers of nodes that only repeat their parent read the parent.
+fn skip_empty(graph: &mut Graph<'_>) {
+    let mut same: Vec<X> = (0..graph.x.len() as u32).map(X).collect();
+    for at in 0..graph.steps.len() {
+        let Step { mut op, node, .. } = graph.steps[at];
+        op.visit(&mut graph.tables, |operand| {
+            if let Operand::ReadX(register) = operand {
+                *register = same[register.0 as usize];
+            }
+        });
+        graph.steps[at].op = op;
+        if let Op::Node { pose: Pose::NONE, base: 0, parent, out } = op
+            && !graph.is_kept(node)
+        {
+            same[out.0 as usize] = parent;
+        }
+    }
+}
+
+/// Runs what depends on no input, once for all.
+fn run_fixed(graph: &mut Graph<'_>, fixed: &[Step]) {
+    let mut machine = Machine::<false> {
+        tables: &graph.tables,
+        x: &mut graph.x,
+        n: &mut graph.n,
+        poses: &[],
+        springs: &mut [] as &mut [SpringState],
+        scratch: &mut Scratch::default(),
+        dt: 0.0,
+        changed: false,
+        moved: &mut [],
+    };
+    fixed.iter().for_each(|step| machine.run(&step.op));
+}
+
+/// Hands out final numbers in the order in which registers are first seen.
+struct Numbering {
+    old_x: Vec<Trs>,
+    old_n: Vec<f32>,
+    new_x: Vec<Option<X>>,
+    new_n: Vec<Option<N>>,
+    pose: BTreeMap<u32, u32>,
+    transforms: Vec<Trs>,
+    numbers: Vec<f32>,
+}
+
+impl Numbering {
+    /// Takes the registers of a graph; the rig's space stays the first.
+    fn new(graph: &mut Graph<'_>) -> Self {
+        let (old_x, old_n) = (std::mem::take(&mut graph.x), std::mem::take(&mut graph.n));
+        let mut numbering = Self {
+            new_x: vec![None; old_x.len()],
+            new_n: vec![None; old_n.len()],
+            old_x,
+            old_n,
+            pose: BTreeMap::new(),
+            transforms: Vec::new(),
+            numbers: Vec::new(),
+        };
+        numbering.x(X::RIG);
+        numbering
+    }
+
+    fn x(&mut self, X(old): X) -> X {
+        let Self { new_x, old_x, transforms, .. } = self;
+        *new_x[old as usize].get_or_insert_with(|| {
+            transforms.push(old_x[old as usize]);
+            X(transforms.len() as u32 - 1)
+        })
+    }
+
+    fn n(&mut self, N(old): N) -> N {
+        let Self { new_n, old_n, numbers, .. } = self;
+        *new_n[old as usize].get_or_insert_with(|| {
+            numbers.push(old_n[old as usize]);
+            N(numbers.len() as u32 - 1)
+        })
+    }
+
+    fn pose(&mut self, pose: Pose) -> Pose {
+        if pose == Pose::NONE {
+            return pose;
+        }
+        let next = self.pose.len() as u32;
+        Pose(*self.pose.entry(pose.0).or_insert(next))
+    }
+}
+
+fn next_serial() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}

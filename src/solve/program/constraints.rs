@@ -1,0 +1,183 @@
+//! Operations of constraints on one node.
+
+use glam::{Quat, Vec3};
+
+use super::{
+    op::{SpringOp, TargetReg, UpReg},
+    run::{Machine, on, place, share},
+    state::SpringState,
+};
+use crate::{
+    mesh::model::Trs,
+    solve::{
+        aim::Up,
+        rotate::{EulerOrder, arc, direction, slerp},
+        spring::{PointSpring, Spring},
+        weights::{blend, blend_points, relative},
+    },
+};
+
+/// Follows weighted targets.
+pub(super) fn transform<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+    let op = &machine.tables.transforms[at as usize];
+    let input = *machine.x(op.input);
+    let weight = share(machine.n(op.weight));
+    let goal = if weight > 0.0 { followed(machine, &machine.tables.targets[op.targets.range()]) } else { None };
+    let Some(goal) = goal else { return machine.put(op.out, input) };
+    let mut local = relative(machine.x(op.parent), &goal);
+    if let Some(offset) = machine.pose(op.pose) {
+        local = on(offset, &local);
+    }
+    let mut out = input;
+    for axis in 0..3 {
+        if op.translate[axis] {
+            out.translation[axis] = mixed(input.translation[axis], local.translation[axis], weight);
+        }
+        if op.scale[axis] {
+            out.scale[axis] = mixed(input.scale[axis], local.scale[axis], weight);
+        }
+    }
+    match op.rotate {
+        [false, false, false] => {}
+        [true, true, true] => out.rotation = turned(input.rotation, local.rotation, weight),
+        some => {
+            let (own, wanted) = (EulerOrder::Xyz.angles(input.rotation), EulerOrder::Xyz.angles(local.rotation));
+            let angles = Vec3::select(glam::BVec3::from_array(some), wanted, own);
+            out.rotation = turned(input.rotation, EulerOrder::Xyz.rotation(angles), weight);
+        }
+    }
+    machine.put(op.out, out);
+}
+
+/// The blend of targets in the rig's space; `None` without weight.
+fn followed<const TRACK: bool>(machine: &Machine<'_, TRACK>, targets: &[TargetReg]) -> Option<Trs> {
+    let place_of = |target: &TargetReg| {
+        let node = machine.x(target.node);
+        target.offset.as_ref().map_or(*node, |offset| place(node, offset))
+    };
+    let mut weighty = targets.iter().filter(|target| machine.n(target.weight) > 0.0);
+    let (first, second) = (weighty.next()?, weighty.next());
+    if second.is_none() {
+        return Some(place_of(first));
+    }
+    blend(targets.iter().map(|target| (place_of(target), machine.n(target.weight))))
+}
+
+#[inline]
+fn mixed(from: f32, to: f32, weight: f32) -> f32 {
+    if weight >= 1.0 { to } else { from + (to - from) * weight }
+}
+
+#[inline]
+fn turned(from: Quat, to: Quat, weight: f32) -> Quat {
+    if weight >= 1.0 { to } else { slerp(from, to, weight) }
+}
+
+/// Points an axis at weighted targets.
+pub(super) fn aim<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+    let op = &machine.tables.aims[at as usize];
+    let mut local = *machine.x(op.input);
+    let weight = share(machine.n(op.weight));
+    let targets = machine.tables.targets[op.targets.range()].iter();
+    let target = blend_points(targets.map(|target| (machine.x(target.node).translation, machine.n(target.weight))));
+    if let Some(target) = target
+        && weight > 0.0
+    {
+        let parent = machine.x(op.parent);
+        let global = place(parent, &local);
+        let up = match op.up {
+            UpReg::Direction(direction) => Up::Vector(direction),
+            UpReg::Point(node) => Up::Point(machine.x(node).translation),
+            UpReg::Axis(node, axis) => Up::Vector(machine.x(node).rotation * axis),
+        };
+        let aimed = op.aim.solve(global.translation, target, up, global.rotation) * op.offset;
+        let wanted = (parent.rotation.conjugate() * aimed).normalize();
+        local.rotation = turned(local.rotation, wanted, weight);
+    }
+    machine.put(op.out, local);
+}
+
+/// Keeps a transform between ends.
+pub(super) fn limit<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+    let op = &machine.tables.limits[at as usize];
+    let (input, base) = (*machine.x(op.input), &machine.tables.bases[op.base as usize]);
+    let offset = relative(base, &input);
+    let translation = op.translate.clamp(offset.translation);
+    let rotation = op.rotate.clamp_rotation(offset.rotation, EulerOrder::Xyz);
+    let scale = op.scale.clamp(offset.scale);
+    let mut out = input;
+    // What is within its ends stays as it is, bit by bit.
+    if translation != offset.translation {
+        out.translation = base.translation + base.rotation * (base.scale * translation);
+    }
+    if rotation.dot(offset.rotation).abs() < 1.0 - 1e-6 {
+        out.rotation = (base.rotation * rotation).normalize();
+    }
+    if scale != offset.scale {
+        out.scale = base.scale * scale;
+    }
+    machine.put(op.out, out);
+}
+
+/// Lags behind, swings and settles.
+pub(super) fn spring<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+    let op = &machine.tables.springs[at as usize];
+    let input = *machine.x(op.input);
+    let parent = *machine.x(op.parent);
+    let weight = share(machine.n(op.weight));
+    let motion = Spring { frequency: machine.n(op.frequency), damping: machine.n(op.damping) };
+    let dt = machine.dt;
+    let state = &mut machine.springs[op.state as usize];
+    let wanted = place(&parent, &input);
+    let sprung = swing(op, &motion, state, &wanted, dt);
+    let local = if weight > 0.0 {
+        let local = relative(&parent, &sprung);
+        let mut out = input;
+        if op.translate {
+            out.translation = input.translation + (local.translation - input.translation) * weight;
+        }
+        if op.tip.is_some() {
+            out.rotation = turned(input.rotation, local.rotation, weight);
+        }
+        out
+    } else {
+        input
+    };
+    machine.put(op.out, local);
+}
+
+/// Where a spring takes a node that is to stand at `wanted`, in the rig's space.
+fn swing(op: &SpringOp, motion: &Spring, state: &mut SpringState, wanted: &Trs, dt: f32) -> Trs {
+    let mut out = *wanted;
+    if !state.started {
+        *state = SpringState { started: true, ..SpringState::default() };
+        state.origin = PointSpring::at(wanted.translation);
+        state.tip = PointSpring::at(wanted.transform_point(op.tip.unwrap_or(Vec3::ZERO)));
+    }
+    if op.translate {
+        out.translation = advance(motion, &mut state.origin, wanted.translation, dt, 1.0);
+    }
+    if let Some(tip) = op.tip {
+        let arm = wanted.rotation * (wanted.scale * tip);
+        let swung = advance(motion, &mut state.tip, out.translation + arm, dt, arm.length());
+        if let (Some(from), Some(to)) = (direction(arm), direction(swung - out.translation)) {
+            out.rotation = (arc(from, to, Vec3::ZERO) * wanted.rotation).normalize();
+        }
+    }
+    out
+}
+
+/// Advances a point, and lets it rest where its motion can no longer be seen.
+fn advance(motion: &Spring, state: &mut PointSpring, target: Vec3, dt: f32, size: f32) -> Vec3 {
+    let is_near = |state: &PointSpring| {
+        let near = 1e-6 * (target.abs().max_element() + size);
+        state.target == target
+            && (state.position - target).abs().max_element() <= near
+            && state.velocity.abs().max_element() <= 10.0 * near
+    };
+    if is_near(state) {
+        *state = PointSpring::at(target);
+        return target;
+    }
+    motion.point(state, target, dt)
+}

@@ -1,0 +1,541 @@
+//! Operations on their way to a program: registers are handed out, nodes and attributes found by uid, and constraints
+//! of one node chained in list order.
+
+use std::{collections::HashMap, sync::Arc};
+
+use glam::Vec3;
+
+use super::{
+    Keep, Outside, ProgramError,
+    op::{N, Op, Pose, Span, Tables, X},
+};
+use crate::{
+    mesh::model::Trs,
+    rig::{BuiltConstraint, BuiltRig, Channel, NodeType, Output, Scalar, Uid},
+    solve::weights::multiply,
+};
+
+/// An operation and what it came from, for the order and for errors.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    pub op: Op,
+    /// The node it moves or belongs to.
+    pub node: usize,
+    /// The constraint, as an index of the rig's list.
+    pub constraint: Option<usize>,
+}
+
+/// What is known of a node while constraints are read.
+#[derive(Debug, Clone, Default)]
+struct NodeState {
+    /// Local transform after the constraints so far; `None` while nothing drives the node.
+    local: Option<X>,
+    /// Local transform after the last constraint that can move the origin.
+    placed: Option<X>,
+    /// The step that still takes driven channels.
+    open: Option<(usize, Vec<(Channel, N)>)>,
+    /// Register of the origin where that is read on its own.
+    position: Option<X>,
+    /// Attributes as constraints read them, in order.
+    attributes: Vec<N>,
+}
+
+/// Operations and registers in the making.
+pub(super) struct Graph<'a> {
+    pub rig: &'a BuiltRig,
+    pub steps: Vec<Step>,
+    pub tables: Tables,
+    pub x: Vec<Trs>,
+    pub n: Vec<f32>,
+    /// Rig transforms of the nodes as they were built.
+    pub built: Vec<Trs>,
+    /// Settable attributes: node, number of the attribute, register.
+    pub attributes: Vec<(usize, usize, N)>,
+    /// Registers of the declared inputs, in order.
+    pub inputs: Vec<X>,
+    /// Morph targets by name, with their register.
+    pub morphs: Vec<(Arc<str>, N)>,
+    nodes: Vec<NodeState>,
+    index: HashMap<Uid, usize>,
+    outside: HashMap<Uid, X>,
+    exposed: Vec<bool>,
+    all: bool,
+    numbers: HashMap<u32, N>,
+    scalars: HashMap<String, N>,
+    /// Last values that constraints gave a driven attribute.
+    driven: HashMap<(usize, usize), N>,
+    morph_terms: Vec<(Arc<str>, Vec<N>)>,
+    /// Origins to be computed apart.
+    aliases: Vec<(usize, X)>,
+}
+
+/// Text for a constraint in errors.
+pub(super) fn describe(constraint: &BuiltConstraint) -> String {
+    format!("{} constraint {} of command {}", kind(&constraint.constraint), constraint.uid, constraint.command)
+}
+
+/// The kind of a constraint in words.
+fn kind(constraint: &crate::rig::Constraint) -> &'static str {
+    use crate::rig::Constraint as C;
+    match constraint {
+        C::Transform { .. } => "transform",
+        C::Aim { .. } => "aim",
+        C::TwoBone { .. } => "two-bone",
+        C::Chain { .. } => "chain",
+        C::Spline { .. } => "spline",
+        C::Twist { .. } => "twist",
+        C::Stretch { .. } => "stretch",
+        C::Limit { .. } => "limit",
+        C::Spring { .. } => "spring",
+        C::DrivenKey { .. } => "driven key",
+        C::Expression { .. } => "expression",
+        C::Foot { .. } => "foot",
+    }
+}
+
+impl<'a> Graph<'a> {
+    /// A graph with a register for every node's rig transform: node `i` has register `i + 1`.
+    pub fn new(rig: &'a BuiltRig, keep: &Keep, outside: &[Outside]) -> Result<Self, ProgramError> {
+        let mut index = HashMap::with_capacity(rig.nodes.len());
+        let mut built: Vec<Trs> = Vec::with_capacity(rig.nodes.len());
+        for (at, node) in rig.nodes.iter().enumerate() {
+            if let Some(first) = index.insert(node.uid, at) {
+                let (first, second) = (name(rig, first), name(rig, at));
+                return Err(ProgramError::DuplicateNode { uid: node.uid, first, second });
+            }
+            let parent = match node.parent {
+                Some(parent) if parent >= at => {
+                    return Err(ProgramError::ParentOrder { node: name(rig, at), parent });
+                }
+                parent => parent.map_or(Trs::IDENTITY, |parent| built[parent]),
+            };
+            if !valid(&node.base) {
+                return Err(ProgramError::NotFinite { place: format!("the base of {}", name(rig, at)) });
+            }
+            built.push(multiply(&parent, &node.base));
+        }
+        let exposed = exposed(rig, &index, keep)?;
+        let mut graph = Self {
+            rig,
+            steps: Vec::new(),
+            tables: Tables { bases: vec![Trs::IDENTITY], ..Tables::default() },
+            x: vec![Trs::IDENTITY; rig.nodes.len() + 1],
+            n: Vec::new(),
+            built,
+            attributes: Vec::new(),
+            inputs: Vec::new(),
+            morphs: Vec::new(),
+            nodes: vec![NodeState::default(); rig.nodes.len()],
+            index,
+            outside: HashMap::new(),
+            exposed,
+            all: matches!(keep, Keep::All),
+            numbers: HashMap::new(),
+            scalars: HashMap::new(),
+            driven: HashMap::new(),
+            morph_terms: Vec::new(),
+            aliases: Vec::new(),
+        };
+        for input in outside {
+            let register = graph.new_x();
+            graph.x[register.0 as usize] = input.rest;
+            graph.inputs.push(register);
+            graph.outside.insert(input.uid, register);
+        }
+        graph.declare_attributes();
+        Ok(graph)
+    }
+
+    /// A register for every attribute, and a second one for those that constraints drive.
+    fn declare_attributes(&mut self) {
+        let mut driven: Vec<(Uid, &str)> = Vec::new();
+        for constraint in &self.rig.constraints {
+            use crate::rig::Constraint::{DrivenKey, Expression};
+            if let DrivenKey { output, .. } | Expression { output, .. } = &*constraint.constraint
+                && let Output::Attribute(node, name) = output
+            {
+                driven.push((*node, name));
+            }
+        }
+        for (at, node) in self.rig.nodes.iter().enumerate() {
+            for (number, attribute) in node.attributes.iter().enumerate() {
+                let register = self.new_n(attribute.clamp(attribute.default));
+                if driven.contains(&(node.uid, &*attribute.name)) {
+                    self.nodes[at].attributes.push(register);
+                    continue;
+                }
+                self.nodes[at].attributes.push(register);
+                if self.is_posable(at) {
+                    self.attributes.push((at, number, register));
+                }
+            }
+        }
+    }
+
+    /// A register for a transform.
+    pub fn new_x(&mut self) -> X {
+        self.x.push(Trs::IDENTITY);
+        X(self.x.len() as u32 - 1)
+    }
+
+    /// A register for a number that begins with a value.
+    pub fn new_n(&mut self, value: f32) -> N {
+        self.n.push(value);
+        N(self.n.len() as u32 - 1)
+    }
+
+    /// The register of a number that never changes.
+    pub fn constant(&mut self, value: f32) -> N {
+        if let Some(register) = self.numbers.get(&value.to_bits()) {
+            return *register;
+        }
+        let register = self.new_n(value);
+        self.numbers.insert(value.to_bits(), register);
+        register
+    }
+
+    /// True if people and animation pose the node.
+    pub fn is_posable(&self, node: usize) -> bool {
+        self.all || self.exposed[node]
+    }
+
+    /// True if the node's rig transform is a result of the program.
+    pub fn is_kept(&self, node: usize) -> bool {
+        self.is_posable(node) || self.rig.nodes[node].kind == NodeType::Joint
+    }
+
+    /// The pose slot of a node.
+    pub fn pose(&self, node: usize) -> Pose {
+        if self.is_posable(node) { Pose(node as u32) } else { Pose::NONE }
+    }
+
+    /// The rig transform of a node.
+    pub fn global(&self, node: usize) -> X {
+        X(node as u32 + 1)
+    }
+
+    /// The rig transform of a node's parent.
+    pub fn parent(&self, node: usize) -> X {
+        self.rig.nodes[node].parent.map_or(X::RIG, |parent| self.global(parent))
+    }
+
+    /// Number of a base in the table; 0 for the identity.
+    pub fn base(&mut self, node: usize) -> u32 {
+        let base = self.rig.nodes[node].base;
+        if base == Trs::IDENTITY {
+            return 0;
+        }
+        self.tables.bases.push(base);
+        self.tables.bases.len() as u32 - 1
+    }
+
+    /// Number of an axis in the table.
+    pub fn axis(&mut self, axis: Vec3) -> u32 {
+        self.tables.axes.push(axis);
+        self.tables.axes.len() as u32 - 1
+    }
+
+    /// Adds an operation for a node.
+    pub fn push(&mut self, op: Op, node: usize, constraint: Option<usize>) {
+        self.steps.push(Step { op, node, constraint });
+    }
+
+    fn text(&self, constraint: usize) -> String {
+        describe(&self.rig.constraints[constraint])
+    }
+
+    /// Index of a node that a constraint drives.
+    pub fn driven(&self, constraint: usize, role: &'static str, node: Uid) -> Result<usize, ProgramError> {
+        if let Some(at) = self.index.get(&node) {
+            return Ok(*at);
+        }
+        let constraint = self.text(constraint);
+        Err(if self.outside.contains_key(&node) {
+            ProgramError::DrivenInput { constraint, role, node }
+        } else {
+            ProgramError::MissingNode { constraint, role, node }
+        })
+    }
+
+    /// Register of the rig transform of a node that a constraint reads.
+    pub fn read(&self, constraint: usize, role: &'static str, node: Uid) -> Result<X, ProgramError> {
+        if let Some(register) = self.outside.get(&node) {
+            return Ok(*register);
+        }
+        self.index.get(&node).map(|at| self.global(*at)).ok_or_else(|| ProgramError::MissingNode {
+            constraint: self.text(constraint),
+            role,
+            node,
+        })
+    }
+
+    /// Register of a transform of which only the translation counts: where the origin of the node ends up, which does
+    /// not wait for constraints that only turn or scale the node.
+    pub fn read_position(&mut self, constraint: usize, role: &'static str, node: Uid) -> Result<X, ProgramError> {
+        let Some(at) = self.index.get(&node).copied() else { return self.read(constraint, role, node) };
+        if let Some(register) = self.nodes[at].position {
+            return Ok(register);
+        }
+        let register = self.new_x();
+        self.nodes[at].position = Some(register);
+        self.aliases.push((at, register));
+        Ok(register)
+    }
+
+    /// Rig transform of a node or input as it was built.
+    pub fn built_of(&self, node: Uid) -> Trs {
+        match (self.index.get(&node), self.outside.get(&node)) {
+            (Some(at), _) => self.built[*at],
+            (None, Some(register)) => self.x[register.0 as usize],
+            (None, None) => Trs::IDENTITY,
+        }
+    }
+
+    /// Takes the local transform of a node as the constraints so far left it, and the register for what comes next.
+    ///
+    /// `places` says that the constraint can move the node's origin.
+    pub fn take_local(&mut self, node: usize, constraint: usize, places: bool) -> (X, X) {
+        let input = self.local(node, constraint);
+        self.nodes[node].open = None;
+        let out = self.new_x();
+        let state = &mut self.nodes[node];
+        state.local = Some(out);
+        if places {
+            state.placed = Some(out);
+        }
+        (input, out)
+    }
+
+    /// The local transform of a node after the constraints so far.
+    fn local(&mut self, node: usize, constraint: usize) -> X {
+        if let Some(local) = self.nodes[node].local {
+            self.close(node);
+            return local;
+        }
+        let (base, out) = (self.base(node), self.new_x());
+        self.push(Op::Local { pose: self.pose(node), base, drives: Span::default(), out }, node, Some(constraint));
+        self.nodes[node].local = Some(out);
+        self.nodes[node].placed = Some(out);
+        out
+    }
+
+    /// Adds a number to a channel of a node: to its base if nothing but channels were driven so far, else on top of what
+    /// the constraints so far left.
+    pub fn drive_channel(&mut self, node: usize, constraint: usize, channel: Channel, value: N) {
+        if self.nodes[node].open.is_none() {
+            let step = self.steps.len();
+            if self.nodes[node].local.is_none() {
+                self.local(node, constraint);
+            } else {
+                let (input, out) = self.take_local(node, constraint, true);
+                self.push(Op::Drive { input, drives: Span::default(), out }, node, Some(constraint));
+            }
+            self.nodes[node].open = Some((step, Vec::new()));
+        }
+        if let Some((_, drives)) = &mut self.nodes[node].open {
+            drives.push((channel, value));
+        }
+    }
+
+    /// Writes the driven channels of a node into the step that takes them.
+    fn close(&mut self, node: usize) {
+        let Some((step, list)) = self.nodes[node].open.take() else { return };
+        let span = Span { start: self.tables.drives.len() as u32, len: list.len() as u32 };
+        self.tables.drives.extend(list);
+        if let Op::Local { drives, .. } | Op::Drive { drives, .. } = &mut self.steps[step].op {
+            *drives = span;
+        }
+    }
+
+    /// Gives an attribute a value; the last one that is given counts.
+    pub fn drive_attribute(
+        &mut self,
+        constraint: usize,
+        node: usize,
+        name: &str,
+        value: N,
+    ) -> Result<(), ProgramError> {
+        let number = self.attribute_number(constraint, node, name)?;
+        self.driven.insert((node, number), value);
+        Ok(())
+    }
+
+    /// Adds a term to a morph target.
+    pub fn drive_morph(&mut self, name: &Arc<str>, value: N) {
+        match self.morph_terms.iter_mut().find(|(known, _)| known == name) {
+            Some((_, terms)) => terms.push(value),
+            None => self.morph_terms.push((Arc::clone(name), vec![value])),
+        }
+    }
+
+    fn attribute_number(&self, constraint: usize, node: usize, name: &str) -> Result<usize, ProgramError> {
+        let attributes = &self.rig.nodes[node].attributes;
+        attributes.iter().position(|attribute| *attribute.name == *name).ok_or_else(|| {
+            let known: Vec<String> = attributes.iter().map(|attribute| format!("\"{}\"", attribute.name)).collect();
+            ProgramError::MissingAttribute {
+                constraint: self.text(constraint),
+                node: super::name(self.rig, node),
+                name: name.to_owned(),
+                known: if known.is_empty() { "none".to_owned() } else { known.join(", ") },
+            }
+        })
+    }
+
+    /// Register of a number that a constraint reads.
+    pub fn scalar(&mut self, constraint: usize, scalar: &Scalar) -> Result<N, ProgramError> {
+        let node = match scalar {
+            Scalar::Value(value) if value.is_finite() => return Ok(self.constant(*value)),
+            Scalar::Value(_) => return Err(ProgramError::NotFinite { place: self.text(constraint) }),
+            Scalar::Attribute { node, .. } | Scalar::Choice { node, .. } | Scalar::Channel { node, .. } => *node,
+        };
+        let at = self.driven(constraint, "attribute's node", node)?;
+        let key = format!("{scalar:?}");
+        if let Some(register) = self.scalars.get(&key) {
+            return Ok(*register);
+        }
+        let register = match scalar {
+            Scalar::Value(value) => self.constant(*value),
+            Scalar::Attribute { name, factor, add, .. } => {
+                let number = self.attribute_number(constraint, at, name)?;
+                let input = self.nodes[at].attributes[number];
+                if !(factor.is_finite() && add.is_finite()) {
+                    return Err(ProgramError::NotFinite { place: self.text(constraint) });
+                }
+                if *factor == 1.0 && *add == 0.0 {
+                    input
+                } else {
+                    let out = self.new_n(0.0);
+                    self.push(Op::Linear { input, factor: *factor, add: *add, out }, at, Some(constraint));
+                    out
+                }
+            }
+            Scalar::Choice { name, value, .. } => {
+                let number = self.attribute_number(constraint, at, name)?;
+                let (input, out) = (self.nodes[at].attributes[number], self.new_n(0.0));
+                self.push(Op::Choice { input, value: *value, out }, at, Some(constraint));
+                out
+            }
+            Scalar::Channel { channel, .. } => {
+                let out = self.new_n(0.0);
+                self.push(Op::Channel { pose: self.pose(at), channel: *channel, out }, at, Some(constraint));
+                out
+            }
+        };
+        self.scalars.insert(key, register);
+        Ok(register)
+    }
+
+    /// Ends every node, attribute and morph target with the operation that makes its final value.
+    ///
+    /// Returns the final local transforms of the nodes that are driven.
+    pub fn finish(&mut self) -> Vec<Option<X>> {
+        for node in 0..self.rig.nodes.len() {
+            self.close(node);
+            let (parent, out) = (self.parent(node), self.global(node));
+            let op = match self.nodes[node].local {
+                Some(local) => Op::Global { parent, local, out },
+                None => Op::Node { pose: self.pose(node), base: self.base(node), parent, out },
+            };
+            self.push(op, node, None);
+        }
+        let mut moved: HashMap<X, X> = HashMap::new();
+        for (node, register) in std::mem::take(&mut self.aliases) {
+            let state = &self.nodes[node];
+            match state.placed {
+                Some(placed) if state.local != Some(placed) => {
+                    self.push(Op::Global { parent: self.parent(node), local: placed, out: register }, node, None);
+                }
+                _ => {
+                    moved.insert(register, self.global(node));
+                }
+            }
+        }
+        self.finish_attributes();
+        self.finish_morphs();
+        for step in &mut self.steps {
+            step.op.visit(&mut self.tables, |operand| {
+                if let super::op::Operand::ReadX(register) = operand
+                    && let Some(to) = moved.get(register)
+                {
+                    *register = *to;
+                }
+            });
+        }
+        self.nodes.iter().map(|state| state.local).collect()
+    }
+
+    fn finish_attributes(&mut self) {
+        let mut driven: Vec<((usize, usize), N)> = self.driven.drain().collect();
+        driven.sort_unstable();
+        for ((node, number), input) in driven {
+            use crate::rig::AttributeKind::{Choice, Number};
+            let attribute = &self.rig.nodes[node].attributes[number];
+            let (low, high) = match &attribute.kind {
+                Number { min, max } => (min.unwrap_or(f32::NEG_INFINITY), max.unwrap_or(f32::INFINITY)),
+                Choice(names) => (0.0, names.len().saturating_sub(1) as f32),
+            };
+            self.tables.ends.push([low, high, attribute.default]);
+            let ends = self.tables.ends.len() as u32 - 1;
+            let out = self.nodes[node].attributes[number];
+            self.push(Op::Clamp { input, ends, out }, node, None);
+        }
+    }
+
+    fn finish_morphs(&mut self) {
+        for (name, terms) in std::mem::take(&mut self.morph_terms) {
+            let out = self.new_n(0.0);
+            let list = Span { start: self.tables.numbers.len() as u32, len: terms.len() as u32 };
+            self.tables.numbers.extend(terms);
+            self.push(Op::Sum { list, out }, self.rig.nodes.len(), None);
+            self.morphs.push((name, out));
+        }
+    }
+
+    /// Where a driven or settable attribute is read.
+    pub fn attribute(&self, node: usize, number: usize) -> N {
+        self.nodes[node].attributes[number]
+    }
+}
+
+fn name(rig: &BuiltRig, node: usize) -> String {
+    super::name(rig, node)
+}
+
+pub(super) fn valid(trs: &Trs) -> bool {
+    let length = trs.rotation.length_squared();
+    trs.translation.is_finite() && trs.scale.is_finite() && length.is_finite() && length > 0.0
+}
+
+fn exposed(rig: &BuiltRig, index: &HashMap<Uid, usize>, keep: &Keep) -> Result<Vec<bool>, ProgramError> {
+    let mut exposed = vec![false; rig.nodes.len()];
+    let Keep::DeformAndExposed(list) = keep else { return Ok(exposed) };
+    for wanted in list {
+        let mut found = false;
+        match wanted {
+            super::Exposed::Uid(uid) => {
+                if let Some(at) = index.get(uid) {
+                    exposed[*at] = true;
+                    found = true;
+                }
+            }
+            super::Exposed::Label(label) => {
+                for (at, node) in rig.nodes.iter().enumerate() {
+                    if node.label.as_deref() == Some(label) {
+                        exposed[at] = true;
+                        found = true;
+                    }
+                }
+            }
+            super::Exposed::Controls => {
+                for (at, node) in rig.nodes.iter().enumerate() {
+                    exposed[at] |= node.kind == NodeType::Control;
+                }
+                found = true;
+            }
+        }
+        if !found {
+            return Err(ProgramError::UnknownExposed { name: wanted.to_string() });
+        }
+    }
+    Ok(exposed)
+}

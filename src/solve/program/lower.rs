@@ -1,0 +1,571 @@
+//! Constraints become operations.
+
+use glam::{Quat, Vec3};
+
+use super::{
+    ProgramError,
+    chains::frames,
+    graph::{Graph, describe},
+    name,
+    op::{
+        AimOp, ChainOp, ExpressionOp, FootOp, KeyOp, LimitOp, Link, N, Op, Pose, Span, SplineOp, SpringOp, StretchOp,
+        TargetReg, TransformOp, TwistOp, TwoBoneOp, UpReg, X,
+    },
+};
+use crate::{
+    mesh::model::Trs,
+    rig::{AimUp, AngleLimits, ChainSolver, Constraint, KeyEase, Output, Scalar, Target, Uid},
+    solve::{
+        aim::Aim,
+        curve::{Beyond, Curve, CurveKey, Interpolation},
+        expression::Expression,
+        limit::{Bounds, JointLimit},
+        rotate::{EulerOrder, direction, perpendicular_or_any, unit},
+        spline::{ArcTable, Spline, SplineKind},
+    },
+};
+
+/// Adds the operations of all constraints in list order.
+pub(super) fn lower(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
+    for at in 0..graph.rig.constraints.len() {
+        Lower { at, graph }.constraint()?;
+    }
+    Ok(())
+}
+
+/// One constraint on its way.
+struct Lower<'g, 'a> {
+    at: usize,
+    graph: &'g mut Graph<'a>,
+}
+
+impl Lower<'_, '_> {
+    fn constraint(&mut self) -> Result<(), ProgramError> {
+        let rig = self.graph.rig;
+        match &*rig.constraints[self.at].constraint {
+            Constraint::Transform { driven, targets, translate, rotate, scale, weight, keep_pose } => {
+                self.transform(*driven, targets, [*translate, *rotate, *scale], weight, *keep_pose)
+            }
+            Constraint::Aim { driven, targets, aim, up, world_up, offset, weight } => {
+                self.aim(*driven, targets, [*aim, *up], world_up, *offset, weight)
+            }
+            Constraint::TwoBone { .. } => self.two_bone(),
+            Constraint::Chain { .. } => self.chain(),
+            Constraint::Spline { joints, points, stretch, twist, weight } => {
+                self.spline(joints, points, [stretch, twist, weight])
+            }
+            Constraint::Twist { source, reference, axis, driven } => self.twist(*source, *reference, *axis, driven),
+            Constraint::Stretch { .. } => self.stretch(),
+            Constraint::Limit { driven, limits } => {
+                let node = self.driven("node", *driven)?;
+                let bounds = |ends: &AngleLimits| Bounds::new(ends.map(|end| end.0), ends.map(|end| end.1));
+                let radians = |end: Option<f32>| end.map(f32::to_radians);
+                let places = limits.translate.iter().any(|end| *end != (None, None));
+                let (input, out) = self.graph.take_local(node, self.at, places);
+                let op = LimitOp {
+                    input,
+                    base: self.graph.base(node),
+                    translate: bounds(&limits.translate),
+                    rotate: bounds(&limits.rotate.map(|(low, high)| (radians(low), radians(high)))),
+                    scale: bounds(&limits.scale),
+                    out,
+                };
+                self.graph.tables.limits.push(op);
+                let at = self.graph.tables.limits.len() - 1;
+                self.push(Op::Limit(at as u32), node);
+                Ok(())
+            }
+            Constraint::Spring { driven, frequency, damping, weight, translate, rotate } => {
+                self.spring(*driven, [frequency, damping, weight], *translate, *rotate)
+            }
+            Constraint::DrivenKey { driver, keys, ease, output } => {
+                let interpolation = match ease {
+                    KeyEase::Step => Interpolation::Constant,
+                    KeyEase::Linear => Interpolation::Linear,
+                    KeyEase::Smooth => Interpolation::Smooth,
+                };
+                let keys: Vec<CurveKey> =
+                    keys.iter().map(|(x, y)| CurveKey { interpolation, ..CurveKey::new(*x, *y) }).collect();
+                let curve = Curve::new(&keys, [Beyond::Hold; 2]).map_err(|error| self.bad(error.to_string()))?;
+                let (driver, out) = (self.scalar(driver)?, self.graph.new_n(0.0));
+                self.graph.tables.keys.push(KeyOp { driver, curve, out });
+                let at = self.graph.tables.keys.len() - 1;
+                self.output(Op::Key(at as u32), output, out)
+            }
+            Constraint::Expression { text, inputs, output } => {
+                let names: Vec<&str> = inputs.iter().map(|(name, _)| name.as_str()).collect();
+                let expression = Expression::new(text, &names).map_err(|error| self.bad(error.to_string()))?;
+                let inputs = inputs.iter().map(|(_, scalar)| self.scalar(scalar)).collect::<Result<Vec<N>, _>>()?;
+                let inputs = self.numbers(inputs);
+                let out = self.graph.new_n(0.0);
+                self.graph.tables.expressions.push(ExpressionOp { expression, inputs, out });
+                let at = self.graph.tables.expressions.len() - 1;
+                self.output(Op::Expression(at as u32), output, out)
+            }
+            Constraint::Foot { .. } => self.foot(),
+        }
+    }
+
+    fn transform(
+        &mut self,
+        driven: Uid,
+        targets: &[Target],
+        [translate, rotate, scale]: [[bool; 3]; 3],
+        weight: &Scalar,
+        keep_pose: bool,
+    ) -> Result<(), ProgramError> {
+        let node = self.driven("driven node", driven)?;
+        if targets.is_empty() {
+            return Err(self.too_few("targets", 0, 1));
+        }
+        // An offset translation follows the turns and scales of the target; so do turns.
+        let whole = rotate != [false; 3] || scale != [false; 3];
+        let list = targets.iter().map(|target| self.target(target, whole)).collect::<Result<Vec<_>, _>>()?;
+        let (targets, weight) = (self.targets(list), self.scalar(weight)?);
+        let (input, out) = self.graph.take_local(node, self.at, translate != [false; 3]);
+        let pose = if keep_pose { self.graph.pose(node) } else { Pose::NONE };
+        let parent = self.graph.parent(node);
+        let op = TransformOp { input, parent, pose, targets, weight, translate, rotate, scale, out };
+        self.graph.tables.transforms.push(op);
+        let at = self.graph.tables.transforms.len() - 1;
+        self.push(Op::Transform(at as u32), node);
+        Ok(())
+    }
+
+    fn aim(
+        &mut self,
+        driven: Uid,
+        targets: &[Target],
+        [axis, up_axis]: [Vec3; 2],
+        world_up: &AimUp,
+        offset: Quat,
+        weight: &Scalar,
+    ) -> Result<(), ProgramError> {
+        let node = self.driven("driven node", driven)?;
+        if targets.is_empty() {
+            return Err(self.too_few("targets", 0, 1));
+        }
+        let list = targets
+            .iter()
+            .map(|target| {
+                let node = self.graph.read_position(self.at, "target", target.node)?;
+                Ok(TargetReg { node, weight: self.scalar(&target.weight)?, offset: None })
+            })
+            .collect::<Result<Vec<_>, ProgramError>>()?;
+        let targets = self.targets(list);
+        let up = match world_up {
+            AimUp::Direction(direction) => UpReg::Direction(*direction),
+            AimUp::Node(node) => UpReg::Point(self.graph.read_position(self.at, "up node", *node)?),
+            AimUp::Axis(node, axis) => UpReg::Axis(self.graph.read(self.at, "up node", *node)?, *axis),
+        };
+        let weight = self.scalar(weight)?;
+        let (input, out) = self.graph.take_local(node, self.at, false);
+        let (parent, aim) = (self.graph.parent(node), Aim { axis, up_axis });
+        self.graph.tables.aims.push(AimOp { input, parent, targets, aim, up, offset: unit(offset), weight, out });
+        let at = self.graph.tables.aims.len() - 1;
+        self.push(Op::Aim(at as u32), node);
+        Ok(())
+    }
+
+    fn two_bone(&mut self) -> Result<(), ProgramError> {
+        let rig = self.graph.rig;
+        let Constraint::TwoBone {
+            root,
+            mid,
+            end,
+            goal,
+            pole,
+            prefer,
+            weight,
+            soft,
+            stretch,
+            max_stretch,
+            twist,
+            orient_end,
+        } = &*rig.constraints[self.at].constraint
+        else {
+            return Ok(());
+        };
+        let nodes = self.joints(&[*root, *mid, *end])?;
+        let goal = self.goal(*goal, orient_end.is_some())?;
+        let pole = self.pole(*pole)?;
+        let can_stretch = *stretch != Scalar::Value(0.0);
+        let [weight, soft, stretch, twist] =
+            [self.scalar(weight)?, self.scalar(soft)?, self.scalar(stretch)?, self.scalar(twist)?];
+        let links = [self.link(nodes[0], false), self.link(nodes[1], can_stretch), self.link(nodes[2], can_stretch)];
+        let op = TwoBoneOp {
+            parent: self.graph.parent(nodes[0]),
+            links,
+            goal,
+            pole,
+            prefer: *prefer,
+            weight,
+            soft,
+            stretch,
+            max_stretch: *max_stretch,
+            twist,
+            orient_end: orient_end.map(unit),
+        };
+        self.graph.tables.two_bones.push(op);
+        let at = self.graph.tables.two_bones.len() - 1;
+        self.push(Op::TwoBone(at as u32), nodes[0]);
+        Ok(())
+    }
+
+    fn chain(&mut self) -> Result<(), ProgramError> {
+        let rig = self.graph.rig;
+        let Constraint::Chain { joints, goal, pole, solver, iterations, tolerance, weight, orient_end } =
+            &*rig.constraints[self.at].constraint
+        else {
+            return Ok(());
+        };
+        if joints.len() < 2 {
+            return Err(self.too_few("joints", joints.len(), 2));
+        }
+        let nodes = self.joints(joints)?;
+        let goal = self.goal(*goal, orient_end.is_some())?;
+        let pole = self.pole(*pole)?;
+        let weight = self.scalar(weight)?;
+        let limits = match solver {
+            ChainSolver::Fabrik => None,
+            ChainSolver::Ccd(limits) => {
+                let limit = |at: usize| limits.get(at).map_or(JointLimit::Free, joint_limit);
+                Some((0..joints.len() - 1).map(limit).collect())
+            }
+        };
+        let links: Vec<Link> = nodes.iter().map(|node| self.link(*node, false)).collect();
+        let op = ChainOp {
+            parent: self.graph.parent(nodes[0]),
+            links: self.links(links),
+            goal,
+            pole,
+            limits,
+            iterations: (*iterations).min(1000),
+            tolerance: if tolerance.is_finite() { tolerance.max(0.0) } else { return Err(self.not_finite()) },
+            weight,
+            orient_end: orient_end.map(unit),
+        };
+        self.graph.tables.chains.push(op);
+        let at = self.graph.tables.chains.len() - 1;
+        self.push(Op::Chain(at as u32), nodes[0]);
+        Ok(())
+    }
+
+    fn spline(
+        &mut self,
+        joints: &[Uid],
+        points: &[Uid],
+        [stretch, twist, weight]: [&Scalar; 3],
+    ) -> Result<(), ProgramError> {
+        let (true, [first, .., last]) = (joints.len() >= 2, points) else {
+            return Err(if joints.len() < 2 {
+                self.too_few("joints", joints.len(), 2)
+            } else {
+                self.too_few("points", points.len(), 2)
+            });
+        };
+        let nodes = self.joints(joints)?;
+        let mut registers = Vec::with_capacity(points.len());
+        for (number, point) in points.iter().enumerate() {
+            let whole = number == 0 || number + 1 == points.len();
+            registers.push(if whole {
+                self.graph.read(self.at, "point", *point)?
+            } else {
+                self.graph.read_position(self.at, "point", *point)?
+            });
+        }
+        let [stretch, twist, weight] = [self.scalar(stretch)?, self.scalar(twist)?, self.scalar(weight)?];
+        let built = |node: &Uid| self.graph.built_of(*node);
+        let ends = [built(first).rotation, built(last).rotation];
+        let rests: Vec<Trs> = joints.iter().map(built).collect();
+        let along = direction(rests[1].translation - rests[0].translation).unwrap_or(Vec3::Y);
+        let up = perpendicular_or_any(along, &[rests[0].rotation * Vec3::Z, rests[0].rotation * Vec3::X]);
+        let controls: Vec<Vec3> = points.iter().map(|point| built(point).translation).collect();
+        let corrections = corrections(&rests, &controls, up);
+        let links: Vec<Link> = nodes.iter().map(|node| self.link(*node, true)).collect();
+        let start = self.graph.tables.points.len() as u32;
+        self.graph.tables.points.extend(registers);
+        let op = SplineOp {
+            parent: self.graph.parent(nodes[0]),
+            links: self.links(links),
+            points: Span { start, len: points.len() as u32 },
+            ends,
+            along,
+            up: ends[0].conjugate() * up,
+            corrections,
+            stretch,
+            twist,
+            weight,
+        };
+        self.graph.tables.splines.push(op);
+        let at = self.graph.tables.splines.len() - 1;
+        self.push(Op::Spline(at as u32), nodes[0]);
+        Ok(())
+    }
+
+    fn twist(
+        &mut self,
+        source: Uid,
+        reference: Option<Uid>,
+        axis: Vec3,
+        driven: &[(Uid, Scalar)],
+    ) -> Result<(), ProgramError> {
+        let from = self.driven("source", source)?;
+        let (reference, against) = match reference {
+            Some(node) => (self.graph.read(self.at, "reference", node)?, self.graph.built_of(node)),
+            None => {
+                let parent = self.graph.rig.nodes[from].parent;
+                (self.graph.parent(from), parent.map_or(Trs::IDENTITY, |parent| self.graph.built[parent]))
+            }
+        };
+        let axis =
+            direction(axis).ok_or_else(|| self.bad("the axis has no length; give the bone's axis".to_owned()))?;
+        let between = against.rotation.conjugate() * self.graph.built[from].rotation;
+        let (source, out) = (self.graph.global(from), self.graph.new_n(0.0));
+        let op = TwistOp { source, reference, rest: between.conjugate(), axis, out };
+        self.graph.tables.twists.push(op);
+        let at = self.graph.tables.twists.len() - 1;
+        self.push(Op::Twist(at as u32), from);
+        for (node, share) in driven {
+            let node = self.driven("driven node", *node)?;
+            let angle = self.product(out, share, node)?;
+            self.turn(node, axis, angle);
+        }
+        Ok(())
+    }
+
+    fn stretch(&mut self) -> Result<(), ProgramError> {
+        let rig = self.graph.rig;
+        let Constraint::Stretch { start, end, rest, axis, volume, range, driven, weight } =
+            &*rig.constraints[self.at].constraint
+        else {
+            return Ok(());
+        };
+        if !(rest.is_finite() && *rest > 0.0) {
+            return Err(self.bad(format!("the distance at rest is {rest}; it must be above zero")));
+        }
+        let axis =
+            direction(*axis).ok_or_else(|| self.bad("the axis has no length; give the bone's axis".to_owned()))?;
+        let start = self.graph.read_position(self.at, "start", *start)?;
+        let end = self.graph.read_position(self.at, "end", *end)?;
+        let [volume, weight] = [self.scalar(volume)?, self.scalar(weight)?];
+        let nodes = driven.iter().map(|node| self.driven("driven node", *node)).collect::<Result<Vec<usize>, _>>()?;
+        let Some(first) = nodes.first().copied() else { return Err(self.too_few("driven nodes", 0, 1)) };
+        let (along, across) = (self.graph.new_n(1.0), self.graph.new_n(1.0));
+        let op = StretchOp { start, end, rest: *rest, range: *range, volume, weight, along, across };
+        self.graph.tables.stretches.push(op);
+        let at = self.graph.tables.stretches.len() - 1;
+        self.push(Op::Stretch(at as u32), first);
+        let axis = self.graph.axis(axis);
+        for node in nodes {
+            let (input, out) = self.graph.take_local(node, self.at, false);
+            self.push(Op::Scale { input, axis, along, across, out }, node);
+        }
+        Ok(())
+    }
+
+    fn spring(
+        &mut self,
+        driven: Uid,
+        [frequency, damping, weight]: [&Scalar; 3],
+        translate: bool,
+        rotate: bool,
+    ) -> Result<(), ProgramError> {
+        let node = self.driven("driven node", driven)?;
+        let rig = self.graph.rig;
+        let (sum, count) = (rig.nodes.iter().filter(|child| child.parent == Some(node)))
+            .fold((Vec3::ZERO, 0.0), |(sum, count), child| (sum + child.base.translation, count + 1.0));
+        let tip = Some(if count > 0.0 { sum / count } else { Vec3::Y }).filter(|_| rotate);
+        let tip = tip.map(|tip| if tip.length_squared() > 0.0 { tip } else { Vec3::Y });
+        let [frequency, damping, weight] = [self.scalar(frequency)?, self.scalar(damping)?, self.scalar(weight)?];
+        let (input, out) = self.graph.take_local(node, self.at, translate);
+        let (parent, state) = (self.graph.parent(node), self.graph.tables.springs.len() as u32);
+        let op = SpringOp { input, parent, frequency, damping, weight, translate, tip, state, out };
+        self.graph.tables.springs.push(op);
+        self.push(Op::Spring(state), node);
+        Ok(())
+    }
+
+    fn foot(&mut self) -> Result<(), ProgramError> {
+        let rig = self.graph.rig;
+        let Constraint::Foot { heel, toe, ball, inner, outer, roll, break_angle, bank, toes, swivel } =
+            &*rig.constraints[self.at].constraint
+        else {
+            return Ok(());
+        };
+        let [roll, break_angle, bank] = [self.scalar(roll)?, self.scalar(break_angle)?, self.scalar(bank)?];
+        let swivel = self.scalar(swivel)?;
+        let pivots = [
+            Some(self.driven("heel", *heel)?),
+            Some(self.driven("ball", *ball)?),
+            Some(self.driven("toe", *toe)?),
+            inner.map(|node| self.driven("inner pivot", node)).transpose()?,
+            outer.map(|node| self.driven("outer pivot", node)).transpose()?,
+        ];
+        let outs = pivots.map(|_| self.graph.new_n(0.0));
+        self.graph.tables.feet.push(FootOp { roll, break_angle, bank, outs });
+        let at = self.graph.tables.feet.len() - 1;
+        let first = pivots[0].unwrap_or_default();
+        self.push(Op::Foot(at as u32), first);
+        if let Some(ball) = pivots[1] {
+            self.turn(ball, Vec3::Y, swivel);
+        }
+        for (number, (pivot, angle)) in pivots.into_iter().zip(outs).enumerate() {
+            if let Some(node) = pivot {
+                self.turn(node, if number < 3 { Vec3::X } else { Vec3::Z }, angle);
+            }
+        }
+        if let Some((node, lift)) = toes {
+            let (node, lift) = (self.driven("toes", *node)?, self.scalar(lift)?);
+            // Up is the other way about X than the roll, which lifts the heel.
+            let out = self.graph.new_n(0.0);
+            self.push(Op::Linear { input: lift, factor: -1.0, add: 0.0, out }, node);
+            self.turn(node, Vec3::X, out);
+        }
+        Ok(())
+    }
+
+    /// Turns a node about an axis of its own by a number of degrees.
+    fn turn(&mut self, node: usize, axis: Vec3, angle: N) {
+        let (input, out) = self.graph.take_local(node, self.at, false);
+        let axis = self.graph.axis(axis);
+        self.push(Op::Turn { input, axis, angle, out }, node);
+    }
+
+    /// A register times a number.
+    fn product(&mut self, a: N, scalar: &Scalar, node: usize) -> Result<N, ProgramError> {
+        if *scalar == Scalar::Value(1.0) {
+            return Ok(a);
+        }
+        let (b, out) = (self.scalar(scalar)?, self.graph.new_n(0.0));
+        self.push(Op::Product { a, b, out }, node);
+        Ok(out)
+    }
+
+    /// Sends a calculated number where it goes.
+    fn output(&mut self, op: Op, output: &Output, value: N) -> Result<(), ProgramError> {
+        match output {
+            Output::Channel(node, channel) => {
+                let node = self.driven("driven node", *node)?;
+                self.push(op, node);
+                self.graph.drive_channel(node, self.at, *channel, value);
+                Ok(())
+            }
+            Output::Attribute(node, name) => {
+                let node = self.driven("driven node", *node)?;
+                self.push(op, node);
+                self.graph.drive_attribute(self.at, node, name, value)
+            }
+            Output::Morph(name) => {
+                self.push(op, self.graph.rig.nodes.len());
+                self.graph.drive_morph(name, value);
+                Ok(())
+            }
+        }
+    }
+
+    fn joints(&mut self, joints: &[Uid]) -> Result<Vec<usize>, ProgramError> {
+        let nodes = joints.iter().map(|node| self.driven("joint", *node)).collect::<Result<Vec<usize>, _>>()?;
+        for pair in nodes.windows(2) {
+            if self.graph.rig.nodes[pair[1]].parent != Some(pair[0]) {
+                return Err(ProgramError::NotAChain {
+                    constraint: self.text(),
+                    parent: name(self.graph.rig, pair[0]),
+                    child: name(self.graph.rig, pair[1]),
+                });
+            }
+        }
+        Ok(nodes)
+    }
+
+    fn link(&mut self, node: usize, places: bool) -> Link {
+        let (input, out) = self.graph.take_local(node, self.at, places);
+        Link { input, out, base: self.graph.base(node) }
+    }
+
+    fn links(&mut self, links: Vec<Link>) -> Span {
+        let span = Span { start: self.graph.tables.links.len() as u32, len: links.len() as u32 };
+        self.graph.tables.links.extend(links);
+        span
+    }
+
+    fn numbers(&mut self, numbers: Vec<N>) -> Span {
+        let span = Span { start: self.graph.tables.numbers.len() as u32, len: numbers.len() as u32 };
+        self.graph.tables.numbers.extend(numbers);
+        span
+    }
+
+    fn target(&mut self, target: &Target, whole: bool) -> Result<TargetReg, ProgramError> {
+        let offset = (target.offset != Trs::IDENTITY).then_some(target.offset);
+        if !super::graph::valid(&target.offset) {
+            return Err(self.not_finite());
+        }
+        let node = if whole || offset.is_some() {
+            self.graph.read(self.at, "target", target.node)?
+        } else {
+            self.graph.read_position(self.at, "target", target.node)?
+        };
+        Ok(TargetReg { node, weight: self.scalar(&target.weight)?, offset })
+    }
+
+    fn targets(&mut self, targets: Vec<TargetReg>) -> Span {
+        let span = Span { start: self.graph.tables.targets.len() as u32, len: targets.len() as u32 };
+        self.graph.tables.targets.extend(targets);
+        span
+    }
+
+    fn goal(&mut self, goal: Uid, whole: bool) -> Result<X, ProgramError> {
+        if whole { self.graph.read(self.at, "goal", goal) } else { self.graph.read_position(self.at, "goal", goal) }
+    }
+
+    fn pole(&mut self, pole: Option<Uid>) -> Result<Option<X>, ProgramError> {
+        pole.map(|pole| self.graph.read_position(self.at, "pole", pole)).transpose()
+    }
+
+    fn driven(&self, role: &'static str, node: Uid) -> Result<usize, ProgramError> {
+        self.graph.driven(self.at, role, node)
+    }
+
+    fn scalar(&mut self, scalar: &Scalar) -> Result<N, ProgramError> {
+        self.graph.scalar(self.at, scalar)
+    }
+
+    fn push(&mut self, op: Op, node: usize) {
+        self.graph.push(op, node, Some(self.at));
+    }
+
+    fn text(&self) -> String {
+        describe(&self.graph.rig.constraints[self.at])
+    }
+
+    fn bad(&self, problem: String) -> ProgramError {
+        ProgramError::BadParameter { constraint: self.text(), problem }
+    }
+
+    fn not_finite(&self) -> ProgramError {
+        ProgramError::NotFinite { place: self.text() }
+    }
+
+    fn too_few(&self, what: &'static str, found: usize, needed: usize) -> ProgramError {
+        ProgramError::TooFew { constraint: self.text(), what, found, needed }
+    }
+}
+
+/// What takes the frames that the solver lays along the curve of the built rig to the joints as they were built.
+fn corrections(rests: &[Trs], controls: &[Vec3], up: Vec3) -> Box<[Quat]> {
+    let lengths: Vec<f32> = rests.windows(2).map(|pair| pair[0].translation.distance(pair[1].translation)).collect();
+    let (mut positions, mut rotations) = (vec![Vec3::ZERO; rests.len()], vec![Quat::IDENTITY; rests.len()]);
+    let curve = Spline { kind: SplineKind::Through, points: controls };
+    frames(0.0, up).solve(&curve, &ArcTable::new(&curve), &lengths, &mut positions, &mut rotations);
+    let correction = |(frame, rest): (&Quat, &Trs)| (frame.conjugate() * rest.rotation).normalize();
+    rotations.iter().zip(rests).map(correction).collect()
+}
+
+fn joint_limit(ends: &AngleLimits) -> JointLimit {
+    if ends.iter().all(|end| *end == (None, None)) {
+        return JointLimit::Free;
+    }
+    let radians = |end: Option<f32>| end.map(f32::to_radians);
+    let bounds = Bounds::new(ends.map(|end| radians(end.0)), ends.map(|end| radians(end.1)));
+    JointLimit::Euler { order: EulerOrder::Xyz, bounds }
+}

@@ -1,0 +1,508 @@
+//! The operations of a program: small, flat, over numbered registers.
+//!
+//! Every register is written by one operation only (static single assignment): a node that several constraints drive
+//! has a register for each state in between. So an operation is a pure function of the registers it reads, and running
+//! only those whose inputs changed gives the same bits as running all.
+
+use glam::{Quat, Vec3};
+
+use crate::{
+    mesh::model::Trs,
+    rig::Channel,
+    solve::{
+        aim::Aim,
+        curve::Curve,
+        expression::Expression,
+        limit::{Bounds, JointLimit},
+    },
+};
+
+/// Register of a transform. [`X::RIG`] is the rig's own space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct X(pub u32);
+
+impl X {
+    /// The identity.
+    pub const RIG: Self = Self(0);
+}
+
+/// Register of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct N(pub u32);
+
+/// Slot of a pose offset; [`Pose::NONE`] for a node that nobody poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Pose(pub u32);
+
+impl Pose {
+    /// Stands as it was built.
+    pub const NONE: Self = Self(u32::MAX);
+}
+
+/// A piece of one of the lists of [`Tables`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Span {
+    pub start: u32,
+    pub len: u32,
+}
+
+impl Span {
+    /// As a range.
+    pub fn range(self) -> std::ops::Range<usize> {
+        self.start as usize..(self.start + self.len) as usize
+    }
+}
+
+/// One step of a program. Large ones are numbers of entries in [`Tables`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Op {
+    /// Rig transform of a node that nothing drives: its base (of the table; 0 is the identity) with its pose.
+    Node {
+        pose: Pose,
+        base: u32,
+        parent: X,
+        out: X,
+    },
+    /// Local transform of a driven node before its first constraint: base, driven channels, pose.
+    Local {
+        pose: Pose,
+        base: u32,
+        drives: Span,
+        out: X,
+    },
+    /// Driven channels on top of what earlier constraints left.
+    Drive {
+        input: X,
+        drives: Span,
+        out: X,
+    },
+    /// Rig transform of a driven node.
+    Global {
+        parent: X,
+        local: X,
+        out: X,
+    },
+    /// Turns about an axis of its own (of the table) by degrees.
+    Turn {
+        input: X,
+        axis: u32,
+        angle: N,
+        out: X,
+    },
+    /// Scales along an axis of its own and across it.
+    Scale {
+        input: X,
+        axis: u32,
+        along: N,
+        across: N,
+        out: X,
+    },
+    /// `factor * input + add`.
+    Linear {
+        input: N,
+        factor: f32,
+        add: f32,
+        out: N,
+    },
+    /// `max(0, 1 - |input - value|)`.
+    Choice {
+        input: N,
+        value: f32,
+        out: N,
+    },
+    /// A number of a pose offset.
+    Channel {
+        pose: Pose,
+        channel: Channel,
+        out: N,
+    },
+    /// `a * b`.
+    Product {
+        a: N,
+        b: N,
+        out: N,
+    },
+    /// Between two ends; `fallback` for what is not finite.
+    Clamp {
+        input: N,
+        ends: u32,
+        out: N,
+    },
+    /// Sum of a list of numbers.
+    Sum {
+        list: Span,
+        out: N,
+    },
+    Key(u32),
+    Expression(u32),
+    Foot(u32),
+    Twist(u32),
+    Stretch(u32),
+    Transform(u32),
+    Aim(u32),
+    TwoBone(u32),
+    Chain(u32),
+    Spline(u32),
+    Limit(u32),
+    Spring(u32),
+}
+
+/// Parameters of operations.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Tables {
+    pub bases: Vec<Trs>,
+    pub axes: Vec<Vec3>,
+    pub drives: Vec<(Channel, N)>,
+    pub numbers: Vec<N>,
+    pub ends: Vec<[f32; 3]>,
+    pub targets: Vec<TargetReg>,
+    pub links: Vec<Link>,
+    pub points: Vec<X>,
+    pub keys: Vec<KeyOp>,
+    pub expressions: Vec<ExpressionOp>,
+    pub feet: Vec<FootOp>,
+    pub twists: Vec<TwistOp>,
+    pub stretches: Vec<StretchOp>,
+    pub transforms: Vec<TransformOp>,
+    pub aims: Vec<AimOp>,
+    pub two_bones: Vec<TwoBoneOp>,
+    pub chains: Vec<ChainOp>,
+    pub splines: Vec<SplineOp>,
+    pub limits: Vec<LimitOp>,
+    pub springs: Vec<SpringOp>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TargetReg {
+    pub node: X,
+    pub weight: N,
+    /// `None` to lie on the target.
+    pub offset: Option<Trs>,
+}
+
+/// A joint of a chain: its local transform before and after.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Link {
+    pub input: X,
+    pub out: X,
+    /// The built base, of the table.
+    pub base: u32,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct KeyOp {
+    pub driver: N,
+    pub curve: Curve,
+    pub out: N,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ExpressionOp {
+    pub expression: Expression,
+    pub inputs: Span,
+    pub out: N,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FootOp {
+    pub roll: N,
+    pub break_angle: N,
+    pub bank: N,
+    /// Degrees for heel, ball, toe, inner and outer.
+    pub outs: [N; 5],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TwistOp {
+    pub source: X,
+    pub reference: X,
+    /// Takes a rotation relative to the reference to one relative to the built base.
+    pub rest: Quat,
+    pub axis: Vec3,
+    /// Degrees.
+    pub out: N,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StretchOp {
+    pub start: X,
+    pub end: X,
+    pub rest: f32,
+    pub range: (f32, f32),
+    pub volume: N,
+    pub weight: N,
+    pub along: N,
+    pub across: N,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TransformOp {
+    pub input: X,
+    pub parent: X,
+    /// The pose that goes on top; none where it is not kept.
+    pub pose: Pose,
+    pub targets: Span,
+    pub weight: N,
+    pub translate: [bool; 3],
+    pub rotate: [bool; 3],
+    pub scale: [bool; 3],
+    pub out: X,
+}
+
+/// Where up is for an aim.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum UpReg {
+    Direction(Vec3),
+    Point(X),
+    Axis(X, Vec3),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct AimOp {
+    pub input: X,
+    pub parent: X,
+    pub targets: Span,
+    pub aim: Aim,
+    pub up: UpReg,
+    pub offset: Quat,
+    pub weight: N,
+    pub out: X,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TwoBoneOp {
+    pub parent: X,
+    pub links: [Link; 3],
+    pub goal: X,
+    pub pole: Option<X>,
+    pub prefer: Vec3,
+    pub weight: N,
+    pub soft: N,
+    pub stretch: N,
+    pub max_stretch: f32,
+    pub twist: N,
+    pub orient_end: Option<Quat>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ChainOp {
+    pub parent: X,
+    pub links: Span,
+    pub goal: X,
+    pub pole: Option<X>,
+    /// One a joint but the last for cyclic coordinate descent; `None` for FABRIK.
+    pub limits: Option<Box<[JointLimit]>>,
+    pub iterations: u32,
+    pub tolerance: f32,
+    pub weight: N,
+    pub orient_end: Option<Quat>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct SplineOp {
+    pub parent: X,
+    pub links: Span,
+    pub points: Span,
+    /// First and last point's rotations at rest, from which twist is measured.
+    pub ends: [Quat; 2],
+    /// Direction of the first bone as it was built, in the rig's space.
+    pub along: Vec3,
+    /// A direction across it, in the space of the first point.
+    pub up: Vec3,
+    /// From the frames along the curve to the joints, as they were built.
+    pub corrections: Box<[Quat]>,
+    pub stretch: N,
+    pub twist: N,
+    pub weight: N,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LimitOp {
+    pub input: X,
+    pub base: u32,
+    pub translate: Bounds,
+    /// Radians.
+    pub rotate: Bounds,
+    pub scale: Bounds,
+    pub out: X,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SpringOp {
+    pub input: X,
+    pub parent: X,
+    pub frequency: N,
+    pub damping: N,
+    pub weight: N,
+    pub translate: bool,
+    /// Where the node's children lie, in its own space, if it swings.
+    pub tip: Option<Vec3>,
+    /// Number of its state.
+    pub state: u32,
+    pub out: X,
+}
+
+/// A register or slot that an operation names.
+pub(super) enum Operand<'a> {
+    ReadX(&'a mut X),
+    WriteX(&'a mut X),
+    ReadN(&'a mut N),
+    WriteN(&'a mut N),
+    Pose(&'a mut Pose),
+}
+
+impl Op {
+    /// Shows every operand of an operation, reads before writes.
+    pub fn visit(&mut self, tables: &mut Tables, mut f: impl FnMut(Operand<'_>)) {
+        use Operand::{ReadN, ReadX, WriteN, WriteX};
+        match self {
+            Self::Node { pose, parent, out, .. } => {
+                f(Operand::Pose(pose));
+                f(ReadX(parent));
+                f(WriteX(out));
+            }
+            Self::Local { pose, drives, out, .. } => {
+                f(Operand::Pose(pose));
+                tables.drives[drives.range()].iter_mut().for_each(|(_, value)| f(ReadN(value)));
+                f(WriteX(out));
+            }
+            Self::Drive { input, drives, out } => {
+                f(ReadX(input));
+                tables.drives[drives.range()].iter_mut().for_each(|(_, value)| f(ReadN(value)));
+                f(WriteX(out));
+            }
+            Self::Global { parent, local, out } => {
+                f(ReadX(parent));
+                f(ReadX(local));
+                f(WriteX(out));
+            }
+            Self::Turn { input, angle, out, .. } => {
+                f(ReadX(input));
+                f(ReadN(angle));
+                f(WriteX(out));
+            }
+            Self::Scale { input, along, across, out, .. } => {
+                f(ReadX(input));
+                f(ReadN(along));
+                f(ReadN(across));
+                f(WriteX(out));
+            }
+            Self::Linear { input, out, .. } | Self::Choice { input, out, .. } | Self::Clamp { input, out, .. } => {
+                f(ReadN(input));
+                f(WriteN(out));
+            }
+            Self::Channel { pose, out, .. } => {
+                f(Operand::Pose(pose));
+                f(WriteN(out));
+            }
+            Self::Product { a, b, out } => {
+                f(ReadN(a));
+                f(ReadN(b));
+                f(WriteN(out));
+            }
+            Self::Sum { list, out } => {
+                tables.numbers[list.range()].iter_mut().for_each(|value| f(ReadN(value)));
+                f(WriteN(out));
+            }
+            Self::Key(at) => {
+                let op = &mut tables.keys[*at as usize];
+                f(ReadN(&mut op.driver));
+                f(WriteN(&mut op.out));
+            }
+            Self::Expression(at) => {
+                let op = &mut tables.expressions[*at as usize];
+                tables.numbers[op.inputs.range()].iter_mut().for_each(|value| f(ReadN(value)));
+                f(WriteN(&mut op.out));
+            }
+            Self::Foot(at) => {
+                let op = &mut tables.feet[*at as usize];
+                [&mut op.roll, &mut op.break_angle, &mut op.bank].into_iter().for_each(|value| f(ReadN(value)));
+                op.outs.iter_mut().for_each(|value| f(WriteN(value)));
+            }
+            Self::Twist(at) => {
+                let op = &mut tables.twists[*at as usize];
+                f(ReadX(&mut op.source));
+                f(ReadX(&mut op.reference));
+                f(WriteN(&mut op.out));
+            }
+            Self::Stretch(at) => {
+                let op = &mut tables.stretches[*at as usize];
+                f(ReadX(&mut op.start));
+                f(ReadX(&mut op.end));
+                f(ReadN(&mut op.volume));
+                f(ReadN(&mut op.weight));
+                f(WriteN(&mut op.along));
+                f(WriteN(&mut op.across));
+            }
+            Self::Transform(at) => {
+                let op = &mut tables.transforms[*at as usize];
+                f(ReadX(&mut op.input));
+                f(ReadX(&mut op.parent));
+                f(Operand::Pose(&mut op.pose));
+                targets(&mut tables.targets[op.targets.range()], &mut f);
+                f(ReadN(&mut op.weight));
+                f(WriteX(&mut op.out));
+            }
+            Self::Aim(at) => {
+                let op = &mut tables.aims[*at as usize];
+                f(ReadX(&mut op.input));
+                f(ReadX(&mut op.parent));
+                targets(&mut tables.targets[op.targets.range()], &mut f);
+                if let UpReg::Point(x) | UpReg::Axis(x, _) = &mut op.up {
+                    f(ReadX(x));
+                }
+                f(ReadN(&mut op.weight));
+                f(WriteX(&mut op.out));
+            }
+            Self::TwoBone(at) => {
+                let op = &mut tables.two_bones[*at as usize];
+                f(ReadX(&mut op.parent));
+                f(ReadX(&mut op.goal));
+                op.pole.iter_mut().for_each(|pole| f(ReadX(pole)));
+                [&mut op.weight, &mut op.soft, &mut op.stretch, &mut op.twist]
+                    .into_iter()
+                    .for_each(|value| f(ReadN(value)));
+                links(&mut op.links, &mut f);
+            }
+            Self::Chain(at) => {
+                let op = &mut tables.chains[*at as usize];
+                f(ReadX(&mut op.parent));
+                f(ReadX(&mut op.goal));
+                op.pole.iter_mut().for_each(|pole| f(ReadX(pole)));
+                f(ReadN(&mut op.weight));
+                links(&mut tables.links[op.links.range()], &mut f);
+            }
+            Self::Spline(at) => {
+                let op = &mut tables.splines[*at as usize];
+                f(ReadX(&mut op.parent));
+                tables.points[op.points.range()].iter_mut().for_each(|point| f(ReadX(point)));
+                [&mut op.stretch, &mut op.twist, &mut op.weight].into_iter().for_each(|value| f(ReadN(value)));
+                links(&mut tables.links[op.links.range()], &mut f);
+            }
+            Self::Limit(at) => {
+                let op = &mut tables.limits[*at as usize];
+                f(ReadX(&mut op.input));
+                f(WriteX(&mut op.out));
+            }
+            Self::Spring(at) => {
+                let op = &mut tables.springs[*at as usize];
+                f(ReadX(&mut op.input));
+                f(ReadX(&mut op.parent));
+                [&mut op.frequency, &mut op.damping, &mut op.weight].into_iter().for_each(|value| f(ReadN(value)));
+                f(WriteX(&mut op.out));
+            }
+        }
+    }
+}
+
+fn targets(list: &mut [TargetReg], f: &mut impl FnMut(Operand<'_>)) {
+    for target in list {
+        f(Operand::ReadX(&mut target.node));
+        f(Operand::ReadN(&mut target.weight));
+    }
+}
+
+fn links(list: &mut [Link], f: &mut impl FnMut(Operand<'_>)) {
+    list.iter_mut().for_each(|link| f(Operand::ReadX(&mut link.input)));
+    list.iter_mut().for_each(|link| f(Operand::WriteX(&mut link.out)));
+}

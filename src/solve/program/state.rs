@@ -1,0 +1,398 @@
+//! What differs between instances of a program.
+
+use std::{cell::RefCell, sync::Arc};
+
+use glam::{Affine3A, Vec3};
+
+use super::{
+    ContentHash, RigProgram, StateError,
+    graph::valid,
+    run::{Machine, Scratch, on},
+};
+use crate::{
+    mesh::model::Trs,
+    rig::{PoseOffset, Uid},
+    solve::{spring::PointSpring, weights::relative},
+};
+
+/// Past this share of operations that certainly run (one in so many), all are run without looking at what changed.
+const FULL: usize = 6;
+
+/// What a state remembers between evaluations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Memory {
+    /// Everything: an evaluation runs only what its inputs changed. For editing.
+    #[default]
+    Whole,
+    /// Inputs and results: an evaluation runs all, in memory that instances of a thread share. For crowds.
+    Results,
+}
+
+/// A spring between evaluations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SpringState {
+    /// False until it was put where its node is.
+    pub started: bool,
+    pub origin: PointSpring,
+    pub tip: PointSpring,
+}
+
+impl Default for SpringState {
+    fn default() -> Self {
+        let still = PointSpring::at(Vec3::ZERO);
+        Self { started: false, origin: still, tip: still }
+    }
+}
+
+impl SpringState {
+    /// True if time alone changes nothing.
+    fn is_settled(&self) -> bool {
+        let rests =
+            |point: &PointSpring| point.velocity == Vec3::ZERO && point.position == point.target && point.left == 0.0;
+        self.started && rests(&self.origin) && rests(&self.tip)
+    }
+}
+
+/// One instance of a [`RigProgram`]: its inputs, its results, and what is between. Cloning copies a few flat lists.
+///
+/// Transforms are in the rig's space unless said otherwise; slots are those of the program's lists.
+#[derive(Debug, Clone)]
+pub struct RigState {
+    program: Arc<RigProgram>,
+    memory: Memory,
+    poses: Vec<PoseOffset>,
+    springs: Vec<SpringState>,
+    /// Registers; only the first of them where results are all that is remembered.
+    x: Vec<Trs>,
+    n: Vec<f32>,
+    /// A bit for each operation that has to run.
+    dirty: Vec<u64>,
+    /// True if all have to run.
+    all_dirty: bool,
+    /// True if any has to run.
+    any_dirty: bool,
+    /// A bit for each node register whose transform the last evaluation changed.
+    moved: Vec<u64>,
+}
+
+/// Registers and memory that instances of a thread share.
+#[derive(Default)]
+struct Workspace {
+    /// The program whose registers these are.
+    serial: u64,
+    x: Vec<Trs>,
+    n: Vec<f32>,
+    scratch: Scratch,
+}
+
+thread_local! {
+    static WORKSPACE: RefCell<Workspace> = RefCell::default();
+}
+
+impl RigState {
+    /// An instance as it was built, that remembers everything.
+    pub fn new(program: Arc<RigProgram>) -> Self {
+        Self::with_memory(program, Memory::Whole)
+    }
+
+    /// An instance as it was built. Its results are there after the first evaluation.
+    pub fn with_memory(program: Arc<RigProgram>, memory: Memory) -> Self {
+        let nodes = program.nodes.len() + 1;
+        let (mut x, mut n) = (program.x.clone(), program.n.clone());
+        if memory == Memory::Results {
+            x.truncate(nodes + program.inputs.len());
+            n.truncate(program.attributes.len() + program.morphs.len());
+            x.shrink_to_fit();
+            n.shrink_to_fit();
+        }
+        let operations = if memory == Memory::Whole { program.ops.len() } else { 0 };
+        Self {
+            memory,
+            poses: vec![PoseOffset::IDENTITY; program.poses],
+            springs: vec![SpringState::default(); program.spring_ops.len()],
+            x,
+            n,
+            dirty: vec![0; operations.div_ceil(64)],
+            all_dirty: true,
+            any_dirty: true,
+            moved: vec![0; nodes.div_ceil(64)],
+            program,
+        }
+    }
+
+    /// The program.
+    pub fn program(&self) -> &Arc<RigProgram> {
+        &self.program
+    }
+
+    /// The hash of the program.
+    pub fn hash(&self) -> ContentHash {
+        self.program.hash
+    }
+
+    /// True if an evaluation would do something: an input changed, or, if time passes, a spring moves.
+    pub fn is_dirty(&self, dt: f32) -> bool {
+        self.any_dirty || (dt > 0.0 && self.springs.iter().any(|spring| !spring.is_settled()))
+    }
+
+    /// Makes the next evaluation run everything.
+    pub fn mark_all(&mut self) {
+        self.all_dirty = true;
+        self.any_dirty = true;
+    }
+
+    /// Poses a node.
+    ///
+    /// # Errors
+    ///
+    /// If the program has no such node or it takes no pose, or if the offset is not finite.
+    pub fn set_offset(&mut self, node: Uid, offset: PoseOffset) -> Result<(), StateError> {
+        let slot = self.program.node(node).ok_or(StateError::UnknownNode(node))?;
+        if !self.program.nodes[slot].is_posable() {
+            return Err(StateError::NotPosable(node));
+        }
+        if !offset.is_valid() {
+            return Err(StateError::NotFinite(node));
+        }
+        self.set_offset_at(slot, offset);
+        Ok(())
+    }
+
+    /// Poses the node of a slot; false if it takes no pose or the offset is not finite.
+    pub fn set_offset_at(&mut self, slot: usize, offset: PoseOffset) -> bool {
+        let Some(node) = self.program.nodes.get(slot) else { return false };
+        let Some(known) = self.poses.get_mut(node.pose.0 as usize) else { return false };
+        if *known == offset {
+            return true;
+        }
+        if !offset.is_valid() {
+            return false;
+        }
+        *known = offset;
+        mark(&mut self.dirty, self.program.pose_readers.get(node.pose.0 as usize));
+        self.any_dirty = true;
+        true
+    }
+
+    /// The pose of a slot; as built for a node that takes none.
+    pub fn offset_at(&self, slot: usize) -> PoseOffset {
+        let node = self.program.nodes.get(slot);
+        node.and_then(|node| self.poses.get(node.pose.0 as usize)).copied().unwrap_or_default()
+    }
+
+    /// Sets an attribute to the nearest value that it can have.
+    ///
+    /// # Errors
+    ///
+    /// If the program has no such attribute or a constraint gives its value, or if the value is not finite.
+    pub fn set_attribute(&mut self, node: Uid, name: &str, value: f32) -> Result<(), StateError> {
+        if !value.is_finite() {
+            return Err(StateError::NotFinite(node));
+        }
+        let slot = self.program.attribute(node, name);
+        if slot.is_some_and(|slot| self.set_attribute_at(slot, value)) {
+            return Ok(());
+        }
+        Err(StateError::UnknownAttribute { node, name: name.to_owned() })
+    }
+
+    /// Sets the attribute of a slot to the nearest value that it can have; false if it cannot be set.
+    pub fn set_attribute_at(&mut self, slot: usize, value: f32) -> bool {
+        let Some(attribute) = self.program.attributes.get(slot).filter(|attribute| attribute.is_settable) else {
+            return false;
+        };
+        let value = attribute.kind.clamp(value, attribute.default);
+        if self.n[slot].to_bits() != value.to_bits() {
+            self.n[slot] = value;
+            mark(&mut self.dirty, self.program.attribute_readers.get(slot));
+            self.any_dirty = true;
+        }
+        true
+    }
+
+    /// Says where an input is, in the rig's space.
+    ///
+    /// # Errors
+    ///
+    /// If the program has no such input, or the transform is not finite.
+    pub fn set_input(&mut self, node: Uid, transform: Trs) -> Result<(), StateError> {
+        let slot = self.program.input(node).ok_or(StateError::UnknownInput(node))?;
+        if self.set_input_at(slot, transform) { Ok(()) } else { Err(StateError::NotFinite(node)) }
+    }
+
+    /// Says where the input of a slot is, in the rig's space; false if there is none or the transform is not finite.
+    pub fn set_input_at(&mut self, slot: usize, transform: Trs) -> bool {
+        if slot >= self.program.inputs.len() || !valid(&transform) {
+            return false;
+        }
+        let register = self.program.nodes.len() + 1 + slot;
+        if !super::run::same_bits(&self.x[register], &transform) {
+            self.x[register] = transform;
+            mark(&mut self.dirty, self.program.input_readers.get(slot));
+            self.any_dirty = true;
+        }
+        true
+    }
+
+    /// Evaluates what changed, after `dt` seconds (springs move by it; other numbers than those above zero count as
+    /// zero). True if anything ran.
+    ///
+    /// The results are the same bits whatever was evaluated before, and whichever of the instance's inputs changed.
+    /// Does not allocate once each thread has evaluated the program.
+    pub fn evaluate(&mut self, dt: f32) -> bool {
+        let dt = if dt > 0.0 && dt.is_finite() { dt } else { 0.0 };
+        if !self.is_dirty(dt) {
+            return false;
+        }
+        self.moved.fill(0);
+        WORKSPACE.with_borrow_mut(|workspace| match self.memory {
+            Memory::Whole => self.evaluate_whole(dt, &mut workspace.scratch),
+            Memory::Results => self.evaluate_results(dt, workspace),
+        });
+        self.any_dirty = false;
+        self.all_dirty = false;
+        true
+    }
+
+    fn evaluate_whole(&mut self, dt: f32, scratch: &mut Scratch) {
+        let Self { program, dirty, x, n, poses, springs, moved, .. } = self;
+        if dt > 0.0 {
+            for (op, state) in program.spring_ops.iter().zip(springs.iter()) {
+                if *op != u32::MAX && !state.is_settled() {
+                    mark(dirty, &[*op]);
+                }
+            }
+        }
+        let certain: u32 = dirty.iter().map(|word| word.count_ones()).sum();
+        if self.all_dirty || certain as usize * FULL > program.ops.len() {
+            dirty.fill(0);
+            moved.fill(u64::MAX);
+            let tables = &program.tables;
+            let mut machine =
+                Machine::<false> { tables, x, n, poses, springs, scratch, dt, changed: false, moved: &mut [] };
+            program.ops.iter().for_each(|op| machine.run(op));
+            return;
+        }
+        let tables = &program.tables;
+        let mut machine = Machine::<true> { tables, x, n, poses, springs, scratch, dt, changed: false, moved };
+        for word in 0..dirty.len() {
+            while dirty[word] != 0 {
+                let bit = dirty[word].trailing_zeros() as usize;
+                dirty[word] &= dirty[word] - 1;
+                let at = word * 64 + bit;
+                machine.changed = false;
+                machine.run(&program.ops[at]);
+                if machine.changed {
+                    // Readers come later, so none is missed.
+                    mark(dirty, program.op_readers.get(at));
+                }
+            }
+        }
+    }
+
+    fn evaluate_results(&mut self, dt: f32, workspace: &mut Workspace) {
+        let Self { program, x, n, poses, springs, moved, .. } = self;
+        let Workspace { serial, x: whole_x, n: whole_n, scratch } = workspace;
+        if *serial != program.serial {
+            whole_x.clone_from(&program.x);
+            whole_n.clone_from(&program.n);
+            *serial = program.serial;
+        }
+        let nodes = program.nodes.len() + 1;
+        whole_x[nodes..x.len()].copy_from_slice(&x[nodes..]);
+        whole_n[..n.len()].copy_from_slice(n);
+        let tables = &program.tables;
+        let mut machine = Machine::<false> {
+            tables,
+            x: whole_x,
+            n: whole_n,
+            poses,
+            springs,
+            scratch,
+            dt,
+            changed: false,
+            moved: &mut [],
+        };
+        program.ops.iter().for_each(|op| machine.run(op));
+        x[..nodes].copy_from_slice(&whole_x[..nodes]);
+        let numbers = n.len();
+        n.copy_from_slice(&whole_n[..numbers]);
+        moved.fill(u64::MAX);
+    }
+
+    /// Where a node is; `None` if the program does not have it.
+    pub fn global(&self, node: Uid) -> Option<Trs> {
+        self.program.node(node).map(|slot| *self.global_at(slot))
+    }
+
+    /// Where the node of a slot is. The slot must be one of the program's.
+    pub fn global_at(&self, slot: usize) -> &Trs {
+        &self.globals()[slot]
+    }
+
+    /// Where all nodes are, by slot.
+    pub fn globals(&self) -> &[Trs] {
+        &self.x[1..=self.program.nodes.len()]
+    }
+
+    /// Where the node of a slot is relative to its parent (to the rig, if the program does not keep the parent). The
+    /// slot must be one of the program's.
+    pub fn local_at(&self, slot: usize) -> Trs {
+        let node = &self.program.nodes[slot];
+        if self.program.nodes.len() != self.program.poses || self.memory == Memory::Results {
+            // Of a program that leaves nodes out, parents may be missing.
+            let Some(parent) = node.parent else { return *self.global_at(slot) };
+            return relative(self.global_at(parent), self.global_at(slot));
+        }
+        match node.local {
+            Some(local) => self.x[local.0 as usize],
+            None => {
+                let offset = self.offset_at(slot);
+                if offset == PoseOffset::IDENTITY { node.base } else { on(&offset, &node.base) }
+            }
+        }
+    }
+
+    /// Slots of nodes whose place the last evaluation changed (or may have changed).
+    pub fn moved(&self) -> impl Iterator<Item = usize> {
+        let count = self.program.nodes.len();
+        // The first register is the rig's space.
+        (0..count).filter(|slot| self.moved[(slot + 1) / 64] & (1 << ((slot + 1) % 64)) != 0)
+    }
+
+    /// The value of an attribute, after what constraints do to it.
+    pub fn attribute(&self, node: Uid, name: &str) -> Option<f32> {
+        self.program.attribute(node, name).map(|slot| self.n[slot])
+    }
+
+    /// The value of the attribute of a slot, after what constraints do to it. The slot must be one of the program's.
+    pub fn attribute_at(&self, slot: usize) -> f32 {
+        self.n[slot]
+    }
+
+    /// Weights of the morph targets, by slot.
+    pub fn morphs(&self) -> &[f32] {
+        let first = self.program.attributes.len();
+        &self.n[first..first + self.program.morphs.len()]
+    }
+
+    /// Multiplies inverse bind matrices with where joints are: what a skinned mesh in the rig's space is moved by.
+    /// `joints` are slots; lists are used as far as the shortest goes.
+    pub fn skin_matrices(&self, joints: &[u32], inverse_binds: &[Affine3A], out: &mut [Affine3A]) {
+        let globals = self.globals();
+        for ((joint, bind), out) in joints.iter().zip(inverse_binds).zip(out) {
+            *out = globals[*joint as usize].affine() * *bind;
+        }
+    }
+}
+
+/// Sets bits.
+#[inline]
+fn mark(bits: &mut [u64], items: &[u32]) {
+    for item in items {
+        // A state that remembers results only has no bits.
+        if let Some(word) = bits.get_mut(*item as usize / 64) {
+            *word |= 1 << (item % 64);
+        }
+    }
+}
