@@ -8,8 +8,10 @@
 //!
 //! Modules see the world through a [`BuildScope`] only. Nothing here knows an `App`.
 
+mod amount;
 mod creation;
 mod error;
+mod ik;
 mod list;
 mod module;
 mod processor;
@@ -18,8 +20,10 @@ mod scope;
 mod snapshot;
 mod world;
 
+pub use amount::Amount;
 pub use creation::Creation;
 pub use error::{BuildError, BuildProblem, ModuleError};
+pub use ik::{Ik, IkSolver, JointAngles};
 pub use list::{BuildRange, ListEntry};
 pub use module::{DynModule, ModuleInfo, Modules, Parameter, RigModule};
 pub use processor::{Builder, CommandState, CommandStatus, RunReport};

@@ -5,12 +5,16 @@
 //! [`Modules::add`].
 
 pub mod attribute;
+pub mod ik_fk_switch;
+pub mod ik_handle;
 
 use crate::build::Modules;
 
 /// Registers every module of this crate.
 pub fn register(modules: &mut Modules) {
     modules.add::<attribute::AttributeModule>();
+    modules.add::<ik_fk_switch::IkFkSwitch>();
+    modules.add::<ik_handle::IkHandle>();
 }
 
 /// Every module of this crate.

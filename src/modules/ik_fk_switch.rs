@@ -1,0 +1,194 @@
+//! `ik_fk_switch`: a limb that follows its joints' controls, a goal, or anything between.
+
+use bevy::reflect::Reflect;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{Amount, BuildScope, Ik, IkSolver, ModuleError, RigModule},
+    rig::{
+        AttributeKind, Constraint, Matching, Scalar, SwitchData, Target,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Moves a limb by forward or inverse kinematics, as an attribute says; thrown without a jump.
+///
+/// The joints follow their forward controls, and the inverse kinematics come on top of that with the attribute as their
+/// weight. Everything is made here: no `ik_handle` or `parent` is needed for these joints.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::ik_fk_switch::IkFkSwitch};
+/// let params = r#"(
+///     start: "@joint upper_arm_l#0000000000000001",
+///     end: "@joint hand_l#0000000000000003",
+///     fk: "@command control/upper_arm_l#00000000000000a0",
+///     goal: "@command control/hand_l#00000000000000aa",
+///     pole: "@command control/elbow_l#00000000000000ab",
+///     control: "@command control/arm_settings_l#00000000000000ac",
+///     stretch: "stretch",
+/// )"#;
+/// # rigsmith::modules::all().load(IkFkSwitch::NAME, params).map(|_| ()).unwrap();
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct IkFkSwitch {
+    /// First joint of the limb.
+    pub start: NodeRefs,
+    /// Last joint of the limb.
+    pub end: NodeRefs,
+    /// A control for each joint, in order.
+    pub fk: NodeRefs,
+    /// Where the end goes.
+    pub goal: NodeRefs,
+    /// The side to which the limb bends.
+    pub pole: NodeRefs,
+    /// The control that carries the attributes.
+    pub control: NodeRefs,
+    /// Name of the attribute that switches.
+    pub attribute: String,
+    /// Its value until somebody sets another.
+    pub default: f32,
+    /// The joints below the first follow their controls' positions, too.
+    pub translate: bool,
+    /// The first joint follows its control's position, too.
+    pub translate_root: bool,
+    /// How the goal is reached.
+    pub solver: IkSolver,
+    /// Share of the length over which two bones ease into being straight.
+    pub soft: Amount,
+    /// How far two bones lengthen towards the goal.
+    pub stretch: Amount,
+    /// Longest stretch.
+    pub max_stretch: f32,
+    /// Turn about the line to the goal.
+    pub twist: Amount,
+    /// The end turns with the goal.
+    pub orient_end: bool,
+    /// Bend of a straight limb.
+    pub prefer: Option<Vec3>,
+}
+
+impl Default for IkFkSwitch {
+    fn default() -> Self {
+        Self {
+            start: NodeRef::this().into(),
+            end: NodeRefs::NONE,
+            fk: NodeRefs::NONE,
+            goal: NodeRefs::NONE,
+            pole: NodeRefs::NONE,
+            control: NodeRefs::NONE,
+            attribute: "ik_fk".to_owned(),
+            default: 1.0,
+            translate: true,
+            translate_root: false,
+            solver: IkSolver::Auto,
+            soft: Amount::Value(0.0),
+            stretch: Amount::Value(0.0),
+            max_stretch: 2.0,
+            twist: Amount::Value(0.0),
+            orient_end: true,
+            prefer: None,
+        }
+    }
+}
+
+impl RigModule for IkFkSwitch {
+    const NAME: &'static str = "ik_fk_switch";
+    const DOC: &'static str = "Moves a limb by its joints' own controls (0) or by a goal (1), as an attribute says; the \
+                               switch can be thrown without a jump.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("start", "The first joint of the limb, such as a shoulder."),
+        ("end", "The last joint of the limb, such as a wrist."),
+        ("fk", "A control for each joint from start to end, in that order."),
+        ("goal", "The control or null that the end goes to by inverse kinematics."),
+        ("pole", "A control on the side to which the limb bends; none: it bends as the forward controls say."),
+        ("control", "The control that carries the attributes; the goal if left out."),
+        ("attribute", "Name of the attribute that switches: 0 forward, 1 inverse. Added if the control lacks it."),
+        ("default", "Its value until somebody sets another, 0 to 1."),
+        ("translate", "The joints below the first follow the positions of their controls, too: needed for stretching."),
+        ("translate_root", "The first joint follows the position of its control, too, and leaves its parent with it."),
+        ("solver", "auto, two_bone (three joints), fabrik or ccd (any number)."),
+        ("soft", "Share of the length, 0 to 1, over which two bones ease into being straight; or an attribute's name."),
+        ("stretch", "0 keeps the lengths of two bones, 1 stretches them to the goal; or an attribute's name."),
+        ("max_stretch", "Longest stretch as a factor, 1 or more."),
+        ("twist", "Turn of two bones about the line to the goal in degrees; or an attribute's name."),
+        ("orient_end", "The end turns with the goal, keeping how the two stand to each other as built."),
+        (
+            "prefer",
+            "Direction in the rig's space in which a straight limb bends; as built, or to the pole, if left out.",
+        ),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        let start = scope.resolve_one("start", &self.start)?;
+        let end = scope.resolve_one("end", &self.end)?;
+        let chain = scope.chain(start, end)?;
+        let fk = scope.resolve_some("fk", &self.fk)?;
+        if fk.len() != chain.len() {
+            let problem = format!(
+                "finds {} controls for the {} joints from {} to {}; give one for each joint, in that order",
+                fk.len(),
+                chain.len(),
+                scope.name(start),
+                scope.name(end)
+            );
+            return Err(ModuleError::reference("fk", &self.fk, problem));
+        }
+        let goal = scope.resolve_one("goal", &self.goal)?;
+        let pole = scope.resolve_maybe("pole", &self.pole)?;
+        let control = scope.resolve_maybe("control", &self.control)?.unwrap_or(goal);
+        scope.in_range("default", self.default, 0.0..=1.0)?;
+        let kind = AttributeKind::Number { min: Some(0.0), max: Some(1.0) };
+        let weight = scope.ensure_attribute(control, &self.attribute, kind, self.default)?;
+
+        for (number, (joint, control)) in chain.iter().zip(&fk).enumerate() {
+            let translate = if number == 0 { self.translate_root } else { self.translate };
+            let target = Target {
+                node: scope.uid(*control),
+                weight: Scalar::Value(1.0),
+                offset: scope.kept_offset(*joint, *control),
+            };
+            let constraint = Constraint::Transform {
+                driven: scope.uid(*joint),
+                targets: vec![target],
+                translate: [translate; 3],
+                rotate: [true; 3],
+                scale: [false; 3],
+                weight: Scalar::Value(1.0),
+                keep_pose: false,
+            };
+            scope.constrain("fk", *joint, 0, constraint)?;
+        }
+        scope.add_ik(&Ik {
+            pole,
+            control: Some(control),
+            solver: self.solver,
+            prefer: self.prefer,
+            weight,
+            soft: self.soft.clone(),
+            stretch: self.stretch.clone(),
+            max_stretch: self.max_stretch,
+            twist: self.twist.clone(),
+            orient_end: self.orient_end,
+            ..Ik::new(chain.clone(), goal)
+        })?;
+        let switch = SwitchData {
+            command: scope.command(),
+            control: scope.uid(control),
+            attribute: self.attribute.as_str().into(),
+            matching: Matching::IkFk {
+                joints: chain.iter().map(|joint| scope.uid(*joint)).collect(),
+                fk: fk.iter().map(|control| scope.uid(*control)).collect(),
+                goal: scope.uid(goal),
+                goal_offset: scope.kept_offset(end, goal),
+                pole: pole.map(|pole| scope.uid(pole)),
+            },
+        };
+        scope.switch("switch", start, switch)
+    }
+
+    fn mirror(&mut self) {
+        self.prefer = self.prefer.map(|prefer| prefer * Vec3::new(-1.0, 1.0, 1.0));
+    }
+}

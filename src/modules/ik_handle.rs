@@ -1,0 +1,141 @@
+//! `ik_handle`: a chain of joints that reaches for a goal.
+
+use bevy::reflect::Reflect;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{Amount, BuildScope, Ik, IkSolver, JointAngles, ModuleError, RigModule},
+    rig::reference::{NodeRef, NodeRefs},
+};
+
+/// Makes a chain of joints reach for a goal.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::ik_handle::IkHandle};
+/// let params = r#"(
+///     start: "@this",
+///     end: "@joint hand_l#0000000000000003",
+///     goal: "@command control/hand_l#00000000000000aa",
+///     pole: "@command control/elbow_l#00000000000000ab",
+///     soft: 0.02,
+///     stretch: "stretch",
+/// )"#;
+/// # rigsmith::modules::all().load(IkHandle::NAME, params).map(|_| ()).unwrap();
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct IkHandle {
+    /// First joint of the chain.
+    pub start: NodeRefs,
+    /// Last joint of the chain: what reaches the goal.
+    pub end: NodeRefs,
+    /// Where the end goes.
+    pub goal: NodeRefs,
+    /// The side to which the chain bends.
+    pub pole: NodeRefs,
+    /// The control whose attributes the numbers below may name.
+    pub control: NodeRefs,
+    /// How the goal is reached.
+    pub solver: IkSolver,
+    /// Share of the reach.
+    pub weight: Amount,
+    /// Share of the length over which two bones ease into being straight.
+    pub soft: Amount,
+    /// How far two bones lengthen towards the goal.
+    pub stretch: Amount,
+    /// Longest stretch.
+    pub max_stretch: f32,
+    /// Turn about the line to the goal.
+    pub twist: Amount,
+    /// The end turns with the goal.
+    pub orient_end: bool,
+    /// Bend of a straight chain.
+    pub prefer: Option<Vec3>,
+    /// Limits of the joints.
+    pub limits: Vec<JointAngles>,
+    /// Rounds of the solver.
+    pub iterations: u32,
+    /// Nearness to the goal.
+    pub tolerance: f32,
+}
+
+impl Default for IkHandle {
+    fn default() -> Self {
+        Self {
+            start: NodeRef::this().into(),
+            end: NodeRefs::NONE,
+            goal: NodeRefs::NONE,
+            pole: NodeRefs::NONE,
+            control: NodeRefs::NONE,
+            solver: IkSolver::Auto,
+            weight: Amount::Value(1.0),
+            soft: Amount::Value(0.0),
+            stretch: Amount::Value(0.0),
+            max_stretch: 2.0,
+            twist: Amount::Value(0.0),
+            orient_end: true,
+            prefer: None,
+            limits: Vec::new(),
+            iterations: 24,
+            tolerance: 1e-4,
+        }
+    }
+}
+
+impl RigModule for IkHandle {
+    const NAME: &'static str = "ik_handle";
+    const DOC: &'static str = "Makes a chain of joints reach for a goal: two bones exactly, longer chains in rounds.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("start", "The first joint of the chain, such as a shoulder."),
+        ("end", "The last joint of the chain, such as a wrist: what reaches the goal."),
+        ("goal", "The control or null that the end goes to."),
+        ("pole", "A control or null on the side to which the chain bends; none: it bends as it stands."),
+        ("control", "The control whose attributes the numbers may name; the goal if left out."),
+        ("solver", "auto, two_bone (three joints), fabrik or ccd (any number; ccd keeps limits)."),
+        ("weight", "0 leaves the chain as it is, 1 reaches; a number or an attribute's name."),
+        ("soft", "Share of the length, 0 to 1, over which two bones ease into being straight; or an attribute's name."),
+        ("stretch", "0 keeps the lengths of two bones, 1 stretches them to the goal; or an attribute's name."),
+        ("max_stretch", "Longest stretch as a factor, 1 or more."),
+        ("twist", "Turn of two bones about the line to the goal in degrees; or an attribute's name."),
+        ("orient_end", "The end turns with the goal, keeping how the two stand to each other as built."),
+        (
+            "prefer",
+            "Direction in the rig's space in which a straight chain bends; as built, or to the pole, if left out.",
+        ),
+        ("limits", "For ccd: lowest and highest angles in degrees about X, Y and Z of each joint, from the first on."),
+        ("iterations", "For fabrik and ccd: rounds at most, 1 to 1000."),
+        ("tolerance", "For fabrik and ccd: distance from the goal that is near enough, as a share of the length."),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        let start = scope.resolve_one("start", &self.start)?;
+        let end = scope.resolve_one("end", &self.end)?;
+        let chain = scope.chain(start, end)?;
+        let goal = scope.resolve_one("goal", &self.goal)?;
+        let pole = scope.resolve_maybe("pole", &self.pole)?;
+        let control = scope.resolve_maybe("control", &self.control)?;
+        let weight = scope.amount("weight", &self.weight, Some(control.unwrap_or(goal)), 0.0..=1.0, 1.0)?;
+        scope.add_ik(&Ik {
+            pole,
+            control,
+            solver: self.solver,
+            prefer: self.prefer,
+            weight,
+            soft: self.soft.clone(),
+            stretch: self.stretch.clone(),
+            max_stretch: self.max_stretch,
+            twist: self.twist.clone(),
+            orient_end: self.orient_end,
+            limits: self.limits.clone(),
+            iterations: self.iterations,
+            tolerance: self.tolerance,
+            ..Ik::new(chain, goal)
+        })?;
+        Ok(())
+    }
+
+    fn mirror(&mut self) {
+        self.prefer = self.prefer.map(|prefer| prefer * Vec3::new(-1.0, 1.0, 1.0));
+    }
+}
