@@ -201,8 +201,7 @@ impl Builder {
                 NodeKind::Null => NodeType::Null,
             };
             let label: Option<Arc<str>> = data.label.as_deref().map(Into::into);
-            let name = label.clone().unwrap_or_else(|| data.uid.to_string().into());
-            let birth = Birth { kind, name, origin: None, order: order as u32 };
+            let birth = Birth { kind, name: None, origin: None, order: order as u32 };
             self.set_document(node, Aspect::Birth, Some(Value::Birth(Arc::new(birth))));
             self.set_document(node, Aspect::Parent, Some(Value::Parent(parent)));
             self.set_document(node, Aspect::Base, Some(Value::Base(base)));
@@ -269,6 +268,7 @@ impl Builder {
             return;
         }
         // With other places, everything may read something else, and everything has to be looked at.
+        let had_any = !self.list.is_empty();
         let reached = self.list.get(self.cursor as usize).copied();
         for number in std::mem::replace(&mut self.list, list) {
             self.world.places[number as usize] = NOWHERE;
@@ -283,7 +283,8 @@ impl Builder {
         }
         self.graph_changed = Some(0);
         let still = reached.map(|number| self.world.places[number as usize]).filter(|place| *place != NOWHERE);
-        self.cursor = still.unwrap_or(self.list.len() as u32).min(self.list.len() as u32);
+        let end = if had_any { self.list.len() as u32 } else { 0 };
+        self.cursor = still.unwrap_or(end);
         if self.failed.is_some_and(|number| self.world.places[number as usize] == NOWHERE) {
             self.failed = None;
         }
@@ -350,9 +351,14 @@ impl Builder {
         self.list.is_empty()
     }
 
-    /// How many commands are in effect: those before this place in the list.
+    /// How many commands are in effect: those before this place in the list. After a change of the document that may be
+    /// fewer than before, until the next run.
     pub fn cursor(&self) -> usize {
-        self.cursor as usize
+        let waiting = |Reverse((place, number)): &Reverse<(u32, u32)>| {
+            let is_due = self.commands[*number as usize].due != Due::Nothing;
+            (is_due && self.world.places[*number as usize] == *place).then_some(*place)
+        };
+        self.due.iter().filter_map(waiting).min().map_or(self.cursor, |due| due.min(self.cursor)) as usize
     }
 
     /// What is known about a command; `None` if it is not in the list.
@@ -360,9 +366,10 @@ impl Builder {
         let number = self.world.creator_of(tag)?;
         let place = Some(self.world.places[number as usize]).filter(|place| *place != NOWHERE)?;
         let command = &self.commands[number as usize];
+        let cursor = self.cursor() as u32;
         let state = match () {
-            () if self.failed == Some(number) && place == self.cursor => CommandState::Failed,
-            () if place >= self.cursor => CommandState::Pending,
+            () if self.failed == Some(number) && place == cursor => CommandState::Failed,
+            () if place >= cursor => CommandState::Pending,
             () if !command.active => CommandState::Skipped,
             () => CommandState::Done,
         };
@@ -391,7 +398,7 @@ impl Builder {
 
     /// Goes on to the next breakpoint, or to the end. Starts over a breakpoint that it stands at.
     pub fn run(&mut self) -> RunReport {
-        let from = (self.cursor as usize + 1).min(self.list.len());
+        let from = (self.cursor() + 1).min(self.list.len());
         let stop = self.list[from..]
             .iter()
             .position(|number| self.breakpoints.contains(&self.world.commands[*number as usize]));
@@ -400,17 +407,17 @@ impl Builder {
 
     /// Carries out the next command.
     pub fn step_forward(&mut self) -> RunReport {
-        self.run_to(self.cursor as usize + 1)
+        self.run_to(self.cursor() + 1)
     }
 
     /// Rolls the last command back.
     pub fn step_back(&mut self) -> RunReport {
-        self.run_to((self.cursor as usize).saturating_sub(1))
+        self.run_to(self.cursor().saturating_sub(1))
     }
 
     /// Carries out the rest of the commands of the joint whose turn it is.
     pub fn joint_forward(&mut self) -> RunReport {
-        let at = self.cursor as usize;
+        let at = self.cursor();
         let joint = self.list.get(at).map(|number| self.commands[*number as usize].joint);
         let same = |number: &&u32| Some(self.commands[**number as usize].joint) == joint;
         let count = self.list.get(at..).unwrap_or_default().iter().take_while(same).count();
@@ -419,7 +426,7 @@ impl Builder {
 
     /// Rolls back the commands of the joint that was last.
     pub fn joint_back(&mut self) -> RunReport {
-        let at = self.cursor as usize;
+        let at = self.cursor();
         let joint = at.checked_sub(1).map(|at| self.commands[self.list[at] as usize].joint);
         let same = |number: &&u32| Some(self.commands[**number as usize].joint) == joint;
         let count = self.list[..at].iter().rev().take_while(same).count();
@@ -460,9 +467,8 @@ impl Builder {
                 break;
             }
         }
-        if failed.is_none() {
-            failed = self.loop_before(target);
-        }
+        let reached = failed.as_ref().map_or(target, |(number, _)| self.world.places[*number as usize]);
+        failed = self.loop_before(reached).or(failed);
         self.failed = None;
         self.cursor = target;
         if let Some((number, problem)) = failed {
@@ -588,6 +594,9 @@ impl Builder {
     /// The first command before `target` that closes a circle which was not there when it ran.
     fn loop_before(&mut self, target: u32) -> Option<(u32, BuildProblem)> {
         let from = self.graph_changed.take()?;
+        if (target as usize) < self.list.len() {
+            self.graph_changed = Some(from.min(target));
+        }
         let mut constraints: Vec<(u32, u32, NodeId)> = Vec::new();
         for place in from..target {
             let number = self.list[place as usize];
@@ -648,8 +657,7 @@ impl Builder {
 
     fn dependency_name(&self, dependency: &Dependency, place: u32) -> String {
         let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = dependency;
-        let birth = self.world.id(*uid).and_then(|node| self.world.birth(node, place));
-        let name = birth.map_or_else(|| uid.to_string(), |birth| birth.name.to_string());
+        let name = self.world.id(*uid).map_or_else(|| uid.to_string(), |node| self.world.name(node, place));
         match dependency {
             Dependency::Node(_) => name,
             Dependency::Attribute(_, attribute) => format!("{name}.{attribute}"),
@@ -658,6 +666,6 @@ impl Builder {
 
     /// The built rig as the commands before the cursor made it.
     pub fn built(&self) -> BuiltRig {
-        snapshot::snapshot(&self.world, self.cursor)
+        snapshot::snapshot(&self.world, self.cursor() as u32)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::world::{Aspect, Birth, NodeId, Value, World};
+use super::world::{Birth, NodeId, World};
 use crate::rig::{
     NodeType, Uid,
     nearest::did_you_mean,
@@ -71,7 +71,8 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef) -> Result<Vec<N
             (0..world.slots.len() as u32).map(NodeId).filter(alive).filter(joints).filter(below).collect()
         }
         Source::Command(uid) => {
-            let command = world.creator_of(*uid).ok_or_else(|| {
+            let before = |command: &u32| world.places[*command as usize] < place;
+            let command = world.creator_of(*uid).filter(before).ok_or_else(|| {
                 format!("no command has the uid {uid} and has run before this one; move it up, or refer to another")
             })?;
             world.created[command as usize].iter().copied().filter(alive).collect()
@@ -105,7 +106,8 @@ fn joint(world: &World, uid: Uid, place: u32) -> Result<NodeId, Refusal> {
 /// The text of a label that is known by who bears it.
 fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, Refusal> {
     let bare = || format!("the joint or command {bearer}, whose label is meant, has no label; give it one");
-    if let Some(command) = world.creator_of(bearer) {
+    let before = |command: &u32| world.places[*command as usize] < place;
+    if let Some(command) = world.creator_of(bearer).filter(before) {
         let nodes = world.created[command as usize].iter();
         let label = nodes.filter(|node| world.exists(**node, place)).find_map(|node| world.label(*node, place));
         return label.map(|label| label.to_string()).ok_or_else(bare);
@@ -165,14 +167,9 @@ pub(super) fn nearest(world: &World, asker: Asker, references: &NodeRefs) -> Str
             return did_you_mean(&text, labels.iter().filter(|label| **label != text));
         }
         if let Source::Module(name) = &reference.source {
-            let modules: HashSet<&str> = world
-                .slots
-                .iter()
-                .flat_map(|slot| match slot.cells[Aspect::Birth as usize].writes.first() {
-                    Some((_, Value::Birth(birth))) => birth.origin.as_ref().map(|origin| &*origin.module),
-                    _ => None,
-                })
-                .collect();
+            let all = (0..world.slots.len() as u32).map(NodeId);
+            let origins = all.filter_map(|node| world.birth(node, place)?.origin.as_ref());
+            let modules: HashSet<&str> = origins.map(|origin| &*origin.module).collect();
             let mut modules: Vec<&str> = modules.into_iter().collect();
             modules.sort_unstable();
             return did_you_mean(name, modules);

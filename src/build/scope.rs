@@ -158,12 +158,9 @@ impl BuildScope<'_> {
         if references.is_empty() { Ok(None) } else { self.resolve_one(parameter, references).map(Some) }
     }
 
-    /// The name of a node for messages: its label, or its name.
+    /// The name of a node, for messages only: a command does not run again when it changes.
     pub fn name(&self, node: NodeId) -> String {
-        let place = self.asker.place + 1;
-        let label = self.world.label(node, place).map(|label| label.to_string());
-        let name = self.world.birth(node, place).map(|birth| birth.name.to_string());
-        label.or(name).unwrap_or_else(|| self.world.uid(node).to_string())
+        self.world.name(node, self.asker.place + 1)
     }
 
     /// Joint, null or control; `None` if the node is not there.
@@ -312,13 +309,6 @@ impl BuildScope<'_> {
             ));
         }
         let node = self.identity(role, subject, number)?;
-        let subject_name = self.name(subject);
-        let name = match &creation.name {
-            Some(name) if number == 0 => name.clone(),
-            Some(name) => format!("{name}_{}", number + 1),
-            None if number == 0 => format!("{subject_name}_{role}"),
-            None => format!("{subject_name}_{role}_{}", number + 1),
-        };
         let origin = Origin {
             command: self.command(),
             module: self.module.clone(),
@@ -326,7 +316,12 @@ impl BuildScope<'_> {
             subject: self.uid(subject),
             number,
         };
-        let birth = Birth { kind, name: name.into(), origin: Some(Arc::new(origin)), order: self.trace.made };
+        let birth = Birth {
+            kind,
+            name: creation.name.as_deref().map(Into::into),
+            origin: Some(Arc::new(origin)),
+            order: self.trace.made,
+        };
         self.trace.made += 1;
         let joint = self.joint();
         let label = match &creation.label {

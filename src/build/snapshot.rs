@@ -72,7 +72,7 @@ fn built(world: &World, node: NodeId, parent: Option<usize>, place: u32) -> Opti
     };
     Some(BuiltNode {
         uid: world.uid(node),
-        name: birth.name.clone(),
+        name: world.name(node, place).into(),
         kind: birth.kind,
         parent,
         base: world.base(node, place),

@@ -53,8 +53,8 @@ impl Aspect {
 pub struct Birth {
     /// Joint, null or control.
     pub kind: NodeType,
-    /// Its name in files.
-    pub name: Arc<str>,
+    /// The name that it was given, if any.
+    pub name: Option<Arc<str>>,
     /// Who made it; `None` for joints of the document.
     pub origin: Option<Arc<Origin>>,
     /// Its place among those that the same command made, or among the document's joints.
@@ -223,6 +223,21 @@ impl World {
             Some(Value::Birth(birth)) => Some(birth),
             _ => None,
         }
+    }
+
+    /// The name in files and messages: as given, or made of that of the node it is for and what it is for.
+    pub fn name(&self, node: NodeId, place: u32) -> String {
+        let Some(birth) = self.birth(node, place) else { return self.uid(node).to_string() };
+        let Some(origin) = &birth.origin else {
+            return self.label(node, place).map_or_else(|| self.uid(node).to_string(), |label| label.to_string());
+        };
+        let numbered = |name: String| if origin.number == 0 { name } else { format!("{name}_{}", origin.number + 1) };
+        if let Some(name) = &birth.name {
+            return numbered(name.to_string());
+        }
+        let subject = self.id(origin.subject).filter(|subject| *subject != node);
+        let subject = subject.map_or_else(|| origin.subject.to_string(), |subject| self.name(subject, place));
+        numbered(format!("{subject}_{}", origin.role))
     }
 
     pub fn exists(&self, node: NodeId, place: u32) -> bool {

@@ -1,5 +1,6 @@
 //! All integration tests in one binary: one module a feature, through the public API.
 
+mod build;
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(feature = "draw")]
