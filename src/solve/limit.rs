@@ -34,10 +34,11 @@ impl Bounds {
         Self { min: or(min, f32::NEG_INFINITY), max: or(max, f32::INFINITY) }
     }
 
-    /// The nearest translation or scale within the bounds; a value that is not a number becomes a bound.
+    /// The nearest translation or scale within the bounds. A value that is not a number counts as zero, such a bound as
+    /// none.
     #[inline]
     pub fn clamp(&self, value: Vec3) -> Vec3 {
-        // Written out: the maximum and minimum of glam leave open which operand a NaN yields.
+        let value = Vec3::select(value.is_nan_mask(), Vec3::ZERO, value);
         Vec3::new(
             clamp(value.x, self.min.x, self.max.x),
             clamp(value.y, self.min.y, self.max.y),
@@ -56,7 +57,8 @@ impl Bounds {
         let (first, outside) = self.nearest(angles);
         let (second, outside_second) = self.nearest(order.other(angles));
         let (angles, outside) = if outside_second < outside { (second, outside_second) } else { (first, outside) };
-        if outside <= 0.0 { rotation } else { order.rotation(self.clamp(angles)) }
+        let clamped = order.rotation(self.clamp(angles));
+        if outside <= 0.0 || !clamped.is_finite() { rotation } else { clamped }
     }
 
     /// Angles shifted by whole turns to where they break the bounds least, and by how much they do in all.
@@ -78,8 +80,9 @@ impl Bounds {
 
 #[inline]
 fn clamp(value: f32, min: f32, max: f32) -> f32 {
-    let value = if value < max { value } else { max };
-    if value > min { value } else { min }
+    // Written out for NaN, and because the standard one panics where bounds cross.
+    let value = if value > max { max } else { value };
+    if value < min { min } else { value }
 }
 
 /// How far a joint may turn from its rest rotation.

@@ -12,9 +12,13 @@ pub const PARALLEL: f32 = 1e-5;
 /// The direction of `v` with unit length; `None` for a vector without one (zero, or not finite).
 #[inline]
 pub fn direction(v: Vec3) -> Option<Vec3> {
-    let largest = v.abs().max_element();
-    // Also false for NaN. Dividing first keeps the square of tiny and of huge vectors in range.
-    (largest > f32::MIN_POSITIVE && largest < f32::INFINITY).then(|| (v / largest).normalize())
+    let square = v.length_squared();
+    if square > 1e-24 && square < 1e24 {
+        return Some(v * (1.0 / square.sqrt()));
+    }
+    // Dividing first keeps squares of tiny and huge vectors in range. A sum, because a maximum may pass over NaN.
+    let size = v.x.abs() + v.y.abs() + v.z.abs();
+    (size > f32::MIN_POSITIVE && size < f32::INFINITY).then(|| (v / size).normalize())
 }
 
 /// The direction of the part of `v` that is perpendicular to the unit vector `axis`; `None` if they are parallel or `v`
@@ -23,10 +27,14 @@ pub fn direction(v: Vec3) -> Option<Vec3> {
 pub fn perpendicular(v: Vec3, axis: Vec3) -> Option<Vec3> {
     let v = direction(v)?;
     let part = v - axis * v.dot(axis);
-    if part.length_squared() <= PARALLEL * PARALLEL {
+    let square = part.length_squared();
+    if square <= PARALLEL * PARALLEL {
         return None;
     }
-    let part = part.normalize();
+    let part = part * (1.0 / square.sqrt());
+    if square > 0.01 {
+        return Some(part);
+    }
     // Once more: what the first subtraction left of a nearly parallel vector is not yet perpendicular.
     direction(part - axis * part.dot(axis))
 }
@@ -53,7 +61,7 @@ pub fn about(axis: Vec3, angle: f32) -> Quat {
 #[inline]
 pub fn arc(from: Vec3, to: Vec3, hint: Vec3) -> Quat {
     let dot = from.dot(to);
-    if dot > -0.99 {
+    if dot > -0.7 {
         let axis = from.cross(to);
         return Quat::from_xyzw(axis.x, axis.y, axis.z, 1.0 + dot).normalize();
     }

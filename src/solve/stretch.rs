@@ -44,6 +44,7 @@ impl Stretch {
         }
         let least = self.min.max(Self::LEAST);
         let along = factor.min(self.max).max(least);
+        let along = if along.is_finite() { along } else { factor };
         let across = if self.volume == 0.0 { 1.0 } else { ops::powf(along, -0.5 * self.volume) };
         Stretched { along, across: if across.is_finite() { across } else { 1.0 } }
     }

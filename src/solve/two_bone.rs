@@ -73,8 +73,9 @@ impl TwoBone {
         let to_goal = self.goal - self.root;
         let distance = to_goal.length();
         // A bone without length has no direction; comparisons are also false for NaN.
-        let usable = upper_length > 1e-6 * length && lower_length > 1e-6 * length && length < 1e18;
-        if !(usable && distance < 1e18) {
+        let usable = upper_length > 1e-6 * length && lower_length > 1e-6 * length;
+        let in_range = length > 1e-15 && length < 1e18 && distance < 1e18;
+        if !(usable && in_range) {
             return self.unsolved();
         }
         let (u, l) = (upper / upper_length, lower / lower_length);
@@ -105,8 +106,10 @@ impl TwoBone {
         let double = 2.0 * reach;
         let along_upper = (reach * reach + squares) / double;
         let along_lower = (reach * reach - squares) / double;
-        let height_squared = (length - reach) * (length + reach) * ((reach - shortest) * (reach + shortest));
-        let height = height_squared.max(0.0).sqrt() / double;
+        // Two roots: the product of all four factors would leave the range of numbers.
+        let outer = ((length - reach) * (length + reach)).max(0.0).sqrt();
+        let inner = ((reach - shortest) * (reach + shortest)).max(0.0).sqrt();
+        let height = outer * (inner / double);
 
         let solved_u = (aim * along_upper + bend * height) / upper_length;
         let solved_l = (aim * along_lower - bend * height) / lower_length;

@@ -51,6 +51,7 @@ mod references;
 mod render;
 mod rig_text;
 mod skin_file;
+mod solvers;
 mod stroke;
 mod surface;
 mod surface_refresh;
