@@ -3,10 +3,12 @@
 //! Exit codes: 0 done, 1 the input is at fault, 2 the command was used wrongly. With `--json` the answer is one JSON
 //! object on standard output, errors included.
 
+mod build;
 mod check;
 mod convert;
 mod demo;
 mod info;
+mod modules;
 mod progress;
 #[cfg(feature = "render")]
 mod render;
@@ -52,6 +54,10 @@ enum Command {
     Info(info::InfoArgs),
     /// Look for problems in files
     Check(check::CheckArgs),
+    /// Carry out the commands of a rig and save what they build
+    Build(build::BuildArgs),
+    /// List what commands can do
+    Modules(modules::ModulesArgs),
     /// Take a picture of a mesh, a template or a project, without a window
     #[cfg(feature = "render")]
     Render(render::RenderArgs),
@@ -158,6 +164,8 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Check(args)) => check::run(&args),
+        Some(Command::Build(args)) => build::run(&args),
+        Some(Command::Modules(args)) => Ok(modules::run(&args)),
         #[cfg(feature = "render")]
         Some(Command::Render(args)) => render::run(&args),
     };

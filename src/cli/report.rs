@@ -19,6 +19,8 @@ pub(super) struct Report {
     pub notes: Vec<String>,
     /// The answer for programs.
     pub json: Map<String, Value>,
+    /// A whole answer for programs that is no object.
+    pub list: Option<Value>,
     /// True if the answer is that the input is at fault.
     pub at_fault: bool,
 }
@@ -94,6 +96,10 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
                 for note in &report.notes {
                     eprintln!("note: {note}");
                 }
+            }
+            if let (true, Some(list)) = (json, &report.list) {
+                print([list.to_string().as_str()]);
+                return ExitCode::from(code);
             }
             let mut answer = Map::from_iter([("ok".to_owned(), Value::from(!report.at_fault))]);
             answer.extend(report.json);

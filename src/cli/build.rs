@@ -1,0 +1,253 @@
+//! `rigsmith build`: carries out the commands of a rig.
+
+use std::{path::PathBuf, sync::Arc};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, progress::Progress, skin};
+use crate::{
+    build::{Builder, CommandState},
+    files::{FileKind, RealDisk, load_model, store_model, store_rig},
+    headless::Workbench,
+    mesh::model::{Model, Trs},
+    modules,
+    rig::{BuiltRig, Rig, RigEdit, Tag, TagKind, Uid, bake::baked},
+    solve::program::{CompileOptions, RigProgram, RigState},
+};
+
+/// Arguments of `rigsmith build`.
+#[derive(Args, Debug)]
+pub(super) struct BuildArgs {
+    /// The rig: a .rig.ron
+    rig: PathBuf,
+    /// A mesh to bind to what is built
+    #[arg(long)]
+    mesh: Option<PathBuf>,
+    /// Turns a feature on or off, or chooses one of its switches; may be repeated
+    #[arg(long, value_name = "NAME=on|off|SWITCH")]
+    feature: Vec<String>,
+    /// Turns a local group on or off; may be repeated
+    #[arg(long, value_name = "NAME=on|off")]
+    group: Vec<String>,
+    /// Stops after so many commands
+    #[arg(long, value_name = "N")]
+    until: Option<usize>,
+    /// Lists the commands with their state and time
+    #[arg(long)]
+    trace: bool,
+    /// The file to write: .glb or .gltf for the character as posed, .rig.ron for the built skeleton
+    #[arg(short, long)]
+    output: Option<Output>,
+    #[command(flatten)]
+    weights: WeightArgs,
+    #[command(flatten)]
+    export: ExportArgs,
+}
+
+pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
+    if let Some(output) = &args.output
+        && !matches!(FileKind::of(output), Some(FileKind::Glb | FileKind::Gltf | FileKind::Template))
+    {
+        return Err(Failure::Usage(format!("cannot write `{}`; give .glb, .gltf or .rig.ron", output.display())));
+    }
+    let mut report = Report::default();
+    let mut rig = skin::load_rig(&args.rig, &mut report)?;
+    switch_features(&mut rig, &args.feature)?;
+    switch_groups(&mut rig, &args.group)?;
+    let mut builder = Builder::new(Arc::new(modules::all()));
+    builder.sync(&rig);
+    let outcome = builder.run_to(args.until.unwrap_or(usize::MAX));
+    let built = builder.built();
+    if args.trace {
+        trace(&mut report, &rig, &builder, &outcome.executed);
+    }
+    let created = built.nodes.iter().filter(|node| node.origin.is_some()).count();
+    report.line(format!(
+        "{} of {} commands, {} joints, {created} created nodes, {} constraints",
+        outcome.cursor,
+        builder.len(),
+        rig.len(),
+        built.constraints.len()
+    ));
+    report.set("commands_done", outcome.cursor);
+    report.set("nodes", built.nodes.len());
+    report.set("created", created);
+    report.set("constraints", built.constraints.len());
+    if let Some(error) = outcome.error {
+        report.at_fault = true;
+        report.notes.push(format!("`{}`: {error} (tag {})", args.rig.display(), error.command));
+        report.set("error", error.to_string());
+        return Ok(report);
+    }
+    if let Some(output) = &args.output {
+        let notes = write(args, output, &rig, &built, &mut report)?;
+        report.notes(notes);
+        report.line(format!("wrote {}", output.display()));
+        report.set("output", output.display().to_string());
+    }
+    Ok(report)
+}
+
+fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) {
+    let mut list = Vec::new();
+    for entry in builder.list() {
+        let Some(status) = builder.status(entry.command) else { continue };
+        let state = match status.state {
+            CommandState::Pending => "pending",
+            CommandState::Done => "done",
+            CommandState::Skipped => "skipped",
+            CommandState::Failed => "failed",
+        };
+        let label = rig.joint(entry.joint).and_then(|joint| joint.data.label.clone());
+        let error = status.error.as_ref().map(ToString::to_string);
+        let name = label.clone().unwrap_or_else(|| entry.joint.to_string());
+        report.line(format!("{state:>8} {:>9.1} µs  {name}  {}", status.micros, entry.module));
+        list.push(json!({
+            "uid": entry.command.to_string(),
+            "joint": entry.joint.to_string(),
+            "label": label,
+            "module": &*entry.module,
+            "state": state,
+            "micros": status.micros,
+            "executed": executed.contains(&entry.command),
+            "error": error,
+        }));
+    }
+    report.set("commands", Value::Array(list));
+}
+
+/// `NAME=off`, `NAME=on` or `NAME=SWITCH`, for all features of that name.
+fn switch_features(rig: &mut Rig, wishes: &[String]) -> Result<(), Failure> {
+    for wish in wishes {
+        let (name, value) = pair("--feature", wish)?;
+        let tags: Vec<(Uid, Tag, String)> = rig
+            .walk()
+            .flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag)))
+            .filter_map(|(joint, tag)| match &tag.kind {
+                TagKind::Feature { name: own, switch, .. } if own == name && !name.is_empty() => {
+                    Some((joint, tag.clone(), switch.clone()))
+                }
+                _ => None,
+            })
+            .collect();
+        if tags.is_empty() {
+            let names = rig.walk().flat_map(|joint| &joint.data.tags).filter_map(|tag| match &tag.kind {
+                TagKind::Feature { name, .. } if !name.is_empty() => Some(name.clone()),
+                _ => None,
+            });
+            let mut names: Vec<String> = names.collect();
+            names.sort();
+            names.dedup();
+            let all = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            return Err(Failure::Usage(format!("--feature {wish}: there is no such feature; the rig has: {all}")));
+        }
+        let switches: Vec<&str> = tags.iter().map(|(_, _, switch)| switch.as_str()).collect();
+        if !["on", "off"].contains(&value) && !switches.contains(&value) {
+            let mut known: Vec<&str> = switches.into_iter().filter(|switch| !switch.is_empty()).collect();
+            known.sort_unstable();
+            known.dedup();
+            let known = if known.is_empty() { String::new() } else { format!(", or {}", known.join(", ")) };
+            return Err(Failure::Usage(format!("--feature {wish}: write on or off{known}")));
+        }
+        for (joint, tag, switch) in &tags {
+            let enabled = match value {
+                "on" => true,
+                "off" => false,
+                // One of several: parts without a switch stay as they are.
+                chosen if !switch.is_empty() => switch == chosen,
+                _ => tag.enabled,
+            };
+            let edit = RigEdit::SetTag(*joint, Box::new(Tag { enabled, ..tag.clone() }));
+            rig.apply(&edit).map_err(|error| Failure::Input(Box::new(error)))?;
+        }
+    }
+    Ok(())
+}
+
+fn switch_groups(rig: &mut Rig, wishes: &[String]) -> Result<(), Failure> {
+    for wish in wishes {
+        let (name, value) = pair("--group", wish)?;
+        let groups: Vec<_> = rig.groups().iter().filter(|group| group.name == name).cloned().collect();
+        let enabled = match value {
+            "on" => true,
+            "off" => false,
+            _ => return Err(Failure::Usage(format!("--group {wish}: write {name}=on or {name}=off"))),
+        };
+        if groups.is_empty() {
+            let names: Vec<&str> = rig.groups().iter().map(|group| group.name.as_str()).collect();
+            return Err(Failure::Usage(format!(
+                "--group {wish}: there is no such group; the rig has: {}",
+                names.join(", ")
+            )));
+        }
+        for mut group in groups {
+            group.enabled = enabled;
+            rig.apply(&RigEdit::SetLocalGroup(group)).map_err(|error| Failure::Input(Box::new(error)))?;
+        }
+    }
+    Ok(())
+}
+
+fn pair<'a>(option: &str, text: &'a str) -> Result<(&'a str, &'a str), Failure> {
+    let wrong = || Failure::Usage(format!("{option} {text}: write NAME=VALUE, for example {text}=off"));
+    text.rsplit_once('=').ok_or_else(wrong)
+}
+
+fn write(
+    args: &BuildArgs,
+    output: &Output,
+    rig: &Rig,
+    built: &BuiltRig,
+    report: &mut Report,
+) -> Result<Vec<String>, Failure> {
+    let skeleton = baked(rig, built);
+    if FileKind::of(output) == Some(FileKind::Template) {
+        return Ok(store_rig(&RealDisk, output, &skeleton)?);
+    }
+    let posed = posed(rig, built)?;
+    let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
+    let mut bench = Workbench::with_rig(SEED, skeleton);
+    if let Some(mesh) = &args.mesh {
+        let model = load_model(&RealDisk, mesh)?;
+        report.notes(model.notes.iter().cloned());
+        bench.open(model, true)?;
+        let mut progress = Progress::new("skinning");
+        let weights = bench.skin(args.weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
+        drop(progress);
+        skin::describe_weights(report, &weights);
+    }
+    let mut model = bench.character();
+    pose(&mut model, &joints, built, &posed);
+    let mut settings = args.export.settings();
+    settings.all_joints |= args.mesh.is_none();
+    Ok(store_model(&RealDisk, output, &model, &settings)?)
+}
+
+/// Where every node of the built rig is with the rig's pose, relative to its parent.
+fn posed(rig: &Rig, built: &BuiltRig) -> Result<Vec<Trs>, Failure> {
+    let program =
+        RigProgram::compile(built, &CompileOptions::default()).map_err(|error| Failure::Input(Box::new(error)))?;
+    let mut state = RigState::new(Arc::new(program));
+    for (node, offset) in rig.pose() {
+        // Poses of nodes that are not built at present wait for them.
+        let _ = state.set_offset(*node, *offset);
+    }
+    state.evaluate(0.0);
+    let globals: Vec<Trs> = built.nodes.iter().map(|node| state.global(node.uid).unwrap_or_default()).collect();
+    let local = |(at, node): (usize, &crate::rig::BuiltNode)| match node.parent {
+        Some(parent) => globals[at].relative_to(&globals[parent]),
+        None => globals[at],
+    };
+    Ok(built.nodes.iter().enumerate().map(local).collect())
+}
+
+/// Moves the nodes of an exported model to where the pose puts them; bind poses stay.
+fn pose(model: &mut Model, joints: &[Uid], built: &BuiltRig, posed: &[Trs]) {
+    let index = built.index();
+    for (node, uid) in model.nodes.iter_mut().zip(joints) {
+        if let Some(at) = index.get(uid) {
+            node.rest = posed[*at];
+        }
+    }
+}

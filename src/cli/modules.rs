@@ -1,0 +1,34 @@
+//! `rigsmith modules`: what commands can do.
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::Report;
+use crate::modules;
+
+/// Arguments of `rigsmith modules`.
+#[derive(Args, Debug)]
+pub(super) struct ModulesArgs {
+    /// Only these
+    names: Vec<String>,
+}
+
+pub(super) fn run(args: &ModulesArgs) -> Report {
+    let modules = modules::all();
+    let chosen = modules.iter().filter(|module| args.names.is_empty() || args.names.iter().any(|n| n == module.name));
+    let mut report = Report::default();
+    let mut list = Vec::new();
+    for module in chosen {
+        report.line(format!("{}: {}", module.name, module.doc));
+        for parameter in &module.parameters {
+            report.line(format!("    {} = {}    {}", parameter.name, parameter.default, parameter.doc));
+        }
+        list.push(json!({ "name": module.name, "doc": module.doc, "parameters": module.parameters }));
+    }
+    for name in args.names.iter().filter(|name| modules.get(name).is_none()) {
+        report.notes.push(format!("there is no module \"{name}\"; `rigsmith modules` lists all"));
+        report.at_fault = true;
+    }
+    report.list = Some(Value::Array(list));
+    report
+}

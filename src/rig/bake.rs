@@ -1,0 +1,48 @@
+//! A built rig as an ordinary skeleton: what is left when commands have done their work.
+
+use std::collections::HashSet;
+
+use super::{BuiltRig, GroupData, JointData, NodeKind, NodeType, Rig, RigEdit, Uid};
+
+/// A rig without tags that holds the joints of a built one, and what they hang on. Uids, labels and groups stay, so
+/// that weights fit; controls and nulls that carry no joint are left out, the others become nulls.
+pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
+    let mut kept: HashSet<usize> = HashSet::new();
+    for (at, node) in built.nodes.iter().enumerate() {
+        let mut next = (node.kind == NodeType::Joint).then_some(at);
+        while let Some(at) = next.filter(|at| kept.insert(*at)) {
+            next = built.nodes[at].parent;
+        }
+    }
+    let mut baked = Rig::new(rig.uid(), rig.about().name.clone());
+    let groups = rig.groups().iter().cloned().enumerate();
+    let mut edits: Vec<RigEdit> = vec![RigEdit::SetAbout(Box::new(rig.about().clone()))];
+    edits.extend(groups.map(|(at, group)| RigEdit::AddLocalGroup(GroupData { enabled: true, ..group }, at)));
+    let known: HashSet<Uid> = rig.groups().iter().map(|group| group.uid).collect();
+    for (at, node) in built.nodes.iter().enumerate().filter(|(at, _)| kept.contains(at)) {
+        let source = rig.joint(node.uid).map(|joint| &joint.data);
+        let joint = JointData {
+            uid: node.uid,
+            // What commands made carries the label of someone else: its name tells more.
+            label: if source.is_some() {
+                node.label.as_deref().map(str::to_owned)
+            } else {
+                Some(node.name.to_string())
+            },
+            group: node.group.filter(|group| known.contains(group)),
+            kind: if node.kind == NodeType::Joint { NodeKind::Joint } else { NodeKind::Null },
+            rest: node.base.into(),
+            mirror: source.and_then(|source| source.mirror),
+            locked: source.is_some_and(|source| source.locked),
+            tags: Vec::new(),
+        };
+        let parent = built.nodes[at].parent.map(|parent| built.nodes[parent].uid);
+        edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX });
+    }
+    edits.extend(rig.skins().map(|(mesh, skin)| RigEdit::SetSkin(mesh, Some(skin.clone()))));
+    for edit in edits {
+        // A rotation that is too far from a unit is all that can be refused; the joint is left out then.
+        let _ = baked.apply(&edit);
+    }
+    baked
+}
