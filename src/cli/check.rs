@@ -1,18 +1,23 @@
 //! `rigsmith check`: problems in files.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::{Failure, Report, skin::load_rig};
 use crate::{
-    files::{FileKind, LoadError, RealDisk, load_gestures, load_model, load_project, load_skin},
+    build::{locate, review},
+    files::{FileKind, LoadError, RealDisk, load_gestures, load_model, load_project, load_skin, read_capped},
     mesh::{
         adjacency::{edges, islands, weld},
         model::Model,
     },
-    rig::Rig,
+    modules,
+    rig::{Rig, SourceError, template},
 };
 
 /// Arguments of `rigsmith check`.
@@ -27,6 +32,8 @@ pub(super) struct CheckArgs {
 #[derive(Default)]
 struct Findings {
     error: Option<String>,
+    /// What is wrong with single commands of a rig, and where in the file.
+    problems: Vec<SourceError>,
     remarks: Vec<String>,
 }
 
@@ -39,11 +46,21 @@ pub(super) fn run(args: &CheckArgs) -> Result<Report, Failure> {
             Some(error) => report.line(format!("{}: error: {error}", path.display())),
             None => report.line(format!("{}: ok", path.display())),
         }
+        for problem in &found.problems {
+            report.line(format!("{}:{}:{}: {}", path.display(), problem.line, problem.column, problem.message));
+        }
         for remark in &found.remarks {
             report.line(format!("  {remark}"));
         }
         report.at_fault |= found.error.is_some();
-        list.push(json!({ "file": path.display().to_string(), "error": found.error, "remarks": found.remarks }));
+        let problems = found.problems.iter();
+        let problems = problems.map(|p| json!({ "line": p.line, "column": p.column, "message": p.message }));
+        list.push(json!({
+            "file": path.display().to_string(),
+            "error": found.error,
+            "problems": problems.collect::<Vec<Value>>(),
+            "remarks": found.remarks,
+        }));
     }
     report.set("files", Value::Array(list));
     Ok(report)
@@ -61,6 +78,12 @@ fn check(path: &Path) -> Result<Findings, Failure> {
                 Ok(rig) => {
                     found.remarks = told.notes;
                     found.remarks.extend(remarks_on_rig(&rig));
+                    found.problems = problems_of_commands(path, &rig);
+                    found.error = match found.problems.len() {
+                        0 => None,
+                        1 => Some("1 command cannot be built".to_owned()),
+                        count => Some(format!("{count} commands cannot be built")),
+                    };
                 }
                 Err(Failure::Input(error)) => found.error = Some(error.to_string()),
                 Err(usage) => return Err(usage),
@@ -83,6 +106,14 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         found.error = Some(error.to_string());
     }
     Ok(found)
+}
+
+fn problems_of_commands(path: &Path, rig: &Rig) -> Vec<SourceError> {
+    let problems = review(rig, &Arc::new(modules::all()));
+    // It was read a moment ago; without the text everything is told of its beginning.
+    let bytes = read_capped(&RealDisk, path, template::MAX_BYTES as u64).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes);
+    problems.iter().map(|problem| locate(&text, problem)).collect()
 }
 
 fn remarks_on_model(model: &Model) -> Vec<String> {
