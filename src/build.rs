@@ -18,6 +18,7 @@ mod processor;
 mod resolve;
 mod review;
 mod scope;
+mod signal;
 mod snapshot;
 mod world;
 

@@ -72,7 +72,7 @@ impl Default for Scalar {
 }
 
 /// One number of a transform.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Channel {
     /// Translation along X.
     TranslateX,
@@ -140,7 +140,7 @@ pub enum Output {
 }
 
 /// How a driven key runs between its keys.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum KeyEase {
     /// The value of the key before.
     Step,

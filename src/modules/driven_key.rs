@@ -1,0 +1,115 @@
+//! `driven_key`: numbers that follow another one along keys.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, ModuleError, RigModule},
+    rig::{
+        Channel, Constraint, KeyEase,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Drives a number by another one along keys: fingers by a curl, a corrective shape by an elbow.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::driven_key::DrivenKey};
+/// let params = r#"(
+///     driver: "@command control/hand_l#00000000000000aa",
+///     driver_attribute: "curl",
+///     keys: [(0.0, 0.0), (1.0, 80.0)],
+///     output: "@hierarchy index_1_l#0000000000000004",
+///     output_channel: RotateX,
+/// )"#;
+/// # rigsmith::modules::all().load(DrivenKey::NAME, params).map(|_| ()).unwrap();
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DrivenKey {
+    /// The node whose number drives.
+    pub driver: NodeRefs,
+    /// The attribute that drives,
+    pub driver_attribute: String,
+    /// or the channel.
+    pub driver_channel: Option<Channel>,
+    /// Pairs of driver and value.
+    pub keys: Vec<(f32, f32)>,
+    /// The run between keys.
+    pub ease: KeyEase,
+    /// The nodes that are driven.
+    pub output: NodeRefs,
+    /// The attribute that is driven,
+    pub output_attribute: String,
+    /// or the channel,
+    pub output_channel: Option<Channel>,
+    /// or the morph target.
+    pub morph: String,
+}
+
+impl Default for DrivenKey {
+    fn default() -> Self {
+        Self {
+            driver: NodeRef::this().into(),
+            driver_attribute: String::new(),
+            driver_channel: None,
+            keys: vec![(0.0, 0.0), (1.0, 1.0)],
+            ease: KeyEase::Smooth,
+            output: NodeRefs::NONE,
+            output_attribute: String::new(),
+            output_channel: None,
+            morph: String::new(),
+        }
+    }
+}
+
+impl RigModule for DrivenKey {
+    const NAME: &'static str = "driven_key";
+    const DOC: &'static str = "Drives channels, attributes or a morph target by another number, along keys.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("driver", "The node whose attribute or channel drives."),
+        ("driver_attribute", "Name of the attribute that drives."),
+        ("driver_channel", "Or the channel of its pose that drives, such as RotateX in degrees."),
+        ("keys", "Pairs of driver and value, driver increasing; flat before the first and after the last."),
+        ("ease", "The run between keys: Step, Linear or Smooth, without overshoot."),
+        ("output", "The nodes that are driven; none for a morph target."),
+        ("output_attribute", "Name of the attribute of theirs that is driven."),
+        ("output_channel", "Or the channel that is driven, on top of how they were built."),
+        ("morph", "Or the name of the morph target whose weight is driven, on every mesh of the rig."),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        let driver = scope.read_number("driver", &self.driver, &self.driver_attribute, self.driver_channel)?;
+        check_keys(&self.keys)?;
+        let outputs =
+            scope.driven_numbers("output", &self.output, &self.output_attribute, self.output_channel, &self.morph)?;
+        let joint = scope.joint();
+        for (output, number) in outputs.into_iter().zip(0..) {
+            let (driver, keys) = (driver.clone(), self.keys.clone());
+            let constraint = Constraint::DrivenKey { driver, keys, ease: self.ease, output };
+            scope.constrain("key", joint, number, constraint)?;
+        }
+        Ok(())
+    }
+
+    /// Keys of channels stay: on joints whose axes are mirrored, the same angle is the mirrored pose.
+    fn mirror(&mut self) {}
+}
+
+/// Refuses keys that are no curve.
+pub(super) fn check_keys(keys: &[(f32, f32)]) -> Result<(), ModuleError> {
+    if keys.is_empty() {
+        return Err(ModuleError::parameter("keys", "there is none; write pairs such as [(0.0, 0.0), (1.0, 90.0)]"));
+    }
+    if !keys.iter().all(|(driver, value)| driver.is_finite() && value.is_finite()) {
+        return Err(ModuleError::parameter("keys", "one is not a finite number; correct it"));
+    }
+    if let Some(pair) = keys.windows(2).find(|pair| pair[0].0 >= pair[1].0) {
+        let (first, second) = (pair[0].0, pair[1].0);
+        return Err(ModuleError::parameter(
+            "keys",
+            format!("the key at {second} stands after that at {first}; sort them by driver, each once"),
+        ));
+    }
+    Ok(())
+}

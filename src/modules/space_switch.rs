@@ -1,0 +1,150 @@
+//! `space_switch`: a control that moves with one of several nodes, as an attribute says.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, Creation, ModuleError, RigModule},
+    rig::{
+        AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Lets a control move with one of several nodes, as a choice attribute says; thrown without a jump.
+///
+/// A null between the control and its parent follows the chosen space and keeps how it was built relative to it, so the
+/// control itself stays free.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::space_switch::SpaceSwitch};
+/// let params = r#"(
+///     control: "@command control/hand_l#00000000000000aa",
+///     spaces: "@command control/root#00000000000000a0 + @joint chest#0000000000000005 + @joint head#0000000000000007",
+///     names: ["world", "chest", "head"],
+/// )"#;
+/// # rigsmith::modules::all().load(SpaceSwitch::NAME, params).map(|_| ()).unwrap();
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SpaceSwitch {
+    /// The control that changes spaces.
+    pub control: NodeRefs,
+    /// The spaces.
+    pub spaces: NodeRefs,
+    /// Names of the spaces.
+    pub names: Vec<String>,
+    /// The control that carries the attribute.
+    pub attribute_on: NodeRefs,
+    /// Name of the attribute.
+    pub attribute: String,
+    /// Number of the space until somebody chooses another.
+    pub default: u32,
+    /// The position follows.
+    pub translate: bool,
+    /// The rotation follows.
+    pub rotate: bool,
+    /// The scale follows.
+    pub scale: bool,
+    /// Name, group and label of the null.
+    pub creation: Creation,
+}
+
+impl Default for SpaceSwitch {
+    fn default() -> Self {
+        Self {
+            control: NodeRef::this().into(),
+            spaces: NodeRefs::NONE,
+            names: Vec::new(),
+            attribute_on: NodeRefs::NONE,
+            attribute: "space".to_owned(),
+            default: 0,
+            translate: true,
+            rotate: true,
+            scale: false,
+            creation: Creation::default(),
+        }
+    }
+}
+
+impl RigModule for SpaceSwitch {
+    const NAME: &'static str = "space_switch";
+    const DOC: &'static str = "Lets a control move with one of several nodes, as an attribute says; spaces can be changed \
+                               without a jump.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("control", "The control that changes spaces. A null that follows the space is put between it and its parent."),
+        ("spaces", "Nodes that the control can move with, in the order of the choices."),
+        ("names", "A name for each space, in that order; the nodes' own names if left out."),
+        ("attribute_on", "The control that carries the attribute; the control itself if left out."),
+        ("attribute", "Name of the choice attribute that is added."),
+        ("default", "Number of the space until somebody chooses another, counted from 0."),
+        ("translate", "The position follows the space."),
+        ("rotate", "The rotation follows the space."),
+        ("scale", "The scale follows the space."),
+        ("creation", "Name, group and label of the null."),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        let control = scope.resolve_one("control", &self.control)?;
+        let spaces = scope.resolve_some("spaces", &self.spaces)?;
+        let names: Vec<String> = match self.names.len() {
+            0 => spaces.iter().map(|space| scope.name(*space)).collect(),
+            count if count == spaces.len() => self.names.clone(),
+            count => {
+                return Err(ModuleError::parameter(
+                    "names",
+                    format!("there are {count} for {} spaces; write one for each, in their order", spaces.len()),
+                ));
+            }
+        };
+        if self.default as usize >= spaces.len() {
+            return Err(ModuleError::parameter(
+                "default",
+                format!("there is no space {}; they are counted from 0 to {}", self.default, spaces.len() - 1),
+            ));
+        }
+        if !(self.translate || self.rotate || self.scale) {
+            return Err(ModuleError::parameter("translate", "nothing follows; turn on translate, rotate or scale"));
+        }
+        let carrier = scope.resolve_maybe("attribute_on", &self.attribute_on)?.unwrap_or(control);
+        let parent = scope.parent(control);
+        let global = scope.global(control);
+        let null = scope.spawn_at(NodeType::Null, "space", control, 0, parent, global, &self.creation)?;
+        scope.set_parent(control, Some(null))?;
+        let attribute = crate::rig::Attribute {
+            name: self.attribute.as_str().into(),
+            kind: AttributeKind::Choice(names),
+            default: self.default as f32,
+        };
+        scope.add_attribute(carrier, attribute)?;
+        let mut targets = Vec::with_capacity(spaces.len());
+        for (number, space) in spaces.iter().enumerate() {
+            targets.push(Target {
+                node: scope.uid(*space),
+                weight: Scalar::Choice {
+                    node: scope.uid(carrier),
+                    name: self.attribute.as_str().into(),
+                    value: number as f32,
+                },
+                offset: scope.kept_offset(null, *space),
+            });
+        }
+        let constraint = Constraint::Transform {
+            driven: scope.uid(null),
+            targets,
+            translate: [self.translate; 3],
+            rotate: [self.rotate; 3],
+            scale: [self.scale; 3],
+            weight: Scalar::Value(1.0),
+            keep_pose: false,
+        };
+        scope.constrain("follow", control, 0, constraint)?;
+        let switch = SwitchData {
+            command: scope.command(),
+            control: scope.uid(carrier),
+            attribute: self.attribute.as_str().into(),
+            matching: Matching::Space { control: scope.uid(control) },
+        };
+        scope.switch("switch", control, switch)
+    }
+}

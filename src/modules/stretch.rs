@@ -1,0 +1,129 @@
+//! `stretch`: nodes that grow and shrink with the distance between two others.
+
+use bevy::reflect::Reflect;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{Amount, BuildScope, ModuleError, RigModule},
+    rig::{
+        Constraint,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Scales nodes along an axis by how far two others are apart, and keeps their volume.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::stretch::Stretch};
+/// let params = r#"(
+///     start: "@command control/hips#00000000000000a0",
+///     end: "@command control/chest#00000000000000a1",
+///     driven: "@joint spine#0000000000000002",
+///     volume: 1.0,
+/// )"#;
+/// # rigsmith::modules::all().load(Stretch::NAME, params).map(|_| ()).unwrap();
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Stretch {
+    /// From here,
+    pub start: NodeRefs,
+    /// to here.
+    pub end: NodeRefs,
+    /// What is scaled.
+    pub driven: NodeRefs,
+    /// The axis that stretches.
+    pub axis: Option<Vec3>,
+    /// Share of the volume that is kept.
+    pub volume: Amount,
+    /// Lowest factor.
+    pub min: f32,
+    /// Highest factor.
+    pub max: f32,
+    /// Share of the stretch.
+    pub weight: Amount,
+    /// The control whose attributes the numbers may name.
+    pub control: NodeRefs,
+}
+
+impl Default for Stretch {
+    fn default() -> Self {
+        Self {
+            start: NodeRefs::NONE,
+            end: NodeRefs::NONE,
+            driven: NodeRef::this().into(),
+            axis: None,
+            volume: Amount::Value(1.0),
+            min: 0.1,
+            max: 10.0,
+            weight: Amount::Value(1.0),
+            control: NodeRefs::NONE,
+        }
+    }
+}
+
+impl RigModule for Stretch {
+    const NAME: &'static str = "stretch";
+    const DOC: &'static str = "Scales nodes along an axis by how far two others are apart, keeping their volume.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("start", "The node from which the distance is measured."),
+        ("end", "The node to which it is measured; not one below what is scaled."),
+        ("driven", "The nodes that are scaled."),
+        (
+            "axis",
+            "The axis that stretches, in the space of each; the one nearest to the line from start to end if left out.",
+        ),
+        ("volume", "0 keeps the other two axes, 1 keeps the volume; a number from -4 to 4 or an attribute's name."),
+        ("min", "Lowest factor, above 0."),
+        ("max", "Highest factor, not below min."),
+        ("weight", "0 is no stretch, 1 all of it; a number or an attribute's name."),
+        ("control", "The control whose attributes the numbers may name; the end if left out."),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        let start = scope.resolve_one("start", &self.start)?;
+        let end = scope.resolve_one("end", &self.end)?;
+        let driven = scope.resolve_some("driven", &self.driven)?;
+        scope.in_range("min", self.min, 1e-3..=1e3)?;
+        scope.in_range("max", self.max, self.min..=1e3)?;
+        let line = scope.position(end) - scope.position(start);
+        let rest = line.length();
+        if rest <= 1e-6 {
+            return Err(ModuleError::parameter("end", "stands where start stands; choose two nodes that are apart"));
+        }
+        let control = scope.resolve_maybe("control", &self.control)?.or(Some(end));
+        let volume = scope.amount("volume", &self.volume, control, -4.0..=4.0, 1.0)?;
+        let weight = scope.amount("weight", &self.weight, control, 0.0..=1.0, 1.0)?;
+        for node in driven {
+            let axis = match self.axis {
+                Some(axis) => axis.try_normalize().ok_or_else(|| {
+                    ModuleError::parameter("axis", "has no direction; write one such as (0, 1, 0), or leave it out")
+                })?,
+                None => nearest_axis(scope.global(node).rotation.inverse() * line),
+            };
+            let constraint = Constraint::Stretch {
+                start: scope.uid(start),
+                end: scope.uid(end),
+                rest,
+                axis,
+                volume: volume.clone(),
+                range: (self.min, self.max),
+                driven: vec![scope.uid(node)],
+                weight: weight.clone(),
+            };
+            scope.constrain("stretch", node, 0, constraint)?;
+        }
+        Ok(())
+    }
+}
+
+/// X, Y or Z.
+fn nearest_axis(direction: Vec3) -> Vec3 {
+    let along = direction.abs();
+    match along.max_element() {
+        most if most == along.x => Vec3::X,
+        most if most == along.y => Vec3::Y,
+        _ => Vec3::Z,
+    }
+}
