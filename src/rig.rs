@@ -8,6 +8,7 @@ pub mod character;
 mod constraint;
 mod document;
 pub mod edit;
+pub mod feature;
 mod format;
 mod group;
 mod joint;

@@ -11,6 +11,7 @@ mod orient;
 mod place;
 mod pose;
 mod symmetry;
+mod tags;
 mod transform;
 
 use bevy::math::{Affine3, Quat, Vec3};
@@ -19,6 +20,7 @@ pub use draft::{Draft, Outcome};
 pub use orient::Axis;
 pub use place::settle;
 pub use symmetry::MirrorPlane;
+pub use tags::{CopiedIdentifiers, CopiedJoint, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope};
 
 use crate::rig::{EditError, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
 
@@ -135,6 +137,8 @@ pub enum Operation {
     RenamePose(Uid, String),
     /// Deletes a stored pose; the current pose stays.
     DeletePose(Uid),
+    /// Does something to tags.
+    Tags(TagOperation),
     /// Edits as they are.
     Edits(Vec<RigEdit>),
 }
@@ -145,6 +149,9 @@ pub enum OperationError {
     /// An edit was refused.
     #[error(transparent)]
     Edit(#[from] EditError),
+    /// Tags could not be changed.
+    #[error(transparent)]
+    Tag(#[from] TagError),
     /// A number makes no sense.
     #[error("{0}")]
     BadNumber(&'static str),
@@ -183,6 +190,7 @@ impl Operation {
             Self::ApplyPose(..) => "Apply pose",
             Self::RenamePose(..) => "Rename pose",
             Self::DeletePose(..) => "Delete pose",
+            Self::Tags(operation) => operation.name(),
             Self::Edits(edits) => match edits[..] {
                 [RigEdit::SetSkin(_, Some(_))] => "Skin mesh",
                 _ => "Edit rig",
@@ -254,6 +262,7 @@ impl Operation {
             Self::ApplyPose(pose) => pose::apply(draft, *pose),
             Self::RenamePose(pose, name) => pose::rename(draft, *pose, name),
             Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),
+            Self::Tags(operation) => tags::run(draft, operation),
             Self::Edits(edits) => edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?)),
         }
     }

@@ -45,11 +45,12 @@ mod write;
 use bevy::prelude::*;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 
-use crate::rig::Uid;
+use crate::rig::{NodeType, Uid};
 
 pub use error::{PickError, ReferenceError, ReferenceProblem};
 pub use names::{NameKind, NameScope, Names, RigNames, label_text};
 pub use params::{BadReference, FoundReference, bind_names, map_references, references_in, refresh_names};
+pub(in crate::rig) use params::{map_text_fields, map_uids};
 
 /// One reference: an ordered list of nodes once it is resolved, parents first, siblings as authored, then in the order
 /// of creation.
@@ -233,6 +234,16 @@ impl NodeTypes {
     /// The names of the kinds in the set.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES.into_iter().filter(move |(_, kind)| self.0 & kind.0 != 0).map(|(name, _)| name)
+    }
+}
+
+impl From<NodeType> for NodeTypes {
+    fn from(node: NodeType) -> Self {
+        match node {
+            NodeType::Joint => Self::JOINT,
+            NodeType::Null => Self::NULL,
+            NodeType::Control => Self::CONTROL,
+        }
     }
 }
 

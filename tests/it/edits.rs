@@ -195,7 +195,7 @@ proptest! {
             let before = rig.clone();
             match operation.run(&mut rig, &mut uids, plane) {
                 Err(_) => prop_assert_eq!(&rig, &before, "refused, but changed by {:?}", operation),
-                Ok(Outcome { edits, inverses, selected }) => {
+                Ok(Outcome { edits, inverses, selected, .. }) => {
                     let after = rig.clone();
                     for inverse in &inverses {
                         prop_assert!(rig.apply(inverse).is_ok(), "{:?} of {:?} was refused", inverse, operation);

@@ -55,6 +55,7 @@ mod solvers;
 mod stroke;
 mod surface;
 mod surface_refresh;
+mod tags;
 mod template;
 mod three_strokes;
 #[cfg(feature = "editor")]

@@ -13,6 +13,7 @@ pub struct Draft<'a> {
     done: Vec<RigEdit>,
     inverses: Vec<RigEdit>,
     selected: Option<Vec<Uid>>,
+    notes: Vec<String>,
 }
 
 /// What an operation did.
@@ -24,12 +25,14 @@ pub struct Outcome {
     pub inverses: Vec<RigEdit>,
     /// The joints that should be selected afterwards; `None` to leave the selection.
     pub selected: Option<Vec<Uid>>,
+    /// What people should know about it, a sentence each: tags that had no place, references that mean nothing.
+    pub notes: Vec<String>,
 }
 
 impl<'a> Draft<'a> {
     /// Begins on a rig; uids of added things come from `uids`.
     pub fn new(rig: &'a mut Rig, uids: &'a mut UidSource, symmetry: Option<MirrorPlane>) -> Self {
-        Self { rig, uids, symmetry, done: Vec::new(), inverses: Vec::new(), selected: None }
+        Self { rig, uids, symmetry, done: Vec::new(), inverses: Vec::new(), selected: None, notes: Vec::new() }
     }
 
     /// The rig as it stands now.
@@ -63,6 +66,11 @@ impl<'a> Draft<'a> {
     /// Says what should be selected afterwards.
     pub fn select(&mut self, joints: Vec<Uid>) {
         self.selected = Some(joints);
+    }
+
+    /// Says something that people should know about what was done.
+    pub fn note(&mut self, note: String) {
+        self.notes.push(note);
     }
 
     /// The joint on the other side, if live mirroring is on and there is one.
@@ -135,7 +143,7 @@ impl<'a> Draft<'a> {
     /// Ends the draft and keeps what was done.
     pub fn finish(mut self) -> Outcome {
         self.inverses.reverse();
-        Outcome { edits: self.done, inverses: self.inverses, selected: self.selected }
+        Outcome { edits: self.done, inverses: self.inverses, selected: self.selected, notes: self.notes }
     }
 
     /// Ends the draft and takes everything back.

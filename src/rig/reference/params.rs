@@ -50,7 +50,7 @@ pub fn references_in(params: &str) -> impl Iterator<Item = FoundReference> {
 /// byte, and so does all around the references. Names stay beside the uids that they stood beside; other uids have
 /// none until [`refresh_names`]. What cannot be read as a reference is left alone.
 pub fn map_references(params: &str, mut change: impl FnMut(&mut NodeRef)) -> String {
-    let rewritten = rewritten(params, |text| {
+    let rewritten = rewritten(params, literals(params), |text| {
         let mut places = Vec::new();
         let before = read_with(text, None, &mut places).ok()?;
         let mut after = before.clone();
@@ -63,7 +63,7 @@ pub fn map_references(params: &str, mut change: impl FnMut(&mut NodeRef)) -> Str
 /// The parameters with the current name beside every uid. The name beside a uid that nothing has stays, as a trace of
 /// what was meant. Names that stand alone stay as they are; see [`bind_names`].
 pub fn refresh_names<'a>(params: &'a str, names: &dyn Names) -> Cow<'a, str> {
-    rewritten(params, |text| {
+    rewritten(params, literals(params), |text| {
         let mut places = Vec::new();
         // With names at hand, a name that stands alone does not keep the others from being refreshed.
         read_with(text, Some(names), &mut places).ok()?;
@@ -82,7 +82,7 @@ pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<
         (!other).then_some(BadReference { range, error })
     });
     let bad = bad.collect();
-    let bound = rewritten(params, |text| {
+    let bound = rewritten(params, literals(params), |text| {
         let mut places = Vec::new();
         read_with(text, Some(names), &mut places).ok()?;
         renamed(text, &places, names)
@@ -90,12 +90,36 @@ pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<
     (bound, bad)
 }
 
+/// The parameters with every uid changed that is a string literal of its own (`group: "0123456789abcdef"`), not part of
+/// a reference. What `change` returns nothing for stays.
+pub(in crate::rig) fn map_uids(params: &str, mut change: impl FnMut(Uid) -> Option<Uid>) -> String {
+    let uid = |text: &str| text.parse::<Uid>().ok();
+    let rewritten = rewritten(params, strings(params), |text| Some(change(uid(text)?)?.to_string()));
+    rewritten.into_owned()
+}
+
+/// The parameters with the text changed of every field with one of these names, at most two brackets deep, whose value
+/// is a string literal.
+pub(in crate::rig) fn map_text_fields(
+    params: &str,
+    names: &[&str],
+    change: impl FnMut(&str) -> Option<String>,
+) -> String {
+    let literals: Vec<Literal> = text_fields(params, names).collect();
+    rewritten(params, literals.into_iter(), change).into_owned()
+}
+
 /// The text of the first field with that name, at most two brackets deep, whose value is a string literal.
 pub(super) fn text_field(params: &str, name: &str) -> Option<String> {
-    fields(params).into_iter().filter(|field| field.depth <= 2 && field.name == name).find_map(|field| {
+    text_fields(params, &[name]).next().map(|literal| literal.text)
+}
+
+fn text_fields(params: &str, names: &[&str]) -> impl Iterator<Item = Literal> {
+    let fields = fields(params).into_iter().filter(|field| field.depth <= 2 && names.contains(&field.name));
+    fields.filter_map(|field| {
         let value = params.get(field.value..field.end)?;
-        let mut tokens = tokens(value).skip_while(|token| matches!(token.text, "Some" | "("));
-        decoded(value, &tokens.next()?).map(|literal| literal.text)
+        let token = tokens(value).find(|token| !matches!(token.text, "Some" | "(" | "r"))?;
+        decoded(params, &Token { text: token.text, start: field.value + token.start })
     })
 }
 
@@ -109,7 +133,11 @@ struct Literal {
 fn literals(params: &str) -> impl Iterator<Item = Literal> {
     // Most parameters have none, and need not be cut into tokens.
     let params = if params.contains('@') || params.contains("\\u") || params.contains("\\x") { params } else { "" };
-    tokens(params).filter_map(|token| decoded(params, &token)).filter(|literal| literal.text.starts_with('@'))
+    strings(params).filter(|literal| literal.text.starts_with('@'))
+}
+
+fn strings(params: &str) -> impl Iterator<Item = Literal> {
+    tokens(params).filter_map(|token| decoded(params, &token))
 }
 
 /// The text of a string literal; `None` for any other token.
@@ -127,11 +155,15 @@ fn decoded(params: &str, token: &Token) -> Option<Literal> {
     Some(Literal { range, text, raw })
 }
 
-/// The parameters with the texts of references replaced where `replace` has something else.
-fn rewritten<'a>(params: &'a str, mut replace: impl FnMut(&str) -> Option<String>) -> Cow<'a, str> {
+/// The parameters with the texts of literals replaced where `replace` has something else.
+fn rewritten(
+    params: &str,
+    literals: impl Iterator<Item = Literal>,
+    mut replace: impl FnMut(&str) -> Option<String>,
+) -> Cow<'_, str> {
     let mut out = String::new();
     let mut at = 0;
-    for Literal { range, text, raw } in literals(params) {
+    for Literal { range, text, raw } in literals {
         let Some(next) = replace(&text).filter(|next| *next != text) else { continue };
         out.push_str(&params[at..range.start]);
         if raw && !next.contains('"') {

@@ -10,6 +10,7 @@ use super::{FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader, write::
 use crate::rig::{
     GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError, Tag, TagKind, Uid,
     format::{Format, blanked},
+    reference::{bind_names, refresh_names},
     scan::{self, Field},
     source::{parse_ron, ron_options, utf8},
 };
@@ -224,10 +225,33 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
     add_joints(&mut rig, file.joints, places, unique)?;
+    bind_references(&mut rig, notes);
     if feature_summaries(&rig) != sorted(file.features) {
         notes.push("the header lists other features than the tags; saving corrects it".to_owned());
     }
     Ok(rig)
+}
+
+/// Puts uids beside names that stand alone in references, as people write them, and current names beside uids.
+fn bind_references(rig: &mut Rig, notes: &mut Vec<String>) {
+    let mut edits = Vec::new();
+    for joint in rig.walk() {
+        for tag in &joint.data.tags {
+            let TagKind::Command { module, params, feature } = &tag.kind else { continue };
+            let (bound, bad) = bind_names(params, rig);
+            let on = joint.data.label.as_deref().unwrap_or("without a label");
+            notes.extend(bad.iter().map(|bad| format!("{module} {} on joint {on}: {bad}; it stays as it is", tag.uid)));
+            let named = refresh_names(&bound, rig);
+            if *named != **params {
+                let kind = TagKind::Command { module: module.clone(), params: named.into_owned(), feature: *feature };
+                edits.push(RigEdit::SetTag(joint.data.uid, Box::new(Tag { kind, ..tag.clone() })));
+            }
+        }
+    }
+    for edit in edits {
+        let done = rig.apply(&edit);
+        debug_assert!(done.is_ok(), "a tag of the rig was refused: {done:?}");
+    }
 }
 
 fn sorted(mut features: Vec<FeatureSummary>) -> Vec<FeatureSummary> {

@@ -8,9 +8,10 @@ use std::{
 use bevy::math::{Quat, Vec3};
 
 use super::{FORMAT, FeatureSummary};
-use crate::rig::{NodeKind, Rig, RigJoint, Tag, TagKind, Uid};
+use crate::rig::{NodeKind, Rig, RigJoint, Tag, TagKind, Uid, reference::refresh_names};
 
-/// The text of a rig's template. The same rig gives the same bytes.
+/// The text of a rig's template. The same rig gives the same bytes. References in parameters are written with the current
+/// names beside the uids.
 pub fn write_template(rig: &Rig) -> String {
     let mut out = String::new();
     write_into(&mut out, rig).unwrap_or_default();
@@ -117,14 +118,14 @@ fn write_joint(out: &mut String, rig: &Rig, joint: &RigJoint, features: &HashSet
     if !data.tags.is_empty() {
         writeln!(out, "\n            tags: [")?;
         for tag in &data.tags {
-            write_tag(out, tag, features)?;
+            write_tag(out, rig, tag, features)?;
         }
         write!(out, "            ],")?;
     }
     writeln!(out, "\n        ),")
 }
 
-fn write_tag(out: &mut String, tag: &Tag, features: &HashSet<Uid>) -> std::fmt::Result {
+fn write_tag(out: &mut String, rig: &Rig, tag: &Tag, features: &HashSet<Uid>) -> std::fmt::Result {
     let name = match tag.kind {
         TagKind::Command { .. } => "Command",
         TagKind::Feature { .. } => "Feature",
@@ -142,7 +143,7 @@ fn write_tag(out: &mut String, tag: &Tag, features: &HashSet<Uid>) -> std::fmt::
             if let Some(feature) = feature.filter(|feature| features.contains(feature)) {
                 write!(out, "\n                    feature: \"{feature}\",")?;
             }
-            write!(out, "\n                    params: {params},")?;
+            write!(out, "\n                    params: {},", refresh_names(params, rig))?;
         }
         TagKind::Feature { kind, name, switch } => {
             write!(out, "\n                    kind: {}, name: {},", quoted(kind), quoted(name))?;

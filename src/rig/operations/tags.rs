@@ -1,0 +1,329 @@
+//! What people do to tags: add, order, change, copy and paste them, and turn features on and off.
+//!
+//! Live mirroring leaves tags alone; pasting them mirrored is how the other side gets them.
+
+mod clipboard;
+mod part;
+mod paste;
+mod remap;
+
+use std::{collections::BTreeMap, sync::Arc};
+
+pub use clipboard::{CopiedIdentifiers, CopiedJoint, TagClipboard, TagScope};
+pub use paste::{PasteTo, PasteWhat};
+
+use super::{Draft, OperationError};
+use crate::rig::{
+    EditError, Rig, RigEdit, Tag, TagKind, Uid,
+    feature::{self, FeatureError, FeatureKey},
+    reference::{BadReference, NameKind, bind_names, refresh_names},
+};
+
+/// One thing a person asks of tags. Tags are named by their uids, wherever in the rig they are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TagOperation {
+    /// Gives each joint a tag.
+    Add {
+        /// Which joints.
+        joints: Vec<Uid>,
+        /// What the tag is. Names without a uid in the parameters are bound.
+        kind: TagKind,
+        /// Its place among the joint's tags; last if left out.
+        index: Option<usize>,
+    },
+    /// Deletes tags. Commands of a deleted feature are in none then.
+    Delete(Vec<Uid>),
+    /// Enables tags or not.
+    Enable(Vec<Uid>, bool),
+    /// Moves tags, in the order given, to a joint (their own or another), before one of its tags or to the end.
+    Move {
+        /// Which.
+        tags: Vec<Uid>,
+        /// Where to.
+        joint: Uid,
+        /// Before which tag.
+        before: Option<Uid>,
+    },
+    /// Gives a tag a comment.
+    Comment(Uid, String),
+    /// Gives a command other parameters. Names without a uid in its references are bound.
+    Params(Uid, String),
+    /// Makes a feature tag another feature: kind, name, switch.
+    Feature {
+        /// Which tag.
+        tag: Uid,
+        /// The kind.
+        kind: String,
+        /// The name; empty to organise only.
+        name: String,
+        /// The switch; empty for none.
+        switch: String,
+    },
+    /// Attaches commands to a feature tag anywhere in the rig, or detaches them.
+    Attach(Vec<Uid>, Option<Uid>),
+    /// Deletes what has been copied.
+    Cut(Arc<TagClipboard>),
+    /// Pastes what has been copied.
+    Paste {
+        /// What has been copied, from this rig or another.
+        clipboard: Arc<TagClipboard>,
+        /// Tags, values or both.
+        what: PasteWhat,
+        /// Onto which joints.
+        to: PasteTo,
+    },
+    /// Drops a part onto a chain of joints: the tags of the part's first joint go to the first, and so on, until either
+    /// list ends.
+    Drop {
+        /// The part.
+        part: Arc<Rig>,
+        /// The joints, in order.
+        joints: Vec<Uid>,
+        /// What joints and groups of the part that have no counterpart in `joints` mean in the rig; the others are found
+        /// by label or name.
+        bindings: BTreeMap<Uid, Uid>,
+    },
+    /// Turns a combined feature on or off.
+    SetFeature(FeatureKey, bool),
+    /// Turns one part of a combined feature on or off.
+    SetSwitch(FeatureKey, String, bool),
+    /// Turns one part of a combined feature on and its other parts off.
+    ChooseSwitch(FeatureKey, String),
+    /// Enables a local group or not.
+    EnableGroup(Uid, bool),
+}
+
+/// Why an operation on tags did nothing.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TagError {
+    /// No such tag.
+    #[error("there is no tag {0} in the rig; it may have been deleted: choose another")]
+    NoTag(Uid),
+    /// Not a command.
+    #[error("tag {0} is no command; choose a command tag")]
+    NotCommand(Uid),
+    /// Not a feature.
+    #[error("tag {0} is no feature; choose a feature tag")]
+    NotFeature(Uid),
+    /// A reference that cannot be read.
+    #[error("parameters of tag {0}, byte {at}: {1}", at = .1.range.start)]
+    BadReference(Uid, BadReference),
+    /// No feature or switch of that name.
+    #[error(transparent)]
+    Feature(#[from] FeatureError),
+    /// Nothing to paste.
+    #[error("nothing has been copied; copy tags first")]
+    EmptyClipboard,
+    /// A text that is no clipboard.
+    #[error("the clipboard holds no tags: {0}; copy tags first")]
+    NoClipboard(String),
+    /// Nothing to paste onto.
+    #[error("no joint is selected to put tags on; select some")]
+    NoTarget,
+    /// Nothing to paste onto on the other side.
+    #[error("none of the copied joints has a joint on the other side; mirror the joints first")]
+    NoMirror,
+    /// A name of the part that could mean several things in the rig.
+    #[error(
+        "\"{name}\" of the part could be {} {kind}s of the rig ({}); choose one of them",
+        candidates.len(),
+        candidates.iter().map(|uid| uid.to_string()).collect::<Vec<_>>().join(", ")
+    )]
+    Ambiguous {
+        /// What it is.
+        kind: NameKind,
+        /// Its uid in the part; bind this.
+        uid: Uid,
+        /// Its name in the part.
+        name: String,
+        /// To one of these.
+        candidates: Vec<Uid>,
+    },
+}
+
+impl TagOperation {
+    /// A few words for the history panel.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Add { .. } => "Add tag",
+            Self::Delete(..) => "Delete tags",
+            Self::Enable(_, true) => "Enable tags",
+            Self::Enable(_, false) => "Disable tags",
+            Self::Move { .. } => "Move tags",
+            Self::Comment(..) => "Comment tag",
+            Self::Params(..) | Self::Feature { .. } => "Change tag",
+            Self::Attach(_, Some(_)) => "Attach to feature",
+            Self::Attach(_, None) => "Detach from feature",
+            Self::Cut(..) => "Cut tags",
+            Self::Paste { to: PasteTo::Mirror, .. } => "Paste tags mirrored",
+            Self::Paste { .. } => "Paste tags",
+            Self::Drop { .. } => "Drop part",
+            Self::SetFeature(_, true) | Self::SetSwitch(_, _, true) => "Turn feature on",
+            Self::SetFeature(_, false) | Self::SetSwitch(_, _, false) => "Turn feature off",
+            Self::ChooseSwitch(..) => "Choose switch",
+            Self::EnableGroup(_, true) => "Enable group",
+            Self::EnableGroup(_, false) => "Disable group",
+        }
+    }
+}
+
+impl From<FeatureError> for OperationError {
+    fn from(error: FeatureError) -> Self {
+        TagError::from(error).into()
+    }
+}
+
+pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), OperationError> {
+    match operation {
+        TagOperation::Add { joints, kind, index } => {
+            for &joint in joints {
+                let tag = Tag { uid: draft.next_uid(), enabled: true, comment: String::new(), kind: kind.clone() };
+                let tag = bound(draft, tag)?;
+                add(draft, joint, tag, index.unwrap_or(usize::MAX))?;
+            }
+            Ok(())
+        }
+        TagOperation::Delete(tags) => delete(draft, tags),
+        TagOperation::Enable(tags, enabled) => {
+            tags.iter().try_for_each(|tag| change(draft, *tag, |tag| tag.enabled = *enabled))
+        }
+        TagOperation::Move { tags, joint, before } => relocate(draft, tags, *joint, *before),
+        TagOperation::Comment(tag, comment) => change(draft, *tag, |tag| tag.comment.clone_from(comment)),
+        TagOperation::Params(uid, text) => {
+            let (joint, mut tag) = found(draft, *uid)?;
+            let TagKind::Command { params, .. } = &mut tag.kind else { return Err(TagError::NotCommand(*uid).into()) };
+            params.clone_from(text);
+            let tag = bound(draft, tag)?;
+            set(draft, joint, tag)
+        }
+        TagOperation::Feature { tag, kind, name, switch } => {
+            let kind = TagKind::Feature { kind: kind.clone(), name: name.clone(), switch: switch.clone() };
+            feature_tag(draft, *tag)?;
+            change(draft, *tag, |tag| tag.kind = kind)
+        }
+        TagOperation::Attach(tags, feature) => attach(draft, tags, *feature),
+        TagOperation::Cut(clipboard) => paste::cut(draft, clipboard),
+        TagOperation::Paste { clipboard, what, to } => paste::paste(draft, clipboard, *what, to),
+        TagOperation::Drop { part, joints, bindings } => part::drop_part(draft, part, joints, bindings),
+        TagOperation::SetFeature(key, on) => apply(draft, feature::set_feature(draft.rig(), key, *on)?),
+        TagOperation::SetSwitch(key, switch, on) => apply(draft, feature::set_switch(draft.rig(), key, switch, *on)?),
+        TagOperation::ChooseSwitch(key, switch) => apply(draft, feature::choose_switch(draft.rig(), key, switch)?),
+        TagOperation::EnableGroup(group, enabled) => {
+            let mut group = draft.rig().group(*group).ok_or(EditError::NoGroup(*group))?.clone();
+            let changes = group.enabled != *enabled;
+            group.enabled = *enabled;
+            if changes { apply(draft, vec![RigEdit::SetLocalGroup(group)]) } else { Ok(()) }
+        }
+    }
+}
+
+fn apply(draft: &mut Draft, edits: Vec<RigEdit>) -> Result<(), OperationError> {
+    edits.into_iter().try_for_each(|edit| Ok(draft.apply(edit)?))
+}
+
+fn found(draft: &Draft, tag: Uid) -> Result<(Uid, Tag), TagError> {
+    let (joint, found) = draft.rig().find_tag(tag).ok_or(TagError::NoTag(tag))?;
+    Ok((joint.data.uid, found.clone()))
+}
+
+fn feature_tag(draft: &Draft, tag: Uid) -> Result<(), TagError> {
+    match found(draft, tag)?.1.kind {
+        TagKind::Feature { .. } => Ok(()),
+        TagKind::Command { .. } => Err(TagError::NotFeature(tag)),
+    }
+}
+
+fn add(draft: &mut Draft, joint: Uid, tag: Tag, index: usize) -> Result<(), OperationError> {
+    Ok(draft.apply(RigEdit::AddTag { joint, tag: Box::new(tag), index })?)
+}
+
+/// Replaces a tag; one that is as it was already needs no edit.
+fn set(draft: &mut Draft, joint: Uid, tag: Tag) -> Result<(), OperationError> {
+    if draft.rig().find_tag(tag.uid).is_some_and(|(_, now)| *now == tag) {
+        return Ok(());
+    }
+    Ok(draft.apply(RigEdit::SetTag(joint, Box::new(tag)))?)
+}
+
+fn change(draft: &mut Draft, tag: Uid, change: impl FnOnce(&mut Tag)) -> Result<(), OperationError> {
+    let (joint, mut tag) = found(draft, tag)?;
+    change(&mut tag);
+    set(draft, joint, tag)
+}
+
+/// The tag with uids beside all names in its references.
+fn bound(draft: &Draft, mut tag: Tag) -> Result<Tag, TagError> {
+    if let TagKind::Command { params, .. } = &mut tag.kind {
+        let (text, bad) = bind_names(params, draft.rig());
+        let text = text.into_owned();
+        if let Some(bad) = bad.into_iter().next() {
+            return Err(TagError::BadReference(tag.uid, bad));
+        }
+        *params = text;
+    }
+    Ok(tag)
+}
+
+/// Writes the current name beside every uid in a tag's references.
+fn refresh(rig: &Rig, tag: &mut Tag) {
+    if let TagKind::Command { params, .. } = &mut tag.kind {
+        *params = refresh_names(params, rig).into_owned();
+    }
+}
+
+fn delete(draft: &mut Draft, tags: &[Uid]) -> Result<(), OperationError> {
+    for &uid in tags {
+        let (joint, tag) = found(draft, uid)?;
+        if matches!(tag.kind, TagKind::Feature { .. }) {
+            let commands: Vec<Uid> = feature::commands_of(draft.rig(), uid).map(|(_, tag)| tag.uid).collect();
+            attach(draft, &commands, None)?;
+        }
+        draft.apply(RigEdit::RemoveTag(joint, uid))?;
+    }
+    Ok(())
+}
+
+fn attach(draft: &mut Draft, tags: &[Uid], to: Option<Uid>) -> Result<(), OperationError> {
+    to.map_or(Ok(()), |feature| feature_tag(draft, feature))?;
+    for &uid in tags {
+        let (joint, mut tag) = found(draft, uid)?;
+        let TagKind::Command { feature, .. } = &mut tag.kind else { return Err(TagError::NotCommand(uid).into()) };
+        *feature = to;
+        set(draft, joint, tag)?;
+    }
+    Ok(())
+}
+
+fn relocate(draft: &mut Draft, tags: &[Uid], joint: Uid, before: Option<Uid>) -> Result<(), OperationError> {
+    let mut moved: Vec<Uid> = Vec::with_capacity(tags.len());
+    for &tag in tags {
+        found(draft, tag)?;
+        if !moved.contains(&tag) {
+            moved.push(tag);
+        }
+    }
+    let order = |draft: &Draft| -> Result<Vec<Uid>, OperationError> {
+        let joint = draft.rig().joint(joint).ok_or(EditError::NoJoint(joint))?;
+        Ok(joint.data.tags.iter().map(|tag| tag.uid).collect())
+    };
+    let old = order(draft)?;
+    let start = match before {
+        Some(before) => old.iter().position(|tag| *tag == before).ok_or(EditError::NoTag(joint, before))?,
+        None => old.len(),
+    };
+    // Where the next tag stands that is not moved itself.
+    let next = old[start..].iter().find(|tag| !moved.contains(tag)).copied();
+    let mut wanted: Vec<Uid> = old.iter().filter(|tag| !moved.contains(tag)).copied().collect();
+    let place = next.and_then(|next| wanted.iter().position(|tag| *tag == next)).unwrap_or(wanted.len());
+    wanted.splice(place..place, moved.iter().copied());
+    if wanted == old {
+        return Ok(());
+    }
+    let mut taken = Vec::with_capacity(moved.len());
+    for &tag in &moved {
+        let (from, data) = found(draft, tag)?;
+        draft.apply(RigEdit::RemoveTag(from, tag))?;
+        taken.push(data);
+    }
+    taken.into_iter().enumerate().try_for_each(|(number, tag)| add(draft, joint, tag, place + number))
+}

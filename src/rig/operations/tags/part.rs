@@ -1,0 +1,160 @@
+//! Dropping a part onto a chain of joints.
+
+use std::collections::BTreeMap;
+
+use super::{
+    super::{Draft, OperationError},
+    TagError, add,
+    paste::refresh_all,
+    remap::Remap,
+};
+use crate::rig::{
+    EditError, GroupData, JointData, NodeRefs, Rig, RigEdit, TagKind, Uid,
+    reference::{NameKind, NameScope, Names, RigScope, map_references, references_in},
+};
+
+/// Puts the tags of a part's joints (parents first, siblings as authored) onto `joints` in order, until either list
+/// ends.
+///
+/// Joints without a label get the part's, joints without a local group the part's group, which is created. What the
+/// part's references name becomes its counterpart; where there is none, what `bindings` says, or what has the same
+/// label or name in the rig.
+pub(super) fn drop_part(
+    draft: &mut Draft,
+    part: &Rig,
+    joints: &[Uid],
+    bindings: &BTreeMap<Uid, Uid>,
+) -> Result<(), OperationError> {
+    for (number, joint) in joints.iter().enumerate() {
+        draft.rig().joint(*joint).ok_or(EditError::NoJoint(*joint))?;
+        if joints[..number].contains(joint) {
+            return Err(EditError::Taken(*joint).into());
+        }
+    }
+    if joints.is_empty() {
+        return Err(TagError::NoTarget.into());
+    }
+    let pairs: Vec<(&JointData, Uid)> = part.walk().map(|joint| &joint.data).zip(joints.iter().copied()).collect();
+    let mut remap = Remap::default();
+    for (joint, target) in &pairs {
+        remap.uids.insert(joint.uid, *target);
+        for tag in &joint.tags {
+            let uid = draft.next_uid();
+            remap.uids.insert(tag.uid, uid);
+        }
+        let unlabelled = draft.rig().joint(*target).is_some_and(|target| target.data.label.is_none());
+        if unlabelled && joint.label.is_some() {
+            draft.apply(RigEdit::SetLabel(*target, joint.label.clone()))?;
+        }
+    }
+    groups(draft, part, &pairs, &mut remap)?;
+    bind(draft, part, &pairs, bindings, &mut remap)?;
+    let mut dropped = Vec::new();
+    for (joint, target) in &pairs {
+        for tag in &joint.tags {
+            let mut copy = remap.tag(draft.rig(), tag);
+            if let TagKind::Command { params, .. } = &mut copy.kind {
+                // The part's own rig is the rig that it is dropped into.
+                *params = map_references(params, |reference| {
+                    if reference.rig == RigScope::Rig(part.uid()) {
+                        reference.rig = RigScope::Own;
+                    }
+                });
+            }
+            dropped.push(copy.uid);
+            add(draft, *target, copy, usize::MAX)?;
+        }
+    }
+    refresh_all(draft, &dropped)?;
+    let left = part.len().saturating_sub(joints.len());
+    if left > 0 {
+        draft.note(format!("{left} joints of the part are left over: only {} are selected", joints.len()));
+    } else if joints.len() > part.len() {
+        let left = joints.len() - part.len();
+        draft.note(format!("{left} selected joints are left over: the part has only {}", part.len()));
+    }
+    Ok(())
+}
+
+/// Each group of the part becomes the group that one of its counterparts is in, or is created.
+fn groups(draft: &mut Draft, part: &Rig, pairs: &[(&JointData, Uid)], remap: &mut Remap) -> Result<(), OperationError> {
+    for group in part.groups() {
+        let members: Vec<Uid> =
+            pairs.iter().filter(|(joint, _)| joint.group == Some(group.uid)).map(|(_, target)| *target).collect();
+        let group_of = |draft: &Draft, joint: Uid| draft.rig().joint(joint).and_then(|joint| joint.data.group);
+        let Some(first) = members.iter().map(|joint| group_of(draft, *joint)).reduce(Option::or) else { continue };
+        let target = match first {
+            Some(known) => known,
+            None => {
+                let group =
+                    GroupData { uid: draft.next_uid(), name: free_name(draft.rig(), &group.name), ..group.clone() };
+                let uid = group.uid;
+                draft.apply(RigEdit::AddLocalGroup(group, usize::MAX))?;
+                uid
+            }
+        };
+        remap.uids.insert(group.uid, target);
+        for joint in members {
+            if group_of(draft, joint).is_none() {
+                draft.apply(RigEdit::SetGroup(joint, Some(target)))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The name, with a number if a group has it already: two arms are two groups.
+fn free_name(rig: &Rig, name: &str) -> String {
+    let is_free = |name: &String| rig.groups().iter().all(|group| group.name != *name);
+    let numbered = (2..).map(|number| format!("{name}_{number}"));
+    std::iter::once(name.to_owned()).chain(numbered).find(is_free).unwrap_or_default()
+}
+
+/// Finds what references of the part mean in the rig where they name what has not been put onto a joint.
+fn bind(
+    draft: &mut Draft,
+    part: &Rig,
+    pairs: &[(&JointData, Uid)],
+    bindings: &BTreeMap<Uid, Uid>,
+    remap: &mut Remap,
+) -> Result<(), OperationError> {
+    let params = pairs.iter().flat_map(|(joint, _)| &joint.tags).filter_map(|tag| match &tag.kind {
+        TagKind::Command { params, .. } => Some(params),
+        TagKind::Feature { .. } => None,
+    });
+    let lists: Vec<NodeRefs> =
+        params.flat_map(|params| references_in(params)).filter_map(|found| found.references.ok()).collect();
+    let named = lists.iter().flatten().filter(|reference| match reference.rig {
+        RigScope::Own => true,
+        RigScope::Rig(rig) => rig == part.uid(),
+    });
+    let mut missing: Vec<String> = Vec::new();
+    for (kind, uid) in named.flat_map(|reference| reference.uids()) {
+        if remap.uids.contains_key(&uid) || kind == NameKind::Rig {
+            continue;
+        }
+        if let Some(bound) = bindings.get(&uid) {
+            remap.uids.insert(uid, *bound);
+            continue;
+        }
+        let name = part.name_of(kind, uid).map(|name| name.into_owned()).unwrap_or_default();
+        let candidates = match kind {
+            NameKind::Command => Vec::new(),
+            _ if name.is_empty() => Vec::new(),
+            // Which joint bears the label decides what the reference means once one of them is renamed.
+            NameKind::Joint | NameKind::Label => draft.rig().find(NameScope::default(), NameKind::Joint, &name),
+            NameKind::Group | NameKind::Rig => draft.rig().find(NameScope::default(), kind, &name),
+        };
+        match candidates.as_slice() {
+            [] => missing.push(format!("{kind} \"{name}\" ({uid})")),
+            [one] => drop(remap.uids.insert(uid, *one)),
+            _ => return Err(TagError::Ambiguous { kind, uid, name, candidates }.into()),
+        }
+    }
+    missing.sort_unstable();
+    missing.dedup();
+    for what in missing {
+        draft.note(format!("references of the part name the {what}, which has no counterpart in the rig"));
+    }
+    Ok(())
+}

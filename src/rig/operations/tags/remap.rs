@@ -1,0 +1,110 @@
+//! What uids in copied tags mean where the tags are put.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::rig::{
+    Rig, Tag, TagKind, Uid,
+    label::mirrored_label,
+    reference::{NameKind, map_references, map_text_fields, map_uids},
+};
+
+/// Uids of joints, tags and groups, and what they become. Others stay.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Remap {
+    pub uids: HashMap<Uid, Uid>,
+    /// Joints without a label, which no label reference can name.
+    pub unlabelled: HashSet<Uid>,
+}
+
+impl Remap {
+    pub fn get(&self, uid: Uid) -> Option<Uid> {
+        self.uids.get(&uid).copied()
+    }
+
+    /// The parameters with references, and uids that stand alone, changed.
+    pub fn params(&self, params: &str) -> String {
+        let referred = map_references(params, |reference| {
+            for (kind, uid) in reference.uids_mut() {
+                let next = self.get(*uid);
+                if let Some(next) = next.filter(|next| kind != NameKind::Label || !self.unlabelled.contains(next)) {
+                    *uid = next;
+                }
+            }
+        });
+        map_uids(&referred, |uid| self.get(uid))
+    }
+
+    /// A copy of a tag under its next uid. A feature that is not in `rig` and not among the copies is left out.
+    pub fn tag(&self, rig: &Rig, tag: &Tag) -> Tag {
+        let mut tag = tag.clone();
+        tag.uid = self.get(tag.uid).unwrap_or(tag.uid);
+        if let TagKind::Command { params, feature, .. } = &mut tag.kind {
+            *params = self.params(params);
+            *feature = feature.and_then(|feature| {
+                let is_known = |feature: &Uid| rig.find_tag(*feature).is_some();
+                self.get(feature).or(Some(feature).filter(is_known))
+            });
+        }
+        tag
+    }
+}
+
+/// The other side of everything in a rig that has one: joints, their tags (the same module or kind at the same place
+/// among its like), and the local groups of joints.
+pub(super) fn other_side(rig: &Rig) -> HashMap<Uid, Uid> {
+    let mut other = HashMap::new();
+    let mut groups: HashMap<Uid, Option<Uid>> = HashMap::new();
+    for joint in rig.walk() {
+        let Some(mirror) = joint.data.mirror.and_then(|mirror| rig.joint(mirror)) else { continue };
+        other.insert(joint.data.uid, mirror.data.uid);
+        pair_tags(&mut other, &joint.data.tags, &mirror.data.tags);
+        if let (Some(group), Some(partner)) = (joint.data.group, mirror.data.group) {
+            let known = groups.entry(group).or_insert(Some(partner));
+            // A group whose joints' partners are in several has no other side.
+            if *known != Some(partner) {
+                *known = None;
+            }
+        }
+    }
+    for group in rig.groups() {
+        let by_name = || {
+            let name = mirrored_label(&group.name)?;
+            rig.groups().iter().find(|other| other.name == name).map(|other| other.uid)
+        };
+        if let Some(partner) = groups.get(&group.uid).copied().flatten().or_else(by_name) {
+            other.insert(group.uid, partner);
+        }
+    }
+    other
+}
+
+/// Pairs each tag with the one at the same place among those of its module or kind.
+pub(super) fn pair_tags(pairs: &mut HashMap<Uid, Uid>, from: &[Tag], to: &[Tag]) {
+    let mut used: HashSet<Uid> = HashSet::new();
+    for tag in from {
+        if let Some(like) = to.iter().find(|other| is_like(tag, other) && !used.contains(&other.uid)) {
+            used.insert(like.uid);
+            pairs.insert(tag.uid, like.uid);
+        }
+    }
+}
+
+fn is_like(a: &Tag, b: &Tag) -> bool {
+    match (&a.kind, &b.kind) {
+        (TagKind::Command { module: a, .. }, TagKind::Command { module: b, .. }) => a == b,
+        (TagKind::Feature { kind: a, .. }, TagKind::Feature { kind: b, .. }) => a == b,
+        _ => false,
+    }
+}
+
+/// The names that a tag gives (node names, labels, a feature's name) with the other side in them.
+pub(super) fn mirror_names(tag: &mut Tag) {
+    match &mut tag.kind {
+        TagKind::Command { params, .. } => *params = map_text_fields(params, &["name", "label"], mirrored_label),
+        TagKind::Feature { name, .. } => {
+            if let Some(other) = mirrored_label(name) {
+                *name = other;
+            }
+        }
+    }
+}
