@@ -74,7 +74,7 @@ pub enum ExpressionProblem {
         nearest: Vec<String>,
     },
     /// A function with the wrong number of arguments.
-    #[error("`{function}` takes {takes} arguments, but has {has}")]
+    #[error("`{function}` takes {takes}, but has {has}")]
     Arguments {
         /// The function.
         function: &'static str,

@@ -62,10 +62,10 @@ impl Arity {
 
     pub(super) fn words(self) -> &'static str {
         match self {
-            Self::One => "one",
-            Self::Two => "two",
-            Self::Three => "three",
-            Self::TwoOrMore => "two or more",
+            Self::One => "one argument",
+            Self::Two => "two arguments",
+            Self::Three => "three arguments",
+            Self::TwoOrMore => "two or more arguments",
         }
     }
 }

@@ -7,6 +7,7 @@ use super::{
     ExpressionError, ExpressionProblem as Problem, MOST_CHARACTERS, MOST_NESTED, MOST_OPERANDS,
     operators::{Arity, CONSTANTS, FUNCTIONS, Function, INFIX, Infix, JOIN, MINUS, NEGATIVE, literal},
 };
+use crate::rig::nearest::nearest;
 
 /// What a scan leaves.
 pub(super) struct Scanned {
@@ -164,7 +165,7 @@ impl Scan<'_> {
         }
         if self.chars.get(next) == Some(&'(') {
             let Some(function) = FUNCTIONS.iter().find(|function| function.name == name) else {
-                let nearest = nearest(&name, FUNCTIONS.iter().map(|function| function.name));
+                let nearest = nearest(&name, FUNCTIONS.iter().map(|function| function.name), 3);
                 return error(from, Problem::Unknown { name, nearest });
             };
             self.at = next;
@@ -183,7 +184,7 @@ impl Scan<'_> {
             (None, Some((_, value))) => literal(*value),
             (None, None) => {
                 let known = self.variables.iter().copied().chain(CONSTANTS.iter().map(|(constant, _)| *constant));
-                return error(from, Problem::Unknown { nearest: nearest(&name, known), name });
+                return error(from, Problem::Unknown { nearest: nearest(&name, known, 3), name });
             }
         };
         self.begin(from, name, true)?;
@@ -303,34 +304,4 @@ impl Scan<'_> {
 
 fn error<T>(at: usize, problem: Problem) -> Result<T, ExpressionError> {
     Err(ExpressionError { column: at + 1, problem })
-}
-
-/// Up to three of `known` that are like `name`, nearest first.
-fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let most = name.chars().count() / 3 + 1;
-    let mut near: Vec<(usize, &str)> = known
-        .map(|candidate| (distance(name, candidate, most), candidate))
-        .filter(|(distance, _)| *distance <= most)
-        .collect();
-    near.sort_unstable();
-    near.iter().take(3).map(|(_, name)| (*name).to_owned()).collect()
-}
-
-/// Insertions, deletions and changes of characters from `a` to `b` (Levenshtein), regardless of case; more than `most`
-/// for names whose lengths tell.
-fn distance(a: &str, b: &str, most: usize) -> usize {
-    let (a, b): (Vec<char>, Vec<char>) = (a.to_lowercase().chars().collect(), b.to_lowercase().chars().collect());
-    if a.len().abs_diff(b.len()) > most {
-        return most + 1;
-    }
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.iter().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
-        for (j, to) in b.iter().enumerate() {
-            let changed = diagonal + usize::from(from != to);
-            diagonal = row[j + 1];
-            row[j + 1] = changed.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }

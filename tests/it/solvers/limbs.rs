@@ -161,6 +161,40 @@ fn two_bone_is_continuous_at_full_stretch() {
 }
 
 #[test]
+fn a_limb_without_pole_follows_its_goal_without_a_pop() {
+    let mut random = Random(4);
+    for _ in 0..40 {
+        let mut limb = limb(Vec3::ZERO, random.direction(), Vec3::ZERO);
+        limb.end = limb.mid + random.direction() * 0.7;
+        let line = limb.end.normalize();
+        // Any way that keeps off the direction opposite to the posed limb.
+        let (a, b) = (random.direction(), random.direction());
+        let goal = |t: f32| {
+            let way = (line + 0.8 * (a * (6.0 * t).sin() + b * (9.0 * t).cos())).normalize_or(line);
+            way * (1.0 + 0.6 * (5.0 * t).sin())
+        };
+        let mut before: Option<TwoBoneSolution> = None;
+        for i in 0..4000 {
+            let t = i as f32 / 4000.0;
+            limb.goal = goal(t);
+            let now = limb.solve();
+            assert_eq!(now, limb.solve(), "the same input gives another answer");
+            if line.dot(limb.goal.normalize()) < -0.9 {
+                before = None;
+                continue;
+            }
+            if let Some(before) = before {
+                let leap = angle(before.root_rotation, now.root_rotation);
+                let leap = leap.max(angle(before.mid_rotation, now.mid_rotation));
+                // The reach ends at 1.7, where the elbow straightens with a root.
+                assert!(leap < 0.1, "a leap of {leap} at {t}");
+            }
+            before = Some(now);
+        }
+    }
+}
+
+#[test]
 fn softness_is_smooth_and_stretch_makes_up_for_it() {
     let mut arm = limb(Vec3::ZERO, Vec3::new(1.0, 0.0, -0.1), Vec3::new(2.0, 0.0, 0.0));
     let length = 2.0 * arm.mid.length();

@@ -102,7 +102,7 @@ fn blends_are_weighted_and_need_weight() {
         assert!(is_unit(mean));
     }
     // Opposite turns cancel; the first one stays.
-    let cancel = [(turn(0.0), 0.0), (turn(90.0) * Quat::from_rotation_x(3.14), 1.0), (turn(180.0), f32::INFINITY)];
+    let cancel = [(turn(0.0), 0.0), (turn(90.0) * Quat::from_rotation_x(3.0), 1.0), (turn(180.0), f32::INFINITY)];
     assert!(blend_rotations(cancel).is_some_and(is_unit));
 }
 
