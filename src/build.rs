@@ -9,8 +9,11 @@
 //! Modules see the world through a [`BuildScope`] only. Nothing here knows an `App`.
 
 mod amount;
+mod authoring;
+mod axis;
 mod creation;
 mod error;
+mod follow;
 mod ik;
 mod list;
 mod module;
@@ -23,8 +26,11 @@ mod snapshot;
 mod world;
 
 pub use amount::Amount;
+pub use authoring::{check_finite, check_limits, degrees};
+pub use axis::Axis;
 pub use creation::Creation;
 pub use error::{BuildError, BuildProblem, ModuleError};
+pub use follow::{FollowParams, TargetParams};
 pub use ik::{Ik, IkSolver, JointAngles};
 pub use list::{BuildRange, ListEntry};
 pub use module::{DynModule, ModuleInfo, Modules, Parameter, RigModule};

@@ -5,12 +5,19 @@
 //! [`Modules::add`].
 
 pub mod attribute;
+pub mod control;
 pub mod driven_key;
 pub mod expression;
 pub mod ik_fk_switch;
 pub mod ik_handle;
+pub mod insert_joints;
 pub mod morph;
+pub mod null;
+pub mod orient;
+pub mod parent;
+pub mod point;
 pub mod reverse_foot;
+pub mod scale;
 pub mod space_switch;
 pub mod spline_ik;
 pub mod spring;
@@ -22,12 +29,19 @@ use crate::build::Modules;
 /// Registers every module of this crate.
 pub fn register(modules: &mut Modules) {
     modules.add::<attribute::AttributeModule>();
+    modules.add::<control::ControlModule>();
     modules.add::<driven_key::DrivenKey>();
     modules.add::<expression::Expression>();
     modules.add::<ik_fk_switch::IkFkSwitch>();
     modules.add::<ik_handle::IkHandle>();
+    modules.add::<insert_joints::InsertJointsModule>();
     modules.add::<morph::Morph>();
+    modules.add::<null::NullModule>();
+    modules.add::<orient::OrientModule>();
+    modules.add::<parent::ParentModule>();
+    modules.add::<point::PointModule>();
     modules.add::<reverse_foot::ReverseFoot>();
+    modules.add::<scale::ScaleModule>();
     modules.add::<space_switch::SpaceSwitch>();
     modules.add::<spline_ik::SplineIk>();
     modules.add::<spring::Spring>();

@@ -19,6 +19,11 @@ pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + 
     const DOC: &'static str;
     /// A line about each parameter: (name, what it is, with its unit and range).
     const PARAMETERS: &'static [(&'static str, &'static str)];
+    /// The form that edits its parameters, as text: see [`Form`](crate::rig::form::Form). Without one, a form is made
+    /// from the parameters' types.
+    const FORM: Option<&'static str> = None;
+    /// Its icon as SVG text: 24 by 24 units, lines in `currentColor`.
+    const ICON: Option<&'static str> = None;
 
     /// Makes nodes and constraints.
     ///
@@ -71,6 +76,10 @@ pub struct ModuleInfo {
     pub doc: &'static str,
     /// Its parameters in order.
     pub parameters: Vec<Parameter>,
+    /// See [`RigModule::FORM`].
+    pub form: Option<&'static str>,
+    /// See [`RigModule::ICON`].
+    pub icon: Option<&'static str>,
     /// Identity of its type, for reflection.
     pub type_id: TypeId,
     /// Its type, for forms made by reflection.
@@ -115,6 +124,8 @@ impl Modules {
             name: M::NAME,
             doc: M::DOC,
             parameters: parameters::<M>(),
+            form: M::FORM,
+            icon: M::ICON,
             type_id: TypeId::of::<M>(),
             type_info: M::type_info(),
             parse: |text| Ok(Arc::new(read::<M>(text)?)),
@@ -171,9 +182,10 @@ fn parameters<M: RigModule>() -> Vec<Parameter> {
     info.iter().map(parameter).collect()
 }
 
-/// The default of one field as RON.
+/// The default of one field as RON, as it may stand in a tag.
 fn default_text<M: RigModule>(default: &M, field: &str) -> String {
-    let value = serde_json::to_value(default).ok();
-    let value = value.as_ref().and_then(|value| value.get(field)).cloned().unwrap_or_default();
-    if value.is_null() { "None".to_owned() } else { ron::to_string(&value).unwrap_or_default() }
+    let text = written(default);
+    let fields = crate::rig::fields(&text);
+    let found = fields.iter().find(|known| known.depth == 1 && known.name == field);
+    found.map_or_else(String::new, |found| text[found.value..found.end].trim().trim_end_matches(',').to_owned())
 }

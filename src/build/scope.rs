@@ -102,6 +102,11 @@ impl BuildScope<'_> {
         self.world.uid(node)
     }
 
+    /// The node with that uid, if the builder has ever seen one.
+    pub fn id(&self, uid: Uid) -> Option<NodeId> {
+        self.world.id(uid)
+    }
+
     /// Nodes that references stand for, in order, each once. May be none.
     ///
     /// # Errors
@@ -270,6 +275,14 @@ impl BuildScope<'_> {
     pub fn control(&mut self, node: NodeId) -> Option<Arc<ControlData>> {
         match self.read(node, Aspect::Control) {
             Some(Value::Control(control)) => Some(control),
+            _ => None,
+        }
+    }
+
+    /// The layer of a node.
+    pub fn layer(&mut self, node: NodeId) -> Option<Arc<LayerData>> {
+        match self.read(node, Aspect::Layer) {
+            Some(Value::Layer(layer)) => Some(layer),
             _ => None,
         }
     }

@@ -139,8 +139,8 @@ pub struct ControlData {
 }
 
 /// Which of the nine transform channels are free: translation, rotation and scale, each along X, Y and Z.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(default)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Channels {
     /// Translation.
     pub translate: [bool; 3],
@@ -160,8 +160,8 @@ impl Default for Channels {
 ///
 /// Translation in units of the node's parent, rotation in degrees as angles about X, Y and Z in that order, scale as
 /// factors.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Limits {
     /// Translation along X, Y and Z.
     pub translate: [(Option<f32>, Option<f32>); 3],
@@ -185,7 +185,8 @@ pub struct LayerData {
 }
 
 /// How the nodes of a layer are shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum LayerDisplay {
     /// As they are.
     #[default]

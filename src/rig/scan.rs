@@ -4,7 +4,7 @@
 //! `name: value` pair, so that errors name the line of a value that only makes no sense together with others.
 
 /// A `name: value` pair of a RON text.
-pub(super) struct Field<'a> {
+pub(crate) struct Field<'a> {
     /// The name.
     pub name: &'a str,
     /// How many brackets are open around it.
@@ -28,7 +28,7 @@ struct Open {
 }
 
 /// All fields of a text in the order of their names. Time is linear, and no depth of nesting is too deep.
-pub(super) fn fields(text: &str) -> Vec<Field<'_>> {
+pub(crate) fn fields(text: &str) -> Vec<Field<'_>> {
     let mut fields: Vec<Field> = Vec::new();
     let mut outer: Vec<Open> = Vec::new();
     let mut here = Open { bracket: 0, owner: None, current: None };

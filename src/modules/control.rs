@@ -1,0 +1,276 @@
+//! `control`: what people take hold of.
+
+use bevy::reflect::Reflect;
+use glam::{Quat, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, degrees},
+    mesh::model::Trs,
+    rig::{
+        Channels, Constraint, ControlData, Limits, NodeType, Scalar, Target,
+        nearest::did_you_mean,
+        reference::{NodeRef, NodeRefs},
+        shapes,
+    },
+};
+
+/// sRGB colours of controls on the left, on the right and in the middle.
+pub const SIDE_COLORS: [[f32; 3]; 3] = [[0.25, 0.55, 1.0], [1.0, 0.3, 0.27], [1.0, 0.82, 0.2]];
+
+/// How a control's axes lie.
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ControlAxes {
+    /// Like those of its node.
+    #[default]
+    Node,
+    /// Like those of the rig.
+    Rig,
+}
+
+/// How a control's shape lies before it is turned.
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShapeAxes {
+    /// The shape's Y points along the bone that starts at the node.
+    #[default]
+    Bone,
+    /// The shape's axes are the control's.
+    Control,
+    /// The shape's axes are the rig's.
+    Rig,
+}
+
+/// Makes a control for each of some nodes, which follow it. Roles: `control`, and `offset` for the null that takes its
+/// place.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::control::ControlModule};
+/// let params = r#"(shape: "cube", size: 0.1, limits: (rotate: ((-90.0, 90.0), (None, None), (None, None))))"#;
+/// # assert!(rigsmith::modules::all().load(ControlModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ControlModule {
+    /// The nodes that get one.
+    pub at: NodeRefs,
+    /// What the controls stand on.
+    pub parent: NodeRefs,
+    /// Whether controls stand below one another like their nodes.
+    pub hierarchy: bool,
+    /// How their axes lie.
+    pub axes: ControlAxes,
+    /// Whether a null takes each one's place.
+    pub offset_group: bool,
+    /// Whether the nodes follow.
+    pub follow: bool,
+    /// Whether they follow the scale, too.
+    pub follow_scale: bool,
+    /// The shape's name.
+    pub shape: String,
+    /// Half the shape's width.
+    pub size: Option<f32>,
+    /// Half the shape's width, relative to the bone, where `size` is left out.
+    pub relative_size: f32,
+    /// How the shape lies.
+    pub shape_axes: ShapeAxes,
+    /// Where the shape lies.
+    pub shape_translate: Vec3,
+    /// How the shape is turned.
+    pub shape_rotate: Vec3,
+    /// Factors of the shape.
+    pub shape_scale: Vec3,
+    /// The colour.
+    pub color: Option<[f32; 3]>,
+    /// What of it people move.
+    pub channels: Channels,
+    /// How far they move it.
+    pub limits: Limits,
+    /// See [`Creation`].
+    pub creation: Creation,
+}
+
+impl Default for ControlModule {
+    fn default() -> Self {
+        Self {
+            at: NodeRef::this().into(),
+            parent: NodeRefs::NONE,
+            hierarchy: true,
+            axes: ControlAxes::Node,
+            offset_group: true,
+            follow: true,
+            follow_scale: false,
+            shape: "circle".to_owned(),
+            size: None,
+            relative_size: 0.35,
+            shape_axes: ShapeAxes::Bone,
+            shape_translate: Vec3::ZERO,
+            shape_rotate: Vec3::ZERO,
+            shape_scale: Vec3::ONE,
+            color: None,
+            channels: Channels::default(),
+            limits: Limits::default(),
+            creation: Creation::default(),
+        }
+    }
+}
+
+impl RigModule for ControlModule {
+    const NAME: &'static str = "control";
+    const DOC: &'static str = "Makes a control, which people move and animate, for each of some nodes.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("at", "The nodes that get one."),
+        ("parent", "What the controls stand on; the parent of each node if left out."),
+        ("hierarchy", "True: each stands below the control of the nearest node above it in the list."),
+        ("axes", "node: its axes lie like its node's; rig: like the rig's."),
+        ("offset_group", "True: a null takes its place, so that its own base changes nothing."),
+        ("follow", "True: the nodes follow their controls in place and turn."),
+        ("follow_scale", "True: the nodes follow the scale of their controls, too."),
+        ("shape", "Name of the wire shape."),
+        ("size", "Half the width of the shape in the rig's units, above 0; from the bone's length if left out."),
+        ("relative_size", "Half the width of the shape as a share of the bone's length, where size is left out."),
+        (
+            "shape_axes",
+            "bone: the shape's Y lies along the bone; control: along the control's Y; rig: along the rig's.",
+        ),
+        ("shape_translate", "Where the shape lies, along its own axes, in the rig's units."),
+        ("shape_rotate", "Turn of the shape about X, Y and Z, in degrees."),
+        ("shape_scale", "Factors of the shape along X, Y and Z."),
+        ("color", "sRGB colour, 0 to 1 each; by the side of the body if left out."),
+        ("channels", "Which axes of translation, rotation and scale people move and keys are set on."),
+        ("limits", "Lowest and highest values of these; rotation in degrees."),
+        ("creation", "Name, groups and label; by default those of the node."),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        self.check(scope)?;
+        let nodes = scope.resolve_some("at", &self.at)?;
+        let parent = scope.resolve_maybe("parent", &self.parent)?;
+        let mut controls: Vec<NodeId> = Vec::with_capacity(nodes.len());
+        for (index, node) in nodes.iter().copied().enumerate() {
+            let upper = if self.hierarchy { scope.upper_in(node, &nodes[..index]) } else { None };
+            let above = match (upper, parent) {
+                (Some(upper), _) => Some(controls[upper]),
+                (None, Some(parent)) => Some(parent),
+                (None, None) => scope.parent(node),
+            };
+            let control = self.make(scope, node, index, above)?;
+            controls.push(control);
+        }
+        Ok(())
+    }
+
+    fn mirror(&mut self) {
+        let turned = Vec3::new(1.0, -1.0, -1.0);
+        self.shape_translate.x = -self.shape_translate.x;
+        self.shape_rotate *= turned;
+        // What goes from -a to b goes from -b to a on the other side.
+        let over = |(low, high): &mut (Option<f32>, Option<f32>)| {
+            (*low, *high) = (high.map(|end| -end), low.map(|end| -end));
+        };
+        let [x, ..] = &mut self.limits.translate;
+        over(x);
+        let [_, y, z] = &mut self.limits.rotate;
+        over(y);
+        over(z);
+        if let Some(color) = &mut self.color {
+            let [left, right, _] = SIDE_COLORS;
+            *color = match *color {
+                color if color == left => right,
+                color if color == right => left,
+                color => color,
+            };
+        }
+    }
+}
+
+impl ControlModule {
+    fn check(&self, scope: &BuildScope<'_>) -> Result<(), ModuleError> {
+        if shapes::shape(&self.shape).is_none() {
+            let nearest = did_you_mean(&self.shape, shapes::names());
+            return Err(ModuleError::parameter("shape", format!("there is no shape \"{}\"{nearest}", self.shape)));
+        }
+        scope.in_range("size", self.size.unwrap_or(1.0), f32::MIN_POSITIVE..=f32::INFINITY)?;
+        scope.in_range("relative_size", self.relative_size, f32::MIN_POSITIVE..=f32::INFINITY)?;
+        for (parameter, vector) in [
+            ("shape_translate", self.shape_translate),
+            ("shape_rotate", self.shape_rotate),
+            ("shape_scale", self.shape_scale),
+        ] {
+            check_finite(parameter, &vector.to_array())?;
+        }
+        for part in self.color.unwrap_or_default() {
+            scope.in_range("color", part, 0.0..=1.0)?;
+        }
+        check_limits("limits", &self.limits)
+    }
+
+    fn make(
+        &self,
+        scope: &mut BuildScope<'_>,
+        node: NodeId,
+        index: usize,
+        above: Option<NodeId>,
+    ) -> Result<NodeId, ModuleError> {
+        let place = match self.axes {
+            ControlAxes::Node => scope.global(node),
+            ControlAxes::Rig => Trs { translation: scope.position(node), ..Trs::IDENTITY },
+        };
+        let creation = scope.creation_for(&self.creation, node, index);
+        let control = if self.offset_group {
+            let name = creation.name.as_ref().map(|name| format!("{name}_offset"));
+            let own = Creation { name, ..creation.clone() };
+            let offset = scope.spawn_at(NodeType::Null, "offset", node, 0, above, place, &own)?;
+            scope.spawn(NodeType::Control, "control", node, 0, Some(offset), Trs::IDENTITY, &creation)?
+        } else {
+            scope.spawn_at(NodeType::Control, "control", node, 0, above, place, &creation)?
+        };
+        let data = ControlData {
+            shape: self.shape.clone(),
+            color: self.color.unwrap_or_else(|| match scope.named_side(node) {
+                Side::Left => SIDE_COLORS[0],
+                Side::Right => SIDE_COLORS[1],
+                Side::Middle => SIDE_COLORS[2],
+            }),
+            size: self.size.unwrap_or_else(|| self.relative_size * scope.bone_length(node)),
+            offset: self.shape_offset(scope, node, place),
+            channels: self.channels,
+            limits: self.limits,
+        };
+        scope.set_control(control, data);
+        if self.follow {
+            let offset = match self.axes {
+                ControlAxes::Node => Trs::IDENTITY,
+                ControlAxes::Rig => scope.global(node).relative_to(&place),
+            };
+            let constraint = Constraint::Transform {
+                driven: scope.uid(node),
+                targets: vec![Target { node: scope.uid(control), weight: Scalar::Value(1.0), offset }],
+                translate: [true; 3],
+                rotate: [true; 3],
+                scale: [self.follow_scale; 3],
+                weight: Scalar::Value(1.0),
+                keep_pose: false,
+            };
+            scope.constrain("follow", node, 0, constraint)?;
+        }
+        Ok(control)
+    }
+
+    /// Where the shape lies in the control's space.
+    fn shape_offset(&self, scope: &mut BuildScope<'_>, node: NodeId, place: Trs) -> Trs {
+        let back = place.rotation.inverse();
+        let axes = match self.shape_axes {
+            ShapeAxes::Control => Quat::IDENTITY,
+            ShapeAxes::Rig => back,
+            ShapeAxes::Bone => match scope.bone(node).map(|bone| (back * bone).normalize()) {
+                // Exactly along an axis is the rule, and shall not become nearly so by rounding.
+                Some(bone) if bone.dot(Vec3::Y) < 1.0 - 1e-5 => Quat::from_rotation_arc(Vec3::Y, bone),
+                _ => Quat::IDENTITY,
+            },
+        };
+        let rotation = (axes * degrees(self.shape_rotate)).normalize();
+        Trs { translation: axes * self.shape_translate, rotation, scale: self.shape_scale }
+    }
+}

@@ -1,0 +1,79 @@
+//! `insert_joints`: joints between a joint and the next.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, Creation, ModuleError, RigModule},
+    mesh::model::Trs,
+    rig::{
+        NodeType,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// The most joints that one command inserts.
+const MOST: u32 = 64;
+
+/// Puts joints evenly between a joint and its child, which is hung below the last of them. Role: `joint`.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::insert_joints::InsertJointsModule};
+/// let params = r#"(joint: "@this", count: 3)"#;
+/// # assert!(rigsmith::modules::all().load(InsertJointsModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InsertJointsModule {
+    /// The upper joint.
+    pub joint: NodeRefs,
+    /// The lower joint.
+    pub child: NodeRefs,
+    /// How many.
+    pub count: u32,
+    /// See [`Creation`].
+    pub creation: Creation,
+}
+
+impl Default for InsertJointsModule {
+    fn default() -> Self {
+        Self { joint: NodeRef::this().into(), child: NodeRefs::NONE, count: 1, creation: Creation::default() }
+    }
+}
+
+impl RigModule for InsertJointsModule {
+    const NAME: &'static str = "insert_joints";
+    const DOC: &'static str = "Puts joints evenly between a joint and the next, which is hung below the last of them.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("joint", "The upper joint."),
+        ("child", "The lower joint, a child of the upper; its only child joint if left out."),
+        ("count", "How many joints, 1 to 64."),
+        ("creation", "Name, groups and label; by default those of the upper joint."),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        if !(1..=MOST).contains(&self.count) {
+            let problem = format!("{} is out of range; write a number from 1 to {MOST}", self.count);
+            return Err(ModuleError::parameter("count", problem));
+        }
+        let joint = scope.resolve_one("joint", &self.joint)?;
+        let child = match scope.resolve_maybe("child", &self.child)? {
+            Some(child) if scope.parent(child) == Some(joint) => child,
+            Some(child) => {
+                let (child, joint) = (scope.name(child), scope.name(joint));
+                let problem = format!("{child} is not a child of {joint}; refer to one of its children");
+                return Err(ModuleError::reference("child", &self.child, problem));
+            }
+            None => scope.only_child("child", joint)?,
+        };
+        // Along the way to the child, turned like the upper joint, so that the bone goes on as it began.
+        let step = scope.base(child).translation / (self.count + 1) as f32;
+        let creation = scope.creation_for(&self.creation, joint, 0);
+        let mut last = joint;
+        for number in 0..self.count {
+            let base = Trs { translation: step, ..Trs::IDENTITY };
+            last = scope.spawn(NodeType::Joint, "joint", joint, number, Some(last), base, &creation)?;
+        }
+        scope.set_parent(child, Some(last))
+    }
+}

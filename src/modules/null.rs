@@ -1,0 +1,108 @@
+//! `null`: a node that carries others, at other nodes.
+
+use bevy::reflect::Reflect;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, Creation, ModuleError, RigModule, check_finite, degrees},
+    mesh::model::Trs,
+    rig::{
+        NodeType,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Makes a null for each of some nodes. Role: `null`.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::null::NullModule};
+/// let params = r#"(at: "@this", world: true, creation: (name: "arm_root"))"#;
+/// # assert!(rigsmith::modules::all().load(NullModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct NullModule {
+    /// The nodes that get one.
+    pub at: NodeRefs,
+    /// What the nulls stand on.
+    pub parent: NodeRefs,
+    /// Whether they stand below the rig.
+    pub world: bool,
+    /// Whether the nodes are hung below their nulls.
+    pub insert: bool,
+    /// Whether they turn like the nodes.
+    pub orient: bool,
+    /// Distance from the node.
+    pub translate: Vec3,
+    /// Turn against the node.
+    pub rotate: Vec3,
+    /// See [`Creation`].
+    pub creation: Creation,
+}
+
+impl Default for NullModule {
+    fn default() -> Self {
+        Self {
+            at: NodeRef::this().into(),
+            parent: NodeRefs::NONE,
+            world: false,
+            insert: false,
+            orient: true,
+            translate: Vec3::ZERO,
+            rotate: Vec3::ZERO,
+            creation: Creation::default(),
+        }
+    }
+}
+
+impl RigModule for NullModule {
+    const NAME: &'static str = "null";
+    const DOC: &'static str = "Makes a node that carries others, at each of some nodes.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("at", "The nodes that get one."),
+        ("parent", "What the nulls stand on; the parent of each node if left out."),
+        ("world", "True: they stand below the rig itself, on no parent."),
+        ("insert", "True: each node is hung below its null, which takes its place."),
+        ("orient", "True: they turn and scale like the nodes; false: along the rig's axes."),
+        ("translate", "Distance from the node, along the null's axes before it is turned, in the rig's units."),
+        ("rotate", "Turn against the node about X, Y and Z, in degrees."),
+        ("creation", "Name, groups and label; by default those of the node."),
+    ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/null.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/null.svg"));
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        check_finite("translate", &self.translate.to_array())?;
+        check_finite("rotate", &self.rotate.to_array())?;
+        let nodes = scope.resolve_some("at", &self.at)?;
+        let parent = scope.resolve_maybe("parent", &self.parent)?;
+        if parent.is_some() && self.world {
+            return Err(ModuleError::parameter("world", "is true, but there is a parent; leave one of the two out"));
+        }
+        for (index, node) in nodes.into_iter().enumerate() {
+            let above = match parent {
+                Some(parent) => Some(parent),
+                None if self.world => None,
+                None => scope.parent(node),
+            };
+            let mut place = scope.global(node);
+            if !self.orient {
+                place = Trs { translation: place.translation, ..Trs::IDENTITY };
+            }
+            let offset =
+                Trs { translation: self.translate / place.scale, rotation: degrees(self.rotate), scale: Vec3::ONE };
+            let creation = scope.creation_for(&self.creation, node, index);
+            let null = scope.spawn_at(NodeType::Null, "null", node, 0, above, place * offset, &creation)?;
+            if self.insert {
+                scope.set_parent(node, Some(null))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn mirror(&mut self) {
+        self.translate.x = -self.translate.x;
+        self.rotate *= Vec3::new(1.0, -1.0, -1.0);
+    }
+}

@@ -1,0 +1,86 @@
+//! `orient`: nodes that follow the turn of others.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{Amount, BuildScope, FollowParams, ModuleError, RigModule, TargetParams},
+    rig::reference::{NodeRef, NodeRefs},
+};
+
+/// Lets nodes turn like weighted targets. Role: `constraint`, for each node.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::orient::OrientModule};
+/// let params = r#"(node: "@this", targets: "@command control#00000000000000aa", keep_offset: true)"#;
+/// # assert!(rigsmith::modules::all().load(OrientModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OrientModule {
+    /// The nodes that follow.
+    pub node: NodeRefs,
+    /// What they follow.
+    pub targets: NodeRefs,
+    /// A share for each target.
+    pub weights: Vec<Amount>,
+    /// The node with the attributes.
+    pub control: NodeRefs,
+    /// Which angles follow.
+    pub rotate: [bool; 3],
+    /// Whether the node stays where it stands now.
+    pub keep_offset: bool,
+    /// Whether the node's own pose comes on top.
+    pub keep_pose: bool,
+    /// How much the nodes follow.
+    pub weight: Amount,
+}
+
+impl Default for OrientModule {
+    fn default() -> Self {
+        Self {
+            node: NodeRef::this().into(),
+            targets: NodeRefs::NONE,
+            weights: Vec::new(),
+            control: NodeRefs::NONE,
+            rotate: [true; 3],
+            keep_offset: true,
+            keep_pose: false,
+            weight: Amount::Value(1.0),
+        }
+    }
+}
+
+impl RigModule for OrientModule {
+    const NAME: &'static str = "orient";
+    const DOC: &'static str = "Lets nodes turn like weighted targets.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("node", "The nodes that follow."),
+        ("targets", "The nodes that they follow."),
+        (
+            "weights",
+            "For each target its share, a number from 0 or the name of an attribute; all the same if left out.",
+        ),
+        ("control", "The node that has the attributes; those that it lacks are added."),
+        ("rotate", "Which angles about X, Y and Z follow, in the parent's space."),
+        (
+            "keep_offset",
+            "Keep where the node stands now, in the space of each target; false: the node lies on its targets.",
+        ),
+        ("keep_pose", "True: the node's own pose comes on top, so that people can still move it."),
+        ("weight", "How much the nodes follow, a number from 0 to 1 or the name of an attribute of the control."),
+    ];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        scope.follow(&FollowParams {
+            node: &self.node,
+            targets: TargetParams { targets: &self.targets, weights: &self.weights, control: &self.control },
+            translate: [false; 3],
+            rotate: self.rotate,
+            scale: [false; 3],
+            keep_offset: self.keep_offset,
+            keep_pose: self.keep_pose,
+            weight: &self.weight,
+        })
+    }
+}
