@@ -1,5 +1,6 @@
 //! The engine as Bevy plugins: one plugin a file, each public, replaceable and usable alone where that makes sense.
 
+pub mod commands;
 #[cfg(feature = "draw")]
 pub mod display;
 pub mod document;
@@ -27,6 +28,7 @@ use bevy::{
 /// | plugin | gives |
 /// | --- | --- |
 /// | [`document::DocumentPlugin`] | rigs, their joint entities, the one edit path, undo and redo |
+/// | [`commands::CommandsPlugin`] | tags as entities, building, stepping and rolling back |
 /// | [`surface::SurfacePlugin`] | the posed surface that rays meet |
 /// | [`picking::PickingPlugin`] | selecting joints |
 /// | [`placement::PlacementPlugin`] | placing joints with rays |
@@ -40,6 +42,7 @@ impl PluginGroup for RigPlugins {
     fn build(self) -> PluginGroupBuilder {
         PluginGroupBuilder::start::<Self>()
             .add(document::DocumentPlugin)
+            .add(commands::CommandsPlugin)
             .add(surface::SurfacePlugin)
             .add(picking::PickingPlugin)
             .add(placement::PlacementPlugin)

@@ -220,7 +220,7 @@ fn apply_edits(
 /// Makes the joint entities equal to their rig: spawns, despawns, reparents, moves what moved at rest, and poses what
 /// the document poses otherwise than before (at rest while [`ShowRest`] says so). As long as the document's pose stays, so does what an animation, a game or
 /// a drag under way put on top of the rest pose.
-fn follow_rigs(
+pub(super) fn follow_rigs(
     mut commands: Commands,
     mut rigs: Query<(Entity, &Rig, &mut JointEntities, Option<&ShowRest>), Or<(Changed<Rig>, Changed<ShowRest>)>>,
     mut joints: Query<

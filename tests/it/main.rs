@@ -3,6 +3,7 @@
 mod build;
 #[cfg(feature = "cli")]
 mod cli;
+mod commands;
 #[cfg(feature = "draw")]
 mod display;
 #[cfg(feature = "draw")]

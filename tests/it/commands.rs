@@ -1,0 +1,178 @@
+//! The command processor in an app: tags and created nodes as entities, requests, reports.
+
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
+use rigsmith::{
+    build::CommandState,
+    plugins::{
+        commands::{
+            BuildDone, BuildFailure, BuildRequest, BuildStep, BuiltEntities, CommandReport, CommandTag, CreatedBy,
+            CreatedRole, FeatureTag, InFeature, Null, Parked, RegisterRigModule, TagEntities, TagOf, Tags,
+        },
+        document::{Change, JointEntities},
+    },
+    prelude::*,
+    rig::{JointData, RestTransform, RigEdit, Tag, TagKind},
+    test_app::test_app,
+};
+
+use crate::build::{Mark, Nudge};
+
+struct Bench {
+    app: App,
+    rig: Entity,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let mut app = test_app();
+        app.register_rig_module::<Mark>().register_rig_module::<Nudge>();
+        let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(1000), "rig"), ..default() }).id();
+        let mut bench = Self { app, rig };
+        for number in 1..=3 {
+            let joint = JointData {
+                uid: Uid(number),
+                label: Some(format!("j{number}")),
+                rest: RestTransform::from_translation(Vec3::Y),
+                ..default()
+            };
+            let parent = (number > 1).then(|| Uid(number - 1));
+            bench.edit(RigEdit::AddJoint { joint: Box::new(joint), parent, index: 0 });
+        }
+        bench
+    }
+
+    fn edit(&mut self, edit: RigEdit) {
+        self.app.world_mut().write_message(EditRequest::operation(self.rig, Operation::Edits(vec![edit])));
+        self.app.update();
+    }
+
+    fn change(&mut self, change: Change) {
+        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
+        self.app.update();
+    }
+
+    fn step(&mut self, step: BuildStep) {
+        self.app.world_mut().write_message(BuildRequest { rig: self.rig, step });
+        self.app.update();
+    }
+
+    fn tag(&mut self, joint: u64, uid: u64, module: &str, params: &str, feature: Option<u64>) {
+        let kind = TagKind::Command { module: module.into(), params: params.into(), feature: feature.map(Uid) };
+        let tag = Tag { uid: Uid(uid), enabled: true, comment: String::new(), kind };
+        self.edit(RigEdit::AddTag { joint: Uid(joint), tag: Box::new(tag), index: usize::MAX });
+    }
+
+    fn get<C: Component>(&self, entity: Entity) -> Option<&C> {
+        self.app.world().get::<C>(entity)
+    }
+
+    fn tag_entity(&self, tag: u64) -> Entity {
+        self.get::<TagEntities>(self.rig).unwrap().get(Uid(tag)).unwrap()
+    }
+
+    fn nodes(&self) -> Vec<(Uid, Entity)> {
+        self.get::<BuiltEntities>(self.rig).map(|nodes| nodes.iter().collect()).unwrap_or_default()
+    }
+}
+
+#[test]
+fn tags_are_entities_below_their_joint_in_order() {
+    let mut bench = Bench::new();
+    let kind = TagKind::Feature { kind: "generic".into(), name: "marks".into(), switch: String::new() };
+    let tag = Tag { uid: Uid(50), enabled: true, comment: "why".into(), kind };
+    bench.edit(RigEdit::AddTag { joint: Uid(1), tag: Box::new(tag), index: 0 });
+    bench.tag(1, 51, "mark", "()", Some(50));
+    bench.tag(1, 52, "mark", "(up: 1.0)", None);
+    let joint = bench.get::<JointEntities>(bench.rig).unwrap().get(Uid(1)).unwrap();
+    let order = |bench: &Bench| -> Vec<u64> {
+        bench.get::<Tags>(joint).unwrap().iter().map(|tag| bench.get::<Uid>(tag).unwrap().0).collect()
+    };
+    assert_eq!(order(&bench), [50, 51, 52]);
+    assert_eq!(bench.get::<FeatureTag>(bench.tag_entity(50)).unwrap().name, "marks");
+    assert_eq!(bench.get::<CommandTag>(bench.tag_entity(52)).unwrap().params, "(up: 1.0)");
+    assert_eq!(bench.get::<InFeature>(bench.tag_entity(51)).unwrap().0, bench.tag_entity(50));
+    let kept = bench.tag_entity(52);
+
+    // Another order, another joint, and gone.
+    let tag = bench.get::<Rig>(bench.rig).unwrap().joint(Uid(1)).unwrap().data.tags[2].clone();
+    bench.edit(RigEdit::Batch(vec![
+        RigEdit::RemoveTag(Uid(1), Uid(52)),
+        RigEdit::AddTag { joint: Uid(1), tag: Box::new(tag), index: 0 },
+    ]));
+    assert_eq!((order(&bench), bench.tag_entity(52)), (vec![52, 50, 51], kept));
+    bench.edit(RigEdit::RemoveTag(Uid(1), Uid(51)));
+    assert_eq!(order(&bench), [52, 50]);
+    bench.change(Change::Undo);
+    assert_eq!(order(&bench), [52, 50, 51]);
+    assert_eq!(bench.get::<TagOf>(bench.tag_entity(51)).unwrap().0, joint);
+}
+
+#[test]
+fn created_nodes_keep_their_entities_through_rolling_back() {
+    let mut bench = Bench::new();
+    bench.tag(1, 51, "mark", r#"(at: "@joints", below: true)"#, None);
+    bench.tag(2, 52, "nudge", "()", None);
+    assert!(bench.nodes().is_empty(), "nobody has asked for it to be built");
+    bench.step(BuildStep::All);
+    let nodes = bench.nodes();
+    assert_eq!(nodes.len(), 3);
+    let joints = bench.get::<JointEntities>(bench.rig).unwrap();
+    for (_, entity) in &nodes {
+        let role = bench.get::<CreatedRole>(*entity).unwrap();
+        assert_eq!(role.role, "mark");
+        assert_eq!(Some(bench.get::<ChildOf>(*entity).unwrap().parent()), joints.get(role.subject));
+        assert_eq!(bench.get::<CreatedBy>(*entity).unwrap().0, bench.tag_entity(51));
+        assert!(bench.get::<Null>(*entity).is_some());
+    }
+    bench.step(BuildStep::RollBack);
+    for (uid, entity) in &nodes {
+        assert!(bench.get::<Parked>(*entity).is_some() && bench.get::<Disabled>(*entity).is_some());
+        assert!(bench.get::<ChildOf>(*entity).is_none() && bench.get::<Null>(*entity).is_none());
+        assert_eq!(bench.get::<BuiltEntities>(bench.rig).unwrap().any(*uid), Some(*entity));
+    }
+    assert!(bench.nodes().is_empty());
+    bench.step(BuildStep::All);
+    assert_eq!(bench.nodes(), nodes);
+    assert!(bench.get::<Parked>(nodes[0].1).is_none() && bench.get::<Null>(nodes[0].1).is_some());
+    // An inserted joint leaves the others' nodes alone.
+    let joint = JointData { uid: Uid(9), ..default() };
+    bench.edit(RigEdit::AddJoint { joint: Box::new(joint), parent: Some(Uid(1)), index: 0 });
+    let more = bench.nodes();
+    assert_eq!(more.len(), 4);
+    assert!(nodes.iter().all(|node| more.contains(node)));
+}
+
+#[test]
+fn states_errors_and_times_are_on_the_tags() {
+    let mut bench = Bench::new();
+    bench.tag(1, 51, "mark", "()", None);
+    bench.tag(2, 52, "mark", "(up: 99.0)", None);
+    bench.tag(3, 53, "mark", "()", None);
+    bench.step(BuildStep::All);
+    let states = |bench: &Bench| {
+        [51, 52, 53].map(|tag| bench.get::<CommandReport>(bench.tag_entity(tag)).map(|report| report.0.state))
+    };
+    use CommandState::{Done, Failed, Pending};
+    assert_eq!(states(&bench), [Some(Done), Some(Failed), Some(Pending)]);
+    let report = bench.get::<CommandReport>(bench.tag_entity(52)).unwrap();
+    assert!(report.0.error.as_ref().unwrap().to_string().contains("from 0 to 10"));
+    assert_eq!(bench.get::<BuildFailure>(bench.rig).unwrap().0.command, Uid(52));
+    assert_eq!(bench.nodes().len(), 1);
+
+    // Mended by an edit: built at once.
+    let kind = TagKind::Command { module: "mark".into(), params: "(up: 9.0)".into(), feature: None };
+    let tag = Tag { uid: Uid(52), enabled: true, comment: String::new(), kind };
+    bench.edit(RigEdit::SetTag(Uid(2), Box::new(tag)));
+    assert_eq!(states(&bench), [Some(Done); 3]);
+    assert!(bench.get::<BuildFailure>(bench.rig).is_none());
+    let done: Vec<BuildDone> = bench.app.world_mut().resource_mut::<Messages<BuildDone>>().drain().collect();
+    let executed: Vec<u64> = done.last().unwrap().report.executed.iter().map(|tag| tag.0).collect();
+    assert_eq!(executed, [52, 53]);
+
+    // Stepped by hand it stays where it is, whatever is edited.
+    bench.step(BuildStep::Back);
+    bench.tag(1, 54, "nudge", "()", None);
+    assert_eq!(states(&bench)[2], Some(Pending));
+    bench.step(BuildStep::All);
+    assert_eq!(states(&bench), [Some(Done); 3]);
+}
