@@ -1,5 +1,8 @@
 //! The processor: follows a document, carries out what has to be carried out, and knows how far it has come.
 
+mod follow;
+mod loops;
+
 use std::{
     cmp::Reverse,
     collections::{BinaryHeap, HashSet},
@@ -9,16 +12,12 @@ use std::{
 
 use super::{
     BuildError, BuildProblem, BuildRange, BuildScope, DynModule, ListEntry, ModuleError, Modules,
-    list::{features, groups_off, is_on, joints_in},
     resolve::Asker,
     scope::Trace,
     snapshot,
-    world::{Aspect, Birth, NOWHERE, NodeId, Value, World, same},
+    world::{Aspect, NOWHERE, NodeId, Value, World, same},
 };
-use crate::{
-    mesh::model::Trs,
-    rig::{BuiltRig, Dependency, NodeKind, NodeType, Rig, RigEdit, TagKind, Uid},
-};
+use crate::rig::{BuiltRig, Rig, Uid};
 
 /// Where a command stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -130,175 +129,6 @@ impl Builder {
     /// Commands of other joints are left out of the list from the next [`Builder::sync`] on.
     pub fn set_range(&mut self, range: BuildRange) {
         self.range = range;
-    }
-
-    /// Takes over what the document says now. Nothing is carried out: see [`Builder::run_to`].
-    pub fn sync(&mut self, rig: &Rig) {
-        self.rig = rig.uid();
-        self.sync_joints(rig);
-        self.sync_list(rig);
-    }
-
-    /// Takes over one edit that was applied to the document since the last [`Builder::sync`]. What concerns one tag or
-    /// one transform takes no look at anything else.
-    pub fn touch(&mut self, rig: &Rig, edit: &RigEdit) {
-        if !self.touch_one(rig, edit) {
-            self.sync(rig);
-        }
-    }
-
-    /// True if that was all there is to do.
-    fn touch_one(&mut self, rig: &Rig, edit: &RigEdit) -> bool {
-        match edit {
-            RigEdit::SetTag(joint, tag) => {
-                let TagKind::Command { module, params, .. } = &tag.kind else { return false };
-                let tags = rig.joint(*joint).map(|joint| &joint.data.tags);
-                let Some(tag) = tags.and_then(|tags| tags.iter().find(|now| now.uid == tag.uid)) else { return false };
-                let Some(number) = self.world.creator_of(tag.uid) else { return false };
-                let TagKind::Command { feature, .. } = &tag.kind else { return false };
-                let command = &mut self.commands[number as usize];
-                // Without a feature, its own switch and that of its group decide; the latter has not changed.
-                if feature.is_some() || tag.enabled != command.active || **module != *command.module {
-                    return false;
-                }
-                if *params != *command.params {
-                    command.params = params.as_str().into();
-                    command.loaded = None;
-                    self.mark(number, Due::Run);
-                }
-                true
-            }
-            RigEdit::SetOffset(..) | RigEdit::SetSkin(..) => true,
-            _ => false,
-        }
-    }
-
-    fn sync_joints(&mut self, rig: &Rig) {
-        let off = groups_off(rig);
-        let before = std::mem::take(&mut self.world.joints);
-        let mut seen = HashSet::with_capacity(rig.len());
-        // Joints that are left out: their children hang on what is above, and stay where they are.
-        let mut left_out: std::collections::HashMap<Uid, (Option<NodeId>, Trs)> = std::collections::HashMap::new();
-        for (order, joint) in rig.walk().enumerate() {
-            let data = &joint.data;
-            let rest: Trs = data.rest.into();
-            let (parent, base) = match joint.parent {
-                Some(parent) => match left_out.get(&parent) {
-                    Some((above, between)) => (*above, *between * rest),
-                    None => (self.world.id(parent), rest),
-                },
-                None => (None, rest),
-            };
-            if data.group.is_some_and(|group| off.contains(&group)) {
-                left_out.insert(data.uid, (parent, base));
-                continue;
-            }
-            let node = self.world.slot(data.uid, None);
-            seen.insert(node);
-            self.world.joints.push(node);
-            let kind = match data.kind {
-                NodeKind::Joint => NodeType::Joint,
-                NodeKind::Null => NodeType::Null,
-            };
-            let label: Option<Arc<str>> = data.label.as_deref().map(Into::into);
-            let birth = Birth { kind, name: None, origin: None, order: order as u32 };
-            self.set_document(node, Aspect::Birth, Some(Value::Birth(Arc::new(birth))));
-            self.set_document(node, Aspect::Parent, Some(Value::Parent(parent)));
-            self.set_document(node, Aspect::Base, Some(Value::Base(base)));
-            self.set_document(node, Aspect::Label, Some(Value::Label(label)));
-            self.set_document(node, Aspect::Group, Some(Value::Group(data.group)));
-        }
-        for node in before.into_iter().filter(|node| !seen.contains(node)) {
-            for aspect in [Aspect::Birth, Aspect::Parent, Aspect::Base, Aspect::Label, Aspect::Group] {
-                self.set_document(node, aspect, None);
-            }
-        }
-    }
-
-    fn set_document(&mut self, node: NodeId, aspect: Aspect, value: Option<Value>) {
-        let cell = self.world.cell_mut(node, aspect);
-        if !same(cell.document.as_ref(), value.as_ref()) {
-            cell.document = value;
-            self.changed(node, aspect, None);
-        }
-    }
-
-    fn sync_list(&mut self, rig: &Rig) {
-        let features = features(rig);
-        let off = groups_off(rig);
-        let mut list = Vec::with_capacity(self.list.len());
-        for uid in joints_in(rig, &self.range) {
-            let Some(joint) = rig.joint(uid) else { continue };
-            let built = !joint.data.group.is_some_and(|group| off.contains(&group));
-            for tag in &joint.data.tags {
-                let TagKind::Command { module, params, .. } = &tag.kind else { continue };
-                let number = self.world.command(tag.uid);
-                let active = built && is_on(tag, &features);
-                if number as usize == self.commands.len() {
-                    self.commands.push(Command {
-                        joint: uid,
-                        module: module.as_str().into(),
-                        params: params.as_str().into(),
-                        loaded: None,
-                        active,
-                        trace: Trace::default(),
-                        due: Due::Nothing,
-                        error: None,
-                        micros: 0.0,
-                        runs: 0,
-                    });
-                    self.mark(number, Due::Run);
-                } else {
-                    let command = &mut self.commands[number as usize];
-                    let reads_anew = *command.module != **module || *command.params != **params;
-                    if reads_anew {
-                        command.module = module.as_str().into();
-                        command.params = params.as_str().into();
-                        command.loaded = None;
-                    }
-                    if reads_anew || command.active != active || command.joint != uid {
-                        (command.active, command.joint) = (active, uid);
-                        self.mark(number, Due::Run);
-                    }
-                }
-                list.push(number);
-            }
-        }
-        if list == self.list {
-            return;
-        }
-        // With other places, everything may read something else, and everything has to be looked at.
-        let had_any = !self.list.is_empty();
-        let reached = self.list.get(self.cursor as usize).copied();
-        for number in std::mem::replace(&mut self.list, list) {
-            self.world.places[number as usize] = NOWHERE;
-        }
-        self.due.clear();
-        for at in 0..self.list.len() {
-            let number = self.list[at];
-            self.world.places[number as usize] = at as u32;
-            let command = &mut self.commands[number as usize];
-            command.due = command.due.max(Due::Check);
-            self.due.push(Reverse((at as u32, number)));
-        }
-        self.graph_changed = Some(0);
-        let still = reached.map(|number| self.world.places[number as usize]).filter(|place| *place != NOWHERE);
-        let end = if had_any { self.list.len() as u32 } else { 0 };
-        self.cursor = still.unwrap_or(end);
-        if self.failed.is_some_and(|number| self.world.places[number as usize] == NOWHERE) {
-            self.failed = None;
-        }
-    }
-
-    fn mark(&mut self, number: u32, due: Due) {
-        let command = &mut self.commands[number as usize];
-        if command.due < due {
-            command.due = due;
-            let place = self.world.places[number as usize];
-            if place != NOWHERE {
-                self.due.push(Reverse((place, number)));
-            }
-        }
     }
 
     /// Somebody (`None`: the document) changed what a cell holds: whoever read it later has to be looked at.
@@ -589,79 +419,6 @@ impl Builder {
             }
         }
         values
-    }
-
-    /// The first command before `target` that closes a circle which was not there when it ran.
-    fn loop_before(&mut self, target: u32) -> Option<(u32, BuildProblem)> {
-        let from = self.graph_changed.take()?;
-        if (target as usize) < self.list.len() {
-            self.graph_changed = Some(from.min(target));
-        }
-        let mut constraints: Vec<(u32, u32, NodeId)> = Vec::new();
-        for place in from..target {
-            let number = self.list[place as usize];
-            let writes = self.commands[number as usize].trace.writes.iter();
-            let own = writes.filter(|(_, aspect)| *aspect == Aspect::Constraint);
-            constraints.extend(own.map(|(node, _)| (place, number, *node)));
-        }
-        for (place, number, constraint) in constraints {
-            if let Err(problem) = self.check_loop(constraint, place + 1) {
-                self.graph_changed = Some(from);
-                return Some((number, problem.into()));
-            }
-        }
-        None
-    }
-
-    /// Refuses a constraint whose input depends on what it drives.
-    fn check_loop(&self, constraint: NodeId, place: u32) -> Result<(), ModuleError> {
-        let Some(Value::Constraint(_, data)) = self.world.read_at(constraint, Aspect::Constraint, place) else {
-            return Ok(());
-        };
-        let drives = data.drives();
-        let mut seen: HashSet<Dependency> = HashSet::new();
-        let mut path: Vec<(Dependency, usize)> = data.reads().into_iter().map(|read| (read, 0)).collect();
-        let mut trail: Vec<Dependency> = Vec::new();
-        while let Some((at, depth)) = path.pop() {
-            trail.truncate(depth);
-            if drives.contains(&at) {
-                trail.push(at);
-                let names: Vec<String> = trail.iter().map(|at| self.dependency_name(at, place)).collect();
-                let first = drives.first().map(|at| self.dependency_name(at, place)).unwrap_or_default();
-                let shown = if names.first() == Some(&first) { String::new() } else { format!("{first} \u{2192} ") };
-                return Err(ModuleError::Cycle(format!("{shown}{}", names.join(" \u{2192} "))));
-            }
-            if !seen.insert(at.clone()) {
-                continue;
-            }
-            trail.push(at.clone());
-            let depth = trail.len();
-            let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = &at;
-            let Some(node) = self.world.id(*uid) else { continue };
-            if matches!(at, Dependency::Node(_))
-                && let Some(parent) = self.world.parent(node, place)
-            {
-                path.push((Dependency::Node(self.world.uid(parent)), depth));
-            }
-            for driver in &self.world.slots[node.0 as usize].driven_by {
-                if let Some(Value::Constraint(_, other)) = self.world.read_at(*driver, Aspect::Constraint, place)
-                    && *driver != constraint
-                    && other.drives().contains(&at)
-                {
-                    path.extend(other.reads().into_iter().map(|read| (read, depth)));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn dependency_name(&self, dependency: &Dependency, place: u32) -> String {
-        let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = dependency;
-        let name = self.world.id(*uid).map_or_else(|| uid.to_string(), |node| self.world.name(node, place));
-        match dependency {
-            Dependency::Node(_) => name,
-            Dependency::Attribute(_, attribute) => format!("{name}.{attribute}"),
-        }
     }
 
     /// The built rig as the commands before the cursor made it.
