@@ -132,7 +132,8 @@ impl Builder {
     }
 
     /// Somebody (`None`: the document) changed what a cell holds: whoever read it later has to be looked at.
-    fn changed(&mut self, node: NodeId, aspect: Aspect, writer: Option<u32>) {
+    /// `circles` is true if that may have closed a circle of constraints.
+    fn changed(&mut self, node: NodeId, aspect: Aspect, writer: Option<u32>, circles: bool) {
         let from = writer.map(|writer| self.world.places[writer as usize]);
         let later = |world: &World, number: u32| {
             let place = world.places[number as usize];
@@ -151,10 +152,16 @@ impl Builder {
                 }
             }
         }
-        if matches!(aspect, Aspect::Parent | Aspect::Constraint | Aspect::Birth) {
+        if circles {
             let from = from.unwrap_or(0);
             self.graph_changed = Some(self.graph_changed.map_or(from, |before| before.min(from)));
         }
+    }
+
+    /// What a command wrote to a cell.
+    fn own(&self, number: u32, node: NodeId, aspect: Aspect) -> Option<&Value> {
+        let writes = &self.world.cell(node, aspect).writes;
+        writes.iter().find(|(writer, _)| *writer == number).map(|(_, value)| value)
     }
 
     /// The commands in order.
@@ -348,28 +355,20 @@ impl Builder {
             self.take_back(number, &trace);
             trace = Trace { reads, ..Trace::default() };
         }
-        for read in &trace.reads {
-            if let super::scope::Read::Cell(node, aspect, _) = read {
-                let readers = &mut self.world.cell_mut(*node, *aspect).readers;
-                if let Err(at) = readers.binary_search(&number) {
-                    readers.insert(at, number);
-                }
-            }
-        }
         // Early cut-off: only what is not as before concerns others.
-        let own = |world: &World, node: NodeId, aspect: Aspect| {
-            let writes = &world.cell(node, aspect).writes;
-            writes.iter().find(|(writer, _)| *writer == number).map(|(_, value)| value.clone())
-        };
         for (node, aspect) in &trace.writes {
-            let was = before.iter().find(|(old, which, _)| old == node && which == aspect).map(|(_, _, value)| value);
-            if !same(own(&self.world, *node, *aspect).as_ref(), was) {
-                self.changed(*node, *aspect, Some(number));
+            let was = before.binary_search_by_key(&(*node, *aspect), |(node, aspect, _)| (*node, *aspect));
+            let was = was.ok().map(|at| &before[at].2);
+            let now = self.own(number, *node, *aspect);
+            if !same(now, was) {
+                let circles = *aspect == Aspect::Parent || *aspect == Aspect::Constraint && !drives_alike(now, was);
+                self.changed(*node, *aspect, Some(number), circles);
             }
         }
         for (node, aspect, _) in &before {
-            if !trace.writes.contains(&(*node, *aspect)) {
-                self.changed(*node, *aspect, Some(number));
+            if self.own(number, *node, *aspect).is_none() {
+                // Taking something away never closes a circle.
+                self.changed(*node, *aspect, Some(number), *aspect == Aspect::Parent);
             }
         }
         let command = &mut self.commands[number as usize];
@@ -418,11 +417,23 @@ impl Builder {
                 values.push((*node, *aspect, writes.swap_remove(at).1));
             }
         }
+        values.sort_unstable_by_key(|(node, aspect, _)| (*node, *aspect));
         values
     }
 
     /// The built rig as the commands before the cursor made it.
     pub fn built(&self) -> BuiltRig {
         snapshot::snapshot(&self.world, self.cursor() as u32)
+    }
+}
+
+/// True if two constraints drive the same and read the same, so that none of them can close a circle that the other
+/// does not.
+fn drives_alike(now: Option<&Value>, was: Option<&Value>) -> bool {
+    match (now, was) {
+        (Some(Value::Constraint(_, now)), Some(Value::Constraint(_, was))) => {
+            now.drives() == was.drives() && now.reads() == was.reads()
+        }
+        _ => false,
     }
 }

@@ -465,14 +465,22 @@ impl BuildScope<'_> {
     }
 
     fn read(&mut self, node: NodeId, aspect: Aspect) -> Option<Value> {
-        let place = self.asker.place;
-        let value = self.world.read_at(node, aspect, place + 1).cloned();
-        let own = self.trace.writes.contains(&(node, aspect));
-        let is_known = |read: &Read| matches!(read, Read::Cell(known, which, _) if *known == node && *which == aspect);
-        if !own && !self.trace.reads.iter().rev().take(64).any(is_known) {
-            self.trace.reads.push(Read::Cell(node, aspect, value.clone()));
+        let value = self.world.read_at(node, aspect, self.asker.place + 1).cloned();
+        let command = self.command;
+        if !self.is_own(node, aspect) {
+            // Who is among the readers has noted it already.
+            let readers = &mut self.world.cell_mut(node, aspect).readers;
+            if let Err(at) = readers.binary_search(&command) {
+                readers.insert(at, command);
+                self.trace.reads.push(Read::Cell(node, aspect, value.clone()));
+            }
         }
         value
+    }
+
+    /// True if the command itself wrote it.
+    fn is_own(&self, node: NodeId, aspect: Aspect) -> bool {
+        self.world.cell(node, aspect).writes.iter().any(|(writer, _)| *writer == self.command)
     }
 
     fn write(&mut self, node: NodeId, aspect: Aspect, value: Value) {
@@ -491,7 +499,7 @@ impl BuildScope<'_> {
     fn identity(&mut self, role: &str, subject: NodeId, number: u32) -> Result<NodeId, ModuleError> {
         let uid = created_uid(self.command(), role, self.uid(subject), number);
         let node = self.world.slot(uid, Some(self.command));
-        let mine = |aspect: Aspect| self.trace.writes.contains(&(node, aspect));
+        let mine = |aspect: Aspect| self.is_own(node, aspect);
         let foreign = self.world.slots[node.0 as usize].creator != Some(self.command);
         if foreign || mine(Aspect::Birth) || mine(Aspect::Constraint) || mine(Aspect::Switch) {
             let subject = self.name(subject);

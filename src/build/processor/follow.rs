@@ -105,7 +105,7 @@ impl Builder {
         let cell = self.world.cell_mut(node, aspect);
         if !same(cell.document.as_ref(), value.as_ref()) {
             cell.document = value;
-            self.changed(node, aspect, None);
+            self.changed(node, aspect, None, aspect == Aspect::Parent);
         }
     }
 
