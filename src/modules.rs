@@ -4,18 +4,26 @@
 //! needs its own file and one line in [`register`]; one from outside is registered the same way with
 //! [`Modules::add`].
 
+pub mod aim;
 pub mod attribute;
+pub mod blend;
 pub mod control;
 pub mod driven_key;
+pub mod duplicate_chain;
 pub mod expression;
 pub mod ik_fk_switch;
 pub mod ik_handle;
 pub mod insert_joints;
+pub mod layer;
+pub mod limit;
+pub mod mirror_joints;
 pub mod morph;
 pub mod null;
 pub mod orient;
+pub mod orient_joints;
 pub mod parent;
 pub mod point;
+pub mod pole_vector;
 pub mod reverse_foot;
 pub mod scale;
 pub mod space_switch;
@@ -28,18 +36,26 @@ use crate::build::Modules;
 
 /// Registers every module of this crate.
 pub fn register(modules: &mut Modules) {
+    modules.add::<aim::AimModule>();
     modules.add::<attribute::AttributeModule>();
+    modules.add::<blend::BlendModule>();
     modules.add::<control::ControlModule>();
     modules.add::<driven_key::DrivenKey>();
+    modules.add::<duplicate_chain::DuplicateChainModule>();
     modules.add::<expression::Expression>();
     modules.add::<ik_fk_switch::IkFkSwitch>();
     modules.add::<ik_handle::IkHandle>();
     modules.add::<insert_joints::InsertJointsModule>();
+    modules.add::<layer::LayerModule>();
+    modules.add::<limit::LimitModule>();
+    modules.add::<mirror_joints::MirrorJointsModule>();
     modules.add::<morph::Morph>();
     modules.add::<null::NullModule>();
     modules.add::<orient::OrientModule>();
+    modules.add::<orient_joints::OrientJointsModule>();
     modules.add::<parent::ParentModule>();
     modules.add::<point::PointModule>();
+    modules.add::<pole_vector::PoleVectorModule>();
     modules.add::<reverse_foot::ReverseFoot>();
     modules.add::<scale::ScaleModule>();
     modules.add::<space_switch::SpaceSwitch>();

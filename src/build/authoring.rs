@@ -154,6 +154,14 @@ impl BuildScope<'_> {
         }
     }
 
+    /// The null that takes a control's place: its parent, if the same command made it for the same node.
+    pub fn offset_of(&mut self, control: NodeId) -> Option<NodeId> {
+        let parent = self.parent(control)?;
+        let (own, above) = (self.origin(control)?, self.origin(parent)?);
+        let is_offset = above.command == own.command && above.subject == own.subject && &*above.role == "offset";
+        is_offset.then_some(parent)
+    }
+
     /// Where a pole lies for a chain: in the plane in which it bends, beside its middle, `distance` times its length
     /// away. A straight chain bends towards `prefer` (rig space).
     pub fn pole_position(&mut self, chain: &[NodeId], distance: f32, prefer: Vec3) -> Vec3 {

@@ -139,6 +139,14 @@ impl BuildScope<'_> {
         }
     }
 
+    /// Who made a node and what for; `None` for joints of the document.
+    pub fn origin(&mut self, node: NodeId) -> Option<Arc<Origin>> {
+        match self.read(node, Aspect::Birth) {
+            Some(Value::Birth(birth)) => birth.origin.clone(),
+            _ => None,
+        }
+    }
+
     /// The parent of a node.
     pub fn parent(&mut self, node: NodeId) -> Option<NodeId> {
         match self.read(node, Aspect::Parent) {

@@ -60,6 +60,8 @@ impl RigModule for AttributeModule {
         ("choices", "Names of choices, of which the value is the number; a plain number if there are none."),
         ("default", "The value until somebody sets another."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/attribute.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/attribute.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         if ![self.min.unwrap_or(0.0), self.max.unwrap_or(0.0), self.default].iter().all(|number| number.is_finite()) {

@@ -142,6 +142,8 @@ impl RigModule for ControlModule {
         ("limits", "Lowest and highest values of these; rotation in degrees."),
         ("creation", "Name, groups and label; by default those of the node."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/control.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/control.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         self.check(scope)?;
@@ -165,15 +167,7 @@ impl RigModule for ControlModule {
         let turned = Vec3::new(1.0, -1.0, -1.0);
         self.shape_translate.x = -self.shape_translate.x;
         self.shape_rotate *= turned;
-        // What goes from -a to b goes from -b to a on the other side.
-        let over = |(low, high): &mut (Option<f32>, Option<f32>)| {
-            (*low, *high) = (high.map(|end| -end), low.map(|end| -end));
-        };
-        let [x, ..] = &mut self.limits.translate;
-        over(x);
-        let [_, y, z] = &mut self.limits.rotate;
-        over(y);
-        over(z);
+        self.limits = self.limits.mirrored();
         if let Some(color) = &mut self.color {
             let [left, right, _] = SIDE_COLORS;
             *color = match *color {

@@ -50,6 +50,8 @@ impl RigModule for InsertJointsModule {
         ("count", "How many joints, 1 to 64."),
         ("creation", "Name, groups and label; by default those of the upper joint."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/insert_joints.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/insert_joints.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         if !(1..=MOST).contains(&self.count) {

@@ -70,6 +70,8 @@ impl RigModule for ScaleModule {
         ("keep_pose", "True: the node's own pose comes on top, so that people can still move it."),
         ("weight", "How much the nodes follow, a number from 0 to 1 or the name of an attribute of the control."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/scale.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/scale.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         scope.follow(&FollowParams {

@@ -171,6 +171,20 @@ pub struct Limits {
     pub scale: [(Option<f32>, Option<f32>); 3],
 }
 
+impl Limits {
+    /// The same ends on the other side of the character: translation along X and turns about Y and Z the other way
+    /// round.
+    pub fn mirrored(mut self) -> Self {
+        let over = |ends: &mut (Option<f32>, Option<f32>)| {
+            *ends = (ends.1.map(|end| -end), ends.0.map(|end| -end));
+        };
+        over(&mut self.translate[0]);
+        over(&mut self.rotate[1]);
+        over(&mut self.rotate[2]);
+        self
+    }
+}
+
 /// A named set of nodes that are shown together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerData {

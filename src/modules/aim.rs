@@ -1,0 +1,178 @@
+//! `aim`: nodes that look at others.
+
+use bevy::reflect::Reflect;
+use glam::{Quat, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{Amount, Axis, BuildScope, ModuleError, NodeId, RigModule, TargetParams, check_finite},
+    rig::{
+        AimUp, Constraint, Scalar,
+        reference::{NodeRef, NodeRefs},
+    },
+    solve::aim::{Aim, Up},
+};
+
+/// What the up axis turns to.
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AimUpMode {
+    /// A direction of the rig, or of the up node if there is one.
+    #[default]
+    Direction,
+    /// The up node itself.
+    Node,
+}
+
+/// Turns nodes so that an axis points at weighted targets. Role: `constraint`, for each node.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::aim::AimModule};
+/// let params = r#"(targets: "@command control#00000000000000aa", aim: z, up_axis: y, direction: (0.0, 1.0, 0.0))"#;
+/// # assert!(rigsmith::modules::all().load(AimModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AimModule {
+    /// The nodes that look.
+    pub node: NodeRefs,
+    /// What they look at.
+    pub targets: NodeRefs,
+    /// A share for each target.
+    pub weights: Vec<Amount>,
+    /// The node with the attributes.
+    pub control: NodeRefs,
+    /// The axis that points at the targets.
+    pub aim: Axis,
+    /// The axis that is kept up.
+    pub up_axis: Axis,
+    /// What up is.
+    pub up: AimUpMode,
+    /// The direction that is up.
+    pub direction: Vec3,
+    /// The node that is up, or whose direction.
+    pub up_node: NodeRefs,
+    /// Whether the nodes stay turned as they are.
+    pub keep_offset: bool,
+    /// How much they turn.
+    pub weight: Amount,
+}
+
+impl Default for AimModule {
+    fn default() -> Self {
+        Self {
+            node: NodeRef::this().into(),
+            targets: NodeRefs::NONE,
+            weights: Vec::new(),
+            control: NodeRefs::NONE,
+            aim: Axis::Y,
+            up_axis: Axis::Z,
+            up: AimUpMode::Direction,
+            direction: Vec3::Y,
+            up_node: NodeRefs::NONE,
+            keep_offset: true,
+            weight: Amount::Value(1.0),
+        }
+    }
+}
+
+impl RigModule for AimModule {
+    const NAME: &'static str = "aim";
+    const DOC: &'static str = "Turns nodes so that one of their axes points at weighted targets.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("node", "The nodes that look."),
+        ("targets", "The nodes that they look at."),
+        (
+            "weights",
+            "For each target its share, a number from 0 or the name of an attribute; all the same if left out.",
+        ),
+        ("control", "The node that has the attributes; those that it lacks are added."),
+        ("aim", "The axis that points at the targets: x, y, z, neg_x, neg_y or neg_z."),
+        ("up_axis", "The axis that is kept up as far as the aim allows."),
+        ("up", "direction: up is a direction of the rig, or of the up node; node: it is where the up node is."),
+        ("direction", "The direction that is up."),
+        ("up_node", "The node that is up, or in whose space the direction is; the rig's if left out."),
+        ("keep_offset", "True: the nodes stay turned as they are, and only what the targets do counts."),
+        ("weight", "How much the nodes turn, a number from 0 to 1 or the name of an attribute of the control."),
+    ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/aim.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/aim.svg"));
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        if self.aim.is_along(self.up_axis) {
+            return Err(ModuleError::parameter("up_axis", "lies along the aim, too; choose one of the other two axes"));
+        }
+        check_finite("direction", &self.direction.to_array())?;
+        let Some(direction) = self.direction.try_normalize() else {
+            return Err(ModuleError::parameter("direction", "has no direction; write one, such as (0.0, 1.0, 0.0)"));
+        };
+        let driven = scope.resolve_some("node", &self.node)?;
+        let params = TargetParams { targets: &self.targets, weights: &self.weights, control: &self.control };
+        let nodes = scope.weighted_nodes(&params)?;
+        let up_node = match self.up {
+            AimUpMode::Node => Some(scope.resolve_one("up_node", &self.up_node)?),
+            AimUpMode::Direction => scope.resolve_maybe("up_node", &self.up_node)?,
+        };
+        let world_up = match (self.up, up_node) {
+            (AimUpMode::Node, Some(node)) => AimUp::Node(scope.uid(node)),
+            (AimUpMode::Direction, Some(node)) => AimUp::Axis(scope.uid(node), direction),
+            (_, None) => AimUp::Direction(direction),
+        };
+        let control = scope.resolve_maybe("control", &self.control)?;
+        let weight = scope.amount("weight", &self.weight, control, 0.0..=1.0, 1.0)?;
+        for node in driven {
+            let offset = match self.keep_offset {
+                true => self.offset(scope, node, &nodes, up_node, direction),
+                false => Quat::IDENTITY,
+            };
+            let constraint = Constraint::Aim {
+                driven: scope.uid(node),
+                targets: scope.targets(node, &nodes, false),
+                aim: self.aim.vector(),
+                up: self.up_axis.vector(),
+                world_up: world_up.clone(),
+                offset,
+                weight: weight.clone(),
+            };
+            scope.constrain("constraint", node, 0, constraint)?;
+        }
+        Ok(())
+    }
+
+    fn mirror(&mut self) {
+        self.aim = self.aim.mirrored();
+        self.up_axis = self.up_axis.mirrored();
+        self.direction.x = -self.direction.x;
+    }
+}
+
+impl AimModule {
+    /// From where the aim alone would turn a node to how it is turned.
+    fn offset(
+        &self,
+        scope: &mut BuildScope<'_>,
+        node: NodeId,
+        targets: &[(NodeId, Scalar)],
+        up_node: Option<NodeId>,
+        direction: Vec3,
+    ) -> Quat {
+        let (mut sum, mut all) = (Vec3::ZERO, 0.0);
+        for (target, weight) in targets {
+            let share = scope.built_value(weight).max(0.0);
+            sum += scope.position(*target) * share;
+            all += share;
+        }
+        if all <= 0.0 {
+            return Quat::IDENTITY;
+        }
+        let global = scope.global(node);
+        let up = match (self.up, up_node) {
+            (AimUpMode::Node, Some(node)) => Up::Point(scope.position(node)),
+            (AimUpMode::Direction, Some(node)) => Up::Vector(scope.global(node).rotation * direction),
+            (_, None) => Up::Vector(direction),
+        };
+        let aim = Aim { axis: self.aim.vector(), up_axis: self.up_axis.vector() };
+        let aimed = aim.solve(global.translation, sum / all, up, global.rotation);
+        (aimed.inverse() * global.rotation).normalize()
+    }
+}

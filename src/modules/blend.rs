@@ -1,0 +1,120 @@
+//! `blend`: nodes between two others each.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{Amount, BuildScope, ModuleError, RigModule},
+    rig::{
+        Constraint, Scalar,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Lets each of some nodes follow one of the list `a` or one of the list `b`, or something between. Role: `constraint`,
+/// for each node.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::blend::BlendModule};
+/// let params = r#"(
+///     nodes: "@hierarchy this",
+///     a: "@command duplicate_chain#00000000000000aa",
+///     b: "@command duplicate_chain#00000000000000ab",
+///     control: "@command control#00000000000000ac",
+///     blend: "ik",
+/// )"#;
+/// # assert!(rigsmith::modules::all().load(BlendModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BlendModule {
+    /// The nodes that are driven.
+    pub nodes: NodeRefs,
+    /// What they follow at 0.
+    pub a: NodeRefs,
+    /// What they follow at 1.
+    pub b: NodeRefs,
+    /// Between the two.
+    pub blend: Amount,
+    /// The node with the attribute.
+    pub control: NodeRefs,
+    /// Which axes of the translation follow.
+    pub translate: [bool; 3],
+    /// Which angles follow.
+    pub rotate: [bool; 3],
+    /// Which factors follow.
+    pub scale: [bool; 3],
+    /// Whether nodes stay where they stand now.
+    pub keep_offset: bool,
+}
+
+impl Default for BlendModule {
+    fn default() -> Self {
+        Self {
+            nodes: NodeRef::this().into(),
+            a: NodeRefs::NONE,
+            b: NodeRefs::NONE,
+            blend: Amount::Value(0.0),
+            control: NodeRefs::NONE,
+            translate: [true; 3],
+            rotate: [true; 3],
+            scale: [false; 3],
+            keep_offset: true,
+        }
+    }
+}
+
+impl RigModule for BlendModule {
+    const NAME: &'static str = "blend";
+    const DOC: &'static str = "Lets each of some nodes follow one of two others, or something between.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("nodes", "The nodes that are driven."),
+        ("a", "What they follow at 0: as many nodes, in the same order."),
+        ("b", "What they follow at 1: as many nodes, in the same order."),
+        ("blend", "0 for a, 1 for b: a number, or the name of an attribute of the control."),
+        ("control", "The node that has the attribute; it is added if it lacks it."),
+        ("translate", "Which axes of the translation follow, in the parent's space."),
+        ("rotate", "Which angles about X, Y and Z follow, in the parent's space."),
+        ("scale", "Which factors along X, Y and Z follow."),
+        ("keep_offset", "Keep where the nodes stand now, in the space of each of the others; false: they lie on them."),
+    ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/blend.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/blend.svg"));
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        if [self.translate, self.rotate, self.scale] == [[false; 3]; 3] {
+            return Err(ModuleError::other("no axis follows; switch on at least one, or disable the tag"));
+        }
+        let nodes = scope.resolve_some("nodes", &self.nodes)?;
+        let (a, b) = (scope.resolve_some("a", &self.a)?, scope.resolve_some("b", &self.b)?);
+        for (parameter, references, list) in [("a", &self.a, &a), ("b", &self.b, &b)] {
+            if list.len() != nodes.len() {
+                let (found, needed) = (list.len(), nodes.len());
+                let problem = format!("finds {found} nodes for {needed} that are driven; refer to one for each");
+                return Err(ModuleError::reference(parameter, references, problem));
+            }
+        }
+        let control = scope.resolve_maybe("control", &self.control)?;
+        let to_b = scope.amount("blend", &self.blend, control, 0.0..=1.0, 0.0)?;
+        let to_a = match &to_b {
+            Scalar::Attribute { node, name, factor, add } => {
+                Scalar::Attribute { node: *node, name: name.clone(), factor: -factor, add: 1.0 - add }
+            }
+            other => Scalar::Value(1.0 - scope.built_value(other)),
+        };
+        for ((node, a), b) in nodes.into_iter().zip(a).zip(b) {
+            let targets = scope.targets(node, &[(a, to_a.clone()), (b, to_b.clone())], self.keep_offset);
+            let constraint = Constraint::Transform {
+                driven: scope.uid(node),
+                targets,
+                translate: self.translate,
+                rotate: self.rotate,
+                scale: self.scale,
+                weight: Scalar::Value(1.0),
+                keep_pose: false,
+            };
+            scope.constrain("constraint", node, 0, constraint)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,98 @@
+//! `duplicate_chain`: a copy of a chain, such as one that is moved by hand and one that reaches.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, Creation, ModuleError, NodeId, RigModule},
+    rig::{
+        NodeType,
+        reference::{NodeRefs, Source, Top},
+    },
+};
+
+/// What the nodes of a copy are.
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CopyKind {
+    /// Nodes that carry others and move no mesh.
+    #[default]
+    Null,
+    /// Joints.
+    Joint,
+}
+
+/// Copies nodes with their hierarchy. Role: `copy`.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::duplicate_chain::DuplicateChainModule};
+/// let params = r#"(joints: "@hierarchy this", suffix: "ik")"#;
+/// # assert!(rigsmith::modules::all().load(DuplicateChainModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DuplicateChainModule {
+    /// What is copied.
+    pub joints: NodeRefs,
+    /// What the uppermost copies stand on.
+    pub parent: NodeRefs,
+    /// What the copies are.
+    pub kind: CopyKind,
+    /// What their names end in.
+    pub suffix: String,
+    /// See [`Creation`].
+    pub creation: Creation,
+}
+
+impl Default for DuplicateChainModule {
+    fn default() -> Self {
+        Self {
+            joints: Source::Hierarchy(Top::This).into(),
+            parent: NodeRefs::NONE,
+            kind: CopyKind::Null,
+            suffix: "copy".to_owned(),
+            creation: Creation::default(),
+        }
+    }
+}
+
+impl RigModule for DuplicateChainModule {
+    const NAME: &'static str = "duplicate_chain";
+    const DOC: &'static str = "Copies nodes with their hierarchy, such as one chain to pose and one that reaches.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("joints", "The nodes to copy; this joint and all below it if left out."),
+        ("parent", "What the uppermost copies stand on; the parent of each node if left out."),
+        ("kind", "null: the copies move no mesh; joint: they are joints."),
+        ("suffix", "What the names of the copies end in."),
+        ("creation", "Name, groups and label; by default those of each node."),
+    ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/duplicate_chain.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/duplicate_chain.svg"));
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        let nodes = scope.resolve_some("joints", &self.joints)?;
+        let parent = scope.resolve_maybe("parent", &self.parent)?;
+        let kind = match self.kind {
+            CopyKind::Null => NodeType::Null,
+            CopyKind::Joint => NodeType::Joint,
+        };
+        let mut copies: Vec<NodeId> = Vec::with_capacity(nodes.len());
+        for (index, node) in nodes.iter().copied().enumerate() {
+            let above = match (scope.upper_in(node, &nodes[..index]), parent) {
+                (Some(upper), _) => Some(copies[upper]),
+                (None, Some(parent)) => Some(parent),
+                (None, None) => scope.parent(node),
+            };
+            let mut creation = scope.creation_for(&self.creation, node, index);
+            if creation.name.is_none()
+                && let Some(label) = scope.label(node)
+                && !self.suffix.is_empty()
+            {
+                creation.name = Some(format!("{label}_{}", self.suffix));
+            }
+            let global = scope.global(node);
+            copies.push(scope.spawn_at(kind, "copy", node, 0, above, global, &creation)?);
+        }
+        Ok(())
+    }
+}

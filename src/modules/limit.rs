@@ -1,0 +1,61 @@
+//! `limit`: nodes that stay within ends.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, ModuleError, RigModule, check_limits},
+    rig::{
+        Constraint, Limits,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Keeps nodes within ends, whatever drives them. Role: `constraint`, for each node.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::limit::LimitModule};
+/// let params = r#"(nodes: "@this", limits: (rotate: ((0.0, 150.0), (0.0, 0.0), (0.0, 0.0))))"#;
+/// # assert!(rigsmith::modules::all().load(LimitModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LimitModule {
+    /// The nodes.
+    pub nodes: NodeRefs,
+    /// The ends.
+    pub limits: Limits,
+}
+
+impl Default for LimitModule {
+    fn default() -> Self {
+        Self { nodes: NodeRef::this().into(), limits: Limits::default() }
+    }
+}
+
+impl RigModule for LimitModule {
+    const NAME: &'static str = "limit";
+    const DOC: &'static str = "Keeps nodes within ends, whatever drives them.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("nodes", "The nodes."),
+        ("limits", "Lowest and highest values against how they were built; rotation in degrees; None where open."),
+    ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/limit.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/limit.svg"));
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        check_limits("limits", &self.limits)?;
+        if self.limits == Limits::default() {
+            return Err(ModuleError::parameter("limits", "are all open; set at least one end, or disable the tag"));
+        }
+        for node in scope.resolve_some("nodes", &self.nodes)? {
+            let constraint = Constraint::Limit { driven: scope.uid(node), limits: self.limits };
+            scope.constrain("constraint", node, 0, constraint)?;
+        }
+        Ok(())
+    }
+
+    fn mirror(&mut self) {
+        self.limits = self.limits.mirrored();
+    }
+}

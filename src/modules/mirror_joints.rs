@@ -1,0 +1,122 @@
+//! `mirror_joints`: the other side of a hierarchy of joints.
+
+use bevy::{
+    math::{Mat3, Quat},
+    reflect::Reflect,
+};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{BuildScope, Creation, ModuleError, NodeId, RigModule, check_finite},
+    mesh::model::Trs,
+    rig::{
+        NodeType,
+        label::mirrored_label,
+        operations::MirrorPlane,
+        reference::{NodeRefs, Source, Top},
+    },
+};
+
+/// Makes the mirror image of joints as joints of their own. Role: `joint`.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::mirror_joints::MirrorJointsModule};
+/// let params = r#"(joints: "@hierarchy this", opposed: true)"#;
+/// # assert!(rigsmith::modules::all().load(MirrorJointsModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MirrorJointsModule {
+    /// The joints to mirror.
+    pub joints: NodeRefs,
+    /// What the uppermost copies stand on.
+    pub parent: NodeRefs,
+    /// A point of the plane.
+    pub point: Vec3,
+    /// The plane's normal.
+    pub normal: Vec3,
+    /// Whether the copies' axes point the other way.
+    pub opposed: bool,
+    /// See [`Creation`].
+    pub creation: Creation,
+}
+
+impl Default for MirrorJointsModule {
+    fn default() -> Self {
+        Self {
+            joints: Source::Hierarchy(Top::This).into(),
+            parent: NodeRefs::NONE,
+            point: Vec3::ZERO,
+            normal: Vec3::X,
+            opposed: false,
+            creation: Creation::default(),
+        }
+    }
+}
+
+impl RigModule for MirrorJointsModule {
+    const NAME: &'static str = "mirror_joints";
+    const DOC: &'static str = "Makes the mirror image of joints, with labels of the other side.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("joints", "The joints to mirror; this joint and all below it if left out."),
+        ("parent", "What the uppermost copies stand on; the parent of each joint if left out."),
+        ("point", "A point of the mirror plane, in the rig's units."),
+        ("normal", "The direction across the plane, in the rig's space; X between left and right."),
+        (
+            "opposed",
+            "True: the copies' axes point the other way, so that the same turn on both sides is a mirrored movement.",
+        ),
+        ("creation", "Name, groups and label; by default each joint's label with the other side in it."),
+    ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/mirror_joints.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/mirror_joints.svg"));
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        check_finite("point", &self.point.to_array())?;
+        check_finite("normal", &self.normal.to_array())?;
+        let Some(normal) = self.normal.try_normalize() else {
+            return Err(ModuleError::parameter("normal", "has no direction; write one, such as (1.0, 0.0, 0.0)"));
+        };
+        let plane = MirrorPlane { point: self.point, normal, tolerance: 0.0 };
+        let joints = scope.resolve_some("joints", &self.joints)?;
+        let parent = scope.resolve_maybe("parent", &self.parent)?;
+        let mut copies: Vec<NodeId> = Vec::with_capacity(joints.len());
+        for (index, joint) in joints.iter().copied().enumerate() {
+            let above = match (scope.upper_in(joint, &joints[..index]), parent) {
+                (Some(upper), _) => Some(copies[upper]),
+                (None, Some(parent)) => Some(parent),
+                (None, None) => scope.parent(joint),
+            };
+            let label = scope.label(joint);
+            let other = label.as_deref().map(|label| mirrored_label(label).unwrap_or_else(|| label.to_owned()));
+            let mut creation = scope.creation_for(&self.creation, joint, index);
+            if self.creation.label.is_none() {
+                creation.label = other.clone();
+            }
+            if creation.name.is_none() && other != label.as_deref().map(str::to_owned) {
+                creation.name = other;
+            }
+            let global = self.mirrored(&plane, scope.global(joint));
+            let kind = scope.kind(joint).unwrap_or(NodeType::Joint);
+            let copy = scope.spawn_at(kind, "joint", joint, 0, above, global, &creation)?;
+            copies.push(copy);
+        }
+        Ok(())
+    }
+
+    fn mirror(&mut self) {
+        self.point.x = -self.point.x;
+        self.normal.x = -self.normal.x;
+    }
+}
+
+impl MirrorJointsModule {
+    fn mirrored(&self, plane: &MirrorPlane, global: Trs) -> Trs {
+        let reflect = plane.reflection();
+        // A reflected frame is left-handed; turning over all its axes, or the one across the plane, mends that.
+        let back = if self.opposed { Mat3::from_diagonal(Vec3::NEG_ONE) } else { reflect };
+        let rotation = Quat::from_mat3(&(reflect * Mat3::from_quat(global.rotation) * back)).normalize();
+        Trs { translation: plane.mirrored(global.translation), rotation, scale: global.scale }
+    }
+}

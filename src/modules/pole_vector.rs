@@ -1,0 +1,127 @@
+//! `pole_vector`: the node towards which a chain bends, in the right place.
+
+use bevy::reflect::Reflect;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    build::{Amount, BuildScope, Creation, ModuleError, RigModule, TargetParams, check_finite},
+    mesh::model::Trs,
+    rig::{Constraint, NodeType, reference::NodeRefs},
+};
+
+/// Puts a control or null where a chain bends to, for an `ik_handle` to take as its pole. Without one it makes a null,
+/// with the role `pole`. With targets, the pole follows them, with the role `constraint`.
+///
+/// ```
+/// # use rigsmith::{build::RigModule, modules::pole_vector::PoleVectorModule};
+/// let params = r#"(chain: "@hierarchy this pick:0,1,2", pole: "@command control#00000000000000aa", distance: 0.8)"#;
+/// # assert!(rigsmith::modules::all().load(PoleVectorModule::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PoleVectorModule {
+    /// The chain from its root to its end.
+    pub chain: NodeRefs,
+    /// The node that is put in place.
+    pub pole: NodeRefs,
+    /// How far from the bend.
+    pub distance: f32,
+    /// Where a straight chain bends to.
+    pub prefer: Vec3,
+    /// What a null stands on.
+    pub parent: NodeRefs,
+    /// What the pole follows.
+    pub targets: NodeRefs,
+    /// A share for each target.
+    pub weights: Vec<Amount>,
+    /// The node with the attributes.
+    pub control: NodeRefs,
+    /// How much it follows.
+    pub weight: Amount,
+    /// See [`Creation`].
+    pub creation: Creation,
+}
+
+impl Default for PoleVectorModule {
+    fn default() -> Self {
+        Self {
+            chain: NodeRefs::NONE,
+            pole: NodeRefs::NONE,
+            distance: 0.75,
+            prefer: Vec3::Z,
+            parent: NodeRefs::NONE,
+            targets: NodeRefs::NONE,
+            weights: Vec::new(),
+            control: NodeRefs::NONE,
+            weight: Amount::Value(1.0),
+            creation: Creation::default(),
+        }
+    }
+}
+
+impl RigModule for PoleVectorModule {
+    const NAME: &'static str = "pole_vector";
+    const DOC: &'static str = "Puts a control or null where a chain bends to, and lets it follow weighted targets.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("chain", "The chain of at least three nodes from its root to its end."),
+        ("pole", "The control or null that is put in place; a null is made if left out."),
+        ("distance", "How far the pole is from the bend, as a share of the chain's length, above 0."),
+        ("prefer", "Where a straight chain bends to, in the rig's space."),
+        ("parent", "What a null that is made stands on; below the rig if left out."),
+        ("targets", "Nodes whose place the pole follows from where it is; none to leave it where its parent takes it."),
+        (
+            "weights",
+            "For each target its share, a number from 0 or the name of an attribute; all the same if left out.",
+        ),
+        ("control", "The node that has the attributes; those that it lacks are added."),
+        ("weight", "How much the pole follows, a number from 0 to 1 or the name of an attribute of the control."),
+        ("creation", "Name, groups and label of a null that is made."),
+    ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/pole_vector.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/pole_vector.svg"));
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        scope.in_range("distance", self.distance, f32::MIN_POSITIVE..=f32::INFINITY)?;
+        check_finite("prefer", &self.prefer.to_array())?;
+        let chain = scope.resolve_chain("chain", &self.chain, 3)?;
+        let position = scope.pole_position(&chain, self.distance, self.prefer);
+        let pole = match scope.resolve_maybe("pole", &self.pole)? {
+            Some(pole) => {
+                scope.need_kind("pole", pole, &[NodeType::Control, NodeType::Null], "a control or null")?;
+                // What takes a control's place moves for it, so that the control's own base stays as it is.
+                let holder = scope.offset_of(pole).unwrap_or(pole);
+                let global = scope.global(holder);
+                scope.set_global(holder, Trs { translation: position, ..global });
+                holder
+            }
+            None => {
+                let parent = scope.resolve_maybe("parent", &self.parent)?;
+                let global = Trs { translation: position, ..Trs::IDENTITY };
+                scope.spawn_at(NodeType::Null, "pole", chain[0], 0, parent, global, &self.creation)?
+            }
+        };
+        if self.targets.is_empty() {
+            return Ok(());
+        }
+        let params = TargetParams { targets: &self.targets, weights: &self.weights, control: &self.control };
+        let nodes = scope.weighted_nodes(&params)?;
+        let control = scope.resolve_maybe("control", &self.control)?;
+        let weight = scope.amount("weight", &self.weight, control, 0.0..=1.0, 1.0)?;
+        let constraint = Constraint::Transform {
+            driven: scope.uid(pole),
+            targets: scope.targets(pole, &nodes, true),
+            translate: [true; 3],
+            rotate: [false; 3],
+            scale: [false; 3],
+            weight,
+            keep_pose: true,
+        };
+        scope.constrain("constraint", chain[0], 0, constraint)?;
+        Ok(())
+    }
+
+    fn mirror(&mut self) {
+        self.prefer.x = -self.prefer.x;
+    }
+}
