@@ -1,6 +1,6 @@
 //! `rigsmith build`: carries out the commands of a rig.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{collections::BTreeSet, path::PathBuf, sync::Arc};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -10,9 +10,14 @@ use crate::{
     build::{Builder, CommandState},
     files::{FileKind, RealDisk, load_model, store_model, store_rig},
     headless::Workbench,
-    mesh::model::{Model, Trs},
+    mesh::model::{Model, SkinBinding, Trs},
     modules,
-    rig::{BuiltRig, Rig, RigEdit, Tag, TagKind, Uid, bake::baked},
+    rig::{
+        BuiltRig, Rig, RigEdit, Uid,
+        bake::baked,
+        character::inverse_bind,
+        feature::{FeatureError, choose_switch, features_named, set_feature},
+    },
     solve::program::{CompileOptions, RigProgram, RigState},
 };
 
@@ -51,6 +56,9 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     {
         return Err(Failure::Usage(format!("cannot write `{}`; give .glb, .gltf or .rig.ron", output.display())));
     }
+    if args.mesh.is_some() && args.output.as_deref().is_none_or(|path| FileKind::of(path) == Some(FileKind::Template)) {
+        return Err(Failure::Usage("--mesh is for a character; write one with -o NAME.glb".to_owned()));
+    }
     let mut report = Report::default();
     let mut rig = skin::load_rig(&args.rig, &mut report)?;
     switch_features(&mut rig, &args.feature)?;
@@ -59,8 +67,9 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     builder.sync(&rig);
     let outcome = builder.run_to(args.until.unwrap_or(usize::MAX));
     let built = builder.built();
+    let lines = trace(&mut report, &rig, &builder, &outcome.executed);
     if args.trace {
-        trace(&mut report, &rig, &builder, &outcome.executed);
+        report.lines.extend(lines);
     }
     let created = built.nodes.iter().filter(|node| node.origin.is_some()).count();
     report.line(format!(
@@ -89,7 +98,9 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) {
+/// Tells programs about the commands, and returns the same for people, a line each.
+fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) -> Vec<String> {
+    let mut lines = Vec::new();
     let mut list = Vec::new();
     for entry in builder.list() {
         let Some(status) = builder.status(entry.command) else { continue };
@@ -102,7 +113,7 @@ fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) {
         let label = rig.joint(entry.joint).and_then(|joint| joint.data.label.clone());
         let error = status.error.as_ref().map(ToString::to_string);
         let name = label.clone().unwrap_or_else(|| entry.joint.to_string());
-        report.line(format!("{state:>8} {:>9.1} µs  {name}  {}", status.micros, entry.module));
+        lines.push(format!("{state:>8} {:>9.1} µs  {name}  {}", status.micros, entry.module));
         list.push(json!({
             "uid": entry.command.to_string(),
             "joint": entry.joint.to_string(),
@@ -115,51 +126,32 @@ fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) {
         }));
     }
     report.set("commands", Value::Array(list));
+    lines
 }
 
-/// `NAME=off`, `NAME=on` or `NAME=SWITCH`, for all features of that name.
+/// `NAME=off`, `NAME=on` or `NAME=SWITCH`, for the features of that name in all groups.
 fn switch_features(rig: &mut Rig, wishes: &[String]) -> Result<(), Failure> {
     for wish in wishes {
         let (name, value) = pair("--feature", wish)?;
-        let tags: Vec<(Uid, Tag, String)> = rig
-            .walk()
-            .flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag)))
-            .filter_map(|(joint, tag)| match &tag.kind {
-                TagKind::Feature { name: own, switch, .. } if own == name && !name.is_empty() => {
-                    Some((joint, tag.clone(), switch.clone()))
-                }
-                _ => None,
-            })
-            .collect();
-        if tags.is_empty() {
-            let names = rig.walk().flat_map(|joint| &joint.data.tags).filter_map(|tag| match &tag.kind {
-                TagKind::Feature { name, .. } if !name.is_empty() => Some(name.clone()),
-                _ => None,
-            });
-            let mut names: Vec<String> = names.collect();
-            names.sort();
-            names.dedup();
-            let all = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            return Err(Failure::Usage(format!("--feature {wish}: there is no such feature; the rig has: {all}")));
+        let wrong = |error: FeatureError| Failure::Usage(format!("--feature {wish}: {error}"));
+        let features = features_named(rig, name).map_err(wrong)?;
+        let switches: BTreeSet<String> =
+            features.iter().flat_map(|feature| &feature.switches).map(|switch| switch.name.clone()).collect();
+        if !["on", "off"].contains(&value) && !switches.contains(value) {
+            let known: String = switches.iter().map(|switch| format!(", or {switch}")).collect();
+            return Err(Failure::Usage(format!("--feature {wish}: write {name}=on or {name}=off{known}")));
         }
-        let switches: Vec<&str> = tags.iter().map(|(_, _, switch)| switch.as_str()).collect();
-        if !["on", "off"].contains(&value) && !switches.contains(&value) {
-            let mut known: Vec<&str> = switches.into_iter().filter(|switch| !switch.is_empty()).collect();
-            known.sort_unstable();
-            known.dedup();
-            let known = if known.is_empty() { String::new() } else { format!(", or {}", known.join(", ")) };
-            return Err(Failure::Usage(format!("--feature {wish}: write on or off{known}")));
-        }
-        for (joint, tag, switch) in &tags {
-            let enabled = match value {
-                "on" => true,
-                "off" => false,
-                // One of several: parts without a switch stay as they are.
-                chosen if !switch.is_empty() => switch == chosen,
-                _ => tag.enabled,
+        for feature in features {
+            let key = &feature.key;
+            let edits = match value {
+                "on" | "off" => set_feature(rig, key, value == "on"),
+                // Of a feature without that switch there is nothing to choose.
+                _ if feature.switches.iter().all(|switch| switch.name != value) => continue,
+                _ => choose_switch(rig, key, value),
             };
-            let edit = RigEdit::SetTag(*joint, Box::new(Tag { enabled, ..tag.clone() }));
-            rig.apply(&edit).map_err(|error| Failure::Input(Box::new(error)))?;
+            for edit in edits.map_err(wrong)? {
+                rig.apply(&edit).map_err(|error| Failure::Input(Box::new(error)))?;
+            }
         }
     }
     Ok(())
@@ -176,10 +168,8 @@ fn switch_groups(rig: &mut Rig, wishes: &[String]) -> Result<(), Failure> {
         };
         if groups.is_empty() {
             let names: Vec<&str> = rig.groups().iter().map(|group| group.name.as_str()).collect();
-            return Err(Failure::Usage(format!(
-                "--group {wish}: there is no such group; the rig has: {}",
-                names.join(", ")
-            )));
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            return Err(Failure::Usage(format!("--group {wish}: there is no such group; the rig has: {names}")));
         }
         for mut group in groups {
             group.enabled = enabled;
@@ -207,6 +197,12 @@ fn write(
     }
     let posed = posed(rig, built)?;
     let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
+    // Readers know joints by the skins that they are in, also where nothing is skinned.
+    let bare = SkinBinding {
+        name: skeleton.about().name.clone(),
+        joints: (0..joints.len()).collect(),
+        inverse_binds: joints.iter().map(|joint| inverse_bind(&skeleton.rest_global(*joint))).collect(),
+    };
     let mut bench = Workbench::with_rig(SEED, skeleton);
     if let Some(mesh) = &args.mesh {
         let model = load_model(&RealDisk, mesh)?;
@@ -219,6 +215,9 @@ fn write(
     }
     let mut model = bench.character();
     pose(&mut model, &joints, built, &posed);
+    if args.mesh.is_none() && !joints.is_empty() {
+        model.skins = vec![bare];
+    }
     let mut settings = args.export.settings();
     settings.all_joints |= args.mesh.is_none();
     Ok(store_model(&RealDisk, output, &model, &settings)?)

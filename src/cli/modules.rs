@@ -4,7 +4,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::Report;
-use crate::modules;
+use crate::{modules, rig::nearest::did_you_mean};
 
 /// Arguments of `rigsmith modules`.
 #[derive(Args, Debug)]
@@ -26,7 +26,8 @@ pub(super) fn run(args: &ModulesArgs) -> Report {
         list.push(json!({ "name": module.name, "doc": module.doc, "parameters": module.parameters }));
     }
     for name in args.names.iter().filter(|name| modules.get(name).is_none()) {
-        report.notes.push(format!("there is no module \"{name}\"; `rigsmith modules` lists all"));
+        let nearest = did_you_mean(name, modules.iter().map(|module| module.name));
+        report.notes.push(format!("there is no module \"{name}\"{nearest}; `rigsmith modules` lists all"));
         report.at_fault = true;
     }
     report.list = Some(Value::Array(list));

@@ -142,7 +142,7 @@ pub fn character(parts: &Character) -> Model {
     model
 }
 
-fn inverse_bind(global: &Affine3) -> Mat4 {
+pub(crate) fn inverse_bind(global: &Affine3) -> Mat4 {
     let inverse = Mat4::from(*global).inverse();
     // The last row of an affine matrix is exact, which the glTF validator insists on; a flat joint has no inverse.
     let mut columns = if inverse.is_finite() { inverse.to_cols_array() } else { Mat4::IDENTITY.to_cols_array() };

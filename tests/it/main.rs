@@ -3,6 +3,8 @@
 mod build;
 #[cfg(feature = "cli")]
 mod cli;
+#[cfg(feature = "cli")]
+mod cli_build;
 mod commands;
 #[cfg(feature = "draw")]
 mod display;
