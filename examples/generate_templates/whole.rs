@@ -1,5 +1,9 @@
 //! Whole characters: skeletons of the bundled models, and parts put together.
 
+mod bird;
+mod creature;
+mod quadruped;
+
 use std::path::Path;
 
 use rigsmith::{
@@ -10,7 +14,8 @@ use rigsmith::{
 use super::writer::{CENTER, Failure, LEFT, RIGHT, Writer};
 
 /// Every whole template with its name.
-pub const ALL: &[(&str, fn() -> Result<Writer, Failure>)] = &[("biped", biped), ("hand", hand)];
+pub const ALL: &[(&str, fn() -> Result<Writer, Failure>)] =
+    &[("biped", biped), ("bird", bird::bird), ("hand", hand), ("quadruped", quadruped::quadruped)];
 
 fn biped() -> Result<Writer, Failure> {
     let mut writer = skeleton("biped", 0x0b1e_ed00)?;
