@@ -6,11 +6,13 @@ mod quadruped;
 
 use std::path::Path;
 
+use bevy::math::Vec3;
 use rigsmith::{
     files::{RealDisk, load_rig_text},
     rig::{Rig, UidSource, character::import_rig_text, operations::Operation},
 };
 
+use super::parts::{self, Around};
 use super::writer::{CENTER, Failure, LEFT, RIGHT, Writer};
 
 /// Every whole template with its name.
@@ -19,15 +21,80 @@ pub const ALL: &[(&str, fn() -> Result<Writer, Failure>)] =
 
 fn biped() -> Result<Writer, Failure> {
     let mut writer = skeleton("biped", 0x0b1e_ed00)?;
-    writer.about("character", "A human skeleton with five fingers a hand, at rest in an A-pose.");
-    sides(&mut writer);
+    writer.about("character", "A human with five fingers a hand, at rest in an A-pose, with controls for all of it.");
+    let names = |list: &[&str], side: &str| list.iter().map(|name| format!("{name}{side}")).collect::<Vec<_>>();
+    let fingers: Vec<String> = parts::hand::FINGERS
+        .iter()
+        .flat_map(|(finger, _)| ["01", "02", "03"].map(|number| format!("{finger}_{number}")))
+        .collect();
+    let fingers: Vec<&str> = fingers.iter().map(String::as_str).collect();
+    writer.members("spine", CENTER, &names(&["hips", "spine", "spine_1", "chest"], ""));
+    writer.members("head", [0.8, 0.47, 0.65], &names(&["neck", "head"], ""));
+    for (side, color, paler) in [("_l", LEFT, [0.0, 0.62, 0.45]), ("_r", RIGHT, [0.9, 0.62, 0.0])] {
+        parts::hand::orient(&mut writer, side);
+        let arm = names(&["clavicle", "upper_arm", "forearm", "hand"], side);
+        writer.members(&format!("arm{side}"), color, &arm);
+        writer.members(&format!("hand{side}"), paler, &names(&fingers, side));
+        writer.members(&format!("leg{side}"), color, &names(&["thigh", "shin", "foot", "toe"], side));
+    }
+    root(&mut writer, "hips");
+    let space = |name, node: &str| (name, node.to_owned());
+    let around = |spaces| Around { root: "@command root role:control".to_owned(), spaces };
+    let [world, hips, chest, head] = [
+        space("root", "@command root role:control"),
+        space("hips", "@joint hips"),
+        space("chest", "@joint chest"),
+        space("head", "@joint head"),
+    ];
+    writer.part("spine", |writer| parts::spine::tags(writer, &around(vec![world.clone()])));
+    writer.part("head", |writer| parts::neck_head::tags(writer, &around(vec![chest.clone(), world.clone()])));
+    writer.part("arm", |writer| {
+        parts::arm::tags(writer, &around(vec![world.clone(), chest.clone(), hips.clone(), head.clone()]));
+    });
+    writer.part("hand", parts::hand::tags);
+    writer.part("leg", |writer| parts::leg::tags(writer, &around(vec![world.clone(), hips.clone(), chest.clone()])));
+    writer.mirror();
     Ok(writer)
+}
+
+/// A control on the ground that everything stands on, and that scales everything. Alias: `root`.
+pub fn root(writer: &mut Writer, joint: &str) {
+    let at = writer.rig().find_label(joint).map_or(Vec3::ZERO, |joint| writer.rig().position(joint));
+    let down = format!("({:?}, {:?}, {:?})", -at.x, -at.y, -at.z);
+    let size = 0.6 * at.y;
+    writer
+        .command(
+            joint,
+            "origin",
+            "null",
+            format!("(world: true, orient: false, translate: {down}, creation: (name: \"origin\"))"),
+        )
+        .command(
+            joint,
+            "root",
+            "control",
+            format!(
+                "(at: \"@command origin\", parent: \"@command origin\", follow: false, shape: \"four_arrows\", size: Some({size:?}), \
+                 creation: (name: \"root\"))"
+            ),
+        )
+        .command(
+            joint,
+            "stand",
+            "null",
+            "(parent: \"@command root role:control\", insert: true, creation: (name: \"skeleton\"))",
+        );
 }
 
 fn hand() -> Result<Writer, Failure> {
     let mut writer = skeleton("hand", 0x0b1e_ed01)?;
-    writer.about("part", "A left hand with its forearm: five fingers.");
-    sides(&mut writer);
+    writer.about("part", "A left hand with its forearm: a control for each joint of five fingers, curl and spread.");
+    writer.members("arm_l", LEFT, &["forearm_l".to_owned(), "hand_l".to_owned()]);
+    let others: Vec<String> = writer.rig().walk().skip(2).filter_map(|joint| joint.data.label.clone()).collect();
+    writer.members("hand_l", [0.0, 0.62, 0.45], &others);
+    parts::hand::orient(&mut writer, "_l");
+    writer.command("forearm_l", "wrist", "control", "(at: \"@joint forearm_l + @joint hand_l\")");
+    writer.part("hand", parts::hand::tags);
     Ok(writer)
 }
 
@@ -41,16 +108,4 @@ pub fn skeleton(name: &str, seed: u64) -> Result<Writer, Failure> {
     let mut writer = Writer::from_rig(rig);
     writer.pair().orient();
     Ok(writer)
-}
-
-/// A local group for each side.
-pub fn sides(writer: &mut Writer) {
-    let labels: Vec<String> = writer.rig().walk().filter_map(|joint| joint.data.label.clone()).collect();
-    for (name, side, color) in [("center", 0, CENTER), ("left", 1, LEFT), ("right", -1, RIGHT)] {
-        let of = |label: &&String| rigsmith::rig::label::label_side(label) == side;
-        let members: Vec<String> = labels.iter().filter(of).cloned().collect();
-        if !members.is_empty() {
-            writer.members(name, color, &members);
-        }
-    }
 }

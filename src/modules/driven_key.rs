@@ -92,8 +92,15 @@ impl RigModule for DrivenKey {
         Ok(())
     }
 
-    /// Keys of channels stay: on joints whose axes are mirrored, the same angle is the mirrored pose.
-    fn mirror(&mut self) {}
+    fn mirror(&mut self) {
+        if self.output_channel.is_some_and(Channel::is_turned_over) {
+            self.keys.iter_mut().for_each(|(_, value)| *value = -*value);
+        }
+        if self.driver_channel.is_some_and(Channel::is_turned_over) {
+            self.keys.iter_mut().for_each(|(driver, _)| *driver = -*driver);
+            self.keys.reverse();
+        }
+    }
 }
 
 /// Refuses keys that are no curve.

@@ -103,4 +103,11 @@ impl RigModule for Expression {
         }
         Ok(())
     }
+
+    /// What is driven is turned over where the other side needs it; channels that are read are left to the text.
+    fn mirror(&mut self) {
+        if self.output_channel.is_some_and(Channel::is_turned_over) {
+            self.text = format!("-({})", self.text);
+        }
+    }
 }

@@ -105,7 +105,10 @@ impl RigModule for ReverseFoot {
     const PARAMETERS: &'static [(&'static str, &'static str)] = &[
         ("ankle", "The ankle's joint: the end of the leg."),
         ("ball", "The joint at the ball of the foot."),
-        ("toe", "The joint at the tip of the toes."),
+        (
+            "toe",
+            "A joint or null at the tip of the toes; beyond the ball, half as far as it is from ankle, if left out.",
+        ),
         ("control", "The foot's control; the pivots hang below it, and it gets the attributes."),
         ("heel", "A joint or null at the back of the sole; placed by heel_back if left out."),
         ("inner", "A joint or null at the inner edge of the sole; placed by width if left out."),
@@ -123,7 +126,7 @@ impl RigModule for ReverseFoot {
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let ankle = scope.resolve_one("ankle", &self.ankle)?;
         let ball = scope.resolve_one("ball", &self.ball)?;
-        let toe = scope.resolve_one("toe", &self.toe)?;
+        let toe = scope.resolve_maybe("toe", &self.toe)?;
         let control = scope.resolve_one("control", &self.control)?;
         let sole = self.sole(scope, ankle, ball, toe)?;
 
@@ -197,15 +200,22 @@ impl RigModule for ReverseFoot {
 }
 
 impl ReverseFoot {
-    fn sole(&self, scope: &mut BuildScope<'_>, ankle: NodeId, ball: NodeId, toe: NodeId) -> Result<Sole, ModuleError> {
+    fn sole(
+        &self,
+        scope: &mut BuildScope<'_>,
+        ankle: NodeId,
+        ball: NodeId,
+        toe: Option<NodeId>,
+    ) -> Result<Sole, ModuleError> {
         scope.in_range("heel_back", self.heel_back, 0.0..=f32::INFINITY)?;
         scope.in_range("width", self.width, 0.0..=f32::INFINITY)?;
         scope.in_range("break_angle", self.break_angle, 0.0..=180.0)?;
         let up = self.up.try_normalize().ok_or_else(|| {
             ModuleError::parameter("up", "has no direction; write that up from the sole, such as (0, 1, 0)")
         })?;
-        let [at_ankle, at_ball, at_toe] = [ankle, ball, toe].map(|joint| scope.position(joint));
+        let [at_ankle, at_ball] = [ankle, ball].map(|joint| scope.position(joint));
         let flat = |direction: Vec3| direction - up * direction.dot(up);
+        let at_toe = toe.map_or_else(|| at_ball + 0.5 * flat(at_ball - at_ankle), |toe| scope.position(toe));
         let ahead = flat(at_toe - at_ankle);
         let length = ahead.length();
         let forward = ahead.try_normalize().ok_or_else(|| {

@@ -94,6 +94,14 @@ pub enum Channel {
     ScaleZ,
 }
 
+impl Channel {
+    /// True if the same number on the other side of a character is not the mirrored pose, but its negative is: joints of
+    /// pairs have mirrored axes, X turned over.
+    pub fn is_turned_over(self) -> bool {
+        matches!(self, Self::TranslateX | Self::RotateY | Self::RotateZ)
+    }
+}
+
 /// Something that a node follows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
