@@ -35,7 +35,7 @@ pub fn tags(writer: &mut Writer, chain: &[&str], around: &Around) {
         "ik_fk_switch",
         format!(
             "(start: \"@joint {first}\", end: \"@this\", fk: \"@command fk role:control\", \
-             goal: \"@command ik role:control\", solver: Fabrik)"
+             goal: \"@command ik role:control\", solver: fabrik)"
         ),
     );
     writer.optional("ik:space", last, "spaces", "space_switch", around.switch("@command ik role:control", ""));
