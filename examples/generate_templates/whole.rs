@@ -51,7 +51,7 @@ fn biped() -> Result<Writer, Failure> {
     writer.part("arm", |writer| {
         parts::arm::tags(writer, &around(vec![world.clone(), chest.clone(), hips.clone(), head.clone()]));
     });
-    writer.part("hand", parts::hand::tags);
+    writer.part("hand", |writer| parts::hand::tags(writer, "@command root role:control"));
     writer.part("leg", |writer| parts::leg::tags(writer, &around(vec![world.clone(), hips.clone(), chest.clone()])));
     writer.mirror();
     Ok(writer)
@@ -94,7 +94,10 @@ fn hand() -> Result<Writer, Failure> {
     writer.members("hand_l", [0.0, 0.62, 0.45], &others);
     parts::hand::orient(&mut writer, "_l");
     writer.command("forearm_l", "wrist", "control", "(at: \"@joint forearm_l + @joint hand_l\")");
-    writer.part("hand", parts::hand::tags);
+    writer.part("hand", |writer| {
+        let around = Around::make(writer, "forearm_l", "arm");
+        parts::hand::tags(writer, &around.root);
+    });
     Ok(writer)
 }
 

@@ -102,7 +102,6 @@ pub fn tags(writer: &mut Writer, around: &Around) {
         "space_switch",
         elbow.switch("@command elbow role:control", ", rotate: false"),
     );
-    writer.feature(at, "deform", "twist");
     twists(writer, at, ("upper_arm_l", "forearm_l"), ("forearm_l", "hand_l"));
 }
 
@@ -120,9 +119,13 @@ pub fn settings(writer: &mut Writer, at: &str, name: &str) {
     );
 }
 
-/// Joints that share the twist of the two bones of a limb, in the feature `twist`.
+/// How many joints share the twist of a bone.
+const TWISTS: usize = 4;
+
+/// Joints that share the twist of the two bones of a limb, in the feature `twist`, with its switch `bend`.
 pub fn twists(writer: &mut Writer, at: &str, upper: (&str, &str), lower: (&str, &str)) {
     let side = "_l";
+    writer.feature(at, "deform", "twist").switch(at, "deform", "twist", "bend");
     let named = |bone: &str| format!("{}_twist{side}", bone.trim_end_matches(side));
     writer.optional(
         "twist",
@@ -130,10 +133,11 @@ pub fn twists(writer: &mut Writer, at: &str, upper: (&str, &str), lower: (&str, 
         "upper_twist",
         "twist",
         format!(
-            "(start: \"@joint {0}\", end: \"@joint {1}\", counter: true, count: 3, creation: (name: \"{2}\"))",
+            "(start: \"@joint {0}\", end: \"@joint {1}\", counter: true, count: {3}, creation: (name: \"{2}\"))",
             upper.0,
             upper.1,
-            named(upper.0)
+            named(upper.0),
+            TWISTS
         ),
     );
     writer.optional(
@@ -142,10 +146,40 @@ pub fn twists(writer: &mut Writer, at: &str, upper: (&str, &str), lower: (&str, 
         "lower_twist",
         "twist",
         format!(
-            "(start: \"@joint {0}\", end: \"@joint {1}\", count: 3, creation: (name: \"{2}\"))",
+            "(start: \"@joint {0}\", end: \"@joint {1}\", count: {3}, creation: (name: \"{2}\"))",
             lower.0,
             lower.1,
-            named(lower.0)
+            named(lower.0),
+            TWISTS
         ),
     );
+    // Small controls that bend the limb between its joints.
+
+    for (bone, command, first) in [(upper.0, "upper_twist", 1), (lower.0, "lower_twist", 0)] {
+        let name = format!("{}_bend{side}", bone.trim_end_matches(side));
+        let places = (first..TWISTS).map(|place| place.to_string()).collect::<Vec<_>>().join(",");
+        writer.optional(
+            "twist:bend",
+            at,
+            &format!("{command}_bend"),
+            "control",
+            format!(
+                "(at: \"@command {command} pick:{places}\", parent: \"@joint {bone}\", hierarchy: false, follow: false, \
+                 relative_size: 0.15, creation: (name: \"{name}\"))"
+            ),
+        );
+        for place in first..TWISTS {
+            writer.optional(
+                "twist:bend",
+                at,
+                &format!("{command}_bend_{place}"),
+                "point",
+                format!(
+                    "(node: \"@command {command} pick:{place}\", \
+                     targets: \"@command {command}_bend role:control pick:{}\")",
+                    place - first
+                ),
+            );
+        }
+    }
 }

@@ -4,7 +4,10 @@
 
 use bevy::math::{Mat3, Quat, Vec3};
 
-use super::super::writer::{LEFT, Writer};
+use super::{
+    super::writer::{LEFT, Writer},
+    Around,
+};
 
 /// The fingers from the thumb on, and how far each turns aside when they spread, in degrees.
 pub const FINGERS: [(&str, f32); 5] =
@@ -32,7 +35,8 @@ pub fn part() -> Writer {
     }
     writer.orient();
     orient(&mut writer, "_l");
-    tags(&mut writer);
+    let around = Around::make(&mut writer, "hand_l", "arm");
+    tags(&mut writer, &around.root);
     writer
 }
 
@@ -69,8 +73,8 @@ pub fn orient(writer: &mut Writer, side: &str) {
     }
 }
 
-/// The tags of a left hand.
-pub fn tags(writer: &mut Writer) {
+/// The tags of a left hand; `root` is what goals of fingertips stand on.
+pub fn tags(writer: &mut Writer, root: &str) {
     let hand = "hand_l";
     writer.feature(hand, "hand", "fingers").switch(hand, "hand", "fingers", "curl");
     writer.optional(
@@ -83,55 +87,98 @@ pub fn tags(writer: &mut Writer) {
          creation: (name: \"fingers_l\"))",
     );
     for name in ["curl", "spread"] {
-        let params = format!("(node: \"@command pose\", name: \"{name}\", min: Some(-1.0), max: Some(1.0))");
-        writer.optional("fingers:curl", hand, name, "attribute", params);
+        writer.optional("fingers:curl", hand, name, "attribute", number("@command pose", name, -1.0));
     }
     for (finger, aside) in FINGERS {
-        let top = format!("{finger}_{}_l", if has(writer, finger, "00") { "00" } else { "01" });
-        let controls = format!("{finger}_controls");
-        writer.optional(
-            "fingers",
-            &top,
-            &controls,
-            "control",
-            format!("(at: \"@hierarchy this\", relative_size: 0.3, creation: (name: \"{finger}_l\"))"),
-        );
-        let own = format!("{finger}_curl");
-        let params = format!("(node: \"@command pose\", name: \"{finger}\", min: Some(-1.0), max: Some(1.0))");
-        writer.optional("fingers:curl", &top, &own, "attribute", params);
-        // A metacarpal stays; a thumb bends less, and least at its root.
-        let (bent, angle) = match (finger, has(writer, finger, "00")) {
-            ("thumb", _) => ("1,2", 55.0),
-            (_, true) => ("1,2,3", 85.0),
-            (_, false) => ("0,1,2", 85.0),
-        };
-        writer.optional(
-            "fingers:curl",
-            &top,
-            &format!("{finger}_bend"),
-            "expression",
-            format!(
-                "(text: \"{angle:.1} * clamp(curl + own, -0.3, 1.2)\", inputs: [\
-                 (name: \"curl\", node: \"@command pose\", attribute: \"curl\"), \
-                 (name: \"own\", node: \"@command pose\", attribute: \"{finger}\")], \
-                 output: \"@command {controls} role:offset pick:{bent}\", output_channel: Some(RotateX))"
-            ),
-        );
-        let knuckle = if has(writer, finger, "00") { 1 } else { 0 };
-        writer.optional(
-            "fingers:curl",
-            &top,
-            &format!("{finger}_spread"),
-            "driven_key",
-            format!(
-                "(driver: \"@command pose\", driver_attribute: \"spread\", keys: [(-1.0, {:.1}), (1.0, {aside:.1})], \
-                 ease: Linear, output: \"@command {controls} role:offset pick:{knuckle}\", output_channel: Some(RotateZ))",
-                -aside
-            ),
-        );
+        self::finger(writer, finger, aside, root);
     }
 }
 
-fn has(writer: &Writer, finger: &str, number: &str) -> bool {
-    writer.rig().find_label(&format!("{finger}_{number}_l")).is_some()
+/// The tags of one finger, which spreads by `aside` degrees.
+fn finger(writer: &mut Writer, finger: &str, aside: f32, root: &str) {
+    let metacarpal = writer.rig().find_label(&format!("{finger}_00_l")).is_some();
+    let joint = |number: u32| format!("{finger}_0{number}_l");
+    let top = joint(if metacarpal { 0 } else { 1 });
+    let alias = |what: &str| format!("{finger}_{what}");
+    let (controls, master) = (alias("controls"), alias("master"));
+    writer.optional(
+        "fingers",
+        &top,
+        &controls,
+        "control",
+        format!("(at: \"@hierarchy this\", relative_size: 0.3, creation: (name: \"{finger}_l\"))"),
+    );
+    writer.optional(
+        "fingers",
+        &top,
+        &master,
+        "control",
+        format!(
+            "(at: \"@joint {}\", parent: \"@joint hand_l\", follow: false, shape: \"pin\", relative_size: 0.8, \
+             shape_rotate: (90.0, 0.0, 0.0), creation: (name: \"{finger}_master_l\"))",
+            joint(1)
+        ),
+    );
+    let on_master = format!("@command {master} role:control");
+    writer.optional("fingers:curl", &top, &alias("curl"), "attribute", number(&on_master, "curl", -1.0));
+    // A thumb bends less, and not at its root.
+    let (first, angle) = if finger == "thumb" { (1, 55.0) } else { (0, 85.0) };
+    let bent: Vec<String> = (first..3).map(|number| (number + usize::from(metacarpal)).to_string()).collect();
+    writer.optional(
+        "fingers:curl",
+        &top,
+        &alias("bend"),
+        "expression",
+        format!(
+            "(text: \"{angle:.1} * clamp(all + own, -0.3, 1.2)\", inputs: [\
+             (name: \"all\", node: \"@command pose\", attribute: \"curl\"), \
+             (name: \"own\", node: \"{on_master}\", attribute: \"curl\")], \
+             output: \"@command {controls} role:offset pick:{}\", output_channel: Some(RotateX))",
+            bent.join(",")
+        ),
+    );
+    writer.optional(
+        "fingers:curl",
+        &top,
+        &alias("spread"),
+        "driven_key",
+        format!(
+            "(driver: \"@command pose\", driver_attribute: \"spread\", keys: [(-1.0, {:.1}), (1.0, {aside:.1})], \
+             ease: Linear, output: \"@command {controls} role:offset pick:{}\", output_channel: Some(RotateZ))",
+            -aside,
+            usize::from(metacarpal)
+        ),
+    );
+    // Fingertips that stay on what they touch.
+    let tip = joint(3);
+    writer.switch(&tip, "hand", "fingers", &alias("tip"));
+    let switch = format!("fingers:{}", alias("tip"));
+    writer.optional(
+        &switch,
+        &tip,
+        &alias("goal"),
+        "control",
+        format!(
+            "(parent: \"{root}\", follow: false, shape: \"sphere\", relative_size: 0.35, \
+             creation: (name: \"{finger}_tip_l\"))"
+        ),
+    );
+    writer.optional(&switch, &tip, &alias("ik"), "attribute", number(&on_master, "ik", 0.0));
+    writer.optional(
+        &switch,
+        &tip,
+        &alias("reach"),
+        "ik_handle",
+        format!(
+            "(start: \"@joint {}\", end: \"@this\", goal: \"@command {} role:control\", control: \"{on_master}\", \
+             weight: \"ik\")",
+            joint(1),
+            alias("goal")
+        ),
+    );
+}
+
+/// Parameters of a number from `min` to 1.
+fn number(node: &str, name: &str, min: f32) -> String {
+    format!("(node: \"{node}\", name: \"{name}\", min: Some({min:.1}), max: Some(1.0))")
 }

@@ -125,6 +125,5 @@ pub fn tags(writer: &mut Writer, around: &Around) {
         "space_switch",
         knee.switch("@command knee role:control", ", rotate: false"),
     );
-    writer.feature(at, "deform", "twist");
     twists(writer, at, ("thigh_l", "shin_l"), ("shin_l", "foot_l"));
 }
