@@ -35,7 +35,7 @@ pub use hash::ContentHash;
 pub use state::{Memory, RigState};
 
 use self::{
-    graph::{Graph, Step},
+    graph::{Driven, Graph, Step},
     op::{N, Op, Operand, Pose, Tables, X},
     run::{Machine, Scratch},
     state::SpringState,
@@ -111,7 +111,7 @@ pub struct ProgramNode {
     pub is_driven: bool,
     /// Slot of its pose offset.
     pose: Pose,
-    /// Register of its local transform after all constraints, if it is driven.
+    /// Register of its local transform after all constraints, if those give it.
     local: Option<X>,
 }
 
@@ -207,7 +207,7 @@ impl RigProgram {
         let hash = ContentHash::of(rig, options);
         let mut graph = Graph::new(rig, &options.keep, &options.inputs)?;
         lower::lower(&mut graph)?;
-        let locals = graph.finish();
+        let driven = graph.finish();
         order::sort(&mut graph)?;
         skip_empty(&mut graph);
         let kept: Vec<usize> = (0..rig.nodes.len()).filter(|node| graph.is_kept(*node)).collect();
@@ -250,9 +250,9 @@ impl RigProgram {
                 kind: rig.nodes[*node].kind,
                 parent: rig.nodes[*node].parent.and_then(|parent| slots.get(&parent)).copied(),
                 base: rig.nodes[*node].base,
-                is_driven: locals[*node].is_some(),
+                is_driven: driven[*node] != Driven::Not,
                 pose: numbering.pose(graph.pose(*node)),
-                local: locals[*node].map(|local| numbering.x(local)),
+                local: if let Driven::Local(local) = driven[*node] { Some(numbering.x(local)) } else { None },
             })
             .collect();
         let mut by_uid: Vec<(Uid, u32)> = nodes.iter().enumerate().map(|(at, node)| (node.uid, at as u32)).collect();

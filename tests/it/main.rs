@@ -53,6 +53,7 @@ mod references;
 #[cfg(feature = "render")]
 mod render;
 mod rig_text;
+mod runtime;
 mod skin_file;
 mod solvers;
 mod stroke;

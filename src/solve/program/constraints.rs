@@ -23,6 +23,10 @@ pub(super) fn transform<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at:
     let input = *machine.x(op.input);
     let weight = share(machine.n(op.weight));
     let goal = if weight > 0.0 { followed(machine, &machine.tables.targets[op.targets.range()]) } else { None };
+    if op.is_global {
+        let global = goal.unwrap_or_else(|| place(machine.x(op.parent), &input));
+        return machine.put(op.out, global);
+    }
     let Some(goal) = goal else { return machine.put(op.out, input) };
     let mut local = relative(machine.x(op.parent), &goal);
     if let Some(offset) = machine.pose(op.pose) {

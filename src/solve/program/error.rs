@@ -1,6 +1,6 @@
 //! What can be wrong with a built rig that is to become a program.
 
-use crate::rig::Uid;
+use crate::rig::{BuiltConstraint, Constraint, Uid};
 
 /// Why a [`BuiltRig`](crate::rig::BuiltRig) has no program. Every text names the constraint and the command that made it
 /// by uid, and says what to do.
@@ -141,4 +141,28 @@ pub enum StateError {
     /// A number is not finite, or a rotation has no length.
     #[error("the value for {0} is not finite or its rotation has no length; nothing was changed")]
     NotFinite(Uid),
+}
+
+/// Text for a constraint in errors.
+pub(super) fn describe(constraint: &BuiltConstraint) -> String {
+    format!("{} constraint {} of command {}", kind(&constraint.constraint), constraint.uid, constraint.command)
+}
+
+/// The kind of a constraint in words.
+fn kind(constraint: &Constraint) -> &'static str {
+    use Constraint as C;
+    match constraint {
+        C::Transform { .. } => "transform",
+        C::Aim { .. } => "aim",
+        C::TwoBone { .. } => "two-bone",
+        C::Chain { .. } => "chain",
+        C::Spline { .. } => "spline",
+        C::Twist { .. } => "twist",
+        C::Stretch { .. } => "stretch",
+        C::Limit { .. } => "limit",
+        C::Spring { .. } => "spring",
+        C::DrivenKey { .. } => "driven key",
+        C::Expression { .. } => "expression",
+        C::Foot { .. } => "foot",
+    }
 }

@@ -1,17 +1,21 @@
 //! Operations on their way to a program: registers are handed out, nodes and attributes found by uid, and constraints
 //! of one node chained in list order.
 
+mod finish;
+
 use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
 
 use super::{
     Keep, Outside, ProgramError,
+    error::describe,
+    name,
     op::{N, Op, Pose, Span, Tables, X},
 };
 use crate::{
     mesh::model::Trs,
-    rig::{BuiltConstraint, BuiltRig, Channel, NodeType, Output, Scalar, Uid},
+    rig::{BuiltRig, Channel, Dependency, NodeType, Output, Scalar, Uid},
     solve::weights::multiply,
 };
 
@@ -25,6 +29,17 @@ pub(super) struct Step {
     pub constraint: Option<usize>,
 }
 
+/// What constraints give of a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Driven {
+    /// Nothing.
+    Not,
+    /// Its local transform.
+    Local(X),
+    /// Its rig transform at once.
+    Global,
+}
+
 /// What is known of a node while constraints are read.
 #[derive(Debug, Clone, Default)]
 struct NodeState {
@@ -34,6 +49,8 @@ struct NodeState {
     placed: Option<X>,
     /// The step that still takes driven channels.
     open: Option<(usize, Vec<(Channel, N)>)>,
+    /// The transform operation that leaves nothing of what came before it, if that is the last constraint.
+    whole: Option<u32>,
     /// Register of the origin where that is read on its own.
     position: Option<X>,
     /// Attributes as constraints read them, in order.
@@ -57,6 +74,8 @@ pub(super) struct Graph<'a> {
     pub morphs: Vec<(Arc<str>, N)>,
     nodes: Vec<NodeState>,
     index: HashMap<Uid, usize>,
+    /// The last constraint on each driven node.
+    last_on: HashMap<Uid, usize>,
     outside: HashMap<Uid, X>,
     exposed: Vec<bool>,
     all: bool,
@@ -67,30 +86,6 @@ pub(super) struct Graph<'a> {
     morph_terms: Vec<(Arc<str>, Vec<N>)>,
     /// Origins to be computed apart.
     aliases: Vec<(usize, X)>,
-}
-
-/// Text for a constraint in errors.
-pub(super) fn describe(constraint: &BuiltConstraint) -> String {
-    format!("{} constraint {} of command {}", kind(&constraint.constraint), constraint.uid, constraint.command)
-}
-
-/// The kind of a constraint in words.
-fn kind(constraint: &crate::rig::Constraint) -> &'static str {
-    use crate::rig::Constraint as C;
-    match constraint {
-        C::Transform { .. } => "transform",
-        C::Aim { .. } => "aim",
-        C::TwoBone { .. } => "two-bone",
-        C::Chain { .. } => "chain",
-        C::Spline { .. } => "spline",
-        C::Twist { .. } => "twist",
-        C::Stretch { .. } => "stretch",
-        C::Limit { .. } => "limit",
-        C::Spring { .. } => "spring",
-        C::DrivenKey { .. } => "driven key",
-        C::Expression { .. } => "expression",
-        C::Foot { .. } => "foot",
-    }
 }
 
 impl<'a> Graph<'a> {
@@ -127,6 +122,7 @@ impl<'a> Graph<'a> {
             morphs: Vec::new(),
             nodes: vec![NodeState::default(); rig.nodes.len()],
             index,
+            last_on: HashMap::new(),
             outside: HashMap::new(),
             exposed,
             all: matches!(keep, Keep::All),
@@ -141,6 +137,13 @@ impl<'a> Graph<'a> {
             graph.x[register.0 as usize] = input.rest;
             graph.inputs.push(register);
             graph.outside.insert(input.uid, register);
+        }
+        for (at, constraint) in rig.constraints.iter().enumerate() {
+            for driven in constraint.constraint.drives() {
+                if let Dependency::Node(node) = driven {
+                    graph.last_on.insert(node, at);
+                }
+            }
         }
         graph.declare_attributes();
         Ok(graph)
@@ -296,7 +299,7 @@ impl<'a> Graph<'a> {
     /// `places` says that the constraint can move the node's origin.
     pub fn take_local(&mut self, node: usize, constraint: usize, places: bool) -> (X, X) {
         let input = self.local(node, constraint);
-        self.nodes[node].open = None;
+        self.nodes[node].whole = None;
         let out = self.new_x();
         let state = &mut self.nodes[node];
         state.local = Some(out);
@@ -317,6 +320,17 @@ impl<'a> Graph<'a> {
         self.nodes[node].local = Some(out);
         self.nodes[node].placed = Some(out);
         out
+    }
+
+    /// True if no later constraint drives a node.
+    pub fn is_last(&self, constraint: usize, node: Uid) -> bool {
+        self.last_on.get(&node) == Some(&constraint)
+    }
+
+    /// Notes that a transform operation gives the whole transform of a node, whatever the node was before; if no other
+    /// constraint follows, it writes the rig transform at once.
+    pub fn is_whole(&mut self, node: usize, transform: u32) {
+        self.nodes[node].whole = Some(transform);
     }
 
     /// Adds a number to a channel of a node: to its base if nothing but channels were driven so far, else on top of what
@@ -374,7 +388,7 @@ impl<'a> Graph<'a> {
             let known: Vec<String> = attributes.iter().map(|attribute| format!("\"{}\"", attribute.name)).collect();
             ProgramError::MissingAttribute {
                 constraint: self.text(constraint),
-                node: super::name(self.rig, node),
+                node: name(self.rig, node),
                 name: name.to_owned(),
                 known: if known.is_empty() { "none".to_owned() } else { known.join(", ") },
             }
@@ -425,80 +439,10 @@ impl<'a> Graph<'a> {
         Ok(register)
     }
 
-    /// Ends every node, attribute and morph target with the operation that makes its final value.
-    ///
-    /// Returns the final local transforms of the nodes that are driven.
-    pub fn finish(&mut self) -> Vec<Option<X>> {
-        for node in 0..self.rig.nodes.len() {
-            self.close(node);
-            let (parent, out) = (self.parent(node), self.global(node));
-            let op = match self.nodes[node].local {
-                Some(local) => Op::Global { parent, local, out },
-                None => Op::Node { pose: self.pose(node), base: self.base(node), parent, out },
-            };
-            self.push(op, node, None);
-        }
-        let mut moved: HashMap<X, X> = HashMap::new();
-        for (node, register) in std::mem::take(&mut self.aliases) {
-            let state = &self.nodes[node];
-            match state.placed {
-                Some(placed) if state.local != Some(placed) => {
-                    self.push(Op::Global { parent: self.parent(node), local: placed, out: register }, node, None);
-                }
-                _ => {
-                    moved.insert(register, self.global(node));
-                }
-            }
-        }
-        self.finish_attributes();
-        self.finish_morphs();
-        for step in &mut self.steps {
-            step.op.visit(&mut self.tables, |operand| {
-                if let super::op::Operand::ReadX(register) = operand
-                    && let Some(to) = moved.get(register)
-                {
-                    *register = *to;
-                }
-            });
-        }
-        self.nodes.iter().map(|state| state.local).collect()
-    }
-
-    fn finish_attributes(&mut self) {
-        let mut driven: Vec<((usize, usize), N)> = self.driven.drain().collect();
-        driven.sort_unstable();
-        for ((node, number), input) in driven {
-            use crate::rig::AttributeKind::{Choice, Number};
-            let attribute = &self.rig.nodes[node].attributes[number];
-            let (low, high) = match &attribute.kind {
-                Number { min, max } => (min.unwrap_or(f32::NEG_INFINITY), max.unwrap_or(f32::INFINITY)),
-                Choice(names) => (0.0, names.len().saturating_sub(1) as f32),
-            };
-            self.tables.ends.push([low, high, attribute.default]);
-            let ends = self.tables.ends.len() as u32 - 1;
-            let out = self.nodes[node].attributes[number];
-            self.push(Op::Clamp { input, ends, out }, node, None);
-        }
-    }
-
-    fn finish_morphs(&mut self) {
-        for (name, terms) in std::mem::take(&mut self.morph_terms) {
-            let out = self.new_n(0.0);
-            let list = Span { start: self.tables.numbers.len() as u32, len: terms.len() as u32 };
-            self.tables.numbers.extend(terms);
-            self.push(Op::Sum { list, out }, self.rig.nodes.len(), None);
-            self.morphs.push((name, out));
-        }
-    }
-
     /// Where a driven or settable attribute is read.
     pub fn attribute(&self, node: usize, number: usize) -> N {
         self.nodes[node].attributes[number]
     }
-}
-
-fn name(rig: &BuiltRig, node: usize) -> String {
-    super::name(rig, node)
 }
 
 pub(super) fn valid(trs: &Trs) -> bool {

@@ -4,7 +4,8 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::{
     ProgramError,
-    graph::{Graph, Step, describe},
+    error::describe,
+    graph::{Graph, Step},
     name,
     op::{N, Operand, Tables, X},
 };

@@ -339,17 +339,18 @@ impl RigState {
     /// slot must be one of the program's.
     pub fn local_at(&self, slot: usize) -> Trs {
         let node = &self.program.nodes[slot];
-        if self.program.nodes.len() != self.program.poses || self.memory == Memory::Results {
-            // Of a program that leaves nodes out, parents may be missing.
-            let Some(parent) = node.parent else { return *self.global_at(slot) };
-            return relative(self.global_at(parent), self.global_at(slot));
-        }
+        // Of a program that leaves nodes out, parents may be missing.
+        let is_whole = self.memory == Memory::Whole && self.program.nodes.len() == self.program.poses;
         match node.local {
-            Some(local) => self.x[local.0 as usize],
-            None => {
+            Some(local) if is_whole => self.x[local.0 as usize],
+            None if is_whole && !node.is_driven => {
                 let offset = self.offset_at(slot);
                 if offset == PoseOffset::IDENTITY { node.base } else { on(&offset, &node.base) }
             }
+            _ => match node.parent {
+                Some(parent) => relative(self.global_at(parent), self.global_at(slot)),
+                None => *self.global_at(slot),
+            },
         }
     }
 
