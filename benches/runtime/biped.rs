@@ -142,7 +142,7 @@ pub fn biped() -> BuiltRig {
 }
 
 fn torso(rig: &mut RigBuilder) {
-    let spine: Vec<Vec3> = (0..6).map(|i| Vec3::new(0.0, 1.0 + 0.09 * i as f32, 0.01 * (i % 3) as f32)).collect();
+    let spine: Vec<Vec3> = (0..6).map(|i| Vec3::new(0.0, 1.0 + 0.09 * i as f32, 0.002 * i as f32)).collect();
     let controls = [0, 2, 4, 5].map(|i| spine[i]);
     let mut points = Vec::new();
     for (i, place) in controls.into_iter().enumerate() {

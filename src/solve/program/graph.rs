@@ -388,7 +388,7 @@ impl<'a> Graph<'a> {
             let known: Vec<String> = attributes.iter().map(|attribute| format!("\"{}\"", attribute.name)).collect();
             ProgramError::MissingAttribute {
                 constraint: self.text(constraint),
-                node: name(self.rig, node),
+                node: super::name(self.rig, node),
                 name: name.to_owned(),
                 known: if known.is_empty() { "none".to_owned() } else { known.join(", ") },
             }
