@@ -11,6 +11,7 @@ pub mod history;
 pub mod journal;
 pub mod picking;
 pub mod placement;
+pub mod runtime;
 pub mod selection;
 pub mod skinning;
 pub mod stroke;
@@ -19,7 +20,7 @@ pub mod surface;
 pub mod viewport;
 
 use bevy::{
-    app::{PluginGroupBuilder, TaskPoolOptions},
+    app::{AnimationSystems, PluginGroupBuilder, TaskPoolOptions},
     prelude::*,
 };
 
@@ -35,6 +36,7 @@ use bevy::{
 /// | [`stroke::StrokePlugin`] | chains from strokes |
 /// | [`gesture::GesturePlugin`] | lists of gestures that drive all of the above |
 /// | [`skinning::SkinningPlugin`] | automatic weights in the background |
+/// | [`runtime::RuntimePlugin`] | compiled rigs that run each frame |
 /// | [`journal::JournalPlugin`] | every change in a safe place, for rigs that ask for it |
 pub struct RigPlugins;
 
@@ -49,11 +51,12 @@ impl PluginGroup for RigPlugins {
             .add(stroke::StrokePlugin)
             .add(gesture::GesturePlugin)
             .add(skinning::SkinningPlugin)
+            .add(runtime::RuntimePlugin)
             .add(journal::JournalPlugin)
     }
 }
 
-/// When the systems of rigs run. The first five are in `Update`, in this order; the last is in `PostUpdate`.
+/// When the systems of rigs run. Unless they say otherwise they are in `Update`, in this order.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RigSystems {
     /// Scripted gestures become requests.
@@ -68,6 +71,10 @@ pub enum RigSystems {
     Build,
     /// Meshes follow their weights; background skinning starts and lands.
     Bind,
+    /// In `PostUpdate`, between Bevy's animation and its propagation of transforms: rigs run.
+    Solve,
+    /// In `PostUpdate`, after transforms have propagated: joints of instances in games get their place in the world.
+    Scatter,
     /// In `PostUpdate`, after transforms have propagated: surfaces follow the pose.
     Surface,
 }
@@ -95,5 +102,11 @@ pub(crate) fn configure_sets(app: &mut App) {
         )
             .chain(),
     )
-    .configure_sets(PostUpdate, RigSystems::Surface.after(TransformSystems::Propagate));
+    .configure_sets(
+        PostUpdate,
+        (
+            RigSystems::Solve.after(AnimationSystems).before(TransformSystems::Propagate),
+            (RigSystems::Scatter, RigSystems::Surface).chain().after(TransformSystems::Propagate),
+        ),
+    );
 }

@@ -199,6 +199,15 @@ fn torso(rig: &mut RigBuilder) {
         ease: KeyEase::Smooth,
         output: Output::Morph("smile".into()),
     });
+    for i in 0..18 {
+        let angle = i as f32 * 0.35;
+        let (control, face) = (format!("face_control_{i}"), format!("face_{i}"));
+        let place = at(Vec3::new(0.05 * angle.sin(), 1.66 + 0.05 * angle.cos(), 0.1));
+        rig.control(&control, if i < 6 { "jaw_control" } else { "head_control" }, place);
+        rig.placed(&face, JOINT, if i < 6 { "jaw" } else { "head" }, place);
+        let target = rig.kept(&face, &control, Scalar::Value(1.0));
+        rig.follow(&face, vec![target]);
+    }
     rig.control("eyes_control", "head_control", at(Vec3::new(0.0, 1.7, 0.8)));
     for (letter, side) in [("L", 1.0), ("R", -1.0)] {
         let (eye, control) = (format!("eye_{letter}"), format!("eye_control_{letter}"));

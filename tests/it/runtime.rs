@@ -5,6 +5,7 @@ pub mod biped;
 mod constraints;
 mod programs;
 mod refusals;
+mod systems;
 
 use std::sync::Arc;
 

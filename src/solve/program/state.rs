@@ -356,9 +356,14 @@ impl RigState {
 
     /// Slots of nodes whose place the last evaluation changed (or may have changed).
     pub fn moved(&self) -> impl Iterator<Item = usize> {
-        let count = self.program.nodes.len();
+        (0..self.program.nodes.len()).filter(|slot| self.is_moved(*slot))
+    }
+
+    /// True if the last evaluation changed (or may have changed) the place of the node of a slot.
+    pub fn is_moved(&self, slot: usize) -> bool {
         // The first register is the rig's space.
-        (0..count).filter(|slot| self.moved[(slot + 1) / 64] & (1 << ((slot + 1) % 64)) != 0)
+        let register = slot + 1;
+        self.moved.get(register / 64).is_some_and(|word| word & (1 << (register % 64)) != 0)
     }
 
     /// The value of an attribute, after what constraints do to it.

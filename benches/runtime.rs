@@ -1,0 +1,222 @@
+//! Programs of built rigs: one control of a biped, and a thousand bipeds that move in every frame.
+//!
+//! Prints one JSON line; times are the least and the median of many frames. `--only NAME` runs one part, for a profiler.
+//!
+//! ```text
+//! cargo bench --no-default-features --bench runtime
+//! ```
+//!
+//! `everything` goes from sampled values (written to the poses of controls, as curves do) over programs, propagation and
+//! joints in the world to skinning matrices. Joints per microsecond are what Bevy's example `many_foxes` is compared by.
+
+#[path = "runtime/biped.rs"]
+mod biped;
+
+use std::{
+    hint::black_box,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use bevy::{
+    ecs::system::RunSystemOnce,
+    math::{Affine3A, Quat, Vec3},
+    prelude::*,
+    time::TimeUpdateStrategy,
+};
+use rayon::prelude::*;
+use rigsmith::{
+    plugins::runtime::{ControlPose, InstanceMode, NodeSlot, RigRuntime, RuntimeNodeOf, RuntimePlugin, spawn_instance},
+    rig::{NodeType, PoseOffset},
+    solve::program::{CompileOptions, Exposed, Keep, Memory, RigProgram, RigState},
+};
+
+/// Instances in a crowd.
+const CROWD: usize = 1000;
+
+/// Frames that are timed.
+const FRAMES: usize = 60;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let only = arguments.iter().position(|a| a == "--only").and_then(|i| arguments.get(i + 1));
+    let wanted = |name: &str| only.is_none_or(|only| only == name);
+    let rig = biped::biped();
+    let compile = |keep| RigProgram::compile(&rig, &CompileOptions { keep, ..CompileOptions::default() }).map(Arc::new);
+    let all = compile(Keep::All)?;
+    let game = compile(Keep::DeformAndExposed(vec![Exposed::Controls]))?;
+    let joints = game.nodes().iter().filter(|node| node.kind == NodeType::Joint).count();
+    let controls = controls(&game);
+    let mut report = vec![
+        format!("\"nodes\": {}", rig.nodes.len()),
+        format!("\"joints\": {joints}"),
+        format!("\"constraints\": {}", rig.constraints.len()),
+        format!("\"controls\": {}", controls.len()),
+        format!("\"operations\": [{}, {}]", all.operations(), game.operations()),
+    ];
+    let mut note = |name: &str, [least, median]: [f64; 2]| report.push(format!("\"{name}\": [{least:.3}, {median:.3}]"));
+
+    if wanted("compile") {
+        note("compile_us", timed(20, |_| drop(black_box(compile(Keep::All)))).map(|time| time * 1e6));
+    }
+    if wanted("one") {
+        let labels = ["arm_L_goal", "leg_R_goal", "finger_control_L_1_1", "head_control", "cog", "root"];
+        for label in labels {
+            let mut state = RigState::new(Arc::clone(&all));
+            state.evaluate(0.0);
+            let slot = all.find_label(label).ok_or("no such control")?;
+            let times = timed(2000, |frame| {
+                state.set_offset_at(slot, sample(frame, 3));
+                state.evaluate(0.0);
+            });
+            note(&format!("one_control_us {label}"), times.map(|time| time * 1e6));
+        }
+    }
+    if wanted("editor") {
+        let mut app = app();
+        let entity = app.world_mut().spawn(Transform::IDENTITY).id();
+        spawn_instance(app.world_mut(), entity, &all, InstanceMode::Hierarchy);
+        let slot = all.find_label("arm_L_goal").ok_or("no such control")?;
+        let control = app.world().get::<RigRuntime>(entity).and_then(|runtime| runtime.entity(slot)).ok_or("no entity")?;
+        for _ in 0..3 {
+            app.world_mut().run_schedule(PostUpdate);
+        }
+        let times = timed(500, |frame| {
+            if let Some(mut transform) = app.world_mut().get_mut::<Transform>(control) {
+                transform.translation.x = 0.7 + (frame as f32 * 0.1).sin() * 0.1;
+            }
+            app.world_mut().run_schedule(PostUpdate);
+        });
+        note("one_control_with_propagation_us", times.map(|time| time * 1e6));
+    }
+    if wanted("programs") {
+        let mut states: Vec<RigState> =
+            (0..CROWD).map(|_| RigState::with_memory(Arc::clone(&game), Memory::Results)).collect();
+        let mut programs = |parallel: bool, states: &mut Vec<RigState>| {
+            let mut times = Vec::new();
+            for frame in 0..FRAMES {
+                for (number, state) in states.iter_mut().enumerate() {
+                    for (at, control) in controls.iter().enumerate() {
+                        state.set_offset_at(*control, sample(frame + number, at));
+                    }
+                }
+                let start = Instant::now();
+                if parallel {
+                    states.par_iter_mut().for_each(|state| drop(state.evaluate(0.016)));
+                } else {
+                    states.iter_mut().for_each(|state| drop(state.evaluate(0.016)));
+                }
+                times.push(start.elapsed());
+            }
+            ends(times)
+        };
+        let mut others = states.clone();
+        let one = programs(false, &mut states);
+        let many = programs(true, &mut others);
+        note("programs_one_core_ms", one.map(|time| time * 1e3));
+        note("programs_ms", many.map(|time| time * 1e3));
+        note("programs_joints_per_us", many.map(|time| (joints * CROWD) as f64 / (time * 1e6)));
+        let is_equal = states.iter().zip(&others).all(|(a, b)| a.globals() == b.globals());
+        note("threads_equal", [f64::from(u8::from(is_equal)); 2]);
+    }
+    if wanted("everything") {
+        let times = everything(&game);
+        for (name, times) in ["sample_ms", "frame_ms", "matrices_ms", "everything_ms"].iter().zip(&times) {
+            note(name, times.map(|time| time * 1e3));
+        }
+        note("everything_joints_per_us", times[3].map(|time| (joints * CROWD) as f64 / (time * 1e6)));
+    }
+    println!("{{{}}}", report.join(", "));
+    Ok(())
+}
+
+/// A pose that differs from frame to frame.
+fn sample(frame: usize, control: usize) -> PoseOffset {
+    let angle = 0.3 * ((frame as f32) * 0.13 + control as f32).sin();
+    let moved = Vec3::new(0.03 * angle, 0.02 * angle, -0.03 * angle);
+    PoseOffset { translation: moved, rotation: Quat::from_rotation_x(angle), scale: Vec3::ONE }
+}
+
+/// Slots that are posed.
+fn controls(program: &RigProgram) -> Vec<usize> {
+    (0..program.nodes().len()).filter(|slot| program.nodes()[*slot].is_posable()).collect()
+}
+
+fn app() -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, TransformPlugin, RuntimePlugin))
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
+    app.finish();
+    app.cleanup();
+    app.update();
+    app
+}
+
+/// A thousand bipeds: sampling, everything in `PostUpdate`, skinning matrices, and the sum.
+fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 4] {
+    let mut app = app();
+    let rigs: Vec<Entity> = (0..CROWD)
+        .map(|number| {
+            let place = Transform::from_xyz((number % 40) as f32, 0.0, (number / 40) as f32);
+            let rig = app.world_mut().spawn(place).id();
+            spawn_instance(app.world_mut(), rig, program, InstanceMode::Direct);
+            rig
+        })
+        .collect();
+    let joints: Vec<Vec<Entity>> = rigs
+        .iter()
+        .map(|rig| {
+            let runtime = app.world().get::<RigRuntime>(*rig);
+            let slots = (0..program.nodes().len()).filter(|slot| program.nodes()[*slot].kind == NodeType::Joint);
+            slots.filter_map(|slot| runtime.and_then(|runtime| runtime.entity(slot))).collect()
+        })
+        .collect();
+    let bind = Affine3A::from_translation(Vec3::Y);
+    let mut matrices = vec![Affine3A::IDENTITY; joints.iter().map(Vec::len).sum()];
+    let mut times = [const { Vec::new() }; 4];
+    for frame in 0..FRAMES {
+        let start = Instant::now();
+        let _ = app.world_mut().run_system_once(
+            move |mut poses: Query<(&mut ControlPose, &NodeSlot, &RuntimeNodeOf)>| {
+                poses.par_iter_mut().for_each(|(mut pose, slot, rig)| {
+                    *pose = sample(frame + rig.0.index().index() as usize, slot.0 as usize).into();
+                });
+            },
+        );
+        let sampled = start.elapsed();
+        app.world_mut().run_schedule(PostUpdate);
+        let ran = start.elapsed();
+        let mut globals = app.world_mut().query::<&GlobalTransform>();
+        let world = app.world();
+        let mut out = matrices.iter_mut();
+        for rig in &joints {
+            for (place, out) in globals.iter_many(world, rig).zip(&mut out) {
+                *out = place.affine() * bind;
+            }
+        }
+        let all = start.elapsed();
+        black_box(&matrices);
+        // The first frames grow lists.
+        if frame >= 5 {
+            for (times, time) in times.iter_mut().zip([sampled, ran - sampled, all - ran, all]) {
+                times.push(time);
+            }
+        }
+    }
+    times.map(ends)
+}
+
+/// Least and median seconds of calls.
+fn timed(count: usize, mut call: impl FnMut(usize)) -> [f64; 2] {
+    let times = (0..count).map(|frame| {
+        let start = Instant::now();
+        call(frame);
+        start.elapsed()
+    });
+    ends(times.collect())
+}
+
+fn ends(mut times: Vec<Duration>) -> [f64; 2] {
+    times.sort_unstable();
+    [times[0].as_secs_f64(), times[times.len() / 2].as_secs_f64()]
+}

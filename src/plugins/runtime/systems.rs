@@ -1,0 +1,152 @@
+//! The systems that run rigs, in their order.
+
+use bevy::{mesh::morph::MeshMorphWeights, prelude::*};
+use rayon::prelude::*;
+
+use super::{ControlPose, DrivenMorphs, InstanceMode, RigRuntime, RuntimeNodeOf, spawn::transform};
+use crate::rig::{PoseOffset, RestTransform};
+
+/// Instances that are handed to the threads at once. A list of fixed size needs no memory of its own each frame.
+const BATCH: usize = 256;
+
+/// Fewer instances than these are run by one thread.
+const FEW: usize = 4;
+
+/// Notes which instances have a control that changed.
+pub(super) fn note_controls(
+    changed: Query<&RuntimeNodeOf, Or<(Changed<Transform>, Changed<ControlPose>)>>,
+    mut rigs: Query<&mut RigRuntime>,
+) {
+    let mut last = Entity::PLACEHOLDER;
+    for RuntimeNodeOf(rig) in &changed {
+        // Nodes of one rig mostly follow one another.
+        if *rig != last {
+            last = *rig;
+            if let Ok(mut runtime) = rigs.get_mut(*rig) {
+                runtime.bypass_change_detection().is_due = true;
+            }
+        }
+    }
+}
+
+/// Takes the poses of controls and runs the programs of all instances that have something to do.
+pub(super) fn solve(
+    mut rigs: Query<&mut RigRuntime>,
+    transforms: Query<&Transform>,
+    poses: Query<&ControlPose>,
+    time: Res<Time>,
+) {
+    let dt = time.delta_secs();
+    let run = |runtime: &mut Mut<RigRuntime>| {
+        let unseen = runtime.bypass_change_detection();
+        if std::mem::take(&mut unseen.is_due) {
+            gather(unseen, &transforms, &poses);
+        }
+        if unseen.state.evaluate(dt) {
+            runtime.set_changed();
+        }
+    };
+    let mut due = rigs.iter_mut().filter(|runtime| runtime.is_due || runtime.state.is_dirty(dt));
+    let mut batch = [const { None::<Mut<RigRuntime>> }; BATCH];
+    loop {
+        let mut count = 0;
+        for (place, runtime) in batch.iter_mut().zip(&mut due) {
+            *place = Some(runtime);
+            count += 1;
+        }
+        let ready = &mut batch[..count];
+        if count < FEW {
+            ready.iter_mut().flatten().for_each(run);
+        } else {
+            ready.par_iter_mut().with_min_len(2).flatten().for_each(run);
+        }
+        if count < BATCH {
+            break;
+        }
+    }
+}
+
+/// Takes the poses of an instance's controls.
+fn gather(runtime: &mut RigRuntime, transforms: &Query<&Transform>, poses: &Query<&ControlPose>) {
+    let RigRuntime { state, controls, mode, .. } = runtime;
+    for (slot, entity) in controls.iter() {
+        let slot = *slot as usize;
+        match mode {
+            InstanceMode::Direct => {
+                if let Ok(pose) = poses.get(*entity) {
+                    state.set_offset_at(slot, (*pose).into());
+                }
+            }
+            InstanceMode::Hierarchy => {
+                let Ok(posed) = transforms.get(*entity) else { continue };
+                // What the rig itself wrote is no pose.
+                if *posed != transform(&state.local_at(slot)) {
+                    let base = state.program().nodes()[slot].base;
+                    let (translation, rotation, scale) = (base.translation, base.rotation, base.scale);
+                    let offset = PoseOffset::between(&RestTransform { translation, rotation, scale }, posed);
+                    state.set_offset_at(slot, offset);
+                }
+            }
+        }
+    }
+}
+
+/// Writes the transforms of driven nodes where every node is an entity.
+pub(super) fn scatter_locals(rigs: Query<&RigRuntime, Changed<RigRuntime>>, mut transforms: Query<&mut Transform>) {
+    for runtime in rigs.iter().filter(|runtime| runtime.mode == InstanceMode::Hierarchy) {
+        for (slot, entity) in &runtime.written {
+            let slot = *slot as usize;
+            if !runtime.state.is_moved(slot) {
+                continue;
+            }
+            if let Ok(mut written) = transforms.get_mut(*entity) {
+                written.set_if_neq(transform(&runtime.state.local_at(slot)));
+            }
+        }
+    }
+}
+
+/// Writes the weights of morph targets.
+pub(super) fn scatter_morphs(
+    rigs: Query<&RigRuntime, Changed<RigRuntime>>,
+    mut meshes: Query<(&DrivenMorphs, &mut MeshMorphWeights)>,
+) {
+    if rigs.is_empty() {
+        return;
+    }
+    for (morphs, mut written) in &mut meshes {
+        let Ok(runtime) = rigs.get(morphs.rig) else { continue };
+        let values = runtime.state.morphs();
+        let MeshMorphWeights::Value { weights } = written.bypass_change_detection() else { continue };
+        let mut is_changed = false;
+        for (number, slot) in &morphs.targets {
+            if let (Some(weight), Some(value)) = (weights.get_mut(*number), values.get(*slot))
+                && weight.to_bits() != value.to_bits()
+            {
+                *weight = *value;
+                is_changed = true;
+            }
+        }
+        if is_changed {
+            written.set_changed();
+        }
+    }
+}
+
+/// Writes where joints are in the world, where only they are entities.
+pub(super) fn scatter_globals(
+    rigs: Query<(&RigRuntime, &GlobalTransform), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
+    mut joints: Query<&mut GlobalTransform, Without<RigRuntime>>,
+) {
+    for (runtime, place) in &rigs {
+        if runtime.mode != InstanceMode::Direct {
+            continue;
+        }
+        let world = place.affine();
+        for (slot, entity) in &runtime.written {
+            if let Ok(mut joint) = joints.get_mut(*entity) {
+                *joint = GlobalTransform::from(world * runtime.state.global_at(*slot as usize).affine());
+            }
+        }
+    }
+}
