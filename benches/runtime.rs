@@ -54,7 +54,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         format!("\"controls\": {}", controls.len()),
         format!("\"operations\": [{}, {}]", all.operations(), game.operations()),
     ];
-    let mut note = |name: &str, [least, median]: [f64; 2]| report.push(format!("\"{name}\": [{least:.3}, {median:.3}]"));
+    let mut note =
+        |name: &str, [least, median]: [f64; 2]| report.push(format!("\"{name}\": [{least:.3}, {median:.3}]"));
 
     if wanted("compile") {
         note("compile_us", timed(20, |_| drop(black_box(compile(Keep::All)))).map(|time| time * 1e6));
@@ -77,7 +78,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let entity = app.world_mut().spawn(Transform::IDENTITY).id();
         spawn_instance(app.world_mut(), entity, &all, InstanceMode::Hierarchy);
         let slot = all.find_label("arm_L_goal").ok_or("no such control")?;
-        let control = app.world().get::<RigRuntime>(entity).and_then(|runtime| runtime.entity(slot)).ok_or("no entity")?;
+        let control =
+            app.world().get::<RigRuntime>(entity).and_then(|runtime| runtime.entity(slot)).ok_or("no entity")?;
         for _ in 0..3 {
             app.world_mut().run_schedule(PostUpdate);
         }
@@ -176,13 +178,12 @@ fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 4] {
     let mut times = [const { Vec::new() }; 4];
     for frame in 0..FRAMES {
         let start = Instant::now();
-        let _ = app.world_mut().run_system_once(
-            move |mut poses: Query<(&mut ControlPose, &NodeSlot, &RuntimeNodeOf)>| {
+        let _ =
+            app.world_mut().run_system_once(move |mut poses: Query<(&mut ControlPose, &NodeSlot, &RuntimeNodeOf)>| {
                 poses.par_iter_mut().for_each(|(mut pose, slot, rig)| {
                     *pose = sample(frame + rig.0.index().index() as usize, slot.0 as usize).into();
                 });
-            },
-        );
+            });
         let sampled = start.elapsed();
         app.world_mut().run_schedule(PostUpdate);
         let ran = start.elapsed();

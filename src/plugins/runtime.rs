@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
+pub use self::spawn::spawn_instance;
 use super::{RigSystems, configure_sets};
 use crate::{
     rig::PoseOffset,
@@ -33,6 +34,8 @@ impl Plugin for RuntimePlugin {
                 systems::scatter_globals.in_set(RigSystems::Scatter),
             ),
         );
+        #[cfg(feature = "draw")]
+        app.add_systems(PostUpdate, systems::show_morphs.in_set(RigSystems::Solve).after(systems::scatter_morphs));
     }
 }
 
@@ -169,21 +172,24 @@ impl From<ControlPose> for PoseOffset {
     }
 }
 
-/// On a mesh: which of its morph targets a running rig drives.
-#[derive(Component, Debug, Clone, PartialEq, Eq)]
+/// On a mesh: which of its morph targets a running rig drives, and their weights.
+///
+/// Where Bevy draws (feature `draw`), the weights go on to the mesh's `MeshMorphWeights`.
+#[derive(Component, Debug, Clone, PartialEq)]
 pub struct DrivenMorphs {
     /// The running rig.
     pub rig: Entity,
     /// Numbers of the mesh's targets, and slots of the program's.
     pub targets: Vec<(usize, usize)>,
+    /// Weights in the order of `targets`, as the rig last gave them.
+    pub weights: Vec<f32>,
 }
 
 impl DrivenMorphs {
     /// Connects the targets of a mesh, given by name in order, with those of a program.
     pub fn new(rig: Entity, program: &RigProgram, names: &[String]) -> Self {
         let slot = |(number, name): (usize, &String)| Some((number, program.morph(name)?));
-        Self { rig, targets: names.iter().enumerate().filter_map(slot).collect() }
+        let targets: Vec<_> = names.iter().enumerate().filter_map(slot).collect();
+        Self { rig, weights: vec![0.0; targets.len()], targets }
     }
 }
-
-pub use spawn::spawn_instance;

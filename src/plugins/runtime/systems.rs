@@ -1,6 +1,6 @@
 //! The systems that run rigs, in their order.
 
-use bevy::{mesh::morph::MeshMorphWeights, prelude::*};
+use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::{ControlPose, DrivenMorphs, InstanceMode, RigRuntime, RuntimeNodeOf, spawn::transform};
@@ -106,21 +106,18 @@ pub(super) fn scatter_locals(rigs: Query<&RigRuntime, Changed<RigRuntime>>, mut 
     }
 }
 
-/// Writes the weights of morph targets.
-pub(super) fn scatter_morphs(
-    rigs: Query<&RigRuntime, Changed<RigRuntime>>,
-    mut meshes: Query<(&DrivenMorphs, &mut MeshMorphWeights)>,
-) {
+/// Hands out the weights of morph targets.
+pub(super) fn scatter_morphs(rigs: Query<&RigRuntime, Changed<RigRuntime>>, mut meshes: Query<&mut DrivenMorphs>) {
     if rigs.is_empty() {
         return;
     }
-    for (morphs, mut written) in &mut meshes {
+    for mut morphs in &mut meshes {
         let Ok(runtime) = rigs.get(morphs.rig) else { continue };
         let values = runtime.state.morphs();
-        let MeshMorphWeights::Value { weights } = written.bypass_change_detection() else { continue };
+        let DrivenMorphs { targets, weights, .. } = morphs.bypass_change_detection();
         let mut is_changed = false;
-        for (number, slot) in &morphs.targets {
-            if let (Some(weight), Some(value)) = (weights.get_mut(*number), values.get(*slot))
+        for ((_, slot), weight) in targets.iter().zip(weights) {
+            if let Some(value) = values.get(*slot)
                 && weight.to_bits() != value.to_bits()
             {
                 *weight = *value;
@@ -128,7 +125,22 @@ pub(super) fn scatter_morphs(
             }
         }
         if is_changed {
-            written.set_changed();
+            morphs.set_changed();
+        }
+    }
+}
+
+/// Lets meshes be drawn with the weights of their morph targets.
+#[cfg(feature = "draw")]
+pub(super) fn show_morphs(
+    mut meshes: Query<(&DrivenMorphs, &mut bevy::mesh::morph::MeshMorphWeights), Changed<DrivenMorphs>>,
+) {
+    for (morphs, mut shown) in &mut meshes {
+        let bevy::mesh::morph::MeshMorphWeights::Value { weights } = &mut *shown else { continue };
+        for ((number, _), value) in morphs.targets.iter().zip(&morphs.weights) {
+            if let Some(weight) = weights.get_mut(*number) {
+                *weight = *value;
+            }
         }
     }
 }
