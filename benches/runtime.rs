@@ -94,7 +94,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if wanted("programs") {
         let mut states: Vec<RigState> =
             (0..CROWD).map(|_| RigState::with_memory(Arc::clone(&game), Memory::Results)).collect();
-        let mut programs = |parallel: bool, states: &mut Vec<RigState>| {
+        let programs = |parallel: bool, states: &mut Vec<RigState>| {
             let mut times = Vec::new();
             for frame in 0..FRAMES {
                 for (number, state) in states.iter_mut().enumerate() {
@@ -104,9 +104,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 }
                 let start = Instant::now();
                 if parallel {
-                    states.par_iter_mut().for_each(|state| drop(state.evaluate(0.016)));
+                    states.par_iter_mut().for_each(|state| {
+                        state.evaluate(0.016);
+                    });
                 } else {
-                    states.iter_mut().for_each(|state| drop(state.evaluate(0.016)));
+                    states.iter_mut().for_each(|state| {
+                        state.evaluate(0.016);
+                    });
                 }
                 times.push(start.elapsed());
             }

@@ -22,6 +22,7 @@ pub mod viewport;
 use bevy::{
     app::{AnimationSystems, PluginGroupBuilder, TaskPoolOptions},
     prelude::*,
+    transform::systems::sync_simple_transforms,
 };
 
 /// Everything a rig needs, head-less.
@@ -73,7 +74,8 @@ pub enum RigSystems {
     Bind,
     /// In `PostUpdate`, between Bevy's animation and its propagation of transforms: rigs run.
     Solve,
-    /// In `PostUpdate`, after transforms have propagated: joints of instances in games get their place in the world.
+    /// In `PostUpdate`, at the end of the propagation of transforms: joints of instances in games get their place in the
+    /// world.
     Scatter,
     /// In `PostUpdate`, after transforms have propagated: surfaces follow the pose.
     Surface,
@@ -106,7 +108,9 @@ pub(crate) fn configure_sets(app: &mut App) {
         PostUpdate,
         (
             RigSystems::Solve.after(AnimationSystems).before(TransformSystems::Propagate),
-            (RigSystems::Scatter, RigSystems::Surface).chain().after(TransformSystems::Propagate),
+            // Within, so that whatever runs after propagation sees these joints, too.
+            RigSystems::Scatter.in_set(TransformSystems::Propagate).after(sync_simple_transforms),
+            RigSystems::Surface.after(TransformSystems::Propagate),
         ),
     );
 }

@@ -1,7 +1,6 @@
 //! Running rigs takes no memory once they are warm. A binary of its own: it counts what the whole process allocates.
 
 #[path = "../benches/runtime/biped.rs"]
-#[expect(dead_code, reason = "a part of what benches and other tests need")]
 mod biped;
 
 use std::{alloc::System, sync::Arc};

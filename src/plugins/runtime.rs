@@ -87,7 +87,8 @@ impl RigRuntime {
         &self.state
     }
 
-    /// Inputs, to be changed: they are taken up in the same frame.
+    /// Inputs, to be changed: they are taken up in the same frame. Leave evaluating to the plugin, or evaluate a clone:
+    /// results of an evaluation that the plugin did not make are not handed out.
     pub fn state_mut(&mut self) -> &mut RigState {
         &mut self.state
     }
