@@ -49,6 +49,24 @@ impl Spline<'_> {
         }
     }
 
+    /// The four control points that make a segment. Beyond the ends the neighbour is mirrored: the curve ends on its last
+    /// point, without curvature.
+    #[inline]
+    fn neighbours(&self, segment: usize) -> [Vec3; 4] {
+        let (points, count) = (self.points, self.points.len());
+        let before = if segment == 0 { 2.0 * points[0] - points[1] } else { points[segment - 1] };
+        let after = if segment + 2 < count { points[segment + 2] } else { 2.0 * points[count - 1] - points[count - 2] };
+        [before, points[segment], points[segment + 1], after]
+    }
+
+    /// The derivative in a segment as a polynomial of the segment's parameter, by rising powers.
+    fn slopes(&self, segment: usize) -> [Vec3; 3] {
+        let neighbours = self.neighbours(segment);
+        let [start, middle, end] = [0.0, 0.5, 1.0].map(|t| weighted(&neighbours, &self.weights(t, true)));
+        let scale = (self.points.len() - 1) as f32;
+        [start * scale, (4.0 * middle - 3.0 * start - end) * scale, (2.0 * (start + end) - 4.0 * middle) * scale]
+    }
+
     /// The weighted sum of control points at parameter `t`, 0 to 1 over the whole curve.
     #[inline]
     fn sum(&self, t: f32, derivative: bool) -> Vec3 {
@@ -60,17 +78,7 @@ impl Spline<'_> {
         let along = if t > 0.0 { t.min(1.0) * segments as f32 } else { 0.0 };
         let segment = (along as usize).min(segments - 1);
         let weights = self.weights(along - segment as f32, derivative);
-        // Beyond the ends the neighbour is mirrored: the curve ends on its last point, without curvature.
-        let before = if segment == 0 { 2.0 * self.points[0] - self.points[1] } else { self.points[segment - 1] };
-        let after = if segment + 2 < count {
-            self.points[segment + 2]
-        } else {
-            2.0 * self.points[count - 1] - self.points[count - 2]
-        };
-        let sum = before * weights[0]
-            + self.points[segment] * weights[1]
-            + self.points[segment + 1] * weights[2]
-            + after * weights[3];
+        let sum = weighted(&self.neighbours(segment), &weights);
         if derivative { sum * segments as f32 } else { sum }
     }
 
@@ -93,10 +101,16 @@ impl Spline<'_> {
     }
 }
 
+#[inline]
+fn weighted(points: &[Vec3; 4], weights: &[f32; 4]) -> Vec3 {
+    points[0] * weights[0] + points[1] * weights[1] + points[2] * weights[2] + points[3] * weights[3]
+}
+
 /// Entries of a table of lengths.
 const STEPS: usize = 64;
 
-/// The length of a curve up to 65 evenly spaced parameters. Made once for each set of control points: 192 evaluations.
+/// The length of a curve up to 65 evenly spaced parameters. Made once for each set of control points: 192 lengths of
+/// derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArcTable {
     lengths: [f32; STEPS + 1],
@@ -106,15 +120,28 @@ impl ArcTable {
     /// Measures a curve, by three points of Gauss and Legendre a step.
     pub fn new(spline: &Spline) -> Self {
         let mut lengths = [0.0; STEPS + 1];
+        if spline.points.len() < 2 {
+            return Self { lengths };
+        }
         let width = 1.0 / STEPS as f32;
-        let speed = |t: f32| {
-            let speed = spline.derivative(t).length();
+        let segments = spline.points.len() - 1;
+        let (mut segment, mut slopes) = (0, spline.slopes(0));
+        let mut speed = |t: f32| {
+            let along = t * segments as f32;
+            let at = (along as usize).min(segments - 1);
+            if at != segment {
+                (segment, slopes) = (at, spline.slopes(at));
+            }
+            let t = along - at as f32;
+            let speed = (slopes[0] + (slopes[1] + slopes[2] * t) * t).length();
             if speed.is_finite() { speed } else { 0.0 }
         };
         for i in 0..STEPS {
             let middle = (i as f32 + 0.5) * width;
             let off = 0.5 * width * 0.774_596_7;
-            let mean = (5.0 * (speed(middle - off) + speed(middle + off)) + 8.0 * speed(middle)) / 18.0;
+            // In order, so that a segment is looked up once.
+            let [before, at, after] = [middle - off, middle, middle + off].map(&mut speed);
+            let mean = (5.0 * (before + after) + 8.0 * at) / 18.0;
             lengths[i + 1] = lengths[i] + mean * width;
         }
         Self { lengths }
