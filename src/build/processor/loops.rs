@@ -1,6 +1,6 @@
 //! Circles: constraints that drive what they follow.
 
-use std::collections::HashSet;
+use std::{collections::HashSet, sync::Arc};
 
 use super::Builder;
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
         BuildProblem, ModuleError,
         world::{Aspect, NodeId, Value},
     },
-    rig::Dependency,
+    rig::{Constraint, Dependency},
 };
 
 impl Builder {
@@ -40,40 +40,57 @@ impl Builder {
             return Ok(());
         };
         let drives = data.drives();
+        // Breadth first, in an order that only the rig decides: the shortest way round is told.
+        let mut found: Vec<(Dependency, Option<usize>)> = data.reads().into_iter().map(|read| (read, None)).collect();
         let mut seen: HashSet<Dependency> = HashSet::new();
-        let mut path: Vec<(Dependency, usize)> = data.reads().into_iter().map(|read| (read, 0)).collect();
-        let mut trail: Vec<Dependency> = Vec::new();
-        while let Some((at, depth)) = path.pop() {
-            trail.truncate(depth);
+        let mut next = 0;
+        while next < found.len() {
+            let at = found[next].0.clone();
             if drives.contains(&at) {
-                trail.push(at);
-                let names: Vec<String> = trail.iter().map(|at| self.dependency_name(at, place)).collect();
-                let first = drives.first().map(|at| self.dependency_name(at, place)).unwrap_or_default();
-                let shown = if names.first() == Some(&first) { String::new() } else { format!("{first} \u{2192} ") };
-                return Err(ModuleError::Cycle(format!("{shown}{}", names.join(" \u{2192} "))));
+                return Err(ModuleError::Cycle(self.trail(&found, next, place)));
             }
-            if !seen.insert(at.clone()) {
-                continue;
+            if seen.insert(at.clone()) {
+                found.extend(self.depends_on(&at, constraint, place).into_iter().map(|read| (read, Some(next))));
             }
-            trail.push(at.clone());
-            let depth = trail.len();
-            let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = &at;
-            let Some(node) = self.world.id(*uid) else { continue };
-            if matches!(at, Dependency::Node(_))
-                && let Some(parent) = self.world.parent(node, place)
-            {
-                path.push((Dependency::Node(self.world.uid(parent)), depth));
-            }
-            for driver in &self.world.slots[node.0 as usize].driven_by {
-                if let Some(Value::Constraint(_, other)) = self.world.read_at(*driver, Aspect::Constraint, place)
-                    && *driver != constraint
-                    && other.drives().contains(&at)
-                {
-                    path.extend(other.reads().into_iter().map(|read| (read, depth)));
-                }
-            }
+            next += 1;
         }
         Ok(())
+    }
+
+    /// What decides where something is: its parent, and what the constraints that drive it read.
+    fn depends_on(&self, at: &Dependency, except: NodeId, place: u32) -> Vec<Dependency> {
+        let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = at;
+        let Some(node) = self.world.id(*uid) else { return Vec::new() };
+        let parent = self.world.parent(node, place).filter(|_| matches!(at, Dependency::Node(_)));
+        let mut needs: Vec<Dependency> =
+            parent.into_iter().map(|parent| Dependency::Node(self.world.uid(parent))).collect();
+        let driven_by = self.world.slots[node.0 as usize].driven_by.iter();
+        let mut drivers: Vec<((u32, u32), &Arc<Constraint>)> = driven_by
+            .filter(|driver| **driver != except)
+            .filter_map(|driver| match self.world.read_at(*driver, Aspect::Constraint, place) {
+                Some(Value::Constraint(number, other)) if other.drives().contains(at) => {
+                    let creator = self.world.slots[driver.0 as usize].creator?;
+                    Some(((self.world.places[creator as usize], *number), other))
+                }
+                _ => None,
+            })
+            .collect();
+        drivers.sort_by_key(|(key, _)| *key);
+        needs.extend(drivers.into_iter().flat_map(|(_, other)| other.reads()));
+        needs
+    }
+
+    /// The circle in names: from what is driven over what it needs back to itself.
+    fn trail(&self, found: &[(Dependency, Option<usize>)], end: usize, place: u32) -> String {
+        let mut names = Vec::new();
+        let mut at = Some(end);
+        while let Some(index) = at {
+            names.push(self.dependency_name(&found[index].0, place));
+            at = found[index].1;
+        }
+        names.push(names[0].clone());
+        names.reverse();
+        names.join(" \u{2192} ")
     }
 
     fn dependency_name(&self, dependency: &Dependency, place: u32) -> String {

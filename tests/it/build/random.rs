@@ -1,5 +1,7 @@
 //! Random rigs under random edits: building what changed gives what building from nothing gives, bit for bit.
 
+use std::collections::BTreeSet;
+
 use super::*;
 use crate::mutate::Random;
 
@@ -47,28 +49,146 @@ impl Maker {
         }
     }
 
-    fn command(&mut self, rig: &Rig) -> (String, String) {
-        let number = |maker: &mut Self| maker.random.below(40) as f32 / 8.0;
-        match self.random.below(6) {
-            0 | 1 => {
-                let below = self.random.chance(2);
-                let label = if self.random.chance(4) { ", create: (label: \"made\")" } else { "" };
-                let (at, up) = (self.reference(rig, true), number(self));
-                ("mark".into(), format!("(at: {at:?}, below: {below}, up: {up:?}{label})"))
-            }
-            2 | 3 => {
-                let (node, by) = (self.reference(rig, true), number(self));
-                ("nudge".into(), format!("(node: {node:?}, by: {by:?})"))
-            }
-            4 => {
-                let (node, targets) = (self.reference(rig, false), self.reference(rig, true));
-                ("follow".into(), format!("(node: {node:?}, targets: {targets:?})"))
-            }
-            _ => {
-                let (node, name) = (self.reference(rig, false), self.random.below(1000));
-                ("attribute".into(), format!("(node: {node:?}, name: \"a{name}\", default: {:?})", number(self)))
-            }
+    /// A joint and one that lies `bones` below it.
+    fn chain(&mut self, rig: &Rig, bones: usize) -> Option<(Uid, Uid)> {
+        let ends: Vec<(Uid, Uid)> = rig
+            .walk()
+            .filter_map(|end| Some((rig.ancestors(end.data.uid).nth(bones - 1)?.data.uid, end.data.uid)))
+            .collect();
+        (!ends.is_empty()).then(|| self.random.pick(&ends))
+    }
+
+    /// A node that commands of a module made, or a joint if there is none.
+    fn made(&mut self, rig: &Rig, by: &str) -> String {
+        let commands: Vec<Uid> = Self::tags(rig)
+            .into_iter()
+            .filter(|(_, tag)| matches!(&tag.kind, TagKind::Command { module, .. } if module == by))
+            .map(|(_, tag)| tag.uid)
+            .collect();
+        match commands.is_empty() {
+            true => format!("@joint #{}", self.joint(rig)),
+            false => format!("@command #{} pick:START", self.random.pick(&commands)),
         }
+    }
+
+    fn number(&mut self) -> f32 {
+        self.random.below(40) as f32 / 8.0
+    }
+
+    fn command(&mut self, rig: &Rig) -> (String, String) {
+        const MODULES: &[&str] = &[
+            "mark",
+            "mark",
+            "mark",
+            "nudge",
+            "nudge",
+            "follow",
+            "attribute",
+            "null",
+            "control",
+            "control",
+            "control",
+            "layer",
+            "insert_joints",
+            "mirror_joints",
+            "orient_joints",
+            "duplicate_chain",
+            "parent",
+            "point",
+            "orient",
+            "scale",
+            "aim",
+            "pole_vector",
+            "blend",
+            "limit",
+            "ik_handle",
+            "ik_fk_switch",
+            "spline_ik",
+            "space_switch",
+            "reverse_foot",
+            "twist",
+            "stretch",
+            "spring",
+            "driven_key",
+            "expression",
+            "morph",
+        ];
+        let module = self.random.pick(MODULES);
+        let (any, joint) = (self.reference(rig, true), self.reference(rig, false));
+        let control = self.made(rig, "control");
+        let other = self.made(rig, "null");
+        let (a, b) = self.chain(rig, 2).unwrap_or((Uid(0), Uid(0)));
+        let middle = rig.joint(b).and_then(|joint| joint.parent).unwrap_or(Uid(0));
+        let number = self.number();
+        let name = format!("a{}", self.random.below(1000));
+        let params = match module {
+            "mark" => {
+                let label = if self.random.chance(4) { ", create: (label: \"made\")" } else { "" };
+                format!("(at: {any:?}, below: {}, up: {number:?}{label})", self.random.chance(2))
+            }
+            "nudge" => format!("(node: {any:?}, by: {number:?})"),
+            "follow" => format!("(node: {joint:?}, targets: {any:?})"),
+            "attribute" => format!("(node: {any:?}, name: \"{name}\", default: {number:?})"),
+            "null" => format!("(at: {any:?}, world: {}, translate: (0.0, {number:?}, 0.0))", self.random.chance(2)),
+            "control" => {
+                let (follow, hierarchy) = (self.random.chance(3), self.random.chance(2));
+                let size = if self.random.chance(2) { format!(", size: {:?}", number + 0.1) } else { String::new() };
+                format!("(at: {joint:?}, follow: {follow}, hierarchy: {hierarchy}{size})")
+            }
+            "layer" => format!("(nodes: {any:?}, name: \"l{}\", use_existing: true)", self.random.below(3)),
+            "insert_joints" => format!("(joint: \"@joint #{a}\", count: {})", 1 + self.random.below(3)),
+            "mirror_joints" | "orient_joints" => format!("(joints: \"@hierarchy #{a}\")"),
+            "duplicate_chain" => format!("(joints: \"@hierarchy #{a}\", suffix: \"copy\")"),
+            "parent" | "point" | "orient" | "scale" => {
+                let keep = self.random.chance(2);
+                format!("(node: {joint:?}, targets: {:?}, keep_offset: {keep})", format!("{control} + {other}"))
+            }
+            "aim" => format!("(node: {joint:?}, targets: {control:?})"),
+            "pole_vector" => {
+                let chain = format!("@joint #{a} + @joint #{middle} + @joint #{b}");
+                format!("(chain: {chain:?}, prefer: (0.0, 0.0, 1.0))")
+            }
+            "blend" => {
+                let (nodes, ends) = (format!("@joint #{b}"), [&control, &other]);
+                format!("(nodes: {nodes:?}, a: {:?}, b: {:?}, blend: 0.5)", ends[0], ends[1])
+            }
+            "limit" => format!("(nodes: {joint:?}, limits: (rotate: ((0.0, {number:?}), (None, None), (None, None))))"),
+            "ik_handle" => format!(
+                "(start: \"@joint #{a}\", end: \"@joint #{b}\", goal: {control:?}, prefer: (0.0, 0.0, 1.0), stretch: {:?})",
+                number / 5.0
+            ),
+            "ik_fk_switch" => {
+                let fk = format!("{control} + {other} + @module mark pick:START");
+                format!(
+                    "(start: \"@joint #{a}\", end: \"@joint #{b}\", fk: {fk:?}, goal: {other:?}, control: {control:?}, \
+                     attribute: \"{name}\", prefer: (0.0, 0.0, 1.0))"
+                )
+            }
+            "spline_ik" => {
+                let points = format!("{control} + {other}");
+                format!("(start: \"@joint #{a}\", end: \"@joint #{b}\", points: {points:?})")
+            }
+            "space_switch" => {
+                let spaces = format!("{joint} + {other}");
+                format!("(control: {control:?}, spaces: {spaces:?}, attribute: \"{name}\")")
+            }
+            "reverse_foot" => format!(
+                "(ankle: \"@joint #{a}\", ball: \"@joint #{middle}\", toe: \"@joint #{b}\", control: {control:?})"
+            ),
+            "twist" => format!("(start: \"@joint #{middle}\", end: \"@joint #{b}\", count: 2)"),
+            "stretch" => format!("(start: {control:?}, end: {other:?}, driven: \"@joint #{b}\")"),
+            "spring" => format!("(nodes: {joint:?}, frequency: 3.0)"),
+            "driven_key" => format!(
+                "(driver: {control:?}, driver_channel: RotateX, keys: [(0.0, 0.0), (1.0, {number:?})], \
+                 output: {joint:?}, output_channel: RotateY)"
+            ),
+            "expression" => format!(
+                "(text: \"x * {number:?}\", inputs: [(name: \"x\", node: {control:?}, channel: TranslateX)], \
+                 output: {joint:?}, output_channel: TranslateZ)"
+            ),
+            _ => format!("(control: {control:?}, morph: \"smile\", attribute: \"{name}\")"),
+        };
+        (module.to_owned(), params)
     }
 
     fn tag(&mut self, rig: &Rig) -> Tag {
@@ -113,7 +233,7 @@ impl Maker {
             rig.apply(&RigEdit::AddTag { joint, tag: Box::new(tag), index: 0 }).unwrap();
         }
         let mut tries = 0;
-        while Self::tags(&rig).len() < COMMANDS + 4 && tries < 4 * COMMANDS {
+        while Self::tags(&rig).len() < COMMANDS + 4 && tries < 16 * COMMANDS {
             tries += 1;
             let (joint, tag) = (self.joint(&rig), self.tag(&rig));
             let undo = rig.apply(&RigEdit::AddTag { joint, tag: Box::new(tag), index: usize::MAX }).unwrap();
@@ -175,12 +295,14 @@ impl Maker {
 fn building_what_changed_is_building_from_nothing() {
     let seeds = std::env::var("RIGSMITH_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(40);
     let (mut ran, mut all, mut failing) = (0, 0, 0);
+    let mut used: BTreeSet<String> = BTreeSet::new();
     for seed in 0..seeds {
         let mut maker = Maker { random: Random::new(seed), next: seed << 32 };
         let mut rig = maker.rig();
         let mut builder = started(&rig);
         let report = builder.run_all();
-        assert_eq!((report.error, builder.len() >= COMMANDS / 2), (None, true), "seed {seed}");
+        assert_eq!((report.error, builder.len() >= COMMANDS), (None, true), "seed {seed}");
+        used.extend(builder.list().iter().map(|entry| entry.module.to_string()));
         for step in 0..30 {
             let edit = maker.edit(&rig);
             let Ok(undo) = rig.apply(&edit) else { continue };
@@ -203,7 +325,9 @@ fn building_what_changed_is_building_from_nothing() {
         }
     }
     println!("{ran} commands ran where building from nothing runs {all}; {failing} edits failed to build");
-    assert!(ran * 3 < all && failing > 0);
+    let modules = modules();
+    let unused: Vec<&str> = modules.iter().map(|module| module.name).filter(|name| !used.contains(*name)).collect();
+    assert!(ran * 3 < all && failing > 0 && (unused.is_empty() || seeds < 40), "not one rig has {unused:?}");
 }
 
 /// 1000 random rigs with `RIGSMITH_SEEDS=1000`; 60 by default.
