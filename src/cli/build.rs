@@ -232,6 +232,11 @@ fn posed(rig: &Rig, built: &BuiltRig) -> Result<Vec<Trs>, Failure> {
         // Poses of nodes that are not built at present wait for them.
         let _ = state.set_offset(*node, *offset);
     }
+    for (node, values) in rig.attribute_values() {
+        for (name, value) in values {
+            let _ = state.set_attribute(*node, name, *value);
+        }
+    }
     state.evaluate(0.0);
     let globals: Vec<Trs> = built.nodes.iter().map(|node| state.global(node.uid).unwrap_or_default()).collect();
     let local = |(at, node): (usize, &crate::rig::BuiltNode)| match node.parent {

@@ -7,6 +7,7 @@
 //! entity, without its components and disabled, until it comes back.
 
 mod nodes;
+mod run;
 mod tags;
 
 use std::sync::Arc;
@@ -14,6 +15,7 @@ use std::sync::Arc;
 use bevy::prelude::*;
 
 pub use nodes::{BuiltEntities, Control, CreatedBy, CreatedNodes, CreatedRole, Null, Parked};
+pub use run::{Programs, RunFailure};
 pub use tags::{CommandTag, FeatureCommands, FeatureTag, InFeature, TagComment, TagEnabled, TagEntities, TagOf, Tags};
 
 use super::{
@@ -35,9 +37,9 @@ impl Plugin for CommandsPlugin {
         if !app.world().contains_resource::<RigModules>() {
             app.insert_resource(RigModules(Arc::new(modules::all())));
         }
-        app.add_message::<BuildRequest>().add_message::<BuildDone>().add_systems(
+        app.init_resource::<Programs>().add_message::<BuildRequest>().add_message::<BuildDone>().add_systems(
             Update,
-            (tags::follow_tags, build_rigs, nodes::follow_nodes, report_commands)
+            (tags::follow_tags, build_rigs, nodes::follow_nodes, (run::run_built, report_commands))
                 .chain()
                 .in_set(RigSystems::Build)
                 .after(super::document::follow_rigs),

@@ -54,7 +54,7 @@ impl Builder {
                 }
                 true
             }
-            RigEdit::SetOffset(..) | RigEdit::SetSkin(..) => true,
+            RigEdit::SetOffset(..) | RigEdit::SetAttributeValue(..) | RigEdit::SetSkin(..) => true,
             _ => false,
         }
     }
