@@ -88,7 +88,7 @@ impl RigModule for SpaceSwitch {
         let control = scope.resolve_one("control", &self.control)?;
         let spaces = scope.resolve_some("spaces", &self.spaces)?;
         let names: Vec<String> = match self.names.len() {
-            0 => spaces.iter().map(|space| scope.name(*space)).collect(),
+            0 => spaces.iter().map(|space| scope.name_to_keep(*space)).collect(),
             count if count == spaces.len() => self.names.clone(),
             count => {
                 return Err(ModuleError::parameter(

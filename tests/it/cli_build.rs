@@ -156,7 +156,13 @@ fn a_build_stops_where_it_is_told_to() {
         let states = states(&json);
         for (place, state) in states.iter().enumerate() {
             let skipped = place == 3 && done > 3;
-            let wanted = if skipped { "skipped" } else if place < done { "done" } else { "pending" };
+            let wanted = if skipped {
+                "skipped"
+            } else if place < done {
+                "done"
+            } else {
+                "pending"
+            };
             if place == 3 && !skipped {
                 assert_ne!(state, "done", "{until}: {states:?}");
             } else {

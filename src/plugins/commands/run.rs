@@ -71,7 +71,8 @@ pub(super) fn run_built(
             }
         }
         for (slot, attribute) in program.attributes().iter().enumerate() {
-            let value = rig.attribute_value(program.nodes()[attribute.node].uid, &attribute.name).unwrap_or(attribute.default);
+            let value =
+                rig.attribute_value(program.nodes()[attribute.node].uid, &attribute.name).unwrap_or(attribute.default);
             runtime.state_mut().set_attribute_at(slot, value);
         }
         if is_fresh {
