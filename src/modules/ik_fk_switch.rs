@@ -5,16 +5,17 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, Ik, IkSolver, ModuleError, RigModule},
+    build::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule},
+    mesh::model::Trs,
     rig::{
-        AttributeKind, Constraint, Matching, Scalar, SwitchData, Target,
+        AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
         reference::{NodeRef, NodeRefs},
     },
 };
 
 /// Moves a limb by forward or inverse kinematics, as an attribute says; thrown without a jump.
 ///
-/// The joints follow their forward controls, and the inverse kinematics come on top of that with the attribute as their
+/// A null on each forward control (role `fk`) stands for its joint. The joints follow these, and the inverse kinematics come on top of that with the attribute as their
 /// weight. Everything is made here: no `ik_handle` or `parent` is needed for these joints.
 ///
 /// ```
@@ -67,6 +68,8 @@ pub struct IkFkSwitch {
     pub orient_end: bool,
     /// Bend of a straight limb.
     pub prefer: Option<Vec3>,
+    /// Name, group and label of the nulls on the forward controls.
+    pub creation: Creation,
 }
 
 impl Default for IkFkSwitch {
@@ -89,6 +92,7 @@ impl Default for IkFkSwitch {
             twist: Amount::Value(0.0),
             orient_end: true,
             prefer: None,
+            creation: Creation::default(),
         }
     }
 }
@@ -118,6 +122,7 @@ impl RigModule for IkFkSwitch {
             "prefer",
             "Direction in the rig's space in which a straight limb bends; as built, or to the pole, if left out.",
         ),
+        ("creation", "Name, group and label of the nulls that stand on the forward controls for the joints."),
     ];
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
@@ -142,23 +147,32 @@ impl RigModule for IkFkSwitch {
         let kind = AttributeKind::Number { min: Some(0.0), max: Some(1.0) };
         let weight = scope.ensure_attribute(control, &self.attribute, kind, self.default)?;
 
-        for (number, (joint, control)) in chain.iter().zip(&fk).enumerate() {
-            let translate = if number == 0 { self.translate_root } else { self.translate };
-            let target = Target {
-                node: scope.uid(*control),
-                weight: Scalar::Value(1.0),
-                offset: scope.kept_offset(*joint, *control),
+        // What each joint would be by forward kinematics alone. Those below the first follow relative to the one above:
+        // where that ends up depends on the inverse kinematics.
+        let mut above = None;
+        for (joint, control) in chain.iter().zip(&fk) {
+            let place = scope.kept_offset(*joint, *control);
+            let at = scope.spawn(NodeType::Null, "fk", *joint, 0, Some(*control), place, &self.creation)?;
+            let constraint = match above.replace(at) {
+                None => Constraint::Transform {
+                    driven: scope.uid(*joint),
+                    targets: vec![Target { node: scope.uid(at), weight: Scalar::Value(1.0), offset: Trs::IDENTITY }],
+                    translate: [self.translate_root; 3],
+                    rotate: [true; 3],
+                    scale: [false; 3],
+                    weight: Scalar::Value(1.0),
+                    keep_pose: false,
+                },
+                Some(above) => Constraint::Relative {
+                    driven: scope.uid(*joint),
+                    source: scope.uid(at),
+                    space: scope.uid(above),
+                    translate: self.translate,
+                    rotate: true,
+                    weight: Scalar::Value(1.0),
+                },
             };
-            let constraint = Constraint::Transform {
-                driven: scope.uid(*joint),
-                targets: vec![target],
-                translate: [translate; 3],
-                rotate: [true; 3],
-                scale: [false; 3],
-                weight: Scalar::Value(1.0),
-                keep_pose: false,
-            };
-            scope.constrain("fk", *joint, 0, constraint)?;
+            scope.constrain("follow", *joint, 0, constraint)?;
         }
         scope.add_ik(&Ik {
             pole,

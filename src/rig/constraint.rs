@@ -180,6 +180,22 @@ pub enum Constraint {
         /// True to follow with the pose offset of the driven node on top, so that it can still be moved by hand.
         keep_pose: bool,
     },
+    /// Stands to its parent as one node stands to another: a joint of a limb that follows its control, and can still be
+    /// driven together with the joints above it, on whose place the other two do not depend.
+    Relative {
+        /// The node.
+        driven: Uid,
+        /// The node that it follows.
+        source: Uid,
+        /// The node that stands for the driven node's parent.
+        space: Uid,
+        /// The position follows.
+        translate: bool,
+        /// The rotation follows.
+        rotate: bool,
+        /// 0 leaves the node as it is, 1 follows.
+        weight: Scalar,
+    },
     /// Turns a node so that one of its axes points at weighted targets.
     Aim {
         /// The node.
@@ -384,6 +400,10 @@ impl Constraint {
                     reads.push(Dependency::Node(*node));
                 }
             }
+            Self::Relative { source, space, weight, .. } => {
+                reads.extend([*source, *space].map(Dependency::Node));
+                scalar(&mut reads, weight);
+            }
             Self::TwoBone { goal, pole, weight, soft, stretch, twist, .. } => {
                 reads.extend([Some(*goal), *pole].into_iter().flatten().map(Dependency::Node));
                 [weight, soft, stretch, twist].into_iter().for_each(|number| scalar(&mut reads, number));
@@ -423,6 +443,7 @@ impl Constraint {
         let nodes = |nodes: &[Uid]| nodes.iter().copied().map(Dependency::Node).collect();
         match self {
             Self::Transform { driven, .. }
+            | Self::Relative { driven, .. }
             | Self::Aim { driven, .. }
             | Self::Limit { driven, .. }
             | Self::Spring { driven, .. } => nodes(&[*driven]),

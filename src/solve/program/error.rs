@@ -153,6 +153,7 @@ fn kind(constraint: &Constraint) -> &'static str {
     use Constraint as C;
     match constraint {
         C::Transform { .. } => "transform",
+        C::Relative { .. } => "relative",
         C::Aim { .. } => "aim",
         C::TwoBone { .. } => "two-bone",
         C::Chain { .. } => "chain",

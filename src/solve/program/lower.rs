@@ -47,6 +47,24 @@ impl Lower<'_, '_> {
             Constraint::Transform { driven, targets, translate, rotate, scale, weight, keep_pose } => {
                 self.transform(*driven, targets, [*translate, *rotate, *scale], weight, *keep_pose)
             }
+            Constraint::Relative { driven, source, space, translate, rotate, weight } => {
+                let node = self.driven("driven node", *driven)?;
+                let parent = self.graph.read(self.at, "space", *space)?;
+                let target = TargetReg {
+                    node: self.graph.read(self.at, "source", *source)?,
+                    weight: self.scalar(&Scalar::Value(1.0))?,
+                    offset: None,
+                };
+                let (targets, weight) = (self.targets(vec![target]), self.scalar(weight)?);
+                let (input, out) = self.graph.take_local(node, self.at, *translate);
+                let (translate, rotate, scale) = ([*translate; 3], [*rotate; 3], [false; 3]);
+                let op =
+                    TransformOp { input, parent, pose: Pose::NONE, targets, weight, translate, rotate, scale, out };
+                self.graph.tables.transforms.push(op);
+                let at = self.graph.tables.transforms.len() - 1;
+                self.push(Op::Transform(at as u32), node);
+                Ok(())
+            }
             Constraint::Aim { driven, targets, aim, up, world_up, offset, weight } => {
                 self.aim(*driven, targets, [*aim, *up], world_up, *offset, weight)
             }
