@@ -40,7 +40,7 @@ pub use document::{Rig, RigAbout, SkinData};
 pub use edit::{EditError, RigEdit};
 pub use group::GroupData;
 pub use joint::{JointData, NodeKind, RestTransform, RigJoint};
-pub use pose::{PoseOffset, StoredPose};
+pub use pose::{AttributeValues, PoseOffset, StoredPose};
 pub use reference::{NodeRef, NodeRefs};
 pub(crate) use scan::{elements, fields};
 pub use source::SourceError;

@@ -9,7 +9,7 @@ use bevy::{math::Affine3, prelude::*};
 
 use crate::{
     mesh::model::Weights,
-    rig::{GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, Tag, Uid},
+    rig::{AttributeValues, GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, Tag, Uid},
 };
 
 /// A rig (= global group). Reading is free; changing goes through [`Rig::apply`](crate::rig::edit) only.
@@ -23,8 +23,10 @@ pub struct Rig {
     /// The joint of every tag, so that neither adding nor finding one needs a search.
     pub(super) tags: HashMap<Uid, Uid>,
     pub(super) skins: BTreeMap<Uid, Arc<SkinData>>,
-    /// The current pose; only joints of the rig that do not stand as they rest.
+    /// The current pose; only joints and created nodes that do not stand as they rest.
     pub(super) pose: BTreeMap<Uid, PoseOffset>,
+    /// Attributes that somebody has set, by node and name; no node without any.
+    pub(super) values: AttributeValues,
     pub(super) poses: Vec<StoredPose>,
 }
 

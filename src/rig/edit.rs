@@ -76,8 +76,12 @@ pub enum RigEdit {
     SetAbout(Box<RigAbout>),
     /// Binds a mesh with weights, replaces them, or lets the mesh go.
     SetSkin(Uid, #[serde(with = "shared")] Option<Arc<SkinData>>),
-    /// Poses a joint: what is added to its rest transform; `None` puts it to rest.
+    /// Poses a joint or a created node: what is added to its rest transform, or to where it was built; `None` puts it
+    /// back there. A node need not be built at the moment: its pose waits for it.
     SetOffset(Uid, Option<PoseOffset>),
+    /// Sets an attribute of a joint or created node; `None` gives it the value again that its command says. The node
+    /// need not be built at the moment.
+    SetAttributeValue(Uid, String, Option<f32>),
     /// Adds a stored pose as the `index`-th.
     AddStoredPose(Box<StoredPose>, usize),
     /// Removes a stored pose.
@@ -123,6 +127,9 @@ pub enum EditError {
     /// A number is not finite or a rotation is not of unit length.
     #[error("joint {0} would get a transform that is not finite or not a rotation; check the numbers")]
     BadTransform(Uid),
+    /// The value of an attribute is not finite.
+    #[error("attribute \"{1}\" of {0} would get a value that is not finite; use another")]
+    BadValue(Uid, String),
     /// Weights do not fit.
     #[error("the weights name {0} joints that the rig does not have; skin the mesh again")]
     BadSkin(usize),
@@ -212,6 +219,7 @@ impl Rig {
             }
             RigEdit::SetSkin(mesh, skin) => self.set_skin(*mesh, skin.as_ref())?,
             RigEdit::SetOffset(joint, offset) => self.set_offset(*joint, *offset)?,
+            RigEdit::SetAttributeValue(node, name, value) => self.set_attribute_value(*node, name, *value)?,
             RigEdit::AddStoredPose(pose, index) => self.add_stored_pose(pose, *index)?,
             RigEdit::RemoveStoredPose(uid) => self.remove_stored_pose(*uid)?,
             RigEdit::SetStoredPose(pose) => self.set_stored_pose(pose)?,
@@ -289,7 +297,11 @@ impl Rig {
         let data = JointData { tags, ..data.clone() };
         let uid = data.uid;
         self.joints.insert(uid, RigJoint { data, parent, children: Vec::new() });
-        Ok(RigEdit::RemoveJoint(uid))
+        // A joint leaves with its part of the pose; what waited for this one goes on waiting then.
+        Ok(match self.pose.get(&uid) {
+            Some(offset) => RigEdit::Batch(vec![RigEdit::RemoveJoint(uid), RigEdit::SetOffset(uid, Some(*offset))]),
+            None => RigEdit::RemoveJoint(uid),
+        })
     }
 
     fn remove_joint(&mut self, uid: Uid) -> Result<RigEdit, EditError> {

@@ -86,6 +86,9 @@ impl PoseOffset {
     }
 }
 
+/// Values of attributes, by node and name.
+pub type AttributeValues = BTreeMap<Uid, BTreeMap<String, f32>>;
+
 /// A pose that was kept under a name.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StoredPose {
@@ -93,21 +96,36 @@ pub struct StoredPose {
     pub uid: Uid,
     /// The name people see.
     pub name: String,
-    /// Offsets of the joints that do not stand as they rest. A joint that was deleted since may be named: undoing the
-    /// deletion brings its part of the pose back.
+    /// Offsets of the joints and created nodes that do not stand as they rest. A joint that was deleted since, or a node
+    /// that is not built at present, may be named: its part of the pose waits for it.
     pub offsets: BTreeMap<Uid, PoseOffset>,
+    /// Attributes that were set.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub values: AttributeValues,
 }
 
 /// Poses of a rig.
 impl Rig {
-    /// What the current pose adds to a joint's rest transform; `None` for a joint that stands as it rests.
+    /// What the current pose adds to the rest transform of a joint, or to where a created node was built; `None` for one
+    /// that stands as it rests.
     pub fn offset(&self, joint: Uid) -> Option<&PoseOffset> {
         self.pose.get(&joint)
     }
 
-    /// The current pose: offsets of all joints that do not stand as they rest.
+    /// The current pose: offsets of all joints and created nodes that do not stand as they rest. Nodes that are not
+    /// built at present keep theirs.
     pub fn pose(&self) -> &BTreeMap<Uid, PoseOffset> {
         &self.pose
+    }
+
+    /// The value that somebody has set an attribute of a joint or created node to.
+    pub fn attribute_value(&self, node: Uid, name: &str) -> Option<f32> {
+        self.values.get(&node)?.get(name).copied()
+    }
+
+    /// All attributes that somebody has set. Nodes that are not built at present keep theirs.
+    pub fn attribute_values(&self) -> &AttributeValues {
+        &self.values
     }
 
     /// The stored poses in order.

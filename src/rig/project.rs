@@ -17,8 +17,11 @@ pub use write::write_project;
 
 use crate::rig::{Rig, Uid};
 
-/// The format that this version writes.
-pub const FORMAT: u32 = 1;
+/// The highest format that this version reads, and writes where it is needed.
+///
+/// Format 2 adds values of attributes, and poses of nodes that are no joints. Projects without them are written in format
+/// 1.
+pub const FORMAT: u32 = 2;
 
 /// The longest project that is read, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;

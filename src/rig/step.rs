@@ -157,6 +157,10 @@ pub fn edits_from_empty(rig: &Rig) -> Vec<RigEdit> {
     }));
     edits.extend(rig.skins().map(|(mesh, skin)| RigEdit::SetSkin(mesh, Some(skin.clone()))));
     edits.extend(rig.pose().iter().map(|(joint, offset)| RigEdit::SetOffset(*joint, Some(*offset))));
+    for (node, values) in rig.attribute_values() {
+        let set = |(name, value): (&String, &f32)| RigEdit::SetAttributeValue(*node, name.clone(), Some(*value));
+        edits.extend(values.iter().map(set));
+    }
     edits.extend(rig.stored_poses().iter().map(|pose| RigEdit::AddStoredPose(Box::new(pose.clone()), last)));
     edits
 }

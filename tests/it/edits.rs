@@ -68,7 +68,7 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
         scale: if a % 3 == 0 { place.abs() + 0.5 } else { Vec3::ONE },
     };
     let stored = rig.stored_poses().get(usize::from(b) % (rig.stored_poses().len() + 1)).map_or(uid, |pose| pose.uid);
-    match kind % 34 {
+    match kind % 37 {
         0 | 1 => Operation::Place { position: place, parent },
         2 | 3 => Operation::Chain { positions: vec![place, place + Vec3::X, place + Vec3::Y * 2.0], parent },
         4 => Operation::Insert { child: x, position: place },
@@ -156,8 +156,20 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
         31 => Operation::DeletePose(stored),
         32 => edit(RigEdit::AddStoredPose(
             // A joint that never was, as after a deletion.
-            Box::new(StoredPose { uid, name: text, offsets: [(x, offset), (Uid(0xbeef), offset)].into() }),
+            Box::new(StoredPose {
+                uid,
+                name: text,
+                offsets: [(x, offset), (Uid(0xbeef), offset)].into(),
+                ..Default::default()
+            }),
             usize::from(b % 3),
+        )),
+        // Nodes that commands may create one day.
+        33 => edit(RigEdit::SetOffset(Uid(0xc0 + u64::from(a % 4)), (b % 3 > 0).then_some(offset))),
+        34 | 35 => edit(RigEdit::SetAttributeValue(
+            if odd { x } else { Uid(0xc0 + u64::from(a % 4)) },
+            text,
+            (b % 3 > 0).then_some(place.x),
         )),
         _ => Operation::Edits(vec![
             RigEdit::SetLocked(x, odd),

@@ -106,13 +106,15 @@ fn what_is_no_pose_is_refused() {
     let (mut bench, hips, ..) = two_arms();
     let broken = PoseOffset { rotation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.3), ..PoseOffset::IDENTITY };
     let nan = PoseOffset { translation: Vec3::NAN, ..PoseOffset::IDENTITY };
-    let pose = |uid, offset| Box::new(StoredPose { uid, name: "p".into(), offsets: [(hips, offset)].into() });
+    let pose =
+        |uid, offset| Box::new(StoredPose { uid, name: "p".into(), offsets: [(hips, offset)].into(), ..default() });
     bench.run(Operation::StorePose("kept".into()));
     let kept = bench.rig.stored_poses()[0].uid;
     bench.run(Operation::StorePose("other".into()));
     let before = bench.rig.clone();
     for (edit, error) in [
-        (RigEdit::SetOffset(Uid(99), None), EditError::NoJoint(Uid(99))),
+        (RigEdit::SetOffset(Uid(99), Some(nan)), EditError::BadTransform(Uid(99))),
+        (RigEdit::SetAttributeValue(Uid(99), "a".into(), Some(f32::NAN)), EditError::BadValue(Uid(99), "a".into())),
         (RigEdit::SetOffset(hips, Some(broken)), EditError::BadTransform(hips)),
         (RigEdit::SetOffset(hips, Some(nan)), EditError::BadTransform(hips)),
         (RigEdit::AddStoredPose(pose(hips, PoseOffset::IDENTITY), 0), EditError::Taken(hips)),
@@ -130,7 +132,7 @@ fn what_is_no_pose_is_refused() {
         (Operation::RenamePose(kept, "other".into()), OperationError::PoseName("other".into())),
         (Operation::ApplyPose(Uid(5)), EditError::NoPose(Uid(5)).into()),
         (Operation::DeletePose(Uid(5)), EditError::NoPose(Uid(5)).into()),
-        (Operation::Pose(vec![(hips, turn(1.0, 0.0, 0.0)), (Uid(5), nan)]), EditError::NoJoint(Uid(5)).into()),
+        (Operation::Pose(vec![(hips, turn(1.0, 0.0, 0.0)), (Uid(5), nan)]), EditError::BadTransform(Uid(5)).into()),
     ] {
         assert_eq!(bench.try_run(operation.clone()), Err(error), "{operation:?}");
         assert_eq!(bench.rig, before);
@@ -276,9 +278,10 @@ fn a_deleted_joint_takes_its_part_of_the_pose_along_and_brings_it_back() {
     let deleted = bench.rig.clone();
     bench.run(Operation::ResetPose(Vec::new()));
     bench.run(Operation::ApplyPose(reach.uid));
-    assert_eq!(bench.rig, deleted);
+    assert_eq!(bench.rig.pose(), &reach.offsets, "what is posed waits for joints that are not there");
     bench.run(Operation::StorePose("reach".into()));
     assert!(bench.rig.stored_pose(reach.uid).unwrap().offsets.contains_key(&right[2]));
+    bench.rig = deleted;
     for inverse in &outcome.inverses {
         bench.rig.apply(inverse).unwrap();
     }

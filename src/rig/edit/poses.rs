@@ -4,9 +4,6 @@ use crate::rig::{EditError, PoseOffset, Rig, RigEdit, StoredPose, Uid};
 
 impl Rig {
     pub(super) fn set_offset(&mut self, joint: Uid, offset: Option<PoseOffset>) -> Result<RigEdit, EditError> {
-        if self.joint(joint).is_none() {
-            return Err(EditError::NoJoint(joint));
-        }
         if offset.is_some_and(|offset| !offset.is_valid()) {
             return Err(EditError::BadTransform(joint));
         }
@@ -15,6 +12,28 @@ impl Rig {
             None => self.pose.remove(&joint),
         };
         Ok(RigEdit::SetOffset(joint, old))
+    }
+
+    pub(super) fn set_attribute_value(
+        &mut self,
+        node: Uid,
+        name: &str,
+        value: Option<f32>,
+    ) -> Result<RigEdit, EditError> {
+        if value.is_some_and(|value| !value.is_finite()) {
+            return Err(EditError::BadValue(node, name.to_owned()));
+        }
+        let old = match value {
+            Some(value) => self.values.entry(node).or_default().insert(name.to_owned(), value),
+            None => {
+                let old = self.values.get_mut(&node).and_then(|values| values.remove(name));
+                if self.values.get(&node).is_some_and(|values| values.is_empty()) {
+                    self.values.remove(&node);
+                }
+                old
+            }
+        };
+        Ok(RigEdit::SetAttributeValue(node, name.to_owned(), old))
     }
 
     pub(super) fn add_stored_pose(&mut self, pose: &StoredPose, index: usize) -> Result<RigEdit, EditError> {
@@ -41,12 +60,19 @@ fn is_posed(offset: &PoseOffset) -> bool {
     *offset != PoseOffset::IDENTITY
 }
 
-/// The pose as the rig keeps it: without joints that stand as they rest.
+/// The pose as the rig keeps it: without what stands as it rests.
 fn checked(pose: &StoredPose) -> Result<StoredPose, EditError> {
     if let Some((joint, _)) = pose.offsets.iter().find(|(_, offset)| !offset.is_valid()) {
         return Err(EditError::BadTransform(*joint));
     }
+    let values = pose.values.iter().flat_map(|(node, values)| values.iter().map(move |value| (node, value)));
+    for (node, (name, value)) in values {
+        if !value.is_finite() {
+            return Err(EditError::BadValue(*node, name.clone()));
+        }
+    }
     let mut pose = pose.clone();
     pose.offsets.retain(|_, offset| is_posed(offset));
+    pose.values.retain(|_, values| !values.is_empty());
     Ok(pose)
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 
 use super::{Draft, OperationError, frame::Frame};
-use crate::rig::{EditError, PoseOffset, RigEdit, StoredPose, Uid};
+use crate::rig::{AttributeValues, EditError, PoseOffset, RigEdit, StoredPose, Uid};
 
 /// Puts offsets on top of the rest pose, and their mirror images on the partners that are not in the list.
 pub(super) fn pose(draft: &mut Draft, offsets: &[(Uid, PoseOffset)]) -> Result<(), OperationError> {
@@ -21,29 +21,32 @@ pub(super) fn pose(draft: &mut Draft, offsets: &[(Uid, PoseOffset)]) -> Result<(
     Ok(())
 }
 
-/// Puts joints and their partners to rest; all joints if none is listed.
+/// Puts joints and their partners to rest, and sets their attributes to what their commands say; all joints and created
+/// nodes if none is listed.
 pub(super) fn reset(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationError> {
     let posed: Vec<Uid> = match joints {
-        [] => draft.rig().pose().keys().copied().collect(),
+        [] => draft.rig().pose().keys().chain(draft.rig().attribute_values().keys()).copied().collect(),
         joints => draft.with_partners(joints),
     };
-    posed.into_iter().try_for_each(|joint| Ok(set(draft, joint, None)?))
+    for node in posed {
+        set(draft, node, None)?;
+        let names = draft.rig().attribute_values().get(&node).into_iter().flat_map(|values| values.keys().cloned());
+        for name in names.collect::<Vec<_>>() {
+            draft.apply(RigEdit::SetAttributeValue(node, name, None))?;
+        }
+    }
+    Ok(())
 }
 
 /// Keeps the current pose under a name; a pose of that name is replaced.
 pub(super) fn store(draft: &mut Draft, name: &str) -> Result<(), OperationError> {
     let name = checked_name(name)?;
-    let offsets = draft.rig().pose().clone();
+    let (offsets, values) = (draft.rig().pose().clone(), draft.rig().attribute_values().clone());
     let known = draft.rig().stored_poses().iter().find(|pose| pose.name == name).cloned();
     let edit = match known {
-        Some(known) => {
-            // Joints that were deleted keep their part, as everywhere.
-            let gone = known.offsets.iter().filter(|(joint, _)| draft.rig().joint(**joint).is_none());
-            let offsets = gone.map(|(joint, offset)| (*joint, *offset)).chain(offsets).collect();
-            RigEdit::SetStoredPose(Box::new(StoredPose { offsets, ..known }))
-        }
+        Some(known) => RigEdit::SetStoredPose(Box::new(StoredPose { offsets, values, ..known })),
         None => {
-            let pose = StoredPose { uid: draft.next_uid(), name: name.to_owned(), offsets };
+            let pose = StoredPose { uid: draft.next_uid(), name: name.to_owned(), offsets, values };
             RigEdit::AddStoredPose(Box::new(pose), usize::MAX)
         }
     };
@@ -52,16 +55,29 @@ pub(super) fn store(draft: &mut Draft, name: &str) -> Result<(), OperationError>
 
 /// Makes a stored pose the current one.
 pub(super) fn apply(draft: &mut Draft, uid: Uid) -> Result<(), OperationError> {
-    let stored: BTreeMap<Uid, PoseOffset> = find(draft, uid)?.offsets;
+    let StoredPose { offsets: stored, values, .. } = find(draft, uid)?;
     let other = |(joint, _): &(&Uid, &PoseOffset)| !stored.contains_key(joint);
     let to_rest: Vec<Uid> = draft.rig().pose().iter().filter(other).map(|(joint, _)| *joint).collect();
     for joint in to_rest {
         set(draft, joint, None)?;
     }
     for (joint, offset) in stored {
-        if draft.rig().joint(joint).is_some() {
-            set(draft, joint, Some(offset))?;
-        }
+        // What is not there at present has its part waiting.
+        set(draft, joint, Some(offset))?;
+    }
+    let all = |values: &AttributeValues| -> BTreeMap<(Uid, String), f32> {
+        let of = |(node, values): (&Uid, &BTreeMap<String, f32>)| {
+            let node = *node;
+            values.iter().map(move |(name, value)| ((node, name.clone()), *value)).collect::<Vec<_>>()
+        };
+        values.iter().flat_map(of).collect()
+    };
+    let (now, then) = (all(draft.rig().attribute_values()), all(&values));
+    for (node, name) in now.keys().filter(|key| !then.contains_key(key)) {
+        draft.apply(RigEdit::SetAttributeValue(*node, name.clone(), None))?;
+    }
+    for ((node, name), value) in then.iter().filter(|(key, value)| now.get(key) != Some(value)) {
+        draft.apply(RigEdit::SetAttributeValue(*node, name.clone(), Some(*value)))?;
     }
     Ok(())
 }
@@ -91,7 +107,7 @@ fn checked_name(name: &str) -> Result<&str, OperationError> {
 /// Sets an offset unless it is there already, so that what changes nothing is no step of the history.
 fn set(draft: &mut Draft, joint: Uid, offset: Option<PoseOffset>) -> Result<(), EditError> {
     let offset = offset.filter(|offset| *offset != PoseOffset::IDENTITY);
-    if draft.rig().joint(joint).is_some() && draft.rig().offset(joint).copied() == offset {
+    if draft.rig().offset(joint).copied() == offset {
         return Ok(());
     }
     draft.apply(RigEdit::SetOffset(joint, offset))

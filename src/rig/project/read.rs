@@ -12,7 +12,7 @@ use super::{
     FORMAT, JournalReference, MAX_BYTES, MeshReference, Project, ProjectRig, ProjectView, ReadProject, SkinReference,
 };
 use crate::rig::{
-    EditError, PoseOffset, Rig, RigEdit, SourceError, StoredPose, Uid,
+    AttributeValues, EditError, PoseOffset, Rig, RigEdit, SourceError, StoredPose, Uid,
     format::Format,
     scan::{self, Field},
     source::{ron_options, utf8},
@@ -46,6 +46,8 @@ struct RigFile {
     #[serde(default)]
     pose: Vec<OffsetFile>,
     #[serde(default)]
+    values: Vec<ValueFile>,
+    #[serde(default)]
     poses: Vec<PoseFile>,
 }
 
@@ -56,6 +58,16 @@ struct PoseFile {
     name: String,
     #[serde(default)]
     offsets: Vec<OffsetFile>,
+    #[serde(default)]
+    values: Vec<ValueFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ValueFile {
+    node: Uid,
+    name: String,
+    value: f32,
 }
 
 #[derive(Deserialize)]
@@ -175,6 +187,13 @@ fn read_rigs(
             }
         }
         read_pose(places, element, &mut rig, &file.pose)?;
+        let values = places.within(element, "values");
+        for (node, values) in read_values(places, values, &file.values)? {
+            for (name, value) in values {
+                let edit = RigEdit::SetAttributeValue(node, name, Some(value));
+                rig.apply(&edit).map_err(|error| places.error(element, "values", error.to_string()))?;
+            }
+        }
         read_stored_poses(places, element, &mut rig, &file.poses)?;
         rigs.push(ProjectRig { rig, skins: file.skins });
     }
@@ -215,10 +234,26 @@ fn read_stored_poses(
                 return Err(places.error(at, "joint", twice(offset.joint)));
             }
         }
+        stored.values = read_values(places, places.within(place, "values"), &pose.values)?;
         let edit = RigEdit::AddStoredPose(Box::new(stored), usize::MAX);
         rig.apply(&edit).map_err(|error| places.error(place, "uid", error.to_string()))?;
     }
     Ok(())
+}
+
+fn read_values(places: &Places, list: Option<usize>, files: &[ValueFile]) -> Result<AttributeValues, SourceError> {
+    let mut values = AttributeValues::new();
+    for (file, at) in files.iter().zip(places.elements(list)) {
+        if !file.value.is_finite() {
+            let error = EditError::BadValue(file.node, file.name.clone());
+            return Err(places.error(at, "value", error.to_string()));
+        }
+        if values.entry(file.node).or_default().insert(file.name.clone(), file.value).is_some() {
+            let message = format!("attribute \"{}\" of {} has two values; keep one of them", file.name, file.node);
+            return Err(places.error(at, "name", message));
+        }
+    }
+    Ok(values)
 }
 
 fn twice(joint: Uid) -> String {
@@ -245,11 +280,12 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
     match (field.depth, path) {
         (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "view", "journal"]),
         (3, ["meshes", "", ""]) => Some(&["uid", "rig", "path", "hash", "nodes"]),
-        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "poses"]),
+        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses"]),
         (5, ["skins", "rigs", ""]) => Some(&["mesh", "path", "hash", "at_rest"]),
         (5, ["pose", "rigs", ""]) => Some(OFFSET),
-        (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets"]),
+        (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets", "values"]),
         (7, ["offsets", "poses", "rigs"]) => Some(OFFSET),
+        (5, ["values", "rigs", ""]) | (7, ["values", "poses", "rigs"]) => Some(&["node", "name", "value"]),
         (2, ["view", "", ""]) => Some(&["camera", "mode", "shading", "switches"]),
         (3, ["camera", "view", ""]) => Some(&["yaw", "pitch", "distance", "focus", "orthographic"]),
         (2, ["journal", "", ""]) => Some(&["file", "last"]),

@@ -6,7 +6,7 @@ use bevy::math::{Quat, Vec3};
 
 use super::{FORMAT, Project, ProjectRig, ProjectView};
 use crate::rig::{
-    PoseOffset, Uid, scan,
+    AttributeValues, PoseOffset, Rig, Uid, scan,
     template::{quoted, vector, write_template},
 };
 
@@ -18,7 +18,8 @@ pub fn write_project(project: &Project) -> String {
 }
 
 fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
-    writeln!(out, "(\n    format: {FORMAT},\n    name: {},", quoted(&project.name))?;
+    let format = if project.rigs.iter().any(|entry| needs_values(&entry.rig)) { FORMAT } else { 1 };
+    writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
     writeln!(out, "    meshes: [")?;
     for mesh in &project.meshes {
         writeln!(out, "        (\n            uid: \"{}\",\n            rig: \"{}\",", mesh.uid, mesh.rig)?;
@@ -60,14 +61,39 @@ fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
     }
     writeln!(out, "            ],\n            pose: [")?;
     write_offsets(out, entry.rig.pose(), "                ")?;
-    writeln!(out, "            ],\n            poses: [")?;
+    writeln!(out, "            ],")?;
+    write_values(out, entry.rig.attribute_values(), "            ")?;
+    writeln!(out, "            poses: [")?;
     for pose in entry.rig.stored_poses() {
         writeln!(out, "                (\n                    uid: \"{}\",", pose.uid)?;
         writeln!(out, "                    name: {},\n                    offsets: [", quoted(&pose.name))?;
         write_offsets(out, &pose.offsets, "                        ")?;
-        writeln!(out, "                    ],\n                ),")?;
+        writeln!(out, "                    ],")?;
+        write_values(out, &pose.values, "                    ")?;
+        writeln!(out, "                ),")?;
     }
     writeln!(out, "            ],\n        ),")
+}
+
+/// True if the rig's poses say something that format 1 has no place for.
+fn needs_values(rig: &Rig) -> bool {
+    !rig.attribute_values().is_empty()
+        || rig.stored_poses().iter().any(|pose| !pose.values.is_empty())
+        || rig.pose().keys().any(|node| rig.joint(*node).is_none())
+}
+
+/// A list of values, if there are any.
+fn write_values(out: &mut String, values: &AttributeValues, indent: &str) -> std::fmt::Result {
+    if values.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "{indent}values: [")?;
+    for (node, values) in values {
+        for (name, value) in values {
+            writeln!(out, "{indent}    (node: \"{node}\", name: {}, value: {value:?}),", quoted(name))?;
+        }
+    }
+    writeln!(out, "{indent}],")
 }
 
 /// The text of a template further to the right. What stands in parameters of modules stays as it is: a line break
