@@ -12,6 +12,7 @@ pub mod expression;
 pub mod fabrik;
 pub mod foot;
 pub mod limit;
+pub mod matching;
 pub mod program;
 pub mod rotate;
 pub mod spline;

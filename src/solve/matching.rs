@@ -1,0 +1,177 @@
+//! Throwing a switch without a jump: from a pose and a switch to the edits that keep everything where it is.
+//!
+//! A limb between forward and inverse kinematics keeps its joints: the controls of the side that takes over are put
+//! where they hold the joints as they are. A control between spaces keeps its place: its offset makes up for the space.
+//! Everything is tried out on a copy of the instance, so whatever else the rig does to the controls (parents, other
+//! constraints, softness) is taken into account, and what is left of a jump is measured.
+
+mod limb;
+
+use crate::{
+    mesh::model::Trs,
+    rig::{BuiltRig, Matching, PoseOffset, RigEdit, SwitchData, Uid},
+    solve::program::{RigState, StateError},
+};
+
+/// Why a switch cannot be thrown.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MatchError {
+    /// The switch names a node that is not built.
+    #[error("node {0}, which the switch matches, is not in the built rig; build the rig again")]
+    NoNode(Uid),
+    /// The instance cannot be posed so.
+    #[error(transparent)]
+    State(#[from] StateError),
+}
+
+/// What throws a switch.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Thrown {
+    /// The edits, as one step: poses of controls, and the value of the attribute.
+    pub edits: Vec<RigEdit>,
+    /// How far what should have stayed has moved, at most, in the rig's units. Above about 1e-4 of a limb's length
+    /// something keeps the controls from where they should be, such as limits.
+    pub distance: f32,
+    /// How far it has turned, at most, in degrees.
+    pub angle: f32,
+}
+
+/// The edits that set the attribute of a switch to `value` while what it matches stays where `state` has it.
+///
+/// `state` is an instance of the rig in its current pose, compiled so that all controls can be posed; it is not
+/// changed. Takes some tens of evaluations of what depends on the controls.
+///
+/// # Errors
+/// If the program does not have what the switch names.
+pub fn throw(rig: &BuiltRig, state: &RigState, switch: &SwitchData, value: f32) -> Result<Thrown, MatchError> {
+    let mut state = state.clone();
+    state.evaluate(0.0);
+    let before = state.attribute(switch.control, &switch.attribute).unwrap_or_default();
+    let mut attempt = Attempt { rig, state, offsets: Vec::new() };
+    let kept = match &switch.matching {
+        Matching::IkFk { joints, .. } => joints.clone(),
+        Matching::Space { control } => vec![*control],
+    };
+    let wanted = kept.iter().map(|node| attempt.global(*node)).collect::<Result<Vec<Trs>, _>>()?;
+    attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
+    let value = attempt.state.attribute(switch.control, &switch.attribute).unwrap_or(value);
+    match &switch.matching {
+        Matching::IkFk { joints, fk, goal, goal_offset, pole } => {
+            let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
+            limb.hold(&mut attempt, &wanted, before, value)?;
+        }
+        Matching::Space { control } => attempt.place(*control, &wanted[0], None)?,
+    }
+    let mut thrown = Thrown::default();
+    for (node, wanted) in kept.iter().zip(&wanted) {
+        let now = attempt.global(*node)?;
+        thrown.distance = thrown.distance.max(now.translation.distance(wanted.translation));
+        thrown.angle = thrown.angle.max(angle_between(&now, wanted));
+    }
+    for (node, offset) in attempt.offsets {
+        thrown.edits.push(RigEdit::SetOffset(node, Some(offset)));
+    }
+    thrown.edits.push(RigEdit::SetAttributeValue(switch.control, switch.attribute.to_string(), Some(value)));
+    Ok(thrown)
+}
+
+/// Degrees. The dot product of two quaternions has no digits left for small angles.
+fn angle_between(a: &Trs, b: &Trs) -> f32 {
+    let between = a.rotation.conjugate() * b.rotation;
+    2.0 * bevy::math::ops::atan2(between.xyz().length(), between.w.abs()).to_degrees()
+}
+
+/// An instance on which poses are tried out.
+struct Attempt<'a> {
+    rig: &'a BuiltRig,
+    state: RigState,
+    /// What was changed, each node once, in the order in which it was first.
+    offsets: Vec<(Uid, PoseOffset)>,
+}
+
+impl Attempt<'_> {
+    fn global(&mut self, node: Uid) -> Result<Trs, MatchError> {
+        self.state.evaluate(0.0);
+        self.state.global(node).ok_or(MatchError::NoNode(node))
+    }
+
+    fn offset(&self, node: Uid) -> PoseOffset {
+        self.state.program().node(node).map_or(PoseOffset::IDENTITY, |slot| self.state.offset_at(slot))
+    }
+
+    fn set(&mut self, node: Uid, offset: PoseOffset) -> Result<(), MatchError> {
+        self.state.set_offset(node, offset)?;
+        match self.offsets.iter_mut().find(|(known, _)| *known == node) {
+            Some((_, known)) => *known = offset,
+            None => self.offsets.push((node, offset)),
+        }
+        Ok(())
+    }
+
+    /// Poses a node so that it stands at `wanted` in the rig's space; its scale stays. With `rotate_only`, so does its
+    /// position, unless it would be off by more than that distance.
+    fn place(&mut self, node: Uid, wanted: &Trs, rotate_only: Option<f32>) -> Result<(), MatchError> {
+        // What drives the node besides its pose is made up for in a second round.
+        for round in 0..3 {
+            let now = self.global(node)?;
+            let near = now.translation.distance(wanted.translation) <= 1e-6 * wanted.translation.length().max(1e-3);
+            if round > 0 && near && angle_between(&now, wanted) < 1e-3 {
+                break;
+            }
+            let offset = self.offset(node);
+            // Where the node stands without its pose, in the rig's space: now = unposed * offset.
+            let turned = (now.rotation * offset.rotation.conjugate()).normalize();
+            let divided = |a: f32, b: f32| if b == 0.0 { a } else { a / b };
+            let scale =
+                |a: glam::Vec3, b: glam::Vec3| glam::Vec3::new(divided(a.x, b.x), divided(a.y, b.y), divided(a.z, b.z));
+            let unposed = scale(now.scale, offset.scale);
+            let origin = now.translation - turned * (unposed * offset.translation);
+            let mut next = offset;
+            next.rotation = (turned.conjugate() * wanted.rotation).normalize();
+            let moved = scale(turned.conjugate() * (wanted.translation - origin), unposed);
+            let off = (moved - offset.translation) * unposed;
+            if rotate_only.is_none_or(|most| off.length() > most) {
+                next.translation = moved;
+            }
+            self.set(node, next)?;
+        }
+        Ok(())
+    }
+
+    /// The node itself or the nearest one above that people move; the node itself if there is none.
+    fn handle(&self, node: Uid) -> Uid {
+        let index = self.rig.nodes.iter().position(|known| known.uid == node);
+        let mut at = index;
+        while let Some(here) = at.map(|at| &self.rig.nodes[at]) {
+            if here.control.is_some() || here.kind == crate::rig::NodeType::Control {
+                return here.uid;
+            }
+            at = here.parent;
+        }
+        node
+    }
+
+    /// Moves what people move so that `node`, which it carries, stands at `wanted`.
+    fn place_carried(&mut self, node: Uid, wanted: &Trs) -> Result<(), MatchError> {
+        let handle = self.handle(node);
+        if handle == node {
+            return self.place(node, wanted, None);
+        }
+        let carried = self.global(node)?.relative_to(&self.global(handle)?);
+        let scale = self.global(handle)?.scale;
+        let rotation = (wanted.rotation * carried.rotation.conjugate()).normalize();
+        let translation = wanted.translation - rotation * (scale * carried.translation);
+        self.place(handle, &Trs { translation, rotation, scale }, None)
+    }
+
+    /// Where nodes stand as built, in the rig's space.
+    fn built(&self, node: Uid) -> Option<Trs> {
+        let mut at = self.rig.nodes.iter().position(|known| known.uid == node)?;
+        let mut global = self.rig.nodes[at].base;
+        while let Some(parent) = self.rig.nodes[at].parent {
+            global = self.rig.nodes[parent].base * global;
+            at = parent;
+        }
+        Some(global)
+    }
+}

@@ -1,0 +1,203 @@
+//! Limbs between forward and inverse kinematics.
+
+use glam::Vec3;
+
+use super::{Attempt, MatchError};
+use crate::{
+    mesh::model::Trs,
+    rig::{Constraint, Scalar, Uid},
+    solve::rotate::{about, direction},
+};
+
+/// What a switch says about a limb.
+pub(super) struct Limb<'a> {
+    pub joints: &'a [Uid],
+    pub fk: &'a [Uid],
+    pub goal: Uid,
+    pub goal_offset: Trs,
+    pub pole: Option<Uid>,
+}
+
+/// How near the end has to come, as a share of the limb's length. The elbow of a limb that is all but straight moves many
+/// times as far as its end.
+const NEAR: f32 = 1e-6;
+
+impl Limb<'_> {
+    /// Poses the controls so that the joints stand at `wanted` with the attribute at `after`.
+    pub fn hold(&self, attempt: &mut Attempt<'_>, wanted: &[Trs], before: f32, after: f32) -> Result<(), MatchError> {
+        let length: f32 = wanted.windows(2).map(|pair| pair[0].translation.distance(pair[1].translation)).sum();
+        // The solver starts from the forward pose, so that has to agree wherever it was not alone before.
+        if after < 1.0 || before > 0.0 {
+            self.hold_forward(attempt, wanted, length)?;
+        }
+        if after > 0.0 {
+            self.hold_inverse(attempt, wanted, length)?;
+        }
+        Ok(())
+    }
+
+    /// Puts each forward control where its joint is held as wanted.
+    fn hold_forward(&self, attempt: &mut Attempt<'_>, wanted: &[Trs], length: f32) -> Result<(), MatchError> {
+        // A limb whose first joint keeps its place may stand elsewhere than its controls do.
+        let mut moved = Vec3::ZERO;
+        for (number, ((joint, control), wanted)) in self.joints.iter().zip(self.fk).zip(wanted).enumerate() {
+            let Some((stand_in, translates)) = follows(attempt, *joint, *control) else { continue };
+            // The joint stands where the node stands that the control carries for it.
+            let (now, carried) =
+                (attempt.global(*control)?, attempt.global(stand_in)?.relative_to(&attempt.global(*control)?));
+            let rotation = (wanted.rotation * carried.rotation.conjugate()).normalize();
+            let translation = match translates {
+                true => wanted.translation + moved - rotation * (now.scale * carried.translation),
+                false => now.translation,
+            };
+            let place = Trs { translation, rotation, scale: now.scale };
+            attempt.place(*control, &place, Some(if translates { 1e-5 * length } else { f32::INFINITY }))?;
+            if number == 0 && !translates {
+                moved = attempt.global(stand_in)?.translation - wanted.translation;
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts goal and pole where the solver holds the joints as wanted.
+    fn hold_inverse(&self, attempt: &mut Attempt<'_>, wanted: &[Trs], length: f32) -> Result<(), MatchError> {
+        let (Some(root), Some(end), Some(last)) = (wanted.first(), wanted.last(), self.joints.last()) else {
+            return Ok(());
+        };
+        let solver = Solver::of(attempt, self.goal, self.joints);
+        let goal = attempt.global(self.goal)?;
+        let rotation = match solver.orients {
+            true => (end.rotation * self.goal_offset.rotation.conjugate()).normalize(),
+            false => goal.rotation,
+        };
+        let at = |translation: Vec3| Trs { translation, rotation, scale: goal.scale };
+        attempt.place_carried(self.goal, &at(end.translation))?;
+        if let (Some(pole), true) = (self.pole, wanted.len() == 3) {
+            let place = self.pole_place(attempt, &solver, wanted, length)?;
+            let now = attempt.global(pole)?;
+            attempt.place_carried(pole, &Trs { translation: place, ..now })?;
+        }
+
+        // A soft limb lags behind its goal: the goal goes ahead until the end is where it was.
+        let off = |attempt: &mut Attempt<'_>, ahead: f32| -> Result<f32, MatchError> {
+            let line = direction(end.translation - root.translation).unwrap_or(Vec3::X);
+            attempt.place_carried(self.goal, &at(end.translation + line * ahead))?;
+            let now = attempt.global(*last)?;
+            Ok((now.translation - end.translation).dot(line))
+        };
+        let first = attempt.global(*last)?.translation.distance(end.translation);
+        if first <= NEAR * length || !solver.is_soft {
+            return Ok(());
+        }
+        let (mut low, mut high) = (0.0, 0.5 * length);
+        let reached = off(attempt, high)?;
+        if reached > -20.0 * NEAR * length {
+            for _ in 0..40 {
+                let middle = 0.5 * (low + high);
+                let off = off(attempt, middle)?;
+                match off < -0.5 * NEAR * length {
+                    true => low = middle,
+                    false => high = middle,
+                }
+                if off.abs() <= 0.5 * NEAR * length {
+                    return Ok(());
+                }
+            }
+        }
+        off(attempt, high)?;
+        Ok(())
+    }
+
+    /// Where the pole holds the middle joint, as far from it as it was built.
+    fn pole_place(
+        &self,
+        attempt: &mut Attempt<'_>,
+        solver: &Solver,
+        wanted: &[Trs],
+        length: f32,
+    ) -> Result<Vec3, MatchError> {
+        let [root, mid, end] = [wanted[0], wanted[1], wanted[2]];
+        let built = |node: Option<Uid>| node.and_then(|node| attempt.built(node)).map(|global| global.translation);
+        let far = match (built(self.pole), built(self.joints.get(1).copied())) {
+            (Some(pole), Some(mid)) => pole.distance(mid),
+            _ => length,
+        };
+        let far = far.max(0.25 * length);
+        let upper = direction(mid.translation - root.translation).unwrap_or(Vec3::Y);
+        let lower = direction(end.translation - mid.translation).unwrap_or(upper);
+        let line = direction(end.translation - root.translation).unwrap_or(upper);
+        // As the solver tells bent limbs from straight ones.
+        let axis = lower.cross(upper);
+        let bend = if axis.length() > 1e-4 {
+            axis.cross(line)
+        } else {
+            let prefer = root.rotation * solver.prefer;
+            prefer - line * prefer.dot(line)
+        };
+        let Some(bend) = direction(bend) else { return Ok(mid.translation) };
+        let twist = solver.twist.as_ref().map_or(0.0, |twist| number(attempt, twist));
+        let bend = about(line, -twist.to_radians()) * bend;
+        Ok(mid.translation + bend * far)
+    }
+}
+
+/// What the limb's solver does.
+struct Solver {
+    orients: bool,
+    is_soft: bool,
+    prefer: Vec3,
+    twist: Option<Scalar>,
+}
+
+impl Solver {
+    fn of(attempt: &Attempt<'_>, goal_of: Uid, joints: &[Uid]) -> Self {
+        let root_of = joints.first().copied();
+        for built in &attempt.rig.constraints {
+            match &*built.constraint {
+                Constraint::TwoBone { root, goal, orient_end, soft, prefer, twist, .. }
+                    if Some(*root) == root_of && *goal == goal_of =>
+                {
+                    let is_soft = *soft != Scalar::Value(0.0);
+                    return Self {
+                        orients: orient_end.is_some(),
+                        is_soft,
+                        prefer: *prefer,
+                        twist: Some(twist.clone()),
+                    };
+                }
+                Constraint::Chain { joints: chain, goal, orient_end, .. } if chain == joints && *goal == goal_of => {
+                    let orients = orient_end.is_some();
+                    return Self { orients, is_soft: false, prefer: Vec3::ZERO, twist: None };
+                }
+                _ => {}
+            }
+        }
+        Self { orients: true, is_soft: false, prefer: Vec3::ZERO, twist: None }
+    }
+}
+
+/// The node on a forward control that stands for a joint, and whether the joint's position follows, too.
+fn follows(attempt: &Attempt<'_>, joint: Uid, control: Uid) -> Option<(Uid, bool)> {
+    let carrier = |node: Uid| attempt.rig.node(node)?.parent.map(|parent| attempt.rig.nodes[parent].uid);
+    attempt.rig.constraints.iter().find_map(|built| match &*built.constraint {
+        Constraint::Transform { driven, targets, translate, .. } if *driven == joint => {
+            let target = targets.iter().find(|target| carrier(target.node) == Some(control))?;
+            Some((target.node, *translate == [true; 3]))
+        }
+        Constraint::Relative { driven, source, translate, .. } if *driven == joint => {
+            (carrier(*source) == Some(control)).then_some((*source, *translate))
+        }
+        _ => None,
+    })
+}
+
+/// The value of a number as things stand.
+fn number(attempt: &Attempt<'_>, scalar: &Scalar) -> f32 {
+    match scalar {
+        Scalar::Value(value) => *value,
+        Scalar::Attribute { node, name, factor, add } => {
+            factor * attempt.state.attribute(*node, name).unwrap_or_default() + add
+        }
+        Scalar::Choice { .. } | Scalar::Channel { .. } => 0.0,
+    }
+}
