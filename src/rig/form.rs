@@ -23,7 +23,7 @@
 use bevy::reflect::TypeInfo;
 use serde::{Deserialize, Serialize};
 
-use super::{SourceError, fields, nearest::did_you_mean, parse_ron, utf8};
+use super::{SourceError, fields, nearest::did_you_mean, ron_options, utf8};
 use crate::build::ModuleInfo;
 
 /// The longest form that is read, in bytes.
@@ -219,7 +219,13 @@ impl Form {
 /// # Errors
 /// [`SourceError`] with line and column.
 pub fn read_form(bytes: &[u8]) -> Result<Form, SourceError> {
-    parse_ron(utf8(bytes, MAX_BYTES, "form")?)
+    parse(utf8(bytes, MAX_BYTES, "form")?)
+}
+
+/// What an element is bound to stands in the element's own brackets.
+fn parse(text: &str) -> Result<Form, SourceError> {
+    let options = ron_options().with_default_extension(ron::extensions::Extensions::UNWRAP_VARIANT_NEWTYPES);
+    options.from_str(text).map_err(|error| SourceError::from_ron(text, &error))
 }
 
 /// Reads the form of a module and checks that every element edits a parameter that the module has, of a type that the
@@ -229,7 +235,7 @@ pub fn read_form(bytes: &[u8]) -> Result<Form, SourceError> {
 /// The first thing wrong, with line and column.
 pub fn read_module_form(bytes: &[u8], module: &ModuleInfo) -> Result<Form, SourceError> {
     let text = utf8(bytes, MAX_BYTES, "form")?;
-    let form: Form = parse_ron(text)?;
+    let form = parse(text)?;
     // The elements' parameters stand in the text in the order of the elements.
     let mut places = fields(text).into_iter().filter(|field| field.name == "param").map(|field| field.start);
     let mut seen: Vec<&str> = Vec::new();
