@@ -38,6 +38,7 @@ mod journal_kill;
 mod layout;
 mod mirror;
 mod models;
+mod modules_rigs;
 mod mutate;
 mod obj;
 mod obj_materials;

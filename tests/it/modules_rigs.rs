@@ -1,0 +1,784 @@
+//! Modules that solve, switch and drive: each on a small rig, through the processor and the runtime.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bevy::{math::Quat, prelude::Vec3, reflect::Reflect};
+use rigsmith::{
+    build::{BuildScope, Builder, Creation, ModuleError, Modules, RigModule},
+    mesh::model::Trs,
+    rig::{
+        BuiltRig, ControlData, JointData, Limits, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Tag, TagKind, Uid,
+        form::read_module_form,
+        reference::{NodeRef, NodeRefs},
+        step::edits_from_empty,
+    },
+    solve::{
+        matching::{Thrown, throw},
+        program::{CompileOptions, RigProgram, RigState},
+    },
+};
+use serde::{Deserialize, Serialize};
+
+/// A control at a place of the rig's space, so that the modules are tested without those that make nodes.
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Knob {
+    at: Vec3,
+    turn: f32,
+    below: NodeRefs,
+    on: NodeRefs,
+}
+
+impl Default for Knob {
+    fn default() -> Self {
+        Self { at: Vec3::NAN, turn: 0.0, below: NodeRefs::NONE, on: NodeRef::this().into() }
+    }
+}
+
+impl RigModule for Knob {
+    const NAME: &'static str = "knob";
+    const DOC: &'static str = "A control for tests.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[];
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        let below = scope.resolve_maybe("below", &self.below)?;
+        let on = scope.resolve_one("on", &self.on)?;
+        let mut global = scope.global(on);
+        if self.at.is_finite() {
+            global.translation = self.at;
+        }
+        global.rotation *= Quat::from_rotation_z(self.turn.to_radians());
+        let knob = scope.spawn_at(NodeType::Control, "knob", on, 0, below, global, &Creation::default())?;
+        let control = ControlData {
+            shape: "circle".into(),
+            color: [1.0; 3],
+            size: 0.1,
+            offset: Trs::IDENTITY,
+            channels: Default::default(),
+            limits: Limits::default(),
+        };
+        scope.set_control(knob, control);
+        Ok(())
+    }
+}
+
+fn modules() -> Arc<Modules> {
+    let mut modules = rigsmith::modules::all();
+    modules.add::<Knob>();
+    Arc::new(modules)
+}
+
+/// A rig of joints (uid, parent, place in the rig's space) with tags from uid 100 on.
+struct Bench {
+    rig: Rig,
+    next: u64,
+}
+
+impl Bench {
+    fn new(joints: &[(u64, u64, [f32; 3])]) -> Self {
+        let mut rig = Rig::new(Uid(1000), "rig");
+        for (uid, parent, place) in joints {
+            let parent = (*parent > 0).then_some(Uid(*parent));
+            let above = parent.map_or(Vec3::ZERO, |parent| rig.position(parent));
+            let rest = RestTransform::from_translation(Vec3::from(*place) - above);
+            let joint = JointData { uid: Uid(*uid), label: Some(format!("j{uid}")), rest, ..Default::default() };
+            let edit = RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX };
+            rig.apply(&edit).unwrap();
+        }
+        Self { rig, next: 100 }
+    }
+
+    /// Adds a command to a joint; its tag.
+    fn tag(&mut self, joint: u64, module: &str, params: &str) -> u64 {
+        let uid = self.next;
+        self.next += 1;
+        let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
+        let tag = Tag { uid: Uid(uid), enabled: true, comment: String::new(), kind };
+        self.rig.apply(&RigEdit::AddTag { joint: Uid(joint), tag: Box::new(tag), index: usize::MAX }).unwrap();
+        uid
+    }
+
+    /// Builds, and checks that stepping back and forward gives the same.
+    fn build(&self) -> BuiltRig {
+        let mut builder = Builder::new(modules());
+        builder.sync(&self.rig);
+        let report = builder.run_all();
+        assert_eq!(report.error, None, "{}", report.error.as_ref().unwrap());
+        let built = builder.built();
+        let mut states = vec![built.clone()];
+        while builder.cursor() > 0 {
+            builder.step_back();
+            states.push(builder.built());
+        }
+        let bare: Vec<Uid> = states.last().unwrap().nodes.iter().map(|node| node.uid).collect();
+        assert_eq!(bare, self.rig.walk().map(|joint| joint.data.uid).collect::<Vec<_>>(), "nothing is left behind");
+        for state in states.iter().rev() {
+            assert_eq!(builder.built(), *state);
+            builder.step_forward();
+        }
+        assert_eq!(builder.built(), built);
+        built
+    }
+
+    fn error(&self) -> String {
+        Builder::build(&self.rig, &modules()).unwrap_err().to_string()
+    }
+
+    fn play(&self) -> Play {
+        let built = self.build();
+        let program = RigProgram::compile(&built, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let mut state = RigState::new(Arc::new(program));
+        state.evaluate(0.0);
+        Play { built, state }
+    }
+}
+
+/// A built rig that is posed.
+struct Play {
+    built: BuiltRig,
+    state: RigState,
+}
+
+impl Play {
+    fn role(&self, command: u64, role: &str) -> Uid {
+        self.built.find_role(Uid(command), role).next().unwrap_or_else(|| panic!("no {role} of {command}")).uid
+    }
+
+    fn knob(&self, command: u64) -> Uid {
+        self.role(command, "knob")
+    }
+
+    fn at(&mut self, node: Uid) -> Trs {
+        self.state.evaluate(0.0);
+        self.state.global(node).unwrap()
+    }
+
+    fn joint(&mut self, joint: u64) -> Trs {
+        self.at(Uid(joint))
+    }
+
+    fn pose(&mut self, node: Uid, translation: [f32; 3], turn: Quat) {
+        let offset = PoseOffset { translation: translation.into(), rotation: turn, scale: Vec3::ONE };
+        self.state.set_offset(node, offset).unwrap();
+    }
+
+    fn value(&mut self, node: Uid, name: &str, value: f32) {
+        self.state.set_attribute(node, name, value).unwrap();
+    }
+
+    /// Throws the first switch.
+    fn throw(&mut self, value: f32) -> Thrown {
+        let thrown = throw(&self.built, &self.state, &self.built.switches[0], value).unwrap();
+        for edit in &thrown.edits {
+            match edit {
+                RigEdit::SetOffset(node, offset) => self.state.set_offset(*node, offset.unwrap_or_default()).unwrap(),
+                RigEdit::SetAttributeValue(node, name, value) => {
+                    self.state.set_attribute(*node, name, value.unwrap()).unwrap();
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        thrown
+    }
+}
+
+fn near(a: Vec3, b: Vec3, what: &str) {
+    assert!(a.distance(b) < 2e-4, "{what}: {a} and not {b}");
+}
+
+fn degrees(a: Quat, b: Quat) -> f32 {
+    let between = a.conjugate() * b;
+    2.0 * between.xyz().length().atan2(between.w.abs()).to_degrees()
+}
+
+/// An arm along X, elbow slightly back.
+const ARM: [(u64, u64, [f32; 3]); 4] =
+    [(1, 0, [0.0, 1.0, 0.0]), (2, 1, [0.2, 1.4, 0.0]), (3, 2, [0.5, 1.4, -0.05]), (4, 3, [0.8, 1.4, 0.0])];
+
+#[test]
+fn every_module_tells_about_each_parameter() {
+    for module in rigsmith::modules::all().iter() {
+        assert!(!module.doc.is_empty(), "{}", module.name);
+        for parameter in &module.parameters {
+            assert!(parameter.doc.len() > 8, "{}: {} is not explained", module.name, parameter.name);
+        }
+        module.parse("()").unwrap_or_else(|error| panic!("{}: {error}", module.name));
+        module.mirrored("()").unwrap_or_else(|error| panic!("{}: {error}", module.name));
+        assert!(module.parse("(no_such_thing: 1)").is_err(), "{}", module.name);
+    }
+}
+
+#[test]
+fn forms_edit_what_modules_have() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/modules");
+    let names = [
+        "driven_key",
+        "expression",
+        "ik_fk_switch",
+        "ik_handle",
+        "morph",
+        "reverse_foot",
+        "space_switch",
+        "spline_ik",
+        "spring",
+        "stretch",
+        "twist",
+    ];
+    let modules = rigsmith::modules::all();
+    for name in names {
+        let module = modules.get(name).unwrap();
+        let form = std::fs::read(folder.join(format!("{name}.ui.ron"))).unwrap();
+        let form = read_module_form(&form, module).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let edited: Vec<&str> = form
+            .elements()
+            .iter()
+            .filter_map(|e| e.bound())
+            .map(|(param, _)| param.split('.').next().unwrap())
+            .collect();
+        for parameter in &module.parameters {
+            assert!(edited.contains(&parameter.name), "{name}: nothing edits {}", parameter.name);
+        }
+        let icon = std::fs::read_to_string(folder.join(format!("{name}.svg"))).unwrap();
+        assert!(icon.starts_with("<svg") && icon.contains("viewBox=\"0 0 24 24\""), "{name}");
+    }
+}
+
+fn knob(tag: u64) -> String {
+    format!("@command #{tag:016x} role:knob")
+}
+
+fn joint(uid: u64) -> String {
+    format!("@joint #{uid:016x}")
+}
+
+#[test]
+fn an_arm_reaches_its_goal_and_bends_to_its_pole() {
+    for (end, solver) in [(4, "auto"), (4, "two_bone"), (4, "fabrik"), (4, "ccd")] {
+        let mut bench = Bench::new(&ARM);
+        let goal = bench.tag(4, "knob", "()");
+        let pole = bench.tag(3, "knob", "(at: (0.5, 1.4, -0.6))");
+        bench.tag(
+            4,
+            "ik_handle",
+            &format!(
+                "(start: \"@joint #0000000000000002\", end: \"{}\", goal: \"{}\", pole: \"{}\", solver: {solver}, weight: \"ik\", iterations: 200)",
+                joint(end),
+                knob(goal),
+                knob(pole)
+            ),
+        );
+        let mut play = bench.play();
+        let rest = play.joint(4);
+        near(rest.translation, Vec3::new(0.8, 1.4, 0.0), "as built");
+        let (goal, pole) = (play.knob(goal), play.knob(pole));
+        play.pose(goal, [-0.3, 0.1, 0.2], Quat::from_rotation_x(0.7));
+        near(play.joint(4).translation, play.state.global(goal).unwrap().translation, solver);
+        assert!(degrees(play.joint(4).rotation, Quat::from_rotation_x(0.7)) < 0.1, "{solver}: turns with the goal");
+        if solver == "two_bone" {
+            play.pose(pole, [0.0, 1.0, 0.6], Quat::IDENTITY);
+            assert!(play.joint(3).translation.y > 1.45, "the elbow goes up to its pole");
+        }
+        play.value(goal, "ik", 0.0);
+        near(play.joint(4).translation, rest.translation, "without weight");
+    }
+}
+
+#[test]
+fn a_straight_chain_has_to_be_told_where_it_bends() {
+    let straight = [(1, 0, [0.0, 1.0, 0.0]), (2, 1, [0.0, 0.5, 0.0]), (3, 2, [0.0, 0.0, 0.0])];
+    let build = |extra: &str| {
+        let mut bench = Bench::new(&straight);
+        let goal = bench.tag(3, "knob", "()");
+        bench.tag(
+            3,
+            "ik_handle",
+            &format!("(start: \"{}\", end: \"{}\", goal: \"{}\", {extra})", joint(1), joint(3), knob(goal)),
+        );
+        (bench, goal)
+    };
+    let error = build("").0.error();
+    assert!(error.contains("straight") && error.contains("prefer"), "{error}");
+    let error = build("prefer: (0, -1, 0)").0.error();
+    assert!(error.contains("across"), "{error}");
+    let (bench, goal) = build("prefer: (0, 0.2, 1)");
+    let mut play = bench.play();
+    let goal = play.knob(goal);
+    play.pose(goal, [0.0, 0.3, 0.0], Quat::IDENTITY);
+    assert!(play.joint(2).translation.z > 0.2, "the knee goes forwards");
+    near(play.joint(3).translation, Vec3::new(0.0, 0.3, 0.0), "the ankle is on its goal");
+}
+
+#[test]
+fn stretch_and_soft_follow_attributes() {
+    let mut bench = Bench::new(&ARM);
+    let goal = bench.tag(4, "knob", "()");
+    bench.tag(
+        4,
+        "ik_handle",
+        &format!(
+            "(start: \"@joint #0000000000000002\", end: \"{}\", goal: \"{}\", stretch: \"stretch\", soft: \"soft\")",
+            joint(4),
+            knob(goal)
+        ),
+    );
+    let mut play = bench.play();
+    let goal = play.knob(goal);
+    play.pose(goal, [0.3, 0.0, 0.0], Quat::IDENTITY);
+    let length = 2.0 * Vec3::new(0.3, 0.0, 0.05).length();
+    let reach = |play: &mut Play| play.joint(4).translation.distance(Vec3::new(0.2, 1.4, 0.0));
+    assert!((reach(&mut play) - length).abs() < 1e-4);
+    play.value(goal, "stretch", 1.0);
+    assert!((reach(&mut play) - 0.9).abs() < 1e-4);
+    play.value(goal, "stretch", 0.0);
+    play.value(goal, "soft", 0.3);
+    assert!(reach(&mut play) < length - 1e-3);
+}
+
+#[test]
+fn mistakes_say_what_to_do() {
+    let two = format!("{} + {}", joint(2), joint(3));
+    let ends = format!("start: \"{}\", end: \"{}\"", joint(2), joint(4));
+    let goal = |tag: u64| format!("goal: \"{}\"", knob(tag));
+    // Module, parameters, and what the error names.
+    let table: Vec<(&str, String, &[&str])> = vec![
+        ("ik_handle", "()".into(), &["end", "is needed"]),
+        ("ik_handle", format!("({ends})"), &["goal", "is needed"]),
+        ("ik_handle", format!("({ends}, goal: \"{}\")", joint(3)), &["goal", "j3", "control"]),
+        ("ik_handle", format!("({ends}, {}, soft: 2.0)", goal(100)), &["soft", "from 0 to 1"]),
+        ("ik_handle", format!("({ends}, {}, max_stretch: 0.5)", goal(100)), &["max_stretch", "not below 1"]),
+        ("ik_handle", format!("({ends}, {}, solver: fabrik, soft: 0.1)", goal(100)), &["soft", "two bones"]),
+        ("ik_handle", format!("({ends}, {}, limits: [((1, 2), (), ())])", goal(100)), &["parameters"]),
+        (
+            "ik_handle",
+            format!("({ends}, {}, limits: [((1.0, 2.0), (None, None), (None, None))])", goal(100)),
+            &["limits", "ccd"],
+        ),
+        (
+            "ik_handle",
+            format!("({ends}, {}, solver: ccd, limits: [((3.0, 2.0), (None, None), (None, None))])", goal(100)),
+            &["limits", "lower angle first"],
+        ),
+        (
+            "ik_handle",
+            format!("(start: \"{}\", end: \"{}\", {}, solver: two_bone)", joint(1), joint(4), goal(100)),
+            &["solver", "4", "fabrik"],
+        ),
+        ("ik_handle", format!("(start: \"{}\", end: \"{}\", {})", joint(4), joint(2), goal(100)), &["not below"]),
+        ("ik_fk_switch", format!("({ends}, {}, fk: \"{}\")", goal(100), knob(100)), &["fk", "1 controls", "3 joints"]),
+        ("spline_ik", format!("({ends}, points: \"{}\")", knob(100)), &["points", "two or more"]),
+        ("spline_ik", format!("({ends}, points: \"{two}\")"), &["points", "joint of the chain"]),
+        ("space_switch", format!("(control: \"{}\", spaces: \"{two}\", names: [\"a\"])", knob(100)), &["names", "1"]),
+        (
+            "space_switch",
+            format!("(control: \"{}\", spaces: \"{two}\", default: 2)", knob(100)),
+            &["default", "0 to 1"],
+        ),
+        ("reverse_foot", format!("(ankle: \"{}\")", joint(2)), &["ball", "is needed"]),
+        ("twist", format!("({ends}, count: 0)"), &["count", "1 to 64"]),
+        ("twist", format!("({ends}, shares: [1.0])"), &["shares", "2 joints"]),
+        ("stretch", format!("({ends}, min: 0.0)"), &["min"]),
+        ("stretch", format!("(start: \"{}\", end: \"{}\")", joint(2), joint(2)), &["end", "apart"]),
+        ("spring", "(rotate: false)".into(), &["rotate", "turn on"]),
+        ("spring", "(frequency: \"hz\", nodes: \"@none\")".into(), &["nodes", "is needed"]),
+        ("driven_key", format!("(driver: \"{}\")", knob(100)), &["driver", "RotateX"]),
+        (
+            "driven_key",
+            format!("(driver: \"{}\", driver_attribute: \"crul\")", knob(100)),
+            &["crul", "curl", "did you mean"],
+        ),
+        (
+            "driven_key",
+            format!("(driver: \"{}\", driver_channel: RotateX, keys: [(1.0, 0.0), (0.0, 1.0)])", knob(100)),
+            &["keys", "sort"],
+        ),
+        (
+            "driven_key",
+            format!("(driver: \"{}\", driver_channel: RotateX, output: \"@this\")", knob(100)),
+            &["output", "what is driven"],
+        ),
+        ("morph", "()".into(), &["morph", "empty"]),
+        ("expression", "(text: \"a + \", output: \"@this\", output_channel: RotateX)".into(), &["text", "column"]),
+        (
+            "expression",
+            "(text: \"clamp(a, 0)\", inputs: [(name: \"a\", node: \"@this\", channel: RotateX)])".into(),
+            &["text", "clamp", "arguments"],
+        ),
+        ("expression", "(text: \"1\", inputs: [(name: \"2x\")])".into(), &["inputs", "2x"]),
+    ];
+    for (module, params, parts) in table {
+        let mut bench = Bench::new(&ARM);
+        bench.tag(4, "knob", "()");
+        bench.tag(4, "attribute", &format!("(node: \"{}\", name: \"curl\")", knob(100)));
+        bench.tag(4, module, &params);
+        let error = bench.error();
+        for part in parts {
+            assert!(error.contains(part), "{module} {params}: {error} does not say {part}");
+        }
+    }
+}
+
+/// An arm with a switch; tags: three forward controls, goal, pole, the switch.
+fn switched(extra: &str) -> (Bench, [u64; 5]) {
+    let mut bench = Bench::new(&ARM);
+    let upper = bench.tag(2, "knob", &format!("(below: \"{}\", turn: 20)", joint(1)));
+    let lower = bench.tag(3, "knob", &format!("(below: \"{}\", turn: -30)", knob(upper)));
+    let hand = bench.tag(4, "knob", &format!("(below: \"{}\", turn: 10)", knob(lower)));
+    let goal = bench.tag(4, "knob", "(turn: 45)");
+    let pole = bench.tag(4, "knob", "(at: (0.5, 1.4, -0.6))");
+    bench.tag(
+        4,
+        "ik_fk_switch",
+        &format!(
+            "(start: \"{}\", end: \"{}\", fk: \"{} + {} + {}\", goal: \"{}\"{extra})",
+            joint(2),
+            joint(4),
+            knob(upper),
+            knob(lower),
+            knob(hand),
+            knob(goal)
+        ),
+    );
+    (bench, [upper, lower, hand, goal, pole])
+}
+
+fn with_pole(extra: &str) -> String {
+    format!(", pole: \"{}\"{extra}", knob(104))
+}
+
+#[test]
+fn a_limb_is_switched_without_a_jump() {
+    let cases = [
+        with_pole(""),
+        String::new(),
+        with_pole(", soft: 0.1"),
+        with_pole(", stretch: 1.0"),
+        with_pole(", soft: 0.05, stretch: 0.5"),
+        with_pole(", twist: 25.0"),
+        with_pole(", orient_end: false"),
+        ", solver: fabrik".to_owned(),
+    ];
+    let turns = [
+        [Quat::from_rotation_z(0.4), Quat::from_rotation_y(0.9), Quat::from_rotation_x(0.5)],
+        [Quat::from_rotation_y(-1.1), Quat::from_rotation_y(0.3), Quat::IDENTITY],
+        [Quat::from_rotation_x(2.0), Quat::from_rotation_y(1.8), Quat::from_rotation_z(-1.0)],
+        // The elbow bends a little the other way than it was built.
+        [Quat::IDENTITY, Quat::from_rotation_y(-0.6), Quat::IDENTITY],
+        // The arm is all but straight.
+        [Quat::IDENTITY, Quat::from_rotation_y(-0.3301), Quat::IDENTITY],
+    ];
+    let goals = [([-0.2, 0.15, 0.1], 0.4), ([0.3, 0.1, 0.0], 0.0), ([-0.45, -0.2, 0.2], -1.2)];
+    for extra in &cases {
+        let (bench, tags) = switched(extra);
+        let mut play = bench.play();
+        let [upper, lower, hand, goal, pole] = tags.map(|tag| play.knob(tag));
+        let joints = |play: &mut Play| [2, 3, 4].map(|joint| play.joint(joint));
+        let check = |before: [Trs; 3], after: [Trs; 3], thrown: &Thrown, what: &str| {
+            for (a, b) in before.iter().zip(&after) {
+                let (moved, turned) = (a.translation.distance(b.translation), degrees(a.rotation, b.rotation));
+                assert!(moved < 0.6e-4 && turned < 0.1, "{extra}, {what}: {moved} {turned}\n{before:?}\n{after:?}");
+                assert!(thrown.distance < 0.6e-4 && thrown.angle < 0.1, "{extra}, {what}: {thrown:?}");
+            }
+        };
+        for (number, [a, b, c]) in turns.into_iter().enumerate() {
+            play.value(goal, "ik_fk", 0.0);
+            for (control, turn) in [(upper, a), (lower, b), (hand, c)] {
+                play.pose(control, [0.0; 3], turn);
+            }
+            let before = joints(&mut play);
+            let thrown = play.throw(1.0);
+            let after = joints(&mut play);
+            check(before, after, &thrown, &format!("to inverse {number}"));
+            // Somewhere on the way.
+            let thrown = play.throw(0.4);
+            let between = joints(&mut play);
+            check(after, between, &thrown, &format!("between {number}"));
+        }
+        for (number, (moved, turned)) in goals.into_iter().enumerate() {
+            play.value(goal, "ik_fk", 1.0);
+            play.pose(goal, moved, Quat::from_rotation_y(turned));
+            play.pose(pole, [0.1, 0.5 * turned, 0.0], Quat::IDENTITY);
+            let before = joints(&mut play);
+            let thrown = play.throw(0.0);
+            let after = joints(&mut play);
+            check(before, after, &thrown, &format!("to forward {number}"));
+        }
+    }
+}
+
+#[test]
+fn a_control_changes_spaces_without_a_jump() {
+    let mut bench = Bench::new(&ARM);
+    let root = bench.tag(1, "knob", "()");
+    let head = bench.tag(1, "knob", "(at: (0, 1.7, 0), turn: 30)");
+    let hand = bench.tag(4, "knob", &format!("(below: \"{}\", turn: 15)", knob(root)));
+    bench.tag(
+        4,
+        "space_switch",
+        &format!(
+            "(control: \"{}\", spaces: \"{} + {} + {}\", names: [\"root\", \"head\", \"chest\"], default: 1)",
+            knob(hand),
+            knob(root),
+            knob(head),
+            joint(2)
+        ),
+    );
+    let mut play = bench.play();
+    let [root, head, hand] = [root, head, hand].map(|tag| play.knob(tag));
+    let attribute = &play.built.node(hand).unwrap().attributes[0];
+    assert_eq!((&*attribute.name, attribute.default), ("space", 1.0));
+    near(play.at(hand).translation, Vec3::new(0.8, 1.4, 0.0), "as built");
+    play.pose(head, [0.1, 0.2, 0.0], Quat::from_rotation_x(0.5));
+    let carried = play.at(hand);
+    assert!(carried.translation.distance(Vec3::new(0.8, 1.4, 0.0)) > 0.1, "it goes with the head");
+    play.pose(root, [0.0, 0.0, 0.3], Quat::from_rotation_y(0.5));
+    near(play.at(hand).translation, carried.translation, "and not with the root");
+    play.pose(hand, [0.05, 0.0, 0.1], Quat::from_rotation_z(0.2));
+    for space in [0.0, 2.0, 1.0, 0.0, 0.5] {
+        let before = play.at(hand);
+        let thrown = play.throw(space);
+        let after = play.at(hand);
+        near(before.translation, after.translation, "thrown");
+        assert!(degrees(before.rotation, after.rotation) < 0.1);
+        assert!(thrown.distance < 1e-4 && thrown.angle < 0.1, "{thrown:?}");
+        assert_eq!(thrown.edits.len(), 2);
+    }
+}
+
+/// A left leg with a foot towards +Z; the right one has its X mirrored.
+fn leg(side: f32) -> [(u64, u64, [f32; 3]); 5] {
+    [
+        (1, 0, [0.1 * side, 0.9, 0.0]),
+        (2, 1, [0.1 * side, 0.5, 0.08]),
+        (3, 2, [0.1 * side, 0.1, 0.0]),
+        (4, 3, [0.1 * side, 0.03, 0.12]),
+        (5, 4, [0.1 * side, 0.0, 0.2]),
+    ]
+}
+
+fn foot(side: f32) -> (Bench, u64, u64) {
+    let mut bench = Bench::new(&leg(side));
+    let control = bench.tag(1, "knob", &format!("(at: ({}, 0.0, 0.05))", 0.1 * side));
+    let foot = bench.tag(
+        3,
+        "reverse_foot",
+        &format!("(ball: \"{}\", toe: \"{}\", control: \"{}\")", joint(4), joint(5), knob(control)),
+    );
+    let goal = format!("@command #{foot:016x} role:goal");
+    bench.tag(5, "ik_handle", &format!("(start: \"{}\", end: \"{}\", goal: \"{goal}\")", joint(1), joint(3)));
+    (bench, control, foot)
+}
+
+#[test]
+fn a_foot_rolls_over_heel_ball_and_toe() {
+    for side in [1.0, -1.0] {
+        let (bench, control, foot) = foot(side);
+        let mut play = bench.play();
+        let knob = play.knob(control);
+        let rest: BTreeMap<u64, Trs> = (3..=5).map(|joint| (joint, play.joint(joint))).collect();
+        near(rest[&3].translation, Vec3::from(leg(side)[2].2), "the ankle stands as built");
+        let names: Vec<String> =
+            play.built.node(knob).unwrap().attributes.iter().map(|attribute| attribute.name.to_string()).collect();
+        assert_eq!(names, ["roll", "bank", "toe", "swivel", "break_angle"]);
+
+        play.value(knob, "roll", 30.0);
+        near(play.joint(4).translation, rest[&4].translation, "the ball stays");
+        near(play.joint(5).translation, rest[&5].translation, "the toes stay flat");
+        assert!(play.joint(3).translation.y > 0.13, "the heel lifts: {}", play.joint(3).translation);
+
+        play.value(knob, "roll", 70.0);
+        near(play.joint(5).translation, rest[&5].translation, "the tip stays");
+        assert!(play.joint(4).translation.y > 0.08, "the ball lifts");
+
+        play.value(knob, "roll", -30.0);
+        let heel = play.role(foot, "heel");
+        let (at, built) = (play.at(heel).translation, play.built.node(heel).unwrap().base.translation);
+        near(at, built + play.at(knob).translation, "the heel stays");
+        assert!(play.joint(5).translation.y > 0.08, "the toes lift: {}", play.joint(5).translation);
+
+        play.value(knob, "roll", 0.0);
+        play.value(knob, "bank", 25.0);
+        assert!(play.joint(3).translation.x * side > 0.11, "it tips outwards: {}", play.joint(3).translation);
+        play.value(knob, "bank", -25.0);
+        assert!(play.joint(3).translation.x * side < 0.09, "it tips inwards: {}", play.joint(3).translation);
+
+        play.value(knob, "bank", 0.0);
+        play.value(knob, "toe", 30.0);
+        near(play.joint(4).translation, rest[&4].translation, "the ball stays");
+        assert!(play.joint(5).translation.y > 0.03, "the toes bend up: {}", play.joint(5).translation);
+
+        play.value(knob, "toe", 0.0);
+        play.value(knob, "swivel", 40.0);
+        near(play.joint(4).translation, rest[&4].translation, "it turns on the ball");
+        assert!(play.joint(3).translation.distance(rest[&3].translation) > 0.05);
+        let (toe, ball) = (play.joint(5).translation, play.joint(4).translation);
+        assert!((toe - ball).angle_between(rest[&5].translation - rest[&4].translation) > 0.5, "the toes turn along");
+    }
+}
+
+#[test]
+fn a_spine_lies_along_its_curve() {
+    let spine: Vec<(u64, u64, [f32; 3])> = (1..=5).map(|n| (n, n - 1, [0.0, 0.8 + 0.2 * n as f32, 0.0])).collect();
+    let mut bench = Bench::new(&spine);
+    let [a, b, c] = [1, 3, 5].map(|on| bench.tag(on, "knob", "()"));
+    bench.tag(
+        5,
+        "spline_ik",
+        &format!(
+            "(start: \"@joint #0000000000000001\", end: \"{}\", points: \"{} + {} + {}\", stretch: \"stretch\", twist: \"twist\")",
+            joint(5),
+            knob(a),
+            knob(b),
+            knob(c)
+        ),
+    );
+    let mut play = bench.play();
+    let c = play.knob(c);
+    near(play.joint(5).translation, Vec3::new(0.0, 1.8, 0.0), "as built");
+    play.pose(c, [0.3, 0.1, 0.0], Quat::IDENTITY);
+    let short = play.joint(5).translation;
+    assert!(short.x > 0.1, "{short}");
+    play.value(c, "stretch", 1.0);
+    let goal = play.at(c).translation;
+    assert!(play.joint(5).translation.distance(goal) < 1e-3, "stretched to the end of the curve");
+    let before = play.joint(5).rotation;
+    play.value(c, "twist", 40.0);
+    let turned = degrees(before, play.joint(5).rotation);
+    assert!((turned - 40.0).abs() < 8.0, "{turned}");
+}
+
+#[test]
+fn twist_joints_take_their_share() {
+    for (counter, shares) in [(false, [1.0 / 3.0, 2.0 / 3.0]), (true, [0.0, 0.5])] {
+        let mut bench = Bench::new(&ARM);
+        let tag =
+            bench.tag(3, "twist", &format!("(start: \"{}\", end: \"{}\", counter: {counter})", joint(2), joint(3)));
+        let mut play = bench.play();
+        let twists: Vec<Uid> = play.built.find_role(Uid(tag), "twist").map(|node| node.uid).collect();
+        assert_eq!(twists.len(), 2);
+        assert!(play.built.node(twists[0]).unwrap().kind == NodeType::Joint);
+        let bone = Vec3::new(0.3, 0.0, -0.05).normalize();
+        let rest: Vec<Quat> = twists.iter().map(|twist| play.at(*twist).rotation).collect();
+        let turned = if counter { 2 } else { 3 };
+        play.pose(Uid(turned), [0.0; 3], Quat::from_axis_angle(bone, 60f32.to_radians()));
+        for ((twist, share), rest) in twists.iter().zip(shares).zip(rest) {
+            let now = play.at(*twist).rotation;
+            let angle = degrees(rest, now);
+            assert!((angle - 60.0 * share).abs() < 0.1, "counter {counter}: {angle} and not {}", 60.0 * share);
+        }
+    }
+}
+
+#[test]
+fn numbers_drive_numbers() {
+    let mut bench = Bench::new(&ARM);
+    let hand = bench.tag(4, "knob", "()");
+    bench.tag(4, "attribute", &format!("(node: \"{}\", name: \"curl\", min: 0.0, max: 1.0)", knob(hand)));
+    bench.tag(
+        4,
+        "driven_key",
+        &format!(
+            "(driver: \"{}\", driver_attribute: \"curl\", keys: [(0.0, 0.0), (1.0, 80.0)], output: \"{} + {}\", \
+             output_channel: RotateX)",
+            knob(hand),
+            joint(3),
+            joint(4)
+        ),
+    );
+    bench.tag(
+        4,
+        "expression",
+        &format!(
+            "(text: \"clamp(curl * 90, 0, 45) + x\", inputs: [(name: \"curl\", node: \"{0}\", attribute: \"curl\"), \
+             (name: \"x\", node: \"{0}\", channel: TranslateX)], output: \"{1}\", output_channel: RotateZ)",
+            knob(hand),
+            joint(2)
+        ),
+    );
+    bench.tag(4, "morph", &format!("(control: \"{}\", morph: \"smile\")", knob(hand)));
+    let mut play = bench.play();
+    let hand = play.knob(hand);
+    play.value(hand, "curl", 1.0);
+    play.pose(hand, [5.0, 0.0, 0.0], Quat::IDENTITY);
+    play.value(hand, "smile", 0.75);
+    let turned = play.joint(2).rotation;
+    assert!((degrees(turned, Quat::IDENTITY) - 50.0).abs() < 0.01);
+    let below = turned.conjugate() * play.joint(3).rotation;
+    assert!((degrees(below, Quat::IDENTITY) - 80.0).abs() < 0.01);
+    let smile = play.state.program().morph("smile").unwrap();
+    assert_eq!(play.state.morphs()[smile], 0.75);
+}
+
+#[test]
+fn a_bone_keeps_its_volume_and_a_tail_lags_behind() {
+    let mut bench = Bench::new(&ARM);
+    let (a, b) = (bench.tag(2, "knob", "()"), bench.tag(3, "knob", "()"));
+    let root = bench.tag(1, "knob", "()");
+    bench.tag(4, "stretch", &format!("(start: \"{}\", end: \"{}\")", knob(a), knob(b)));
+    bench.tag(2, "spring", "(nodes: \"@joint #0000000000000002 + @joint #0000000000000003\", frequency: 3.0)");
+    let mut play = bench.play();
+    assert_eq!(play.built.constraints.len(), 3);
+    let (b, _) = (play.knob(b), play.knob(root));
+    let far = Vec3::new(0.3, 0.0, -0.05);
+    play.pose(b, far.into(), Quat::IDENTITY);
+    let scale = play.joint(4).scale;
+    assert!((scale - Vec3::new(2.0, 0.5f32.sqrt(), 0.5f32.sqrt())).length() < 1e-3, "{scale}");
+
+    let rest = play.joint(3).translation;
+    play.pose(Uid(1), [0.0; 3], Quat::from_rotation_z(0.5));
+    play.state.evaluate(1.0 / 60.0);
+    let lagging = play.state.global(Uid(3)).unwrap().translation;
+    for _ in 0..600 {
+        play.state.evaluate(1.0 / 60.0);
+    }
+    let settled = play.state.global(Uid(3)).unwrap().translation;
+    let turned = Vec3::Y + Quat::from_rotation_z(0.5) * (rest - Vec3::Y);
+    near(settled, turned, "it settles");
+    assert!(lagging.distance(settled) > 0.02, "it lags: {lagging} {settled}");
+}
+
+#[test]
+fn what_is_posed_waits_for_its_node() {
+    let (mut bench, tags) = switched("");
+    let play = bench.play();
+    let (goal, hand) = (play.knob(tags[3]), play.knob(tags[2]));
+    let offset = PoseOffset { translation: Vec3::X, ..PoseOffset::IDENTITY };
+    let edits = [
+        RigEdit::SetOffset(goal, Some(offset)),
+        RigEdit::SetAttributeValue(goal, "ik_fk".into(), Some(0.25)),
+        RigEdit::SetAttributeValue(hand, "odd \"name\"".into(), Some(-0.0)),
+        RigEdit::SetOffset(goal, None),
+        RigEdit::SetAttributeValue(goal, "ik_fk".into(), None),
+        RigEdit::SetOffset(hand, Some(offset)),
+        RigEdit::SetAttributeValue(goal, "ik_fk".into(), Some(0.5)),
+    ];
+    let start = bench.rig.clone();
+    let mut inverses = Vec::new();
+    for edit in &edits {
+        let before = bench.rig.clone();
+        let inverse = bench.rig.apply(edit).unwrap();
+        let after = bench.rig.clone();
+        let again = bench.rig.apply(&inverse).unwrap();
+        assert_eq!(bench.rig, before);
+        bench.rig.apply(&again).unwrap();
+        assert_eq!(bench.rig, after);
+        inverses.push(inverse);
+    }
+    assert_eq!(bench.rig.attribute_value(goal, "ik_fk"), Some(0.5));
+    assert_eq!(bench.rig.offset(hand), Some(&offset));
+    // The commands are gone, and what was posed is not.
+    for joint in [2, 3, 4] {
+        for tag in bench.rig.joint(Uid(joint)).unwrap().data.tags.clone() {
+            inverses.push(bench.rig.apply(&RigEdit::RemoveTag(Uid(joint), tag.uid)).unwrap());
+        }
+    }
+    assert_eq!(bench.rig.offset(hand), Some(&offset));
+    let mut copy = Rig::new(bench.rig.uid(), "");
+    for edit in edits_from_empty(&bench.rig) {
+        copy.apply(&edit).unwrap();
+    }
+    assert_eq!(copy, bench.rig);
+    for inverse in inverses.iter().rev() {
+        bench.rig.apply(inverse).unwrap();
+    }
+    assert_eq!(bench.rig, start);
+}
