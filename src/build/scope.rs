@@ -15,7 +15,10 @@ use super::{
 };
 use crate::{
     mesh::model::Trs,
-    rig::{Attribute, Constraint, ControlData, Dependency, NodeType, Origin, SwitchData, Uid, reference::NodeRefs},
+    rig::{
+        Attribute, Constraint, ControlData, Dependency, LayerData, NodeType, Origin, SwitchData, Uid,
+        reference::NodeRefs,
+    },
 };
 
 /// The side of the body that a node is on.

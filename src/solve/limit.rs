@@ -56,7 +56,8 @@ impl Bounds {
         let angles = order.angles(rotation);
         let (first, outside) = self.nearest(angles);
         let (second, outside_second) = self.nearest(order.other(angles));
-        let (angles, outside) = if outside_second < outside - 1e-4 { (second, outside_second) } else { (first, outside) };
+        let (angles, outside) =
+            if outside_second < outside - 1e-4 { (second, outside_second) } else { (first, outside) };
         let clamped = order.rotation(self.clamp(angles));
         if outside <= 0.0 || !clamped.is_finite() { rotation } else { clamped }
     }

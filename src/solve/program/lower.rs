@@ -58,8 +58,18 @@ impl Lower<'_, '_> {
                 let (targets, weight) = (self.targets(vec![target]), self.scalar(weight)?);
                 let (input, out) = self.graph.take_local(node, self.at, *translate);
                 let (translate, rotate, scale) = ([*translate; 3], [*rotate; 3], [false; 3]);
-                let op =
-                    TransformOp { input, parent, pose: Pose::NONE, targets, weight, translate, rotate, scale, out };
+                let op = TransformOp {
+                    input,
+                    parent,
+                    pose: Pose::NONE,
+                    targets,
+                    weight,
+                    translate,
+                    rotate,
+                    scale,
+                    is_global: false,
+                    out,
+                };
                 self.graph.tables.transforms.push(op);
                 let at = self.graph.tables.transforms.len() - 1;
                 self.push(Op::Transform(at as u32), node);
