@@ -12,9 +12,13 @@ use std::{
 use bevy::prelude::*;
 
 pub use super::selection::{Hovered, Selection};
-use super::{RigSystems, configure_sets, history::RigHistory};
+use super::{
+    RigSystems, configure_sets,
+    history::{Recorded, RigHistory},
+};
 use crate::rig::{
     PoseOffset, RestTransform, Rig, Uid, UidSource,
+    feature::FeatureKinds,
     operations::{MirrorPlane, Operation},
     step::Committed,
 };
@@ -26,6 +30,7 @@ impl Plugin for DocumentPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.init_resource::<UidSource>()
+            .init_resource::<FeatureKinds>()
             .add_message::<EditRequest>()
             .add_message::<Edited>()
             .add_message::<EditRefused>()
@@ -152,6 +157,8 @@ pub struct Edited {
     pub committed: Option<Committed>,
     /// True if something is only previewed, or was and no longer is.
     pub preview: bool,
+    /// What people should know about it, a sentence each: copied tags that had no place, for example.
+    pub notes: Vec<String>,
 }
 
 /// A change was refused; the rig is as it was.
@@ -177,12 +184,14 @@ fn apply_edits(
             refused.write(EditRefused { rig, reason: format!("entity {rig} is no rig; it may have been closed") });
             continue;
         };
-        let done = |name, committed| Edited { rig, name, committed, preview: false };
-        let previewed = |name: &'static str| Edited { rig, name: name.into(), committed: None, preview: true };
+        let done = |name, committed| Edited { rig, name, committed, preview: false, notes: Vec::new() };
+        let previewed =
+            |name: &'static str| Edited { rig, name: name.into(), committed: None, preview: true, notes: Vec::new() };
+        let recorded = |Recorded { name, step, notes }| Edited { notes, ..done(name, step.map(Committed::Done)) };
         let result = match change {
             Change::Do(operation) => history
                 .edit(&mut document, &mut selection, &mut uids, symmetry.0, operation)
-                .map(|recorded| done(recorded.name, recorded.step.map(Committed::Done)))
+                .map(recorded)
                 .map_err(|error| error.to_string()),
             Change::Undo => history
                 .undo(&mut document, &mut selection)
@@ -198,8 +207,8 @@ fn apply_edits(
                 .map_err(|error| error.to_string()),
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
             Change::Commit => {
-                let Some(recorded) = history.commit_preview(&mut document, &mut selection) else { continue };
-                Ok(done(recorded.name, recorded.step.map(Committed::Done)))
+                let Some(step) = history.commit_preview(&mut document, &mut selection) else { continue };
+                Ok(recorded(step))
             }
             Change::CancelPreview => {
                 history.cancel_preview(&mut document);

@@ -32,6 +32,8 @@ pub struct Recorded {
     pub name: Cow<'static, str>,
     /// The step; `None` if nothing changed, which is no step.
     pub step: Option<Arc<Step>>,
+    /// What people should know about it, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// A step in the record.
@@ -159,14 +161,14 @@ impl RigHistory {
         let name = Cow::Borrowed(name);
         // What changed nothing is no step: undoing it would seem to do nothing.
         if outcome.edits.is_empty() && after == before {
-            return Recorded { name, step: None };
+            return Recorded { name, step: None, notes: outcome.notes };
         }
         let step = Step { name: name.clone(), forward: outcome.edits, backward: outcome.inverses, before, after };
         let step = Arc::new(step);
         let entry = Entry { step: step.clone(), applied: true };
         let recorded = self.with(rig, selection, |record, target| record.edit(target, entry));
         debug_assert!(recorded.is_ok(), "a step that was applied already cannot fail");
-        Recorded { name, step: Some(step) }
+        Recorded { name, step: Some(step), notes: outcome.notes }
     }
 
     /// Takes the last step back and returns it, or `None` if there is none. A preview is taken back before.

@@ -49,7 +49,9 @@ use crate::rig::{NodeType, Uid};
 
 pub use error::{PickError, ReferenceError, ReferenceProblem};
 pub use names::{NameKind, NameScope, Names, RigNames, label_text};
-pub use params::{BadReference, FoundReference, bind_names, map_references, references_in, refresh_names};
+pub use params::{
+    BadReference, FoundReference, bind_names, map_references, nearest_to_gone, references_in, refresh_names, written_as,
+};
 pub(in crate::rig) use params::{map_text_fields, map_uids};
 
 /// One reference: an ordered list of nodes once it is resolved, parents first, siblings as authored, then in the order

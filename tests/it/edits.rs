@@ -36,7 +36,7 @@ const TEXTS: [&str; 10] = [
 ];
 
 /// Parameters of modules in every shape of RON.
-const PARAMS: [&str; 8] = [
+const PARAMS: [&str; 9] = [
     "()",
     "(a: 1, uid: \"0000000000000001\", joints: [(uid: 3)])",
     "[1,\n    2, // two\n]",
@@ -45,6 +45,7 @@ const PARAMS: [&str; 8] = [
     "Some(Name(-1.5e3))",
     "\"text, with ) and ]\"",
     "/* a */ 1 // trailing",
+    "(t: \"@joint x#0000000000000001 + @this\", u: r#\"@command 'a b'#0000000000000002\"#)",
 ];
 
 fn a_joint(rig: &Rig, number: u16) -> Uid {

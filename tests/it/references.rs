@@ -7,7 +7,7 @@ use rigsmith::rig::{
     GroupData, JointData, NodeRef, NodeRefs, NodeType, Rig, RigEdit, Tag, TagKind, Uid,
     reference::{
         GroupScope, NameKind, NameScope, Names, NodeTypes, Pick, PickAt, PickError, RigNames, RigScope, Source, Top,
-        bind_names, label_text, map_references, references_in, refresh_names,
+        bind_names, label_text, map_references, nearest_to_gone, references_in, refresh_names, written_as,
     },
     template::{read_template, write_template},
 };
@@ -309,6 +309,19 @@ fn names_are_made_current_and_uids_put_beside_them() {
         bound,
         "(t: \"@joint hand_l#00000000000000aa type:joint + @command ik_handle/upper_arm_l#00000000000000c2\")"
     );
+}
+
+#[test]
+fn errors_can_quote_what_is_written_and_say_what_is_gone() {
+    let mut rig = rig();
+    let params = "(goal: \"@joint hand_l#00000000000000aa role:offset\")";
+    let refs: NodeRefs = NodeRef::joint(HAND).with_role("offset").into();
+    assert_eq!(written_as(params, &refs), "@joint hand_l#00000000000000aa role:offset");
+    assert_eq!(written_as("()", &refs), "@joint #00000000000000aa role:offset");
+    assert_eq!(nearest_to_gone(params, &refs, &rig), "");
+    rig.apply(&RigEdit::RemoveJoint(HAND)).unwrap();
+    let said = nearest_to_gone(params, &refs, &rig);
+    assert!(said.starts_with("; the joint \"hand_l\" is gone; did you mean \"hand_r\""), "{said}");
 }
 
 #[test]

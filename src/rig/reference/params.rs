@@ -12,6 +12,7 @@ use super::{
 };
 use crate::rig::{
     Uid,
+    nearest::did_you_mean,
     scan::{Token, fields, tokens},
     template::quoted,
 };
@@ -88,6 +89,30 @@ pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<
         renamed(text, &places, names)
     });
     (bound, bad)
+}
+
+/// References as they stand in parameters, with the names that stand there: what errors should quote. Without names if
+/// they are not in the parameters.
+pub fn written_as(params: &str, references: &NodeRefs) -> String {
+    let mut found = references_in(params).filter(|found| found.references.as_ref() == Ok(references));
+    found.next().map_or_else(|| references.to_string(), |found| found.text)
+}
+
+/// What to say about uids of references that nothing has any more, as the rest of a sentence: the names that stand
+/// beside them in the parameters, and the nearest there are. Empty if there is nothing to say.
+pub fn nearest_to_gone(params: &str, references: &NodeRefs, names: &dyn Names) -> String {
+    let text = written_as(params, references);
+    let mut places = Vec::new();
+    let read = read_with(&text, None, &mut places);
+    let mut said = String::new();
+    for place in places.iter().filter(|place| read.is_ok() && !place.name.is_empty()) {
+        let Some(name) = unquoted(&text[place.name.clone()]) else { continue };
+        if names.name_of(place.kind, place.uid).is_none() {
+            let hint = did_you_mean(&name, names.all(NameScope::default(), place.kind));
+            said.push_str(&format!("; the {} \"{name}\" is gone{hint}", place.kind));
+        }
+    }
+    said
 }
 
 /// The parameters with every uid changed that is a string literal of its own (`group: "0123456789abcdef"`), not part of
