@@ -25,17 +25,27 @@ pub fn part() -> Writer {
 /// Controls and solvers for the four joints; the foot's control stands on `space`.
 pub fn tags(writer: &mut Writer, [thigh, shin, metatarsus, foot]: [&str; 4], space: &str) {
     let goal = "@command foot role:control";
-    let ik = "Leg IK";
+    let ik = "Leg";
     writer
-        .command(
+        .feature(thigh, "limb", ik)
+        .optional(
+            ik,
             thigh,
             "fk",
             "control",
             format!(
-                r#"(at: "@joint {thigh} + @joint {shin} + @joint {metatarsus} + @joint {foot}", shape: "circle", relative_size: 0.3)"#
+                r#"(at: "@joint {thigh} + @joint {shin} + @joint {metatarsus}", follow: false, shape: "circle", relative_size: 0.3)"#
             ),
         )
-        .feature(thigh, "ik", ik)
+        .optional(
+            ik,
+            thigh,
+            "fk_foot",
+            "control",
+            format!(
+                r#"(at: "@joint {foot}", parent: "@command fk role:control pick:END", follow: false, shape: "circle", relative_size: 0.3)"#
+            ),
+        )
         .optional(
             ik,
             thigh,
@@ -146,8 +156,15 @@ pub fn tags(writer: &mut Writer, [thigh, shin, metatarsus, foot]: [&str; 4], spa
             "reach",
             "ik_fk_switch",
             format!(
-                r#"(end: "@joint {metatarsus}", fk: "@command fk role:control pick:0,1,2", goal: "@command goal", pole: "@command plane", control: "{goal}", attribute: "ik_fk")"#
+                r#"(end: "@joint {metatarsus}", fk: "@command fk role:control ", goal: "@command goal", pole: "@command plane", control: "{goal}", attribute: "ik_fk")"#
             ),
+        )
+        .optional(
+            ik,
+            thigh,
+            "fk_sole",
+            "orient",
+            format!(r#"(node: "@joint {foot}", targets: "@command fk_foot role:control")"#),
         )
         .optional(
             ik,

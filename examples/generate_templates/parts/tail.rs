@@ -23,7 +23,7 @@ pub fn part() -> Writer {
 
 /// Controls, springs and a curve for the joint and the joints below it.
 pub fn tags(writer: &mut Writer, joint: &str) {
-    spring_chain::tags(writer, joint, "Tail Spring");
+    spring_chain::controls(writer, joint);
     let feature = "Tail Curve";
     let points = "@command points role:control";
     writer
@@ -49,7 +49,9 @@ pub fn tags(writer: &mut Writer, joint: &str) {
             "spline",
             "spline_ik",
             format!(
-                r#"(end: "@hierarchy this pick:END", points: "{points}", control: "@command fk role:control pick:START", weight: "curve")"#
+                r#"(start: "@command fk role:control pick:START", end: "@command fk role:control pick:END", points: "{points}", control: "@command fk role:control pick:START", weight: "curve")"#
             ),
         );
+    // What swings does so on top of the curve.
+    spring_chain::springs(writer, joint, "Tail Spring");
 }

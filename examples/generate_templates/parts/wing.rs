@@ -83,15 +83,31 @@ pub fn tags(writer: &mut Writer, side: &str, space: &str) {
     let [arm, forearm, hand] = ARM.map(|label| format!("{label}{side}"));
     let (arm, forearm, hand) = (arm.as_str(), forearm.as_str(), hand.as_str());
     let feathers: Vec<String> = FEATHERS.iter().map(|feather| format!("@joint {}{side}", feather.0)).collect();
-    let (first, ik) = ("@command fk role:control pick:START", "Wing IK");
+    let first = "@command fk role:control pick:START";
     writer
         .command(
             arm,
             "fk",
             "control",
-            format!(r#"(at: "@joint {arm} + @joint {forearm} + @joint {hand}", shape: "circle", relative_size: 0.25)"#),
+            format!(r#"(at: "@joint {arm} + @joint {forearm} + @joint {hand}", follow: false, shape: "circle", relative_size: 0.25)"#),
         )
         .command(arm, "feathers", "control", format!(r#"(at: "{}", shape: "pin", size: 0.05)"#, feathers.join(" + ")))
+        .command(
+            arm,
+            "hand",
+            "control",
+            format!(
+                r#"(at: "@joint {hand}", parent: "{space}", axes: rig, follow: false, shape: "cube", relative_size: 0.25, shape_axes: rig)"#
+            ),
+        )
+        .command(
+            arm,
+            "reach",
+            "ik_fk_switch",
+            format!(
+                r#"(end: "@joint {hand}", fk: "@command fk role:control", goal: "@command hand role:control", attribute: "ik_fk", default: 0.0, twist: "elbow_twist")"#
+            ),
+        )
         .feature(arm, "limb", "Fold")
         .optional("Fold", arm, "fold", "attribute", format!(r#"(node: "{first}", name: "fold", min: 0.0, max: 1.0)"#))
         .optional("Fold", arm, "fan", "attribute", format!(r#"(node: "{first}", name: "fan", min: -1.0, max: 1.0)"#));
@@ -119,24 +135,4 @@ pub fn tags(writer: &mut Writer, side: &str, space: &str) {
             ),
         );
     }
-    writer
-        .feature(arm, "ik", ik)
-        .optional(
-            ik,
-            arm,
-            "hand",
-            "control",
-            format!(
-                r#"(at: "@joint {hand}", parent: "{space}", axes: rig, follow: false, shape: "cube", relative_size: 0.25, shape_axes: rig)"#
-            ),
-        )
-        .optional(
-            ik,
-            arm,
-            "reach",
-            "ik_fk_switch",
-            format!(
-                r#"(end: "@joint {hand}", fk: "@command fk role:control", goal: "@command hand role:control", attribute: "ik_fk", default: 0.0, twist: "elbow_twist")"#
-            ),
-        );
 }

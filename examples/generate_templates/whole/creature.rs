@@ -42,17 +42,18 @@ pub fn chain(writer: &mut Writer, alias: &str, joints: &[&str], size: f32) {
     writer.command(first, alias, "control", format!("(at: \"{}\", shape: \"circle\", size: {size:?})", at.join(" + ")));
 }
 
-/// A limb of two bones with its foot: FK, and IK that a feature turns on.
+/// A limb of two bones with its foot, by IK and FK; all of it in a feature.
 pub fn limb(writer: &mut Writer, [upper, lower, end]: [&str; 3], feature: &str, size: f32) {
     let goal = "@command goal role:control";
     writer
-        .command(
+        .feature(upper, "limb", feature)
+        .optional(
+            feature,
             upper,
             "fk",
             "control",
-            format!("(at: \"@joint {upper} + @joint {lower} + @joint {end}\", shape: \"circle\", size: {size:?})"),
+            format!("(at: \"@joint {upper} + @joint {lower} + @joint {end}\", follow: false, shape: \"circle\", size: {size:?})"),
         )
-        .feature(upper, "ik", feature)
         .optional(
             feature,
             upper,

@@ -25,14 +25,13 @@ pub fn quadruped() -> Result<Writer, Failure> {
     w.part("tail", |w| tail::tags(w, "tail_1"));
     for side in ["_l", "_r"] {
         let name = |label: &str| format!("{label}{side}");
-        let label = |label: &str| name(label);
         w.part(&format!("eye{side}"), |w| {
-            eye::tags(w, &label("eye"), "@command neck role:control pick:END", [0.0, 0.0, 0.4])
+            eye::tags(w, &name("eye"), "@command neck role:control pick:END", [0.0, 0.0, 0.4])
         });
-        w.part(&format!("ear{side}"), |w| single_control::tags(w, &label("ear"), "pin"));
-        w.part(&format!("shoulder{side}"), |w| single_control::tags(w, &label("scapula"), "half_circle"));
+        w.part(&format!("ear{side}"), |w| single_control::tags(w, &name("ear"), "pin"));
+        w.part(&format!("shoulder{side}"), |w| single_control::tags(w, &name("scapula"), "half_circle"));
         w.part(&format!("front{side}"), |w| {
-            limb(w, [&name("upper_arm"), &name("forearm"), &name("carpus")], "Front Leg IK", 0.04);
+            limb(w, [&name("upper_arm"), &name("forearm"), &name("carpus")], "Front Leg", 0.04);
         });
         w.part(&format!("paw{side}"), |w| chain(w, "fk", &[&name("paw"), &name("fingers")], 0.03));
         w.part(&format!("hind{side}"), |w| {
