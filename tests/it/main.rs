@@ -6,6 +6,7 @@ mod cli;
 #[cfg(feature = "cli")]
 mod cli_build;
 mod commands;
+mod custom_module;
 #[cfg(feature = "draw")]
 mod display;
 #[cfg(feature = "draw")]
@@ -45,6 +46,7 @@ mod obj_materials;
 mod obj_torture;
 #[cfg(feature = "editor")]
 mod panels;
+mod parts_more;
 mod picking;
 mod placement;
 mod plugins;

@@ -1,7 +1,11 @@
 //! A tail: a control a joint, a curve through three controls, and lag.
 
-use super::super::writer::{CENTER, Writer};
-use super::spring_chain;
+use bevy::math::{Mat3, Quat, Vec3};
+
+use super::{
+    super::writer::{CENTER, Writer},
+    spring_chain,
+};
 
 /// The part alone.
 pub fn part() -> Writer {
@@ -16,9 +20,24 @@ pub fn part() -> Writer {
         ("tail_5", [0.0, 0.65, -0.72]),
         ("tail_6", [0.0, 0.58, -0.80]),
     ];
-    writer.group("tail", CENTER).chain("", &chain).orient();
+    writer.group("tail", CENTER).chain("", &chain);
+    turn(&mut writer, &chain.map(|(label, _)| label));
     writer.part("tail", |writer| tags(writer, "tail_1"));
     writer
+}
+
+/// Turns the joints of a tail: Y along it, X to the side all the way, so that turning about X lifts and lowers it.
+pub fn turn(writer: &mut Writer, labels: &[&str]) {
+    let place = |writer: &Writer, label: &str| writer.rig().find_label(label).map(|joint| writer.rig().position(joint));
+    let mut last = None;
+    for (number, label) in labels.iter().enumerate() {
+        let next = labels.get(number + 1).and_then(|next| place(writer, next));
+        let bone = next.zip(place(writer, label)).map(|(next, here)| next - here).or(last);
+        let Some(along) = bone.and_then(Vec3::try_normalize) else { continue };
+        last = Some(along);
+        let side = along.cross(Vec3::Y).normalize_or(Vec3::X);
+        writer.turn(label, Quat::from_mat3(&Mat3::from_cols(side, along, side.cross(along))).normalize());
+    }
 }
 
 /// Controls, springs and a curve for the joint and the joints below it.

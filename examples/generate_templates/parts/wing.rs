@@ -82,7 +82,6 @@ fn along(angle: f32, out: f32) -> Quat {
 pub fn tags(writer: &mut Writer, side: &str, space: &str) {
     let [arm, forearm, hand] = ARM.map(|label| format!("{label}{side}"));
     let (arm, forearm, hand) = (arm.as_str(), forearm.as_str(), hand.as_str());
-    let feathers: Vec<String> = FEATHERS.iter().map(|feather| format!("@joint {}{side}", feather.0)).collect();
     let first = "@command fk role:control pick:START";
     writer
         .command(
@@ -91,7 +90,6 @@ pub fn tags(writer: &mut Writer, side: &str, space: &str) {
             "control",
             format!(r#"(at: "@joint {arm} + @joint {forearm} + @joint {hand}", follow: false, shape: "circle", relative_size: 0.25)"#),
         )
-        .command(arm, "feathers", "control", format!(r#"(at: "{}", shape: "pin", size: 0.05)"#, feathers.join(" + ")))
         .command(
             arm,
             "hand",
@@ -111,6 +109,10 @@ pub fn tags(writer: &mut Writer, side: &str, space: &str) {
         .feature(arm, "limb", "Fold")
         .optional("Fold", arm, "fold", "attribute", format!(r#"(node: "{first}", name: "fold", min: 0.0, max: 1.0)"#))
         .optional("Fold", arm, "fan", "attribute", format!(r#"(node: "{first}", name: "fan", min: -1.0, max: 1.0)"#));
+    for (feather, ..) in FEATHERS {
+        let at = format!("@joint {feather}{side}");
+        writer.command(arm, feather, "control", format!(r#"(at: "{at}", shape: "pin", size: 0.05)"#));
+    }
     for (place, angle) in FOLD.iter().enumerate() {
         writer.optional(
             "Fold",
@@ -131,7 +133,7 @@ pub fn tags(writer: &mut Writer, side: &str, space: &str) {
             &format!("fold_{feather}"),
             "expression",
             format!(
-                r#"(text: "fold * {angle:?} + fan * (1 - fold) * {spread:?}", inputs: [(name: "fold", node: "{first}", attribute: "fold"), (name: "fan", node: "{first}", attribute: "fan")], output: "@command feathers role:offset pick:{place}", output_channel: RotateX)"#
+                r#"(text: "fold * {angle:?} + fan * (1 - fold) * {spread:?}", inputs: [(name: "fold", node: "{first}", attribute: "fold"), (name: "fan", node: "{first}", attribute: "fan")], output: "@command {feather} role:offset", output_channel: RotateX)"#
             ),
         );
     }

@@ -17,6 +17,7 @@ pub fn quadruped() -> Result<Writer, Failure> {
     for eye in ["eye_l", "eye_r"] {
         eye::forwards(&mut writer, eye);
     }
+    tail::turn(&mut writer, &["tail_1", "tail_2", "tail_3", "tail_4", "tail_5", "tail_6"]);
     let w = &mut writer;
     main(w, "hips", 0.35);
     chain(w, "trunk", &["spine_1", "spine_2", "chest"], 0.11);
