@@ -157,7 +157,10 @@ impl RigModule for ControlModule {
                 (None, Some(parent)) => Some(parent),
                 (None, None) => scope.parent(node),
             };
-            let control = self.make(scope, node, index, above)?;
+            // The control of the node right above, whose space is that of the node's own parent.
+            let parent_control =
+                upper.filter(|upper| scope.parent(node) == Some(nodes[*upper])).map(|upper| controls[upper]);
+            let control = self.make(scope, node, index, above, parent_control)?;
             controls.push(control);
         }
         Ok(())
@@ -206,6 +209,7 @@ impl ControlModule {
         node: NodeId,
         index: usize,
         above: Option<NodeId>,
+        upper: Option<NodeId>,
     ) -> Result<NodeId, ModuleError> {
         let place = match self.axes {
             ControlAxes::Node => scope.global(node),
@@ -234,22 +238,39 @@ impl ControlModule {
         };
         scope.set_control(control, data);
         if self.follow {
-            let offset = match self.axes {
-                ControlAxes::Node => Trs::IDENTITY,
-                ControlAxes::Rig => scope.global(node).relative_to(&place),
-            };
-            let constraint = Constraint::Transform {
-                driven: scope.uid(node),
-                targets: vec![Target { node: scope.uid(control), weight: Scalar::Value(1.0), offset }],
-                translate: [true; 3],
-                rotate: [true; 3],
-                scale: [self.follow_scale; 3],
-                weight: Scalar::Value(1.0),
-                keep_pose: false,
+            let constraint = match upper {
+                // A joint that may be driven together with the one above it, by inverse kinematics say, cannot follow in
+                // the rig's space: that would depend on where the one above ends up.
+                Some(upper) if self.axes == ControlAxes::Node && !self.follow_scale => Constraint::Relative {
+                    driven: scope.uid(node),
+                    source: scope.uid(control),
+                    space: scope.uid(upper),
+                    translate: true,
+                    rotate: true,
+                    weight: Scalar::Value(1.0),
+                },
+                _ => self.following(scope, node, control, place),
             };
             scope.constrain("follow", node, 0, constraint)?;
         }
         Ok(control)
+    }
+
+    /// The node stands where its control says, in the rig's space.
+    fn following(&self, scope: &mut BuildScope<'_>, node: NodeId, control: NodeId, place: Trs) -> Constraint {
+        let offset = match self.axes {
+            ControlAxes::Node => Trs::IDENTITY,
+            ControlAxes::Rig => scope.global(node).relative_to(&place),
+        };
+        Constraint::Transform {
+            driven: scope.uid(node),
+            targets: vec![Target { node: scope.uid(control), weight: Scalar::Value(1.0), offset }],
+            translate: [true; 3],
+            rotate: [true; 3],
+            scale: [self.follow_scale; 3],
+            weight: Scalar::Value(1.0),
+            keep_pose: false,
+        }
     }
 
     /// Where the shape lies in the control's space.

@@ -46,6 +46,7 @@ mod obj_materials;
 mod obj_torture;
 #[cfg(feature = "editor")]
 mod panels;
+mod parts;
 mod parts_more;
 mod picking;
 mod placement;

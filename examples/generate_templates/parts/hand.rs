@@ -151,7 +151,7 @@ fn finger(writer: &mut Writer, finger: &str, aside: f32, root: &str) {
     );
     // Fingertips that stay on what they touch.
     let tip = joint(3);
-    writer.switch(&tip, "hand", "fingers", &alias("tip"));
+    writer.switch("hand_l", "hand", "fingers", &alias("tip"));
     let switch = format!("fingers:{}", alias("tip"));
     writer.optional(
         &switch,

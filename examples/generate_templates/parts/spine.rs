@@ -58,7 +58,7 @@ pub fn tags(writer: &mut Writer, around: &Around) {
         ),
     );
     let at = "chest";
-    writer.feature(at, "ik", "ik").feature(at, "deform", "stretch");
+    writer.feature(at, "ik", "ik").switch(at, "ik", "ik", "stretch");
     writer.optional(
         "ik",
         at,
@@ -83,7 +83,7 @@ pub fn tags(writer: &mut Writer, around: &Around) {
          shape_scale: (1.0, 0.3, 1.0), creation: (name: \"chest_ik\"))",
     );
     writer.optional(
-        "stretch",
+        "ik:stretch",
         at,
         "stretch",
         "attribute",
