@@ -10,14 +10,15 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report, skin::load_rig};
 use crate::{
-    build::{locate, review},
+    build::{BuildError, BuildProblem, Builder, ModuleError, Modules, locate, review},
     files::{FileKind, LoadError, RealDisk, load_gestures, load_model, load_project, load_skin, read_capped},
     mesh::{
         adjacency::{edges, islands, weld},
         model::Model,
     },
     modules,
-    rig::{Rig, SourceError, template},
+    rig::{Rig, SourceError, Tag, TagKind, Uid, template},
+    solve::program::{CompileOptions, RigProgram},
 };
 
 /// Arguments of `rigsmith check`.
@@ -109,11 +110,35 @@ fn check(path: &Path) -> Result<Findings, Failure> {
 }
 
 fn problems_of_commands(path: &Path, rig: &Rig) -> Vec<SourceError> {
-    let problems = review(rig, &Arc::new(modules::all()));
+    let modules = Arc::new(modules::all());
+    let problems = review(rig, &modules);
     // It was read a moment ago; without the text everything is told of its beginning.
     let bytes = read_capped(&RealDisk, path, template::MAX_BYTES as u64).unwrap_or_default();
     let text = String::from_utf8_lossy(&bytes);
+    if problems.is_empty() {
+        return problem_of_program(rig, &modules, &text).into_iter().collect();
+    }
     problems.iter().map(|problem| locate(&text, problem)).collect()
+}
+
+/// What keeps a rig whose commands can all be built from moving, such as constraints that wait for each other by way of
+/// a parent; at the first command that it names.
+fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, text: &str) -> Option<SourceError> {
+    let built = Builder::build(rig, modules).ok()?;
+    let problem = RigProgram::compile(&built, &CompileOptions::default()).err()?.to_string();
+    let named = problem.split("command ").skip(1).filter_map(|rest| rest.get(..16)?.parse::<Uid>().ok());
+    let found = named.filter_map(|uid| rig.find_tag(uid)).next();
+    let Some((joint, Tag { uid, kind: TagKind::Command { module, .. }, .. })) = found else {
+        return Some(SourceError::at(text, 0, problem));
+    };
+    let error = BuildError {
+        command: *uid,
+        joint: joint.data.uid,
+        joint_label: joint.data.label.clone().unwrap_or_default(),
+        module: module.clone(),
+        problem: BuildProblem::Module(ModuleError::other(problem)),
+    };
+    Some(locate(text, &error))
 }
 
 fn remarks_on_model(model: &Model) -> Vec<String> {

@@ -397,8 +397,7 @@ fn check_tells_every_problem_of_a_template_with_its_place() {
     let text = ARM
         .replace("shape: \"circle\"", "shape: \"cirle\"")
         .replace("min: 0.0", "mini: 0.0")
-        .replace("\"insert_joints\"", "\"insert_joins\"")
-        .replace("(1.0, 90.0)", "(-1.0, 90.0)");
+        .replace("\"insert_joints\"", "\"insert_joins\"");
     fs::write(folder.path().join("bad.rig.ron"), &text).unwrap();
     let answer = rigsmith(folder.path(), &["check", "arm.rig.ron", "bad.rig.ron"]);
     assert_eq!(answer.code, 1, "{}", answer.out);
@@ -414,7 +413,8 @@ fn check_tells_every_problem_of_a_template_with_its_place() {
         (place("\"0000000000000020\""), "cirle"),
         (place("mini"), "mini"),
         (place("\"0000000000000023\""), "insert_joins"),
-        (place("\"0000000000000024\""), "keys"),
+        // Its driver is a control that could not be made.
+        (place("\"0000000000000024\""), "driver"),
     ];
     for ((line, column), words) in wanted {
         let told = answer.out.lines().find(|told| told.starts_with(&format!("bad.rig.ron:{line}:")));
@@ -430,6 +430,18 @@ fn check_tells_every_problem_of_a_template_with_its_place() {
         assert!((column..column + 6).contains(&(problem["column"].as_u64().unwrap() as usize)), "{problem}");
         assert!(problem["message"].as_str().unwrap().contains(words), "{problem}");
     }
+    // What builds and still cannot move is told, too: an arm that follows its control and is part of a chain that
+    // reaches for another one.
+    let circle = ARM.replace(
+        r#"Command(uid: "0000000000000024""#,
+        r#"Command(uid: "0000000000000025", module: "ik_handle", params: (start: "@joint root#0000000000000001",
+                    end: "@this", goal: "@command control#0000000000000020 role:control", prefer: (0.0, 0.0, 1.0))),
+                Command(uid: "0000000000000024""#,
+    );
+    fs::write(folder.path().join("circle.rig.ron"), &circle).unwrap();
+    let answer = rigsmith(folder.path(), &["check", "circle.rig.ron"]);
+    assert_eq!(answer.code, 1, "{}", answer.out);
+    assert!(answer.out.lines().any(|line| line.starts_with("circle.rig.ron:")), "{}", answer.out);
     // The bundled templates have none.
     let templates = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates");
     let mut open = vec![templates];
