@@ -77,6 +77,8 @@ impl RigModule for DrivenKey {
         ("output_channel", "Or the channel that is driven, on top of how they were built."),
         ("morph", "Or the name of the morph target whose weight is driven, on every mesh of the rig."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/driven_key.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/driven_key.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let driver = scope.read_number("driver", &self.driver, &self.driver_attribute, self.driver_channel)?;

@@ -69,6 +69,8 @@ impl RigModule for Expression {
         ("output_channel", "Or the channel that is driven, on top of how they were built."),
         ("morph", "Or the name of the morph target whose weight is driven, on every mesh of the rig."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/expression.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/expression.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let names: Vec<&str> = self.inputs.iter().map(|input| input.name.as_str()).collect();

@@ -124,6 +124,8 @@ impl RigModule for IkFkSwitch {
         ),
         ("creation", "Name, group and label of the nulls that stand on the forward controls for the joints."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let start = scope.resolve_one("start", &self.start)?;

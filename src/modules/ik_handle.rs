@@ -107,6 +107,8 @@ impl RigModule for IkHandle {
         ("iterations", "For fabrik and ccd: rounds at most, 1 to 1000."),
         ("tolerance", "For fabrik and ccd: distance from the goal that is near enough, as a share of the length."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_handle.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/ik_handle.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let start = scope.resolve_one("start", &self.start)?;

@@ -59,6 +59,8 @@ impl RigModule for Morph {
         ("keys", "Pairs of attribute and weight, attribute increasing; flat before the first and after the last."),
         ("ease", "The run between keys: Step, Linear or Smooth, without overshoot."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/morph.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/morph.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         if self.morph.trim().is_empty() {

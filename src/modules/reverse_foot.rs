@@ -122,6 +122,8 @@ impl RigModule for ReverseFoot {
         ("weight_control", "The control that carries that attribute; the foot's if left out."),
         ("creation", "Name, group and label of the pivots."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/reverse_foot.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/reverse_foot.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let ankle = scope.resolve_one("ankle", &self.ankle)?;

@@ -83,6 +83,8 @@ impl RigModule for SpaceSwitch {
         ("scale", "The scale follows the space."),
         ("creation", "Name, group and label of the null."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/space_switch.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/space_switch.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let control = scope.resolve_one("control", &self.control)?;

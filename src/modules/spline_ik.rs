@@ -74,6 +74,8 @@ impl RigModule for SplineIk {
         ),
         ("weight", "0 leaves the chain as it is, 1 follows the curve; a number or an attribute's name."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/spline_ik.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/spline_ik.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let start = scope.resolve_one("start", &self.start)?;

@@ -63,6 +63,8 @@ impl RigModule for Spring {
         ("rotate", "The direction lags in which the node's children lie."),
         ("control", "The control whose attributes the numbers may name; the first of the nodes if left out."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/spring.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/spring.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let nodes = scope.resolve_some("nodes", &self.nodes)?;

@@ -80,6 +80,8 @@ impl RigModule for Stretch {
         ("weight", "0 is no stretch, 1 all of it; a number or an attribute's name."),
         ("control", "The control whose attributes the numbers may name; the end if left out."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/stretch.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/stretch.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let start = scope.resolve_one("start", &self.start)?;

@@ -79,6 +79,8 @@ impl RigModule for Twist {
         ("counter", "Takes the twist back, wholly at the start of the bone: for upper arms and thighs."),
         ("creation", "Name, group and label of joints that are made."),
     ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/twist.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/twist.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let start = scope.resolve_one("start", &self.start)?;

@@ -39,6 +39,7 @@ mod journal_kill;
 mod layout;
 mod mirror;
 mod models;
+mod modules_nodes;
 mod modules_rigs;
 mod mutate;
 mod obj;
