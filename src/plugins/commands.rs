@@ -155,13 +155,11 @@ fn build_rigs(
 ) {
     let mut changed: Vec<(Entity, Vec<RigEdit>, bool)> = Vec::new();
     for message in edited.read() {
-        let entry = match changed.iter_mut().find(|(rig, ..)| *rig == message.rig) {
-            Some(entry) => entry,
-            None => {
-                changed.push((message.rig, Vec::new(), true));
-                changed.last_mut().unwrap_or_else(|| unreachable!())
-            }
-        };
+        let at = changed.iter().position(|(rig, ..)| *rig == message.rig).unwrap_or_else(|| {
+            changed.push((message.rig, Vec::new(), true));
+            changed.len() - 1
+        });
+        let entry = &mut changed[at];
         match &message.committed {
             Some(Committed::Done(step) | Committed::Redone(step)) => entry.1.extend(step.forward.iter().cloned()),
             Some(Committed::Undone(step)) => entry.1.extend(step.backward.iter().cloned()),

@@ -42,6 +42,11 @@ fn sound(mut rig: Rig) -> Rig {
     for joint in rig.pose().keys().copied().collect::<Vec<_>>() {
         rig.apply(&RigEdit::SetOffset(joint, None)).unwrap();
     }
+    for (node, values) in rig.attribute_values().clone() {
+        for name in values.keys() {
+            rig.apply(&RigEdit::SetAttributeValue(node, name.clone(), None)).unwrap();
+        }
+    }
     for pose in rig.stored_poses().to_vec() {
         rig.apply(&RigEdit::RemoveStoredPose(pose.uid)).unwrap();
     }
