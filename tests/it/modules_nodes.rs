@@ -357,6 +357,10 @@ fn controls_take_the_places_of_their_nodes_which_follow() {
                     && targets[0].node == control.uid
                     && (*translate, *rotate, *scale) == ([true; 3], [true; 3], [false; 3])
             }
+            // Below another one: as the control stands to that of the joint above.
+            Constraint::Relative { driven, source, translate, rotate, .. } => {
+                number > 0 && *driven == joint && *source == control.uid && *translate && *rotate
+            }
             _ => false,
         });
         assert!(follows, "{joint}");

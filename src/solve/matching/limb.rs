@@ -136,8 +136,9 @@ impl Limb<'_> {
         };
         let Some(bend) = direction(bend) else { return Ok(mid.translation) };
         let twist = solver.twist.as_ref().map_or(0.0, |twist| number(attempt, twist));
-        let bend = about(line, -twist.to_radians()) * bend;
-        Ok(mid.translation + bend * far)
+        // The twist turns the plane of the bend about the line, and with it what lies beside the line.
+        let on_line = root.translation + line * (mid.translation - root.translation).dot(line);
+        Ok(on_line + about(line, -twist.to_radians()) * (mid.translation - on_line + bend * far))
     }
 }
 
