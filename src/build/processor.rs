@@ -73,6 +73,10 @@ struct Command {
     loaded: Option<Result<Arc<dyn DynModule>, BuildProblem>>,
     active: bool,
     trace: Trace,
+    /// True if it looked for nodes when it ran last.
+    asks: bool,
+    /// The run in which it ran last.
+    ran_in: u32,
     due: Due,
     error: Option<BuildProblem>,
     micros: f32,
@@ -93,6 +97,10 @@ pub struct Builder {
     breakpoints: HashSet<Uid>,
     /// Whether something that can close a circle of constraints has changed, and from which place on.
     graph_changed: Option<u32>,
+    /// From which place on references may find other nodes than before.
+    structure_changed: Option<u32>,
+    /// Counts runs.
+    run: u32,
 }
 
 impl Builder {
@@ -110,6 +118,8 @@ impl Builder {
             failed: None,
             breakpoints: HashSet::new(),
             graph_changed: None,
+            structure_changed: None,
+            run: 0,
         }
     }
 
@@ -146,15 +156,24 @@ impl Builder {
             }
         }
         if aspect.is_structure() {
-            for number in 0..self.commands.len() as u32 {
-                if later(&self.world, number) && self.commands[number as usize].trace.asks() {
-                    self.mark(number, Due::Check);
-                }
-            }
+            let from = from.map_or(0, |from| from + 1);
+            self.structure_changed = Some(self.structure_changed.map_or(from, |before| before.min(from)));
         }
         if circles {
             let from = from.unwrap_or(0);
             self.graph_changed = Some(self.graph_changed.map_or(from, |before| before.min(from)));
+        }
+    }
+
+    /// Lets all commands that look for nodes look again, from where one of them may find others.
+    fn spread_structure(&mut self) {
+        let Some(from) = self.structure_changed.take() else { return };
+        for at in from as usize..self.list.len() {
+            let number = self.list[at];
+            let command = &self.commands[number as usize];
+            if command.due == Due::Nothing && command.asks {
+                self.mark(number, Due::Check);
+            }
         }
     }
 
@@ -279,6 +298,7 @@ impl Builder {
     /// fails. Executes only what has not been executed as things stand now.
     pub fn run_to(&mut self, place: usize) -> RunReport {
         let target = place.min(self.list.len()) as u32;
+        self.run = self.run.wrapping_add(1);
         let mut report = RunReport::default();
         let mut failed = None;
         while let Some(Reverse((place, number))) = self.due.peek().copied() {
@@ -372,12 +392,15 @@ impl Builder {
             }
         }
         let command = &mut self.commands[number as usize];
+        command.asks = trace.asks();
         command.trace = trace;
+        command.ran_in = self.run;
         if command.active {
             command.runs += 1;
             command.micros = started.elapsed().as_nanos() as f32 / 1000.0;
         }
         command.error = result.clone().err();
+        self.spread_structure();
         result
     }
 

@@ -23,6 +23,7 @@ impl Builder {
         self.rig = rig.uid();
         self.sync_joints(rig);
         self.sync_list(rig);
+        self.spread_structure();
     }
 
     /// Takes over one edit that was applied to the document since the last [`Builder::sync`]. What concerns one tag or
@@ -128,6 +129,8 @@ impl Builder {
                         loaded: None,
                         active,
                         trace: Trace::default(),
+                        asks: false,
+                        ran_in: 0,
                         due: Due::Nothing,
                         error: None,
                         micros: 0.0,

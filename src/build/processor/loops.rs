@@ -21,7 +21,12 @@ impl Builder {
         let mut constraints: Vec<(u32, u32, NodeId)> = Vec::new();
         for place in from..target {
             let number = self.list[place as usize];
-            let writes = self.commands[number as usize].trace.writes.iter();
+            let command = &self.commands[number as usize];
+            // What ran just now was looked at when it ran.
+            if command.ran_in == self.run {
+                continue;
+            }
+            let writes = command.trace.writes.iter();
             let own = writes.filter(|(_, aspect)| *aspect == Aspect::Constraint);
             constraints.extend(own.map(|(node, _)| (place, number, *node)));
         }
