@@ -76,9 +76,9 @@ pub struct BuildError {
     /// The joint that carries it.
     pub joint: Uid,
     /// The joint's label, or its uid where it has none.
-    pub joint_label: String,
+    pub joint_label: Box<str>,
     /// The module.
-    pub module: String,
+    pub module: Box<str>,
     /// What is wrong.
     pub problem: BuildProblem,
 }

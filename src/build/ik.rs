@@ -198,8 +198,7 @@ impl BuildScope<'_> {
         }
         for (number, (low, high)) in ik.limits.iter().enumerate().flat_map(|(n, axes)| axes.map(|axis| (n, axis))) {
             let (low, high) = (low.unwrap_or(f32::MIN), high.unwrap_or(f32::MAX));
-            // Also for NaN.
-            if !(low <= high) {
+            if low > high || low.is_nan() || high.is_nan() {
                 return Err(ModuleError::parameter(
                     "limits",
                     format!("those of joint {} go from {low} to {high}; write the lower angle first", number + 1),

@@ -347,8 +347,8 @@ impl Builder {
         BuildError {
             command: self.world.commands[number as usize],
             joint: command.joint,
-            joint_label: label.map_or_else(|| command.joint.to_string(), |label| label.to_string()),
-            module: command.module.to_string(),
+            joint_label: label.map_or_else(|| command.joint.to_string(), |label| label.to_string()).into(),
+            module: (*command.module).into(),
             problem,
         }
     }

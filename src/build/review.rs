@@ -22,8 +22,8 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
                 problems.push(BuildError {
                     command: tag.uid,
                     joint: joint.data.uid,
-                    joint_label: joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()),
-                    module: module.clone(),
+                    joint_label: joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()).into(),
+                    module: module.as_str().into(),
                     problem,
                 });
                 off.push((joint.data.uid, tag.clone()));

@@ -134,8 +134,8 @@ fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, text: &str) -> Option<S
     let error = BuildError {
         command: *uid,
         joint: joint.data.uid,
-        joint_label: joint.data.label.clone().unwrap_or_default(),
-        module: module.clone(),
+        joint_label: joint.data.label.clone().unwrap_or_default().into(),
+        module: module.as_str().into(),
         problem: BuildProblem::Module(ModuleError::other(problem)),
     };
     Some(locate(text, &error))

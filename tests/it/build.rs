@@ -267,7 +267,7 @@ fn a_failing_command_halts_the_build_where_it_is() {
     builder.touch(&rig, &bad);
     let report = builder.run_all();
     let error = report.error.unwrap();
-    assert_eq!((error.command, error.joint, error.module.as_str()), (Uid(103), Uid(2), "nudge"));
+    assert_eq!((error.command, error.joint, &*error.module), (Uid(103), Uid(2), "nudge"));
     let text = error.to_string();
     assert!(text.contains("j2") && text.contains("@module mrak") && text.contains("mark"), "{text}");
     assert_eq!(builder.cursor(), 2);

@@ -7,9 +7,7 @@ use proptest::prelude::*;
 use rigsmith::plugins::document::{EditRequest, Edited, RigBundle};
 use rigsmith::rig::{
     EditError, GroupData, JointData, Rig, RigEdit, Tag, TagKind, Uid, UidSource,
-    feature::{
-        FeatureError, FeatureKey, FeatureKind, FeatureKinds, FeatureState, combined_features, features_named, is_active,
-    },
+    feature::{FeatureKey, FeatureKind, FeatureKinds, FeatureState, combined_features, features_named, is_active},
     operations::{
         Operation, OperationError, Outcome, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
     },
@@ -280,7 +278,7 @@ fn features_of_one_kind_and_name_in_one_group_act_as_one() {
     for (error, says) in [
         (desk.refused(TagOperation::SetSwitch(left, "sotf".into(), true)), "did you mean \"soft\"?"),
         (desk.refused(TagOperation::SetFeature(key(Some(RIGHT), "fk"), true)), "\"IK arm\" of kind \"fk\""),
-        (FeatureError::from(features_named(&desk.rig, "IK amr").unwrap_err()).into(), "did you mean \"IK arm\"?"),
+        (features_named(&desk.rig, "IK amr").unwrap_err().into(), "did you mean \"IK arm\"?"),
     ] {
         assert!(error.to_string().contains(says), "{error}");
     }

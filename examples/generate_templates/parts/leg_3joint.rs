@@ -127,9 +127,7 @@ pub fn tags(writer: &mut Writer, [thigh, shin, metatarsus, foot]: [&str; 4], spa
             thigh,
             "hock",
             "control",
-            format!(
-                r#"(at: "@command lean", parent: "@command lean", offset_group: false, follow: false, shape: "ring_arrows", relative_size: 0.5, shape_axes: control, channels: (translate: (false, false, false), scale: (false, false, false)))"#
-            ),
+            r#"(at: "@command lean", parent: "@command lean", offset_group: false, follow: false, shape: "ring_arrows", relative_size: 0.5, shape_axes: control, channels: (translate: (false, false, false), scale: (false, false, false)))"#.to_owned(),
         )
         .optional(
             ik,

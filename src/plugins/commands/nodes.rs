@@ -79,12 +79,8 @@ pub(super) fn follow_nodes(
     for (rig_entity, rig, built, joints, tags, known) in &mut rigs {
         let mut own = BuiltEntities::default();
         let is_new = known.is_none();
-        let mut found;
         let known: &mut BuiltEntities = match known {
-            Some(known) => {
-                found = known.into_inner();
-                &mut found
-            }
+            Some(known) => known.into_inner(),
             None => &mut own,
         };
         let alive: HashSet<Uid> =

@@ -84,13 +84,9 @@ pub(super) fn follow_tags(
 ) {
     for (rig_entity, rig, joints, known) in &mut rigs {
         let mut own = TagEntities::default();
-        let mut found;
         let is_new = known.is_none();
         let known: &mut TagEntities = match known {
-            Some(known) => {
-                found = known.into_inner();
-                &mut found
-            }
+            Some(known) => known.into_inner(),
             None => &mut own,
         };
         let mut seen: HashSet<Uid> = HashSet::new();

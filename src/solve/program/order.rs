@@ -54,9 +54,9 @@ pub(super) fn sort(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
     let count = graph.steps.len();
     let mut waits = vec![0; count];
     let mut after: Vec<Vec<u32>> = vec![Vec::new(); count];
-    for at in 0..count {
+    for (at, waits) in waits.iter_mut().enumerate() {
         for before in wires.before(at) {
-            waits[at] += 1;
+            *waits += 1;
             after[before].push(at as u32);
         }
     }
@@ -166,12 +166,12 @@ pub(super) fn split_fixed(graph: &mut Graph<'_>, numbers: &[N]) -> Vec<Step> {
     graph.inputs.iter().for_each(|X(register)| moves[*register as usize] = true);
     numbers.iter().for_each(|N(register)| moves[transforms + *register as usize] = true);
     let mut changes = vec![false; graph.steps.len()];
-    for at in 0..graph.steps.len() {
+    for (at, change) in changes.iter_mut().enumerate() {
         // A spring moves by itself.
-        changes[at] = wires.is_posed[at]
+        *change = wires.is_posed[at]
             || matches!(graph.steps[at].op, super::op::Op::Spring(_))
             || wires.reads[at].iter().any(|register| moves[*register]);
-        if changes[at] {
+        if *change {
             let tables = &mut graph.tables;
             graph.steps[at].op.visit(tables, |operand| match operand {
                 Operand::WriteX(X(register)) => moves[*register as usize] = true,
