@@ -9,11 +9,9 @@
 //! `everything` goes from sampled values (written to the poses of controls, as curves do) over programs, propagation and
 //! joints in the world to skinning matrices. Joints per microsecond are what Bevy's example `many_foxes` is compared by.
 
-#[path = "runtime/biped.rs"]
-mod biped;
-
 use std::{
     hint::black_box,
+    path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -26,9 +24,12 @@ use bevy::{
 };
 use rayon::prelude::*;
 use rigsmith::{
+    build::Builder,
+    files::{RealDisk, load_template},
+    modules,
     plugins::runtime::{ControlPose, InstanceMode, NodeSlot, RigRuntime, RuntimeNodeOf, RuntimePlugin, spawn_instance},
-    rig::{NodeType, PoseOffset},
-    solve::program::{CompileOptions, Exposed, Keep, Memory, RigProgram, RigState},
+    rig::{BuiltRig, NodeType, PoseOffset},
+    solve::program::{CompileOptions, Exposed, Keep, LANES, Memory, RigProgram, RigState},
 };
 
 /// Instances in a crowd.
@@ -41,7 +42,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
     let only = arguments.iter().position(|a| a == "--only").and_then(|i| arguments.get(i + 1));
     let wanted = |name: &str| only.is_none_or(|only| only == name);
-    let rig = biped::biped();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates/biped.rig.ron");
+    let rig = Builder::build(&load_template(&RealDisk, &path)?.rig, &Arc::new(modules::all()))?;
     let compile = |keep| RigProgram::compile(&rig, &CompileOptions { keep, ..CompileOptions::default() }).map(Arc::new);
     let all = compile(Keep::All)?;
     let game = compile(Keep::DeformAndExposed(vec![Exposed::Controls]))?;
@@ -61,23 +63,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         note("compile_us", timed(20, |_| drop(black_box(compile(Keep::All)))).map(|time| time * 1e6));
     }
     if wanted("one") {
-        let labels = ["arm_L_goal", "leg_R_goal", "finger_control_L_1_1", "head_control", "cog", "root"];
-        for label in labels {
+        for name in ["hand_ik_l", "foot_ik_r", "index_l", "head", "torso", "root"] {
             let mut state = RigState::new(Arc::clone(&all));
             state.evaluate(0.0);
-            let slot = all.find_label(label).ok_or("no such control")?;
+            let slot = slot(&rig, &all, name).ok_or("no such control")?;
             let times = timed(2000, |frame| {
                 state.set_offset_at(slot, sample(frame, 3));
                 state.evaluate(0.0);
             });
-            note(&format!("one_control_us {label}"), times.map(|time| time * 1e6));
+            note(&format!("one_control_us {name}"), times.map(|time| time * 1e6));
         }
     }
     if wanted("editor") {
         let mut app = app();
         let entity = app.world_mut().spawn(Transform::IDENTITY).id();
         spawn_instance(app.world_mut(), entity, &all, InstanceMode::Hierarchy);
-        let slot = all.find_label("arm_L_goal").ok_or("no such control")?;
+        let slot = slot(&rig, &all, "hand_ik_l").ok_or("no such control")?;
         let control =
             app.world().get::<RigRuntime>(entity).and_then(|runtime| runtime.entity(slot)).ok_or("no entity")?;
         for _ in 0..3 {
@@ -94,6 +95,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if wanted("programs") {
         let mut states: Vec<RigState> =
             (0..CROWD).map(|_| RigState::with_memory(Arc::clone(&game), Memory::Results)).collect();
+        let together = |states: &mut [RigState]| {
+            let mut states = states.iter_mut();
+            RigState::evaluate_together(std::array::from_fn(|_| states.next()), 0.016);
+        };
         let programs = |parallel: bool, states: &mut Vec<RigState>| {
             let mut times = Vec::new();
             for frame in 0..FRAMES {
@@ -104,13 +109,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 }
                 let start = Instant::now();
                 if parallel {
-                    states.par_iter_mut().for_each(|state| {
-                        state.evaluate(0.016);
-                    });
+                    states.par_chunks_mut(LANES).for_each(together);
                 } else {
-                    states.iter_mut().for_each(|state| {
-                        state.evaluate(0.016);
-                    });
+                    states.chunks_mut(LANES).for_each(together);
                 }
                 times.push(start.elapsed());
             }
@@ -143,9 +144,15 @@ fn sample(frame: usize, control: usize) -> PoseOffset {
     PoseOffset { translation: moved, rotation: Quat::from_rotation_x(angle), scale: Vec3::ONE }
 }
 
-/// Slots that are posed.
+/// Slots of the controls.
 fn controls(program: &RigProgram) -> Vec<usize> {
-    (0..program.nodes().len()).filter(|slot| program.nodes()[*slot].is_posable()).collect()
+    (0..program.nodes().len()).filter(|slot| program.nodes()[*slot].kind == NodeType::Control).collect()
+}
+
+/// The slot of the first control with that name.
+fn slot(rig: &BuiltRig, program: &RigProgram, name: &str) -> Option<usize> {
+    let node = rig.nodes.iter().find(|node| node.kind == NodeType::Control && *node.name == *name)?;
+    program.node(node.uid)
 }
 
 fn app() -> App {

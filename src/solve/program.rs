@@ -32,7 +32,7 @@ use std::{
 pub use cache::ProgramCache;
 pub use error::{ProgramError, StateError};
 pub use hash::ContentHash;
-pub use state::{Memory, RigState};
+pub use state::{LANES, Memory, RigState};
 
 use self::{
     graph::{Driven, Graph, Step},
@@ -152,6 +152,8 @@ pub struct RigProgram {
     inputs: Vec<Uid>,
     poses: usize,
     ops: Vec<Op>,
+    /// How many of the first operations depend on attributes only: what people set once rather than animate.
+    settings: usize,
     tables: Tables,
     /// Registers before the first run. Transforms: the rig's space, nodes by slot, inputs, others; numbers: attributes,
     /// morph targets, others.
@@ -234,6 +236,9 @@ impl RigProgram {
         order::prune(&mut graph, &results, &numbers);
         let fixed = order::split_fixed(&mut graph, &settable);
         run_fixed(&mut graph, &fixed);
+        let settled = order::split_fixed(&mut graph, &[]);
+        let settings = settled.len();
+        graph.steps.splice(0..0, settled);
 
         let mut numbering = Numbering::new(&mut graph);
         for register in results.iter().chain(&graph.inputs) {
@@ -267,6 +272,7 @@ impl RigProgram {
             inputs: options.inputs.iter().map(|input| input.uid).collect(),
             poses: 0,
             ops: graph.steps.iter().map(|step| step.op).collect(),
+            settings,
             tables: std::mem::take(&mut graph.tables),
             x: Vec::new(),
             n: Vec::new(),

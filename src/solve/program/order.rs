@@ -158,7 +158,7 @@ pub(super) fn prune(graph: &mut Graph<'_>, results: &[X], numbers: &[N]) {
     });
 }
 
-/// Splits off the operations that depend on no input: those come first and are never run again.
+/// Splits off the operations that depend on no input, on no pose, and on none of those numbers.
 pub(super) fn split_fixed(graph: &mut Graph<'_>, numbers: &[N]) -> Vec<Step> {
     let transforms = graph.x.len();
     let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, graph.n.len());

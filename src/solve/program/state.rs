@@ -75,6 +75,9 @@ pub struct RigState {
     moved: Vec<u64>,
 }
 
+/// Instances that one thread runs in step; see [`RigState::evaluate_together`].
+pub const LANES: usize = 4;
+
 /// Registers and memory that instances of a thread share.
 #[derive(Default)]
 struct Workspace {
@@ -82,11 +85,62 @@ struct Workspace {
     serial: u64,
     x: Vec<Trs>,
     n: Vec<f32>,
+    /// Of the instance that runs, in one piece near the registers: instances lie far apart in memory.
+    poses: Vec<PoseOffset>,
     scratch: Scratch,
 }
 
+impl Workspace {
+    /// Takes up what an instance puts in, and returns the first operation to run: what depends on attributes only
+    /// stands as it is where the instance before had the same ones.
+    fn take(&mut self, state: &RigState) -> usize {
+        let program = &state.program;
+        let mut is_same = self.serial == program.serial;
+        if !is_same {
+            self.x.clone_from(&program.x);
+            self.n.clone_from(&program.n);
+            self.serial = program.serial;
+        }
+        let nodes = program.nodes.len() + 1;
+        self.x[nodes..state.x.len()].copy_from_slice(&state.x[nodes..]);
+        for ((attribute, known), value) in program.attributes.iter().zip(&mut self.n).zip(&state.n) {
+            if attribute.is_settable && known.to_bits() != value.to_bits() {
+                *known = *value;
+                is_same = false;
+            }
+        }
+        self.poses.clear();
+        self.poses.extend_from_slice(&state.poses);
+        if is_same { program.settings } else { 0 }
+    }
+
+    /// Hands an instance what came of it.
+    fn give(&self, state: &mut RigState) {
+        let nodes = state.program.nodes.len() + 1;
+        state.x[..nodes].copy_from_slice(&self.x[..nodes]);
+        let numbers = state.n.len();
+        state.n.copy_from_slice(&self.n[..numbers]);
+        state.settle();
+        state.moved.fill(u64::MAX);
+    }
+
+    fn machine<'a>(&'a mut self, state: &'a mut RigState, dt: f32) -> Machine<'a, false> {
+        Machine {
+            tables: &state.program.tables,
+            x: &mut self.x,
+            n: &mut self.n,
+            poses: &self.poses,
+            springs: &mut state.springs,
+            scratch: &mut self.scratch,
+            dt,
+            changed: false,
+            moved: &mut [],
+        }
+    }
+}
+
 thread_local! {
-    static WORKSPACE: RefCell<Workspace> = RefCell::default();
+    static WORKSPACES: RefCell<[Workspace; LANES]> = RefCell::default();
 }
 
 impl RigState {
@@ -240,18 +294,66 @@ impl RigState {
     /// The results are the same bits whatever was evaluated before, and whichever of the instance's inputs changed.
     /// Does not allocate once each thread has evaluated the program.
     pub fn evaluate(&mut self, dt: f32) -> bool {
-        let dt = if dt > 0.0 && dt.is_finite() { dt } else { 0.0 };
+        let dt = elapsed(dt);
         if !self.is_dirty(dt) {
             return false;
         }
-        self.moved.fill(0);
-        WORKSPACE.with_borrow_mut(|workspace| match self.memory {
-            Memory::Whole => self.evaluate_whole(dt, &mut workspace.scratch),
-            Memory::Results => self.evaluate_results(dt, workspace),
+        WORKSPACES.with_borrow_mut(|[workspace, ..]| match self.memory {
+            Memory::Whole => {
+                self.moved.fill(0);
+                self.evaluate_whole(dt, &mut workspace.scratch);
+                self.settle();
+            }
+            Memory::Results => {
+                let first = workspace.take(self);
+                let program = Arc::clone(&self.program);
+                let mut machine = workspace.machine(self, dt);
+                program.ops[first..].iter().for_each(|op| machine.run(op));
+                workspace.give(self);
+            }
         });
+        true
+    }
+
+    /// As [`evaluate`](Self::evaluate), for several instances; true for those that ran.
+    ///
+    /// Instances of one program that remember [`Memory::Results`] run in step, one operation for all of them before the
+    /// next: joints of a chain wait for each other, joints of other instances do not, so that a processor has more to
+    /// do at once. The results are the same bits as of instances that run alone.
+    pub fn evaluate_together(mut states: [Option<&mut Self>; LANES], dt: f32) -> [bool; LANES] {
+        let dt = elapsed(dt);
+        let serial = states[0].as_ref().map(|state| state.program.serial);
+        let is_alike = states.iter().flatten().all(|state| {
+            state.memory == Memory::Results && Some(state.program.serial) == serial && state.is_dirty(dt)
+        });
+        let [Some(a), Some(b), Some(c), Some(d)] = &mut states else {
+            return states.map(|state| state.is_some_and(|state| state.evaluate(dt)));
+        };
+        if !is_alike {
+            return [a, b, c, d].map(|state| state.evaluate(dt));
+        }
+        WORKSPACES.with_borrow_mut(|[wa, wb, wc, wd]| {
+            let program = Arc::clone(&a.program);
+            let first = [wa.take(a), wb.take(b), wc.take(c), wd.take(d)];
+            let mut machines = [wa.machine(a, dt), wb.machine(b, dt), wc.machine(c, dt), wd.machine(d, dt)];
+            for (machine, first) in machines.iter_mut().zip(first) {
+                program.ops[first..program.settings].iter().for_each(|op| machine.run(op));
+            }
+            for op in &program.ops[program.settings..] {
+                machines.iter_mut().for_each(|machine| machine.run(op));
+            }
+            wa.give(a);
+            wb.give(b);
+            wc.give(c);
+            wd.give(d);
+        });
+        [true; LANES]
+    }
+
+    /// Notes that results fit the inputs.
+    fn settle(&mut self) {
         self.any_dirty = false;
         self.all_dirty = false;
-        true
     }
 
     fn evaluate_whole(&mut self, dt: f32, scratch: &mut Scratch) {
@@ -288,36 +390,6 @@ impl RigState {
                 }
             }
         }
-    }
-
-    fn evaluate_results(&mut self, dt: f32, workspace: &mut Workspace) {
-        let Self { program, x, n, poses, springs, moved, .. } = self;
-        let Workspace { serial, x: whole_x, n: whole_n, scratch } = workspace;
-        if *serial != program.serial {
-            whole_x.clone_from(&program.x);
-            whole_n.clone_from(&program.n);
-            *serial = program.serial;
-        }
-        let nodes = program.nodes.len() + 1;
-        whole_x[nodes..x.len()].copy_from_slice(&x[nodes..]);
-        whole_n[..n.len()].copy_from_slice(n);
-        let tables = &program.tables;
-        let mut machine = Machine::<false> {
-            tables,
-            x: whole_x,
-            n: whole_n,
-            poses,
-            springs,
-            scratch,
-            dt,
-            changed: false,
-            moved: &mut [],
-        };
-        program.ops.iter().for_each(|op| machine.run(op));
-        x[..nodes].copy_from_slice(&whole_x[..nodes]);
-        let numbers = n.len();
-        n.copy_from_slice(&whole_n[..numbers]);
-        moved.fill(u64::MAX);
     }
 
     /// Where a node is; `None` if the program does not have it.
@@ -390,6 +462,11 @@ impl RigState {
             *out = globals[*joint as usize].affine() * *bind;
         }
     }
+}
+
+/// Seconds that count.
+fn elapsed(dt: f32) -> f32 {
+    if dt > 0.0 && dt.is_finite() { dt } else { 0.0 }
 }
 
 /// Sets bits.
