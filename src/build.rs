@@ -23,6 +23,7 @@ mod review;
 mod scope;
 mod signal;
 mod snapshot;
+mod told;
 mod world;
 
 pub use amount::Amount;

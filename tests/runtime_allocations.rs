@@ -1,6 +1,6 @@
 //! Running rigs takes no memory once they are warm. A binary of its own: it counts what the whole process allocates.
 
-#[path = "../benches/runtime/biped.rs"]
+#[path = "it/runtime/biped.rs"]
 mod biped;
 
 use std::{alloc::System, sync::Arc};

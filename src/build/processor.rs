@@ -14,7 +14,7 @@ use super::{
     BuildError, BuildProblem, BuildRange, BuildScope, DynModule, ListEntry, ModuleError, Modules,
     resolve::Asker,
     scope::Trace,
-    snapshot,
+    snapshot, told,
     world::{Aspect, NOWHERE, NodeId, Value, World, same},
 };
 use crate::rig::{BuiltRig, Rig, Uid};
@@ -414,7 +414,10 @@ impl Builder {
         let module = loaded.clone()?;
         let name = command.module.clone();
         let mut scope = BuildScope { world: &mut self.world, trace, asker, command: number, module: name };
-        module.construct(&mut scope)?;
+        if let Err(problem) = module.construct(&mut scope) {
+            let params = &self.commands[number as usize].params;
+            return Err(told::as_written(problem, params, &self.world, asker.place));
+        }
         let made = trace.writes.iter().filter(|(_, aspect)| *aspect == Aspect::Constraint);
         let made: Vec<NodeId> = made.map(|(node, _)| *node).collect();
         for constraint in made {

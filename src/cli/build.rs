@@ -89,8 +89,10 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
         report.set("error", error.to_string());
         return Ok(report);
     }
+    // Also without a file: what cannot run, a circle through parents for one, is no rig.
+    let posed = posed(&rig, &built)?;
     if let Some(output) = &args.output {
-        let notes = write(args, output, &rig, &built, &mut report)?;
+        let notes = write(args, output, &rig, &built, &posed, &mut report)?;
         report.notes(notes);
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -189,13 +191,13 @@ fn write(
     output: &Output,
     rig: &Rig,
     built: &BuiltRig,
+    posed: &[Trs],
     report: &mut Report,
 ) -> Result<Vec<String>, Failure> {
     let skeleton = baked(rig, built);
     if FileKind::of(output) == Some(FileKind::Template) {
         return Ok(store_rig(&RealDisk, output, &skeleton)?);
     }
-    let posed = posed(rig, built)?;
     let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
     // Readers know joints by the skins that they are in, also where nothing is skinned.
     let bare = SkinBinding {
@@ -214,7 +216,7 @@ fn write(
         skin::describe_weights(report, &weights);
     }
     let mut model = bench.character();
-    pose(&mut model, &joints, built, &posed);
+    pose(&mut model, &joints, built, posed);
     if args.mesh.is_none() && !joints.is_empty() {
         model.skins = vec![bare];
     }

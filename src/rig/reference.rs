@@ -195,28 +195,10 @@ impl NodeTypes {
     pub const CONTROL: Self = Self(1 << 1);
     /// Nodes that only carry others.
     pub const NULL: Self = Self(1 << 2);
-    /// Constraints.
-    pub const CONSTRAINT: Self = Self(1 << 3);
-    /// Curves.
-    pub const CURVE: Self = Self(1 << 4);
-    /// Layers.
-    pub const LAYER: Self = Self(1 << 5);
-    /// Attributes of controls.
-    pub const ATTRIBUTE: Self = Self(1 << 6);
-    /// Handles of inverse kinematics.
-    pub const HANDLE: Self = Self(1 << 7);
 
     /// Every kind with its name in the text form.
-    pub const NAMES: [(&'static str, Self); 8] = [
-        ("joint", Self::JOINT),
-        ("control", Self::CONTROL),
-        ("null", Self::NULL),
-        ("constraint", Self::CONSTRAINT),
-        ("curve", Self::CURVE),
-        ("layer", Self::LAYER),
-        ("attribute", Self::ATTRIBUTE),
-        ("handle", Self::HANDLE),
-    ];
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("joint", Self::JOINT), ("control", Self::CONTROL), ("null", Self::NULL)];
 
     /// The kinds of both sets. (The empty set adds nothing.)
     pub const fn with(self, other: Self) -> Self {

@@ -5,6 +5,7 @@
 //! shortest rotation from bone to bone (parallel transport), so they never flip, and twist is added on top.
 
 use bevy::math::{Quat, Vec3};
+use wide::f32x4;
 
 use crate::solve::rotate::{about, arc, between_frames, direction, perpendicular_or_any};
 
@@ -124,25 +125,46 @@ impl ArcTable {
             return Self { lengths };
         }
         let width = 1.0 / STEPS as f32;
+        let off = 0.5 * width * 0.774_596_7;
         let segments = spline.points.len() - 1;
+        let segment_at = |t: f32| ((t * segments as f32) as usize).min(segments - 1);
         let (mut segment, mut slopes) = (0, spline.slopes(0));
-        let mut speed = |t: f32| {
-            let along = t * segments as f32;
-            let at = (along as usize).min(segments - 1);
-            if at != segment {
-                (segment, slopes) = (at, spline.slopes(at));
+        for first in (0..STEPS).step_by(4) {
+            let middles = [0.5, 1.5, 2.5, 3.5].map(|step| (first as f32 + step) * width);
+            let mut means = [0.0; 4];
+            let at = segment_at(middles[0] - off);
+            if at == segment_at(middles[3] + off) {
+                if at != segment {
+                    (segment, slopes) = (at, spline.slopes(at));
+                }
+                let middles = f32x4::from(middles);
+                let [before, middle, after] = [middles - off, middles, middles + off].map(|t| {
+                    let along = t * segments as f32 - at as f32;
+                    let [x, y, z] = [0, 1, 2].map(|axis| {
+                        let [constant, linear, square] = slopes.map(|slope| slope[axis]);
+                        (along * square + linear) * along + constant
+                    });
+                    (x * x + y * y + z * z).sqrt()
+                });
+                means = ((before + after) * 5.0 + middle * 8.0).to_array();
+            } else {
+                // Steps on both sides of a control point.
+                for (mean, middle) in means.iter_mut().zip(middles) {
+                    let [before, middle, after] = [middle - off, middle, middle + off].map(|t| {
+                        let at = segment_at(t);
+                        if at != segment {
+                            (segment, slopes) = (at, spline.slopes(at));
+                        }
+                        let along = t * segments as f32 - at as f32;
+                        (slopes[0] + (slopes[1] + slopes[2] * along) * along).length()
+                    });
+                    *mean = 5.0 * (before + after) + 8.0 * middle;
+                }
             }
-            let t = along - at as f32;
-            let speed = (slopes[0] + (slopes[1] + slopes[2] * t) * t).length();
-            if speed.is_finite() { speed } else { 0.0 }
-        };
-        for i in 0..STEPS {
-            let middle = (i as f32 + 0.5) * width;
-            let off = 0.5 * width * 0.774_596_7;
-            // In order, so that a segment is looked up once.
-            let [before, at, after] = [middle - off, middle, middle + off].map(&mut speed);
-            let mean = (5.0 * (before + after) + 8.0 * at) / 18.0;
-            lengths[i + 1] = lengths[i] + mean * width;
+            for (step, mean) in means.into_iter().enumerate() {
+                let length = mean * (width / 18.0);
+                lengths[first + step + 1] = lengths[first + step] + if length.is_finite() { length } else { 0.0 };
+            }
         }
         Self { lengths }
     }

@@ -111,6 +111,11 @@ pub fn multiply(parent: &Trs, child: &Trs) -> Trs {
 pub fn relative(parent: &Trs, transform: &Trs) -> Trs {
     let back = parent.rotation.conjugate();
     let moved = back * (transform.translation - parent.translation);
+    // Most parents are as large as they were: dividing by one changes no bit.
+    if parent.scale == Vec3::ONE {
+        let rotation = (back * transform.rotation).normalize();
+        return Trs { translation: moved, rotation, scale: transform.scale };
+    }
     Trs {
         translation: divide(moved, parent.scale, Vec3::ZERO),
         rotation: (back * transform.rotation).normalize(),

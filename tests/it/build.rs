@@ -292,6 +292,11 @@ fn errors_say_what_to_do() {
         ("mark", "(up: true)", &["line 1, column 5"]),
         ("mark", "(up: 11.0)", &["up", "from 0 to 10"]),
         ("mark", r#"(at: "@joint #00000000000000ff")"#, &["at", "no joint 00000000000000ff", "deleted"]),
+        (
+            "mark",
+            r#"(at: "@joint jj2#00000000000000ff")"#,
+            &["@joint jj2#00000000000000ff", "the joint \"jj2\" is gone; did you mean \"j2\""],
+        ),
         ("mark", r#"(at: "@none")"#, &["at", "is needed"]),
         ("mark", r#"(at: "@any rig:#0000000000000bad")"#, &["another rig", "merge"]),
         ("follow", r#"(node: "@joints", targets: "@this")"#, &["node", "3 nodes (j1, j2, j3)", "pick:START"]),

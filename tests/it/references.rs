@@ -190,7 +190,7 @@ fn places_are_counted_from_zero_and_taken_once() {
     }
     let both = NodeTypes::JOINT | NodeType::Null.into();
     assert!(
-        both.allows(NodeTypes::NULL) && !both.allows(NodeTypes::CONTROL) && NodeTypes::ANY.allows(NodeTypes::CURVE)
+        both.allows(NodeTypes::NULL) && !both.allows(NodeTypes::CONTROL) && NodeTypes::ANY.allows(NodeTypes::CONTROL)
     );
 }
 

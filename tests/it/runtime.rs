@@ -1,6 +1,5 @@
 //! Programs of built rigs: what constraints do, in which order, what is refused, and that what is skipped does not show.
 
-#[path = "../../benches/runtime/biped.rs"]
 pub mod biped;
 mod constraints;
 mod programs;

@@ -1,6 +1,6 @@
 //! Tags, features and parts: every operation does what it says, and is taken back to the bit.
 
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
 use bevy::prelude::*;
 use proptest::prelude::*;
@@ -8,6 +8,7 @@ use rigsmith::plugins::document::{EditRequest, Edited, RigBundle};
 use rigsmith::rig::{
     EditError, GroupData, JointData, Rig, RigEdit, Tag, TagKind, Uid, UidSource,
     feature::{FeatureKey, FeatureKind, FeatureKinds, FeatureState, combined_features, features_named, is_active},
+    form::{FormElement, read_form},
     operations::{
         Operation, OperationError, Outcome, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
     },
@@ -298,6 +299,20 @@ fn kinds_of_feature_are_registered_from_outside_and_unknown_ones_told() {
     assert_eq!(kinds.get("wing"), Some(&wing));
     assert_eq!(kinds.unknown_in(&desk.rig).len(), 1);
     assert!(kinds.iter().any(|kind| kind.name == "ik" && !kind.icon.is_empty() && !kind.form.is_empty()));
+}
+
+#[test]
+fn every_kind_of_feature_has_its_form_and_icon() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/modules");
+    for kind in FeatureKinds::default().iter() {
+        let form = read_form(&std::fs::read(folder.join(&kind.form)).unwrap()).unwrap();
+        let edited: Vec<&str> = form.elements().iter().filter_map(|e| e.bound()).map(|(param, _)| param).collect();
+        assert_eq!(edited, ["kind", "name", "switch"]);
+        let offers = |e: &&FormElement| matches!(e, FormElement::Menu { options, .. } if options.contains(&kind.name));
+        assert!(form.elements().iter().any(offers), "the form does not offer {}", kind.name);
+        let icon = std::fs::read_to_string(folder.join(&kind.icon)).unwrap();
+        assert!(icon.starts_with("<svg") && icon.contains("viewBox=\"0 0 24 24\""), "{}", kind.name);
+    }
 }
 
 fn copy(rig: &Rig, scope: TagScope, identifiers: bool) -> TagClipboard {

@@ -4,13 +4,16 @@ use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::{ControlPose, DrivenMorphs, InstanceMode, RigRuntime, RuntimeNodeOf, spawn::transform};
-use crate::rig::{PoseOffset, RestTransform};
+use crate::{
+    rig::{PoseOffset, RestTransform},
+    solve::program::{LANES, RigState},
+};
 
 /// Instances that are handed to the threads at once. A list of fixed size needs no memory of its own each frame.
 const BATCH: usize = 256;
 
 /// Fewer instances than these are run by one thread.
-const FEW: usize = 4;
+const FEW: usize = LANES;
 
 /// Notes which instances have a control that changed.
 pub(super) fn note_controls(
@@ -37,13 +40,19 @@ pub(super) fn solve(
     time: Res<Time>,
 ) {
     let dt = time.delta_secs();
-    let run = |runtime: &mut Mut<RigRuntime>| {
-        let unseen = runtime.bypass_change_detection();
-        if std::mem::take(&mut unseen.is_due) {
-            gather(unseen, &transforms, &poses);
+    let run = |runtimes: &mut [Option<Mut<RigRuntime>>]| {
+        for runtime in runtimes.iter_mut().flatten() {
+            let unseen = runtime.bypass_change_detection();
+            if std::mem::take(&mut unseen.is_due) {
+                gather(unseen, &transforms, &poses);
+            }
         }
-        if unseen.state.evaluate(dt) {
-            runtime.set_changed();
+        let mut states = runtimes.iter_mut().flatten().map(|runtime| &mut runtime.bypass_change_detection().state);
+        let ran = RigState::evaluate_together(std::array::from_fn(|_| states.next()), dt);
+        for (runtime, ran) in runtimes.iter_mut().flatten().zip(ran) {
+            if ran {
+                runtime.set_changed();
+            }
         }
     };
     let mut due = rigs.iter_mut().filter(|runtime| runtime.is_due || runtime.state.is_dirty(dt));
@@ -56,9 +65,9 @@ pub(super) fn solve(
         }
         let ready = &mut batch[..count];
         if count < FEW {
-            ready.iter_mut().flatten().for_each(run);
+            run(ready);
         } else {
-            ready.par_iter_mut().with_min_len(2).flatten().for_each(run);
+            ready.par_chunks_mut(LANES).for_each(run);
         }
         if count < BATCH {
             break;

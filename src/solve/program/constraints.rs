@@ -24,7 +24,11 @@ pub(super) fn transform<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at:
     let weight = share(machine.n(op.weight));
     let goal = if weight > 0.0 { followed(machine, &machine.tables.targets[op.targets.range()]) } else { None };
     if op.is_global {
-        let global = goal.unwrap_or_else(|| place(machine.x(op.parent), &input));
+        let global = match goal {
+            Some(goal) if op.scale[0] => goal,
+            Some(goal) => Trs { scale: machine.x(op.parent).scale * input.scale, ..goal },
+            None => place(machine.x(op.parent), &input),
+        };
         return machine.put(op.out, global);
     }
     let Some(goal) = goal else { return machine.put(op.out, input) };

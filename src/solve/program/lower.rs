@@ -151,7 +151,8 @@ impl Lower<'_, '_> {
         let whole = rotate != [false; 3] || scale != [false; 3];
         let list = targets.iter().map(|target| self.target(target, whole)).collect::<Result<Vec<_>, _>>()?;
         let is_whole = !keep_pose
-            && [translate, rotate, scale] == [[true; 3]; 3]
+            && [translate, rotate] == [[true; 3]; 2]
+            && (scale == [true; 3] || scale == [false; 3])
             && matches!(weight, Scalar::Value(weight) if *weight >= 1.0);
         let is_sure = targets.iter().any(|target| matches!(target.weight, Scalar::Value(weight) if weight > 0.0));
         let (targets, weight) = (self.targets(list), self.scalar(weight)?);
@@ -162,7 +163,7 @@ impl Lower<'_, '_> {
         if is_whole {
             self.graph.is_whole(node, at);
         }
-        if is_whole && is_sure && self.graph.is_last(self.at, driven) {
+        if is_whole && is_sure && scale[0] && self.graph.is_last(self.at, driven) {
             // Nothing of the node's own counts.
             (input, parent) = (X::RIG, X::RIG);
         }

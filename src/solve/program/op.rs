@@ -250,7 +250,8 @@ pub(super) struct TransformOp {
     pub translate: [bool; 3],
     pub rotate: [bool; 3],
     pub scale: [bool; 3],
-    /// True to write the rig transform instead of the local one.
+    /// True to write the rig transform instead of the local one; translations and rotations are then followed whole,
+    /// and so are scales, or not at all.
     pub is_global: bool,
     pub out: X,
 }

@@ -102,6 +102,10 @@ impl<const TRACK: bool> Machine<'_, TRACK> {
                 let global = match (offset, base) {
                     (None, 0) => *above,
                     (None, _) => place(above, &self.tables.bases[base as usize]),
+                    (Some(PoseOffset { translation, rotation, scale }), 0) => {
+                        let rotation = rotation.normalize();
+                        place(above, &Trs { translation: *translation, rotation, scale: *scale })
+                    }
                     (Some(offset), _) => place(above, &on(offset, &self.tables.bases[base as usize])),
                 };
                 self.put(out, global);

@@ -323,9 +323,10 @@ impl RigState {
     pub fn evaluate_together(mut states: [Option<&mut Self>; LANES], dt: f32) -> [bool; LANES] {
         let dt = elapsed(dt);
         let serial = states[0].as_ref().map(|state| state.program.serial);
-        let is_alike = states.iter().flatten().all(|state| {
-            state.memory == Memory::Results && Some(state.program.serial) == serial && state.is_dirty(dt)
-        });
+        let is_alike = states
+            .iter()
+            .flatten()
+            .all(|state| state.memory == Memory::Results && Some(state.program.serial) == serial && state.is_dirty(dt));
         let [Some(a), Some(b), Some(c), Some(d)] = &mut states else {
             return states.map(|state| state.is_some_and(|state| state.evaluate(dt)));
         };

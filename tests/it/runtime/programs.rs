@@ -4,7 +4,7 @@ use super::{biped::biped, *};
 use proptest::prelude::*;
 use rigsmith::{
     rig::{BuiltRig, Constraint, Uid},
-    solve::program::{ContentHash, Exposed, Keep, Memory, ProgramCache},
+    solve::program::{ContentHash, Exposed, Keep, LANES, Memory, ProgramCache},
 };
 
 fn compile(rig: &BuiltRig, keep: Keep) -> Arc<RigProgram> {
@@ -97,11 +97,19 @@ proptest! {
         let mut changed = RigState::new(Arc::clone(&all));
         let mut whole = RigState::new(all);
         let mut game = RigState::new(Arc::clone(&few));
-        let mut crowd = RigState::with_memory(few, Memory::Results);
-        for (changes, frames) in frames {
+        let mut crowd = RigState::with_memory(Arc::clone(&few), Memory::Results);
+        // In step with others, two of which are set differently.
+        let mut lanes: [RigState; LANES] =
+            std::array::from_fn(|_| RigState::with_memory(Arc::clone(&few), Memory::Results));
+        for (number, (changes, frames)) in frames.into_iter().enumerate() {
             for change in &changes {
                 let states = &mut [&mut changed, &mut whole, &mut game, &mut crowd];
                 apply(change, states, &controls, &attributes);
+                let [a, b, c, d] = &mut lanes;
+                apply(change, &mut [a, c], &controls, &attributes);
+                if number % 2 == 0 {
+                    apply(change, &mut [b, d], &controls, &attributes);
+                }
             }
             let dt = frames as f32 / 60.0;
             whole.mark_all();
@@ -111,6 +119,9 @@ proptest! {
             equal(&changed, &whole);
             equal(&game, &whole);
             equal(&crowd, &whole);
+            RigState::evaluate_together(lanes.each_mut().map(Some), dt);
+            equal(&lanes[0], &whole);
+            equal(&lanes[2], &whole);
         }
     }
 }
@@ -175,12 +186,17 @@ fn threads_do_not_show() {
                     let angle = (at + 7 * number + 13 * frame) as f32 % 40.0 - 20.0;
                     state.set_offset_at(*control, turned(Vec3::new(0.6, 0.0, 0.8), angle));
                 }
-                state.evaluate(1.0 / 60.0);
             };
+            states.iter_mut().enumerate().for_each(step);
             if parallel {
-                states.par_iter_mut().enumerate().for_each(step);
+                states.par_chunks_mut(LANES).for_each(|states| {
+                    let mut states = states.iter_mut();
+                    RigState::evaluate_together(std::array::from_fn(|_| states.next()), 1.0 / 60.0);
+                });
             } else {
-                states.iter_mut().enumerate().for_each(step);
+                states.iter_mut().for_each(|state| {
+                    state.evaluate(1.0 / 60.0);
+                });
             }
         }
         states
