@@ -1,5 +1,9 @@
 //! One algorithm a file: plain functions over slices, with their errors and sources.
 
+pub mod face;
+pub mod fit;
+pub mod kmeans;
+pub mod linkage;
 pub mod picking;
 pub mod placement;
 pub mod stroke;

@@ -1,0 +1,14 @@
+//! Faces: from a head mesh to facial bones, weights and expressions, without a person placing anything.
+//!
+//! The method is that of "automatic placement of bones on face models": group the head in depth, put head and neck bones
+//! through the means of the middle, and one facial bone at each centroid of the facial mask.
+
+pub mod axes;
+pub mod bones;
+pub mod expression;
+pub mod grouping;
+pub mod head_bones;
+pub mod head_part;
+pub mod landmarks;
+pub mod shells;
+pub mod weights;
