@@ -1,0 +1,313 @@
+//! A face as edits of a rig: joints, pairs, tags, weights; and away with the bones that it replaces.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use glam::{Affine3A, Quat, Vec3};
+
+use super::known::{FACE_GROUP, FaceRig, KnownBone, Placed};
+use crate::{
+    algo::face::{
+        auto::{AutoFace, FaceAnalysis},
+        bones::{FaceBone, FaceBoneKind, Region, Side},
+    },
+    mesh::model::Weights,
+    rig::{
+        GroupData, JointData, NodeKind, RestTransform, Rig, RigEdit, RigJoint, SkinData, Tag, TagKind, Uid, UidSource,
+    },
+};
+
+/// The edits that give a rig a face.
+pub(super) struct FaceEdits {
+    /// In the order in which they are applied.
+    pub edits: Vec<RigEdit>,
+    /// The joint of each bone.
+    pub joints: Vec<Uid>,
+}
+
+/// What is put into the rig.
+pub(super) struct NewFace<'a> {
+    pub analysis: &'a FaceAnalysis,
+    pub face: &'a AutoFace,
+    /// The bones of the rig that stay, in the order of the face's fixed places.
+    pub kept: &'a [KnownBone],
+    /// The mesh whose weights are set.
+    pub mesh: Uid,
+}
+
+/// The colour of the local group.
+const FACE_COLOR: [f32; 3] = [0.95, 0.62, 0.55];
+
+pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut UidSource) -> FaceEdits {
+    let NewFace { analysis, face, kept, mesh } = *new;
+    let mut edits = Vec::new();
+    let to_rig = analysis.to_mesh();
+    let group = known.group.unwrap_or_else(|| {
+        let group = GroupData { uid: uids.next_uid(), name: FACE_GROUP.to_owned(), color: FACE_COLOR, enabled: true };
+        let uid = group.uid;
+        edits.push(RigEdit::AddLocalGroup(group, rig.groups().len()));
+        uid
+    });
+    let host = known.head.and_then(|head| rig.joint(head)).map(|joint| joint.data.uid);
+    let (neck, head, head_global) = match host {
+        Some(head) => (known.neck, head, Affine3A::from(glam_affine(rig, head))),
+        None => skull(rig, analysis, uids, &mut edits),
+    };
+    let feature = known.feature.unwrap_or_else(|| {
+        let kind = TagKind::Feature { kind: FACE_GROUP.to_owned(), name: "Face".to_owned(), switch: String::new() };
+        let tag = Tag { uid: uids.next_uid(), enabled: true, comment: "controls of the face".to_owned(), kind };
+        let uid = tag.uid;
+        edits.push(RigEdit::AddTag { joint: head, tag: Box::new(tag), index: usize::MAX });
+        uid
+    });
+    let joints: Vec<Uid> = face
+        .bones
+        .iter()
+        .map(|bone| bone.fixed.and_then(|fixed| kept.get(fixed)).map_or_else(|| uids.next_uid(), |bone| bone.uid))
+        .collect();
+    let eye = analysis.landmarks.eye_distance();
+    for (bone, uid) in face.bones.iter().zip(&joints) {
+        if bone.fixed.is_some_and(|fixed| fixed < kept.len()) {
+            continue;
+        }
+        let position = to_rig * bone.position;
+        let global = Affine3A::from_rotation_translation(to_rig, position);
+        let placed = Placed { kind: bone.kind, label: bone.label.clone(), position };
+        let kind = TagKind::Command {
+            module: "control".to_owned(),
+            params: control(bone, eye),
+            feature: Some(feature),
+        };
+        let tag = Tag { uid: uids.next_uid(), enabled: true, comment: placed.comment(), kind };
+        let joint = JointData {
+            uid: *uid,
+            label: Some(bone.label.clone()),
+            group: Some(group),
+            rest: local(&head_global, &global),
+            tags: vec![tag],
+            ..JointData::default()
+        };
+        edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent: Some(head), index: usize::MAX });
+    }
+    pairs(rig, face, &joints, &mut edits);
+    let skin = skin(rig, new, known, neck, head, &joints);
+    edits.push(RigEdit::SetSkin(mesh, Some(Arc::new(skin))));
+    let stays: Vec<Uid> = kept.iter().map(|bone| bone.uid).collect();
+    for bone in known.bones.iter().filter(|bone| !stays.contains(&bone.uid)) {
+        // A partner that stays must not name what goes.
+        let partner = rig.joint(bone.uid).and_then(|joint| joint.data.mirror);
+        if let Some(partner) = partner.filter(|partner| stays.contains(partner)) {
+            let renewed = joints.contains(&partner) && face.bones.iter().zip(&joints).any(|(b, j)| *j == partner && b.pair.is_some());
+            if !renewed {
+                edits.push(RigEdit::SetMirror(partner, None));
+            }
+        }
+        edits.push(RigEdit::RemoveJoint(bone.uid));
+    }
+    FaceEdits { edits, joints }
+}
+
+fn glam_affine(rig: &Rig, joint: Uid) -> glam::Mat4 {
+    let global = rig.rest_global(joint);
+    glam::Mat4::from_cols(
+        global.matrix3.x_axis.extend(0.0),
+        global.matrix3.y_axis.extend(0.0),
+        global.matrix3.z_axis.extend(0.0),
+        global.translation.extend(1.0),
+    )
+}
+
+/// Makes neck and head. Their Y axes lie along their bones; X and Z are those of the head.
+fn skull(
+    rig: &Rig,
+    analysis: &FaceAnalysis,
+    uids: &mut UidSource,
+    edits: &mut Vec<RigEdit>,
+) -> (Option<Uid>, Uid, Affine3A) {
+    let to_rig = analysis.to_mesh();
+    let bones = &analysis.head_bones;
+    let along = |bone: Vec3| match bone.try_normalize() {
+        Some(direction) => to_rig * Quat::from_rotation_arc(Vec3::Y, direction),
+        None => to_rig,
+    };
+    let place = |turn: Quat, at: Vec3| Affine3A::from_rotation_translation(turn, to_rig * at);
+    let neck_global = place(along(bones.neck.tail - bones.neck.head), bones.neck.head);
+    let head_global = place(along(bones.head.tail - bones.head.head), bones.head.head);
+    let end_global = place(along(bones.head.tail - bones.head.head), bones.head.tail);
+    let mut add = |label: &str, kind: NodeKind, rest: RestTransform, parent: Option<Uid>, index: usize| {
+        let joint = JointData { uid: uids.next_uid(), label: Some(label.to_owned()), kind, rest, ..JointData::default() };
+        let uid = joint.uid;
+        edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent, index });
+        uid
+    };
+    let root = Affine3A::IDENTITY;
+    let neck = add("neck", NodeKind::Joint, local(&root, &neck_global), None, rig.roots().len());
+    let head = add("head", NodeKind::Joint, local(&neck_global, &head_global), Some(neck), 0);
+    // Where the head ends is nothing that moves skin, but it shows how the bone lies.
+    add("head_end", NodeKind::Null, local(&head_global, &end_global), Some(head), 0);
+    (Some(neck), head, head_global)
+}
+
+fn local(parent: &Affine3A, global: &Affine3A) -> RestTransform {
+    let (scale, rotation, translation) = (parent.inverse() * *global).to_scale_rotation_translation();
+    let snapped = |factor: f32| if (factor - 1.0).abs() < 1e-5 { 1.0 } else { factor };
+    let scale = Vec3::new(snapped(scale.x), snapped(scale.y), snapped(scale.z));
+    RestTransform { translation, rotation: rotation.normalize(), scale }
+}
+
+/// Bones that belong together name each other.
+fn pairs(rig: &Rig, face: &AutoFace, joints: &[Uid], edits: &mut Vec<RigEdit>) {
+    for (bone, uid) in face.bones.iter().zip(joints) {
+        let Some(partner) = bone.pair.and_then(|pair| joints.get(pair)).copied() else { continue };
+        if rig.joint(*uid).and_then(|joint| joint.data.mirror) != Some(partner) {
+            edits.push(RigEdit::SetMirror(*uid, Some(partner)));
+        }
+    }
+}
+
+/// Parameters of a bone's control: how it looks, and limits within which skin moves as it does on a face.
+fn control(bone: &FaceBone, eye: f32) -> String {
+    let (shape, size) = match bone.kind {
+        FaceBoneKind::Skin => ("sphere", 0.035),
+        FaceBoneKind::Jaw => ("half_circle", 0.3),
+        FaceBoneKind::Eye => ("eye", 0.12),
+    };
+    let range = |(low, high): (f32, f32), unit: f32| format!("({}, {})", decimal(low * unit), decimal(high * unit));
+    let three = |ranges: [(f32, f32); 3], unit: f32| ranges.map(|ends| range(ends, unit)).join(", ");
+    let (translate, rotate) = limits(bone);
+    format!(
+        "(shape: \"{shape}\", size: {}, shape_axes: control, offset_group: false, keep_pose: true, \
+         limits: (translate: ({}), rotate: ({})))",
+        decimal(size * eye),
+        three(translate, eye),
+        three(rotate, 1.0),
+    )
+}
+
+/// The number with four significant digits, always with a point.
+fn decimal(number: f32) -> String {
+    let rounded: f32 = format!("{number:.3e}").parse().unwrap_or(number);
+    format!("{rounded:?}")
+}
+
+/// Lowest and highest translation, as a share of the distance of the eyes' outer corners, and rotation in degrees.
+fn limits(bone: &FaceBone) -> ([(f32, f32); 3], [(f32, f32); 3]) {
+    let both = |reach: f32| (-reach, reach);
+    let (side, up, down, depth) = match bone.kind {
+        FaceBoneKind::Jaw => return ([both(0.08), (-0.1, 0.04), (-0.06, 0.1)], [(-5.0, 35.0), both(12.0), both(6.0)]),
+        FaceBoneKind::Eye => return ([both(0.0); 3], [both(35.0), both(45.0), both(0.0)]),
+        FaceBoneKind::Skin => match bone.region {
+            Region::Brow => (0.1, 0.2, 0.14, 0.06),
+            Region::Forehead => (0.06, 0.12, 0.08, 0.04),
+            Region::Lid => (0.06, 0.14, 0.16, 0.08),
+            Region::Nose => (0.08, 0.1, 0.06, 0.06),
+            Region::Cheek => (0.1, 0.14, 0.1, 0.12),
+            Region::Lip => (0.18, 0.2, 0.4, 0.16),
+            Region::Jaw => (0.1, 0.12, 0.4, 0.14),
+            Region::Temple => (0.06, 0.08, 0.06, 0.04),
+        },
+    };
+    // A bone in the middle, too, may go either way.
+    let _ = Side::Middle;
+    ([both(side), (-down, up), both(depth)], [both(25.0); 3])
+}
+
+/// The weights of the whole mesh. On a rig that holds it already the face takes its share from what is there.
+fn skin(rig: &Rig, new: &NewFace, known: &FaceRig, neck: Option<Uid>, head: Uid, joints: &[Uid]) -> SkinData {
+    let NewFace { analysis, face, mesh, .. } = *new;
+    let old = rig.skin(mesh).filter(|skin| skin.weights.len() == analysis.mesh_points);
+    let face_joints: Vec<Uid> = known.bones.iter().map(|bone| bone.uid).chain(joints.iter().copied()).collect();
+    let is_own = |uid: &Uid| Some(*uid) == neck || *uid == head || face_joints.contains(uid);
+    let body = old.filter(|skin| skin.joints.iter().any(|uid| !is_own(uid) && rig.joint(*uid).is_some()));
+    let mut table = Table::default();
+    let [neck_number, head_number] = [neck.unwrap_or(head), head].map(|uid| table.number(uid));
+    let numbers: Vec<u32> = joints.iter().map(|uid| table.number(*uid)).collect();
+    let locked = |uid: &Uid| rig.joint(*uid).is_some_and(|joint: &RigJoint| joint.data.locked);
+    let mut of_part: Vec<Option<usize>> = vec![None; analysis.mesh_points];
+    for point in 0..analysis.points.len() {
+        if let Some(slot) = of_part.get_mut(analysis.mesh_point(point)) {
+            *slot = Some(point);
+        }
+    }
+    let mut weights = Weights::default();
+    let mut shares: BTreeMap<u32, f32> = BTreeMap::new();
+    for (point, part) in of_part.iter().enumerate() {
+        shares.clear();
+        let mut add = |joint: u32, share: f32| *shares.entry(joint).or_default() += share;
+        // What a person has locked stays; all else shares what is left.
+        let held: Vec<(Uid, f32)> = old.map_or_else(Vec::new, |skin| {
+            let influences = skin.weights.of(point).map(|(joint, weight)| (skin.joints[joint as usize], weight));
+            influences.filter(|(uid, _)| rig.joint(*uid).is_some()).collect()
+        });
+        let kept: f32 = held.iter().filter(|(uid, _)| locked(uid)).map(|(_, weight)| weight).sum();
+        for (uid, weight) in held.iter().filter(|(uid, _)| locked(uid)) {
+            add(table.number(*uid), *weight);
+        }
+        let free = (1.0 - kept).max(0.0);
+        let mut below = 1.0;
+        let computed: Vec<(u32, f32)> = part.map_or_else(Vec::new, |part| face.weights.of(part).collect());
+        for (joint, weight) in computed.iter().filter(|(joint, _)| *joint >= 2) {
+            if let Some(number) = numbers.get(*joint as usize - 2).filter(|_| !locked(&joints[*joint as usize - 2])) {
+                add(*number, weight * free);
+                below -= weight;
+            }
+        }
+        let below = f32::max(below, 0.0) * free;
+        match body {
+            Some(_) => {
+                // Facial bones that were there gave the head's share away.
+                let others = held.iter().filter(|(uid, _)| !locked(uid));
+                let sum: f32 = others.clone().map(|(_, weight)| weight).sum();
+                for (uid, weight) in others {
+                    let uid = if face_joints.contains(uid) { head } else { *uid };
+                    add(table.number(uid), below * weight / sum.max(f32::MIN_POSITIVE));
+                }
+                if sum <= 0.0 && below > 0.0 {
+                    add(head_number, below);
+                }
+            }
+            None => {
+                let of_neck: f32 = computed.iter().filter(|(joint, _)| *joint == 0).map(|(_, weight)| weight).sum();
+                let of_head: f32 = computed.iter().filter(|(joint, _)| *joint == 1).map(|(_, weight)| weight).sum();
+                match part {
+                    Some(_) if of_neck + of_head > 0.0 => {
+                        add(neck_number, below * of_neck / (of_neck + of_head));
+                        add(head_number, below * of_head / (of_neck + of_head));
+                    }
+                    Some(_) => add(head_number, below),
+                    // The rest of a body stands with the neck until it gets joints of its own.
+                    None => add(neck_number, below),
+                }
+            }
+        }
+        weights.push(strongest(&shares));
+    }
+    SkinData { joints: table.uids, weights, at_rest: true }
+}
+
+/// The joints that weights name, in the order in which they come up.
+#[derive(Default)]
+struct Table {
+    uids: Vec<Uid>,
+    numbers: BTreeMap<Uid, u32>,
+}
+
+impl Table {
+    fn number(&mut self, uid: Uid) -> u32 {
+        *self.numbers.entry(uid).or_insert_with(|| {
+            self.uids.push(uid);
+            self.uids.len() as u32 - 1
+        })
+    }
+}
+
+/// At most eight influences, strongest first, summing to one.
+fn strongest(shares: &BTreeMap<u32, f32>) -> Vec<(u32, f32)> {
+    let mut list: Vec<(u32, f32)> = shares.iter().map(|(joint, share)| (*joint, *share)).filter(|(_, s)| *s > 1e-4).collect();
+    list.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    list.truncate(8);
+    let sum: f32 = list.iter().map(|(_, share)| share).sum();
+    for (_, share) in &mut list {
+        *share /= sum;
+    }
+    list
+}

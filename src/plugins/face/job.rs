@@ -1,0 +1,324 @@
+//! Placing a face in the background.
+
+use std::{
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicU32, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use bevy::{
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
+
+use super::{
+    Face, FaceExpressions, FacePlaced, FaceReport, FaceRequest, FaceShapes,
+    edits::{FaceEdits, NewFace, face_edits},
+    known::{FaceRig, KnownBone},
+    pose,
+};
+use crate::{
+    algo::{
+        face::{
+            auto::{AutoFace, AutoSettings, FaceAnalysis, FaceStep},
+            bones::FixedBone,
+            expression::ExpressionSet,
+            grouping::HeadGroup,
+        },
+        fit::Fit,
+    },
+    plugins::{
+        document::EditRequest,
+        surface::{RigMesh, SkinOf},
+    },
+    rig::{PoseOffset, Rig, RigEdit, StoredPose, Uid, UidSource, operations::Operation},
+};
+
+/// A face that is being placed; remove the component or call [`FaceJob::cancel`] to stop it.
+#[derive(Component)]
+pub struct FaceJob {
+    progress: Arc<Progress>,
+    /// Names of the shapes that are fitted.
+    shapes: Option<Arc<FaceShapes>>,
+    task: Task<Result<Done, String>>,
+}
+
+#[derive(Default)]
+struct Progress {
+    part: AtomicU32,
+    cancelled: AtomicBool,
+    /// Steps in the order they began.
+    steps: Mutex<Vec<(FaceStep, Instant)>>,
+}
+
+/// What a task brings back.
+struct Done {
+    analysis: Arc<FaceAnalysis>,
+    settings: AutoSettings,
+    rest: Arc<crate::mesh::model::Model>,
+    face: AutoFace,
+    fit: Option<Fit>,
+    /// Bones of the rig that stay, in the order of the face's fixed places.
+    kept: Vec<KnownBone>,
+    times: Vec<(&'static str, Duration)>,
+}
+
+impl FaceJob {
+    /// How much is done, 0 to 1.
+    pub fn progress(&self) -> f32 {
+        f32::from_bits(self.progress.part.load(Ordering::Relaxed))
+    }
+
+    /// The step that runs.
+    pub fn step(&self) -> Option<FaceStep> {
+        let steps = self.progress.steps.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        steps.last().map(|(step, _)| *step)
+    }
+
+    /// Stops it; the rig stays as it was.
+    pub fn cancel(&self) {
+        self.progress.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for FaceJob {
+    fn drop(&mut self) {
+        self.cancel();
+    }
+}
+
+impl Progress {
+    fn told(&self, step: FaceStep, part: f32) -> bool {
+        self.part.store(part.to_bits(), Ordering::Relaxed);
+        let mut steps = self.steps.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if steps.last().is_none_or(|(last, _)| *last != step) {
+            steps.push((step, Instant::now()));
+        }
+        !self.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// How long each step took until `end`; steps that ran several times are summed.
+    fn times(&self, end: Instant) -> Vec<(&'static str, Duration)> {
+        let steps = self.steps.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let ends = steps.iter().skip(1).map(|(_, at)| *at).chain([end]);
+        let mut times: Vec<(&'static str, Duration)> = Vec::new();
+        for ((step, begin), end) in steps.iter().zip(ends) {
+            let took = end.duration_since(*begin);
+            match times.iter_mut().find(|(name, _)| *name == step.name()) {
+                Some((_, time)) => *time += took,
+                None => times.push((step.name(), took)),
+            }
+        }
+        times
+    }
+}
+
+pub(super) fn start(
+    mut commands: Commands,
+    mut requests: MessageReader<FaceRequest>,
+    meshes: Query<(&RigMesh, &SkinOf, Option<&Face>)>,
+    rigs: Query<&Rig>,
+    expressions: Res<FaceExpressions>,
+    mut placed: MessageWriter<FacePlaced>,
+) {
+    for FaceRequest { mesh: entity, settings, fit } in requests.read() {
+        let found = meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, rigs.get(of.0).ok()?, face)));
+        let Some((mesh, rig, face)) = found else {
+            let result = Err("the mesh belongs to no rig; it may have been closed".to_owned());
+            placed.write(FacePlaced { mesh: *entity, result });
+            continue;
+        };
+        let ready = face.filter(|face| face.serves(&mesh.rest, settings)).map(|face| face.analysis.clone());
+        let work = Work {
+            rig: rig.clone(),
+            mesh: mesh.clone(),
+            settings: settings.clone(),
+            shapes: fit.clone(),
+            expressions: expressions.0.clone(),
+            ready,
+        };
+        let progress = Arc::new(Progress::default());
+        let told = progress.clone();
+        let task = AsyncComputeTaskPool::get().spawn(async move { work.run(&told) });
+        commands.entity(*entity).insert(FaceJob { progress, shapes: fit.clone(), task });
+    }
+}
+
+/// What a task works on.
+struct Work {
+    rig: Rig,
+    mesh: RigMesh,
+    settings: AutoSettings,
+    shapes: Option<Arc<FaceShapes>>,
+    expressions: Arc<ExpressionSet>,
+    ready: Option<Arc<FaceAnalysis>>,
+}
+
+impl Work {
+    fn run(self, progress: &Progress) -> Result<Done, String> {
+        let Self { rig, mesh, settings, shapes, expressions, ready } = self;
+        let told = |step: FaceStep, part: f32| progress.told(step, part);
+        let text = |error: crate::algo::face::auto::FaceError| error.to_string();
+        let analysis = match ready {
+            Some(analysis) => analysis,
+            None => {
+                let found = FaceAnalysis::new(&mesh.rest.points, &mesh.triangles, &settings, &told);
+                Arc::new(found.map_err(text)?)
+            }
+        };
+        let known = FaceRig::read(&rig);
+        let turn = analysis.axes.rotation();
+        // A fit begins with the bones there are, whoever placed them; a placing keeps those that a person touched.
+        let kept: Vec<KnownBone> =
+            known.bones.iter().filter(|bone| bone.touched || shapes.is_some()).cloned().collect();
+        let fixed: Vec<FixedBone> =
+            kept.iter().map(|bone| FixedBone { position: turn * bone.position, kind: bone.kind }).collect();
+        let bones = match &shapes {
+            // Jaw and eyes come on top of the bones that are asked for.
+            Some(_) if !kept.is_empty() => {
+                kept.iter().filter(|b| b.kind == crate::algo::face::bones::FaceBoneKind::Skin).count().max(1)
+            }
+            _ => settings.bones,
+        };
+        let how = AutoSettings { bones, ..settings.clone() };
+        let mut face = analysis.rig(&fixed, &how, &expressions, &told).map_err(text)?;
+        let fit = match &shapes {
+            None => None,
+            Some(shapes) => {
+                let (refitted, fit) = analysis
+                    .refit(&face, &shapes.displacements, &shapes.settings, &told)
+                    .map_err(text)?;
+                face = refitted;
+                Some(fit)
+            }
+        };
+        let times = progress.times(Instant::now());
+        Ok(Done { analysis, settings, rest: mesh.rest.clone(), face, fit, kept, times })
+    }
+}
+
+pub(super) fn land(
+    mut commands: Commands,
+    mut jobs: Query<(Entity, &mut FaceJob, &RigMesh, &SkinOf)>,
+    rigs: Query<&Rig>,
+    mut uids: ResMut<UidSource>,
+    mut placed: MessageWriter<FacePlaced>,
+) {
+    for (entity, mut job, mesh, of) in &mut jobs {
+        let Some(result) = check_ready(&mut job.task) else { continue };
+        let shapes = job.shapes.clone();
+        let mut entity_commands = commands.entity(entity);
+        entity_commands.remove::<FaceJob>();
+        let result = result.and_then(|done| {
+            let rig = rigs.get(of.0).map_err(|_| "the rig was closed meanwhile".to_owned())?;
+            if done.kept.iter().any(|bone| rig.joint(bone.uid).is_none()) {
+                return Err("facial bones were deleted meanwhile; place the face again".to_owned());
+            }
+            let (edits, report) = done.edits(rig, mesh, shapes.as_deref(), &mut uids);
+            entity_commands.insert(Face {
+                analysis: done.analysis.clone(),
+                settings: done.settings.clone(),
+                rest: done.rest.clone(),
+            });
+            let name = if shapes.is_some() { "Fit face" } else { "Place face" };
+            commands.write_message(EditRequest::operation(of.0, Operation::Named { name, edits }));
+            Ok(report)
+        });
+        placed.write(FacePlaced { mesh: entity, result });
+    }
+}
+
+impl Done {
+    fn edits(
+        &self,
+        rig: &Rig,
+        mesh: &RigMesh,
+        shapes: Option<&FaceShapes>,
+        uids: &mut UidSource,
+    ) -> (Vec<RigEdit>, FaceReport) {
+        let known = FaceRig::read(rig);
+        let new = NewFace { analysis: &self.analysis, face: &self.face, kept: &self.kept, mesh: mesh.uid };
+        let FaceEdits { mut edits, joints } = face_edits(rig, &known, &new, uids);
+        if let (Some(fit), Some(shapes)) = (&self.fit, shapes) {
+            edits.extend(self.moved(rig, &joints));
+            edits.extend(self.poses(rig, fit, shapes, &joints, uids));
+        }
+        (edits, self.report())
+    }
+
+    /// Bones that stayed as joints but were moved by a fit.
+    fn moved(&self, rig: &Rig, joints: &[Uid]) -> Vec<RigEdit> {
+        let to_rig = self.analysis.to_mesh();
+        let all = self.face.bones.iter().zip(joints);
+        all.filter_map(|(bone, uid)| {
+            let joint = rig.joint(*uid)?;
+            let mut global = rig.rest_global(*uid);
+            global.translation = to_rig * bone.position;
+            let rest = rig.local_rest(joint.parent, &global);
+            let rest = crate::rig::RestTransform { translation: rest.translation, ..joint.data.rest };
+            (rest != joint.data.rest).then_some(RigEdit::SetRest(*uid, rest))
+        })
+        .collect()
+    }
+
+    /// A stored pose for each shape; those of the same name are replaced.
+    fn poses(
+        &self,
+        rig: &Rig,
+        fit: &Fit,
+        shapes: &FaceShapes,
+        joints: &[Uid],
+        uids: &mut UidSource,
+    ) -> Vec<RigEdit> {
+        let frames: Vec<pose::Frame> = joints.iter().map(|uid| pose::Frame::of(rig, *uid, &self.analysis)).collect();
+        let mut added = rig.stored_poses().len();
+        let mut edits = Vec::new();
+        for (name, transforms) in shapes.names.iter().zip(&fit.transforms) {
+            let offset = |((uid, frame), transform): ((&Uid, &pose::Frame), &crate::algo::face::expression::BonePose)| {
+                let offset = frame.offset(transform);
+                (!offset.is_rest(1e-7)).then_some((*uid, offset))
+            };
+            let offsets: std::collections::BTreeMap<Uid, PoseOffset> =
+                joints.iter().zip(&frames).zip(transforms).filter_map(offset).collect();
+            let same = rig.stored_poses().iter().find(|pose| pose.name == *name);
+            let stored = |uid: Uid| StoredPose { uid, name: name.clone(), offsets, ..StoredPose::default() };
+            edits.push(match same {
+                Some(same) => RigEdit::SetStoredPose(Box::new(stored(same.uid))),
+                None => {
+                    added += 1;
+                    RigEdit::AddStoredPose(Box::new(stored(uids.next_uid())), added - 1)
+                }
+            });
+        }
+        edits
+    }
+
+    fn report(&self) -> FaceReport {
+        let Self { analysis, face, .. } = self;
+        let count = |group: HeadGroup| analysis.groups.of.iter().filter(|of| **of == group).count();
+        let to_rig = analysis.to_mesh();
+        let mut bones = face.bones.clone();
+        for bone in &mut bones {
+            bone.position = to_rig * bone.position;
+        }
+        FaceReport {
+            groups: [HeadGroup::Face, HeadGroup::Middle, HeadGroup::Back].map(count),
+            cut: analysis.groups.groups,
+            heights: analysis.groups.depth.heights(12),
+            mask: analysis.groups.mask.iter().filter(|inside| **inside).count(),
+            points: [analysis.points.len(), analysis.mesh_points],
+            is_part: analysis.part.is_some(),
+            certain: analysis.certain,
+            confidence: analysis.landmarks.confidence,
+            bones,
+            square_error: face.square_error,
+            rounds: face.rounds,
+            folds: face.folds,
+            kept: self.kept.len(),
+            fit_error: self.fit.as_ref().map(|fit| fit.error),
+            times: self.times.clone(),
+        }
+    }
+}

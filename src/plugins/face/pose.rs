@@ -1,0 +1,161 @@
+//! Expressions on a rig: strengths become pose offsets of facial joints.
+
+use std::collections::BTreeMap;
+
+use bevy::prelude::*;
+
+use super::{ExpressRequest, Expressed, Expressions, Face, FaceExpressions, known::FaceRig};
+use crate::{
+    algo::face::{
+        auto::{AutoSettings, FaceAnalysis, FaceError},
+        expression::{BonePose, ExpressionSet},
+    },
+    mesh::model::Weights,
+    plugins::{
+        document::{Change, EditRequest},
+        surface::{RigMesh, SkinOf},
+    },
+    rig::{PoseOffset, RestTransform, Rig, RigEdit, SkinData, Uid, nearest::did_you_mean, operations::Operation},
+};
+
+/// How a facial joint rests: what turns motion in head space into a pose offset.
+pub(super) struct Frame {
+    to_rig: Quat,
+    global: Quat,
+    parent: bevy::math::Affine3,
+    rest: RestTransform,
+}
+
+impl Frame {
+    /// Of a joint of the rig; of one that is about to be made, as it will be made.
+    pub fn of(rig: &Rig, joint: Uid, analysis: &FaceAnalysis) -> Self {
+        let to_rig = analysis.to_mesh();
+        match rig.joint(joint) {
+            Some(data) => Self {
+                to_rig,
+                global: rig.rest_global(joint).to_scale_rotation_translation().1.normalize(),
+                parent: data.parent.map_or(bevy::math::Affine3::IDENTITY, |parent| rig.rest_global(parent)),
+                rest: data.data.rest,
+            },
+            None => Self {
+                to_rig,
+                global: to_rig,
+                parent: bevy::math::Affine3::IDENTITY,
+                rest: RestTransform { rotation: to_rig, ..RestTransform::default() },
+            },
+        }
+    }
+
+    /// The offset of the joint's pose that moves and turns it so.
+    pub fn offset(&self, pose: &BonePose) -> PoseOffset {
+        let moved = self.to_rig * pose.translation;
+        let in_parent = self.parent.inverse().transform_vector3(moved);
+        let scale = self.rest.scale;
+        let divided = |value: f32, by: f32| if by == 0.0 { 0.0 } else { value / by };
+        let own = self.rest.rotation.inverse() * in_parent;
+        let turn = self.to_rig * pose.rotation * self.to_rig.inverse();
+        PoseOffset {
+            translation: Vec3::new(divided(own.x, scale.x), divided(own.y, scale.y), divided(own.z, scale.z)),
+            rotation: (self.global.inverse() * turn * self.global).normalize(),
+            scale: Vec3::ONE,
+        }
+    }
+}
+
+pub(super) fn express(
+    mut commands: Commands,
+    mut requests: MessageReader<ExpressRequest>,
+    meshes: Query<(&RigMesh, &SkinOf, Option<&Face>)>,
+    rigs: Query<&Rig>,
+    set: Res<FaceExpressions>,
+    mut told: MessageWriter<Expressed>,
+) {
+    for ExpressRequest { mesh: entity, strengths, preview } in requests.read() {
+        let found = meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, of.0, rigs.get(of.0).ok()?, face)));
+        let Some((mesh, rig_entity, rig, face)) = found else {
+            let result = Err("the mesh belongs to no rig; it may have been closed".to_owned());
+            told.write(Expressed { mesh: *entity, result });
+            continue;
+        };
+        let analysed = match face {
+            Some(face) if face.serves(&mesh.rest, &face.settings) => Ok(face.clone()),
+            // A file that was opened says where the bones are, not where the features are.
+            _ => analyse(mesh),
+        };
+        let result = analysed.map_err(|error| error.to_string()).and_then(|face| {
+            let edits = expression_edits(rig, mesh, &face.analysis, &set.0, strengths)?;
+            let operation = Operation::Named { name: "Express", edits };
+            let change = if *preview { Change::Preview(operation) } else { Change::Do(operation) };
+            if !*preview {
+                commands.write_message(EditRequest { rig: rig_entity, change: Change::CancelPreview });
+            }
+            commands.write_message(EditRequest { rig: rig_entity, change });
+            commands.entity(*entity).insert((Expressions(strengths.clone()), face));
+            Ok(())
+        });
+        told.write(Expressed { mesh: *entity, result });
+    }
+}
+
+fn analyse(mesh: &RigMesh) -> Result<Face, FaceError> {
+    let settings = AutoSettings::default();
+    let analysis = FaceAnalysis::new(&mesh.rest.points, &mesh.triangles, &settings, &|_, _| true)?;
+    Ok(Face { analysis: analysis.into(), settings, rest: mesh.rest.clone() })
+}
+
+/// The edits that pose the facial joints as strengths say. Facial joints that they do not move stand at rest.
+fn expression_edits(
+    rig: &Rig,
+    mesh: &RigMesh,
+    analysis: &FaceAnalysis,
+    set: &ExpressionSet,
+    strengths: &BTreeMap<String, f32>,
+) -> Result<Vec<RigEdit>, String> {
+    let known = FaceRig::read(rig);
+    if known.bones.is_empty() {
+        return Err("the rig has no facial bones; place a face first".to_owned());
+    }
+    let skin = rig.skin(mesh.uid).ok_or_else(|| "the mesh is not skinned; place a face first".to_owned())?;
+    let mut wanted = Vec::new();
+    for (name, strength) in strengths {
+        if !strength.is_finite() {
+            return Err(format!("the strength of \"{name}\" is not a number; write one from 0 to 1"));
+        }
+        let expression = set.find(name).ok_or_else(|| {
+            let names: Vec<&str> = set.names().collect();
+            format!("there is no expression \"{name}\"{}", did_you_mean(name, names.iter().copied()))
+        })?;
+        wanted.push((expression, strength.clamp(0.0, 1.0)));
+    }
+    let borrowed: Vec<(&_, f32)> = wanted.iter().map(|(expression, strength)| (expression.as_ref(), *strength)).collect();
+    let weights = analysed_weights(skin, &known, analysis);
+    let bones = known.face_bones(analysis);
+    let poses = analysis.pose(&bones, &weights, set, &borrowed);
+    let edits = known.bones.iter().zip(&poses).filter_map(|(bone, pose)| {
+        let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
+        let offset = (!offset.is_rest(1e-7)).then_some(offset);
+        (rig.offset(bone.uid) != offset.as_ref()).then_some(RigEdit::SetOffset(bone.uid, offset))
+    });
+    Ok(edits.collect())
+}
+
+/// The weights of the analysed points over neck (0), head (1, and whatever else there is) and the facial bones (from 2).
+fn analysed_weights(skin: &SkinData, known: &FaceRig, analysis: &FaceAnalysis) -> Weights {
+    let numbers: Vec<u32> = skin
+        .joints
+        .iter()
+        .map(|uid| match known.bones.iter().position(|bone| bone.uid == *uid) {
+            Some(number) => number as u32 + 2,
+            None if Some(*uid) == known.neck => 0,
+            None => 1,
+        })
+        .collect();
+    let mut weights = Weights::default();
+    for point in 0..analysis.points.len() {
+        let point = analysis.mesh_point(point);
+        let known = point < skin.weights.len();
+        let influences = known.then(|| skin.weights.of(point)).into_iter().flatten();
+        weights.push(influences.map(|(joint, weight)| (numbers[joint as usize], weight)));
+    }
+    weights
+}
