@@ -7,6 +7,7 @@ mod build;
 mod check;
 mod convert;
 mod demo;
+mod face;
 mod info;
 mod modules;
 mod progress;
@@ -48,6 +49,8 @@ enum Command {
     Sketch(sketch::SketchArgs),
     /// Bind a mesh to a skeleton and save the character
     Skin(skin::SkinArgs),
+    /// Place a face in a head: bones, weights and expressions
+    Face(face::FaceArgs),
     /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where that makes sense
     Convert(convert::ConvertArgs),
     /// Say what is in a file
@@ -161,6 +164,7 @@ pub fn main(window: OpenWindow) -> ExitCode {
         },
         Some(Command::Sketch(args)) => sketch::run(&args),
         Some(Command::Skin(args)) => skin::run(&args),
+        Some(Command::Face(args)) => face::run(&args),
         Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Check(args)) => check::run(&args),

@@ -21,6 +21,7 @@ pub mod journal;
 mod load;
 mod project;
 mod read;
+mod shapes;
 mod store;
 
 pub use atomic::{SaveError, SaveStep, is_temp_name, remove_stale_temps, save_all_atomic, save_atomic};
@@ -33,4 +34,5 @@ pub use project::{
     project_files, store_project,
 };
 pub use read::{OpenFile, ReadError, open, read_capped};
+pub use shapes::{LoadShapesError, load_shapes};
 pub use store::{StoreError, store_model, store_rig, store_skin};

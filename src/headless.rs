@@ -3,16 +3,20 @@
 //! A [`Workbench`] is an app with [`RigPlugins`] and a rig in it. It drives the very
 //! plugins that a window drives, and waits for their background work.
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use bevy::prelude::*;
 
 use crate::{
-    algo::weights::{WeightReport, WeightSettings},
+    algo::{
+        face::auto::{AutoSettings, FaceStep},
+        weights::{WeightReport, WeightSettings},
+    },
     mesh::model::Model,
     plugins::{
         RigPlugins,
         document::{EditRefused, EditRequest, RigBundle},
+        face::{ExpressRequest, Expressed, Face, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceShapes},
         gesture::{Gesture, GestureAnswer, GestureScript},
         skinning::{BindRequest, Bound, SkinningJob},
         surface::{RigMesh, SkinOf},
@@ -95,8 +99,7 @@ impl Workbench {
     pub fn operate(&mut self, operation: Operation) -> Result<(), WorkbenchError> {
         self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
         self.app.update();
-        let refused = self.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().last();
-        refused.map_or(Ok(()), |refused| Err(WorkbenchError::Refused(refused.reason)))
+        self.refused().map_or(Ok(()), Err)
     }
 
     /// Makes gestures and returns an answer for each.
@@ -138,6 +141,54 @@ impl Workbench {
             }
             std::thread::sleep(Duration::from_millis(1));
         }
+    }
+
+    /// Places a face in the mesh, or moves the face's bones to fit shapes. `progress` is told the step that runs and how
+    /// much is done, 0 to 1, now and then.
+    pub fn face(
+        &mut self,
+        settings: AutoSettings,
+        fit: Option<Arc<FaceShapes>>,
+        progress: &mut dyn FnMut(FaceStep, f32),
+    ) -> Result<FaceReport, WorkbenchError> {
+        let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
+        self.app.world_mut().write_message(FaceRequest { mesh, settings, fit });
+        loop {
+            self.app.update();
+            let placed = self.app.world_mut().resource_mut::<Messages<FacePlaced>>().drain().last();
+            if let Some(placed) = placed {
+                // The edit that makes the face is carried out in the next frame.
+                self.app.update();
+                let report = placed.result.map_err(WorkbenchError::Refused)?;
+                return self.refused().map_or(Ok(report), Err);
+            }
+            if let Some(job) = self.app.world().get::<FaceJob>(mesh)
+                && let Some(step) = job.step()
+            {
+                progress(step, job.progress());
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Shows expressions and units by name, each with a strength from 0 to 1, in place of those there are.
+    pub fn express(&mut self, strengths: BTreeMap<String, f32>) -> Result<(), WorkbenchError> {
+        let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
+        self.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
+        self.app.update();
+        let told = self.app.world_mut().resource_mut::<Messages<Expressed>>().drain().last();
+        told.map_or(Ok(()), |told| told.result.map_err(WorkbenchError::Refused))?;
+        self.refused().map_or(Ok(()), Err)
+    }
+
+    /// What is known about the mesh's face.
+    pub fn placed_face(&self) -> Option<&Face> {
+        self.app.world().get::<Face>(self.mesh?)
+    }
+
+    fn refused(&mut self) -> Option<WorkbenchError> {
+        let refused = self.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().last();
+        refused.map(|refused| WorkbenchError::Refused(refused.reason))
     }
 
     /// Binds given weights.

@@ -8,6 +8,7 @@ pub mod model;
 pub mod obj;
 pub mod ray;
 mod rest;
+pub mod shapes;
 pub mod skinning;
 pub mod surface;
 pub mod voxels;

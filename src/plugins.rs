@@ -6,6 +6,7 @@ pub mod display;
 pub mod document;
 #[cfg(feature = "draw")]
 pub mod drawing;
+pub mod face;
 pub mod gesture;
 pub mod history;
 pub mod journal;
@@ -37,6 +38,7 @@ use bevy::{
 /// | [`stroke::StrokePlugin`] | chains from strokes |
 /// | [`gesture::GesturePlugin`] | lists of gestures that drive all of the above |
 /// | [`skinning::SkinningPlugin`] | automatic weights in the background |
+/// | [`face::FacePlugin`] | faces: bones, weights and expressions |
 /// | [`runtime::RuntimePlugin`] | compiled rigs that run each frame |
 /// | [`journal::JournalPlugin`] | every change in a safe place, for rigs that ask for it |
 pub struct RigPlugins;
@@ -52,6 +54,7 @@ impl PluginGroup for RigPlugins {
             .add(stroke::StrokePlugin)
             .add(gesture::GesturePlugin)
             .add(skinning::SkinningPlugin)
+            .add(face::FacePlugin)
             .add(runtime::RuntimePlugin)
             .add(journal::JournalPlugin)
     }

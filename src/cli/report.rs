@@ -6,7 +6,7 @@ use miette::{Diagnostic, NamedSource, SourceSpan};
 use serde_json::{Map, Value, json};
 
 use crate::{
-    files::{LoadError, StoreError},
+    files::{LoadError, LoadShapesError, StoreError},
     headless::WorkbenchError,
 };
 
@@ -54,6 +54,16 @@ impl From<LoadError> for Failure {
     fn from(error: LoadError) -> Self {
         match error {
             LoadError::Kind { .. } => Self::Usage(error.to_string()),
+            error => Self::Input(Box::new(error)),
+        }
+    }
+}
+
+impl From<LoadShapesError> for Failure {
+    fn from(error: LoadShapesError) -> Self {
+        match error {
+            LoadShapesError::Load(error) => error.into(),
+            LoadShapesError::Kind { .. } => Self::Usage(error.to_string()),
             error => Self::Input(Box::new(error)),
         }
     }

@@ -67,6 +67,8 @@ pub struct ControlModule {
     pub follow: bool,
     /// Whether they follow the scale, too.
     pub follow_scale: bool,
+    /// Whether the nodes' own pose is put on top.
+    pub keep_pose: bool,
     /// The shape's name.
     pub shape: String,
     /// Half the shape's width.
@@ -101,6 +103,7 @@ impl Default for ControlModule {
             offset_group: true,
             follow: true,
             follow_scale: false,
+            keep_pose: false,
             shape: "circle".to_owned(),
             size: None,
             relative_size: 0.35,
@@ -127,6 +130,7 @@ impl RigModule for ControlModule {
         ("offset_group", "True: a null takes its place, so that its own base changes nothing."),
         ("follow", "True: the nodes follow their controls in place and turn."),
         ("follow_scale", "True: the nodes follow the scale of their controls, too."),
+        ("keep_pose", "True: the nodes' own pose, of an expression say, is put on top of what their controls say."),
         ("shape", "Name of the wire shape."),
         ("size", "Half the width of the shape in the rig's units, above 0; from the bone's length if left out."),
         ("relative_size", "Half the width of the shape as a share of the bone's length, where size is left out."),
@@ -241,7 +245,7 @@ impl ControlModule {
             let constraint = match upper {
                 // A joint that may be driven together with the one above it, by inverse kinematics say, cannot follow in
                 // the rig's space: that would depend on where the one above ends up.
-                Some(upper) if self.axes == ControlAxes::Node && !self.follow_scale => Constraint::Relative {
+                Some(upper) if self.axes == ControlAxes::Node && !self.follow_scale && !self.keep_pose => Constraint::Relative {
                     driven: scope.uid(node),
                     source: scope.uid(control),
                     space: scope.uid(upper),
@@ -269,7 +273,7 @@ impl ControlModule {
             rotate: [true; 3],
             scale: [self.follow_scale; 3],
             weight: Scalar::Value(1.0),
-            keep_pose: false,
+            keep_pose: self.keep_pose,
         }
     }
 

@@ -141,6 +141,13 @@ pub enum Operation {
     Tags(TagOperation),
     /// Edits as they are.
     Edits(Vec<RigEdit>),
+    /// Edits as they are, under a name of their own.
+    Named {
+        /// A few words for the history panel.
+        name: &'static str,
+        /// The edits, in order.
+        edits: Vec<RigEdit>,
+    },
 }
 
 /// Why an operation did nothing.
@@ -195,6 +202,7 @@ impl Operation {
                 [RigEdit::SetSkin(_, Some(_))] => "Skin mesh",
                 _ => "Edit rig",
             },
+            Self::Named { name, .. } => name,
         }
     }
 
@@ -263,7 +271,7 @@ impl Operation {
             Self::RenamePose(pose, name) => pose::rename(draft, *pose, name),
             Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),
             Self::Tags(operation) => tags::run(draft, operation),
-            Self::Edits(edits) => edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?)),
+            Self::Edits(edits) | Self::Named { edits, .. } => edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?)),
         }
     }
 }

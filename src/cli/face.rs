@@ -1,0 +1,286 @@
+//! `rigsmith face`: a head mesh becomes a face with bones, weights and expressions.
+
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+
+use bevy::math::Vec3;
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{
+    ExportArgs, Failure, Output, Report, SEED,
+    progress::{Progress, spinning},
+};
+use crate::{
+    algo::{
+        face::{
+            auto::{AutoSettings, FaceStep},
+            bones::FaceBoneKind,
+        },
+        fit::FitSettings,
+    },
+    files::{FileKind, RealDisk, load_model, load_shapes, stem, store_model, store_rig},
+    headless::Workbench,
+    plugins::face::{FaceReport, FaceShapes},
+    rig::{Rig, nearest::did_you_mean},
+};
+
+/// Arguments of `rigsmith face`.
+#[derive(Args, Debug)]
+pub(super) struct FaceArgs {
+    /// The mesh: a head, or a body whose head is found. .obj, .gltf or .glb
+    mesh: PathBuf,
+    /// Bones of the facial skin: the density. Jaw and eyes come on top
+    #[arg(long, value_name = "K", default_value_t = 40)]
+    bones: usize,
+    /// Up in the mesh, if the guess is wrong
+    #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true)]
+    up: Option<Vec3>,
+    /// Where the face looks in the mesh, if the guess is wrong
+    #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true)]
+    forward: Option<Vec3>,
+    /// What the first centroids are drawn with; the same seed gives the same bytes
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Without pairs of bones on both sides
+    #[arg(long)]
+    no_symmetry: bool,
+    /// Without bones for jaw and eyes
+    #[arg(long)]
+    skin_only: bool,
+    /// Take the whole mesh for a head, even if it looks like a body
+    #[arg(long)]
+    whole: bool,
+    /// An expression, or one of the units that they are made of, with a strength from 0 to 1; may be repeated
+    #[arg(long, value_name = "NAME=STRENGTH", value_parser = strength)]
+    expression: Vec<(String, f32)>,
+    /// Move the bones to fit shapes: a .glb with morph targets, a folder of .obj files, or a .json beside its .f32. Each
+    /// shape is kept as a stored pose
+    #[arg(long, value_name = "SHAPES")]
+    fit: Option<PathBuf>,
+    /// What to write: .glb or .gltf for the character, .rig.ron for the rig, .png for a picture
+    #[arg(short, long)]
+    output: Output,
+    #[command(flatten)]
+    export: ExportArgs,
+}
+
+fn axis(text: &str) -> Result<Vec3, String> {
+    let (sign, letter) = match text.strip_prefix('-') {
+        Some(letter) => (-1.0, letter),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
+    };
+    match letter.to_ascii_lowercase().as_str() {
+        "x" => Ok(Vec3::X * sign),
+        "y" => Ok(Vec3::Y * sign),
+        "z" => Ok(Vec3::Z * sign),
+        _ => Err("write x, y or z, or -x, -y or -z".to_owned()),
+    }
+}
+
+fn strength(text: &str) -> Result<(String, f32), String> {
+    let wanted = || "write NAME=STRENGTH, such as happiness=0.8".to_owned();
+    let (name, strength) = text.split_once('=').ok_or_else(wanted)?;
+    match strength.trim().parse::<f32>() {
+        Ok(number) if (0.0..=1.0).contains(&number) => Ok((name.trim().to_owned(), number)),
+        Ok(number) if number.is_finite() => Err(format!("{number} is not from 0 to 1")),
+        _ => Err(wanted()),
+    }
+}
+
+/// What is written.
+#[derive(Clone, Copy, PartialEq)]
+enum Wanted {
+    Character,
+    Rig,
+    Picture,
+}
+
+pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
+    let wanted = wanted(args)?;
+    if args.bones == 0 {
+        return Err(Failure::Usage("--bones 0 makes no face; ask for at least 1".to_owned()));
+    }
+    let mut report = Report::default();
+    let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
+    report.notes(model.notes.iter().cloned());
+    let shapes = args.fit.as_ref().map(|path| spinning("reading shapes", || load_shapes(&RealDisk, path, &model)));
+    let shapes = shapes.transpose()?.map(|shapes| {
+        let settings = FitSettings { bones: args.bones, seed: args.seed, ..FitSettings::default() };
+        Arc::new(FaceShapes { names: shapes.names, displacements: shapes.displacements, settings })
+    });
+    let mut bench = Workbench::new(SEED, &stem(&args.mesh));
+    bench.open(model, false)?;
+    let settings = AutoSettings {
+        bones: args.bones,
+        seed: args.seed,
+        symmetric: !args.no_symmetry,
+        extras: !args.skin_only,
+        up: args.up,
+        forward: args.forward,
+        whole: args.whole,
+        ..AutoSettings::default()
+    };
+    let mut progress = Progress::new("placing the face");
+    let placed = bench.face(settings, shapes, &mut |_: FaceStep, part| progress.at(part))?;
+    drop(progress);
+    describe(&mut report, &placed);
+    if !args.expression.is_empty() {
+        express(args, &mut bench, &mut report)?;
+    }
+    report.set("joints", bench.rig().len());
+    match wanted {
+        Wanted::Rig => report.notes(store_rig(&RealDisk, &args.output, bench.rig())?),
+        Wanted::Character => {
+            let mut model = bench.character();
+            pose(&mut model.nodes, bench.rig());
+            let settings = args.export.settings();
+            report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
+        }
+        Wanted::Picture => picture(args, &bench, &mut report)?,
+    }
+    report.line(format!("wrote {}", args.output.display()));
+    report.set("output", args.output.display().to_string());
+    Ok(report)
+}
+
+fn wanted(args: &FaceArgs) -> Result<Wanted, Failure> {
+    let is_png = args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
+    match FileKind::of(&args.output) {
+        Some(FileKind::Glb | FileKind::Gltf) => Ok(Wanted::Character),
+        Some(FileKind::Template) => Ok(Wanted::Rig),
+        None if is_png && cfg!(feature = "render") => Ok(Wanted::Picture),
+        _ if is_png => Err(Failure::Usage("this build draws no pictures; write .glb, .gltf or .rig.ron".to_owned())),
+        _ => {
+            let message = format!("cannot write `{}`; give .glb, .gltf, .rig.ron or .png", args.output.display());
+            Err(Failure::Usage(message))
+        }
+    }
+}
+
+fn express(args: &FaceArgs, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
+    let strengths: BTreeMap<String, f32> = args.expression.iter().cloned().collect();
+    let set = crate::algo::face::expression::ExpressionSet::bundled();
+    for name in strengths.keys() {
+        if set.find(name).is_none() {
+            let names: Vec<&str> = set.names().collect();
+            let nearest = did_you_mean(name, names.iter().copied());
+            return Err(Failure::Usage(format!("--expression {name}: there is no such expression{nearest}")));
+        }
+    }
+    bench.express(strengths.clone())?;
+    report.set("expressions", json!(strengths));
+    Ok(())
+}
+
+/// Puts the exported joints where the pose has them; bind poses stay.
+fn pose(nodes: &mut [crate::mesh::model::Node], rig: &Rig) {
+    for (node, joint) in nodes.iter_mut().zip(rig.walk()) {
+        if rig.offset(joint.data.uid).is_some() {
+            node.rest = crate::rig::RestTransform::from(rig.posed_local(joint.data.uid)).into();
+        }
+    }
+}
+
+#[cfg(feature = "render")]
+fn picture(args: &FaceArgs, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
+    use bevy::math::UVec2;
+
+    use crate::{
+        algo::view::View,
+        files::save_atomic,
+        plugins::drawing::{LabelChoice, RigDrawing},
+        render::{PictureSettings, adapter, png, take_picture},
+    };
+
+    let wrong = |error| Failure::Input(Box::new(error));
+    let settings = PictureSettings {
+        size: UVec2::new(900, 900),
+        view: View::Front,
+        // Bones of a face that shows something would hide it.
+        drawing: RigDrawing {
+            rig: args.expression.is_empty(),
+            grid: false,
+            labels: LabelChoice::None,
+            ..RigDrawing::default()
+        },
+        ..PictureSettings::default()
+    };
+    if let Some((name, true)) = adapter() {
+        report.notes.push(format!("no graphics card: drawn in software ({name})"));
+    }
+    let Some(mesh) = bench.mesh() else { return Ok(()) };
+    let (rig, mesh) = (bench.rig().clone(), mesh.clone());
+    let image = spinning("drawing", || take_picture(rig, vec![mesh], &settings)).map_err(wrong)?;
+    let bytes = png(image).map_err(wrong)?;
+    save_atomic(&RealDisk, &args.output, &bytes).map_err(|error| Failure::Input(Box::new(error)))
+}
+
+#[cfg(not(feature = "render"))]
+fn picture(_: &FaceArgs, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
+    Err(Failure::Usage("this build draws no pictures; write .glb, .gltf or .rig.ron".to_owned()))
+}
+
+/// Says what was placed.
+fn describe(report: &mut Report, placed: &FaceReport) {
+    let [face, middle, back] = placed.groups;
+    let [head, all] = placed.points;
+    if placed.is_part {
+        report.notes.push(format!(
+            "the mesh is more than a head: the face was placed in its head part ({head} of {all} points); \
+             --whole takes all of it for a head"
+        ));
+    }
+    if !placed.certain {
+        report.notes.push("which way the head looks is a weak guess; say it with --up and --forward".to_owned());
+    }
+    if placed.confidence < 0.5 {
+        report.notes.push(format!(
+            "features of a human face were found with a confidence of {:.2} only; check where bones and regions are",
+            placed.confidence
+        ));
+    }
+    if placed.folds > 0 {
+        report.notes.push(format!(
+            "{} triangles fold over in the six expressions at full strength; try another --seed or density",
+            placed.folds
+        ));
+    }
+    let skin = placed.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
+    report.line(format!("groups: face {face}, middle {middle}, back {back} points; facial mask {} points", placed.mask));
+    report.line(format!(
+        "{skin} facial bones, {} of jaw and eyes; square error {:.4} after {} rounds",
+        placed.bones.len() - skin,
+        placed.square_error,
+        placed.rounds
+    ));
+    if let Some(error) = placed.fit_error {
+        report.line(format!("fitted to the shapes with an error of {error:.5} (root mean square)"));
+        report.set("fit_error", error);
+    }
+    let milliseconds = |time: &std::time::Duration| time.as_secs_f64() * 1000.0;
+    let sum: f64 = placed.times.iter().map(|(_, time)| milliseconds(time)).sum();
+    report.line(format!("{sum:.0} ms"));
+    report.set("groups", json!({ "face": face, "middle": middle, "back": back, "cut": placed.cut, "mask": placed.mask }));
+    report.set("points", json!({ "head": head, "mesh": all }));
+    report.set("heights", json!(placed.heights));
+    report.set("confidence", placed.confidence);
+    report.set("square_error", placed.square_error);
+    report.set("rounds", placed.rounds);
+    report.set("folds", placed.folds);
+    report.set("kept", placed.kept);
+    let bone = |bone: &crate::algo::face::bones::FaceBone| {
+        json!({
+            "label": bone.label,
+            "kind": format!("{:?}", bone.kind).to_lowercase(),
+            "region": format!("{:?}", bone.region).to_lowercase(),
+            "side": format!("{:?}", bone.side).to_lowercase(),
+            "position": bone.position.to_array(),
+            "pair": bone.pair.and_then(|pair| placed.bones.get(pair)).map(|pair| pair.label.as_str()),
+        })
+    };
+    report.set("bones", placed.bones.iter().map(bone).collect::<Vec<Value>>());
+    let times = placed.times.iter().map(|(name, time)| ((*name).to_owned(), json!(milliseconds(time))));
+    let mut times: serde_json::Map<String, Value> = times.collect();
+    times.insert("sum".to_owned(), json!(sum));
+    report.set("milliseconds", times);
+}
