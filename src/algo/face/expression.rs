@@ -1,1 +1,160 @@
-//! To be written.
+//! Expressions: what moves in a face, as fields in normalised face coordinates, and what that means for bones.
+//!
+//! A [`Unit`] is about what one facial muscle does (the action units of the Facial Action Coding System): a few
+//! landmarks of the skin, and where each goes. It is written once, in shares of the eye distance, for the character's
+//! left, and fits any head that has [`Landmarks`] and any number of bones. An [`Expression`] names units and strengths.
+//!
+//! [`pose`] samples the field where the bones are. Few bones cannot follow it everywhere, and each drags its whole patch
+//! of skin along, so [`FittedFace`] (and [`pose_fitted`]) solves for the bone movements whose *skinned surface* follows
+//! the field best, above all at the landmarks. That is what makes a face look the same with ten bones or eighty.
+
+mod field;
+mod fitted;
+mod gates;
+mod set;
+mod text;
+
+use bevy::math::ops;
+use glam::{Affine3A, Quat, Vec3};
+
+use self::field::Field;
+use super::{
+    bones::{FaceBone, FaceBoneKind},
+    landmarks::Landmarks,
+};
+use crate::mesh::{model::Weights, skinning::skin_points};
+
+pub use self::{
+    fitted::{FittedFace, pose_fitted},
+    set::{ExpressionSet, UnitSet},
+    text::{Expression, ExpressionError, Gaze, Part, Sides, Unit, UnitMove, UnitUse, MAX_TEXT},
+};
+
+/// The furthest that a bone is moved, in eye distances.
+const FURTHEST: f32 = 0.6;
+
+/// A bone's offset from rest in head space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BonePose {
+    /// How far the bone moves, in units of the mesh.
+    pub translation: Vec3,
+    /// How it turns, about its own (moved) position.
+    pub rotation: Quat,
+}
+
+impl BonePose {
+    /// At rest.
+    pub const REST: Self = Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
+
+    /// What takes points of the rest pose to the posed ones, for a bone that rests at `position`.
+    pub fn affine(&self, position: Vec3) -> Affine3A {
+        let matrix = glam::Mat3A::from_quat(self.rotation);
+        Affine3A { matrix3: matrix, translation: glam::Vec3A::from(position + self.translation) - matrix * glam::Vec3A::from(position) }
+    }
+}
+
+/// How strongly each unit acts on each side: what any blend of expressions comes down to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mix {
+    /// Left and right strength of each unit, in the order of the [`UnitSet`], each from 0 to the unit's limit.
+    pub strengths: Vec<[f32; 2]>,
+}
+
+impl Mix {
+    /// Nothing moves.
+    pub fn rest(units: &UnitSet) -> Self {
+        Self { strengths: vec![[0.0; 2]; units.units().len()] }
+    }
+
+    /// A blend of expressions: strengths of the same unit add up, to the unit's limit at most.
+    ///
+    /// Strengths of expressions are cut to 0..=1, those that are not numbers count as 0. Units that `units` does not have
+    /// are left out ([`ExpressionSet`] never has any).
+    pub fn of(expressions: &[(&Expression, f32)], units: &UnitSet) -> Self {
+        let mut mix = Self::rest(units);
+        for (expression, strength) in expressions {
+            for used in &expression.units {
+                mix.add(&used.unit, used.side, used.strength * between(*strength, 1.0), units);
+            }
+        }
+        mix
+    }
+
+    /// Adds one unit on one side or both; false if there is no such unit.
+    pub fn add(&mut self, unit: &str, side: Sides, strength: f32, units: &UnitSet) -> bool {
+        let Some(index) = units.index(unit) else { return false };
+        let (Some(strengths), Some(unit)) = (self.strengths.get_mut(index), units.units().get(index)) else { return false };
+        for (side_index, strengths) in strengths.iter_mut().enumerate() {
+            if side.has(side_index) {
+                *strengths = between(*strengths + between(strength, unit.limit), unit.limit);
+            }
+        }
+        true
+    }
+
+    /// True if nothing moves.
+    pub fn is_rest(&self) -> bool {
+        self.strengths.iter().all(|strengths| strengths == &[0.0; 2])
+    }
+}
+
+/// A number in 0..=`most`; 0 for what is none.
+fn between(value: f32, most: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(0.0, most) }
+}
+
+/// The pose of each bone for a blend of expressions (strengths 0..=1): the field, sampled where the bones are.
+///
+/// `bones` and `landmarks` are in head space, and so are the poses. Skin bones move, the jaw bone turns about where it
+/// is, eye bones turn. With a jaw bone among `bones`, what the jaw does to the skin is left to it as far as its weights
+/// go only in [`pose_fitted`]; here skin bones follow the whole field, as if the jaw bone held no skin. Everything at
+/// rest if the landmarks are degenerate. Cost: bones times moves.
+pub fn pose(expressions: &[(&Expression, f32)], units: &UnitSet, bones: &[FaceBone], landmarks: &Landmarks) -> Vec<BonePose> {
+    pose_mix(&Mix::of(expressions, units), units, bones, landmarks)
+}
+
+/// Like [`pose`], for any mix of units.
+pub fn pose_mix(mix: &Mix, units: &UnitSet, bones: &[FaceBone], landmarks: &Landmarks) -> Vec<BonePose> {
+    let Some(field) = Field::new(mix, units, bones, landmarks) else { return vec![BonePose::REST; bones.len()] };
+    bones
+        .iter()
+        .map(|bone| match bone.kind {
+            FaceBoneKind::Skin => BonePose {
+                translation: limited(field.at(bone.position, gates::Known::default()), landmarks),
+                rotation: Quat::IDENTITY,
+            },
+            _ => field.turn(bone),
+        })
+        .collect()
+}
+
+/// A movement no longer than bones may make.
+fn limited(movement: Vec3, landmarks: &Landmarks) -> Vec3 {
+    if movement.is_finite() { movement.clamp_length_max(FURTHEST * landmarks.eye_distance()) } else { Vec3::ZERO }
+}
+
+/// The points of a head in an expression, by linear blend skinning.
+///
+/// `points` in head space; `weights` as [`face_weights`](super::weights) makes them: joint 0 the neck and 1 the head,
+/// which stay where they are, 2 + i `bones[i]`. Bones without a pose stay at rest. A point without weights stays.
+pub fn apply(points: &[Vec3], weights: &Weights, bones: &[FaceBone], poses: &[BonePose]) -> Vec<Vec3> {
+    let mut matrices = vec![Affine3A::IDENTITY; 2];
+    matrices.extend(bones.iter().enumerate().map(|(index, bone)| {
+        poses.get(index).copied().unwrap_or(BonePose::REST).affine(bone.position)
+    }));
+    let mut posed = Vec::new();
+    skin_points(points, weights, &matrices, &mut posed);
+    posed
+}
+
+/// A turn by degrees about the x axis, which opens a jaw when positive.
+fn pitch(degrees: f32) -> Quat {
+    let half = degrees.to_radians() * 0.5;
+    Quat::from_xyzw(ops::sin(half), 0.0, 0.0, ops::cos(half))
+}
+
+/// A turn by degrees about the y axis, to the character's left when positive.
+fn yaw(degrees: f32) -> Quat {
+    let half = degrees.to_radians() * 0.5;
+    Quat::from_xyzw(0.0, ops::sin(half), 0.0, ops::cos(half))
+}

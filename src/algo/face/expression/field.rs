@@ -1,0 +1,178 @@
+//! The displacement field of a mix of units on one head.
+
+use glam::{Quat, Vec3};
+
+use super::{
+    BonePose, Mix, UnitSet,
+    gates::{Gates, Known},
+    pitch,
+    text::{Part, UnitMove},
+    yaw,
+};
+use crate::algo::face::{
+    bones::{FaceBone, FaceBoneKind},
+    landmarks::Landmarks,
+};
+
+/// The field, ready to be sampled at points of the rest pose.
+pub(super) struct Field {
+    scale: f32,
+    gates: Gates,
+    sources: Vec<Source>,
+    /// How far the jaw is open, and about which point it turns.
+    jaw: Quat,
+    pivot: Vec3,
+    /// How the left and the right eye turn.
+    eyes: [Quat; 2],
+}
+
+/// One unit on one side.
+struct Source {
+    side: usize,
+    strength: f32,
+    moves: Vec<Move>,
+}
+
+/// A move of a unit, on this head.
+struct Move {
+    center: Vec3,
+    by: Vec3,
+    /// One over the radii.
+    narrow: [f32; 2],
+    part: Part,
+}
+
+impl Field {
+    /// `None` if the landmarks are degenerate. The jaw turns about the jaw bone if there is one.
+    pub fn new(mix: &Mix, units: &UnitSet, bones: &[FaceBone], landmarks: &Landmarks) -> Option<Self> {
+        let gates = Gates::new(landmarks)?;
+        let distance = landmarks.eye_distance();
+        let mut sources = Vec::new();
+        let mut open = 0.0;
+        let mut gaze = [[0.0_f32; 2]; 2];
+        for (unit, strengths) in units.units().iter().zip(&mix.strengths) {
+            open += unit.jaw * (strengths[0] + strengths[1]) * 0.5;
+            for (side, &strength) in strengths.iter().enumerate().filter(|(_, strength)| **strength > 0.0) {
+                gaze[side][0] += unit.gaze.out * strength;
+                gaze[side][1] += unit.gaze.up * strength;
+                let moves = unit.moves.iter().map(|one| Move::new(one, side, landmarks)).collect();
+                sources.push(Source { side, strength, moves });
+            }
+        }
+        let eye = |side: usize, [out, up]: [f32; 2]| {
+            yaw(if side == 0 { out } else { -out }.clamp(-40.0, 40.0)) * pitch(-up.clamp(-35.0, 35.0))
+        };
+        let jaw_bone = bones.iter().find(|bone| bone.kind == FaceBoneKind::Jaw);
+        Some(Self {
+            scale: 1.0 / distance,
+            gates,
+            sources,
+            jaw: pitch(open.clamp(0.0, 35.0)),
+            pivot: jaw_bone.map_or_else(|| hinge(landmarks), |bone| bone.position),
+            eyes: [eye(0, gaze[0]), eye(1, gaze[1])],
+        })
+    }
+
+    /// How far the skin at `point` goes, in units of the mesh.
+    pub fn at(&self, point: Vec3, known: Known) -> Vec3 {
+        let arm = point - self.pivot;
+        let mut sum = (self.jaw * arm - arm) * self.gates.jaw(point, known);
+        for source in &self.sources {
+            let share = self.gates.side(point, source.side) * source.strength;
+            if share > 0.0 {
+                sum += source.at(point, known, self.scale, &self.gates) * (share / self.scale);
+            }
+        }
+        sum
+    }
+
+    /// How a jaw or eye bone turns.
+    pub fn turn(&self, bone: &FaceBone) -> BonePose {
+        let rotation = match bone.kind {
+            FaceBoneKind::Skin => Quat::IDENTITY,
+            FaceBoneKind::Jaw => self.jaw,
+            FaceBoneKind::Eye => {
+                let [left, right] = self.eyes;
+                if self.gates.side(bone.position, 0) >= 0.5 { left } else { right }
+            }
+        };
+        BonePose { translation: Vec3::ZERO, rotation }
+    }
+
+    /// The parts of lips and lids on this head.
+    pub fn gates(&self) -> &Gates {
+        &self.gates
+    }
+}
+
+impl Source {
+    /// In eye distances: near each place what was asked for, in between a blend, and less with distance.
+    fn at(&self, point: Vec3, known: Known, scale: f32, gates: &Gates) -> Vec3 {
+        let (mut sum, mut weights, mut outside) = (Vec3::ZERO, 0.0, 1.0);
+        for one in &self.moves {
+            let off = (point - one.center) * scale;
+            let square = (off.x * one.narrow[0]).powi(2) + (off.y * one.narrow[1]).powi(2);
+            if square >= 1.0 {
+                continue;
+            }
+            let part = gates.part(one.part, point, known);
+            let near = (1.0 - square) * (1.0 - square) * part;
+            let weight = near / (square + 0.02);
+            sum += one.by * weight;
+            weights += weight;
+            outside *= 1.0 - near;
+        }
+        if weights > 0.0 { sum * ((1.0 - outside) / weights) } else { Vec3::ZERO }
+    }
+}
+
+impl Move {
+    fn new(one: &UnitMove, side: usize, landmarks: &Landmarks) -> Self {
+        let mirror = |v: Vec3| if side == 0 { v } else { Vec3::new(-v.x, v.y, v.z) };
+        let mean = |marks: &[u8]| {
+            let mut sum = Vec3::ZERO;
+            for &mark in marks {
+                let mark = if side == 0 { usize::from(mark) } else { mirrored(usize::from(mark)) };
+                sum += landmarks.points.get(mark).copied().unwrap_or_default();
+            }
+            sum / marks.len().max(1) as f32
+        };
+        let at = mean(&one.at);
+        let way = if one.toward.is_empty() { Vec3::ZERO } else { mean(&one.toward) - at };
+        let distance = landmarks.eye_distance();
+        Self {
+            center: at + mirror(one.offset) * distance,
+            by: mirror(one.by) + way * (one.share / distance),
+            narrow: [1.0 / one.reach.0.max(1e-3), 1.0 / one.reach.1.max(1e-3)],
+            part: one.part,
+        }
+    }
+}
+
+/// The landmark at the same place on the other side.
+fn mirrored(mark: usize) -> usize {
+    match mark {
+        0..=16 => 16 - mark,
+        17..=26 => 43 - mark,
+        31..=35 => 66 - mark,
+        36..=39 => 81 - mark,
+        40 => 47,
+        41 => 46,
+        42..=45 => 81 - mark,
+        46 => 41,
+        47 => 40,
+        48..=54 => 102 - mark,
+        55..=59 => 114 - mark,
+        60..=64 => 124 - mark,
+        65 => 67,
+        67 => 65,
+        _ => mark,
+    }
+}
+
+/// About where the lower jaw hangs: a little in front of and below the ears, where the outline begins.
+fn hinge(landmarks: &Landmarks) -> Vec3 {
+    let points = &landmarks.points;
+    let outline = (points[0] + points[16] + points[1] + points[15]) * 0.25;
+    Vec3::new(landmarks.middle, outline.y, outline.z)
+}

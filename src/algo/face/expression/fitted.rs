@@ -1,0 +1,353 @@
+//! Bone movements whose skinned surface follows the field.
+//!
+//! The skin of a patch goes where the weighted mean of its bones' movements takes it, which is less than the field asks
+//! for at the field's peaks and drags along what should stay. So the movements are solved for: least squares over the
+//! points of the skin, landmarks counting most, held back a little towards what each bone's own patch asks for. With the
+//! weights fixed the matrix is the same for all expressions and factorised once.
+
+use glam::Vec3;
+
+use super::{
+    BonePose, Expression, Mix, UnitSet, apply,
+    field::Field,
+    gates::{Gates, Known},
+    limited,
+};
+use crate::{
+    algo::face::{
+        bones::{FaceBone, FaceBoneKind},
+        landmarks::Landmarks,
+    },
+    mesh::model::Weights,
+};
+
+/// What a landmark counts, as a share of the whole skin.
+const LANDMARK: f64 = 0.02;
+/// How strongly movements are held to what their own patch asks for, as a share of what the patch counts.
+const HOLD: f64 = 0.01;
+/// How strongly bones with common skin are held together, in turn, where the face would fold otherwise.
+const STIFFER: [f64; 4] = [0.002, 0.05, 0.3, 2.0];
+
+/// A head with its bones and weights, ready to be posed many times.
+pub struct FittedFace<'a> {
+    points: &'a [Vec3],
+    triangles: &'a [[u32; 3]],
+    weights: &'a Weights,
+    bones: &'a [FaceBone],
+    landmarks: &'a Landmarks,
+    /// The bones that are solved for, and the place of each bone among them.
+    skin: Vec<usize>,
+    samples: Vec<Sample>,
+    /// Cholesky factors, one for each of [`STIFFER`].
+    factors: Vec<Vec<f64>>,
+    /// What each bone's patch counts.
+    patch: Vec<f64>,
+    /// Triangles that bones move.
+    moving: Vec<u32>,
+}
+
+/// A point of the skin that should follow the field.
+struct Sample {
+    /// Where the field is asked, which for landmarks is where the landmark is.
+    place: Vec3,
+    known: Known,
+    counts: f64,
+    /// Unknowns and weights.
+    influences: Vec<(u32, f64)>,
+    /// Of the jaw bone, with its place among the bones.
+    jaw: f64,
+}
+
+/// Poses bones so that the skin follows a blend of expressions: [`FittedFace::new`] and [`FittedFace::pose`] in one.
+pub fn pose_fitted(
+    expressions: &[(&Expression, f32)],
+    units: &UnitSet,
+    bones: &[FaceBone],
+    landmarks: &Landmarks,
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    mask: &[bool],
+    weights: &Weights,
+) -> Vec<BonePose> {
+    FittedFace::new(points, triangles, mask, weights, bones, landmarks).pose(&Mix::of(expressions, units), units)
+}
+
+impl<'a> FittedFace<'a> {
+    /// Prepares a head.
+    ///
+    /// All in head space. `mask` says which points are skin of the face (none given: all that bones move); `weights` as
+    /// [`apply`] takes them. What does not fit together (too few weights, joints without a bone, triangles without
+    /// points) is passed over. Cost: points times influences squared, and bones cubed.
+    pub fn new(
+        points: &'a [Vec3],
+        triangles: &'a [[u32; 3]],
+        mask: &[bool],
+        weights: &'a Weights,
+        bones: &'a [FaceBone],
+        landmarks: &'a Landmarks,
+    ) -> Self {
+        let skin: Vec<usize> = (0..bones.len()).filter(|&bone| bones[bone].kind == FaceBoneKind::Skin).collect();
+        let mut unknown_of = vec![u32::MAX; bones.len()];
+        for (unknown, &bone) in skin.iter().enumerate() {
+            unknown_of[bone] = unknown as u32;
+        }
+        let mut face = Self {
+            points,
+            triangles,
+            weights,
+            bones,
+            landmarks,
+            skin,
+            samples: Vec::new(),
+            factors: Vec::new(),
+            patch: Vec::new(),
+            moving: Vec::new(),
+        };
+        let Some(gates) = Gates::new(landmarks) else { return face };
+        face.gather(&gates, &unknown_of, mask);
+        face.factorise();
+        face.moving = (0..triangles.len() as u32)
+            .filter(|&index| {
+                let corners = triangles[index as usize].map(|corner| corner as usize);
+                corners.iter().all(|&corner| corner < points.len())
+                    && corners.iter().any(|&corner| face.influences(corner).any(|(joint, _)| joint >= 2))
+            })
+            .collect();
+        face
+    }
+
+    /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of units.
+    ///
+    /// Where triangles of the skin would turn over or inner lips cross, bones with common skin are held together more
+    /// and more, and at last everything is made weaker. Cost: points times moves of the field.
+    pub fn pose(&self, mix: &Mix, units: &UnitSet) -> Vec<BonePose> {
+        let rest = vec![BonePose::REST; self.bones.len()];
+        if mix.is_rest() {
+            return rest;
+        }
+        let Some(field) = Field::new(mix, units, self.bones, self.landmarks) else { return rest };
+        let mut best = (usize::MAX, rest);
+        for factor in &self.factors {
+            let poses = self.solve(&field, factor);
+            let faults = self.faults(&poses);
+            if faults == 0 {
+                return poses;
+            }
+            if faults < best.0 {
+                best = (faults, poses);
+            }
+        }
+        let mut poses = best.1;
+        for _ in 0..8 {
+            for pose in &mut poses {
+                pose.translation *= 0.85;
+                pose.rotation = glam::Quat::IDENTITY.slerp(pose.rotation, 0.85);
+            }
+            if self.faults(&poses) < best.0.min(1) {
+                break;
+            }
+        }
+        poses
+    }
+
+    /// The influences of a point, none where `weights` is too short.
+    fn influences(&self, point: usize) -> impl Iterator<Item = (u32, f32)> + '_ {
+        let range = match (self.weights.starts.get(point), self.weights.starts.get(point + 1)) {
+            (Some(&start), Some(&end)) => start as usize..end as usize,
+            _ => 0..0,
+        };
+        let joints = self.weights.joints.get(range.clone()).unwrap_or_default();
+        joints.iter().copied().zip(self.weights.values.get(range).unwrap_or_default().iter().copied())
+    }
+
+    /// Takes samples all over the skin, and at the landmarks.
+    fn gather(&mut self, gates: &Gates, unknown_of: &[u32], mask: &[bool]) {
+        let mut lower_share = vec![0.5_f32; self.points.len()];
+        let mut samples = Vec::new();
+        for (index, &point) in self.points.iter().enumerate() {
+            let Some(mut sample) = self.sample(index, point, unknown_of) else { continue };
+            let (mut lower, mut all) = (0.0, 0.0);
+            for (joint, weight) in self.influences(index) {
+                let Some(bone) = (joint as usize).checked_sub(2).and_then(|bone| self.bones.get(bone)) else { continue };
+                all += weight;
+                if bone.kind == FaceBoneKind::Jaw || !gates.above_mouth(bone.position) {
+                    lower += weight;
+                }
+            }
+            lower_share[index] = lower / all.max(1e-6);
+            if !mask.is_empty() && !mask.get(index).copied().unwrap_or(false) {
+                continue;
+            }
+            // Of lips that touch only the skin's own weights tell which is which.
+            if gates.near_mouth_line(point) {
+                match lower_share[index] {
+                    share if share > 0.8 => sample.known.upper_lip = Some(false),
+                    share if share < 0.2 => sample.known.upper_lip = Some(true),
+                    _ => continue,
+                }
+            }
+            samples.push(sample);
+        }
+        let each = 1.0 / samples.len().max(1) as f64;
+        for sample in &mut samples {
+            sample.counts = each;
+        }
+        for mark in 0..68 {
+            let place = self.landmarks.points[mark];
+            let known = Known::of_landmark(mark);
+            let fits = |index: usize| match known.upper_lip {
+                None => true,
+                Some(upper) => (lower_share[index] < 0.5) == upper,
+            };
+            let nearest = (0..self.points.len())
+                .filter(|&index| (mask.is_empty() || mask.get(index).copied().unwrap_or(false)) && fits(index))
+                .min_by(|&a, &b| {
+                    let [a, b] = [a, b].map(|index| self.points[index].distance_squared(place));
+                    a.total_cmp(&b)
+                });
+            let Some(mut sample) = nearest.and_then(|index| self.sample(index, place, unknown_of)) else { continue };
+            sample.known = known;
+            sample.counts = LANDMARK;
+            samples.push(sample);
+        }
+        self.samples = samples;
+    }
+
+    /// A sample of a point, if bones move it at all.
+    fn sample(&self, index: usize, place: Vec3, unknown_of: &[u32]) -> Option<Sample> {
+        let mut sample = Sample { place, known: Known::default(), counts: 0.0, influences: Vec::new(), jaw: 0.0 };
+        let mut all = 0.0;
+        for (joint, weight) in self.influences(index) {
+            let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < self.bones.len()) else { continue };
+            if !weight.is_finite() {
+                continue;
+            }
+            all += weight;
+            match self.bones[bone].kind {
+                FaceBoneKind::Skin => sample.influences.push((unknown_of[bone], f64::from(weight))),
+                FaceBoneKind::Jaw => sample.jaw += f64::from(weight),
+                FaceBoneKind::Eye => {}
+            }
+        }
+        (all > 0.02 && place.is_finite() && !sample.influences.is_empty()).then_some(sample)
+    }
+
+    /// Sums the normal equations and factorises them.
+    fn factorise(&mut self) {
+        let size = self.skin.len();
+        let mut matrix = vec![0.0; size * size];
+        self.patch = vec![0.0; size];
+        for sample in &self.samples {
+            for &(a, weight) in &sample.influences {
+                self.patch[a as usize] += sample.counts * weight;
+                for &(b, other) in &sample.influences {
+                    matrix[a as usize * size + b as usize] += sample.counts * weight * other;
+                }
+            }
+        }
+        let common = matrix.clone();
+        let floor = 1e-6 / size.max(1) as f64;
+        for stiff in STIFFER {
+            let mut system = common.clone();
+            for a in 0..size {
+                system[a * size + a] += HOLD * self.patch[a] + floor;
+                for b in 0..size {
+                    if a != b {
+                        system[a * size + a] += stiff * common[a * size + b];
+                        system[a * size + b] -= stiff * common[a * size + b];
+                    }
+                }
+            }
+            cholesky(&mut system, size);
+            self.factors.push(system);
+        }
+    }
+
+    /// The poses that follow a field best.
+    fn solve(&self, field: &Field, factor: &[f64]) -> Vec<BonePose> {
+        let size = self.skin.len();
+        let mut poses: Vec<BonePose> = self.bones.iter().map(|bone| field.turn(bone)).collect();
+        let jaw = self.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw);
+        let jaw = jaw.map(|bone| poses[bone].affine(self.bones[bone].position));
+        let mut right = vec![[0.0; 3]; size];
+        let mut asked = vec![[0.0; 3]; size];
+        for sample in &self.samples {
+            let mut target = field.at(sample.place, sample.known).as_dvec3();
+            if let Some(jaw) = jaw.filter(|_| sample.jaw > 0.0) {
+                target -= (jaw.transform_point3(sample.place) - sample.place).as_dvec3() * sample.jaw;
+            }
+            for &(unknown, weight) in &sample.influences {
+                for axis in 0..3 {
+                    let value = sample.counts * weight * target[axis];
+                    right[unknown as usize][axis] += value;
+                    asked[unknown as usize][axis] += value;
+                }
+            }
+        }
+        // What a patch asks for is the mean over it.
+        for unknown in 0..size {
+            if self.patch[unknown] > 0.0 {
+                for axis in 0..3 {
+                    right[unknown][axis] += HOLD * asked[unknown][axis];
+                }
+            }
+        }
+        substitute(factor, size, &mut right);
+        for (&bone, solved) in self.skin.iter().zip(&right) {
+            let movement = Vec3::new(solved[0] as f32, solved[1] as f32, solved[2] as f32);
+            poses[bone].translation = limited(movement, self.landmarks);
+        }
+        poses
+    }
+
+    /// How many triangles turn over, by more than a right angle, and inner lips cross.
+    fn faults(&self, poses: &[BonePose]) -> usize {
+        let posed = apply(self.points, self.weights, self.bones, poses);
+        let normal = |points: &[Vec3], corners: [u32; 3]| {
+            let [a, b, c] = corners.map(|corner| points[corner as usize]);
+            (b - a).cross(c - a)
+        };
+        let flips = self.moving.iter().filter(|&&index| {
+            let corners = self.triangles[index as usize];
+            normal(self.points, corners).dot(normal(&posed, corners)) < 0.0
+        });
+        flips.count()
+    }
+}
+
+/// Factorises a symmetric positive matrix in place, L in the lower triangle. A pivot that is lost to rounding is 1.
+fn cholesky(matrix: &mut [f64], size: usize) {
+    for row in 0..size {
+        for column in 0..=row {
+            let mut sum = matrix[row * size + column];
+            for k in 0..column {
+                sum -= matrix[row * size + k] * matrix[column * size + k];
+            }
+            matrix[row * size + column] = if row == column {
+                if sum > 0.0 { sum.sqrt() } else { 1.0 }
+            } else {
+                sum / matrix[column * size + column]
+            };
+        }
+    }
+}
+
+/// Solves for three right-hand sides at once.
+fn substitute(factor: &[f64], size: usize, right: &mut [[f64; 3]]) {
+    for axis in 0..3 {
+        for row in 0..size {
+            let mut sum = right[row][axis];
+            for k in 0..row {
+                sum -= factor[row * size + k] * right[k][axis];
+            }
+            right[row][axis] = sum / factor[row * size + row];
+        }
+        for row in (0..size).rev() {
+            let mut sum = right[row][axis];
+            for k in row + 1..size {
+                sum -= factor[k * size + row] * right[k][axis];
+            }
+            right[row][axis] = sum / factor[row * size + row];
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! The files of units and expressions: RON that a person can read and write, checked while it is read.
+
+use std::fmt;
+
+use glam::Vec3;
+use ron::{Options, extensions::Extensions, ser::PrettyConfig};
+use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned, de::Error};
+
+/// The longest text that is read, in bytes.
+pub const MAX_TEXT: usize = 256 << 10;
+/// The most units, moves or uses in one list.
+const MOST: usize = 256;
+/// The longest name, in bytes.
+const LONGEST_NAME: usize = 64;
+
+/// Something wrong in a file of units or expressions, and where.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file}: line {line}, column {column}: {message}")]
+pub struct ExpressionError {
+    /// The file, as the caller calls it.
+    pub file: String,
+    /// 1-based line.
+    pub line: usize,
+    /// 1-based column, in characters.
+    pub column: usize,
+    /// What is wrong and what to do.
+    pub message: String,
+}
+
+/// What one muscle, or a group that acts as one, does to the face.
+///
+/// Written for the character's left (+x), the right is its mirror image. Lengths are in eye distances (landmarks 36 to
+/// 45), x to the side, away from the middle, y up, z to the front.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Unit {
+    /// Its name, such as `lip_corner_pull`.
+    #[serde(deserialize_with = "name")]
+    pub name: String,
+    /// Which muscle, and what is seen.
+    #[serde(default)]
+    pub about: String,
+    /// The most that several expressions may add up to.
+    #[serde(default = "one", deserialize_with = "limit")]
+    pub limit: f32,
+    /// How the skin moves.
+    #[serde(default, deserialize_with = "few")]
+    pub moves: Vec<UnitMove>,
+    /// How far the jaw opens, in degrees.
+    #[serde(default, deserialize_with = "angle")]
+    pub jaw: f32,
+    /// How the eyeballs turn.
+    #[serde(default)]
+    pub gaze: Gaze,
+}
+
+/// A turn of an eyeball in degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Gaze {
+    /// To the side, away from the nose.
+    #[serde(deserialize_with = "angle")]
+    pub out: f32,
+    /// Up.
+    #[serde(deserialize_with = "angle")]
+    pub up: f32,
+}
+
+/// A place of the skin, and where it goes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnitMove {
+    /// The mean of these landmarks (Multi-PIE numbers, those of the character's left).
+    #[serde(deserialize_with = "marks")]
+    pub at: Vec<u8>,
+    /// Added to it.
+    #[serde(default, deserialize_with = "vector")]
+    pub offset: Vec3,
+    /// Where it goes from there.
+    #[serde(default, deserialize_with = "vector")]
+    pub by: Vec3,
+    /// Added to `by`: a share of the way from `at` to the mean of these landmarks, such as one lid to the other.
+    #[serde(default, deserialize_with = "targets")]
+    pub toward: Vec<u8>,
+    /// How much of that way; negative is away from them.
+    #[serde(default, deserialize_with = "share")]
+    pub share: f32,
+    /// How far the skin around goes along: the radii of an ellipse, in x and y.
+    #[serde(deserialize_with = "reach")]
+    pub reach: (f32, f32),
+    /// Which skin this is for.
+    #[serde(default)]
+    pub part: Part,
+}
+
+/// The skin that a move is for. Lips part at the mouth's line, lids at the eye's; beyond the corners both blend.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Part {
+    /// All.
+    #[default]
+    Everywhere,
+    /// What is above the mouth.
+    UpperLip,
+    /// What is below it.
+    LowerLip,
+    /// What is above the eye.
+    UpperLid,
+    /// What is below it.
+    LowerLid,
+}
+
+/// One side of the face, or both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Sides {
+    /// Both.
+    #[default]
+    Both,
+    /// The character's left, +x.
+    Left,
+    /// The character's right.
+    Right,
+}
+
+impl Sides {
+    /// Whether 0, the left, or 1, the right, belongs to it.
+    pub(super) fn has(self, side: usize) -> bool {
+        matches!((self, side), (Self::Both, _) | (Self::Left, 0) | (Self::Right, 1))
+    }
+}
+
+/// Units at strengths, under a name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expression {
+    /// Its name, such as `happiness`.
+    #[serde(deserialize_with = "name")]
+    pub name: String,
+    /// What it looks like.
+    #[serde(default)]
+    pub about: String,
+    /// What it is made of.
+    #[serde(deserialize_with = "few")]
+    pub units: Vec<UnitUse>,
+}
+
+/// A unit in an expression.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnitUse {
+    /// Its name.
+    #[serde(deserialize_with = "name")]
+    pub unit: String,
+    /// On which side.
+    #[serde(default)]
+    pub side: Sides,
+    /// How strongly, 0 to 1.
+    #[serde(default = "one", deserialize_with = "strength")]
+    pub strength: f32,
+}
+
+impl Unit {
+    /// Reads a file of units; `file` is what errors call it. Names are unique in it.
+    pub fn parse_list(text: &str, file: &str) -> Result<Vec<Self>, ExpressionError> {
+        #[derive(Deserialize)]
+        #[serde(transparent)]
+        struct List(#[serde(deserialize_with = "few")] Vec<Unit>);
+        let List(units) = parse(text, file)?;
+        for (index, unit) in units.iter().enumerate() {
+            if units.iter().take(index).any(|other| other.name == unit.name) {
+                let message = format!("a second unit {:?}; rename one of the two", unit.name);
+                return Err(located(text, file, last_quoted(text, &unit.name), message));
+            }
+        }
+        Ok(units)
+    }
+
+    /// The text of a file of units.
+    pub fn list_to_text(units: &[Self]) -> Result<String, ron::Error> {
+        ron::ser::to_string_pretty(&units, PrettyConfig::default())
+    }
+}
+
+impl Expression {
+    /// Reads a file with one expression; `file` is what errors call it. Whether its units exist is checked by
+    /// [`ExpressionSet::add`](super::ExpressionSet::add).
+    pub fn parse(text: &str, file: &str) -> Result<Self, ExpressionError> {
+        parse(text, file)
+    }
+
+    /// The text of its file.
+    pub fn to_text(&self) -> Result<String, ron::Error> {
+        ron::ser::to_string_pretty(self, PrettyConfig::default())
+    }
+}
+
+/// Reads any of our values.
+fn parse<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, ExpressionError> {
+    if text.len() > MAX_TEXT {
+        let message = format!("{} KiB, more than the {} KiB that are read; split the file", text.len() >> 10, MAX_TEXT >> 10);
+        return Err(located(text, file, 0, message));
+    }
+    if text.trim().is_empty() {
+        return Err(located(text, file, 0, "the file is empty; save it again".into()));
+    }
+    Options::default().with_default_extension(Extensions::IMPLICIT_SOME).from_str(text).map_err(|error| ExpressionError {
+        file: file.into(),
+        line: error.span.start.line,
+        column: error.span.start.col,
+        message: error.code.to_string(),
+    })
+}
+
+/// An error at a byte offset.
+pub(super) fn located(text: &str, file: &str, offset: usize, message: String) -> ExpressionError {
+    let before = text.get(..offset).unwrap_or_default();
+    let line = before.rsplit('\n').next().unwrap_or_default();
+    ExpressionError {
+        file: file.into(),
+        line: before.matches('\n').count() + 1,
+        column: line.chars().count() + 1,
+        message,
+    }
+}
+
+/// Where a name in quotes is last in a text, 0 if nowhere.
+pub(super) fn last_quoted(text: &str, name: &str) -> usize {
+    text.rfind(&format!("\"{name}\"")).unwrap_or(0)
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+/// A number in a range; `what` and the range are told otherwise.
+fn number<'de, D: Deserializer<'de>>(reader: D, what: &str, least: f32, most: f32) -> Result<f32, D::Error> {
+    checked(f32::deserialize(reader)?, what, least, most)
+}
+
+fn checked<E: Error>(value: f32, what: impl fmt::Display, least: f32, most: f32) -> Result<f32, E> {
+    if value >= least && value <= most {
+        Ok(value)
+    } else {
+        Err(E::custom(format!("{what} is {value}; give a number from {least} to {most}")))
+    }
+}
+
+fn limit<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
+    number(reader, "the limit", 0.0, 2.0)
+}
+
+fn strength<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
+    number(reader, "the strength", 0.0, 1.0)
+}
+
+fn angle<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
+    number(reader, "the angle in degrees", -45.0, 45.0)
+}
+
+fn vector<'de, D: Deserializer<'de>>(reader: D) -> Result<Vec3, D::Error> {
+    let (x, y, z) = <(f32, f32, f32)>::deserialize(reader)?;
+    for (axis, value) in [("x", x), ("y", y), ("z", z)] {
+        checked::<D::Error>(value, axis, -2.0, 2.0)?;
+    }
+    Ok(Vec3::new(x, y, z))
+}
+
+fn reach<'de, D: Deserializer<'de>>(reader: D) -> Result<(f32, f32), D::Error> {
+    let (x, y) = <(f32, f32)>::deserialize(reader)?;
+    Ok((checked(x, "the reach in x", 0.01, 4.0)?, checked(y, "the reach in y", 0.01, 4.0)?))
+}
+
+fn marks<'de, D: Deserializer<'de>>(reader: D) -> Result<Vec<u8>, D::Error> {
+    some_marks(reader, 1)
+}
+
+fn some_marks<'de, D: Deserializer<'de>>(reader: D, least: usize) -> Result<Vec<u8>, D::Error> {
+    let marks = Vec::<u8>::deserialize(reader)?;
+    if marks.len() < least || marks.len() > 8 {
+        return Err(D::Error::custom(format!("a list of {} landmarks; give {least} to 8", marks.len())));
+    }
+    match marks.iter().find(|&&mark| mark >= 68) {
+        Some(mark) => Err(D::Error::custom(format!("there is no landmark {mark}; they are numbered 0 to 67"))),
+        None => Ok(marks),
+    }
+}
+
+fn targets<'de, D: Deserializer<'de>>(reader: D) -> Result<Vec<u8>, D::Error> {
+    some_marks(reader, 0)
+}
+
+fn share<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
+    number(reader, "the share", -2.0, 2.0)
+}
+
+fn name<'de, D: Deserializer<'de>>(reader: D) -> Result<String, D::Error> {
+    let name = String::deserialize(reader)?;
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) {
+        return Err(D::Error::custom("a name is 1 to 64 of a-z, 0-9 and _"));
+    }
+    Ok(name)
+}
+
+fn few<'de, D: Deserializer<'de>, T: Deserialize<'de>>(reader: D) -> Result<Vec<T>, D::Error> {
+    let list = Vec::<T>::deserialize(reader)?;
+    if list.len() > MOST {
+        return Err(D::Error::custom(format!("a list of {}, more than {MOST}", list.len())));
+    }
+    Ok(list)
+}
