@@ -99,10 +99,6 @@ impl Field {
         BonePose { translation: Vec3::ZERO, rotation }
     }
 
-    /// The parts of lips and lids on this head.
-    pub fn gates(&self) -> &Gates {
-        &self.gates
-    }
 }
 
 impl Source {
