@@ -1,4 +1,15 @@
 //! Shells: the loose parts of a head mesh, skin, eyes and what lies inside.
+//!
+//! A head often comes with eyeballs, teeth and lashes as loose parts, and a scan with its skin in several pieces. Size
+//! alone cannot tell them apart, so every part is looked at from six sides: skin is big and seen, eyes are a pair of
+//! equal balls, and the rest lies inside.
+
+use glam::Vec3;
+
+use crate::mesh::adjacency;
+
+mod eyes;
+mod seen;
 
 /// What a shell is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,4 +38,76 @@ impl Shells {
     pub fn kind(&self, point: usize) -> ShellKind {
         self.shell_of.get(point).and_then(|&shell| self.kinds.get(shell as usize)).copied().unwrap_or(ShellKind::Inside)
     }
+}
+
+/// Area of a skin shell, at the least, as a share of the largest shell's.
+const SKIN_AREA: f32 = 0.03;
+/// How much of a skin shell is seen from six sides. A flat patch of skin shows one half of itself; teeth behind open
+/// lips show a sixth.
+const SKIN_SEEN: f32 = 0.3;
+
+/// What is known of one shell.
+#[derive(Debug, Clone, Copy)]
+struct Island {
+    low: Vec3,
+    high: Vec3,
+    area: f32,
+}
+
+/// Finds the loose parts of a mesh and what each is.
+///
+/// `points` are in head space (+x the character's left, +y up, +z forward), in any unit. Points of equal position hang
+/// together, so that seams of texture do not cut the skin. Every large part that is seen from outside is
+/// [`ShellKind::Skin`], and so are the walls of mouth and eye sockets that hang on it; two balls of one size are the
+/// eyes. Points without triangles are [`ShellKind::Inside`]. Triangles with corners past the end are ignored.
+///
+/// Shells are numbered by their first points. Linear time; a millisecond for 10,000 points.
+pub fn find_shells(points: &[Vec3], triangles: &[[u32; 3]]) -> Shells {
+    let (welded, count) = adjacency::weld(points);
+    let whole = |triangle: &&[u32; 3]| triangle.iter().all(|corner| (*corner as usize) < points.len());
+    let joined: Vec<[u32; 3]> =
+        triangles.iter().filter(whole).map(|triangle| triangle.map(|corner| welded[corner as usize])).collect();
+    let (island_of, found) = adjacency::islands(&joined, count);
+    let shell_of: Vec<u32> = welded.iter().map(|place| island_of[*place as usize]).collect();
+
+    let mut islands = vec![Island { low: Vec3::MAX, high: Vec3::MIN, area: 0.0 }; found];
+    for (point, shell) in points.iter().zip(&shell_of) {
+        let island = &mut islands[*shell as usize];
+        island.low = island.low.min(*point);
+        island.high = island.high.max(*point);
+    }
+    for triangle in triangles.iter().filter(whole) {
+        let [a, b, c] = triangle.map(|corner| points[corner as usize]);
+        let area = 0.5 * (b - a).cross(c - a).length();
+        if area.is_finite() {
+            islands[shell_of[triangle[0] as usize] as usize].area += area;
+        }
+    }
+    let kinds = kinds(points, triangles, &shell_of, &islands);
+    Shells { shell_of, kinds }
+}
+
+fn kinds(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands: &[Island]) -> Vec<ShellKind> {
+    let largest = islands.iter().map(|island| island.area).fold(0.0, f32::max);
+    let mut kinds: Vec<ShellKind> = islands.iter().map(|_| ShellKind::Inside).collect();
+    if largest <= 0.0 {
+        return kinds;
+    }
+    let solid = islands.iter().filter(|island| island.area > 0.0).count();
+    let seen = if solid > 1 { seen::shares(points, triangles, shell_of, islands) } else { vec![1.0; islands.len()] };
+    for (kind, (island, seen)) in kinds.iter_mut().zip(islands.iter().zip(&seen)) {
+        if island.area >= SKIN_AREA * largest && *seen >= SKIN_SEEN {
+            *kind = ShellKind::Skin;
+        }
+    }
+    if solid > 1 {
+        eyes::find(points, shell_of, islands, &mut kinds);
+    }
+    // Something has to be the skin, even of a shape that hides itself.
+    if !kinds.contains(&ShellKind::Skin)
+        && let Some(first) = islands.iter().position(|island| island.area == largest)
+    {
+        kinds[first] = ShellKind::Skin;
+    }
+    kinds
 }

@@ -1,0 +1,140 @@
+//! Which shells are the eyes: two balls of one size, side by side.
+
+use glam::Vec3;
+
+use super::{Island, ShellKind};
+
+/// A shell that is a ball, or a good part of one.
+#[derive(Debug, Clone, Copy)]
+struct Ball {
+    shell: usize,
+    center: Vec3,
+    radius: f32,
+}
+
+/// Radius of an eye, at most, as a share of the size of all shells.
+const LARGEST: f32 = 0.2;
+/// How far points of a ball lie from it, as a share of its radius (root of the mean square). The cornea's bulge and the
+/// hole behind it have to pass.
+const ROUND: f32 = 0.12;
+/// Fewest points of a ball; a sphere runs through any four.
+const FEWEST: usize = 8;
+
+/// Marks the eyes among `kinds`.
+pub fn find(points: &[Vec3], shell_of: &[u32], islands: &[Island], kinds: &mut [ShellKind]) {
+    let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
+    for island in islands.iter().filter(|island| island.area > 0.0) {
+        low = low.min(island.low);
+        high = high.max(island.high);
+    }
+    let size = (high - low).max_element();
+    let balls = balls(points, shell_of, islands, size);
+    let Some((left, right)) = pair(&balls, (low.z + high.z) * 0.5) else { return };
+    for (eye, kind) in [(left, ShellKind::LeftEye), (right, ShellKind::RightEye)] {
+        for (shell, island) in islands.iter().enumerate() {
+            // Cornea and iris are often shells of their own; all that lies within the eye turns with it. Lashes reach
+            // out of it.
+            let reach = (island.low - eye.center).abs().max((island.high - eye.center).abs());
+            if shell == eye.shell || (island.area > 0.0 && reach.max_element() <= eye.radius * 1.15) {
+                kinds[shell] = kind;
+            }
+        }
+    }
+}
+
+/// All shells that are balls.
+fn balls(points: &[Vec3], shell_of: &[u32], islands: &[Island], size: f32) -> Vec<Ball> {
+    let fits = |island: &Island| {
+        let extent = island.high - island.low;
+        island.area > 0.0 && extent.max_element() < 2.2 * LARGEST * size && extent.min_element() > 0.0
+    };
+    let possible: Vec<bool> = islands.iter().map(fits).collect();
+    let mut members: Vec<Vec<Vec3>> = vec![Vec::new(); islands.len()];
+    for (point, shell) in points.iter().zip(shell_of) {
+        if possible[*shell as usize] {
+            members[*shell as usize].push(*point);
+        }
+    }
+    members.iter().enumerate().filter_map(|(shell, members)| ball(shell, members, &islands[shell], size)).collect()
+}
+
+/// The sphere through a shell's points by least squares, if it is one.
+///
+/// |p|² = 2 c·p + (r² - |c|²) is linear in the centre c and the rest. Solved about the middle of the box, in units of it,
+/// by Gauss elimination in double precision.
+fn ball(shell: usize, members: &[Vec3], island: &Island, size: f32) -> Option<Ball> {
+    if members.len() < FEWEST {
+        return None;
+    }
+    let middle = (island.low + island.high) * 0.5;
+    let unit = (island.high - island.low).max_element() * 0.5;
+    let mut system = [[0.0_f64; 5]; 4];
+    for member in members {
+        let p = ((*member - middle) / unit).as_dvec3();
+        let row = [2.0 * p.x, 2.0 * p.y, 2.0 * p.z, 1.0, p.length_squared()];
+        for i in 0..4 {
+            for j in 0..5 {
+                system[i][j] += row[i] * row[j];
+            }
+        }
+    }
+    let [x, y, z, rest] = solve(system)?;
+    let square = rest + x * x + y * y + z * z;
+    let center = Vec3::new(x as f32, y as f32, z as f32);
+    let radius = square.max(0.0).sqrt() as f32;
+    let off = |member: &Vec3| ((*member - middle) / unit).distance(center) - radius;
+    let error = members.iter().map(|member| off(member) * off(member)).sum::<f32>() / members.len() as f32;
+    // A ball, not a bowl cut from a much larger one.
+    let round = error.sqrt() <= ROUND * radius && (0.6..1.4).contains(&radius);
+    (round && radius * unit <= LARGEST * size).then(|| Ball {
+        shell,
+        center: middle + center * unit,
+        radius: radius * unit,
+    })
+}
+
+fn solve(mut system: [[f64; 5]; 4]) -> Option<[f64; 4]> {
+    for column in 0..4 {
+        let pivot = (column..4).max_by(|a, b| system[*a][column].abs().total_cmp(&system[*b][column].abs()))?;
+        system.swap(column, pivot);
+        if system[column][column].abs() < 1e-9 {
+            return None;
+        }
+        for row in 0..4 {
+            if row != column {
+                let factor = system[row][column] / system[column][column];
+                for entry in 0..5 {
+                    system[row][entry] -= factor * system[column][entry];
+                }
+            }
+        }
+    }
+    Some([0, 1, 2, 3].map(|row| system[row][4] / system[row][row]))
+}
+
+/// The two balls most like a pair of eyes, left one first.
+///
+/// Of one size, side by side rather than above each other or behind, and the largest such: beads and buttons are
+/// smaller. In doubt those in front.
+fn pair(balls: &[Ball], middle: f32) -> Option<(Ball, Ball)> {
+    let mut best: Option<(f32, Ball, Ball)> = None;
+    for (index, a) in balls.iter().enumerate() {
+        for b in &balls[index + 1..] {
+            let apart = a.center - b.center;
+            let radius = (a.radius + b.radius) * 0.5;
+            let alike = (a.radius - b.radius).abs() <= 0.15 * radius;
+            let beside = apart.x.abs() > 1.2 * radius && apart.x.abs() > 0.6 * apart.length();
+            if !alike || !beside || apart.length() > 30.0 * radius {
+                continue;
+            }
+            let front = if (a.center.z + b.center.z) * 0.5 >= middle { 1.0 } else { 0.5 };
+            let straight = apart.x.abs() / apart.length();
+            let score = radius * front * straight;
+            if best.is_none_or(|best| score > best.0) {
+                let (left, right) = if a.center.x >= b.center.x { (*a, *b) } else { (*b, *a) };
+                best = Some((score, left, right));
+            }
+        }
+    }
+    best.map(|(_, left, right)| (left, right))
+}
