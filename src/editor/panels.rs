@@ -3,6 +3,7 @@
 //! Each panel reads the active rig anew whenever it is drawn and keeps only what the rig does not know: what is folded,
 //! what is being typed. Long lists draw the rows that can be seen and nothing else.
 
+pub mod face;
 pub mod hierarchy;
 pub mod history;
 pub mod log;
@@ -27,10 +28,11 @@ pub struct PanelsPlugin;
 
 impl Plugin for PanelsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins((log::LogPlugin, skinning::SkinningPanelPlugin, poses::PosesPlugin, toasts::ToastsPlugin))
+        app.add_plugins((log::LogPlugin, skinning::SkinningPanelPlugin, face::FacePanelPlugin, poses::PosesPlugin, toasts::ToastsPlugin))
             .add_panel(hierarchy::HierarchyPanel::default())
             .add_panel(properties::PropertiesPanel::default())
             .add_panel(skinning::SkinningPanel::default())
+            .add_panel(face::FacePanel::default())
             .add_panel(poses::PosesPanel::default())
             .add_panel(history::HistoryPanel::default())
             .add_panel(log::LogPanel::default())

@@ -28,6 +28,7 @@ use crate::{
 
 pub use job::FaceJob;
 pub use known::{FaceRig, KnownBone};
+pub use pose::expressed_points;
 
 /// Adds automatic faces.
 pub struct FacePlugin;

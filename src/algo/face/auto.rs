@@ -38,6 +38,8 @@ pub struct AutoSettings {
     pub forward: Option<Vec3>,
     /// True to take the whole mesh for a head, even if it looks like a body.
     pub whole: bool,
+    /// Into how many groups the depths are cut before front groups are joined; found from the mesh if `None`.
+    pub groups: Option<usize>,
 }
 
 impl Default for AutoSettings {
@@ -51,6 +53,7 @@ impl Default for AutoSettings {
             up: None,
             forward: None,
             whole: false,
+            groups: None,
         }
     }
 }
@@ -58,7 +61,7 @@ impl Default for AutoSettings {
 impl AutoSettings {
     /// True if an analysis for `other` serves these settings, too.
     pub fn same_head(&self, other: &Self) -> bool {
-        (self.up, self.forward, self.whole) == (other.up, other.forward, other.whole)
+        (self.up, self.forward, self.whole, self.groups) == (other.up, other.forward, other.whole, other.groups)
     }
 }
 

@@ -8,7 +8,8 @@ use super::{ExpressRequest, Expressed, Expressions, Face, FaceExpressions, known
 use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis, FaceError},
-        expression::{BonePose, ExpressionSet},
+        bones::FaceBone,
+        expression::{BonePose, ExpressionSet, apply},
     },
     mesh::model::Weights,
     plugins::{
@@ -103,14 +104,22 @@ fn analyse(mesh: &RigMesh) -> Result<Face, FaceError> {
     Ok(Face { analysis: analysis.into(), settings, rest: mesh.rest.clone() })
 }
 
-/// The edits that pose the facial joints as strengths say. Facial joints that they do not move stand at rest.
-fn expression_edits(
+/// The face of a rig as the expressions see it.
+struct Posed {
+    known: FaceRig,
+    bones: Vec<FaceBone>,
+    weights: Weights,
+    poses: Vec<BonePose>,
+}
+
+/// How the facial bones move for strengths. The error is a sentence without its point.
+fn posed(
     rig: &Rig,
     mesh: &RigMesh,
     analysis: &FaceAnalysis,
     set: &ExpressionSet,
     strengths: &BTreeMap<String, f32>,
-) -> Result<Vec<RigEdit>, String> {
+) -> Result<Posed, String> {
     let known = FaceRig::read(rig);
     if known.bones.is_empty() {
         return Err("the rig has no facial bones; place a face first".to_owned());
@@ -127,16 +136,43 @@ fn expression_edits(
         })?;
         wanted.push((expression, strength.clamp(0.0, 1.0)));
     }
-    let borrowed: Vec<(&_, f32)> = wanted.iter().map(|(expression, strength)| (expression.as_ref(), *strength)).collect();
     let weights = analysed_weights(skin, &known, analysis);
     let bones = known.face_bones(analysis);
-    let poses = analysis.pose(&bones, &weights, set, &borrowed);
+    let poses = analysis.pose(&bones, &weights, set, &wanted);
+    Ok(Posed { known, bones, weights, poses })
+}
+
+/// The edits that pose the facial joints as strengths say. Facial joints that they do not move stand at rest.
+fn expression_edits(
+    rig: &Rig,
+    mesh: &RigMesh,
+    analysis: &FaceAnalysis,
+    set: &ExpressionSet,
+    strengths: &BTreeMap<String, f32>,
+) -> Result<Vec<RigEdit>, String> {
+    let Posed { known, poses, .. } = posed(rig, mesh, analysis, set, strengths)?;
     let edits = known.bones.iter().zip(&poses).filter_map(|(bone, pose)| {
         let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
         let offset = (!offset.is_rest(1e-7)).then_some(offset);
         (rig.offset(bone.uid) != offset.as_ref()).then_some(RigEdit::SetOffset(bone.uid, offset))
     });
     Ok(edits.collect())
+}
+
+/// Where the analysed points of a rig's face are, in head space, while it shows expressions by name, each with a strength
+/// from 0 to 1.
+///
+/// # Errors
+/// A sentence without its point: no facial bones, no weights, no such expression.
+pub fn expressed_points(
+    rig: &Rig,
+    mesh: &RigMesh,
+    analysis: &FaceAnalysis,
+    set: &ExpressionSet,
+    strengths: &BTreeMap<String, f32>,
+) -> Result<Vec<Vec3>, String> {
+    let Posed { bones, weights, poses, .. } = posed(rig, mesh, analysis, set, strengths)?;
+    Ok(apply(&analysis.points, &weights, &bones, &poses))
 }
 
 /// The weights of the analysed points over neck (0), head (1, and whatever else there is) and the facial bones (from 2).

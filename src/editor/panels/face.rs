@@ -1,0 +1,318 @@
+//! The face: how many bones, how the head is grouped, and what the face shows.
+
+mod dendrogram;
+mod expressions;
+mod thumbnail;
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Button, CollapsingHeader, DragValue, ProgressBar, RichText, ScrollArea, Slider, Ui};
+
+use super::{
+    fields, list,
+    log::LogSystems,
+    shown::{Shown, Stamp},
+};
+use crate::{
+    algo::{
+        face::{
+            auto::{AutoSettings, FaceError},
+            bones::{FaceBoneKind, Region},
+        },
+        fit::FitSettings,
+    },
+    editor::{
+        notice::Notice,
+        panel::{EditorPanel, Requests},
+    },
+    mesh::shapes::Shapes,
+    plugins::{
+        face::{Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig, FaceShapes},
+        picking::{Pick, PickRequest},
+        surface::{RigMesh, RigMeshes},
+    },
+    rig::Uid,
+};
+
+/// Tells what came of faces, and stops them.
+pub struct FacePanelPlugin;
+
+impl Plugin for FacePanelPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<FaceResults>()
+            .add_message::<CancelFace>()
+            .add_message::<FacePlaced>()
+            .add_message::<Expressed>()
+            .add_message::<Notice>()
+            .add_systems(Update, cancel)
+            .add_systems(Last, tell_results.before(LogSystems));
+    }
+}
+
+/// What was last placed in each mesh.
+#[derive(Resource, Debug, Default)]
+pub struct FaceResults(Vec<(Entity, FaceReport)>);
+
+impl FaceResults {
+    /// The last report for a mesh.
+    pub fn get(&self, mesh: Entity) -> Option<&FaceReport> {
+        self.0.iter().find(|(known, _)| *known == mesh).map(|(_, report)| report)
+    }
+}
+
+/// Asks to stop placing a face; the rig stays as it is.
+#[derive(Message, Debug, Clone, Copy)]
+pub struct CancelFace(pub Entity);
+
+fn cancel(mut requests: MessageReader<CancelFace>, jobs: Query<&FaceJob>) {
+    requests.read().filter_map(|request| jobs.get(request.0).ok()).for_each(FaceJob::cancel);
+}
+
+fn tell_results(
+    mut placed: MessageReader<FacePlaced>,
+    mut expressed: MessageReader<Expressed>,
+    meshes: Query<&RigMesh>,
+    mut results: ResMut<FaceResults>,
+    mut commands: Commands,
+) {
+    for FacePlaced { mesh, result } in placed.read() {
+        match result {
+            Ok(report) => {
+                commands.write_message(Notice::done(told(report)));
+                if report.is_part {
+                    let text = "The mesh is more than a head: the face was placed in its head part. \
+                                Tick \"Whole mesh\" in the Face panel to take all of it for a head.";
+                    commands.write_message(Notice::info(text));
+                }
+                if !report.certain {
+                    let text = "Which way the head looks is a weak guess. Choose up and forward in the Face panel.";
+                    commands.write_message(Notice::warning(text));
+                }
+                results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
+                results.0.push((*mesh, report.clone()));
+            }
+            Err(reason) if *reason == FaceError::Cancelled.to_string() => {
+                commands.write_message(Notice::info("Placing the face was cancelled. The rig is as it was."));
+            }
+            Err(reason) => {
+                commands.write_message(Notice::error(format!("No face was placed: {reason}.")));
+            }
+        }
+    }
+    for Expressed { result, .. } in expressed.read() {
+        if let Err(reason) = result {
+            commands.write_message(Notice::error(format!("The face shows nothing: {reason}.")));
+        }
+    }
+}
+
+fn told(report: &FaceReport) -> String {
+    let skin = report.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
+    let sum: f64 = report.times.iter().map(|(_, time)| time.as_secs_f64() * 1000.0).sum();
+    let kept = match report.kept {
+        0 => String::new(),
+        1 => ", 1 of them kept as it was".to_owned(),
+        more => format!(", {more} of them kept as they were"),
+    };
+    let fitted = report.fit_error.map_or(String::new(), |error| format!("; the shapes are met to {error:.4} on average"));
+    format!("{skin} facial bones in {sum:.0} ms{kept}{fitted}.")
+}
+
+/// The panel.
+#[derive(Default)]
+pub struct FacePanel {
+    settings: AutoSettings,
+    /// Fewest points of a bone are not asked for: the slider ends where faces end.
+    shown: Option<Drawn>,
+}
+
+/// What was made of the face in one state of the rig.
+struct Drawn {
+    mesh: Entity,
+    stamp: Stamp,
+    known: FaceRig,
+    pictures: thumbnail::Pictures,
+}
+
+impl EditorPanel for FacePanel {
+    fn title(&self) -> &'static str {
+        "Face"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let Some(shown) = Shown::of(world) else {
+            return list::nothing(ui, "No rig is open.");
+        };
+        let first = world.get::<RigMeshes>(shown.entity).and_then(|meshes| meshes.iter().next());
+        let Some((entity, mesh)) = first.and_then(|entity| Some((entity, world.get::<RigMesh>(entity)?))) else {
+            return list::nothing(ui, "Open a head, or a character with one, to place a face in it.");
+        };
+        self.renew(&shown, entity, mesh, world.get::<Face>(entity));
+        ScrollArea::vertical().id_salt("face").auto_shrink(false).show(ui, |ui| {
+            self.place(ui, world, entity, requests);
+            ui.add_space(4.0);
+            self.options(ui, world, entity);
+            let Some(drawn) = self.shown.as_mut().filter(|drawn| !drawn.known.bones.is_empty()) else {
+                return;
+            };
+            ui.separator();
+            regions(ui, &shown, &drawn.known, world.get::<Face>(entity), requests);
+            ui.separator();
+            expressions::show(ui, world, (shown.entity, &shown.rig), (entity, mesh), &mut drawn.pictures, requests);
+            ui.separator();
+            fit(ui, entity, mesh, &self.settings, requests);
+        });
+    }
+}
+
+impl FacePanel {
+    /// Reads the rig's face again where the rig has changed.
+    fn renew(&mut self, shown: &Shown, mesh: Entity, _: &RigMesh, _: Option<&Face>) {
+        let stamp = shown.stamp();
+        if self.shown.as_ref().is_some_and(|drawn| drawn.mesh == mesh && drawn.stamp == stamp) {
+            return;
+        }
+        let known = FaceRig::read(&shown.rig);
+        let pictures = self.shown.take().filter(|drawn| drawn.mesh == mesh).map(|drawn| drawn.pictures);
+        self.shown = Some(Drawn { mesh, stamp, known, pictures: pictures.unwrap_or_default() });
+    }
+
+    /// The button; while a job runs, its progress and a button that stops it.
+    fn place(&mut self, ui: &mut Ui, world: &World, entity: Entity, requests: &mut Requests) {
+        let size = egui::vec2(ui.available_width(), 34.0);
+        if let Some(job) = world.get::<FaceJob>(entity) {
+            let step = job.step().map_or("", |step| step.name()).replace('_', " ");
+            let text = format!("{step} {:.0} %", job.progress() * 100.0);
+            ui.add(ProgressBar::new(job.progress()).text(text).desired_height(20.0));
+            if ui.add_sized(egui::vec2(ui.available_width(), 24.0), Button::new("Cancel")).clicked() {
+                requests.send(CancelFace(entity));
+            }
+            ui.ctx().request_repaint_after_secs(0.05);
+            return;
+        }
+        let again = self.shown.as_ref().is_some_and(|drawn| !drawn.known.bones.is_empty());
+        let button = Button::new(RichText::new(if again { "Place again" } else { "Place face" }).size(16.0).strong());
+        let hint = "Head, neck and facial bones, weights and controls; bones you have touched stay";
+        if ui.add_sized(size, button).on_hover_text(hint).clicked() {
+            requests.send(FaceRequest { mesh: entity, settings: self.settings.clone(), fit: None });
+        }
+        fields::labelled(ui, "Bones", |ui| {
+            ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
+            let slider = ui.add(Slider::new(&mut self.settings.bones, 4..=150).logarithmic(true));
+            let slider = slider.on_hover_text("Density: bones of the facial skin");
+            // Letting go is enough: what was placed is placed again as dense.
+            if again && (slider.drag_stopped() || slider.lost_focus()) {
+                requests.send(FaceRequest { mesh: entity, settings: self.settings.clone(), fit: None });
+            }
+        });
+    }
+
+    /// How faces are placed, folded away; among it the merge history.
+    fn options(&mut self, ui: &mut Ui, world: &World, entity: Entity) {
+        CollapsingHeader::new("Settings").show(ui, |ui| {
+            fields::labelled(ui, "Seed", |ui| {
+                ui.add(DragValue::new(&mut self.settings.seed).speed(0.1))
+                    .on_hover_text("The same seed gives the same bones");
+            });
+            ui.checkbox(&mut self.settings.symmetric, "Symmetric").on_hover_text("Pairs of bones on both sides");
+            ui.checkbox(&mut self.settings.extras, "Jaw and eyes")
+                .on_hover_text("Bones for jaw and eyes besides, where the mesh has them");
+            ui.checkbox(&mut self.settings.whole, "Whole mesh")
+                .on_hover_text("Take all of the mesh for a head, even if it looks like a body");
+            axis(ui, "Up", &mut self.settings.up);
+            axis(ui, "Forward", &mut self.settings.forward);
+        });
+        let Some(face) = world.get::<Face>(entity) else { return };
+        CollapsingHeader::new("Grouping").show(ui, |ui| {
+            dendrogram::show(ui, &face.analysis, &mut self.settings.groups);
+        });
+    }
+}
+
+/// One of the six axes, or what the mesh looks like.
+fn axis(ui: &mut Ui, name: &str, value: &mut Option<Vec3>) {
+    let axes = [
+        ("X", Vec3::X),
+        ("Y", Vec3::Y),
+        ("Z", Vec3::Z),
+        ("-X", Vec3::NEG_X),
+        ("-Y", Vec3::NEG_Y),
+        ("-Z", Vec3::NEG_Z),
+    ];
+    let text = axes.iter().find(|(_, axis)| *value == Some(*axis)).map_or("Guess", |(name, _)| name);
+    fields::labelled(ui, name, |ui| {
+        egui::ComboBox::from_id_salt(name).selected_text(text).width(ui.available_width()).show_ui(ui, |ui| {
+            ui.selectable_value(value, None, "Guess");
+            for (name, axis) in axes {
+                ui.selectable_value(value, Some(axis), name);
+            }
+        });
+    });
+}
+
+/// How many bones each region has; a click selects them.
+fn regions(ui: &mut Ui, shown: &Shown, known: &FaceRig, face: Option<&Face>, requests: &mut Requests) {
+    let mut by_region: BTreeMap<&str, Vec<Uid>> = BTreeMap::new();
+    match face {
+        Some(face) => {
+            for (bone, uid) in known.face_bones(&face.analysis).iter().zip(known.bones.iter().map(|bone| bone.uid)) {
+                by_region.entry(region_name(bone.kind, bone.region)).or_default().push(uid);
+            }
+        }
+        None => by_region.entry("all").or_default().extend(known.bones.iter().map(|bone| bone.uid)),
+    }
+    ui.strong("Regions");
+    ui.horizontal_wrapped(|ui| {
+        for (name, joints) in by_region {
+            let selected = joints.iter().all(|joint| shown.selection.0.contains(joint));
+            let label = ui.selectable_label(selected, format!("{name} {}", joints.len()));
+            if label.on_hover_text("Select these bones").clicked() {
+                let add = ui.input(|input| input.modifiers.shift);
+                requests.send(PickRequest { rig: shown.entity, what: Pick::Joints(joints), add });
+            }
+        }
+    });
+}
+
+fn region_name(kind: FaceBoneKind, region: Region) -> &'static str {
+    match (kind, region) {
+        (FaceBoneKind::Jaw, _) => "jaw pivot",
+        (FaceBoneKind::Eye, _) => "eyes",
+        (_, Region::Forehead) => "forehead",
+        (_, Region::Brow) => "brow",
+        (_, Region::Lid) => "lid",
+        (_, Region::Nose) => "nose",
+        (_, Region::Cheek) => "cheek",
+        (_, Region::Lip) => "lip",
+        (_, Region::Jaw) => "jaw",
+        (_, Region::Temple) => "temple",
+    }
+}
+
+/// Moves the bones to fit the morph targets of the mesh's file.
+fn fit(ui: &mut Ui, entity: Entity, mesh: &RigMesh, settings: &AutoSettings, requests: &mut Requests) {
+    let count: usize = mesh.file.objects.iter().map(|object| object.morph_names.len()).max().unwrap_or(0);
+    let text = match count {
+        0 => "The mesh has no morph targets to fit".to_owned(),
+        count => format!("Moves the bones so that they can show the mesh's {count} morph targets"),
+    };
+    let button = ui.add_enabled(count > 0, Button::new("Refit to morph targets")).on_hover_text(&text);
+    if button.on_disabled_hover_text(&text).clicked() {
+        match Shapes::of_morphs(&mesh.file) {
+            Ok(shapes) => {
+                let how = FitSettings { bones: settings.bones, seed: settings.seed, ..FitSettings::default() };
+                let shapes =
+                    FaceShapes { names: shapes.names, displacements: shapes.displacements, settings: how };
+                let settings = settings.clone();
+                requests.send(FaceRequest { mesh: entity, settings, fit: Some(Arc::new(shapes)) });
+            }
+            Err(error) => requests.send(Notice::error(format!("The morph targets cannot be fitted: {error}."))),
+        }
+    }
+}
+
+/// The expressions that are known.
+fn set(world: &World) -> FaceExpressions {
+    world.get_resource::<FaceExpressions>().cloned().unwrap_or_default()
+}
