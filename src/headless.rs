@@ -12,11 +12,11 @@ use crate::{
         face::auto::{AutoSettings, FaceStep},
         weights::{WeightReport, WeightSettings},
     },
-    mesh::model::Model,
+    mesh::{model::Model, shapes::Shapes},
     plugins::{
         RigPlugins,
         document::{EditRefused, EditRequest, RigBundle},
-        face::{ExpressRequest, Expressed, Face, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceShapes},
+        face::{ExpressRequest, Expressed, Face, FaceJob, FacePlaced, FaceReport, FaceRequest},
         gesture::{Gesture, GestureAnswer, GestureScript},
         skinning::{BindRequest, Bound, SkinningJob},
         surface::{RigMesh, SkinOf},
@@ -148,7 +148,7 @@ impl Workbench {
     pub fn face(
         &mut self,
         settings: AutoSettings,
-        fit: Option<Arc<FaceShapes>>,
+        fit: Option<Arc<Shapes>>,
         progress: &mut dyn FnMut(FaceStep, f32),
     ) -> Result<FaceReport, WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;

@@ -11,17 +11,15 @@ use super::{
     progress::{Progress, spinning},
 };
 use crate::{
-    algo::{
-        face::{
-            auto::{AutoSettings, FaceStep},
-            bones::FaceBoneKind,
-        },
-        fit::FitSettings,
+    algo::face::{
+        auto::{AutoSettings, FaceStep},
+        bones::FaceBoneKind,
+        expression::ExpressionSet,
     },
     files::{FileKind, RealDisk, load_model, load_shapes, stem, store_model, store_rig},
     headless::Workbench,
-    plugins::face::{FaceReport, FaceShapes},
-    rig::{Rig, nearest::did_you_mean},
+    plugins::face::{FaceReport, mixed},
+    rig::Rig,
 };
 
 /// Arguments of `rigsmith face`.
@@ -104,10 +102,7 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
     report.notes(model.notes.iter().cloned());
     let shapes = args.fit.as_ref().map(|path| spinning("reading shapes", || load_shapes(&RealDisk, path, &model)));
-    let shapes = shapes.transpose()?.map(|shapes| {
-        let settings = FitSettings { bones: args.bones, seed: args.seed, ..FitSettings::default() };
-        Arc::new(FaceShapes { names: shapes.names, displacements: shapes.displacements, settings })
-    });
+    let shapes = shapes.transpose()?.map(Arc::new);
     let mut bench = Workbench::new(SEED, &stem(&args.mesh));
     bench.open(model, false)?;
     let settings = AutoSettings {
@@ -159,14 +154,9 @@ fn wanted(args: &FaceArgs) -> Result<Wanted, Failure> {
 
 fn express(args: &FaceArgs, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
     let strengths: BTreeMap<String, f32> = args.expression.iter().cloned().collect();
-    let set = crate::algo::face::expression::ExpressionSet::bundled();
-    for name in strengths.keys() {
-        if set.find(name).is_none() {
-            let names: Vec<&str> = set.names().collect();
-            let nearest = did_you_mean(name, names.iter().copied());
-            return Err(Failure::Usage(format!("--expression {name}: there is no such expression{nearest}")));
-        }
-    }
+    // A name that is wrong is wrong use; what is wrong with the face is not.
+    let set = ExpressionSet::bundled().map_err(|error| Failure::Input(Box::new(error)))?;
+    mixed(&set, &strengths).map_err(|reason| Failure::Usage(format!("--expression: {reason}")))?;
     bench.express(strengths.clone())?;
     report.set("expressions", json!(strengths));
     Ok(())

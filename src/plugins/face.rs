@@ -15,20 +15,17 @@ use bevy::prelude::*;
 
 use super::{RigSystems, configure_sets};
 use crate::{
-    algo::{
-        face::{
-            auto::{AutoSettings, FaceAnalysis},
-            bones::FaceBone,
-            expression::ExpressionSet,
-        },
-        fit::FitSettings,
+    algo::face::{
+        auto::{AutoSettings, FaceAnalysis},
+        bones::FaceBone,
+        expression::ExpressionSet,
     },
-    mesh::model::Model,
+    mesh::{model::Model, shapes::Shapes},
 };
 
 pub use job::FaceJob;
 pub use known::{FaceRig, KnownBone};
-pub use pose::expressed_points;
+pub use pose::{expressed_points, mixed};
 
 /// Adds automatic faces.
 pub struct FacePlugin;
@@ -57,7 +54,11 @@ pub struct FaceExpressions(pub Arc<ExpressionSet>);
 
 impl Default for FaceExpressions {
     fn default() -> Self {
-        Self(Arc::new(ExpressionSet::bundled().clone()))
+        let set = ExpressionSet::bundled().unwrap_or_else(|wrong| {
+            error!("the bundled expressions cannot be read: {wrong}");
+            ExpressionSet::default()
+        });
+        Self(Arc::new(set))
     }
 }
 
@@ -68,19 +69,8 @@ pub struct FaceRequest {
     pub mesh: Entity,
     /// How.
     pub settings: AutoSettings,
-    /// Shapes that the bones are moved to fit; see [`FaceShapes`].
-    pub fit: Option<Arc<FaceShapes>>,
-}
-
-/// Shapes of a face, such as those that an artist has sculpted.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FaceShapes {
-    /// A name for each.
-    pub names: Vec<String>,
-    /// For each a displacement of every point of the mesh, in the mesh's space and unit.
-    pub displacements: Vec<Vec<Vec3>>,
-    /// How they are fitted. Number and start of the bones are the rig's.
-    pub settings: FitSettings,
+    /// Shapes that the bones are moved to fit, such as those that an artist has sculpted.
+    pub fit: Option<Arc<Shapes>>,
 }
 
 /// The answer to a [`FaceRequest`].

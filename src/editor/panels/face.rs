@@ -15,12 +15,9 @@ use super::{
     shown::{Shown, Stamp},
 };
 use crate::{
-    algo::{
-        face::{
-            auto::{AutoSettings, FaceError},
-            bones::{FaceBoneKind, Region},
-        },
-        fit::FitSettings,
+    algo::face::{
+        auto::{AutoSettings, FaceError},
+        bones::{FaceBoneKind, Region},
     },
     editor::{
         notice::Notice,
@@ -28,7 +25,7 @@ use crate::{
     },
     mesh::shapes::Shapes,
     plugins::{
-        face::{Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig, FaceShapes},
+        face::{Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig},
         picking::{Pick, PickRequest},
         surface::{RigMesh, RigMeshes},
     },
@@ -301,9 +298,6 @@ fn fit(ui: &mut Ui, entity: Entity, mesh: &RigMesh, settings: &AutoSettings, req
     if button.on_disabled_hover_text(&text).clicked() {
         match Shapes::of_morphs(&mesh.file) {
             Ok(shapes) => {
-                let how = FitSettings { bones: settings.bones, seed: settings.seed, ..FitSettings::default() };
-                let shapes =
-                    FaceShapes { names: shapes.names, displacements: shapes.displacements, settings: how };
                 let settings = settings.clone();
                 requests.send(FaceRequest { mesh: entity, settings, fit: Some(Arc::new(shapes)) });
             }

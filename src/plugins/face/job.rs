@@ -14,21 +14,19 @@ use bevy::{
 };
 
 use super::{
-    Face, FaceExpressions, FacePlaced, FaceReport, FaceRequest, FaceShapes,
+    Face, FaceExpressions, FacePlaced, FaceReport, FaceRequest,
     edits::{FaceEdits, NewFace, face_edits},
     known::{FaceRig, KnownBone},
     pose,
 };
 use crate::{
-    algo::{
-        face::{
-            auto::{AutoFace, AutoSettings, FaceAnalysis, FaceStep},
-            bones::FixedBone,
-            expression::ExpressionSet,
-            grouping::HeadGroup,
-        },
-        fit::Fit,
+    algo::face::{
+        auto::{AutoFace, AutoSettings, FaceAnalysis, FaceError, FaceStep, Refitted},
+        bones::{FaceBoneKind, FixedBone},
+        expression::{BonePose, ExpressionSet},
+        grouping::HeadGroup,
     },
+    mesh::{model::Model, shapes::Shapes},
     plugins::{
         document::EditRequest,
         surface::{RigMesh, SkinOf},
@@ -41,7 +39,7 @@ use crate::{
 pub struct FaceJob {
     progress: Arc<Progress>,
     /// Names of the shapes that are fitted.
-    shapes: Option<Arc<FaceShapes>>,
+    shapes: Option<Arc<Shapes>>,
     task: Task<Result<Done, String>>,
 }
 
@@ -57,9 +55,9 @@ struct Progress {
 struct Done {
     analysis: Arc<FaceAnalysis>,
     settings: AutoSettings,
-    rest: Arc<crate::mesh::model::Model>,
+    rest: Arc<Model>,
     face: AutoFace,
-    fit: Option<Fit>,
+    fit: Option<Refitted>,
     /// Bones of the rig that stay, in the order of the face's fixed places.
     kept: Vec<KnownBone>,
     times: Vec<(&'static str, Duration)>,
@@ -151,7 +149,7 @@ struct Work {
     rig: Rig,
     mesh: RigMesh,
     settings: AutoSettings,
-    shapes: Option<Arc<FaceShapes>>,
+    shapes: Option<Arc<Shapes>>,
     expressions: Arc<ExpressionSet>,
     ready: Option<Arc<FaceAnalysis>>,
 }
@@ -160,7 +158,7 @@ impl Work {
     fn run(self, progress: &Progress) -> Result<Done, String> {
         let Self { rig, mesh, settings, shapes, expressions, ready } = self;
         let told = |step: FaceStep, part: f32| progress.told(step, part);
-        let text = |error: crate::algo::face::auto::FaceError| error.to_string();
+        let text = |error: FaceError| error.to_string();
         let analysis = match ready {
             Some(analysis) => analysis,
             None => {
@@ -178,7 +176,7 @@ impl Work {
         let bones = match &shapes {
             // Jaw and eyes come on top of the bones that are asked for.
             Some(_) if !kept.is_empty() => {
-                kept.iter().filter(|b| b.kind == crate::algo::face::bones::FaceBoneKind::Skin).count().max(1)
+                kept.iter().filter(|b| b.kind == FaceBoneKind::Skin).count().max(1)
             }
             _ => settings.bones,
         };
@@ -187,10 +185,13 @@ impl Work {
         let fit = match &shapes {
             None => None,
             Some(shapes) => {
-                let (refitted, fit) = analysis
-                    .refit(&face, &shapes.displacements, &shapes.settings, &told)
-                    .map_err(text)?;
-                face = refitted;
+                let locked = |bone: &crate::algo::face::bones::FaceBone| {
+                    let joint = bone.fixed.and_then(|fixed| rig.joint(kept.get(fixed)?.uid));
+                    joint.is_some_and(|joint| joint.data.locked)
+                };
+                let locked: Vec<bool> = face.bones.iter().map(locked).collect();
+                let fit = analysis.refit(&face, &shapes.displacements, &locked, &told).map_err(text)?;
+                face = fit.face.clone();
                 Some(fit)
             }
         };
@@ -235,7 +236,7 @@ impl Done {
         &self,
         rig: &Rig,
         mesh: &RigMesh,
-        shapes: Option<&FaceShapes>,
+        shapes: Option<&Shapes>,
         uids: &mut UidSource,
     ) -> (Vec<RigEdit>, FaceReport) {
         let known = FaceRig::read(rig);
@@ -267,16 +268,16 @@ impl Done {
     fn poses(
         &self,
         rig: &Rig,
-        fit: &Fit,
-        shapes: &FaceShapes,
+        fit: &Refitted,
+        shapes: &Shapes,
         joints: &[Uid],
         uids: &mut UidSource,
     ) -> Vec<RigEdit> {
         let frames: Vec<pose::Frame> = joints.iter().map(|uid| pose::Frame::of(rig, *uid, &self.analysis)).collect();
         let mut added = rig.stored_poses().len();
         let mut edits = Vec::new();
-        for (name, transforms) in shapes.names.iter().zip(&fit.transforms) {
-            let offset = |((uid, frame), transform): ((&Uid, &pose::Frame), &crate::algo::face::expression::BonePose)| {
+        for (name, transforms) in shapes.names.iter().zip(&fit.poses) {
+            let offset = |((uid, frame), transform): ((&Uid, &pose::Frame), &BonePose)| {
                 let offset = frame.offset(transform);
                 (!offset.is_rest(1e-7)).then_some((*uid, offset))
             };

@@ -9,7 +9,7 @@ use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis, FaceError},
         bones::FaceBone,
-        expression::{BonePose, ExpressionSet, apply},
+        expression::{BonePose, ExpressionSet, Mix, Sides, apply},
     },
     mesh::model::Weights,
     plugins::{
@@ -125,21 +125,41 @@ fn posed(
         return Err("the rig has no facial bones; place a face first".to_owned());
     }
     let skin = rig.skin(mesh.uid).ok_or_else(|| "the mesh is not skinned; place a face first".to_owned())?;
-    let mut wanted = Vec::new();
+    let mix = mixed(set, strengths)?;
+    let weights = analysed_weights(skin, &known, analysis);
+    let bones = known.face_bones(analysis);
+    let poses = analysis.fitted(&bones, &weights).pose(&mix, &set.units);
+    Ok(Posed { known, bones, weights, poses })
+}
+
+/// A blend of expressions and units by name; a unit's name may end in `_l` or `_r` for one side.
+///
+/// # Errors
+/// A sentence without its point: an unknown name, a strength that is not a number.
+pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<Mix, String> {
+    let mut mix = Mix::rest(&set.units);
     for (name, strength) in strengths {
         if !strength.is_finite() {
             return Err(format!("the strength of \"{name}\" is not a number; write one from 0 to 1"));
         }
-        let expression = set.find(name).ok_or_else(|| {
-            let names: Vec<&str> = set.names().collect();
-            format!("there is no expression \"{name}\"{}", did_you_mean(name, names.iter().copied()))
-        })?;
-        wanted.push((expression, strength.clamp(0.0, 1.0)));
+        let strength = strength.clamp(0.0, 1.0);
+        if let Some(expression) = set.get(name) {
+            for used in &expression.units {
+                mix.add(&used.unit, used.side, used.strength * strength, &set.units);
+            }
+            continue;
+        }
+        let one_side = [("_l", Sides::Left), ("_r", Sides::Right)];
+        let sided = one_side.iter().find_map(|(ending, side)| Some((name.strip_suffix(ending)?, *side)));
+        let known = mix.add(name, Sides::Both, strength, &set.units)
+            || sided.is_some_and(|(unit, side)| mix.add(unit, side, strength, &set.units));
+        if !known {
+            let expressions = set.expressions().iter().map(|expression| expression.name.as_str());
+            let units = set.units.units().iter().map(|unit| unit.name.as_str());
+            return Err(format!("there is no expression \"{name}\"{}", did_you_mean(name, expressions.chain(units))));
+        }
     }
-    let weights = analysed_weights(skin, &known, analysis);
-    let bones = known.face_bones(analysis);
-    let poses = analysis.pose(&bones, &weights, set, &wanted);
-    Ok(Posed { known, bones, weights, poses })
+    Ok(mix)
 }
 
 /// The edits that pose the facial joints as strengths say. Facial joints that they do not move stand at rest.
