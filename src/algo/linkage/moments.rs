@@ -1,0 +1,1 @@
+//! Mean distances of clusters that are far from each other, by their moments.
