@@ -98,7 +98,6 @@ impl Field {
         };
         BonePose { translation: Vec3::ZERO, rotation }
     }
-
 }
 
 impl Source {

@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use super::{
-    BonePose, Expression, Mix, UnitSet, apply,
+    BonePose, Mix, UnitSet, apply,
     field::Field,
     gates::{Gates, Known},
     limited,
@@ -58,24 +58,10 @@ struct Sample {
     jaw: f64,
 }
 
-/// Poses bones so that the skin follows a blend of expressions: [`FittedFace::new`] and [`FittedFace::pose`] in one.
-pub fn pose_fitted(
-    expressions: &[(&Expression, f32)],
-    units: &UnitSet,
-    bones: &[FaceBone],
-    landmarks: &Landmarks,
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    mask: &[bool],
-    weights: &Weights,
-) -> Vec<BonePose> {
-    FittedFace::new(points, triangles, mask, weights, bones, landmarks).pose(&Mix::of(expressions, units), units)
-}
-
 impl<'a> FittedFace<'a> {
     /// Prepares a head.
     ///
-    /// All in head space. `mask` says which points are skin of the face (none given: all that bones move); `weights` as
+    /// All in head space. `triangles` are looked at for those that turn over (none given: no such check). `mask` says which points are skin of the face (none given: all that bones move); `weights` as
     /// [`apply`] takes them. What does not fit together (too few weights, joints without a bone, triangles without
     /// points) is passed over. Cost: points times influences squared, and bones cubed.
     pub fn new(
@@ -118,7 +104,7 @@ impl<'a> FittedFace<'a> {
 
     /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of units.
     ///
-    /// Where triangles of the skin would turn over or inner lips cross, bones with common skin are held together more
+    /// Where triangles of the skin would turn over, bones with common skin are held together more
     /// and more, and at last everything is made weaker. Cost: points times moves of the field.
     pub fn pose(&self, mix: &Mix, units: &UnitSet) -> Vec<BonePose> {
         let rest = vec![BonePose::REST; self.bones.len()];
@@ -168,7 +154,9 @@ impl<'a> FittedFace<'a> {
             let Some(mut sample) = self.sample(index, point, unknown_of) else { continue };
             let (mut lower, mut all) = (0.0, 0.0);
             for (joint, weight) in self.influences(index) {
-                let Some(bone) = (joint as usize).checked_sub(2).and_then(|bone| self.bones.get(bone)) else { continue };
+                let Some(bone) = (joint as usize).checked_sub(2).and_then(|bone| self.bones.get(bone)) else {
+                    continue;
+                };
                 all += weight;
                 if bone.kind == FaceBoneKind::Jaw || !gates.above_mouth(bone.position) {
                     lower += weight;
@@ -300,8 +288,11 @@ impl<'a> FittedFace<'a> {
         poses
     }
 
-    /// How many triangles turn over, by more than a right angle, and inner lips cross.
+    /// How many triangles turn by more than a right angle.
     fn faults(&self, poses: &[BonePose]) -> usize {
+        if self.moving.is_empty() {
+            return 0;
+        }
         let posed = apply(self.points, self.weights, self.bones, poses);
         let normal = |points: &[Vec3], corners: [u32; 3]| {
             let [a, b, c] = corners.map(|corner| points[corner as usize]);

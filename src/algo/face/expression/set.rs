@@ -1,6 +1,11 @@
 //! Sets of units and expressions, those that come with the program among them.
 
-use super::text::{Expression, ExpressionError, Unit, last_quoted, located};
+use std::{borrow::Cow, sync::LazyLock};
+
+use super::text::{Expression, ExpressionError, Sides, Unit, UnitUse, last_quoted, located};
+
+/// The six basic expressions, in the order in which they are shown.
+const SIX: [&str; 6] = ["happiness", "anger", "sadness", "fear", "disgust", "surprise"];
 
 /// The bundled files of units: name and text.
 const UNITS: [(&str, &str); 4] = [
@@ -53,21 +58,33 @@ impl UnitSet {
 /// Expressions, each name once, and the units that they are made of.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExpressionSet {
-    /// The units.
-    pub units: UnitSet,
+    units: UnitSet,
     expressions: Vec<Expression>,
 }
 
 impl ExpressionSet {
-    /// What comes with the program: neutral, happiness, anger, sadness, fear, disgust, surprise.
+    /// What comes with the program: neutral, happiness, anger, sadness, fear, disgust, surprise, and their units.
+    pub fn bundled() -> &'static Self {
+        // That the files have no errors is for a test to say.
+        static BUNDLED: LazyLock<ExpressionSet> = LazyLock::new(|| {
+            let files: Vec<(&str, &str)> = ExpressionSet::bundled_files().collect();
+            ExpressionSet::parse(&files).unwrap_or_default()
+        });
+        &BUNDLED
+    }
+
+    /// Reads files, each a name and a text: those that end in `.units.ron` have units, all others an expression. Units
+    /// may come after the expressions that use them.
     ///
-    /// The error is for those who change the files; a test reads them all.
-    pub fn bundled() -> Result<Self, ExpressionError> {
+    /// # Errors
+    /// The first of: a malformed text, a name that is taken, a unit that there is not.
+    pub fn parse(files: &[(&str, &str)]) -> Result<Self, ExpressionError> {
         let mut set = Self::default();
-        for (file, text) in UNITS {
+        let are_units = |file: &str| file.ends_with(".units.ron");
+        for (file, text) in files.iter().filter(|(file, _)| are_units(file)) {
             set.units.add(text, file)?;
         }
-        for (file, text) in EXPRESSIONS {
+        for (file, text) in files.iter().filter(|(file, _)| !are_units(file)) {
             set.add(text, file)?;
         }
         Ok(set)
@@ -83,15 +100,59 @@ impl ExpressionSet {
         &self.expressions
     }
 
+    /// The units, in the order in which they were added.
+    pub fn units(&self) -> &[Unit] {
+        self.units.units()
+    }
+
+    /// The units as what mixes are made of.
+    pub fn unit_set(&self) -> &UnitSet {
+        &self.units
+    }
+
+    /// Happiness, anger, sadness, fear, disgust and surprise, as far as the set has them.
+    pub fn six(&self) -> impl Iterator<Item = &Expression> {
+        SIX.iter().filter_map(|name| self.get(name))
+    }
+
+    /// The names of the expressions, then those of the units.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let expressions = self.expressions.iter().map(|expression| expression.name.as_str());
+        expressions.chain(self.units().iter().map(|unit| unit.name.as_str()))
+    }
+
     /// The expression of a name.
     pub fn get(&self, name: &str) -> Option<&Expression> {
         self.expressions.iter().find(|expression| expression.name == name)
     }
 
+    /// The expression of a name, or a unit as an expression of its own: on both sides, or with `_l` or `_r` after its
+    /// name on one.
+    pub fn find(&self, name: &str) -> Option<Cow<'_, Expression>> {
+        if let Some(expression) = self.get(name) {
+            return Some(Cow::Borrowed(expression));
+        }
+        let (unit, side) = match self.units.index(name) {
+            Some(_) => (name, Sides::Both),
+            None => name
+                .strip_suffix("_l")
+                .map(|unit| (unit, Sides::Left))
+                .or_else(|| name.strip_suffix("_r").map(|unit| (unit, Sides::Right)))?,
+        };
+        self.units.index(unit)?;
+        let units = vec![UnitUse { unit: unit.into(), side, strength: 1.0 }];
+        Some(Cow::Owned(Expression { name: name.into(), about: String::new(), units }))
+    }
+
+    /// Adds the units of a file; see [`UnitSet::add`].
+    pub fn add_units(&mut self, text: &str, file: &str) -> Result<(), ExpressionError> {
+        self.units.add(text, file)
+    }
+
     /// Adds the expression of a file.
     ///
     /// # Errors
-    /// A malformed text, a name that is taken, a unit that [`units`](Self::units) does not have.
+    /// A malformed text, a name that is taken, a unit that the set does not have.
     pub fn add(&mut self, text: &str, file: &str) -> Result<(), ExpressionError> {
         let expression = Expression::parse(text, file)?;
         if self.get(&expression.name).is_some() {

@@ -196,17 +196,20 @@ impl Expression {
 /// Reads any of our values.
 fn parse<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, ExpressionError> {
     if text.len() > MAX_TEXT {
-        let message = format!("{} KiB, more than the {} KiB that are read; split the file", text.len() >> 10, MAX_TEXT >> 10);
+        let message =
+            format!("{} KiB, more than the {} KiB that are read; split the file", text.len() >> 10, MAX_TEXT >> 10);
         return Err(located(text, file, 0, message));
     }
     if text.trim().is_empty() {
         return Err(located(text, file, 0, "the file is empty; save it again".into()));
     }
-    Options::default().with_default_extension(Extensions::IMPLICIT_SOME).from_str(text).map_err(|error| ExpressionError {
-        file: file.into(),
-        line: error.span.start.line,
-        column: error.span.start.col,
-        message: error.code.to_string(),
+    Options::default().with_default_extension(Extensions::IMPLICIT_SOME).from_str(text).map_err(|error| {
+        ExpressionError {
+            file: file.into(),
+            line: error.span.start.line,
+            column: error.span.start.col,
+            message: error.code.to_string(),
+        }
     })
 }
 
