@@ -74,3 +74,5 @@ mod voxels;
 mod weights;
 #[cfg(all(feature = "editor", feature = "cli"))]
 mod window;
+mod cli_face;
+mod face;

@@ -1,0 +1,108 @@
+//! Faces on the command line: the real binary, real files, exit codes.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use rigsmith::files::{RealDisk, load_model, load_template};
+use serde_json::Value;
+
+struct Answer {
+    code: i32,
+    out: String,
+    err: String,
+}
+
+impl Answer {
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error} in {:?}", self.out))
+    }
+}
+
+fn rigsmith(folder: &Path, args: &[&str]) -> Answer {
+    let output = Command::new(env!("CARGO_BIN_EXE_rigsmith")).current_dir(folder).args(args).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    let answer = Answer { code: output.status.code().unwrap(), out: text(output.stdout), err: text(output.stderr) };
+    assert!(!answer.err.contains("panicked"), "{args:?} panicked: {}", answer.err);
+    answer
+}
+
+fn head() -> String {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
+    path.display().to_string()
+}
+
+#[test]
+fn a_head_becomes_a_character_and_a_rig() {
+    let folder = tempfile::tempdir().unwrap();
+    let exports = std::env::var_os("RIGSMITH_EXPORTS").map(PathBuf::from);
+    let glb = exports.map_or_else(|| folder.path().join("face.glb"), |exports| exports.join("face.glb"));
+    let glb = glb.display().to_string();
+    let answer = rigsmith(folder.path(), &["face", &head(), "--bones", "24", "-o", &glb, "--json"]);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let json = answer.json();
+    for key in ["groups", "heights", "bones", "square_error", "milliseconds"] {
+        assert!(!json[key].is_null(), "{key} is told: {json}");
+    }
+    let bones = json["bones"].as_array().unwrap();
+    assert_eq!(bones.iter().filter(|bone| bone["kind"] == "skin").count(), 24);
+    assert!(json["heights"].as_array().unwrap().windows(2).all(|pair| pair[0].as_f64() >= pair[1].as_f64()));
+    let model = load_model(&RealDisk, Path::new(&glb)).unwrap();
+    assert!(model.weights.is_some() && model.nodes.len() > 24);
+
+    let rig = folder.path().join("face.rig.ron").display().to_string();
+    let happy = ["face", &head(), "--bones", "12", "--expression", "happiness=1", "-o", &rig];
+    assert_eq!(rigsmith(folder.path(), &happy).code, 0);
+    let template = load_template(&RealDisk, Path::new(&rig)).unwrap();
+    assert!(template.rig.find_label("head").is_some());
+    let first = fs::read(&rig).unwrap();
+    assert_eq!(rigsmith(folder.path(), &happy).code, 0);
+    assert_eq!(fs::read(&rig).unwrap(), first, "the same command writes the same bytes");
+}
+
+#[test]
+fn an_expression_poses_the_character() {
+    let folder = tempfile::tempdir().unwrap();
+    let (still, moved) = ("still.glb", "moved.glb");
+    for (name, more) in [(still, &[][..]), (moved, &["--expression", "surprise=1"][..])] {
+        let head = head();
+        let mut args = vec!["face", &head, "--bones", "20", "-o", name];
+        args.extend(more);
+        let answer = rigsmith(folder.path(), &args);
+        assert_eq!(answer.code, 0, "{}", answer.err);
+    }
+    let [still, moved] = [still, moved].map(|name| load_model(&RealDisk, &folder.path().join(name)).unwrap());
+    let differ = still.nodes.iter().zip(&moved.nodes).filter(|(a, b)| a.rest != b.rest).count();
+    assert!(differ > 4, "{differ} nodes are posed");
+    assert_eq!(still.points, moved.points, "the mesh itself stays");
+}
+
+#[test]
+fn wrong_use_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    fs::write(folder.path().join("shapes.json"), "{}").unwrap();
+    fs::write(folder.path().join("shapes.f32"), "x").unwrap();
+    let head = head();
+    let cases: &[(&[&str], i32, &str)] = &[
+        (&["face", &head, "--bones", "0", "-o", "a.glb"], 2, "at least 1"),
+        (&["face", &head, "--bones", "9999999", "-o", "a.glb"], 1, "bones"),
+        (&["face", &head, "-o", "a.obj"], 2, ".glb"),
+        (&["face", &head, "--expression", "hapiness=1", "-o", "a.glb"], 2, "happiness"),
+        (&["face", &head, "--expression", "happiness=2", "-o", "a.glb"], 2, "0 to 1"),
+        (&["face", &head, "--expression", "happiness", "-o", "a.glb"], 2, "NAME=STRENGTH"),
+        (&["face", &head, "--up", "w", "-o", "a.glb"], 2, "x, y or z"),
+        (&["face", "flat.obj", "-o", "a.glb"], 1, ""),
+        (&["face", "none.obj", "-o", "a.glb"], 1, "none.obj"),
+        (&["face", &head, "--fit", "shapes.json", "-o", "a.glb"], 1, "vertices"),
+        (&["face", &head, "--fit", "none.txt", "-o", "a.glb"], 2, "morph targets"),
+    ];
+    for (args, code, words) in cases {
+        let answer = rigsmith(folder.path(), args);
+        assert_eq!(answer.code, *code, "{args:?}: {}", answer.err);
+        assert!(answer.err.contains(words), "{args:?} must say \"{words}\": {}", answer.err);
+        assert!(!folder.path().join("a.glb").exists(), "{args:?} writes nothing");
+    }
+}
