@@ -155,8 +155,7 @@ fn wanted(args: &FaceArgs) -> Result<Wanted, Failure> {
 fn express(args: &FaceArgs, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
     let strengths: BTreeMap<String, f32> = args.expression.iter().cloned().collect();
     // A name that is wrong is wrong use; what is wrong with the face is not.
-    let set = ExpressionSet::bundled().map_err(|error| Failure::Input(Box::new(error)))?;
-    mixed(&set, &strengths).map_err(|reason| Failure::Usage(format!("--expression: {reason}")))?;
+    mixed(ExpressionSet::bundled(), &strengths).map_err(|reason| Failure::Usage(format!("--expression: {reason}")))?;
     bench.express(strengths.clone())?;
     report.set("expressions", json!(strengths));
     Ok(())

@@ -54,11 +54,7 @@ pub struct FaceExpressions(pub Arc<ExpressionSet>);
 
 impl Default for FaceExpressions {
     fn default() -> Self {
-        let set = ExpressionSet::bundled().unwrap_or_else(|wrong| {
-            error!("the bundled expressions cannot be read: {wrong}");
-            ExpressionSet::default()
-        });
-        Self(Arc::new(set))
+        Self(Arc::new(ExpressionSet::bundled().clone()))
     }
 }
 

@@ -5,6 +5,8 @@ mod build;
 mod cli;
 #[cfg(feature = "cli")]
 mod cli_build;
+#[cfg(feature = "cli")]
+mod cli_face;
 mod commands;
 mod custom_module;
 #[cfg(feature = "draw")]
@@ -18,6 +20,7 @@ mod edit_text;
 mod editor_files;
 mod edits;
 mod exports;
+mod face;
 mod files;
 mod files_read;
 mod files_set;
@@ -74,5 +77,3 @@ mod voxels;
 mod weights;
 #[cfg(all(feature = "editor", feature = "cli"))]
 mod window;
-mod cli_face;
-mod face;

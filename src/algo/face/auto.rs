@@ -359,11 +359,11 @@ impl FaceAnalysis {
     fn folds(&self, face: &AutoFace, expressions: &ExpressionSet) -> usize {
         let ready = self.fitted(&face.bones, &face.weights);
         let one = |expression| {
-            let poses = ready.pose(&Mix::of(&[(expression, 1.0)], &expressions.units), &expressions.units);
+            let poses = ready.pose(&Mix::of(&[(expression, 1.0)], expressions.unit_set()), expressions.unit_set());
             let moved = apply(&self.points, &face.weights, &face.bones, &poses);
             folded(&self.points, &moved, &self.triangles)
         };
-        expressions.expressions().iter().map(one).sum()
+        expressions.six().map(one).sum()
     }
 
     /// Moves the bones of a face, and weighs the points anew, so that the bones can show given shapes.

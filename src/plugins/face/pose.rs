@@ -9,7 +9,7 @@ use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis, FaceError},
         bones::FaceBone,
-        expression::{BonePose, ExpressionSet, Mix, Sides, apply},
+        expression::{BonePose, Expression, ExpressionSet, Mix, apply},
     },
     mesh::model::Weights,
     plugins::{
@@ -128,7 +128,7 @@ fn posed(
     let mix = mixed(set, strengths)?;
     let weights = analysed_weights(skin, &known, analysis);
     let bones = known.face_bones(analysis);
-    let poses = analysis.fitted(&bones, &weights).pose(&mix, &set.units);
+    let poses = analysis.fitted(&bones, &weights).pose(&mix, set.unit_set());
     Ok(Posed { known, bones, weights, poses })
 }
 
@@ -137,29 +137,20 @@ fn posed(
 /// # Errors
 /// A sentence without its point: an unknown name, a strength that is not a number.
 pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<Mix, String> {
-    let mut mix = Mix::rest(&set.units);
+    let mut wanted = Vec::new();
     for (name, strength) in strengths {
         if !strength.is_finite() {
             return Err(format!("the strength of \"{name}\" is not a number; write one from 0 to 1"));
         }
-        let strength = strength.clamp(0.0, 1.0);
-        if let Some(expression) = set.get(name) {
-            for used in &expression.units {
-                mix.add(&used.unit, used.side, used.strength * strength, &set.units);
-            }
-            continue;
-        }
-        let one_side = [("_l", Sides::Left), ("_r", Sides::Right)];
-        let sided = one_side.iter().find_map(|(ending, side)| Some((name.strip_suffix(ending)?, *side)));
-        let known = mix.add(name, Sides::Both, strength, &set.units)
-            || sided.is_some_and(|(unit, side)| mix.add(unit, side, strength, &set.units));
-        if !known {
-            let expressions = set.expressions().iter().map(|expression| expression.name.as_str());
-            let units = set.units.units().iter().map(|unit| unit.name.as_str());
-            return Err(format!("there is no expression \"{name}\"{}", did_you_mean(name, expressions.chain(units))));
-        }
+        let expression = set.find(name).ok_or_else(|| {
+            let units = set.units().iter().map(|unit| unit.name.as_str());
+            let nearest = did_you_mean(name, set.names().chain(units));
+            format!("there is no expression \"{name}\"{nearest}")
+        })?;
+        wanted.push((expression, strength.clamp(0.0, 1.0)));
     }
-    Ok(mix)
+    let wanted: Vec<(&Expression, f32)> = wanted.iter().map(|(expression, s)| (expression.as_ref(), *s)).collect();
+    Ok(Mix::of(&wanted, set.unit_set()))
 }
 
 /// The edits that pose the facial joints as strengths say. Facial joints that they do not move stand at rest.

@@ -41,7 +41,7 @@ pub(super) fn show(
             let_go = true;
         }
     });
-    for expression in set.0.expressions().iter().filter(|expression| !expression.units.is_empty()) {
+    for expression in set.0.six() {
         ui.horizontal(|ui| {
             match pictures.of(&expression.name) {
                 Some(texture) => {
@@ -62,7 +62,7 @@ pub(super) fn show(
         });
     }
     CollapsingHeader::new("Units").show(ui, |ui| {
-        for name in set.0.units.units().iter().map(|unit| unit.name.as_str()) {
+        for name in set.0.units().iter().map(|unit| unit.name.as_str()) {
             ui.label(capital(&name.replace('_', " ")));
             let (drag, done) = strength(ui, name, &mut next);
             dragging |= drag;

@@ -41,7 +41,7 @@ impl Pictures {
             self.textures.clear();
             self.of = Some((face.analysis.clone(), skin.clone()));
         }
-        let Some(expression) = set.expressions().iter().find(|expression| !self.textures.contains_key(&expression.name)) else {
+        let Some(expression) = set.six().find(|expression| !self.textures.contains_key(&expression.name)) else {
             return;
         };
         let strengths = [(expression.name.clone(), 1.0)].into();
