@@ -1,6 +1,7 @@
 //! The editor's panels: what a person does in them reaches the rig as one step, and everything is told.
 
 mod desk;
+mod face;
 
 use std::{
     collections::HashSet,

@@ -143,8 +143,7 @@ pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<M
             return Err(format!("the strength of \"{name}\" is not a number; write one from 0 to 1"));
         }
         let expression = set.find(name).ok_or_else(|| {
-            let units = set.units().iter().map(|unit| unit.name.as_str());
-            let nearest = did_you_mean(name, set.names().chain(units));
+            let nearest = did_you_mean(name, set.names());
             format!("there is no expression \"{name}\"{nearest}")
         })?;
         wanted.push((expression, strength.clamp(0.0, 1.0)));

@@ -1,0 +1,98 @@
+//! The Face panel: a click makes a face, sliders pose it, the merge history is there to be cut.
+
+use std::path::PathBuf;
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+use rigsmith::{
+    editor::panels::face::FacePanel,
+    files::{RealDisk, load_model},
+    plugins::{
+        face::{Expressions, Face, FaceJob, FaceRig},
+        surface::{RigMesh, SkinOf},
+    },
+    prelude::*,
+};
+
+use super::desk::{Desk, Sheet};
+
+/// The panel, tall enough for all of it, and the bundled head.
+fn with_head() -> (Desk, Entity) {
+    let mut desk = Desk::with(Sheet::Panel(Box::new(FacePanel::default())), egui::vec2(320.0, 1400.0));
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
+    let mesh = RigMesh::new(Uid(99), load_model(&RealDisk, &path).unwrap(), Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(desk.rig))).id();
+    desk.frames(2);
+    (desk, mesh)
+}
+
+fn wait(desk: &mut Desk, mesh: Entity) {
+    for _ in 0..4000 {
+        desk.frame();
+        if desk.app.world().get::<FaceJob>(mesh).is_none() && desk.look("Cancel").is_none() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    desk.frames(12);
+}
+
+#[test]
+fn without_a_mesh_it_says_what_to_do() {
+    let mut desk = Desk::new(FacePanel::default());
+    desk.frames(2);
+    assert!(desk.seen.iter().any(|seen| seen.label.contains("Open a head")), "{:?}", desk.seen);
+}
+
+#[test]
+fn a_click_makes_a_face_that_sliders_pose() {
+    let (mut desk, mesh) = with_head();
+    assert!(desk.look("Regions").is_none(), "there is no face yet");
+    desk.click("Place face");
+    wait(&mut desk, mesh);
+    assert!(FaceRig::read(desk.rig()).bones.len() >= 40);
+    assert!(desk.told().iter().any(|told| told.contains("facial bones")), "{:?}", desk.told());
+    assert!(desk.look("Place again").is_some() && desk.look("Regions").is_some());
+    assert_eq!(desk.steps().0, 1, "one step of the history");
+
+    // A region selects its bones.
+    let lips = desk.seen.iter().find(|seen| seen.label.starts_with("lip ")).expect("lips have bones").label.clone();
+    desk.click(&lips);
+    desk.frames(2);
+    let count: usize = lips["lip ".len()..].parse().unwrap();
+    assert_eq!(desk.selected().len(), count);
+
+    // An expression is one step, however long its slider is dragged.
+    let happiness = desk.find("Happiness");
+    let slider = desk
+        .seen
+        .iter()
+        .filter(|seen| seen.rect.top() > happiness.rect.top() && !seen.value.is_empty())
+        .min_by(|a, b| a.rect.top().total_cmp(&b.rect.top()).then(a.rect.left().total_cmp(&b.rect.left())))
+        .expect("a slider below the name")
+        .rect;
+    let at = |share: f32| egui::pos2(slider.left() + share * slider.width(), slider.center().y);
+    desk.drag(at(0.02), at(0.6));
+    desk.frames(4);
+    let shown = desk.app.world().get::<Expressions>(mesh).cloned().unwrap_or_default();
+    assert!(shown.0.get("happiness").is_some_and(|strength| *strength > 0.2), "{shown:?}");
+    assert!(!desk.rig().pose().is_empty());
+    assert_eq!(desk.steps().0, 2, "the drag is one step");
+    desk.click("Reset");
+    desk.frames(4);
+    assert!(desk.rig().pose().is_empty(), "back at rest");
+}
+
+#[test]
+fn the_merge_history_can_be_cut() {
+    let (mut desk, mesh) = with_head();
+    desk.click("Place face");
+    wait(&mut desk, mesh);
+    let before = desk.app.world().get::<Face>(mesh).unwrap().analysis.clone();
+    desk.click("Grouping");
+    desk.frames(20);
+    let groups = desk.find("groups");
+    let value = desk.seen.iter().find(|seen| seen.rect.center().y > groups.rect.top() - 30.0 && !seen.value.is_empty());
+    assert!(value.is_some(), "{:?}", desk.seen);
+    assert!(before.groups.groups >= 3);
+}
