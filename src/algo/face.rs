@@ -5,6 +5,7 @@
 
 pub mod axes;
 pub mod bones;
+pub mod depth_map;
 pub mod expression;
 pub mod grouping;
 pub mod head_bones;

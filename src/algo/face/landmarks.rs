@@ -1,6 +1,21 @@
 //! Landmarks: the 68 points of the Multi-PIE scheme, found on a head mesh.
 
-use glam::Vec3;
+mod assemble;
+mod eyes;
+mod mouth;
+mod prior;
+mod profile;
+mod relief;
+mod search;
+mod surface;
+
+use glam::{Vec3, vec2, vec3};
+
+use self::{assemble::Measured, relief::Relief};
+use super::{
+    depth_map::{DepthFrame, DepthMap, NO_TRIANGLE},
+    shells::{ShellKind, Shells},
+};
 
 /// The 68 landmarks of a face, in head space.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,4 +37,161 @@ impl Landmarks {
     pub fn eye_distance(&self) -> f32 {
         self.points[36].distance(self.points[45])
     }
+}
+
+/// Why no landmarks could be found.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LandmarkError {
+    /// Nothing to look at.
+    #[error("the mesh has no skin triangles to find a face on: give a head mesh")]
+    Empty,
+    /// A coordinate is not a number.
+    #[error("point {point} is not finite: repair the mesh")]
+    NotFinite {
+        /// Which one.
+        point: usize,
+    },
+    /// No depth, no width or no height.
+    #[error("the mesh is flat, a head has depth: check the axes and the mesh")]
+    Flat,
+    /// Nothing like a front was seen.
+    #[error("no face was found looking along -z: check which axis is forward, and that the mesh is a head")]
+    NoFront,
+}
+
+/// Finds the landmarks.
+pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) -> Result<Landmarks, LandmarkError> {
+    let kind = |triangle: usize| {
+        let corner = triangles.get(triangle).map_or(u32::MAX, |corners| corners[0]);
+        shells.kind(corner as usize)
+    };
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for (index, point) in points.iter().enumerate() {
+        if !point.is_finite() {
+            return Err(LandmarkError::NotFinite { point: index });
+        }
+        if shells.kind(index) == ShellKind::Skin {
+            low = low.min(*point);
+            high = high.max(*point);
+        }
+    }
+    let size = high - low;
+    if triangles.is_empty() || !(size.max_element() > 0.0) {
+        return Err(LandmarkError::Empty);
+    }
+    if size.min_element() < 1e-3 * size.max_element() {
+        return Err(LandmarkError::Flat);
+    }
+    let coarse = DepthFrame::over(low.truncate(), high.truncate(), size.truncate().max_element() / 191.0, 192);
+    let (coarse, solid) = front(coarse, points, triangles, |t| kind(t) != ShellKind::Inside);
+    let exact = search::exact_mirror(points, low, high);
+    let middles = exact.map_or_else(
+        || {
+            let (center, width, step) = ((low.x + high.x) / 2.0, size.x, coarse.frame.pixel * 1.5);
+            let span = (center - 0.2 * width, center + 0.2 * width);
+            search::mirror_axes(&coarse, span, step, 0.3 * width, (low.y, high.y), 0.1 * width, 3)
+        },
+        |middle| vec![middle],
+    );
+    let poses = middles.iter().filter_map(|&middle| search::find_face(&coarse, &solid, middle));
+    let pose = poses.max_by(|a, b| a.worth.total_cmp(&b.worth)).ok_or(LandmarkError::NoFront)?;
+    let middle = pose.center.x;
+    let (fine, _) = front(relief::close_up(&pose), points, triangles, |t| kind(t) != ShellKind::Inside);
+    let eyeball = |t: u32| matches!(kind(t as usize), ShellKind::LeftEye | ShellKind::RightEye);
+    let eyes = [-1.0, 1.0].map(|side| eyes::find_opening(&fine, &pose, side, eyeball));
+    let measured = assemble::measure(&fine, &pose, &eyes, exact.is_some());
+    let skin = front(fine.frame, points, triangles, |t| kind(t) == ShellKind::Skin).0;
+    let found = lay(&measured, &skin, points, triangles, |point| shells.kind(point) == ShellKind::Skin, exact);
+    let mouth_open = opens(&measured, points, triangles, |t| kind(t) == ShellKind::Skin);
+    let sure = |yes: bool| if yes { 0.2 } else { 0.0 };
+    let nose = measured.profile.nose > 0.08;
+    let confidence =
+        0.6 * ((pose.worth - 0.4) / 0.5).clamp(0.0, 1.0) + sure(measured.eyes) + sure(measured.lips && nose);
+    Ok(Landmarks { points: found, middle, symmetric: exact.is_some(), confidence, mouth_open })
+}
+
+/// Lays the normalised places onto the skin: those that the front view shows by their depth there, the rest at the
+/// closest place of the skin.
+fn lay(
+    measured: &Measured,
+    skin: &DepthMap,
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    is_skin: impl Fn(usize) -> bool,
+    exact: Option<f32>,
+) -> [Vec3; 68] {
+    let relief = Relief { map: skin, center: measured.center, size: measured.size };
+    let places = &measured.places;
+    // Where the mean face's depths begin on this head: the median over places the front view shows well.
+    let mut offsets: Vec<f32> = [19, 21, 22, 24, 27, 31, 33, 35, 51, 57]
+        .iter()
+        .filter_map(|&i: &usize| places.get(i).and_then(|p| relief.at(p.x, p.y).map(|depth| depth - p.z)))
+        .collect();
+    offsets.sort_by(f32::total_cmp);
+    let offset = offsets.get(offsets.len() / 2).copied().unwrap_or_default();
+    let mut laid: [Vec3; 68] = std::array::from_fn(|index| {
+        let place = places[index];
+        let seen = match index {
+            0..=6 | 10..=16 => None,
+            // Off the rim, where skin is sure to be.
+            37 | 38 | 43 | 44 => relief.at(place.x, place.y + 0.012),
+            40 | 41 | 46 | 47 => relief.at(place.x, place.y - 0.012),
+            61..=63 => relief.at(place.x, place.y + 0.004).map(|depth| depth - 0.03),
+            65..=67 => relief.at(place.x, place.y - 0.004).map(|depth| depth - 0.02),
+            _ => relief.at(place.x, place.y),
+        };
+        let depth = seen.filter(|depth| (depth - offset - place.z).abs() < 0.35).unwrap_or(place.z + offset);
+        relief.place(place.x, place.y, depth)
+    });
+    let snapped = surface::snap(&laid, points, triangles, is_skin);
+    let flip = |p: Vec3| exact.map_or(p, |middle| vec3(2.0 * middle - p.x, p.y, p.z));
+    for (index, point) in snapped.iter().enumerate() {
+        let other = prior::mirrored(index);
+        // On a head that is the same on both sides, so are the landmarks.
+        laid[index] = if exact.is_some() && other < index { flip(laid[other]) } else { *point };
+    }
+    laid
+}
+
+/// True if there is a cavity close behind the lips, or nothing between them.
+fn opens(measured: &Measured, points: &[Vec3], triangles: &[[u32; 3]], skin: impl Fn(usize) -> bool) -> bool {
+    let line = (measured.profile.upper_edge + measured.profile.lower_edge) / 2.0;
+    let looks = [(0.02, 0.05), (-0.04, 0.05), (0.02, -0.05), (-0.04, -0.05), (0.05, 0.03)];
+    let behind = looks.iter().filter(|&&(u, v)| {
+        let place = measured.center + vec2(u, line + v) * measured.size;
+        let depths = surface::depths_at(place, points, triangles, &skin);
+        depths
+            .first()
+            .is_some_and(|first| depths.iter().any(|depth| (0.005..0.45).contains(&((first - depth) / measured.size))))
+    });
+    behind.count() >= 2 || measured.profile.slit > 0.12
+}
+
+/// The map of what faces the viewer, the far wall seen through a hole left out, and what is covered with it.
+fn front(
+    frame: DepthFrame,
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    keep: impl Fn(usize) -> bool,
+) -> (DepthMap, Vec<bool>) {
+    let mut map = DepthMap::draw(frame, points, triangles, keep);
+    let facing: Vec<i8> = map
+        .triangle
+        .iter()
+        .map(|&triangle| {
+            let Some(corners) = triangles.get(triangle as usize).filter(|_| triangle != NO_TRIANGLE) else { return 0 };
+            let [Some(a), Some(b), Some(c)] = corners.map(|corner| points.get(corner as usize)) else { return 0 };
+            if (*b - *a).truncate().perp_dot((*c - *a).truncate()) >= 0.0 { 1 } else { -1 }
+        })
+        .collect();
+    // A mesh that is wound the other way round faces us with its back throughout.
+    let most = if facing.iter().map(|&side| i64::from(side)).sum::<i64>() >= 0 { 1 } else { -1 };
+    let solid = map.triangle.iter().map(|&triangle| triangle != NO_TRIANGLE).collect();
+    for ((depth, triangle), side) in map.depth.iter_mut().zip(&mut map.triangle).zip(facing) {
+        if side == -most {
+            *depth = f32::NEG_INFINITY;
+            *triangle = NO_TRIANGLE;
+        }
+    }
+    (map, solid)
 }

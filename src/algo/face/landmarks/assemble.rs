@@ -1,0 +1,161 @@
+//! From what was measured to 68 places: the mean face is bent until it passes through the measured features, and laid
+//! onto the skin.
+
+use glam::{Vec2, Vec3, vec2, vec3};
+
+use super::{
+    eyes::EyeOpening,
+    mouth,
+    prior::{mean_landmarks, mirrored},
+    profile::{Curve, Profile},
+    relief::Relief,
+    search::Pose,
+};
+
+/// What was measured on one head.
+pub(super) struct Measured {
+    /// Normalised places of the landmarks (u, v), and the depth of the mean face there.
+    pub places: [Vec3; 68],
+    /// Half way between the eyes, in head space.
+    pub center: Vec2,
+    /// The eye distance.
+    pub size: f32,
+    /// Heights along the profile.
+    pub profile: Profile,
+    /// True if both eye openings were found.
+    pub eyes: bool,
+    /// True if the lips' line and both its ends were found.
+    pub lips: bool,
+}
+
+/// How far the corner at the nose lies beyond the visible opening, and how much lower, as shares of the opening's
+/// width: the opening narrows to a cleft there.
+const CLEFT: Vec2 = vec2(0.12, 0.07);
+
+/// The corners of an eye from its opening: (outer, inner), in head space.
+fn corners(eye: &EyeOpening) -> (Vec2, Vec2) {
+    let along = eye.inner - eye.outer;
+    let inner = eye.inner + vec2(along.x * CLEFT.x, -along.length() * CLEFT.y);
+    (eye.outer - vec2(along.x * 0.015, 0.0), inner)
+}
+
+/// Both openings if they were found and mirror each other well enough to be believed.
+fn believed(eyes: &[Option<EyeOpening>; 2], pose: &Pose) -> Option<[EyeOpening; 2]> {
+    let [Some(right), Some(left)] = eyes else { return None };
+    let flip = |place: Vec2| vec2(2.0 * pose.center.x - place.x, place.y);
+    let far = 0.09 * pose.size;
+    let near = right.outer.distance(flip(left.outer)) < far && right.inner.distance(flip(left.inner)) < far;
+    near.then(|| [right.clone(), left.clone()])
+}
+
+/// Bends the mean face through what the fine map shows. With `even`, both sides are made the same.
+pub(super) fn measure(
+    relief_map: &crate::algo::face::depth_map::DepthMap,
+    pose: &Pose,
+    eyes: &[Option<EyeOpening>; 2],
+    even: bool,
+) -> Measured {
+    let eyes = believed(eyes, pose);
+    let (mut center, mut size) = (pose.center, pose.size);
+    if let Some([right, left]) = &eyes {
+        let ((a, b), (c, d)) = (corners(right), corners(left));
+        size = a.distance(c);
+        center = vec2(pose.center.x, (a.y + b.y + c.y + d.y) / 4.0);
+    }
+    let tall = pose.tall * pose.size / size;
+    let relief = Relief { map: relief_map, center, size };
+    let profile = Curve::read(&relief).features(tall);
+    let mean = mean_landmarks();
+    let mut places = mean;
+    // Brows rise with the upper face, which differs less than the lower.
+    let upper = 0.5 + 0.5 * tall.clamp(0.7, 1.3);
+    for place in &mut places[17..27] {
+        place.y *= upper;
+    }
+    let tip = profile.tip + 0.08 * (profile.nasion - profile.tip);
+    let chin = 0.6 * profile.menton + 0.4 * (profile.subnasale - 0.745 * tall);
+    let stretch = chin / mean[8].y;
+    for place in &mut places[0..17] {
+        let part = (place.y / mean[8].y).clamp(0.0, 1.0);
+        place.y *= 1.0 + (stretch - 1.0) * part;
+    }
+    places[27].y = profile.nasion;
+    places[28].y = profile.nasion + (tip - profile.nasion) * 0.33;
+    places[29].y = profile.nasion + (tip - profile.nasion) * 0.64;
+    places[30].y = tip;
+    for place in &mut places[31..36] {
+        place.y += profile.subnasale - mean[33].y;
+    }
+    if let Some(eyes) = &eyes {
+        for (eye, side) in eyes.iter().zip([0usize, 1]) {
+            set_eye(&mut places, eye, side, center, size);
+        }
+    }
+    let line = profile.upper_edge;
+    let ends = [-1.0, 1.0].map(|side| {
+        mouth::lip_corner(&relief, side, line, tall)
+            .filter(|end| (0.16..0.45).contains(&end.0) && (end.1 - line).abs() < 0.12)
+    });
+    set_mouth(&mut places, &mean, &profile, ends, chin);
+    if even {
+        for index in 0..68 {
+            let other = mirrored(index);
+            if other > index {
+                let (a, b) = (places[index], places[other]);
+                let half = vec3((a.x - b.x) / 2.0, (a.y + b.y) / 2.0, (a.z + b.z) / 2.0);
+                places[index] = half;
+                places[other] = vec3(-half.x, half.y, half.z);
+            } else if other == index {
+                places[index].x = 0.0;
+            }
+        }
+    }
+    let lips = ends.iter().all(Option::is_some) && profile.slit > 0.008;
+    Measured { places, center, size, profile, eyes: eyes.is_some(), lips }
+}
+
+fn set_eye(places: &mut [Vec3; 68], eye: &EyeOpening, side: usize, center: Vec2, size: f32) {
+    // Outer corner, upper lid from there, inner corner, lower lid back.
+    let order: [usize; 6] = if side == 0 { [36, 37, 38, 39, 40, 41] } else { [45, 44, 43, 42, 47, 46] };
+    let (outer, inner) = corners(eye);
+    let along = |part: f32| eye.outer.x + (eye.inner.x - eye.outer.x) * part;
+    let found = [
+        outer,
+        vec2(along(0.24), eye.lid(0.24).1),
+        vec2(along(0.715), eye.lid(0.715).1),
+        inner,
+        vec2(along(0.735), eye.lid(0.735).0),
+        vec2(along(0.248), eye.lid(0.248).0),
+    ];
+    for (index, place) in order.into_iter().zip(found) {
+        let place = (place - center) / size;
+        places[index] = place.extend(places[index].z);
+    }
+}
+
+fn set_mouth(places: &mut [Vec3; 68], mean: &[Vec3; 68], profile: &Profile, ends: [Option<(f32, f32)>; 2], chin: f32) {
+    let line = (profile.upper_edge + profile.lower_edge) / 2.0;
+    let top = profile.subnasale + (line - profile.subnasale) * 0.615;
+    let low = 0.5 * (profile.lower_lip - 0.037) + 0.5 * (line + 0.227 * (chin - line));
+    let (mean_line, mean_top, mean_low) = (-0.768, mean[51].y, mean[57].y);
+    let usual = |end: Option<(f32, f32)>| end.unwrap_or((-mean[48].x, line + mean[48].y - mean_line));
+    let other = |own: Option<(f32, f32)>, other: Option<(f32, f32)>| usual(own.or(other));
+    let sides = [other(ends[0], ends[1]), other(ends[1], ends[0])];
+    for index in 48..68 {
+        let place = mean[index];
+        let (reach, height) = if place.x <= 0.0 { sides[0] } else { sides[1] };
+        let part = place.x / mean[54].x;
+        let bend = part * part;
+        let base = mean_line + (mean[48].y - mean_line) * bend;
+        let above = place.y - base;
+        let scale =
+            if above > 0.0 { (top - line) / (mean_top - mean_line) } else { (low - line) / (mean_low - mean_line) };
+        let gap = match index {
+            61..=63 => profile.upper_edge - line + 0.006,
+            65..=67 => profile.lower_edge - line - 0.006,
+            _ => above * scale,
+        };
+        places[index].x = part * reach;
+        places[index].y = line + (height - line) * bend + gap;
+    }
+}

@@ -1,0 +1,150 @@
+//! The profile: heights of nose, lips and chin along the plane of symmetry.
+
+use glam::vec2;
+
+use super::relief::{Relief, smooth};
+
+/// Step along the profile, in eye distances.
+const STEP: f32 = 0.008;
+/// Where it begins and ends.
+const TOP: f32 = 0.6;
+const BOTTOM: f32 = -1.7;
+
+/// Heights (v) of the features along the profile, from the forehead down.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Profile {
+    /// The deepest place between the brows and the nose.
+    pub nasion: f32,
+    /// The tip of the nose.
+    pub tip: f32,
+    /// The corner below the nose.
+    pub subnasale: f32,
+    /// The foremost place of the upper lip.
+    pub upper_lip: f32,
+    /// The lower edge of the upper lip.
+    pub upper_edge: f32,
+    /// The upper edge of the lower lip.
+    pub lower_edge: f32,
+    /// The foremost place of the lower lip.
+    pub lower_lip: f32,
+    /// The fold between lip and chin.
+    pub fold: f32,
+    /// The foremost place of the chin.
+    pub pogonion: f32,
+    /// The lower edge of the chin.
+    pub menton: f32,
+    /// How far the lips' line lies behind the lips.
+    pub slit: f32,
+    /// How far the nose stands out.
+    pub nose: f32,
+}
+
+/// Depths along the profile.
+pub(super) struct Curve {
+    depths: Vec<f32>,
+}
+
+impl Curve {
+    /// Reads the profile at u = 0.
+    pub fn read(relief: &Relief) -> Self {
+        let count = ((TOP - BOTTOM) / STEP) as usize;
+        let lines = [-0.012f32, 0.0, 0.012].map(|u| relief.line(vec2(u, TOP), vec2(0.0, -STEP), count));
+        let mut depths: Vec<f32> = (0..count).map(|i| lines.iter().map(|line| line[i]).sum::<f32>() / 3.0).collect();
+        // Below the last thing seen it falls away, so that a cut neck looks like one that recedes.
+        let seen = (0..count).rposition(|i| relief.at(0.0, TOP - i as f32 * STEP).is_some()).unwrap_or(0);
+        for i in seen + 1..count {
+            depths[i] = depths[seen] - 2.0 * STEP * (i - seen) as f32;
+        }
+        smooth(&mut depths, 2);
+        Self { depths }
+    }
+
+    fn at(&self, v: f32) -> f32 {
+        let at = ((TOP - v) / STEP).clamp(0.0, (self.depths.len().max(2) - 2) as f32);
+        let (index, part) = (at.floor() as usize, at.fract());
+        let get = |i: usize| self.depths.get(i).copied().unwrap_or_default();
+        get(index) * (1.0 - part) + get(index + 1) * part
+    }
+
+    /// The height between `from` and `to` at which `worth` (of height and depth) is largest, to a fraction of a step.
+    fn best(&self, from: f32, to: f32, worth: impl Fn(f32, f32) -> f32) -> f32 {
+        let (low, high) = (from.min(to), from.max(to));
+        let count = (((high - low) / STEP) as usize).max(1);
+        let at = |i: f32| high - i * STEP;
+        let values: Vec<f32> = (0..=count).map(|i| worth(at(i as f32), self.at(at(i as f32)))).collect();
+        let best = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
+        let mut offset = 0.0;
+        if best > 0 && best + 1 < values.len() {
+            let (a, b, c) = (values[best - 1], values[best], values[best + 1]);
+            let bend = a - 2.0 * b + c;
+            if bend < 0.0 {
+                offset = (0.5 * (a - c) / bend).clamp(-0.5, 0.5);
+            }
+        }
+        at(best as f32 + offset)
+    }
+
+    /// The height between two heights where the curve lies furthest behind (`side` 1) or before (−1) the straight line.
+    fn off_line(&self, from: f32, to: f32, side: f32) -> f32 {
+        let (a, b) = (self.at(from), self.at(to));
+        let slope = (b - a) / (to - from);
+        self.best(from, to, |v, depth| side * (a + slope * (v - from) - depth))
+    }
+
+    /// Finds the features; `tall` is how tall the face is for its width.
+    pub fn features(&self, tall: f32) -> Profile {
+        let t = tall;
+        let tip = self.best(-0.1 * t, -0.62 * t, |_, depth| depth);
+        let glabella = self.best(0.15 * t, 0.42 * t, |v, depth| depth - 0.3 * (v - 0.25 * t).abs());
+        let nasion = self.off_line(glabella, tip, 1.0);
+        let subnasale = self.off_line(tip, tip - 0.34 * t, 1.0);
+        // The lips' line is the deepest valley with lips above and below it.
+        let valley = |v: f32| {
+            let peak = |from: f32, to: f32| {
+                let count = 8;
+                (0..=count).map(|i| self.at(v + from + (to - from) * i as f32 / count as f32)).fold(f32::MIN, f32::max)
+            };
+            peak(0.02 * t, 0.12 * t).min(peak(-0.12 * t, -0.02 * t)) - self.at(v)
+        };
+        let lips = self.best(subnasale - 0.12 * t, subnasale - 0.42 * t, |v, _| {
+            let off = (v - (subnasale - 0.25 * t)) / t;
+            valley(v) - 0.6 * off * off
+        });
+        let slit = valley(lips);
+        let upper_lip = self.best(lips + 0.02 * t, lips + 0.15 * t, |_, depth| depth);
+        let lower_lip = self.best(lips - 0.02 * t, lips - 0.15 * t, |_, depth| depth);
+        let floor = self.at(upper_lip).min(self.at(lower_lip));
+        let edge = |toward: f32| {
+            let deep = floor - 0.06;
+            let mut v = lips;
+            while self.at(v) < deep && (v - lips).abs() < 0.1 {
+                v += toward * STEP;
+            }
+            v
+        };
+        let (upper_edge, lower_edge) = (edge(1.0), edge(-1.0));
+        let chin = self.best(lower_lip - 0.2 * t, lower_lip - 0.55 * t, |v, depth| {
+            depth - 0.15 * (v - (lower_lip - 0.33 * t)).abs()
+        });
+        let fold = self.off_line(lower_lip, chin, 1.0);
+        let pogonion = self.best(fold - 0.03, fold - 0.4 * t, |v, depth| depth + 0.3 * (v - fold));
+        let mut menton = pogonion;
+        while self.at(menton) - self.at(menton - 0.03) < 0.03 && menton > pogonion - 0.35 * t {
+            menton -= STEP / 2.0;
+        }
+        Profile {
+            nasion,
+            tip,
+            subnasale,
+            upper_lip,
+            upper_edge,
+            lower_edge,
+            lower_lip,
+            fold,
+            pogonion,
+            menton,
+            slit,
+            nose: self.at(tip) - 0.5 * (self.at(nasion) + self.at(subnasale)),
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Where the face is: the plane of symmetry, the height of the eyes and the size of the face, from a coarse depth map.
+//!
+//! The mean relief of a face is laid over the map at every height and size; what remains after a fit of offset, pitch,
+//! bend and strength tells how well it matches.
+
+use bevy::math::ops;
+use glam::{Vec2, Vec3};
+
+use super::prior::{RELIEF, RELIEF_STEP, RELIEF_TOP};
+use crate::algo::face::depth_map::DepthMap;
+
+/// Where the face is in head space.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Pose {
+    /// Half way between the eyes.
+    pub center: Vec2,
+    /// The distance of the outer eye corners.
+    pub size: f32,
+    /// How well the mean relief matches, -1 to 1.
+    pub match_: f32,
+    /// How much deeper the relief is than the mean's.
+    pub gain: f32,
+    /// How tall the face is for its width, relative to the mean's.
+    pub tall: f32,
+    /// The match less what speaks against a face here.
+    pub worth: f32,
+}
+
+/// The x of the plane in which the points mirror onto each other, if they do.
+///
+/// Tries the middle of the bounds, the mean and zero, on up to 400 points. Sorting dominates: `n log n`.
+pub(super) fn exact_mirror(points: &[Vec3], low: Vec3, high: Vec3) -> Option<f32> {
+    let size = (high - low).max_element();
+    let tolerance = size * 2e-4;
+    let mut order: Vec<Vec3> = points.to_vec();
+    order.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
+    let stride = (order.len() / 400).max(1);
+    let mean = points.iter().map(|point| f64::from(point.x)).sum::<f64>() / points.len().max(1) as f64;
+    [(low.x + high.x) / 2.0, 0.0, mean as f32].into_iter().find(|&middle| {
+        let (mut found, mut asked) = (0, 0);
+        for point in order.iter().step_by(stride) {
+            asked += 1;
+            let mirror = Vec3::new(2.0 * middle - point.x, point.y, point.z);
+            let start = order.partition_point(|other| other.x < mirror.x - tolerance);
+            let near = order.iter().skip(start).take_while(|other| other.x <= mirror.x + tolerance);
+            if near.into_iter().any(|other| other.distance_squared(mirror) <= tolerance * tolerance) {
+                found += 1;
+            }
+        }
+        asked > 0 && found * 100 >= asked * 97
+    })
+}
+
+/// Places where the map is more like its mirror image than near them, best first, at most `most`.
+///
+/// Between `from` and `to`, looking within `reach` either side and between the heights `rows`; depths that differ by
+/// more than `far` count as that.
+pub(super) fn mirror_axes(
+    map: &DepthMap,
+    (from, to): (f32, f32),
+    step: f32,
+    reach: f32,
+    rows: (f32, f32),
+    far: f32,
+    most: usize,
+) -> Vec<f32> {
+    let pixel = map.frame.pixel;
+    let stride = pixel.max((rows.1 - rows.0) / 60.0).max(f32::MIN_POSITIVE);
+    let across = pixel.max(reach / 40.0).max(f32::MIN_POSITIVE);
+    let (lines, columns) = (((rows.1 - rows.0) / stride) as usize, (reach / across) as usize);
+    let cost = |middle: f32| -> f32 {
+        let (mut sum, mut count) = (0.0f32, 0u32);
+        for line in 0..=lines {
+            let y = rows.0 + line as f32 * stride;
+            for column in 1..=columns {
+                let t = column as f32 * across;
+                let sides = (map.sample(Vec2::new(middle + t, y)), map.sample(Vec2::new(middle - t, y)));
+                sum += match sides {
+                    (Some(left), Some(right)) => (left - right).abs().min(far),
+                    (None, None) => continue,
+                    _ => far,
+                };
+                count += 1;
+            }
+        }
+        if count == 0 { far } else { sum / count as f32 }
+    };
+    let steps = (((to - from) / step).ceil() as usize).clamp(2, 100);
+    let at = |i: f32| from + (to - from) * i / steps as f32;
+    let costs: Vec<f32> = (0..=steps).map(|i| cost(at(i as f32))).collect();
+    let mut found: Vec<(f32, f32)> = Vec::new();
+    for (i, window) in costs.windows(3).enumerate() {
+        let &[a, b, c] = window else { continue };
+        let bend = a - 2.0 * b + c;
+        if b <= a && b <= c && bend > 0.0 {
+            found.push((b, at(i as f32 + 1.0 + (0.5 * (a - c) / bend).clamp(-0.5, 0.5))));
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.truncate(most);
+    found.into_iter().map(|(_, place)| place).collect()
+}
+
+/// For each row how far the head reaches from `middle` to the right (−x) and left (+x), over `solid` pixels.
+fn reaches(map: &DepthMap, solid: &[bool], middle: f32) -> Vec<(f32, f32)> {
+    let (width, pixel) = (map.frame.width, map.frame.pixel);
+    let center = map.frame.pixels(Vec2::new(middle, 0.0)).x.round().clamp(0.0, width as f32 - 1.0) as usize;
+    let run = |row: &[bool]| {
+        let right = (0..=center).rev().take_while(|&x| row.get(x) == Some(&true)).count();
+        let left = (center..width).take_while(|&x| row.get(x) == Some(&true)).count();
+        (right as f32 * pixel, left as f32 * pixel)
+    };
+    solid.chunks(width.max(1)).map(run).collect()
+}
+
+/// The Gram matrix of offset, pitch, bend, relief and depth over the places of the mean relief, every `stride`-th.
+fn gram(map: &DepthMap, pose: &Pose, stride: usize) -> Option<[[f64; 5]; 5]> {
+    let mut gram = [[0.0f64; 5]; 5];
+    let (mut seen, mut asked) = (0u32, 0u32);
+    let inverse = 1.0 / pose.size;
+    for (row, depths) in RELIEF.iter().enumerate() {
+        let v = RELIEF_TOP - row as f32 * RELIEF_STEP;
+        for (column, &relief) in depths.iter().enumerate() {
+            if (row + column) % stride != 0 {
+                continue;
+            }
+            let u = column as f32 * RELIEF_STEP;
+            for side in [-1.0, 1.0] {
+                if column == 0 && side > 0.0 {
+                    continue;
+                }
+                asked += 1;
+                let at = map.frame.pixels(pose.center + Vec2::new(u * side, v * pose.tall) * pose.size).round();
+                if at.x < 0.0 || at.y < 0.0 {
+                    continue;
+                }
+                let Some(depth) = map.at(at.x as usize, at.y as usize) else { continue };
+                seen += 1;
+                let values = [1.0, v, u * u, relief, depth * inverse].map(f64::from);
+                for i in 0..5 {
+                    for j in 0..=i {
+                        gram[i][j] += values[i] * values[j];
+                    }
+                }
+            }
+        }
+    }
+    (seen * 10 >= asked * 8).then_some(gram)
+}
+
+/// How well the mean face fits at a pose: its `match_`, `gain` and `pitch` are filled in.
+///
+/// The Cholesky factor of the Gram matrix holds the correlation of depth and relief with the rest taken out.
+fn judge(map: &DepthMap, reaches: &[(f32, f32)], pose: Pose, stride: usize) -> Option<Pose> {
+    let row = map.frame.pixels(pose.center).y.round();
+    let (right, left) = *reaches.get(row.max(0.0) as usize)?;
+    let width = (right + left) / pose.size;
+    if !(1.15..=3.4).contains(&width) {
+        return None;
+    }
+    let gram = gram(map, &pose, stride)?;
+    let mut factor = [[0.0f64; 5]; 5];
+    for i in 0..5 {
+        for j in 0..=i {
+            let sum: f64 = gram[i][j] - (0..j).map(|k| factor[i][k] * factor[j][k]).sum::<f64>();
+            factor[i][j] = match (i == j, factor[j][j] > 1e-9) {
+                (true, _) => sum.max(0.0).sqrt(),
+                (false, true) => sum / factor[j][j],
+                (false, false) => 0.0,
+            };
+        }
+    }
+    let (with, rest, own) = (factor[4][3], factor[4][4], factor[3][3]);
+    let total = (with * with + rest * rest).sqrt();
+    if total < 1e-6 || own < 1e-9 {
+        return None;
+    }
+    let (match_, gain) = ((with / total) as f32, (with / own) as f32);
+    // A relief much flatter or deeper than the mean's, a head much wider or narrower, or more on one side than on the
+    // other, is less likely a face.
+    let depth = if gain > 0.0 { 0.12 * ops::ln(gain).abs() } else { 1.0 };
+    let wide = 0.5 * (ops::ln(width / 1.9).abs() - 0.3).max(0.0);
+    let uneven = 0.5 * ((right - left).abs() / (right + left) - 0.1).max(0.0);
+    let tall = 0.3 * ops::ln(pose.tall).abs();
+    Some(Pose { match_, gain, worth: match_ - depth - wide - uneven - tall, ..pose })
+}
+
+/// The best place and size of a face whose plane of symmetry is at `middle`. `solid` tells what the head covers.
+pub(super) fn find_face(map: &DepthMap, solid: &[bool], middle: f32) -> Option<Pose> {
+    let frame = &map.frame;
+    let reaches = reaches(map, solid, middle);
+    let (bottom, top) = (frame.origin.y, frame.place(0, frame.height).y);
+    let extent = (frame.width.max(frame.height)) as f32 * frame.pixel;
+    let pose = |y: f32, size: f32, tall: f32| Pose { center: Vec2::new(middle, y), size, tall, ..Pose::default() };
+    let mut found: Vec<Pose> = Vec::new();
+    let mut size = extent * 0.08;
+    while size < extent * 0.65 {
+        let mut y = bottom + size * 0.6;
+        while y < top {
+            found.extend([0.8, 1.0].into_iter().filter_map(|tall| judge(map, &reaches, pose(y, size, tall), 2)));
+            y += (size * 0.08).max(frame.pixel);
+        }
+        size *= 1.1;
+    }
+    found.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+    found.truncate(4);
+    let refine = |start: Pose| {
+        let mut best = start;
+        for step in [0.04f32, 0.02, 0.01] {
+            for _ in 0..3 {
+                let from = best;
+                for (y, size, tall) in [
+                    (1.0, 0.0, 0.0),
+                    (-1.0, 0.0, 0.0),
+                    (0.0, 1.0, 0.0),
+                    (0.0, -1.0, 0.0),
+                    (0.0, 0.0, 1.0),
+                    (0.0, 0.0, -1.0),
+                    (0.0, 1.0, -1.0),
+                    (0.0, -1.0, 1.0),
+                    (1.0, 1.0, 0.0),
+                    (-1.0, -1.0, 0.0),
+                ] {
+                    let tall = (from.tall * (1.0 + step * tall)).clamp(0.65, 1.35);
+                    let next = pose(from.center.y + y * step * from.size, from.size * (1.0 + step * size), tall);
+                    if let Some(next) = judge(map, &reaches, next, 1)
+                        && next.worth > best.worth
+                    {
+                        best = next;
+                    }
+                }
+                if best == from {
+                    break;
+                }
+            }
+        }
+        best
+    };
+    let starts = found.into_iter().filter_map(|start| judge(map, &reaches, start, 1));
+    starts.map(refine).max_by(|a, b| a.worth.total_cmp(&b.worth))
+}
