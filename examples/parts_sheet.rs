@@ -6,24 +6,29 @@ use std::{collections::HashMap, error::Error, path::Path, sync::Arc};
 
 use bevy::math::{Quat, UVec2, Vec3};
 use rigsmith::{
-    algo::view::View,
+    algo::{view::View, weights::WeightSettings},
     build::Builder,
-    files::{RealDisk, load_template, save_atomic},
+    files::{RealDisk, load_model, load_template, save_atomic},
+    headless::Workbench,
     mesh::model::Trs,
     modules,
-    plugins::drawing::RigDrawing,
+    plugins::{drawing::RigDrawing, surface::RigMesh},
     render::{PictureSettings, take_picture},
-    rig::{BuiltNode, BuiltRig, JointData, PoseOffset, RestTransform, Rig, RigEdit, Uid},
+    rig::{
+        BuiltNode, BuiltRig, JointData, PoseOffset, RestTransform, Rig, RigEdit, RigJoint, Uid, operations::Operation,
+    },
     solve::program::{CompileOptions, RigProgram, RigState},
 };
 
 /// Width and height of one picture in pixels, and how many stand beside each other.
-const TILE: UVec2 = UVec2::new(480, 360);
-const COLUMNS: u32 = 3;
+const TILE: UVec2 = UVec2::new(360, 300);
+const COLUMNS: u32 = 4;
 
 /// One picture: a template, from where, and what is done to it.
 struct Picture {
     template: &'static str,
+    /// A bundled mesh that it moves.
+    mesh: Option<&'static str>,
     view: View,
     moves: &'static [Move],
 }
@@ -38,10 +43,21 @@ enum Move {
     Turn(&'static str, &'static str, [f32; 3]),
 }
 
-const PICTURES: [Picture; 9] = [
-    Picture { template: "quadruped", view: View::Orbit(50.0, 12.0), moves: &[] },
+const PICTURES: [Picture; 16] = [
+    Picture {
+        template: "biped",
+        mesh: Some("biped.obj"),
+        view: View::Orbit(25.0, 5.0),
+        moves: &[
+            Move::Shift("hand_l", "cube", [-0.05, 0.45, 0.12]),
+            Move::Shift("hand_r", "cube", [-0.02, -0.05, 0.2]),
+            Move::Shift("foot_l", "foot", [0.0, 0.16, 0.2]),
+            Move::Turn("head", "square", [0.0, 25.0, 0.0]),
+        ],
+    },
     Picture {
         template: "quadruped",
+        mesh: None,
         view: View::Orbit(50.0, 12.0),
         moves: &[
             Move::Shift("carpus_l", "cube", [0.0, 0.05, 0.10]),
@@ -55,25 +71,57 @@ const PICTURES: [Picture; 9] = [
         ],
     },
     Picture {
-        template: "parts/leg_3joint",
-        view: View::Left,
-        moves: &[Move::Shift("foot_l", "foot", [0.0, 0.12, 0.08])],
-    },
-    Picture { template: "bird", view: View::Orbit(25.0, 35.0), moves: &[] },
-    Picture {
         template: "bird",
+        mesh: None,
         view: View::Orbit(25.0, 35.0),
         moves: &[
             Move::Set("wing_1_l", "fold", 0.85),
-            Move::Set("wing_1_r", "fold", 0.85),
             Move::Shift("foot_l", "foot", [0.0, 0.06, 0.06]),
             Move::Set("beak", "open", 1.0),
         ],
     },
-    Picture { template: "parts/wing", view: View::Top, moves: &[Move::Set("wing_1_l", "fan", 1.0)] },
-    Picture { template: "parts/wing", view: View::Top, moves: &[Move::Set("wing_1_l", "fold", 0.6)] },
+    Picture {
+        template: "parts/arm",
+        mesh: None,
+        view: View::Front,
+        moves: &[Move::Shift("hand_l", "cube", [-0.12, 0.3, 0.15])],
+    },
+    Picture {
+        template: "parts/leg",
+        mesh: None,
+        view: View::Left,
+        moves: &[Move::Shift("foot_l", "foot", [0.0, 0.2, 0.15])],
+    },
+    Picture {
+        template: "parts/leg_3joint",
+        mesh: None,
+        view: View::Left,
+        moves: &[Move::Shift("foot_l", "foot", [0.0, 0.12, 0.08])],
+    },
+    Picture {
+        template: "parts/spine",
+        mesh: None,
+        view: View::Left,
+        moves: &[Move::Turn("spine", "circle", [20.0, 0.0, 0.0]), Move::Turn("spine_1", "circle", [20.0, 0.0, 0.0])],
+    },
+    Picture {
+        template: "parts/neck_head",
+        mesh: None,
+        view: View::Left,
+        moves: &[Move::Turn("neck", "circle", [20.0, 0.0, 0.0]), Move::Turn("head", "square", [-30.0, 0.0, 0.0])],
+    },
+    Picture { template: "parts/hand", mesh: None, view: View::Top, moves: &[Move::Set("hand_l", "spread", 1.0)] },
+    Picture {
+        template: "parts/hand",
+        mesh: None,
+        view: View::Orbit(-20.0, 35.0),
+        moves: &[Move::Set("hand_l", "curl", 0.7)],
+    },
+    Picture { template: "parts/wing", mesh: None, view: View::Top, moves: &[Move::Set("wing_1_l", "fan", 1.0)] },
+    Picture { template: "parts/wing", mesh: None, view: View::Top, moves: &[Move::Set("wing_1_l", "fold", 0.6)] },
     Picture {
         template: "parts/tail",
+        mesh: None,
         view: View::Left,
         moves: &[
             Move::Set("tail_1", "curve", 1.0),
@@ -81,7 +129,14 @@ const PICTURES: [Picture; 9] = [
             Move::Shift("tail_4", "diamond", [0.0, 0.0, -0.1]),
         ],
     },
-    Picture { template: "parts/jaw", view: View::Left, moves: &[Move::Set("jaw", "open", 1.0)] },
+    Picture {
+        template: "parts/ikfk_chain",
+        mesh: None,
+        view: View::Left,
+        moves: &[Move::Shift("chain_5", "cube", [0.0, 0.25, -0.3])],
+    },
+    Picture { template: "parts/jaw", mesh: None, view: View::Left, moves: &[Move::Set("jaw", "open", 1.0)] },
+    Picture { template: "parts/eye", mesh: None, view: View::Left, moves: &[Move::Set("eye", "blink", 1.0)] },
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -91,14 +146,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut sheet = image::RgbImage::new(COLUMNS * TILE.x, rows * TILE.y);
     for (number, picture) in (0..).zip(&PICTURES) {
         let template = load_template(&RealDisk, &root.join(format!("assets/templates/{}.rig.ron", picture.template)))?;
-        let rig = posed(&template.rig, picture.moves)?;
+        let posed = posed(&template.rig, picture.moves)?;
+        let (rig, meshes) = match picture.mesh {
+            Some(mesh) => dressed(template.rig, &posed, &root.join("assets/models").join(mesh))?,
+            None => (posed, Vec::new()),
+        };
         let settings = PictureSettings {
             size: TILE,
             view: picture.view,
             drawing: RigDrawing { grid: false, ..RigDrawing::default() },
             ..PictureSettings::default()
         };
-        let tile = take_picture(rig, Vec::new(), &settings)?.try_into_dynamic()?.to_rgb8();
+        let tile = take_picture(rig, meshes, &settings)?.try_into_dynamic()?.to_rgb8();
         let (x, y) = (number % COLUMNS * TILE.x, number / COLUMNS * TILE.y);
         image::imageops::replace(&mut sheet, &tile, i64::from(x), i64::from(y));
         println!("{}", picture.template);
@@ -108,6 +167,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     save_atomic(&RealDisk, &file, &bytes.into_inner())?;
     println!("wrote {}", file.display());
     Ok(())
+}
+
+/// A skinned rig in the pose in which another rests.
+fn dressed(rig: Rig, posed: &Rig, mesh: &Path) -> Result<(Rig, Vec<RigMesh>), Box<dyn Error>> {
+    let mut bench = Workbench::with_rig(1, rig);
+    bench.open(load_model(&RealDisk, mesh)?, true)?;
+    bench.skin(WeightSettings::default(), Vec::new(), &mut |_| {})?;
+    let offset = |joint: &RigJoint| {
+        let to = posed.joint(joint.data.uid)?.data.rest.into();
+        Some(RigEdit::SetOffset(joint.data.uid, Some(PoseOffset::between(&joint.data.rest, &to))))
+    };
+    let edits = bench.rig().walk().filter_map(offset).collect();
+    bench.operate(Operation::Edits(edits))?;
+    Ok((bench.rig().clone(), bench.mesh().cloned().into_iter().collect()))
 }
 
 /// A skeleton that rests as the template stands after some moves.

@@ -216,7 +216,12 @@ fn aim(world: &mut World, rig: Entity, camera: Entity, settings: &PictureSetting
     let bounds = match (world.get::<RigSurface>(rig), world.get::<Rig>(rig)) {
         (Some(surface), _) => surface.bounds(),
         (None, Some(rig)) if !rig.is_empty() => {
-            let places = rig.walk().map(|joint| rig.position(joint.data.uid));
+            // Bones of last joints reach about as far beyond them as those before.
+            let places = rig.walk().flat_map(|joint| {
+                let place = rig.position(joint.data.uid);
+                let above = joint.parent.filter(|_| joint.children.is_empty()).map(|parent| rig.position(parent));
+                [place, above.map_or(place, |above| place + 0.4 * (place - above))]
+            });
             places.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
         }
         _ => [Vec3::new(-0.5, 0.0, -0.5), Vec3::new(0.5, 1.0, 0.5)],
