@@ -13,19 +13,21 @@ use rigsmith::{
 };
 use serde_json::Value;
 
-struct Answer {
-    code: i32,
-    out: String,
-    err: String,
+/// What the binary said.
+pub struct Answer {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
 }
 
 impl Answer {
-    fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error} in {:?}", self.out))
     }
 }
 
-fn rigsmith(folder: &Path, args: &[&str]) -> Answer {
+/// Runs the binary, which must not panic.
+pub fn rigsmith(folder: &Path, args: &[&str]) -> Answer {
     let output = Command::new(env!("CARGO_BIN_EXE_rigsmith")).current_dir(folder).args(args).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     let answer = Answer { code: output.status.code().unwrap(), out: text(output.stdout), err: text(output.stderr) };

@@ -3,31 +3,11 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 use rigsmith::files::{RealDisk, load_model, load_template};
-use serde_json::Value;
 
-struct Answer {
-    code: i32,
-    out: String,
-    err: String,
-}
-
-impl Answer {
-    fn json(&self) -> Value {
-        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error} in {:?}", self.out))
-    }
-}
-
-fn rigsmith(folder: &Path, args: &[&str]) -> Answer {
-    let output = Command::new(env!("CARGO_BIN_EXE_rigsmith")).current_dir(folder).args(args).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    let answer = Answer { code: output.status.code().unwrap(), out: text(output.stdout), err: text(output.stderr) };
-    assert!(!answer.err.contains("panicked"), "{args:?} panicked: {}", answer.err);
-    answer
-}
+use crate::cli_build::rigsmith;
 
 fn head() -> String {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
