@@ -11,5 +11,6 @@ pub mod grouping;
 pub mod head_bones;
 pub mod head_part;
 pub mod landmarks;
+pub mod sections;
 pub mod shells;
 pub mod weights;

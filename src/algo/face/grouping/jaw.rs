@@ -1,0 +1,57 @@
+//! Where the face ends and the neck begins: the line of the jaw, seen from the side.
+
+use glam::{Vec2, Vec3};
+
+use super::profile;
+use crate::algo::face::landmarks::Landmarks;
+
+/// How far below the jaw's line still belongs to the face, as a share of the distance of the eyes: the line runs along
+/// the bone's edge, and landmarks that were found on a mesh are not exact.
+const MARGIN: f32 = 0.15;
+
+/// The jaw's line from ear to chin, as depth and height.
+pub struct Jaw {
+    /// By depth, hindmost first.
+    line: Vec<Vec2>,
+    margin: f32,
+    chin: f32,
+}
+
+impl Jaw {
+    /// The lower of the two sides, so that no landmark is left out where they differ.
+    pub fn new(landmarks: &Landmarks) -> Self {
+        let mut line: Vec<Vec2> = (0..=8)
+            .map(|index| {
+                let (right, left) = (profile(landmarks.points[index]), profile(landmarks.points[16 - index]));
+                Vec2::new((right.x + left.x) * 0.5, right.y.min(left.y))
+            })
+            .collect();
+        line.sort_by(|a, b| a.x.total_cmp(&b.x));
+        // Never falling towards the back, as a line of found landmarks may by mistake.
+        let mut lowest = f32::MAX;
+        for place in &mut line {
+            lowest = lowest.min(place.y);
+            place.y = lowest;
+        }
+        let margin = MARGIN * landmarks.eye_distance();
+        let chin = landmarks.points[6..=10].iter().map(|point| point.y).fold(f32::MAX, f32::min);
+        Self { line, margin, chin }
+    }
+
+    /// Height of the underside of the chin.
+    pub fn chin(&self) -> f32 {
+        self.chin
+    }
+
+    /// True if a point is not below the jaw.
+    pub fn above(&self, point: Vec3) -> bool {
+        let at = profile(point);
+        let next = self.line.partition_point(|place| place.x < at.x);
+        let height = match (next.checked_sub(1).and_then(|last| self.line.get(last)), self.line.get(next)) {
+            (Some(last), Some(next)) => last.lerp(*next, (at.x - last.x) / (next.x - last.x).max(f32::MIN_POSITIVE)).y,
+            (Some(end), None) | (None, Some(end)) => end.y,
+            (None, None) => f32::MIN,
+        };
+        at.y >= height - self.margin
+    }
+}
