@@ -11,7 +11,7 @@ mod surface;
 
 use glam::{Vec3, vec2, vec3};
 
-use self::{assemble::Measured, relief::Relief};
+use self::{assemble::Measured, relief::Relief, search::EyeHint};
 use super::{
     depth_map::{DepthFrame, DepthMap, NO_TRIANGLE},
     shells::{ShellKind, Shells},
@@ -85,18 +85,29 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     let coarse = DepthFrame::over(low.truncate(), high.truncate(), size.truncate().max_element() / 191.0, 192);
     let (coarse, solid) = front(coarse, points, triangles, |t| kind(t) != ShellKind::Inside);
     let exact = search::exact_mirror(points, low, high);
-    let middles = exact.map_or_else(
-        || {
-            let (center, width, step) = ((low.x + high.x) / 2.0, size.x, coarse.frame.pixel * 1.5);
+    let hint = eye_hint(points, shells);
+    let middles = match (exact, hint) {
+        (Some(middle), _) => vec![middle],
+        (None, Some(hint)) => vec![hint.center.x],
+        (None, None) => {
+            let (center, width, step) = ((low.x + high.x) / 2.0, size.x, coarse.frame.pixel * 2.0);
             let span = (center - 0.2 * width, center + 0.2 * width);
             search::mirror_axes(&coarse, span, step, 0.3 * width, (low.y, high.y), 0.1 * width, 3)
-        },
-        |middle| vec![middle],
-    );
-    let poses = middles.iter().filter_map(|&middle| search::find_face(&coarse, &solid, middle));
-    let pose = poses.max_by(|a, b| a.worth.total_cmp(&b.worth)).ok_or(LandmarkError::NoFront)?;
-    let middle = pose.center.x;
+        }
+    };
+    let find = |hint| {
+        let poses = middles.iter().filter_map(|&middle| search::find_face(&coarse, &solid, middle, hint));
+        poses.max_by(|a, b| a.worth.total_cmp(&b.worth))
+    };
+    let mut pose = find(hint).or_else(|| find(None)).ok_or(LandmarkError::NoFront)?;
     let (fine, _) = front(relief::close_up(&pose), points, triangles, |t| kind(t) != ShellKind::Inside);
+    if exact.is_none() {
+        let (x, y, d) = (pose.center.x, pose.center.y, pose.size);
+        let rows = (y - 1.0 * d * pose.tall, y + 0.35 * d);
+        let axes = search::mirror_axes(&fine, (x - 0.06 * d, x + 0.06 * d), 0.01 * d, 0.45 * d, rows, 0.06 * d, 1);
+        pose.center.x = axes.first().copied().unwrap_or(x);
+    }
+    let middle = pose.center.x;
     let eyeball = |t: u32| matches!(kind(t as usize), ShellKind::LeftEye | ShellKind::RightEye);
     let eyes = [-1.0, 1.0].map(|side| eyes::find_opening(&fine, &pose, side, eyeball));
     let measured = assemble::measure(&fine, &pose, &eyes, exact.is_some());
@@ -108,6 +119,18 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     let confidence =
         0.6 * ((pose.worth - 0.4) / 0.5).clamp(0.0, 1.0) + sure(measured.eyes) + sure(measured.lips && nose);
     Ok(Landmarks { points: found, middle, symmetric: exact.is_some(), confidence, mouth_open })
+}
+
+/// Where eyeballs that are loose parts say the face is: their centres lie 0.7 outer corner distances apart.
+fn eye_hint(points: &[Vec3], shells: &Shells) -> Option<EyeHint> {
+    let center = |wanted: ShellKind| {
+        let own = points.iter().enumerate().filter(|&(index, _)| shells.kind(index) == wanted);
+        let (low, high) =
+            own.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), (_, p)| (low.min(*p), high.max(*p)));
+        (low.x <= high.x).then(|| ((low + high) / 2.0).truncate())
+    };
+    let (left, right) = (center(ShellKind::LeftEye)?, center(ShellKind::RightEye)?);
+    Some(EyeHint { center: (left + right) / 2.0, size: (left.x - right.x).abs() / 0.7 })
 }
 
 /// Lays the normalised places onto the skin: those that the front view shows by their depth there, the rest at the

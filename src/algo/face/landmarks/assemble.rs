@@ -9,7 +9,7 @@ use super::{
     prior::{mean_landmarks, mirrored},
     profile::{Curve, Profile},
     relief::Relief,
-    search::Pose,
+    search::{Pose, fit_height},
 };
 
 /// What was measured on one head.
@@ -62,7 +62,10 @@ pub(super) fn measure(
         size = a.distance(c);
         center = vec2(pose.center.x, (a.y + b.y + c.y + d.y) / 4.0);
     }
-    let tall = pose.tall * pose.size / size;
+    let mut tall = pose.tall * pose.size / size;
+    if eyes.is_some() {
+        tall = fit_height(relief_map, &Pose { center, size, tall, ..*pose });
+    }
     let relief = Relief { map: relief_map, center, size };
     let profile = Curve::read(&relief).features(tall);
     let mean = mean_landmarks();
@@ -140,7 +143,10 @@ fn set_mouth(places: &mut [Vec3; 68], mean: &[Vec3; 68], profile: &Profile, ends
     let (mean_line, mean_top, mean_low) = (-0.768, mean[51].y, mean[57].y);
     let usual = |end: Option<(f32, f32)>| end.unwrap_or((-mean[48].x, line + mean[48].y - mean_line));
     let other = |own: Option<(f32, f32)>, other: Option<(f32, f32)>| usual(own.or(other));
-    let sides = [other(ends[0], ends[1]), other(ends[1], ends[0])];
+    let own = [other(ends[0], ends[1]), other(ends[1], ends[0])];
+    // Mouths are nearly even; what the two ends differ by is half noise.
+    let half = |a: f32, b: f32| 0.75 * a + 0.25 * b;
+    let sides = [0, 1].map(|i| (half(own[i].0, own[1 - i].0), half(own[i].1, own[1 - i].1)));
     for index in 48..68 {
         let place = mean[index];
         let (reach, height) = if place.x <= 0.0 { sides[0] } else { sides[1] };

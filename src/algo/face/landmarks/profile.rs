@@ -42,6 +42,8 @@ pub(super) struct Profile {
 /// Depths along the profile.
 pub(super) struct Curve {
     depths: Vec<f32>,
+    /// Columns beside the middle, for what runs across.
+    beside: Vec<Vec<f32>>,
 }
 
 impl Curve {
@@ -56,14 +58,30 @@ impl Curve {
             depths[i] = depths[seen] - 2.0 * STEP * (i - seen) as f32;
         }
         smooth(&mut depths, 2);
-        Self { depths }
+        let beside = [-0.12f32, -0.06, 0.06, 0.12].map(|u| {
+            let mut line = relief.line(vec2(u, TOP), vec2(0.0, -STEP), count);
+            smooth(&mut line, 2);
+            line
+        });
+        Self { depths, beside: beside.into() }
     }
 
     fn at(&self, v: f32) -> f32 {
-        let at = ((TOP - v) / STEP).clamp(0.0, (self.depths.len().max(2) - 2) as f32);
+        Self::on(&self.depths, v)
+    }
+
+    fn on(line: &[f32], v: f32) -> f32 {
+        let at = ((TOP - v) / STEP).clamp(0.0, (line.len().max(2) - 2) as f32);
         let (index, part) = (at.floor() as usize, at.fract());
-        let get = |i: usize| self.depths.get(i).copied().unwrap_or_default();
+        let get = |i: usize| line.get(i).copied().unwrap_or_default();
         get(index) * (1.0 - part) + get(index + 1) * part
+    }
+
+    /// How far a line lies behind short chords across the height `v`; a slit counts as a deep fold.
+    fn hollow(line: &[f32], v: f32, tall: f32) -> f32 {
+        let here = Self::on(line, v);
+        let chord = |reach: f32| 0.5 * (Self::on(line, v + reach * tall) + Self::on(line, v - reach * tall)) - here;
+        chord(0.03).max(chord(0.05)).min(0.05)
     }
 
     /// The height between `from` and `to` at which `worth` (of height and depth) is largest, to a fraction of a step.
@@ -98,22 +116,24 @@ impl Curve {
         let glabella = self.best(0.15 * t, 0.42 * t, |v, depth| depth - 0.3 * (v - 0.25 * t).abs());
         let nasion = self.off_line(glabella, tip, 1.0);
         let subnasale = self.off_line(tip, tip - 0.34 * t, 1.0);
-        // The lips' line is the deepest valley with lips above and below it.
-        let valley = |v: f32| {
-            let peak = |from: f32, to: f32| {
-                let count = 8;
-                (0..=count).map(|i| self.at(v + from + (to - from) * i as f32 / count as f32)).fold(f32::MIN, f32::max)
-            };
-            peak(0.02 * t, 0.12 * t).min(peak(-0.12 * t, -0.02 * t)) - self.at(v)
+        // The lips' line is the deepest fold that runs across, about where it usually is.
+        let across = |v: f32| {
+            let sides: f32 = self.beside.iter().map(|line| Self::hollow(line, v, t)).sum();
+            (Self::hollow(&self.depths, v, t) * 2.0 + sides) / (self.beside.len() + 2) as f32
         };
         let lips = self.best(subnasale - 0.12 * t, subnasale - 0.42 * t, |v, _| {
             let off = (v - (subnasale - 0.25 * t)) / t;
-            valley(v) - 0.6 * off * off
+            across(v) - 0.6 * off * off
         });
-        let slit = valley(lips);
+        let lips = self.best(lips + 0.02, lips - 0.02, |v, depth| 2.0 * Self::hollow(&self.depths, v, t) - depth);
+        let slit = Self::hollow(&self.depths, lips, t);
         let upper_lip = self.best(lips + 0.02 * t, lips + 0.15 * t, |_, depth| depth);
-        let lower_lip = self.best(lips - 0.02 * t, lips - 0.15 * t, |_, depth| depth);
-        let floor = self.at(upper_lip).min(self.at(lower_lip));
+        let mut lower_lip = self.best(lips - 0.02 * t, lips - 0.15 * t, |_, depth| depth);
+        if lower_lip > lips - 0.03 * t {
+            // A lip that lies far behind the upper one is no maximum.
+            lower_lip = self.off_line(lips, lips - 0.17 * t, -1.0);
+        }
+        let floor = self.at(upper_lip).min(self.at(lower_lip)).min(self.at(lips + 0.05 * t));
         let edge = |toward: f32| {
             let deep = floor - 0.06;
             let mut v = lips;

@@ -148,17 +148,9 @@ fn gram(map: &DepthMap, pose: &Pose, stride: usize) -> Option<[[f64; 5]; 5]> {
     (seen * 10 >= asked * 8).then_some(gram)
 }
 
-/// How well the mean face fits at a pose: its `match_`, `gain` and `pitch` are filled in.
-///
-/// The Cholesky factor of the Gram matrix holds the correlation of depth and relief with the rest taken out.
-fn judge(map: &DepthMap, reaches: &[(f32, f32)], pose: Pose, stride: usize) -> Option<Pose> {
-    let row = map.frame.pixels(pose.center).y.round();
-    let (right, left) = *reaches.get(row.max(0.0) as usize)?;
-    let width = (right + left) / pose.size;
-    if !(1.15..=3.4).contains(&width) {
-        return None;
-    }
-    let gram = gram(map, &pose, stride)?;
+/// How well depth and relief go together with offset, pitch and bend taken out (partial correlation), and how much
+/// deeper the depths are, from a Gram matrix: its Cholesky factor holds both.
+fn correlation(gram: &[[f64; 5]; 5]) -> Option<(f32, f32)> {
     let mut factor = [[0.0f64; 5]; 5];
     for i in 0..5 {
         for j in 0..=i {
@@ -172,10 +164,18 @@ fn judge(map: &DepthMap, reaches: &[(f32, f32)], pose: Pose, stride: usize) -> O
     }
     let (with, rest, own) = (factor[4][3], factor[4][4], factor[3][3]);
     let total = (with * with + rest * rest).sqrt();
-    if total < 1e-6 || own < 1e-9 {
+    (total > 1e-6 && own > 1e-9).then(|| ((with / total) as f32, (with / own) as f32))
+}
+
+/// How well the mean face fits at a pose: its `match_`, `gain` and `worth` are filled in.
+fn judge(map: &DepthMap, reaches: &[(f32, f32)], pose: Pose, stride: usize) -> Option<Pose> {
+    let row = map.frame.pixels(pose.center).y.round();
+    let (right, left) = *reaches.get(row.max(0.0) as usize)?;
+    let width = (right + left) / pose.size;
+    if !(1.15..=3.4).contains(&width) {
         return None;
     }
-    let (match_, gain) = ((with / total) as f32, (with / own) as f32);
+    let (match_, gain) = correlation(&gram(map, &pose, stride)?)?;
     // A relief much flatter or deeper than the mean's, a head much wider or narrower, or more on one side than on the
     // other, is less likely a face.
     let depth = if gain > 0.0 { 0.12 * ops::ln(gain).abs() } else { 1.0 };
@@ -185,18 +185,41 @@ fn judge(map: &DepthMap, reaches: &[(f32, f32)], pose: Pose, stride: usize) -> O
     Some(Pose { match_, gain, worth: match_ - depth - wide - uneven - tall, ..pose })
 }
 
-/// The best place and size of a face whose plane of symmetry is at `middle`. `solid` tells what the head covers.
-pub(super) fn find_face(map: &DepthMap, solid: &[bool], middle: f32) -> Option<Pose> {
+/// How tall a face is for its width once its eyes are known.
+pub(super) fn fit_height(map: &DepthMap, pose: &Pose) -> f32 {
+    let worth = |tall: f32| {
+        let (match_, _) = correlation(&gram(map, &Pose { tall, ..*pose }, 1)?)?;
+        Some((match_ - 0.1 * ops::ln(tall).abs(), tall))
+    };
+    let steps = (0..=30).filter_map(|i| worth(0.65 + 0.7 * i as f32 / 30.0));
+    steps.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(pose.tall, |(_, tall)| tall)
+}
+
+/// What eyeballs that are loose parts tell of a face's place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct EyeHint {
+    /// Half way between their centres.
+    pub center: Vec2,
+    /// The distance of outer eye corners that belongs to their distance.
+    pub size: f32,
+}
+
+/// The best place and size of a face whose plane of symmetry is at `middle`. `solid` tells what the head
+/// covers.
+pub(super) fn find_face(map: &DepthMap, solid: &[bool], middle: f32, hint: Option<EyeHint>) -> Option<Pose> {
     let frame = &map.frame;
     let reaches = reaches(map, solid, middle);
     let (bottom, top) = (frame.origin.y, frame.place(0, frame.height).y);
     let extent = (frame.width.max(frame.height)) as f32 * frame.pixel;
     let pose = |y: f32, size: f32, tall: f32| Pose { center: Vec2::new(middle, y), size, tall, ..Pose::default() };
     let mut found: Vec<Pose> = Vec::new();
-    let mut size = extent * 0.08;
-    while size < extent * 0.65 {
-        let mut y = bottom + size * 0.6;
-        while y < top {
+    let sizes = hint.map_or((0.08 * extent, 0.65 * extent), |hint| (0.8 * hint.size, 1.25 * hint.size));
+    let mut size = sizes.0;
+    while size < sizes.1 {
+        let heights =
+            hint.map_or((bottom + 0.6 * size, top), |hint| (hint.center.y - 0.1 * size, hint.center.y + 0.1 * size));
+        let mut y = heights.0;
+        while y < heights.1 {
             found.extend([0.8, 1.0].into_iter().filter_map(|tall| judge(map, &reaches, pose(y, size, tall), 2)));
             y += (size * 0.08).max(frame.pixel);
         }
