@@ -19,7 +19,7 @@ mod boxes;
 mod dense;
 mod engine;
 mod history;
-mod kd;
+pub(super) mod kd;
 mod line;
 mod moments;
 mod pair;

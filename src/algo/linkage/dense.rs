@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::{LinkageError, engine::Cluster, history::History, pair::Points};
+use super::{LinkageError, engine::Cluster, history::History, moments::Tree, pair::Points};
 
 /// How many clusters the matrix is filled for.
 pub(super) fn clusters(points: usize) -> usize {
-    std::env::var("DENSE").ok().and_then(|v| v.parse().ok()).unwrap_or(768).min(points)
+    LAST.min(points)
 }
 
 /// What is left of a cluster.
@@ -19,6 +19,8 @@ struct Row {
     distance: f64,
 }
 
+/// So many clusters have few enough distances for a matrix, and are small enough for sums before.
+const LAST: usize = 384;
 const NONE: u32 = u32::MAX;
 /// Fewer distances than this are compared on one thread.
 const ALONE: usize = 1 << 15;
@@ -47,6 +49,25 @@ pub(super) fn finish(
     Ok(())
 }
 
+/// Cuts each cluster into blocks, and puts the points in their order.
+fn plant(clusters: &[Cluster], points: &Points) -> (Vec<Tree>, Points) {
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    let mut parts: Vec<&mut [u32]> = Vec::with_capacity(clusters.len());
+    let mut rest = order.as_mut_slice();
+    for cluster in clusters {
+        let (part, next) = std::mem::take(&mut rest).split_at_mut(cluster.span.size as usize);
+        parts.push(part);
+        rest = next;
+    }
+    let trees =
+        clusters.par_iter().zip(parts).map(|(cluster, part)| Tree::new(points, cluster.span, part)).collect();
+    let mut sorted = Points::with_capacity(points.len());
+    for &at in &order {
+        sorted.push(points.at(at as usize));
+    }
+    (trees, sorted)
+}
+
 impl Matrix {
     fn fill(clusters: &[Cluster], points: &Points) -> Self {
         let stride = clusters.len();
@@ -55,10 +76,12 @@ impl Matrix {
             .map(|cluster| Row { node: cluster.node, size: cluster.span.size, nearest: NONE, distance: f64::INFINITY })
             .collect();
         let mut cells = vec![f64::INFINITY; stride * stride];
-        cells.par_chunks_mut(stride).enumerate().for_each(|(at, row)| {
+        let (trees, points) = plant(clusters, points);
+        // Rows get longer, so a run of rows is taken from either end.
+        cells.par_chunks_mut(stride).enumerate().with_max_len(4).for_each(|(at, row)| {
             for (to, cell) in row[..at].iter_mut().enumerate() {
-                let (a, b) = (clusters[to].span, clusters[at].span);
-                *cell = points.sum(a, b) / (f64::from(a.size) * f64::from(b.size));
+                let count = f64::from(clusters[to].span.size) * f64::from(clusters[at].span.size);
+                *cell = trees[to].sum(&trees[at], &points) / count;
             }
         });
         for at in 0..stride {

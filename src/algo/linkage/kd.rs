@@ -4,9 +4,9 @@ use rayon::join;
 
 /// A place and whose it is.
 #[derive(Clone, Copy)]
-pub(super) struct Site {
-    pub(super) at: [f32; 3],
-    pub(super) index: u32,
+pub(crate) struct Site {
+    pub(crate) at: [f32; 3],
+    pub(crate) index: u32,
 }
 
 /// How many sites a leaf has, whose order does not matter.
@@ -15,7 +15,7 @@ const LEAF: usize = 8;
 const ALONE: usize = 2048;
 
 /// Orders sites so that each aligned block of 8, 16, 32... is a box of its own, split across its longest side.
-pub(super) fn order(sites: &mut [Site]) {
+pub(crate) fn order(sites: &mut [Site]) {
     if sites.len() <= LEAF {
         return;
     }

@@ -11,7 +11,7 @@ pub(super) struct Points {
 }
 
 /// Where a cluster's points are.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Span {
     pub(super) start: u32,
     pub(super) size: u32,

@@ -1,0 +1,271 @@
+//! Rounds: points to their nearest centroid, centroids to their points' mean.
+
+use rayon::prelude::*;
+use wide::{CmpLt, f32x8};
+
+use super::{
+    KMeansError,
+    seeds::square_distance,
+    space::{BLOCK, Place, Space, Sum},
+};
+
+/// What a start came to.
+pub(super) struct State {
+    pub(super) centroids: Vec<Place>,
+    /// In the order of the space's points.
+    pub(super) labels: Vec<u32>,
+    pub(super) square_error: f64,
+    pub(super) rounds: usize,
+}
+
+/// Bounds are wider than they are computed by this, in units: all places are within one, so this is far more than what
+/// roots, sums and differences in single precision are rounded by.
+const SLACK: f32 = 4e-6;
+/// A block before its first round.
+const NEVER: f64 = f64::NEG_INFINITY;
+/// Blocks are handed out in runs of so many.
+const RUN: usize = 16;
+
+/// Eight centroids; lanes without one are at infinity.
+struct Eight {
+    x: f32x8,
+    y: f32x8,
+    z: f32x8,
+}
+
+struct Centroids {
+    eights: Vec<Eight>,
+    places: Vec<Place>,
+}
+
+/// How far centroids have gone since the start: each one, and the sum of each round's furthest.
+struct Gone {
+    each: Vec<f32>,
+    most: f64,
+}
+
+/// A block's points: where they belong and what is known about them.
+struct Bounds<'a> {
+    labels: &'a mut [u32],
+    /// The largest distance to the own centroid, less the way it had gone.
+    own: &'a mut [f32],
+    /// The least distance to any other centroid, and the sum of the furthest ways on top.
+    others: &'a mut [f32],
+    /// Nothing changes here until the sum of the furthest ways is this.
+    holds: &'a mut f64,
+}
+
+/// A point that went from one group to another; [`NOWHERE`] before the first round.
+type Change = (u32, u32, u32);
+const NOWHERE: u32 = u32::MAX;
+
+/// Runs until no point changes its group.
+pub(super) fn run<const BOUNDS: bool>(
+    space: &Space,
+    seeds: Vec<Place>,
+    max_rounds: usize,
+    report: &dyn Fn(usize) -> Result<(), KMeansError>,
+) -> Result<State, KMeansError> {
+    let count = space.points.len();
+    let mut centroids = Centroids::new(seeds);
+    let groups = centroids.places.len();
+    let mut labels = vec![NOWHERE; count];
+    let mut own = vec![0.0; count];
+    let mut others = vec![0.0; count];
+    let mut holds = vec![NEVER; space.boxes.len()];
+    let mut sums = vec![Sum::default(); groups];
+    let mut gone = Gone { each: vec![0.0; groups], most: 0.0 };
+    let mut rounds = 0;
+    loop {
+        let blocks = space
+            .points
+            .par_chunks(BLOCK)
+            .zip(labels.par_chunks_mut(BLOCK))
+            .zip(own.par_chunks_mut(BLOCK))
+            .zip(others.par_chunks_mut(BLOCK))
+            .zip(holds.par_iter_mut())
+            .enumerate()
+            .with_min_len(RUN);
+        let changes: Vec<Change> = blocks
+            .fold(Vec::new, |mut changes, (block, ((((points, labels), own), others), holds))| {
+                let mut bounds = Bounds { labels, own, others, holds };
+                if !BOUNDS || gone.most >= *bounds.holds {
+                    bounds.settle::<BOUNDS>(block * BLOCK, points, &centroids, &gone, &mut changes);
+                }
+                changes
+            })
+            .reduce(Vec::new, |mut all, more| {
+                all.extend(more);
+                all
+            });
+        for &(at, from, to) in &changes {
+            let place = space.points[at as usize];
+            if from != NOWHERE {
+                sums[from as usize].add(place, -1);
+            }
+            sums[to as usize].add(place, 1);
+        }
+        if changes.is_empty() || rounds >= max_rounds {
+            break;
+        }
+        rounds += 1;
+        report(rounds)?;
+        let fixed = space.fixed.len();
+        let mut moved: Vec<Place> = centroids.places.clone();
+        let mut empty = Vec::new();
+        for (group, sum) in sums.iter().enumerate().skip(fixed) {
+            if sum.count > 0 {
+                moved[group] = sum.mean();
+            } else {
+                empty.push(group);
+            }
+        }
+        if !empty.is_empty() {
+            refill(space, &centroids, &labels, &sums, &empty, &mut moved);
+        }
+        let mut furthest = 0.0_f32;
+        for ((gone, from), to) in gone.each.iter_mut().zip(&centroids.places).zip(&moved) {
+            let way = square_distance(*from, *to).sqrt() * (1.0 + 1e-6);
+            *gone += way;
+            furthest = furthest.max(way);
+        }
+        gone.most += f64::from(furthest);
+        // The sums of ways lose digits as they grow, which the slack no longer covers: begin the bounds anew.
+        if gone.most > 16.0 {
+            gone = Gone { each: vec![0.0; groups], most: 0.0 };
+            holds.fill(NEVER);
+            others.fill(f32::NEG_INFINITY);
+        }
+        centroids = Centroids::new(moved);
+    }
+    let blocks: Vec<f64> = space
+        .points
+        .par_chunks(BLOCK)
+        .zip(labels.par_chunks(BLOCK))
+        .map(|(points, labels)| {
+            let square = |(point, label): (&Place, &u32)| exact_square(*point, centroids.places[*label as usize]);
+            points.iter().zip(labels).map(square).sum()
+        })
+        .collect();
+    Ok(State { centroids: centroids.places, labels, square_error: blocks.iter().sum(), rounds })
+}
+
+/// Puts each group without points at a point that is furthest from its centroid (of equal ones the first).
+fn refill(space: &Space, centroids: &Centroids, labels: &[u32], sums: &[Sum], empty: &[usize], moved: &mut [Place]) {
+    let mut far: Vec<(f32, u32)> = space
+        .points
+        .iter()
+        .zip(labels)
+        .enumerate()
+        .filter(|(_, (_, label))| sums[**label as usize].count > 1)
+        .map(|(at, (point, label))| (square_distance(*point, centroids.places[*label as usize]), at as u32))
+        .collect();
+    far.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(space.index[a.1 as usize].cmp(&space.index[b.1 as usize])));
+    let mut taken: Vec<Place> = Vec::new();
+    let mut far = far.into_iter().map(|(_, at)| space.points[at as usize]);
+    for &group in empty {
+        if let Some(place) = far.find(|place| !taken.contains(place)) {
+            moved[group] = place;
+            taken.push(place);
+        }
+    }
+}
+
+fn exact_square(a: Place, b: Place) -> f64 {
+    let apart = |axis: usize| f64::from(a[axis]) - f64::from(b[axis]);
+    apart(0) * apart(0) + apart(1) * apart(1) + apart(2) * apart(2)
+}
+
+impl Bounds<'_> {
+    /// Finds the nearest centroid of each point for which the bounds leave a doubt.
+    fn settle<const BOUNDS: bool>(
+        &mut self,
+        start: usize,
+        points: &[Place],
+        centroids: &Centroids,
+        gone: &Gone,
+        changes: &mut Vec<Change>,
+    ) {
+        let most = gone.most as f32;
+        let mut room = f32::INFINITY;
+        for (at, point) in points.iter().enumerate() {
+            let label = self.labels[at];
+            if BOUNDS && label != NOWHERE {
+                let least = self.others[at] - most - SLACK;
+                let way = gone.each[label as usize];
+                let margin = least - (self.own[at] + way);
+                if margin > 0.0 {
+                    room = room.min(margin);
+                    continue;
+                }
+                let distance = square_distance(*point, centroids.places[label as usize]).sqrt();
+                if distance + SLACK < least {
+                    self.own[at] = distance + SLACK - way;
+                    room = room.min(least - (distance + SLACK));
+                    continue;
+                }
+            }
+            let (nearest, square, second) = centroids.nearest(*point);
+            let (distance, other) = (square.sqrt() + SLACK, second.sqrt());
+            self.own[at] = distance - gone.each[nearest as usize];
+            self.others[at] = other + most;
+            room = room.min(other - SLACK - distance);
+            if nearest != label {
+                changes.push(((start + at) as u32, label, nearest));
+                self.labels[at] = nearest;
+            }
+        }
+        // Both bounds come nearer by no more than the furthest way.
+        *self.holds = gone.most + f64::from((room - SLACK).max(0.0)) * 0.5;
+    }
+}
+
+impl Centroids {
+    fn new(places: Vec<Place>) -> Self {
+        let eights = places
+            .chunks(8)
+            .map(|chunk| {
+                let lanes = |axis: usize| {
+                    let mut lanes = [f32::INFINITY; 8];
+                    for (lane, place) in lanes.iter_mut().zip(chunk) {
+                        *lane = place[axis];
+                    }
+                    f32x8::new(lanes)
+                };
+                Eight { x: lanes(0), y: lanes(1), z: lanes(2) }
+            })
+            .collect();
+        Self { eights, places }
+    }
+
+    /// The nearest centroid (of equally near ones the first), its squared distance, and that of the second nearest.
+    fn nearest(&self, point: Place) -> (u32, f32, f32) {
+        let [x, y, z] = point.map(f32x8::splat);
+        let mut least = f32x8::splat(f32::INFINITY);
+        let mut second = least;
+        // Exact in single precision up to 2^24 eights.
+        let mut which = f32x8::ZERO;
+        for (at, eight) in self.eights.iter().enumerate() {
+            let (dx, dy, dz) = (eight.x - x, eight.y - y, eight.z - z);
+            let square = dx * dx + dy * dy + dz * dz;
+            let closer = square.cmp_lt(least);
+            second = second.min(square.max(least));
+            least = least.min(square);
+            which = closer.blend(f32x8::splat(at as f32), which);
+        }
+        let (least, which, second) = (least.to_array(), which.to_array(), second.to_array());
+        let mut best = (f32::INFINITY, u32::MAX);
+        let mut next = f32::INFINITY;
+        for lane in 0..8 {
+            let group = (which[lane] as u32) * 8 + lane as u32;
+            next = next.min(second[lane]);
+            if least[lane] < best.0 || (least[lane] == best.0 && group < best.1) {
+                next = next.min(best.0);
+                best = (least[lane], group);
+            } else {
+                next = next.min(least[lane]);
+            }
+        }
+        (best.1, best.0, next)
+    }
+}
