@@ -89,29 +89,26 @@ impl DepthMap {
         if high.x < 0.0 || high.y < 0.0 || low.x > limit.x || low.y > limit.y {
             return;
         }
+        // Whole numbers by truncation: all are positive after clamping. Most triangles of a fine mesh cover no centre.
+        let (low, high) = (low.max(Vec2::ZERO), high.min(limit));
+        let up = |x: f32| x as usize + usize::from(x > (x as usize) as f32);
+        let (columns, rows) = (up(low.x)..high.x as usize + 1, up(low.y)..high.y as usize + 1);
         let area = (pb - pa).perp_dot(pc - pa);
-        if area.abs() < 1e-12 {
+        if columns.is_empty() || rows.is_empty() || area.abs() < 1e-12 {
             return;
         }
         let inverse = 1.0 / area;
-        let (first, last) = (low.max(Vec2::ZERO).ceil(), high.min(limit).floor());
         // A little over the edge, so that no ray slips between two neighbours.
         let slack = -1e-5;
         // The weights are linear in x, so each row needs them once.
         let step_b = (pc.y - pa.y) * inverse;
         let step_c = -(pb.y - pa.y) * inverse;
-        for row in first.y as usize..=last.y.max(0.0) as usize {
-            if (row as f32) > last.y {
-                break;
-            }
-            let from = Vec2::new(first.x, row as f32) - pa;
+        for row in rows {
+            let from = Vec2::new(columns.start as f32, row as f32) - pa;
             let mut weight_b = from.perp_dot(pc - pa) * inverse;
             let mut weight_c = (pb - pa).perp_dot(from) * inverse;
             let start = row * self.frame.width;
-            for column in first.x as usize..=last.x.max(0.0) as usize {
-                if (column as f32) > last.x {
-                    break;
-                }
+            for column in columns.clone() {
                 let weight_a = 1.0 - weight_b - weight_c;
                 if weight_a >= slack && weight_b >= slack && weight_c >= slack {
                     let z = a.z * weight_a + b.z * weight_b + c.z * weight_c;
@@ -141,8 +138,9 @@ impl DepthMap {
         if !(at.x > -1.0 && at.y > -1.0 && at.x < self.frame.width as f32 && at.y < self.frame.height as f32) {
             return None;
         }
-        let corner = at.floor();
-        let part = at - corner;
+        // One more and one less, so that truncation rounds down.
+        let (column, row) = ((at.x + 1.0) as i64 - 1, (at.y + 1.0) as i64 - 1);
+        let part = at - Vec2::new(column as f32, row as f32);
         let (mut sum, mut weight) = (0.0, 0.0);
         for (dx, dy, share) in [
             (0, 0, (1.0 - part.x) * (1.0 - part.y)),
@@ -150,7 +148,7 @@ impl DepthMap {
             (0, 1, (1.0 - part.x) * part.y),
             (1, 1, part.x * part.y),
         ] {
-            let (column, row) = (corner.x as i64 + dx, corner.y as i64 + dy);
+            let (column, row) = (column + dx, row + dy);
             if column < 0 || row < 0 {
                 continue;
             }

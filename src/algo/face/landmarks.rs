@@ -111,8 +111,16 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     let eyeball = |t: u32| matches!(kind(t as usize), ShellKind::LeftEye | ShellKind::RightEye);
     let eyes = [-1.0, 1.0].map(|side| eyes::find_opening(&fine, &pose, side, eyeball));
     let measured = assemble::measure(&fine, &pose, &eyes, exact.is_some());
-    let skin = front(fine.frame, points, triangles, |t| kind(t) == ShellKind::Skin).0;
-    let found = lay(&measured, &skin, points, triangles, |point| shells.kind(point) == ShellKind::Skin, exact);
+    let eyeballs = shells.kinds.iter().any(|kind| matches!(kind, ShellKind::LeftEye | ShellKind::RightEye));
+    let skin = eyeballs.then(|| front(fine.frame, points, triangles, |t| kind(t) == ShellKind::Skin).0);
+    let found = lay(
+        &measured,
+        skin.as_ref().unwrap_or(&fine),
+        points,
+        triangles,
+        |point| shells.kind(point) == ShellKind::Skin,
+        exact,
+    );
     let mouth_open = opens(&measured, points, triangles, |t| kind(t) == ShellKind::Skin);
     let sure = |yes: bool| if yes { 0.2 } else { 0.0 };
     let nose = measured.profile.nose > 0.08;
@@ -152,6 +160,7 @@ fn lay(
         .collect();
     offsets.sort_by(f32::total_cmp);
     let offset = offsets.get(offsets.len() / 2).copied().unwrap_or_default();
+    let mut snapped = Vec::new();
     let mut laid: [Vec3; 68] = std::array::from_fn(|index| {
         let place = places[index];
         let seen = match index {
@@ -163,15 +172,29 @@ fn lay(
             65..=67 => relief.at(place.x, place.y - 0.004).map(|depth| depth - 0.02),
             _ => relief.at(place.x, place.y),
         };
-        let depth = seen.filter(|depth| (depth - offset - place.z).abs() < 0.35).unwrap_or(place.z + offset);
-        relief.place(place.x, place.y, depth)
+        let seen = seen.filter(|depth| (depth - offset - place.z).abs() < 0.35);
+        let front = matches!(index, 7..=9 | 17..=35 | 48..=60 | 64);
+        // On a head that is the same on both sides, one side is enough.
+        if !(front && seen.is_some()) && (exact.is_none() || index <= prior::mirrored(index)) {
+            snapped.push(index);
+        }
+        relief.place(place.x, place.y, seen.unwrap_or(place.z + offset))
     });
-    let snapped = surface::snap(&laid, points, triangles, is_skin);
-    let flip = |p: Vec3| exact.map_or(p, |middle| vec3(2.0 * middle - p.x, p.y, p.z));
-    for (index, point) in snapped.iter().enumerate() {
-        let other = prior::mirrored(index);
-        // On a head that is the same on both sides, so are the landmarks.
-        laid[index] = if exact.is_some() && other < index { flip(laid[other]) } else { *point };
+    let targets: Vec<Vec3> = snapped.iter().map(|&index| laid[index]).collect();
+    let closest = surface::snap(&targets, points, triangles, is_skin);
+    for (index, point) in snapped.into_iter().zip(closest) {
+        laid[index] = point;
+    }
+    if let Some(middle) = exact {
+        for index in 0..68 {
+            let (point, other) = (laid[index], prior::mirrored(index));
+            if other >= index {
+                laid[other] = vec3(2.0 * middle - point.x, point.y, point.z);
+            }
+            if other == index {
+                laid[index].x = middle;
+            }
+        }
     }
     laid
 }
@@ -187,7 +210,7 @@ fn opens(measured: &Measured, points: &[Vec3], triangles: &[[u32; 3]], skin: imp
             .first()
             .is_some_and(|first| depths.iter().any(|depth| (0.005..0.45).contains(&((first - depth) / measured.size))))
     });
-    behind.count() >= 2 || measured.profile.slit > 0.12
+    behind.count() >= 2 || measured.profile.upper_edge - measured.profile.lower_edge > 0.015
 }
 
 /// The map of what faces the viewer, the far wall seen through a hole left out, and what is covered with it.

@@ -94,7 +94,7 @@ pub(super) fn measure(
             set_eye(&mut places, eye, side, center, size);
         }
     }
-    let line = profile.upper_edge;
+    let line = (profile.upper_edge + profile.lower_edge) / 2.0;
     let ends = [-1.0, 1.0].map(|side| {
         mouth::lip_corner(&relief, side, line, tall)
             .filter(|end| (0.16..0.45).contains(&end.0) && (end.1 - line).abs() < 0.12)
@@ -138,8 +138,8 @@ fn set_eye(places: &mut [Vec3; 68], eye: &EyeOpening, side: usize, center: Vec2,
 
 fn set_mouth(places: &mut [Vec3; 68], mean: &[Vec3; 68], profile: &Profile, ends: [Option<(f32, f32)>; 2], chin: f32) {
     let line = (profile.upper_edge + profile.lower_edge) / 2.0;
-    let top = profile.subnasale + (line - profile.subnasale) * 0.615;
-    let low = 0.5 * (profile.lower_lip - 0.037) + 0.5 * (line + 0.227 * (chin - line));
+    let top = profile.subnasale + (profile.upper_edge - profile.subnasale) * 0.615;
+    let low = 0.5 * (profile.lower_lip - 0.037) + 0.5 * (profile.lower_edge + 0.227 * (chin - profile.lower_edge));
     let (mean_line, mean_top, mean_low) = (-0.768, mean[51].y, mean[57].y);
     let usual = |end: Option<(f32, f32)>| end.unwrap_or((-mean[48].x, line + mean[48].y - mean_line));
     let other = |own: Option<(f32, f32)>, other: Option<(f32, f32)>| usual(own.or(other));
@@ -157,8 +157,8 @@ fn set_mouth(places: &mut [Vec3; 68], mean: &[Vec3; 68], profile: &Profile, ends
         let scale =
             if above > 0.0 { (top - line) / (mean_top - mean_line) } else { (low - line) / (mean_low - mean_line) };
         let gap = match index {
-            61..=63 => profile.upper_edge - line + 0.006,
-            65..=67 => profile.lower_edge - line - 0.006,
+            61..=63 => (profile.upper_edge - line) * (1.0 - bend) + 0.006,
+            65..=67 => (profile.lower_edge - line) * (1.0 - bend) - 0.006,
             _ => above * scale,
         };
         places[index].x = part * reach;

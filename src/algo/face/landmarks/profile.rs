@@ -54,6 +54,12 @@ impl Curve {
         let mut depths: Vec<f32> = (0..count).map(|i| lines.iter().map(|line| line[i]).sum::<f32>() / 3.0).collect();
         // Below the last thing seen it falls away, so that a cut neck looks like one that recedes.
         let seen = (0..count).rposition(|i| relief.at(0.0, TOP - i as f32 * STEP).is_some()).unwrap_or(0);
+        for i in 0..seen {
+            // Between open lips there may be nothing at all.
+            if relief.at(0.0, TOP - i as f32 * STEP).is_none() {
+                depths[i] -= 0.1;
+            }
+        }
         for i in seen + 1..count {
             depths[i] = depths[seen] - 2.0 * STEP * (i - seen) as f32;
         }
@@ -109,6 +115,39 @@ impl Curve {
         self.best(from, to, |v, depth| side * (a + slope * (v - from) - depth))
     }
 
+    /// The edges of open lips, upper and lower: the tallest stretch below the nose that lies far behind what is above
+    /// and below it.
+    fn gap(&self, subnasale: f32, tall: f32) -> Option<(f32, f32)> {
+        let (start, count) = (subnasale - 0.08 * tall, (0.75 * tall / STEP) as usize);
+        let line: Vec<f32> = (0..count).map(|i| self.at(start - i as f32 * STEP)).collect();
+        let highest = |line: &mut dyn Iterator<Item = f32>| {
+            let mut most = f32::NEG_INFINITY;
+            line.map(|depth| {
+                most = most.max(depth);
+                most
+            })
+            .collect::<Vec<f32>>()
+        };
+        let above = highest(&mut line.iter().copied());
+        let mut below = highest(&mut line.iter().rev().copied());
+        below.reverse();
+        let open = |i: usize| above[i].min(below[i]) - line[i] > 0.09;
+        let (mut best, mut from) = ((0, 0), None);
+        for i in 0..count {
+            match (open(i), from) {
+                (true, None) => from = Some(i),
+                (false, Some(start)) => {
+                    if i - start > best.1 - best.0 {
+                        best = (start, i);
+                    }
+                    from = None;
+                }
+                _ => {}
+            }
+        }
+        (best.1 > best.0 + 1).then(|| (start - (best.0 as f32 - 0.5) * STEP, start - (best.1 as f32 - 0.5) * STEP))
+    }
+
     /// Finds the features; `tall` is how tall the face is for its width.
     pub fn features(&self, tall: f32) -> Profile {
         let t = tall;
@@ -127,22 +166,13 @@ impl Curve {
         });
         let lips = self.best(lips + 0.02, lips - 0.02, |v, depth| 2.0 * Self::hollow(&self.depths, v, t) - depth);
         let slit = Self::hollow(&self.depths, lips, t);
-        let upper_lip = self.best(lips + 0.02 * t, lips + 0.15 * t, |_, depth| depth);
-        let mut lower_lip = self.best(lips - 0.02 * t, lips - 0.15 * t, |_, depth| depth);
-        if lower_lip > lips - 0.03 * t {
+        let (upper_edge, lower_edge) = self.gap(subnasale, t).unwrap_or((lips, lips));
+        let upper_lip = self.best(upper_edge + 0.02 * t, upper_edge + 0.15 * t, |_, depth| depth);
+        let mut lower_lip = self.best(lower_edge - 0.02 * t, lower_edge - 0.15 * t, |_, depth| depth);
+        if lower_lip > lower_edge - 0.03 * t {
             // A lip that lies far behind the upper one is no maximum.
-            lower_lip = self.off_line(lips, lips - 0.17 * t, -1.0);
+            lower_lip = self.off_line(lower_edge, lower_edge - 0.17 * t, -1.0);
         }
-        let floor = self.at(upper_lip).min(self.at(lower_lip)).min(self.at(lips + 0.05 * t));
-        let edge = |toward: f32| {
-            let deep = floor - 0.06;
-            let mut v = lips;
-            while self.at(v) < deep && (v - lips).abs() < 0.1 {
-                v += toward * STEP;
-            }
-            v
-        };
-        let (upper_edge, lower_edge) = (edge(1.0), edge(-1.0));
         let chin = self.best(lower_lip - 0.2 * t, lower_lip - 0.55 * t, |v, depth| {
             depth - 0.15 * (v - (lower_lip - 0.33 * t)).abs()
         });

@@ -130,7 +130,7 @@ fn gram(map: &DepthMap, pose: &Pose, stride: usize) -> Option<[[f64; 5]; 5]> {
                     continue;
                 }
                 asked += 1;
-                let at = map.frame.pixels(pose.center + Vec2::new(u * side, v * pose.tall) * pose.size).round();
+                let at = map.frame.pixels(pose.center + Vec2::new(u * side, v * pose.tall) * pose.size) + 0.5;
                 if at.x < 0.0 || at.y < 0.0 {
                     continue;
                 }

@@ -84,7 +84,8 @@ pub(super) fn depths_at(
     let mut found = Vec::new();
     for (index, corners) in triangles.iter().enumerate() {
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| points.get(corner as usize)) else { continue };
-        if place.x < a.x.min(b.x).min(c.x) || place.x > a.x.max(b.x).max(c.x) {
+        let across = |place: f32, a: f32, b: f32, c: f32| place < a.min(b).min(c) || place > a.max(b).max(c);
+        if across(place.y, a.y, b.y, c.y) || across(place.x, a.x, b.x, c.x) {
             continue;
         }
         let (ab, ac, ap) = ((*b - *a).truncate(), (*c - *a).truncate(), place - a.truncate());
