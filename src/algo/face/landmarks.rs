@@ -1,4 +1,10 @@
 //! Landmarks: the 68 points of the Multi-PIE scheme, found on a head mesh.
+//!
+//! From the shape alone, whatever the topology, in three steps. A coarse depth map and the mean relief of a face tell
+//! where the face is and how large (`search`). On a fine depth map, features are measured: the eye openings
+//! (`eyes`), nose, lips and chin along the profile (`profile`), and the ends of the lips (`mouth`). The mean
+//! face is bent through them (`assemble`) and laid onto the skin (`surface`). What cannot be measured, as brows
+//! without hair or the eyes of a creature, stays where the mean face has it.
 
 mod assemble;
 mod eyes;
@@ -37,6 +43,17 @@ impl Landmarks {
     pub fn eye_distance(&self) -> f32 {
         self.points[36].distance(self.points[45])
     }
+
+    /// The mean of the two corners of an eye: the character's left or right one.
+    pub fn eye_center(&self, left: bool) -> Vec3 {
+        let (a, b) = if left { (42, 45) } else { (36, 39) };
+        (self.points[a] + self.points[b]) / 2.0
+    }
+
+    /// The lower edge of the chin.
+    pub fn chin(&self) -> Vec3 {
+        self.points[8]
+    }
 }
 
 /// Why no landmarks could be found.
@@ -59,7 +76,17 @@ pub enum LandmarkError {
     NoFront,
 }
 
-/// Finds the landmarks.
+/// Finds the landmarks of a head.
+///
+/// `points` in head space (x to the character's left, y up, z to the front) in any unit and at any place; `shells`
+/// tells skin and eyeballs apart. A head that is turned by more than a few degrees, or open wide at the mouth, is found
+/// with growing error. Whatever has a front gets an answer: on what is no human face, a low
+/// [`confidence`](Landmarks::confidence).
+///
+/// Takes 5 to 10 ms at 11,000 points and 15 to 20 ms at 45,000, about half of it for heads that are exactly symmetric.
+///
+/// # Errors
+/// [`LandmarkError`] for a point that is not finite, no skin, skin without depth, and where no front is seen.
 pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) -> Result<Landmarks, LandmarkError> {
     let kind = |triangle: usize| {
         let corner = triangles.get(triangle).map_or(u32::MAX, |corners| corners[0]);
@@ -184,6 +211,15 @@ fn lay(
     let closest = surface::snap(&targets, points, triangles, is_skin);
     for (index, point) in snapped.into_iter().zip(closest) {
         laid[index] = point;
+    }
+    // Between closed lips the closest skin can be the other lip's: then what is seen from the front has to do.
+    for (upper, lower) in [(61, 67), (62, 66), (63, 65)] {
+        if laid[upper].y < laid[lower].y {
+            for index in [upper, lower] {
+                let place = places[index];
+                laid[index] = relief.place(place.x, place.y, relief.at(place.x, place.y).unwrap_or(place.z + offset));
+            }
+        }
     }
     if let Some(middle) = exact {
         for index in 0..68 {

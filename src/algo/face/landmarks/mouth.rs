@@ -1,4 +1,4 @@
-//! Sideways features: the ends of the lips' line and the creases beside the nose wings.
+//! The ends of the lips' line.
 
 use glam::vec2;
 
@@ -48,20 +48,4 @@ pub(super) fn lip_corner(relief: &Relief, side: f32, start: f32, tall: f32) -> O
     // Past the end the valley is lost, so the height is that a little before it.
     let (_, v, _) = *track.get(end * 9 / 10)?;
     Some((u, v))
-}
-
-/// How far from the middle the crease between nose wing and cheek lies at height `v`, on the mean of both sides.
-pub(super) fn wing_crease(relief: &Relief, v: f32) -> Option<f32> {
-    let count = 38;
-    let mut sum = vec![0.0; count];
-    for side in [-1.0, 1.0] {
-        let line = relief.line(vec2(0.0, v), vec2(side * STEP, 0.0), count);
-        sum.iter_mut().zip(line).for_each(|(sum, depth)| *sum += 0.5 * depth);
-    }
-    smooth(&mut sum, 1);
-    let from = 3;
-    let (a, b) = (*sum.get(from)?, *sum.last()?);
-    let behind = |i: usize| a + (b - a) * (i - from) as f32 / (count - 1 - from) as f32 - sum[i];
-    let best = (from..count).max_by(|&a, &b| behind(a).total_cmp(&behind(b)))?;
-    (behind(best) > 0.02).then_some(best as f32 * STEP)
 }

@@ -54,11 +54,16 @@ impl Curve {
         let mut depths: Vec<f32> = (0..count).map(|i| lines.iter().map(|line| line[i]).sum::<f32>() / 3.0).collect();
         // Below the last thing seen it falls away, so that a cut neck looks like one that recedes.
         let seen = (0..count).rposition(|i| relief.at(0.0, TOP - i as f32 * STEP).is_some()).unwrap_or(0);
-        for i in 0..seen {
-            // Between open lips there may be nothing at all.
-            if relief.at(0.0, TOP - i as f32 * STEP).is_none() {
-                depths[i] -= 0.1;
+        // Between open lips there may be nothing at all.
+        let nothing: Vec<bool> = (0..seen).map(|i| relief.at(0.0, TOP - i as f32 * STEP).is_none()).collect();
+        let mut first = 0;
+        for run in nothing.chunk_by(|a, b| a == b) {
+            let last = first + run.len();
+            if run[0] && first > 0 {
+                let floor = depths[first - 1].min(depths[last]) - 0.2;
+                depths[first..last].fill(floor);
             }
+            first = last;
         }
         for i in seen + 1..count {
             depths[i] = depths[seen] - 2.0 * STEP * (i - seen) as f32;
