@@ -12,6 +12,7 @@ mod convex;
 mod moves;
 mod place;
 mod problem;
+mod renew;
 mod rotation;
 mod share;
 mod start;
@@ -178,8 +179,8 @@ pub enum FitError {
 ///
 /// Each point gets one to [`FitSettings::influences`] joints, strongest first, positive, summing to one; points that
 /// no shape moves belong to the head alone. The result does not depend on the number of threads. Cost: a round is
-/// linear in points times shapes times bones (at most 24 of them a point); 9,000 moving points, 57 shapes and 40 bones
-/// take about two seconds on two cores.
+/// linear in points times shapes times bones (some 12 to 20 of them a point); 9,000 moving points, 57 shapes and 40 bones
+/// take about three seconds on two cores.
 ///
 /// # Errors
 /// [`FitError`]: nothing to fit, input that is not finite or does not fit together, or cancelled.
@@ -201,28 +202,36 @@ pub fn fit(
     let given: Vec<_> = settings.start.iter().map(|p| problem.inward(*p)).collect();
     let mut moves = start::groups(&problem, bones, &given, STIFFNESS);
     step(0.05)?;
+    let rounds = settings.rounds.max(1);
+    let smoothing = if settings.smoothing.is_finite() { settings.smoothing.clamp(0.0, 100.0) } else { 0.0 };
     let mut influences = vec![Vec::new(); moving];
     let mut centers = Vec::new();
-    let mut left = 0.0;
-    for round in 0..settings.rounds.max(1) {
+    let mut renewed = Vec::new();
+    for round in 0..rounds {
+        let done = |part: f32| 0.05 + 0.9 * (round as f32 + part) / rounds as f32;
         let columns = Columns::new(&problem, &moves);
-        let near = Near { problem: &problem, centers: &centers, influences: &influences, bones };
+        let near = Near { problem: &problem, centers: &centers, influences: &influences, bones, anywhere: &renewed };
         let candidates = |point: usize, out: &mut Vec<u32>| near.of(point, out);
-        let sharing = Sharing {
-            most: settings.influences,
-            smoothing: f64::from(settings.smoothing.clamp(0.0, 100.0)) * 0.01,
-            candidates: &candidates,
-        };
-        let (found, errors) = share(&problem, &columns, &influences, &sharing);
-        influences = found;
-        let _ = errors;
+        let smoothing = f64::from(smoothing) * 0.01;
+        let sharing = Sharing { most: settings.influences, smoothing, candidates: &candidates };
+        let left;
+        (influences, left) = share(&problem, &columns, &influences, &sharing);
+        step(done(0.5))?;
         let moments = Moments::new(&problem, &influences, bones, STIFFNESS);
-        left = moments.improve(&mut moves, 1, 2);
+        moments.improve(&mut moves, 1, 2);
         centers = (0..bones).map(|bone| moments.center(bone)).collect();
-        if std::env::var("FIT_TRACE").is_ok() { eprintln!("{round} {}", problem.error(left)); }
-        step(0.05 + 0.9 * (round + 1) as f32 / settings.rounds.max(1) as f32)?;
+        renewed.clear();
+        if round % 3 == 2 && 10 * round < 7 * rounds {
+            let (first, most) = (settings.start.len(), bones.div_ceil(10));
+            renewed = renew::renew(&problem, &columns, &mut influences, &mut moves, &left, first, most);
+        }
+        step(done(1.0))?;
     }
-    place::finish(&problem, rest.len(), settings, &influences, &moves, left)
+    let (positions, weights) = place::finish(&problem, settings, &influences, &moves);
+    let moves = place::outward(&problem, &positions, &moves);
+    let error = error(rest, &positions, &weights, shapes, &moves);
+    step(1.0)?;
+    Ok(Fit { positions, weights, moves, error })
 }
 
 /// Finds how bones with known weights have to move to bring the mesh `rest` as near as possible to each of `shapes`.
@@ -318,12 +327,14 @@ struct Near<'a> {
     centers: &'a [(f64, glam::DVec3)],
     influences: &'a [Vec<(u32, f64)>],
     bones: usize,
+    /// Bones that have no points yet.
+    anywhere: &'a [u32],
 }
 
 impl Near<'_> {
-    /// The nearest bones, those that the point follows already, and those of its neighbours; sorted.
+    /// The nearest bones, those that the point follows already, those of its neighbours and new ones; sorted.
     fn of(&self, point: usize, out: &mut Vec<u32>) {
-        const NEAREST: usize = 24;
+        const NEAREST: usize = 12;
         if self.bones <= NEAREST || self.centers.is_empty() {
             out.extend(0..self.bones as u32);
             return;
@@ -338,6 +349,7 @@ impl Near<'_> {
         for &other in self.problem.around(point) {
             out.extend(self.influences[other as usize].iter().map(|e| e.0));
         }
+        out.extend(self.anywhere);
         out.sort_unstable();
         out.dedup();
     }

@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec3, Vec3};
 
 use super::{
-    BoneMove, Fit, FitError, FitSettings, PRUNE,
+    BoneMove, FitSettings, PRUNE,
     moves::{Influences, Rigid},
     problem::Problem,
 };
@@ -20,18 +20,16 @@ impl Problem {
     }
 }
 
-/// The result in the caller's space.
+/// The bones' positions, and the weights of all points, in the caller's space.
 pub(super) fn finish(
     problem: &Problem,
-    points: usize,
     settings: &FitSettings,
     influences: &Influences,
     moves: &[Vec<Rigid>],
-    left: f64,
-) -> Result<Fit, FitError> {
+) -> (Vec<Vec3>, Weights) {
     let mut weights = Weights::default();
     let mut moving = problem.origin.iter().zip(influences).peekable();
-    for point in 0..points {
+    for point in 0..problem.all {
         match moving.next_if(|(p, _)| **p as usize == point) {
             Some((_, row)) => weights.push(finished(row, settings.influences)),
             None => weights.push([(0, 1.0)]),
@@ -45,8 +43,7 @@ pub(super) fn finish(
             _ => (free * problem.scale + problem.center).as_vec3(),
         })
         .collect();
-    let moves = outward(problem, &positions, moves);
-    Ok(Fit { positions, weights, moves, error: problem.error(left) })
+    (positions, weights)
 }
 
 /// One point's influences over joints, the head's share included, strongest first.
@@ -70,7 +67,8 @@ fn positions(problem: &Problem, influences: &Influences, moves: &[Vec<Rigid>]) -
     for (row, p) in influences.iter().zip(&problem.points) {
         for &(bone, weight) in row {
             let sum = &mut sums[bone as usize];
-            *sum = (sum.0 + weight * weight, sum.1 + *p * weight * weight, sum.2 + weight * weight * p.length_squared());
+            *sum =
+                (sum.0 + weight * weight, sum.1 + *p * weight * weight, sum.2 + weight * weight * p.length_squared());
         }
     }
     sums.iter()
@@ -105,10 +103,7 @@ pub(super) fn outward(problem: &Problem, positions: &[Vec3], moves: &[Vec<Rigid>
     let one = |position: &Vec3, rigid: &Rigid| {
         let at = problem.inward(*position);
         let shift = (rigid.rotation * at + rigid.translation - at) * problem.scale;
-        BoneMove {
-            rotation: DQuat::from_mat3(&rigid.rotation).as_quat().normalize(),
-            translation: shift.as_vec3(),
-        }
+        BoneMove { rotation: DQuat::from_mat3(&rigid.rotation).as_quat().normalize(), translation: shift.as_vec3() }
     };
     (0..problem.shapes)
         .map(|shape| positions.iter().zip(moves).map(|(position, moves)| one(position, &moves[shape])).collect())

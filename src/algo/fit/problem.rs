@@ -30,8 +30,7 @@ pub(super) struct Problem {
     /// What a unit here is in the caller's space, and where the origin is there.
     pub scale: f64,
     pub center: DVec3,
-    /// Sum of squares (in units here) of what the points that stand still would move, and the number of all points.
-    pub rest_energy: f64,
+    /// The number of all points.
     pub all: usize,
 }
 
@@ -59,17 +58,9 @@ impl Problem {
         }
         let square = |row: &[f32]| row.iter().map(|&d| f64::from(d) * f64::from(d)).sum::<f64>();
         let energy = moved.chunks_exact(width).map(square).collect();
-        let mut is_moving = vec![false; rest.len()];
-        origin.iter().for_each(|&p| is_moving[p as usize] = true);
-        let rest_energy = shapes
-            .iter()
-            .flat_map(|shape| shape.as_ref().iter().zip(&is_moving))
-            .filter(|(_, moving)| !**moving)
-            .map(|(d, _)| (d.as_dvec3() / scale).length_squared())
-            .sum();
         let (starts, neighbours) = surface(rest, triangles, &origin);
         let (shapes, all) = (shapes.len(), rest.len());
-        Ok(Self { origin, points, neighbours, starts, shapes, width, moved, energy, scale, center, rest_energy, all })
+        Ok(Self { origin, points, neighbours, starts, shapes, width, moved, energy, scale, center, all })
     }
 
     /// The displacements of one moving point.
@@ -80,13 +71,6 @@ impl Problem {
     /// The neighbours of one moving point.
     pub fn around(&self, point: usize) -> &[u32] {
         &self.neighbours[self.starts[point] as usize..self.starts[point + 1] as usize]
-    }
-
-    /// A sum of squared distances of the moving points as a root mean square over all points and shapes, in the
-    /// caller's unit.
-    pub fn error(&self, squares: f64) -> f32 {
-        let mean = (squares.max(0.0) + self.rest_energy) / (self.all * self.shapes) as f64;
-        (mean.sqrt() * self.scale) as f32
     }
 }
 

@@ -123,7 +123,18 @@ pub(super) fn share(
                     (sharing.candidates)(point, &mut bones);
                     let around = problem.around(point);
                     let smooth = if around.is_empty() { 0.0 } else { pull };
-                    one(problem, columns, influences, &bones, point, smooth, mean * 1e-9, sharing.most, &mut convex, &mut targets)
+                    one(
+                        problem,
+                        columns,
+                        influences,
+                        &bones,
+                        point,
+                        smooth,
+                        mean * 1e-9,
+                        sharing.most,
+                        &mut convex,
+                        &mut targets,
+                    )
                 })
                 .collect()
         })
