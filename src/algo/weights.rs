@@ -19,8 +19,8 @@ mod coarse;
 pub mod fill;
 mod finish;
 mod heat;
-mod laplacian;
-mod ldl;
+pub(crate) mod laplacian;
+pub(crate) mod ldl;
 mod sight;
 pub mod voxel_bind;
 

@@ -1,0 +1,169 @@
+//! Places spread evenly over the visible skin of the facial mask.
+
+use glam::Vec3;
+
+use super::map::{FaceMap, Part};
+use crate::algo::face::{
+    grouping::HeadGroups,
+    shells::{ShellKind, Shells},
+};
+
+/// Cells along the longer side of the grid that tells what is hidden.
+const CELLS: usize = 160;
+/// How far behind the front, as a share of the face's scale, skin counts as hidden.
+const HIDDEN: f32 = 0.06;
+
+/// Which points of the mask are seen from the front: skin, not the inner walls of mouth, nose and sockets.
+///
+/// Linear in the triangles: their corners and middles are laid into a grid of depths.
+pub(crate) fn visible_mask(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    shells: &Shells,
+    groups: &HeadGroups,
+    scale: f32,
+) -> Vec<bool> {
+    let mut seen: Vec<bool> = (0..points.len())
+        .map(|i| groups.mask.get(i).copied().unwrap_or(false) && shells.kind(i) == ShellKind::Skin)
+        .collect();
+    let (mut low, mut high) = (Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY));
+    for (p, _) in points.iter().zip(&seen).filter(|(_, seen)| **seen) {
+        (low, high) = (low.min(*p), high.max(*p));
+    }
+    let size = (high - low).truncate().max_element();
+    if !(size > 0.0 && size.is_finite()) {
+        return seen;
+    }
+    let cell = size / CELLS as f32;
+    let of = |p: Vec3| (((p.x - low.x) / cell) as usize, ((p.y - low.y) / cell) as usize);
+    let mut front = vec![f32::NEG_INFINITY; (CELLS + 1) * (CELLS + 1)];
+    for t in triangles {
+        let c = t.map(|i| i as usize);
+        if !c.iter().all(|&i| seen.get(i).copied().unwrap_or(false)) {
+            continue;
+        }
+        let c = c.map(|i| points[i]);
+        let (a, b) = (c[0].min(c[1]).min(c[2]), c[0].max(c[1]).max(c[2]));
+        let ((x0, y0), (x1, y1)) = (of(a), of(b));
+        let area = (c[1] - c[0]).truncate().perp_dot((c[2] - c[0]).truncate());
+        for y in y0..=y1.min(CELLS) {
+            for x in x0..=x1.min(CELLS) {
+                let at = glam::Vec2::new(low.x + (x as f32 + 0.5) * cell, low.y + (y as f32 + 0.5) * cell);
+                let u = (c[1].truncate() - at).perp_dot(c[2].truncate() - at) / area;
+                let v = (c[2].truncate() - at).perp_dot(c[0].truncate() - at) / area;
+                if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+                    let z = u * c[0].z + v * c[1].z + (1.0 - u - v) * c[2].z;
+                    let slot = &mut front[y * (CELLS + 1) + x];
+                    *slot = slot.max(z);
+                }
+            }
+        }
+    }
+    for (p, seen) in points.iter().zip(&mut seen).filter(|(_, seen)| **seen) {
+        let (x, y) = of(*p);
+        // The shallowest of the cells around: skin that falls away steeply is not behind itself.
+        let mut least = f32::INFINITY;
+        for y in y.saturating_sub(1)..=(y + 1).min(CELLS) {
+            for x in x.saturating_sub(1)..=(x + 1).min(CELLS) {
+                least = least.min(front[y * (CELLS + 1) + x]);
+            }
+        }
+        *seen = !(least.is_finite() && p.z < least - HIDDEN * scale);
+    }
+    seen
+}
+
+/// The triangles of one side of one part, to sample.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Patch {
+    /// Corners of each triangle.
+    pub corners: Vec<[Vec3; 3]>,
+    /// What each weighs.
+    pub masses: Vec<f64>,
+    /// Lone points, where there is no area.
+    pub points: Vec<Vec3>,
+}
+
+impl Patch {
+    /// The whole mass.
+    pub fn mass(&self) -> f64 {
+        self.masses.iter().sum()
+    }
+
+    /// True where there is nothing to sample.
+    pub fn is_empty(&self) -> bool {
+        self.corners.is_empty() && self.points.is_empty()
+    }
+
+    /// About `count` points, evenly by mass, the same every time.
+    pub fn sample(&self, count: usize) -> Vec<Vec3> {
+        let total = self.mass();
+        if !(total > 0.0 && total.is_finite()) {
+            return self.points.clone();
+        }
+        let step = total / count.max(1) as f64;
+        let mut samples = Vec::with_capacity(count + 1);
+        let (mut sum, mut next) = (0.0, 0.5 * step);
+        // The additive sequence of the plastic number fills triangles evenly.
+        let (mut u, mut v) = (0.5f32, 0.5f32);
+        for (c, mass) in self.corners.iter().zip(&self.masses) {
+            sum += mass;
+            while next < sum {
+                let (s, t) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                samples.push(c[0] + (c[1] - c[0]) * s + (c[2] - c[0]) * t);
+                u = (u + 0.754_877_7) % 1.0;
+                v = (v + 0.569_840_3) % 1.0;
+                next += step;
+            }
+        }
+        samples
+    }
+}
+
+/// Cuts the visible mask into patches by part and side; `[part group][side]`, side 0 = left and middle.
+pub(crate) fn patches(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    seen: &[bool],
+    map: &FaceMap,
+    group_of: impl Fn(Part) -> usize,
+    count: usize,
+) -> Vec<[Patch; 2]> {
+    let mut patches = vec![<[Patch; 2]>::default(); count];
+    let mut area = 0.0;
+    for t in triangles {
+        let c = t.map(|i| i as usize);
+        if !c.iter().all(|&i| seen.get(i).copied().unwrap_or(false)) {
+            continue;
+        }
+        let c = c.map(|i| points[i]);
+        let middle = (c[0] + c[1] + c[2]) / 3.0;
+        let mass = 0.5 * f64::from((c[1] - c[0]).cross(c[2] - c[0]).length());
+        if !(mass > 0.0 && mass.is_finite()) {
+            continue;
+        }
+        let part = map.part(middle);
+        let patch = &mut patches[group_of(part)][usize::from(middle.x < map.middle)];
+        patch.corners.push(c);
+        patch.masses.push(mass * density(part));
+        area += mass;
+    }
+    if area <= 0.0 {
+        for (&p, _) in points.iter().zip(seen).filter(|(_, seen)| **seen) {
+            patches[group_of(map.part(p))][usize::from(p.x < map.middle)].points.push(p);
+        }
+    }
+    patches
+}
+
+/// How much more a part of the face moves than plain skin.
+fn density(part: Part) -> f64 {
+    match part {
+        Part::Nose => 2.2,
+        Part::Cheek => 1.2,
+        Part::Jaw => 1.0,
+        Part::Forehead => 0.7,
+        Part::Temple => 0.4,
+        _ => 1.0,
+    }
+}

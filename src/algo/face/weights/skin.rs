@@ -1,0 +1,276 @@
+//! Weights of the skin: patches of bones that heat spreads into one another.
+
+use std::{cmp::Reverse, collections::BinaryHeap};
+
+use rayon::prelude::*;
+
+use super::{
+    Face, FIRST, FaceWeightsError, HEAD, NECK, Row,
+    sides::{Rim, Sides, inset},
+    smooth,
+};
+use crate::algo::{
+    face::bones::FaceBoneKind,
+    weights::ldl::{LANES, Lane, Ldl, Symmetric},
+};
+
+/// Width of a heat step as a share of the distance of neighbouring bones.
+const WIDTH: f32 = 0.3;
+/// The largest share that the jaw takes of the skin.
+const JAW: f32 = 0.5;
+
+/// Rows of all welded vertices that are skin; the others stay empty.
+pub(crate) fn rows(
+    face: &Face,
+    sides: &Sides,
+    progress: &(dyn Fn(f32) -> bool + Sync),
+) -> Result<Vec<Row>, FaceWeightsError> {
+    let n = face.places.len();
+    let mut rows: Vec<Row> = vec![Row::new(); n];
+    let bones: Vec<usize> = (0..face.bones.len()).filter(|&b| face.bones[b].kind == FaceBoneKind::Skin).collect();
+    let spacing = spacings(face, &bones);
+    let widest = spacing.iter().copied().fold(0.0, f32::max);
+    let active = around(face, widest);
+    let index: Vec<u32> = {
+        let mut index = vec![u32::MAX; n];
+        for (i, &v) in active.iter().enumerate() {
+            index[v as usize] = i as u32;
+        }
+        index
+    };
+    // The nearest bone of each vertex and how far its heat goes.
+    let start: Vec<(usize, f32)> = active
+        .par_iter()
+        .map(|&v| {
+            let v = v as usize;
+            let mut best = (f32::INFINITY, 0, false);
+            for (i, &bone) in bones.iter().enumerate() {
+                let distance = face.places[v].distance_squared(face.bones[bone].position);
+                let allowed = sides.allows(v, bone);
+                if (allowed && !best.2) || (allowed == best.2 && distance < best.0) {
+                    best = (distance, i, allowed);
+                }
+            }
+            let width = spacing.get(best.1).copied().unwrap_or(0.0);
+            (if face.mask[v] && !bones.is_empty() { best.1 } else { bones.len() + inner(face, v) }, width)
+        })
+        .collect();
+    if !progress(0.2) {
+        return Err(FaceWeightsError::Cancelled);
+    }
+    let heat = spread(face, &active, &index, &start, bones.len() + 2, progress)?;
+    for (i, &v) in active.iter().enumerate() {
+        let v = v as usize;
+        let row = &mut rows[v];
+        for (column, solved) in heat.iter().enumerate() {
+            let value = solved[i];
+            if value < 1e-4 {
+                continue;
+            }
+            match bones.get(column) {
+                Some(&bone) => {
+                    let value = value * sides.keep(face, v, bone);
+                    if value > 0.0 {
+                        row.push((FIRST + bone as u32, value));
+                    }
+                }
+                None if column == bones.len() + 1 => row.push((face.jaw.unwrap_or(HEAD), value)),
+                None => row.push((HEAD, value)),
+            }
+        }
+    }
+    rows.par_iter_mut().enumerate().filter(|(v, _)| face.skin[*v]).for_each(|(v, row)| settle(face, sides, v, row));
+    Ok(rows)
+}
+
+/// Shares what the head holds with the neck, and gives the jaw its part.
+fn settle(face: &Face, sides: &Sides, v: usize, row: &mut Row) {
+    if row.is_empty() {
+        row.push((HEAD, 1.0));
+    }
+    let total: f32 = row.iter().map(|e| e.1).sum();
+    let share = jaw_share(face, sides, v);
+    let neck = face.neck_share(face.places[v]);
+    let mut others: Row = Vec::with_capacity(2);
+    for e in row.iter_mut() {
+        e.1 /= total;
+        // What is the jaw's inside the mouth stays so.
+        if Some(e.0) != face.jaw {
+            if share > 0.0
+                && let Some(jaw) = face.jaw
+            {
+                others.push((jaw, e.1 * share));
+                e.1 *= 1.0 - share;
+            }
+            if e.0 == HEAD && neck > 0.0 {
+                others.push((NECK, e.1 * neck));
+                e.1 *= 1.0 - neck;
+            }
+        }
+    }
+    for (joint, value) in others {
+        match row.iter_mut().find(|e| e.0 == joint) {
+            Some(e) => e.1 += value,
+            None => row.push((joint, value)),
+        }
+    }
+}
+
+/// How much of the skin at a vertex follows the jaw.
+fn jaw_share(face: &Face, sides: &Sides, v: usize) -> f32 {
+    if face.jaw.is_none() || !face.map.trusted {
+        return 0.0;
+    }
+    let e = face.map.scale;
+    let p = face.places[v];
+    let (half, q) = face.map.fold(p);
+    let below = face.below_lips(p);
+    let mut share = smooth(-0.1 * e, 0.25 * e, below);
+    // Between the corners the slit parts what follows from what does not.
+    let corner = half.lip_corner();
+    let near = inset(face, 0, p) * smooth(0.35 * e, 0.05 * e, below.abs());
+    let own = match sides.lip(v) {
+        Rim::Upper => 0.0,
+        Rim::Lower => 1.0,
+        Rim::None if q.z < corner.z - 0.3 * e => share,
+        Rim::None => f32::from(u8::from(below > 0.0)),
+    };
+    share += (own - share) * near;
+    let chin = half.jaw[0];
+    let forward = (p.z - face.pivot.z) / (chin.z - face.pivot.z).max(0.1 * e);
+    JAW * share * smooth(0.05, 0.45, forward) * smooth(face.chin - 0.35 * e, face.chin - 0.02 * e, p.y)
+}
+
+/// 1 for inner walls that the jaw carries, 0 for all else outside the bones' patches.
+fn inner(face: &Face, v: usize) -> usize {
+    let (half, p) = face.map.fold(face.places[v]);
+    let corner = half.lip_corner();
+    let mouth = face.map.trusted
+        && face.jaw.is_some()
+        && p.x < 1.4 * corner.x
+        && (p.y - corner.y).abs() < 0.45 * face.map.scale
+        && p.z > face.pivot.z
+        && p.z < half.lip_line()[0].z;
+    // In front of the chin's own skin there is none of it.
+    usize::from(mouth && p.y > face.chin + 0.05 * face.map.scale && face.below_lips(face.places[v]) > 0.0)
+}
+
+/// The distance of each bone from its neighbours: the mean of the three nearest.
+fn spacings(face: &Face, bones: &[usize]) -> Vec<f32> {
+    bones
+        .iter()
+        .map(|&bone| {
+            let at = face.bones[bone].position;
+            let mut near: Vec<f32> = bones
+                .iter()
+                .filter(|&&b| b != bone)
+                .map(|&b| face.bones[b].position.distance(at))
+                .filter(|&d| d > 1e-4 * face.map.scale)
+                .collect();
+            near.sort_by(f32::total_cmp);
+            near.truncate(3);
+            if near.is_empty() { 0.5 * face.map.scale } else { near.iter().sum::<f32>() / near.len() as f32 }
+        })
+        .collect()
+}
+
+/// The vertices of the skin within `reach` of the mask, along the surface, in order.
+fn around(face: &Face, reach: f32) -> Vec<u32> {
+    let n = face.places.len();
+    let mut distance = vec![f32::INFINITY; n];
+    let mut heap = BinaryHeap::new();
+    for v in (0..n).filter(|&v| face.mask[v]) {
+        distance[v] = 0.0;
+        if face.graph.of(v).any(|(other, _)| !face.mask[other]) {
+            heap.push(Reverse((0u32, v as u32)));
+        }
+    }
+    while let Some(Reverse((d, v))) = heap.pop() {
+        let v = v as usize;
+        if d != distance[v].to_bits() {
+            continue;
+        }
+        for (other, _) in face.graph.of(v) {
+            let to = distance[v] + face.places[v].distance(face.places[other]);
+            if face.skin[other] && to <= reach && to < distance[other] {
+                distance[other] = to;
+                heap.push(Reverse((to.to_bits(), other as u32)));
+            }
+        }
+    }
+    (0..n as u32).filter(|&v| distance[v as usize].is_finite()).collect()
+}
+
+/// Lets the patches spread: `(A + t L) w = A w₀`, twice, where `t` follows the distance of the bones.
+///
+/// Answers a column a patch, a value a vertex of `active`; the last but one column is the head's, which also lies all
+/// around. Columns of a vertex sum to one.
+fn spread(
+    face: &Face,
+    active: &[u32],
+    index: &[u32],
+    start: &[(usize, f32)],
+    columns: usize,
+    progress: &(dyn Fn(f32) -> bool + Sync),
+) -> Result<Vec<Vec<f32>>, FaceWeightsError> {
+    let n = active.len();
+    let head = columns - 2;
+    let mean: f64 = active.iter().map(|&v| f64::from(face.graph.areas[v as usize])).sum::<f64>() / n.max(1) as f64;
+    let areas: Vec<f64> =
+        active.iter().map(|&v| f64::from(face.graph.areas[v as usize]).max(1e-3 * mean).max(1e-30)).collect();
+    let mut matrix = Symmetric { starts: vec![0], columns: Vec::new(), values: Vec::new(), diagonal: Vec::new() };
+    let mut lost = vec![0f64; n];
+    for (i, &v) in active.iter().enumerate() {
+        let own = start[i].1;
+        let mut diagonal = areas[i];
+        for (other, weight) in face.graph.of(v as usize) {
+            if !face.skin[other] {
+                continue;
+            }
+            let j = index[other];
+            let width = start.get(j as usize).map_or(own, |s| 0.5 * (s.1 + own)) * WIDTH;
+            let flow = f64::from(width) * f64::from(width) * f64::from(weight);
+            diagonal += flow;
+            if j == u32::MAX {
+                lost[i] += flow;
+            } else {
+                matrix.columns.push(j);
+                matrix.values.push(-flow);
+            }
+        }
+        matrix.starts.push(matrix.columns.len() as u32);
+        matrix.diagonal.push(diagonal);
+    }
+    let unsolved = || {
+        (0..columns).map(|c| start.iter().map(|s| f32::from(u8::from(s.0 == c))).collect()).collect::<Vec<Vec<f32>>>()
+    };
+    let Some(factor) = Ldl::new(&matrix) else { return Ok(unsolved()) };
+    if !progress(0.5) {
+        return Err(FaceWeightsError::Cancelled);
+    }
+    let blocks: Vec<Vec<Lane>> = (0..columns.div_ceil(LANES))
+        .into_par_iter()
+        .map(|block| {
+            let mut lanes: Vec<Lane> = start
+                .iter()
+                .map(|s| std::array::from_fn(|l| f64::from(u8::from(s.0 == block * LANES + l))))
+                .collect();
+            for _ in 0..2 {
+                for (i, lane) in lanes.iter_mut().enumerate() {
+                    for value in lane.iter_mut() {
+                        *value *= areas[i];
+                    }
+                    if head / LANES == block {
+                        lane[head % LANES] += lost[i];
+                    }
+                }
+                factor.solve(&mut lanes);
+            }
+            lanes
+        })
+        .collect();
+    if !progress(0.9) {
+        return Err(FaceWeightsError::Cancelled);
+    }
+    Ok((0..columns).map(|c| blocks[c / LANES].iter().map(|lane| lane[c % LANES] as f32).collect()).collect())
+}
