@@ -25,8 +25,10 @@ use crate::{
 const LANDMARK: f64 = 0.02;
 /// How strongly movements are held to what their own patch asks for, as a share of what the patch counts.
 const HOLD: f64 = 0.01;
-/// How strongly bones with common skin are held together, in turn, where the face would fold otherwise.
-const STIFFER: [f64; 4] = [0.002, 0.05, 0.3, 2.0];
+/// How strongly bones with common skin are held together.
+const STIFF: f64 = 0.002;
+/// How often bones are brought nearer to each other where skin folds.
+const ROUNDS: usize = 16;
 
 /// A head with its bones and weights, ready to be posed many times.
 pub struct FittedFace<'a> {
@@ -38,8 +40,8 @@ pub struct FittedFace<'a> {
     /// The bones that are solved for, and the place of each bone among them.
     skin: Vec<usize>,
     samples: Vec<Sample>,
-    /// Cholesky factors, one for each of [`STIFFER`].
-    factors: Vec<Vec<f64>>,
+    /// The Cholesky factor.
+    factor: Vec<f64>,
     /// What each bone's patch counts.
     patch: Vec<f64>,
     /// Triangles that bones move.
@@ -85,7 +87,7 @@ impl<'a> FittedFace<'a> {
             landmarks,
             skin,
             samples: Vec::new(),
-            factors: Vec::new(),
+            factor: Vec::new(),
             patch: Vec::new(),
             moving: Vec::new(),
         };
@@ -104,34 +106,22 @@ impl<'a> FittedFace<'a> {
 
     /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of units.
     ///
-    /// Where triangles of the skin would turn over, bones with common skin are held together more
-    /// and more, and at last everything is made weaker. Cost: points times moves of the field.
+    /// Where triangles of the skin would turn over, the bones that move them are brought nearer to moving alike, again
+    /// and again. Cost: points times moves of the field.
     pub fn pose(&self, mix: &Mix, units: &UnitSet) -> Vec<BonePose> {
         let rest = vec![BonePose::REST; self.bones.len()];
         if mix.is_rest() {
             return rest;
         }
         let Some(field) = Field::new(mix, units, self.bones, self.landmarks) else { return rest };
-        let mut best = (usize::MAX, rest);
-        for factor in &self.factors {
-            let poses = self.solve(&field, factor);
-            let faults = self.faults(&poses);
-            if faults == 0 {
-                return poses;
-            }
-            if faults < best.0 {
-                best = (faults, poses);
-            }
-        }
-        let mut poses = best.1;
-        for _ in 0..8 {
-            for pose in &mut poses {
-                pose.translation *= 0.85;
-                pose.rotation = glam::Quat::IDENTITY.slerp(pose.rotation, 0.85);
-            }
-            if self.faults(&poses) < best.0.min(1) {
+        let mut poses = self.solve(&field);
+        let mut folded = self.folded(&poses);
+        for round in 0..ROUNDS {
+            if folded.is_empty() {
                 break;
             }
+            self.relax(&mut poses, &folded, if round < ROUNDS / 2 { 0.3 } else { 0.6 });
+            folded = self.folded(&poses);
         }
         poses
     }
@@ -233,26 +223,21 @@ impl<'a> FittedFace<'a> {
                 }
             }
         }
-        let common = matrix.clone();
         let floor = 1e-6 / size.max(1) as f64;
-        for stiff in STIFFER {
-            let mut system = common.clone();
-            for a in 0..size {
-                system[a * size + a] += HOLD * self.patch[a] + floor;
-                for b in 0..size {
-                    if a != b {
-                        system[a * size + a] += stiff * common[a * size + b];
-                        system[a * size + b] -= stiff * common[a * size + b];
-                    }
-                }
+        let common = matrix.clone();
+        for a in 0..size {
+            matrix[a * size + a] += HOLD * self.patch[a] + floor;
+            for b in (0..size).filter(|&b| b != a) {
+                matrix[a * size + a] += STIFF * common[a * size + b];
+                matrix[a * size + b] -= STIFF * common[a * size + b];
             }
-            cholesky(&mut system, size);
-            self.factors.push(system);
         }
+        cholesky(&mut matrix, size);
+        self.factor = matrix;
     }
 
     /// The poses that follow a field best.
-    fn solve(&self, field: &Field, factor: &[f64]) -> Vec<BonePose> {
+    fn solve(&self, field: &Field) -> Vec<BonePose> {
         let size = self.skin.len();
         let mut poses: Vec<BonePose> = self.bones.iter().map(|bone| field.turn(bone)).collect();
         let jaw = self.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw);
@@ -280,7 +265,7 @@ impl<'a> FittedFace<'a> {
                 }
             }
         }
-        substitute(factor, size, &mut right);
+        substitute(&self.factor, size, &mut right);
         for (&bone, solved) in self.skin.iter().zip(&right) {
             let movement = Vec3::new(solved[0] as f32, solved[1] as f32, solved[2] as f32);
             poses[bone].translation = limited(movement, self.landmarks);
@@ -288,21 +273,59 @@ impl<'a> FittedFace<'a> {
         poses
     }
 
-    /// How many triangles turn by more than a right angle.
-    fn faults(&self, poses: &[BonePose]) -> usize {
+    /// The triangles that turn by more than a right angle.
+    fn folded(&self, poses: &[BonePose]) -> Vec<u32> {
         if self.moving.is_empty() {
-            return 0;
+            return Vec::new();
         }
         let posed = apply(self.points, self.weights, self.bones, poses);
         let normal = |points: &[Vec3], corners: [u32; 3]| {
             let [a, b, c] = corners.map(|corner| points[corner as usize]);
             (b - a).cross(c - a)
         };
-        let flips = self.moving.iter().filter(|&&index| {
-            let corners = self.triangles[index as usize];
+        let turned = |index: &u32| {
+            let corners = self.triangles[*index as usize];
             normal(self.points, corners).dot(normal(&posed, corners)) < 0.0
-        });
-        flips.count()
+        };
+        self.moving.iter().copied().filter(turned).collect()
+    }
+
+    /// Brings the bones that move some triangles nearer to moving alike, by a part of the way.
+    fn relax(&self, poses: &mut [BonePose], triangles: &[u32], part: f32) {
+        let jaw = self.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw);
+        let jaw = jaw.map(|bone| (bone, poses[bone].affine(self.bones[bone].position)));
+        let mut alike = vec![(Vec3::ZERO, 0.0_f32); self.bones.len()];
+        for &index in triangles {
+            let corners = self.triangles[index as usize];
+            let mut mean = Vec3::ZERO;
+            for corner in corners {
+                for (joint, weight) in self.influences(corner as usize) {
+                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < poses.len()) else { continue };
+                    mean += weight / 3.0
+                        * match jaw {
+                            Some((jaw, turn)) if jaw == bone => {
+                                let point = self.points[corner as usize];
+                                turn.transform_point3(point) - point
+                            }
+                            _ => poses[bone].translation,
+                        };
+                }
+            }
+            for corner in corners {
+                for (joint, weight) in self.influences(corner as usize) {
+                    let bone = (joint as usize).wrapping_sub(2);
+                    if let Some((sum, weights)) = alike.get_mut(bone) {
+                        *sum += mean * weight;
+                        *weights += weight;
+                    }
+                }
+            }
+        }
+        for ((pose, bone), (sum, weights)) in poses.iter_mut().zip(self.bones).zip(alike) {
+            if bone.kind == FaceBoneKind::Skin && weights > 0.0 {
+                pose.translation += (sum / weights - pose.translation) * (part * weights.min(1.0));
+            }
+        }
     }
 }
 
