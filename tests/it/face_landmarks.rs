@@ -152,6 +152,20 @@ fn stretched_heads() {
 }
 
 #[test]
+fn looking_aside() {
+    let Some(folder) = data("looking_aside") else { return };
+    let truth = truth(&folder);
+    let (points, triangles) = read(folder.join("heads/ict_identity_2.obj"));
+    for (axis, degrees) in [(Vec3::Y, 8.0f32), (Vec3::Y, -24.0), (Vec3::Z, 12.0)] {
+        let turn = Quat::from_axis_angle(axis, degrees.to_radians());
+        let turned: Vec<Vec3> = points.iter().map(|&point| turn * point).collect();
+        let errors = errors(&turned, &truth, &find(&(turned.clone(), triangles.clone())));
+        let mean = errors.iter().sum::<f32>() / 68.0;
+        assert!(mean <= 3.5, "{degrees} degrees about {axis}: mean error {mean} %");
+    }
+}
+
+#[test]
 fn any_unit_and_place() {
     let Some(folder) = data("any_unit_and_place") else { return };
     let (points, triangles) = read(folder.join("heads/ict_identity_1.obj"));
