@@ -5,6 +5,9 @@
 //! Vassilvitskii, "k-means++", 2007), so a seed is likely where many points are far from any. Then points go to their nearest
 //! centroid and centroids to their points' mean, until no point changes its group (Lloyd).
 //!
+//! In the first rounds, centroids jump from where two groups might as well be one to where one might better be two, which
+//! such rounds alone never do.
+//!
 //! Bounds say for most points that nothing can have changed: how far the own centroid is at most and any other at
 //! least (Hamerly, "Making k-means even faster", 2010). They are kept as differences from the way that centroids have gone
 //! since the start, so a point whose bounds hold is not written at all, and a block of them is not even read. Bounds only ever
@@ -14,6 +17,7 @@
 //! their group are added and taken away, on any number of threads.
 
 mod lloyd;
+mod rearrange;
 mod seeds;
 mod space;
 

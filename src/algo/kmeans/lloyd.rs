@@ -1,10 +1,10 @@
 //! Rounds: points to their nearest centroid, centroids to their points' mean.
 
 use rayon::prelude::*;
-use wide::{CmpLt, f32x8};
+use wide::{CmpLe, CmpLt, f32x8};
 
 use super::{
-    KMeansError,
+    KMeansError, rearrange,
     seeds::square_distance,
     space::{BLOCK, Place, Space, Sum},
 };
@@ -23,6 +23,8 @@ pub(super) struct State {
 const SLACK: f32 = 4e-6;
 /// A block before its first round.
 const NEVER: f64 = f64::NEG_INFINITY;
+/// After these rounds centroids that are of little use jump to where they are of more.
+const REARRANGE: [usize; 4] = [5, 10, 16, 24];
 /// Blocks are handed out in runs of so many.
 const RUN: usize = 16;
 
@@ -38,9 +40,13 @@ struct Centroids {
     places: Vec<Place>,
 }
 
-/// How far centroids have gone since the start: each one, and the sum of each round's furthest.
+/// How far centroids have gone since the bounds began: each one, in all and in the last round.
 struct Gone {
     each: Vec<f32>,
+    /// In the last round.
+    last: Vec<f32>,
+    furthest: f32,
+    /// The sum of each round's furthest.
     most: f64,
 }
 
@@ -51,8 +57,21 @@ struct Bounds<'a> {
     own: &'a mut [f32],
     /// The least distance to any other centroid, and the sum of the furthest ways on top.
     others: &'a mut [f32],
-    /// Nothing changes here until the sum of the furthest ways is this.
-    holds: &'a mut f64,
+    /// What is known about all of them.
+    block: &'a mut Block,
+}
+
+/// What is known about a block.
+#[derive(Clone)]
+struct Block {
+    /// The sum of each round's furthest way of a candidate.
+    most: f64,
+    /// Nothing changes here until that sum is this.
+    holds: f64,
+    /// The centroids that can be nearest or second nearest to any of its points, in order.
+    candidates: Vec<u32>,
+    /// They are all until the sum of the furthest ways of any centroid is this.
+    complete: f64,
 }
 
 /// A point that went from one group to another; [`NOWHERE`] before the first round.
@@ -72,9 +91,9 @@ pub(super) fn run<const BOUNDS: bool>(
     let mut labels = vec![NOWHERE; count];
     let mut own = vec![0.0; count];
     let mut others = vec![0.0; count];
-    let mut holds = vec![NEVER; space.boxes.len()];
+    let mut known = vec![Block { most: 0.0, holds: NEVER, candidates: Vec::new(), complete: NEVER }; space.boxes.len()];
     let mut sums = vec![Sum::default(); groups];
-    let mut gone = Gone { each: vec![0.0; groups], most: 0.0 };
+    let mut gone = Gone::new(groups);
     let mut rounds = 0;
     loop {
         let blocks = space
@@ -83,17 +102,22 @@ pub(super) fn run<const BOUNDS: bool>(
             .zip(labels.par_chunks_mut(BLOCK))
             .zip(own.par_chunks_mut(BLOCK))
             .zip(others.par_chunks_mut(BLOCK))
-            .zip(holds.par_iter_mut())
+            .zip(known.par_iter_mut())
             .enumerate()
             .with_min_len(RUN);
         let changes: Vec<Change> = blocks
-            .fold(Vec::new, |mut changes, (block, ((((points, labels), own), others), holds))| {
-                let mut bounds = Bounds { labels, own, others, holds };
-                if !BOUNDS || gone.most >= *bounds.holds {
-                    bounds.settle::<BOUNDS>(block * BLOCK, points, &centroids, &gone, &mut changes);
-                }
-                changes
-            })
+            .fold(
+                Default::default,
+                |(mut changes, mut room): (Vec<Change>, Vec<Eight>),
+                 (at, ((((points, labels), own), others), block))| {
+                    let mut bounds = Bounds { labels, own, others, block };
+                    if !BOUNDS || bounds.block.follow(&space.boxes[at], &centroids, &gone) {
+                        bounds.settle::<BOUNDS>(at * BLOCK, points, &centroids, &gone, &mut changes, &mut room);
+                    }
+                    (changes, room)
+                },
+            )
+            .map(|(changes, _)| changes)
             .reduce(Vec::new, |mut all, more| {
                 all.extend(more);
                 all
@@ -111,6 +135,7 @@ pub(super) fn run<const BOUNDS: bool>(
         rounds += 1;
         report(rounds)?;
         let fixed = space.fixed.len();
+        let swap = REARRANGE.contains(&rounds) && rearrange::worth(groups - fixed, count);
         let mut moved: Vec<Place> = centroids.places.clone();
         let mut empty = Vec::new();
         for (group, sum) in sums.iter().enumerate().skip(fixed) {
@@ -123,18 +148,18 @@ pub(super) fn run<const BOUNDS: bool>(
         if !empty.is_empty() {
             refill(space, &centroids, &labels, &sums, &empty, &mut moved);
         }
-        let mut furthest = 0.0_f32;
-        for ((gone, from), to) in gone.each.iter_mut().zip(&centroids.places).zip(&moved) {
-            let way = square_distance(*from, *to).sqrt() * (1.0 + 1e-6);
-            *gone += way;
-            furthest = furthest.max(way);
+        if swap {
+            rearrange::rearrange(space, &labels, &mut moved);
         }
-        gone.most += f64::from(furthest);
-        // The sums of ways lose digits as they grow, which the slack no longer covers: begin the bounds anew.
-        if gone.most > 16.0 {
-            gone = Gone { each: vec![0.0; groups], most: 0.0 };
-            holds.fill(NEVER);
+        gone.go(&centroids.places, &moved);
+        // The sums of ways lose digits as they grow, which the slack no longer covers: begin the bounds anew. After a
+        // centroid has jumped no bound is worth anything.
+        if swap || gone.most > 4.0 {
+            gone = Gone::new(groups);
             others.fill(f32::NEG_INFINITY);
+            for block in &mut known {
+                (block.most, block.holds, block.complete) = (0.0, NEVER, NEVER);
+            }
         }
         centroids = Centroids::new(moved);
     }
@@ -185,9 +210,11 @@ impl Bounds<'_> {
         centroids: &Centroids,
         gone: &Gone,
         changes: &mut Vec<Change>,
+        near: &mut Vec<Eight>,
     ) {
-        let most = gone.most as f32;
+        let most = self.block.most as f32;
         let mut room = f32::INFINITY;
+        near.clear();
         for (at, point) in points.iter().enumerate() {
             let label = self.labels[at];
             if BOUNDS && label != NOWHERE {
@@ -205,7 +232,15 @@ impl Bounds<'_> {
                     continue;
                 }
             }
-            let (nearest, square, second) = centroids.nearest(*point);
+            let (nearest, square, second) = if BOUNDS {
+                if near.is_empty() {
+                    self.block.gather(centroids, near);
+                }
+                let (at, square, second) = nearest(near, *point);
+                (self.block.candidates.get(at as usize).copied().unwrap_or(at), square, second)
+            } else {
+                nearest(&centroids.eights, *point)
+            };
             let (distance, other) = (square.sqrt() + SLACK, second.sqrt());
             self.own[at] = distance - gone.each[nearest as usize];
             self.others[at] = other + most;
@@ -216,56 +251,136 @@ impl Bounds<'_> {
             }
         }
         // Both bounds come nearer by no more than the furthest way.
-        *self.holds = gone.most + f64::from((room - SLACK).max(0.0)) * 0.5;
+        self.block.holds = self.block.most + f64::from((room - SLACK).max(0.0)) * 0.5;
+    }
+}
+
+impl Gone {
+    fn new(groups: usize) -> Self {
+        Self { each: vec![0.0; groups], last: vec![0.0; groups], furthest: 0.0, most: 0.0 }
+    }
+
+    fn go(&mut self, from: &[Place], to: &[Place]) {
+        self.furthest = 0.0;
+        for (group, (from, to)) in from.iter().zip(to).enumerate() {
+            let way = square_distance(*from, *to).sqrt() * (1.0 + 1e-6);
+            self.each[group] += way;
+            self.last[group] = way;
+            self.furthest = self.furthest.max(way);
+        }
+        self.most += f64::from(self.furthest);
     }
 }
 
 impl Centroids {
     fn new(places: Vec<Place>) -> Self {
-        let eights = places
-            .chunks(8)
-            .map(|chunk| {
-                let lanes = |axis: usize| {
-                    let mut lanes = [f32::INFINITY; 8];
-                    for (lane, place) in lanes.iter_mut().zip(chunk) {
-                        *lane = place[axis];
-                    }
-                    f32x8::new(lanes)
-                };
-                Eight { x: lanes(0), y: lanes(1), z: lanes(2) }
-            })
-            .collect();
-        Self { eights, places }
+        Self { eights: places.chunks(8).map(|chunk| Eight::new(chunk.iter())).collect(), places }
+    }
+}
+
+/// The nearest centroid (of equally near ones the first), its squared distance, and that of the second nearest.
+fn nearest(eights: &[Eight], point: Place) -> (u32, f32, f32) {
+    let [x, y, z] = point.map(f32x8::splat);
+    let mut least = f32x8::splat(f32::INFINITY);
+    let mut second = least;
+    // Exact in single precision up to 2^24 eights.
+    let mut which = f32x8::ZERO;
+    for (at, eight) in eights.iter().enumerate() {
+        let (dx, dy, dz) = (eight.x - x, eight.y - y, eight.z - z);
+        let square = dx * dx + dy * dy + dz * dz;
+        let closer = square.cmp_lt(least);
+        second = second.min(square.max(least));
+        least = least.min(square);
+        which = closer.blend(f32x8::splat(at as f32), which);
+    }
+    let (least, which, second) = (least.to_array(), which.to_array(), second.to_array());
+    let mut best = (f32::INFINITY, u32::MAX);
+    let mut next = f32::INFINITY;
+    for lane in 0..8 {
+        let group = (which[lane] as u32) * 8 + lane as u32;
+        next = next.min(second[lane]);
+        if least[lane] < best.0 || (least[lane] == best.0 && group < best.1) {
+            next = next.min(best.0);
+            best = (least[lane], group);
+        } else {
+            next = next.min(least[lane]);
+        }
+    }
+    (best.1, best.0, next)
+}
+
+impl Block {
+    /// Follows the last round; whether a point may have changed its group.
+    fn follow(&mut self, around: &(Place, Place), centroids: &Centroids, gone: &Gone) -> bool {
+        let step = if gone.most < self.complete {
+            self.candidates.iter().fold(0.0_f32, |most, &group| most.max(gone.last[group as usize]))
+        } else {
+            // Enough for some rounds like the last.
+            let ahead = gone.furthest * 4.0;
+            self.choose(around, 2.0 * ahead, centroids);
+            self.complete = gone.most + f64::from(ahead);
+            gone.furthest
+        };
+        self.most += f64::from(step);
+        self.most >= self.holds
     }
 
-    /// The nearest centroid (of equally near ones the first), its squared distance, and that of the second nearest.
-    fn nearest(&self, point: Place) -> (u32, f32, f32) {
-        let [x, y, z] = point.map(f32x8::splat);
+    fn gather(&self, centroids: &Centroids, near: &mut Vec<Eight>) {
+        near.extend(
+            self.candidates
+                .chunks(8)
+                .map(|chunk| Eight::new(chunk.iter().map(|&group| &centroids.places[group as usize]))),
+        );
+    }
+
+    /// No point of the box is further from its two nearest than the second least of the furthest distances to the box.
+    fn choose(&mut self, (low, high): &(Place, Place), wider: f32, centroids: &Centroids) {
+        let (low, high) = (low.map(f32x8::splat), high.map(f32x8::splat));
         let mut least = f32x8::splat(f32::INFINITY);
         let mut second = least;
-        // Exact in single precision up to 2^24 eights.
-        let mut which = f32x8::ZERO;
-        for (at, eight) in self.eights.iter().enumerate() {
-            let (dx, dy, dz) = (eight.x - x, eight.y - y, eight.z - z);
-            let square = dx * dx + dy * dy + dz * dz;
-            let closer = square.cmp_lt(least);
-            second = second.min(square.max(least));
-            least = least.min(square);
-            which = closer.blend(f32x8::splat(at as f32), which);
+        for eight in &centroids.eights {
+            let mut far = f32x8::ZERO;
+            for (axis, value) in [eight.x, eight.y, eight.z].into_iter().enumerate() {
+                let out = (value - low[axis]).max(high[axis] - value);
+                far += out * out;
+            }
+            second = second.min(far.max(least));
+            least = least.min(far);
         }
-        let (least, which, second) = (least.to_array(), which.to_array(), second.to_array());
-        let mut best = (f32::INFINITY, u32::MAX);
-        let mut next = f32::INFINITY;
-        for lane in 0..8 {
-            let group = (which[lane] as u32) * 8 + lane as u32;
-            next = next.min(second[lane]);
-            if least[lane] < best.0 || (least[lane] == best.0 && group < best.1) {
-                next = next.min(best.0);
-                best = (least[lane], group);
-            } else {
-                next = next.min(least[lane]);
+        let mut all = [0.0; 16];
+        all[..8].copy_from_slice(&least.to_array());
+        all[8..].copy_from_slice(&second.to_array());
+        all.sort_unstable_by(f32::total_cmp);
+        let reach = all[1].sqrt() + wider + 2.0 * SLACK;
+        let reach = f32x8::splat(reach * reach);
+        self.candidates.clear();
+        for (at, eight) in centroids.eights.iter().enumerate() {
+            let mut near = f32x8::ZERO;
+            for (axis, value) in [eight.x, eight.y, eight.z].into_iter().enumerate() {
+                let out = (low[axis] - value).max(value - high[axis]).max(f32x8::ZERO);
+                near += out * out;
+            }
+            let mut mask = near.cmp_le(reach).move_mask() as u32;
+            while mask != 0 {
+                let group = at as u32 * 8 + mask.trailing_zeros();
+                mask &= mask - 1;
+                if (group as usize) < centroids.places.len() {
+                    self.candidates.push(group);
+                }
             }
         }
-        (best.1, best.0, next)
+    }
+}
+
+impl Eight {
+    fn new<'a>(places: impl Iterator<Item = &'a Place>) -> Self {
+        let mut lanes = [[f32::INFINITY; 8]; 3];
+        for (lane, place) in places.take(8).enumerate() {
+            for (lanes, value) in lanes.iter_mut().zip(place) {
+                lanes[lane] = *value;
+            }
+        }
+        let [x, y, z] = lanes.map(f32x8::new);
+        Self { x, y, z }
     }
 }

@@ -29,10 +29,8 @@ pub(super) struct Space {
 impl Space {
     pub(super) fn new(points: &[Vec3], fixed: &[Vec3]) -> Self {
         let first = points.first().copied().unwrap_or_default();
-        let (low, high) = points
-            .iter()
-            .chain(fixed)
-            .fold((first, first), |(low, high), point| (low.min(*point), high.max(*point)));
+        let (low, high) =
+            points.iter().chain(fixed).fold((first, first), |(low, high), point| (low.min(*point), high.max(*point)));
         let (low, high) = (low.as_dvec3(), high.as_dvec3());
         let middle = (low + high) * 0.5;
         let half = ((high - low) * 0.5).max_element();

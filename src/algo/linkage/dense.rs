@@ -59,8 +59,7 @@ fn plant(clusters: &[Cluster], points: &Points) -> (Vec<Tree>, Points) {
         parts.push(part);
         rest = next;
     }
-    let trees =
-        clusters.par_iter().zip(parts).map(|(cluster, part)| Tree::new(points, cluster.span, part)).collect();
+    let trees = clusters.par_iter().zip(parts).map(|(cluster, part)| Tree::new(points, cluster.span, part)).collect();
     let mut sorted = Points::with_capacity(points.len());
     for &at in &order {
         sorted.push(points.at(at as usize));
@@ -159,8 +158,7 @@ impl Matrix {
     fn merge(&mut self, a: usize, b: usize, history: &mut History) {
         let (first, second) = (self.rows[a], self.rows[b]);
         let size = first.size + second.size;
-        let (part_a, part_b) =
-            (f64::from(first.size) / f64::from(size), f64::from(second.size) / f64::from(size));
+        let (part_a, part_b) = (f64::from(first.size) / f64::from(size), f64::from(second.size) / f64::from(size));
         let count = self.rows.len();
         for to in 0..count {
             let mean = part_a * self.cells[a * self.stride + to] + part_b * self.cells[b * self.stride + to];

@@ -73,7 +73,7 @@ pub(super) fn run<const SQUARE: bool>(points: &[Vec3], progress: Progress) -> Re
     report(count)?;
     let frame = Frame::of(points);
     let mut engine = Engine::new(points, &frame);
-    let mut work: Vec<u32> = (0..count as u32).collect();
+    let mut work: Vec<u32> = (0..engine.alive as u32).collect();
     let last = if SQUARE { 1 } else { dense::clusters(count) };
     while engine.alive > last {
         engine.round::<SQUARE>(&mut work);
@@ -90,6 +90,43 @@ pub(super) fn run<const SQUARE: bool>(points: &[Vec3], progress: Progress) -> Re
     report(0)?;
     let unit = if SQUARE { frame.unit * frame.unit } else { frame.unit };
     Ok(engine.history.finish(unit))
+}
+
+/// A place with all points that lie there.
+struct Place {
+    /// One of them.
+    first: u32,
+    node: u32,
+    size: u32,
+}
+
+/// Merges points that coincide, which are each other's nearest in any case: searches would meet all of them as ties.
+fn merge_equal(points: &[Vec3], history: &mut History) -> Vec<Place> {
+    let bits = |at: u32| (points[at as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
+    let mut order: Vec<(u64, u32)> = (0..points.len() as u32).map(|at| (mix(bits(at)), at)).collect();
+    order.par_sort_unstable();
+    let mut places: Vec<Place> = Vec::with_capacity(points.len());
+    for run in order.chunk_by(|a, b| a.0 == b.0) {
+        // Places that only share their key are told apart.
+        let start = places.len();
+        for &(_, at) in run {
+            match places[start..].iter_mut().find(|place| bits(place.first) == bits(at)) {
+                Some(place) => {
+                    place.size += 1;
+                    place.node = history.join(place.node, at, 0.0, place.size);
+                }
+                None => places.push(Place { first: at, node: at, size: 1 }),
+            }
+        }
+    }
+    places.sort_unstable_by_key(|place| place.first);
+    places
+}
+
+fn mix([x, y, z]: [u32; 3]) -> u64 {
+    let mut key = (u64::from(x) << 32 | u64::from(y)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    key = (key ^ key >> 29 ^ u64::from(z)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    key ^ key >> 32
 }
 
 /// Where points are and how large: inside, they span one unit, so that no square is too large or too small.
@@ -119,33 +156,42 @@ impl Frame {
 impl Engine {
     fn new(points: &[Vec3], frame: &Frame) -> Self {
         let count = points.len();
-        let mut sites: Vec<Site> =
-            points.iter().enumerate().map(|(at, point)| Site { at: point.to_array(), index: at as u32 }).collect();
+        let mut history = History::new(count);
+        let places = merge_equal(points, &mut history);
+        let mut sites: Vec<Site> = places
+            .iter()
+            .enumerate()
+            .map(|(at, place)| Site { at: points[place.first as usize].to_array(), index: at as u32 })
+            .collect();
         kd::order(&mut sites);
         let scale = 1.0 / frame.unit;
         let mut own = Points::with_capacity(2 * count + 128);
-        let clusters = sites
+        let clusters: Vec<Cluster> = sites
             .iter()
-            .enumerate()
-            .map(|(at, site)| {
+            .map(|site| {
+                let Place { node, size, .. } = places[site.index as usize];
                 // Scaling by a power of two is exact.
                 let place = site.at.map(|value| (f64::from(value) * scale) as f32);
-                own.push(place);
+                let start = own.len() as u32;
+                for _ in 0..size {
+                    own.push(place);
+                }
                 Cluster {
                     mean: place.map(f64::from),
                     variance: 0.0,
-                    span: Span { start: at as u32, size: 1 },
-                    node: site.index,
+                    span: Span { start, size },
+                    node,
                     nearest: NONE,
                     distance: f64::INFINITY,
                 }
             })
             .collect();
+        let count = clusters.len();
         let mut engine = Self {
             clusters,
             points: own,
             boxes: Boxes::default(),
-            history: History::new(count),
+            history,
             asked_by: vec![NONE; count],
             next_asker: vec![NONE; count],
             alive: count,
@@ -164,8 +210,7 @@ impl Engine {
 
     /// One round. `work` holds the slots whose nearest cluster is not known, in order, before and after.
     fn round<const SQUARE: bool>(&mut self, work: &mut Vec<u32>) {
-        let scene =
-            Scene { clusters: &self.clusters, boxes: &self.boxes, points: &self.points, slack: self.slack };
+        let scene = Scene { clusters: &self.clusters, boxes: &self.boxes, points: &self.points, slack: self.slack };
         let found: Vec<Option<(u32, f64)>> = if work.len() <= ALONE {
             let mut room = Room::default();
             work.iter().map(|&slot| scene.nearest::<SQUARE>(slot, &mut room)).collect()
@@ -201,7 +246,8 @@ impl Engine {
 
     /// Merges the nearest pair of all. Rounding may leave a ring of ties in which no two are each other's nearest.
     fn merge_least(&mut self, work: &mut Vec<u32>) {
-        let known = self.clusters.iter().enumerate().filter(|(_, cluster)| cluster.is_alive() && cluster.nearest != NONE);
+        let known =
+            self.clusters.iter().enumerate().filter(|(_, cluster)| cluster.is_alive() && cluster.nearest != NONE);
         let least = known.min_by(|a, b| a.1.distance.total_cmp(&b.1.distance).then(a.0.cmp(&b.0)));
         if let Some((slot, cluster)) = least {
             let (a, b) = (slot as u32, cluster.nearest);

@@ -50,8 +50,12 @@ impl History {
     pub(super) fn finish(self, unit: f64) -> Dendrogram {
         let points = self.points;
         // Heights are not negative, so their bits are in order, too.
-        let mut order: Vec<u64> =
-            self.joins.iter().enumerate().map(|(at, join)| u64::from(join.height.to_bits()) << 32 | at as u64).collect();
+        let mut order: Vec<u64> = self
+            .joins
+            .iter()
+            .enumerate()
+            .map(|(at, join)| u64::from(join.height.to_bits()) << 32 | at as u64)
+            .collect();
         order.par_sort_unstable();
         let mut rank = vec![0_u32; order.len()];
         for (at, &key) in order.iter().enumerate() {
@@ -66,7 +70,12 @@ impl History {
             .map(|&key| {
                 let join = self.joins[key as u32 as usize];
                 let (first, second) = (number(join.first), number(join.second));
-                Merge { first: first.min(second), second: first.max(second), height: (f64::from(join.height) * unit).min(f64::from(f32::MAX)) as f32, size: join.size }
+                Merge {
+                    first: first.min(second),
+                    second: first.max(second),
+                    height: (f64::from(join.height) * unit).min(f64::from(f32::MAX)) as f32,
+                    size: join.size,
+                }
             })
             .collect();
         Dendrogram { points, merges }

@@ -161,13 +161,15 @@ fn far(a: &Block, b: &Block) -> Option<f64> {
     let p4 = f(0) * xx * xx
         + f(1) * yy * yy
         + f(2) * zz * zz
-        + 4.0
-            * (xx * (f(3) * xy + f(4) * xz) + yy * (f(5) * xy + f(6) * yz) + zz * (f(7) * xz + f(8) * yz))
+        + 4.0 * (xx * (f(3) * xy + f(4) * xz) + yy * (f(5) * xy + f(6) * yz) + zz * (f(7) * xz + f(8) * yz))
         + 6.0 * (f(9) * xx * yy + f(10) * xx * zz + f(11) * yy * zz)
         + 12.0 * (f(12) * xx * yz + f(13) * yy * xz + f(14) * zz * xy)
         + 6.0 * pa * pb;
     let g = |at: usize| a.fourth_trace[at] + b.fourth_trace[at];
-    let p2s = g(0) * xx + g(1) * yy + g(2) * zz + 2.0 * (g(3) * xy + g(4) * xz + g(5) * yz)
+    let p2s = g(0) * xx
+        + g(1) * yy
+        + g(2) * zz
+        + 2.0 * (g(3) * xy + g(4) * xz + g(5) * yz)
         + pa * b.square
         + pb * a.square
         + 4.0 * dot(ca, cb);
