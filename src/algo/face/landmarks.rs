@@ -102,7 +102,7 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
         }
     }
     let size = high - low;
-    if triangles.is_empty() || !(size.max_element() > 0.0) {
+    if triangles.is_empty() || size.max_element() <= 0.0 {
         return Err(LandmarkError::Empty);
     }
     if size.min_element() < 1e-3 * size.max_element() {

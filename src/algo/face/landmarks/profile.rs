@@ -150,7 +150,7 @@ impl Curve {
                 _ => {}
             }
         }
-        (best.1 > best.0 + 1).then(|| (start - (best.0 as f32 - 0.5) * STEP, start - (best.1 as f32 - 0.5) * STEP))
+        (best.1 > best.0 + 1).then_some((start - (best.0 as f32 - 0.5) * STEP, start - (best.1 as f32 - 0.5) * STEP))
     }
 
     /// Finds the features; `tall` is how tall the face is for its width.
