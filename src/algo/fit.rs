@@ -179,7 +179,7 @@ pub enum FitError {
 ///
 /// Each point gets one to [`FitSettings::influences`] joints, strongest first, positive, summing to one; points that
 /// no shape moves belong to the head alone. The result does not depend on the number of threads. Cost: a round is
-/// linear in points times shapes times bones (some 12 to 20 of them a point); 9,000 moving points, 57 shapes and 40 bones
+/// linear in points times shapes times bones (some ten of them a point); 9,000 moving points, 57 shapes and 40 bones
 /// take about three seconds on two cores.
 ///
 /// # Errors
@@ -221,7 +221,8 @@ pub fn fit(
         moments.improve(&mut moves, 1, 2);
         centers = (0..bones).map(|bone| moments.center(bone)).collect();
         renewed.clear();
-        if round % 3 == 2 && 10 * round < 7 * rounds {
+        // What begins anew needs some rounds to settle.
+        if round % 2 == 1 && 5 * round < 4 * rounds && round + 4 < rounds {
             let (first, most) = (settings.start.len(), bones.div_ceil(10));
             renewed = renew::renew(&problem, &columns, &mut influences, &mut moves, &left, first, most);
         }
@@ -334,7 +335,7 @@ struct Near<'a> {
 impl Near<'_> {
     /// The nearest bones, those that the point follows already, those of its neighbours and new ones; sorted.
     fn of(&self, point: usize, out: &mut Vec<u32>) {
-        const NEAREST: usize = 12;
+        const NEAREST: usize = 8;
         if self.bones <= NEAREST || self.centers.is_empty() {
             out.extend(0..self.bones as u32);
             return;

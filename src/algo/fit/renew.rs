@@ -12,9 +12,9 @@ use super::{
 };
 
 /// How many points around a seed say how a bone there begins.
-const PATCH: usize = 24;
+const PATCH: usize = 40;
 /// A bone there will serve more points than those; how much more it is hoped to gain.
-const GAIN: f64 = 3.0;
+const GAIN: f64 = 6.0;
 
 /// Gives up to `most` of the bones from `first` on a new beginning, and returns which, sorted.
 ///
