@@ -21,6 +21,7 @@ mod editor_files;
 mod edits;
 mod exports;
 mod face;
+mod face_bones;
 mod face_fit;
 mod face_landmarks;
 mod files;

@@ -13,7 +13,11 @@ mod spread;
 use glam::Vec3;
 
 use crate::algo::{
-    face::{grouping::HeadGroups, landmarks::Landmarks, shells::{ShellKind, Shells}},
+    face::{
+        grouping::HeadGroups,
+        landmarks::Landmarks,
+        shells::{ShellKind, Shells},
+    },
     kmeans::KMeansError,
 };
 use map::{FaceMap, Part};
@@ -235,9 +239,7 @@ pub fn place_bones(
         .iter()
         .zip(&seen)
         .filter(|(_, seen)| **seen)
-        .map(|(p, _)| {
-            f64::from(bones.iter().map(|b| b.position.distance_squared(*p)).fold(f32::INFINITY, f32::min))
-        })
+        .map(|(p, _)| f64::from(bones.iter().map(|b| b.position.distance_squared(*p)).fold(f32::INFINITY, f32::min)))
         .sum();
     extras(points, shells, landmarks, &map, fixed, settings.extras, &mut bones);
     if !progress(1.0) {
@@ -328,7 +330,9 @@ fn spread(spreader: &mut Spreader, patches: &[[Patch; 2]], fixed: &[Fixed]) -> R
     let mut quotas = spread::quotas(settings.bones, &least, &empty, symmetric);
     // What found no room anywhere goes to the largest part of the middle.
     let missing = settings.bones - quotas.iter().sum::<usize>().min(settings.bones);
-    if missing > 0 && let Some(part) = (0..PARTS.len()).find(|&p| !empty[p]) {
+    if missing > 0
+        && let Some(part) = (0..PARTS.len()).find(|&p| !empty[p])
+    {
         quotas[part] += missing;
     }
     let mut seats = Vec::with_capacity(settings.bones);
@@ -434,7 +438,8 @@ fn extras(
     bones: &mut Vec<FaceBone>,
 ) {
     let given = |kind: FaceBoneKind, side: Option<Side>| {
-        let is = |f: &FixedBone| f.kind == kind && side.is_none_or(|s| (s == Side::Right) == (f.position.x < map.middle));
+        let is =
+            |f: &FixedBone| f.kind == kind && side.is_none_or(|s| (s == Side::Right) == (f.position.x < map.middle));
         fixed.iter().position(is).map(|i| (fixed[i].position, Some(i)))
     };
     let ear: Vec3 = map.halves.iter().map(|h| h.jaw[8] + h.jaw[6]).sum::<Vec3>() / 4.0;

@@ -129,7 +129,8 @@ impl FaceMap {
         let wing = half.base[2];
         let top = half.bridge[0].y;
         let down = ((top - p.y) / (top - wing.y).max(1e-3 * e)).clamp(0.0, 1.0);
-        if p.y < top + 0.03 * e && p.y > half.base[0].y - 0.07 * e && p.x < 0.09 * e + (1.3 * wing.x - 0.09 * e) * down {
+        if p.y < top + 0.03 * e && p.y > half.base[0].y - 0.07 * e && p.x < 0.09 * e + (1.3 * wing.x - 0.09 * e) * down
+        {
             return Part::Nose;
         }
         let outer = half.upper_lid[3];
@@ -141,6 +142,18 @@ impl FaceMap {
         }
         let corner = half.upper_lip[3];
         if p.y < height(&[corner, half.jaw[6]], p.x) { Part::Jaw } else { Part::Cheek }
+    }
+
+    /// How near a place is to brows, eyes, nose and mouth: 1 on them, falling to 0 over half the face.
+    pub fn restless(&self, place: Vec3) -> f32 {
+        if !self.trusted {
+            return 0.0;
+        }
+        let (half, p) = self.fold(place);
+        let lines: [&[Vec3]; 5] = [&half.brow, &half.lower_lid, &half.upper_lip, &half.lower_lip, &half.base];
+        let distance = lines.iter().map(|line| line_distance(line, p)).fold(f32::INFINITY, f32::min);
+        let far = distance / (0.2 * self.scale);
+        1.0 / (1.0 + far * far)
     }
 
     /// How far inside the corner of the lips a place is, as a share of half the mouth's width; negative outside.
@@ -211,8 +224,10 @@ impl Half {
     fn lip(&self, p: Vec3, e: f32) -> Option<Part> {
         let over = p.y > height(&self.lip_line(), p.x);
         let corner = self.lip_corner();
-        let inside =
-            p.x < corner.x && p.y < height(&self.upper_lip, p.x) && p.y > height(&self.lower_lip, p.x) && p.z > corner.z - 0.1 * e;
+        let inside = p.x < corner.x
+            && p.y < height(&self.upper_lip, p.x)
+            && p.y > height(&self.lower_lip, p.x)
+            && p.z > corner.z - 0.1 * e;
         let distance = line_distance(if over { &self.upper_lip } else { &self.lower_lip }, p);
         if !inside && distance > if over { 0.07 * e } else { 0.05 * e } {
             return None;
@@ -227,18 +242,21 @@ impl Half {
 
 /// Landmarks of the left half, in the order of the lines of [`Half`].
 const LEFT: [usize; 43] = [
-    22, 23, 24, 25, 26, 42, 43, 44, 45, 42, 47, 46, 45, 51, 52, 53, 54, 57, 56, 55, 54, 62, 63, 64, 66, 65, 64, 27, 28, 29,
-    30, 33, 34, 35, 8, 9, 10, 11, 12, 13, 14, 15, 16,
+    22, 23, 24, 25, 26, 42, 43, 44, 45, 42, 47, 46, 45, 51, 52, 53, 54, 57, 56, 55, 54, 62, 63, 64, 66, 65, 64, 27, 28,
+    29, 30, 33, 34, 35, 8, 9, 10, 11, 12, 13, 14, 15, 16,
 ];
 /// Landmarks of the right half, in the same order.
 const RIGHT: [usize; 43] = [
-    21, 20, 19, 18, 17, 39, 38, 37, 36, 39, 40, 41, 36, 51, 50, 49, 48, 57, 58, 59, 48, 62, 61, 60, 66, 67, 60, 27, 28, 29,
-    30, 33, 32, 31, 8, 7, 6, 5, 4, 3, 2, 1, 0,
+    21, 20, 19, 18, 17, 39, 38, 37, 36, 39, 40, 41, 36, 51, 50, 49, 48, 57, 58, 59, 48, 62, 61, 60, 66, 67, 60, 27, 28,
+    29, 30, 33, 32, 31, 8, 7, 6, 5, 4, 3, 2, 1, 0,
 ];
 
 /// The distance of a point from a line of segments.
 pub(crate) fn line_distance(line: &[Vec3], p: Vec3) -> f32 {
-    line.windows(2).map(|s| (p - nearest_on_segment(s[0], s[1], p)).length_squared()).fold(f32::INFINITY, f32::min).sqrt()
+    line.windows(2)
+        .map(|s| (p - nearest_on_segment(s[0], s[1], p)).length_squared())
+        .fold(f32::INFINITY, f32::min)
+        .sqrt()
 }
 
 /// The point of a segment nearest to `p`.

@@ -2,7 +2,11 @@
 
 use glam::Vec3;
 
-use super::{FaceBone, FaceBoneKind, Region, Side, map::{FaceMap, Part}, spread::Seat};
+use super::{
+    FaceBone, FaceBoneKind, Region, Side,
+    map::{FaceMap, Part},
+    spread::Seat,
+};
 
 impl Region {
     /// The word that labels begin with.

@@ -145,7 +145,7 @@ pub(crate) fn patches(
         let part = map.part(middle);
         let patch = &mut patches[group_of(part)][usize::from(middle.x < map.middle)];
         patch.corners.push(c);
-        patch.masses.push(mass * density(part));
+        patch.masses.push(mass * density(part, map.restless(middle)));
         area += mass;
     }
     if area <= 0.0 {
@@ -156,14 +156,14 @@ pub(crate) fn patches(
     patches
 }
 
-/// How much more a part of the face moves than plain skin.
-fn density(part: Part) -> f64 {
-    match part {
-        Part::Nose => 2.2,
-        Part::Cheek => 1.2,
-        Part::Jaw => 1.0,
-        Part::Forehead => 0.7,
-        Part::Temple => 0.4,
-        _ => 1.0,
-    }
+/// How much more a part of the face moves than plain skin; `near` is 1 beside eyes, nose and mouth, 0 far from them.
+fn density(part: Part, near: f32) -> f64 {
+    let own = match part {
+        Part::Nose => 1.3,
+        Part::Forehead => 0.8,
+        Part::Temple => 0.5,
+        Part::Cheek | Part::Jaw => 1.0,
+        _ => return 1.0,
+    };
+    own * (0.25 + f64::from(near))
 }

@@ -23,12 +23,12 @@ pub(crate) struct PartRule {
 
 /// The parts by number: the rest, upper and lower lip, corners, brows, upper and lower lids.
 pub(crate) const PARTS: [PartRule; 7] = [
-    PartRule { share: 0.34, lateral: false, most: usize::MAX },
+    PartRule { share: 0.42, lateral: false, most: usize::MAX },
     PartRule { share: 0.12, lateral: false, most: usize::MAX },
     PartRule { share: 0.10, lateral: false, most: usize::MAX },
-    PartRule { share: 0.12, lateral: true, most: 2 },
-    PartRule { share: 0.16, lateral: true, most: usize::MAX },
-    PartRule { share: 0.13, lateral: true, most: usize::MAX },
+    PartRule { share: 0.17, lateral: true, most: 2 },
+    PartRule { share: 0.19, lateral: true, most: usize::MAX },
+    PartRule { share: 0.15, lateral: true, most: usize::MAX },
     PartRule { share: 0.09, lateral: true, most: usize::MAX },
 ];
 
@@ -75,7 +75,9 @@ pub(crate) fn quotas(bones: usize, least: &[usize], empty: &[bool], paired: bool
             if cost > left || have + cost > rule.most {
                 continue;
             }
-            let score = rule.share / (have as f64 + 0.5 * cost as f64);
+            // The rest comes late: a few bones are better spent on lips, brows and lids.
+            let offset = if part == 0 { 1.0 } else { 0.5 * cost as f64 };
+            let score = rule.share / (have as f64 + offset);
             if best.is_none_or(|b| score > b.0) {
                 best = Some((score, part, cost));
             }
@@ -225,7 +227,13 @@ impl Spreader<'_> {
         p.with_x((p.x - self.map.middle).abs())
     }
 
-    fn run(&mut self, points: &[Vec3], fixed: &[Vec3], groups: usize, part: usize) -> Result<Vec<Vec3>, FaceBonesError> {
+    fn run(
+        &mut self,
+        points: &[Vec3],
+        fixed: &[Vec3],
+        groups: usize,
+        part: usize,
+    ) -> Result<Vec<Vec3>, FaceBonesError> {
         if groups <= fixed.len() {
             return Ok(fixed[..groups].to_vec());
         }

@@ -53,12 +53,10 @@ impl Sides {
                 if lips && face.map.lip_inset(bone.position) < 0.14 {
                     continue;
                 }
-                let nearest = (0..n)
-                    .filter(|&v| rims[v] != Rim::None && face.mask[v])
-                    .min_by(|&a, &b| {
-                        let to = bone.position;
-                        face.places[a].distance_squared(to).total_cmp(&face.places[b].distance_squared(to))
-                    });
+                let nearest = (0..n).filter(|&v| rims[v] != Rim::None && face.mask[v]).min_by(|&a, &b| {
+                    let to = bone.position;
+                    face.places[a].distance_squared(to).total_cmp(&face.places[b].distance_squared(to))
+                });
                 rim[opening] = nearest.map_or(Rim::None, |v| rims[v]);
             }
         }
@@ -90,13 +88,18 @@ impl Sides {
         keep
     }
 
+    /// True if two bones lie across an opening from each other.
+    pub fn apart(&self, a: usize, b: usize) -> bool {
+        let across = |o: usize| {
+            matches!((self.bones[a][o], self.bones[b][o]), (Rim::Upper, Rim::Lower) | (Rim::Lower, Rim::Upper))
+        };
+        (0..OPENINGS).any(across)
+    }
+
     /// True if a bone may be the nearest one of a vertex.
     pub fn allows(&self, vertex: usize, bone: usize) -> bool {
         (0..OPENINGS).all(|o| {
-            !matches!(
-                (self.bones[bone][o], self.rims[o][vertex]),
-                (Rim::Upper, Rim::Lower) | (Rim::Lower, Rim::Upper)
-            )
+            !matches!((self.bones[bone][o], self.rims[o][vertex]), (Rim::Upper, Rim::Lower) | (Rim::Lower, Rim::Upper))
         })
     }
 }

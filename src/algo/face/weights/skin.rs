@@ -5,7 +5,7 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 use rayon::prelude::*;
 
 use super::{
-    Face, FIRST, FaceWeightsError, HEAD, NECK, Row,
+    FIRST, Face, FaceWeightsError, HEAD, NECK, Row,
     sides::{Rim, Sides, inset},
     smooth,
 };
@@ -15,7 +15,9 @@ use crate::algo::{
 };
 
 /// Width of a heat step as a share of the distance of neighbouring bones.
-const WIDTH: f32 = 0.3;
+const WIDTH: f32 = 0.36;
+/// Bones count as no further apart than this share of the face's scale.
+const WIDEST: f32 = 0.22;
 /// The largest share that the jaw takes of the skin.
 const JAW: f32 = 0.5;
 
@@ -28,7 +30,7 @@ pub(crate) fn rows(
     let n = face.places.len();
     let mut rows: Vec<Row> = vec![Row::new(); n];
     let bones: Vec<usize> = (0..face.bones.len()).filter(|&b| face.bones[b].kind == FaceBoneKind::Skin).collect();
-    let spacing = spacings(face, &bones);
+    let spacing = spacings(face, sides, &bones);
     let widest = spacing.iter().copied().fold(0.0, f32::max);
     let active = around(face, widest);
     let index: Vec<u32> = {
@@ -155,21 +157,24 @@ fn inner(face: &Face, v: usize) -> usize {
     usize::from(mouth && p.y > face.chin + 0.05 * face.map.scale && face.below_lips(face.places[v]) > 0.0)
 }
 
-/// The distance of each bone from its neighbours: the mean of the three nearest.
-fn spacings(face: &Face, bones: &[usize]) -> Vec<f32> {
+/// The distance of each bone from its neighbours: the mean of the three nearest on its side of lips and lids.
+fn spacings(face: &Face, sides: &Sides, bones: &[usize]) -> Vec<f32> {
     bones
         .iter()
         .map(|&bone| {
             let at = face.bones[bone].position;
             let mut near: Vec<f32> = bones
                 .iter()
-                .filter(|&&b| b != bone)
+                .filter(|&&b| b != bone && !sides.apart(b, bone))
                 .map(|&b| face.bones[b].position.distance(at))
                 .filter(|&d| d > 1e-4 * face.map.scale)
                 .collect();
             near.sort_by(f32::total_cmp);
             near.truncate(3);
-            if near.is_empty() { 0.5 * face.map.scale } else { near.iter().sum::<f32>() / near.len() as f32 }
+            let mean =
+                if near.is_empty() { 0.5 * face.map.scale } else { near.iter().sum::<f32>() / near.len() as f32 };
+            // Few bones do not blur a whole face.
+            mean.min(WIDEST * face.map.scale)
         })
         .collect()
 }
@@ -228,7 +233,7 @@ fn spread(
                 continue;
             }
             let j = index[other];
-            let width = start.get(j as usize).map_or(own, |s| 0.5 * (s.1 + own)) * WIDTH;
+            let width = start.get(j as usize).map_or(own, |s| s.1.min(own)) * WIDTH;
             let flow = f64::from(width) * f64::from(width) * f64::from(weight);
             diagonal += flow;
             if j == u32::MAX {
@@ -251,10 +256,8 @@ fn spread(
     let blocks: Vec<Vec<Lane>> = (0..columns.div_ceil(LANES))
         .into_par_iter()
         .map(|block| {
-            let mut lanes: Vec<Lane> = start
-                .iter()
-                .map(|s| std::array::from_fn(|l| f64::from(u8::from(s.0 == block * LANES + l))))
-                .collect();
+            let mut lanes: Vec<Lane> =
+                start.iter().map(|s| std::array::from_fn(|l| f64::from(u8::from(s.0 == block * LANES + l)))).collect();
             for _ in 0..2 {
                 for (i, lane) in lanes.iter_mut().enumerate() {
                     for value in lane.iter_mut() {
