@@ -9,7 +9,7 @@
 //! 1. While there are many clusters, each keeps its mean and its variance. With Δ between two means, the mean distance lies
 //!    in |Δ| ≤ d ≤ √(Δ² + var + var) (Jensen's inequality both ways), which leaves a handful of candidates; a hierarchy of
 //!    boxes over the means finds them, and sums over their pairs of points decide.
-//! 2. Once a thousand clusters are left, a matrix of all mean distances is filled, far pairs from their moments up to the
+//! 2. Once a few hundred clusters are left, a matrix of all mean distances is filled, far pairs from their moments up to the
 //!    fourth with a proven bound on the rest, and kept by Lance and Williams' formula.
 //!
 //! Sums decide in single precision only where their error cannot matter; near ties are summed again in double precision,
@@ -119,8 +119,8 @@ pub enum LinkageError {
 
 /// Average linkage of points in space: the distance of two clusters is the mean Euclidean distance over all pairs.
 ///
-/// Heights are in the units of the points, exact to 1e-5 of themselves. Memory is linear in the points (plus 12 MB at
-/// most). Time on surfaces grows about as n log n; points that all lie at one place or evenly in space are
+/// Heights are in the units of the points, exact to 1e-5 of themselves. Memory is linear in the points (some 150 bytes each, and 1 MB
+/// more). Time on surfaces grows about as n log n; points that lie evenly in space (many ties) are
 /// slower, never wrong.
 pub fn average_linkage(points: &[Vec3], progress: Progress) -> Result<Dendrogram, LinkageError> {
     check(points)?;
