@@ -1,1 +1,209 @@
-//! To be written.
+//! Axes: which way a head looks and where its crown is.
+//!
+//! Width is the direction across the plane that mirrors the head best. What is up and what is forward is then one of
+//! four, and the shape has to say: faces are rough, with eyes, nose and mouth, where the back of a head and its crown are
+//! smooth; the neck is where an open mesh ends; and eyeballs lie in front.
+
+use glam::{Mat3, Quat, Vec3};
+use thiserror::Error;
+
+use super::{
+    sections::border,
+    shells::{ShellKind, find_shells},
+};
+
+mod mirror;
+
+/// How a head stands in the space of its mesh: unit vectors at right angles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadAxes {
+    /// Towards the crown.
+    pub up: Vec3,
+    /// Where the face looks.
+    pub forward: Vec3,
+}
+
+impl HeadAxes {
+    /// The rotation from the mesh's space to head space (+x the character's left, +y up, +z forward).
+    pub fn rotation(&self) -> Quat {
+        let left = self.up.cross(self.forward);
+        if (self.up, self.forward) == (Vec3::Y, Vec3::Z) {
+            return Quat::IDENTITY;
+        }
+        Quat::from_mat3(&Mat3::from_cols(left, self.up, self.forward).transpose()).normalize()
+    }
+}
+
+/// Axes, and whether the shape says so clearly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxesGuess {
+    /// The axes.
+    pub axes: HeadAxes,
+    /// False if a person should confirm them.
+    pub certain: bool,
+}
+
+/// Why there are no axes.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum AxesError {
+    /// Nothing to look at.
+    #[error("the mesh has no points or no triangles; pick a mesh with a surface")]
+    Empty,
+    /// A coordinate is infinite or not a number.
+    #[error("point {point} has a coordinate that is not a finite number; remove it or repair the mesh")]
+    NotFinite {
+        /// Its index.
+        point: usize,
+    },
+    /// A given direction is none.
+    #[error("the given direction of up or forward has no length; name an axis such as +y")]
+    NoDirection,
+    /// Up and forward given along one line.
+    #[error("up and forward are along one line; they have to be at right angles, such as +y and +z")]
+    Parallel,
+}
+
+/// Guesses how a head stands among the 24 ways along the axes of its space, and honours what is given.
+///
+/// `points` are in the mesh's space and any unit. A given `up` is kept; a given `forward` is made to be at right angles
+/// to `up`, or kept where only it is given. Where the shape says nothing, +y is up and +z forward, and the guess is not
+/// certain.
+///
+/// # Errors
+/// [`AxesError`]: nothing to look at, coordinates that are not finite, directions without length or along one line.
+/// Linear time, a few milliseconds for 10,000 points.
+pub fn guess_axes(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    up: Option<Vec3>,
+    forward: Option<Vec3>,
+) -> Result<AxesGuess, AxesError> {
+    if points.is_empty() || triangles.is_empty() {
+        return Err(AxesError::Empty);
+    }
+    if let Some(point) = points.iter().position(|point| !point.is_finite()) {
+        return Err(AxesError::NotFinite { point });
+    }
+    let unit = |given: Option<Vec3>| match given {
+        Some(given) => given.try_normalize().map(Some).ok_or(AxesError::NoDirection),
+        None => Ok(None),
+    };
+    let (up, forward) = (unit(up)?, unit(forward)?);
+    if let (Some(up), Some(forward)) = (up, forward) {
+        let forward = forward.reject_from(up);
+        if forward.length() < 1e-3 {
+            return Err(AxesError::Parallel);
+        }
+        return Ok(AxesGuess { axes: HeadAxes { up, forward: forward.normalize() }, certain: true });
+    }
+    // In the frame of what is given: its direction becomes an axis.
+    let frame = match (up, forward) {
+        (Some(up), _) => Quat::from_rotation_arc(up, Vec3::Y),
+        (_, Some(forward)) => Quat::from_rotation_arc(forward, Vec3::Z),
+        _ => Quat::IDENTITY,
+    };
+    let turned: Vec<Vec3> = points.iter().map(|point| frame * *point).collect();
+    let signs = Signs::new(&turned, triangles);
+    let possible = ways().filter(|(u, f)| up.is_none_or(|_| *u == Vec3::Y) && forward.is_none_or(|_| *f == Vec3::Z));
+    let mut scored: Vec<(f32, Vec3, Vec3)> = possible.map(|(u, f)| (signs.score(u, f), u, f)).collect();
+    // The usual way comes first and wins ties, since sorting keeps the order of equals.
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (best, u, f) = scored.first().copied().unwrap_or((0.0, Vec3::Y, Vec3::Z));
+    let margin = best - scored.get(1).map_or(f32::MIN, |next| next.0);
+    let certain = signs.symmetric && margin >= CLEAR;
+    // A weak lead says nothing against what nearly all files do.
+    let (u, f) = if certain { (u, f) } else { scored.iter().map(|way| (way.1, way.2)).fold((u, f), usual) };
+    let back = frame.inverse();
+    let axes = HeadAxes { up: up.unwrap_or(back * u), forward: forward.unwrap_or(back * f) };
+    Ok(AxesGuess { axes, certain })
+}
+
+/// The usual way, if it is among those possible.
+fn usual(best: (Vec3, Vec3), way: (Vec3, Vec3)) -> (Vec3, Vec3) {
+    if way == (Vec3::Y, Vec3::Z) { way } else { best }
+}
+
+/// A lead in score from which a guess is certain.
+const CLEAR: f32 = 0.25;
+
+/// The 24 ways to stand, the usual one first.
+fn ways() -> impl Iterator<Item = (Vec3, Vec3)> {
+    const AXES: [Vec3; 6] = [Vec3::Y, Vec3::Z, Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z, Vec3::NEG_X];
+    const FORWARD: [Vec3; 6] = [Vec3::Z, Vec3::Y, Vec3::X, Vec3::NEG_Z, Vec3::NEG_Y, Vec3::NEG_X];
+    AXES.into_iter().flat_map(|up| FORWARD.into_iter().filter(move |f| f.dot(up) == 0.0).map(move |f| (up, f)))
+}
+
+/// What the shape says of directions.
+struct Signs {
+    /// How much each axis is unlike width: 0 for a perfect mirror, 1 for none.
+    skew: Vec3,
+    symmetric: bool,
+    /// From the open end to the middle; towards the crown. Length up to 1.
+    crown: Vec3,
+    /// From the middle to where the surface is rough.
+    rough: Vec3,
+    /// From the middle to the eyes.
+    eyes: Option<Vec3>,
+    /// Third moment along each axis by extent: noses and snouts reach far.
+    reach: Vec3,
+}
+
+impl Signs {
+    fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let (low, high) = points.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
+        let half = ((high - low) * 0.5).max(Vec3::splat(f32::MIN_POSITIVE));
+        let size = half.max_element();
+        let (mut surface, mut area) = (Vec3::ZERO, 0.0_f32);
+        let mut cloud = Vec::with_capacity(triangles.len());
+        for triangle in triangles {
+            let [Some(a), Some(b), Some(c)] = triangle.map(|corner| points.get(corner as usize).copied()) else {
+                continue;
+            };
+            let (weight, at) = ((b - a).cross(c - a).length(), (a + b + c) / 3.0);
+            surface += at * weight;
+            area += weight;
+            cloud.push(at);
+        }
+        let center = surface / area.max(f32::MIN_POSITIVE);
+        let skew = mirror::skew(points, triangles, (low + high) * 0.5, size);
+        // Modellers and scanners put small triangles where the detail is.
+        let dense = cloud.iter().copied().sum::<Vec3>() / cloud.len().max(1) as f32;
+        let reach =
+            Vec3::from_array([0, 1, 2].map(|axis| ((low[axis] + high[axis]) * 0.5 - center[axis]) / half[axis]));
+        let end = border::largest(points, triangles).filter(|end| (end.high - end.low).max_element() > 0.3 * size);
+        let crown = end.map_or(Vec3::ZERO, |end| (center - end.center) / size);
+        let shells = find_shells(points, triangles);
+        let mut balls = [(Vec3::ZERO, 0_u32); 2];
+        for (point, place) in points.iter().enumerate() {
+            let ball = match shells.kind(point) {
+                ShellKind::LeftEye => &mut balls[0],
+                ShellKind::RightEye => &mut balls[1],
+                _ => continue,
+            };
+            *ball = (ball.0 + *place, ball.1 + 1);
+        }
+        let eyes = (balls[0].1 > 0 && balls[1].1 > 0).then(|| {
+            let middle = (balls[0].0 / balls[0].1 as f32 + balls[1].0 / balls[1].1 as f32) * 0.5;
+            (middle - center) / size
+        });
+        let symmetric = skew.min_element() < 0.35 && {
+            let mut sorted = skew.to_array();
+            sorted.sort_by(f32::total_cmp);
+            sorted[1] - sorted[0] > 0.05
+        };
+        Self { skew, symmetric, crown, rough: (dense - center) / size, eyes, reach }
+    }
+
+    /// How well a way to stand agrees with the shape; higher is better.
+    fn score(&self, up: Vec3, forward: Vec3) -> f32 {
+        let width = up.cross(forward).abs();
+        let mut score = -4.0 * self.skew.dot(width);
+        score += 1.0 * self.crown.dot(up);
+        score += 3.0 * self.rough.dot(forward) - 0.5 * self.rough.dot(up).abs();
+        score += 0.3 * self.reach.dot(forward);
+        if let Some(eyes) = self.eyes {
+            score += 2.0 * eyes.dot(forward) + 0.5 * eyes.dot(up);
+        }
+        score
+    }
+}

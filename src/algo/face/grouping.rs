@@ -239,7 +239,7 @@ fn heights(
     }
     // The lower part is no neck. Where there is one, the split nearest its narrowest section is.
     let bottom = points.iter().map(|point| point.y).fold(f32::MAX, f32::min);
-    let neck = sections::neck(points, &skin, bottom, chin);
+    let neck = sections::neck(points, &skin, sections::border::largest(points, &skin).as_ref(), bottom, chin);
     let Some(narrow) = sections::narrowest(&neck).map(|index| neck[index].at) else { return Ok(plain) };
     let nearest = borders
         .iter()

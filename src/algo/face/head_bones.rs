@@ -1,1 +1,226 @@
-//! To be written.
+//! Head and neck bones: one through each mean of the middle group.
+//!
+//! After "automatic placement of bones on face models", section 3.1: the head bone passes the mean of the upper part in
+//! the direction of up, the neck bone the mean of the lower part in the direction of the neck, and the two are joined.
+//! Seen from the side these two lines meet; where they do is the joint. A straight neck that never meets the head's line,
+//! or far from the skull's base, takes the skull's base instead.
+
+use glam::{Vec2, Vec3};
+use thiserror::Error;
+
+use super::{
+    grouping::HeadGroups,
+    landmarks::Landmarks,
+    sections::{self, Section, border},
+};
+
+/// A bone from its joint to its end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bone {
+    /// Where it turns.
+    pub head: Vec3,
+    /// Where it ends.
+    pub tail: Vec3,
+}
+
+/// The two bones that carry a face, joined: the neck's tail is the head's head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadBones {
+    /// From the root of the neck to the base of the skull.
+    pub neck: Bone,
+    /// From the base of the skull to the crown.
+    pub head: Bone,
+}
+
+/// Why a head has no place for its bones.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum HeadBonesError {
+    /// Nothing there.
+    #[error("the head has no points or no triangles to put bones into; pick a mesh with a surface")]
+    Empty,
+    /// A coordinate is infinite or not a number.
+    #[error("point {point} has a coordinate that is not a finite number; remove it or repair the mesh")]
+    NotFinite {
+        /// Its index.
+        point: usize,
+    },
+    /// No height.
+    #[error("the head is flat: a head bone needs height; check which way is up")]
+    Flat,
+}
+
+/// A section belongs to the neck up to this much wider than its narrowest.
+const NECK_WIDENS: f32 = 1.25;
+/// Where the skull's base is between chin and crown, at the highest: about the upper lip.
+const SKULL_BASE: f32 = 0.35;
+
+/// Places head and neck bones.
+///
+/// All in head space (+x the character's left, +y up, +z forward) and one unit. The head bone is upright, above the
+/// groups' upper mean. A neck that leaves the head backwards, as with most beasts, is followed between its open end and
+/// the skull; a head without neck gets a short neck bone just below the skull's base.
+///
+/// # Errors
+/// [`HeadBonesError`]: no points or triangles, coordinates that are not finite, no height. Linear time.
+pub fn head_bones(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    groups: &HeadGroups,
+    landmarks: &Landmarks,
+) -> Result<HeadBones, HeadBonesError> {
+    if points.is_empty() || triangles.is_empty() {
+        return Err(HeadBonesError::Empty);
+    }
+    if let Some(point) = points.iter().position(|point| !point.is_finite()) {
+        return Err(HeadBonesError::NotFinite { point });
+    }
+    let (low, high) = points.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
+    if high.y <= low.y {
+        return Err(HeadBonesError::Flat);
+    }
+    let shape = Shape { points, triangles, low, high, chin: groups.chin };
+    let center = (landmarks.points[36] + landmarks.points[45]) * 0.25 + groups.upper_mean * 0.5;
+    let end = border::largest(points, triangles).filter(|end| end.is_neck(low, high, center));
+    let bones = match end {
+        Some(end) if (end.center - center).normalize_or_zero().y > -0.6 => slanted(&shape, end.center, center, groups),
+        end => upright(&shape, end.as_ref(), groups),
+    };
+    Ok(if landmarks.symmetric { centered(bones, landmarks.middle) } else { bones })
+}
+
+/// What both ways of placing look at.
+struct Shape<'a> {
+    points: &'a [Vec3],
+    triangles: &'a [[u32; 3]],
+    low: Vec3,
+    high: Vec3,
+    chin: f32,
+}
+
+/// A human neck: below the head.
+fn upright(shape: &Shape, end: Option<&border::End>, groups: &HeadGroups) -> HeadBones {
+    let upper = groups.upper_mean;
+    let crown = crown(shape, upper);
+    let chin = shape.chin.clamp(shape.low.y, crown);
+    let skull = chin + SKULL_BASE * (crown - chin);
+    let below = chin - shape.low.y;
+    let sections = if below > 0.1 * (crown - chin) {
+        sections::neck(shape.points, shape.triangles, end, shape.low.y, chin)
+    } else {
+        Vec::new()
+    };
+    let Some(neck) = NeckLine::new(&sections) else {
+        // No neck: a short one from the bottom of the head, or what a neck would be.
+        let joint = upper.with_y(chin + 0.5 * (skull - chin));
+        let root = joint.with_y(shape.low.y.min(chin) - 0.05 * (crown - chin));
+        return joined(root, joint, crown);
+    };
+    // The neck's line passes the lower mean where that lies in the neck; a mean among the shoulders does not.
+    let place = neck.at(groups.lower_mean.y);
+    let off = (groups.lower_mean - place).with_x(0.0);
+    let inside = groups.lower_mean.y >= neck.bottom && groups.lower_mean.y <= chin && off.length() <= 0.25 * neck.width;
+    let shift = if inside { off.with_y(0.0) } else { Vec3::ZERO };
+    let meet = if neck.slope.y.abs() > 1e-3 {
+        neck.middle.y + (upper.z - neck.middle.z - shift.z) / neck.slope.y
+    } else {
+        (chin + skull) * 0.5
+    };
+    let joint = upper.with_y(meet.clamp(chin, skull));
+    joined(neck.at(neck.bottom) + shift, joint, crown)
+}
+
+/// The neck of a beast: behind the head, from its open end to the skull.
+fn slanted(shape: &Shape, end: Vec3, center: Vec3, groups: &HeadGroups) -> HeadBones {
+    let upper = groups.upper_mean;
+    let axis = (center - end).normalize_or_zero();
+    let (from, to) = (end.dot(axis), center.dot(axis));
+    let sections = sections::sections(shape.points, shape.triangles, axis, [from + 0.04 * (to - from), to], 32);
+    let (bottom, top) = column(shape, upper).unwrap_or((shape.low.y, shape.high.y));
+    let height = top - bottom;
+    let Some(first) = sections.iter().find(|section| section.at >= from + 0.1 * (to - from)) else {
+        let joint = upper.with_y(bottom + 0.4 * height);
+        return joined(end, joint, top);
+    };
+    // Where the middle of the neck passes below the head's line; as high as the skull's base at the most.
+    let passing = sections
+        .iter()
+        .min_by(|a, b| (a.centroid.z - upper.z).abs().total_cmp(&(b.centroid.z - upper.z).abs()))
+        .map_or(upper.y, |section| section.centroid.y);
+    let joint = upper.with_y(passing.clamp(bottom + 0.2 * height, bottom + 0.6 * height));
+    joined(first.centroid, joint, top)
+}
+
+fn joined(root: Vec3, joint: Vec3, crown: f32) -> HeadBones {
+    HeadBones { neck: Bone { head: root, tail: joint }, head: Bone { head: joint, tail: joint.with_y(crown) } }
+}
+
+/// Onto the plane of symmetry.
+fn centered(bones: HeadBones, middle: f32) -> HeadBones {
+    let onto = |bone: Bone| Bone { head: bone.head.with_x(middle), tail: bone.tail.with_x(middle) };
+    HeadBones { neck: onto(bones.neck), head: onto(bones.head) }
+}
+
+/// The crown's height: the top of the head straight above a place.
+fn crown(shape: &Shape, above: Vec3) -> f32 {
+    column(shape, above).map_or(shape.high.y, |(_, top)| top).max(above.y)
+}
+
+/// Where the vertical line through a place enters and leaves the mesh.
+fn column(shape: &Shape, through: Vec3) -> Option<(f32, f32)> {
+    let at = Vec2::new(through.x, through.z);
+    let (mut bottom, mut top) = (f32::MAX, f32::MIN);
+    for triangle in shape.triangles {
+        let [Some(a), Some(b), Some(c)] = triangle.map(|corner| shape.points.get(corner as usize)) else { continue };
+        let [p, q, r] = [a, b, c].map(|corner| Vec2::new(corner.x, corner.z) - at);
+        let area = (q - p).perp_dot(r - p);
+        let weights = Vec3::new(q.perp_dot(r), r.perp_dot(p), p.perp_dot(q)) / area;
+        if area != 0.0 && weights.min_element() >= 0.0 {
+            let height = weights.dot(Vec3::new(a.y, b.y, c.y));
+            bottom = bottom.min(height);
+            top = top.max(height);
+        }
+    }
+    (top > bottom).then_some((bottom, top))
+}
+
+/// The middle of an upright neck: x and z as straight functions of y.
+struct NeckLine {
+    /// Mean of the centroids.
+    middle: Vec3,
+    /// How much x and z change with y.
+    slope: Vec2,
+    /// Height of the neck's root.
+    bottom: f32,
+    /// Depth and width of the narrowest section.
+    width: f32,
+}
+
+impl NeckLine {
+    /// Through the centroids of the sections about the narrowest.
+    fn new(sections: &[Section]) -> Option<Self> {
+        let narrow = sections::narrowest(sections)?;
+        let width = sections[narrow].size();
+        let is_neck = |section: &&Section| section.size() <= NECK_WIDENS * width;
+        let first = narrow - sections[..narrow].iter().rev().take_while(is_neck).count();
+        let last = narrow + sections[narrow..].iter().take_while(is_neck).count();
+        let neck = &sections[first..last.max(first + 1)];
+        let count = neck.len() as f32;
+        let middle = neck.iter().map(|section| section.centroid).sum::<Vec3>() / count;
+        let (mut xy, mut zy, mut yy) = (0.0, 0.0, 0.0);
+        for section in neck {
+            let off = section.centroid - middle;
+            xy += off.x * off.y;
+            zy += off.z * off.y;
+            yy += off.y * off.y;
+        }
+        // More than 25 degrees from up is the slope of chin and shoulders, not of a neck.
+        let slope = if yy > 0.0 && neck.len() >= 3 { Vec2::new(xy, zy) / yy } else { Vec2::ZERO };
+        Some(Self { middle, slope: slope.clamp_length_max(0.45), bottom: neck[0].at, width })
+    }
+
+    /// Where the line is at a height.
+    fn at(&self, height: f32) -> Vec3 {
+        let up = height - self.middle.y;
+        Vec3::new(self.middle.x + self.slope.x * up, height, self.middle.z + self.slope.y * up)
+    }
+}

@@ -4,6 +4,10 @@
 
 use glam::{Vec2, Vec3};
 
+pub mod border;
+
+use self::border::End;
+
 /// What one plane cuts out of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Section {
@@ -18,9 +22,9 @@ pub struct Section {
 }
 
 impl Section {
-    /// The side of a square as large as the box around the outline.
+    /// The larger extent. A slanted cut through shoulders leaves shallow arcs, which are no neck for being shallow.
     pub fn size(&self) -> f32 {
-        (self.extent.x * self.extent.y).max(0.0).sqrt()
+        self.extent.max_element()
     }
 }
 
@@ -100,9 +104,13 @@ pub fn narrowest(sections: &[Section]) -> Option<usize> {
     (0..sections.len()).min_by(|a, b| sections[*a].size().total_cmp(&sections[*b].size()))
 }
 
-/// The neck of an upright head: horizontal sections from `bottom` to the underside of the chin.
-pub fn neck(points: &[Vec3], triangles: &[[u32; 3]], bottom: f32, chin: f32) -> Vec<Section> {
-    // The very edge of an open mesh is ragged.
+/// The neck of an upright head: horizontal sections from its open `end`, or the `bottom` of a closed mesh, to the
+/// underside of the chin.
+///
+/// Where the end is not level, planes below its highest point cut an open outline, so that the neck begins there.
+pub fn neck(points: &[Vec3], triangles: &[[u32; 3]], end: Option<&End>, bottom: f32, chin: f32) -> Vec<Section> {
+    let bottom = end.map(|end| end.high.y).filter(|top| *top < chin - 0.1 * (chin - bottom)).unwrap_or(bottom);
+    // The very edge is ragged.
     let edge = 0.03 * (chin - bottom);
     sections(points, triangles, Vec3::Y, [bottom + edge, chin - edge], 48)
 }

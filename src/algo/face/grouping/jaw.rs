@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::profile;
 use crate::algo::face::landmarks::Landmarks;
 
-/// How far below the jaw's line still belongs to the face, as a share of the distance of the eyes: the line runs along
+/// How far from the jaw's line still belongs to the face, as a share of the distance of the eyes: the line runs along
 /// the bone's edge, and landmarks that were found on a mesh are not exact.
 const MARGIN: f32 = 0.15;
 
@@ -52,6 +52,14 @@ impl Jaw {
             (Some(end), None) | (None, Some(end)) => end.y,
             (None, None) => f32::MIN,
         };
-        at.y >= height - self.margin
+        // The line is steep near the ears, so that nearness counts and not only height.
+        at.y >= height || self.line.windows(2).any(|ends| near(at, ends[0], ends[1], self.margin))
     }
+}
+
+/// True if a place lies within `reach` of a segment.
+fn near(at: Vec2, from: Vec2, to: Vec2, reach: f32) -> bool {
+    let along = to - from;
+    let share = ((at - from).dot(along) / along.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+    at.distance_squared(from + along * share) <= reach * reach
 }
