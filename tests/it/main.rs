@@ -20,6 +20,7 @@ mod edit_text;
 mod editor_files;
 mod edits;
 mod exports;
+mod face_expressions;
 mod face;
 mod face_bones;
 mod face_fit;

@@ -112,7 +112,7 @@ impl Source {
             }
             let part = gates.part(one.part, point, known);
             let near = (1.0 - square) * (1.0 - square) * part;
-            let weight = near / (square + 0.02);
+            let weight = near / (square + 0.05);
             sum += one.by * weight;
             weights += weight;
             outside *= 1.0 - near;

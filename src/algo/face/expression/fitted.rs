@@ -24,7 +24,14 @@ use crate::{
 /// What a landmark counts, as a share of the whole skin.
 const LANDMARK: f64 = 0.02;
 /// How strongly movements are held to what their own patch asks for, as a share of what the patch counts.
-const HOLD: f64 = 0.01;
+const HOLD: f64 = 0.02;
+/// What the distance of two landmarks counts, as a share of the whole skin.
+const PAIR: f64 = 0.06;
+/// Landmarks whose distance says more than where they are: lips, lids, corners of the mouth, inner brows.
+const PAIRS: [[usize; 2]; 9] =
+    [[61, 67], [62, 66], [63, 65], [37, 41], [38, 40], [43, 47], [44, 46], [54, 48], [22, 21]];
+/// Those of [`PAIRS`] whose first must stay above the second: lips and lids.
+const APART: usize = 7;
 /// How strongly bones with common skin are held together.
 const STIFF: f64 = 0.002;
 /// How often bones are brought nearer to each other where skin folds.
@@ -46,9 +53,12 @@ pub struct FittedFace<'a> {
     patch: Vec<f64>,
     /// Triangles that bones move.
     moving: Vec<u32>,
+    /// Points of lips and lids that must stay one above the other.
+    apart: Vec<[u32; 2]>,
 }
 
 /// A point of the skin that should follow the field.
+#[derive(Clone)]
 struct Sample {
     /// Where the field is asked, which for landmarks is where the landmark is.
     place: Vec3,
@@ -56,8 +66,10 @@ struct Sample {
     counts: f64,
     /// Unknowns and weights.
     influences: Vec<(u32, f64)>,
-    /// Of the jaw bone, with its place among the bones.
+    /// Of the jaw bone.
     jaw: f64,
+    /// The sample that this one is told from, if it is their difference that counts; with the jaw's weight there.
+    minus: Option<(Vec3, Known, f64)>,
 }
 
 impl<'a> FittedFace<'a> {
@@ -90,6 +102,7 @@ impl<'a> FittedFace<'a> {
             factor: Vec::new(),
             patch: Vec::new(),
             moving: Vec::new(),
+            apart: Vec::new(),
         };
         let Some(gates) = Gates::new(landmarks) else { return face };
         face.gather(&gates, &unknown_of, mask);
@@ -106,7 +119,7 @@ impl<'a> FittedFace<'a> {
 
     /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of units.
     ///
-    /// Where triangles of the skin would turn over, the bones that move them are brought nearer to moving alike, again
+    /// Where triangles of the skin would turn over, lips or lids cross, the bones that move them are brought nearer to moving alike, again
     /// and again. Cost: points times moves of the field.
     pub fn pose(&self, mix: &Mix, units: &UnitSet) -> Vec<BonePose> {
         let rest = vec![BonePose::REST; self.bones.len()];
@@ -170,30 +183,54 @@ impl<'a> FittedFace<'a> {
         for sample in &mut samples {
             sample.counts = each;
         }
-        for mark in 0..68 {
-            let place = self.landmarks.points[mark];
+        let candidates: Vec<usize> = (0..self.points.len())
+            .filter(|&index| mask.is_empty() || mask.get(index).copied().unwrap_or(false))
+            .collect();
+        let mut at_marks = Vec::new();
+        for (mark, &place) in self.landmarks.points.iter().enumerate() {
             let known = Known::of_landmark(mark);
             let fits = |index: usize| match known.upper_lip {
                 None => true,
                 Some(upper) => (lower_share[index] < 0.5) == upper,
             };
-            let nearest = (0..self.points.len())
-                .filter(|&index| (mask.is_empty() || mask.get(index).copied().unwrap_or(false)) && fits(index))
-                .min_by(|&a, &b| {
-                    let [a, b] = [a, b].map(|index| self.points[index].distance_squared(place));
-                    a.total_cmp(&b)
-                });
-            let Some(mut sample) = nearest.and_then(|index| self.sample(index, place, unknown_of)) else { continue };
-            sample.known = known;
-            sample.counts = LANDMARK;
-            samples.push(sample);
+            let nearest = candidates.iter().copied().filter(|&index| fits(index)).min_by(|&a, &b| {
+                let [a, b] = [a, b].map(|index| self.points[index].distance_squared(place));
+                a.total_cmp(&b)
+            });
+            let sample = nearest.and_then(|index| self.sample(index, place, unknown_of));
+            if let Some(mut sample) = sample.clone() {
+                sample.known = known;
+                sample.counts = LANDMARK;
+                samples.push(sample);
+            }
+            at_marks.push(nearest.zip(sample));
+        }
+        for (number, [a, b]) in PAIRS.into_iter().enumerate() {
+            let (Some(Some((point, one))), Some(Some((other_point, other)))) = (at_marks.get(a), at_marks.get(b))
+            else {
+                continue;
+            };
+            let minus = Some((other.place, Known::of_landmark(b), other.jaw));
+            let known = Known::of_landmark(a);
+            let mut pair = Sample { known, counts: PAIR, minus, ..one.clone() };
+            for &(unknown, weight) in &other.influences {
+                match pair.influences.iter_mut().find(|(known, _)| *known == unknown) {
+                    Some((_, known)) => *known -= weight,
+                    None => pair.influences.push((unknown, -weight)),
+                }
+            }
+            samples.push(pair);
+            if number < APART && point != other_point {
+                self.apart.push([*point as u32, *other_point as u32]);
+            }
         }
         self.samples = samples;
     }
 
     /// A sample of a point, if bones move it at all.
     fn sample(&self, index: usize, place: Vec3, unknown_of: &[u32]) -> Option<Sample> {
-        let mut sample = Sample { place, known: Known::default(), counts: 0.0, influences: Vec::new(), jaw: 0.0 };
+        let mut sample =
+            Sample { place, known: Known::default(), counts: 0.0, influences: Vec::new(), jaw: 0.0, minus: None };
         let mut all = 0.0;
         for (joint, weight) in self.influences(index) {
             let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < self.bones.len()) else { continue };
@@ -217,7 +254,9 @@ impl<'a> FittedFace<'a> {
         self.patch = vec![0.0; size];
         for sample in &self.samples {
             for &(a, weight) in &sample.influences {
-                self.patch[a as usize] += sample.counts * weight;
+                if sample.minus.is_none() {
+                    self.patch[a as usize] += sample.counts * weight;
+                }
                 for &(b, other) in &sample.influences {
                     matrix[a as usize * size + b as usize] += sample.counts * weight * other;
                 }
@@ -245,15 +284,24 @@ impl<'a> FittedFace<'a> {
         let mut right = vec![[0.0; 3]; size];
         let mut asked = vec![[0.0; 3]; size];
         for sample in &self.samples {
-            let mut target = field.at(sample.place, sample.known).as_dvec3();
-            if let Some(jaw) = jaw.filter(|_| sample.jaw > 0.0) {
-                target -= (jaw.transform_point3(sample.place) - sample.place).as_dvec3() * sample.jaw;
+            let rest = |place: Vec3, known: Known, weight: f64| {
+                let target = field.at(place, known).as_dvec3();
+                match jaw {
+                    Some(jaw) if weight > 0.0 => target - (jaw.transform_point3(place) - place).as_dvec3() * weight,
+                    _ => target,
+                }
+            };
+            let mut target = rest(sample.place, sample.known, sample.jaw);
+            if let Some((place, known, weight)) = sample.minus {
+                target -= rest(place, known, weight);
             }
             for &(unknown, weight) in &sample.influences {
                 for axis in 0..3 {
                     let value = sample.counts * weight * target[axis];
                     right[unknown as usize][axis] += value;
-                    asked[unknown as usize][axis] += value;
+                    if sample.minus.is_none() {
+                        asked[unknown as usize][axis] += value;
+                    }
                 }
             }
         }
@@ -273,9 +321,9 @@ impl<'a> FittedFace<'a> {
         poses
     }
 
-    /// The triangles that turn by more than a right angle.
-    fn folded(&self, poses: &[BonePose]) -> Vec<u32> {
-        if self.moving.is_empty() {
+    /// The corners of triangles that turn by more than a right angle, and of lips and lids that cross.
+    fn folded(&self, poses: &[BonePose]) -> Vec<[u32; 3]> {
+        if self.moving.is_empty() && self.apart.is_empty() {
             return Vec::new();
         }
         let posed = apply(self.points, self.weights, self.bones, poses);
@@ -283,24 +331,34 @@ impl<'a> FittedFace<'a> {
             let [a, b, c] = corners.map(|corner| points[corner as usize]);
             (b - a).cross(c - a)
         };
-        let turned = |index: &u32| {
-            let corners = self.triangles[*index as usize];
-            normal(self.points, corners).dot(normal(&posed, corners)) < 0.0
-        };
-        self.moving.iter().copied().filter(turned).collect()
+        let turned = |corners: &[u32; 3]| normal(self.points, *corners).dot(normal(&posed, *corners)) < 0.0;
+        let mut folded: Vec<[u32; 3]> =
+            self.moving.iter().map(|&index| self.triangles[index as usize]).filter(turned).collect();
+        let slack = 0.002 * self.landmarks.eye_distance();
+        for &[above, below] in &self.apart {
+            let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
+            let rest = gap(self.points);
+            // Lips that touch at rest may go on touching.
+            let least = if rest > slack { 0.3 * rest } else { rest - slack };
+            if gap(&posed) < least {
+                folded.push([above, below, below]);
+            }
+        }
+        folded
     }
 
-    /// Brings the bones that move some triangles nearer to moving alike, by a part of the way.
-    fn relax(&self, poses: &mut [BonePose], triangles: &[u32], part: f32) {
+    /// Brings the bones that move some corners nearer to moving alike, by a part of the way.
+    fn relax(&self, poses: &mut [BonePose], folded: &[[u32; 3]], part: f32) {
         let jaw = self.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw);
         let jaw = jaw.map(|bone| (bone, poses[bone].affine(self.bones[bone].position)));
         let mut alike = vec![(Vec3::ZERO, 0.0_f32); self.bones.len()];
-        for &index in triangles {
-            let corners = self.triangles[index as usize];
+        for &corners in folded {
             let mut mean = Vec3::ZERO;
             for corner in corners {
                 for (joint, weight) in self.influences(corner as usize) {
-                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < poses.len()) else { continue };
+                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < poses.len()) else {
+                        continue;
+                    };
                     mean += weight / 3.0
                         * match jaw {
                             Some((jaw, turn)) if jaw == bone => {

@@ -1,0 +1,261 @@
+//! Expressions: their files, and what they do to real heads.
+
+use std::path::PathBuf;
+
+use glam::Vec3;
+use rigsmith::{
+    algo::face::{
+        bones::{FaceBone, FaceBonesSettings, place_bones},
+        expression::{
+            BonePose, Expression, ExpressionSet, FittedFace, Mix, Sides, Unit, UnitSet, apply, pose, pose_sampled,
+        },
+        grouping::group_head,
+        landmarks::Landmarks,
+        shells::find_shells,
+        weights::face_weights,
+    },
+    mesh::{
+        model::Weights,
+        obj::{ObjSettings, read_model},
+    },
+};
+
+const HEADS: [&str; 3] = ["ict_neutral.obj", "ict_identity_1.obj", "ict_identity_2.obj"];
+
+/// A head with bones at its true landmarks.
+struct Head {
+    points: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    landmarks: Landmarks,
+    marks: Vec<usize>,
+    mask: Vec<bool>,
+    bones: Vec<FaceBone>,
+    weights: Weights,
+}
+
+fn head(name: &str, density: usize) -> Option<Head> {
+    let Some(data) = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from) else {
+        eprintln!("skipped: RIGSMITH_DATA is not set");
+        return None;
+    };
+    let bytes = std::fs::read(data.join("heads").join(name)).unwrap();
+    let model = read_model(&bytes[..], name, &ObjSettings::default(), &mut |_| None).unwrap();
+    let text = std::fs::read_to_string(data.join("heads/ict_landmarks.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let marks: Vec<usize> = json["landmark_vertex_indices"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|mark| mark.as_u64().unwrap() as usize)
+        .collect();
+    let (triangles, points) = (model.point_triangles(), model.points);
+    let landmarks = Landmarks {
+        points: std::array::from_fn(|mark| points[marks[mark]]),
+        middle: points[marks[33]].x,
+        symmetric: true,
+        confidence: 1.0,
+        mouth_open: true,
+    };
+    let shells = find_shells(&points, &triangles);
+    let go_on = |_: f32| true;
+    let groups = group_head(&points, &triangles, &shells, &landmarks, &go_on).unwrap();
+    let settings = FaceBonesSettings { bones: density, seed: 1, starts: 3, symmetric: true, extras: true };
+    let bones = place_bones(&points, &triangles, &shells, &groups, &landmarks, &[], &settings, &go_on).unwrap().bones;
+    let weights = face_weights(&points, &triangles, &shells, &groups, &landmarks, &bones, &go_on).unwrap();
+    Some(Head { points, triangles, landmarks, marks, mask: groups.mask, bones, weights })
+}
+
+impl Head {
+    fn moved(&self, name: &str, strength: f32) -> Vec<Vec3> {
+        let set = ExpressionSet::bundled();
+        let expression = set.find(name).unwrap();
+        let face =
+            FittedFace::new(&self.points, &self.triangles, &self.mask, &self.weights, &self.bones, &self.landmarks);
+        let mix = Mix::of(&[(expression.as_ref(), strength)], set.unit_set());
+        apply(&self.points, &self.weights, &self.bones, &face.pose(&mix, set.unit_set()))
+    }
+
+    fn folds(&self, moved: &[Vec3]) -> usize {
+        let normal = |points: &[Vec3], triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|corner| points[corner as usize]);
+            (b - a).cross(c - a)
+        };
+        self.triangles.iter().filter(|t| normal(&self.points, t).dot(normal(moved, t)) < 0.0).count()
+    }
+
+    /// What an expression must reach, in eye distances (lids: in their opening), as (what, reached, least).
+    fn reached(&self, name: &str, moved: &[Vec3]) -> Vec<(String, f32, f32)> {
+        let scale = 1.0 / self.landmarks.eye_distance();
+        let at = |points: &[Vec3], mark: usize| points[self.marks[mark]];
+        let up = |mark: usize, least: f32| {
+            (format!("{mark} up"), (at(moved, mark).y - at(&self.points, mark).y) * scale, least)
+        };
+        let down = |mark: usize, least: f32| (format!("{mark} down"), -up(mark, least).1, least);
+        let distance = |points: &[Vec3], a, b| at(points, a).distance(at(points, b));
+        let apart = |a: usize, b: usize, least: f32| {
+            (format!("{a}-{b} apart"), (distance(moved, a, b) - distance(&self.points, a, b)) * scale, least)
+        };
+        let wider = |a: usize, b: usize| distance(moved, a, b) / distance(&self.points, a, b) - 1.0;
+        let lids = [(37, 41), (44, 46)];
+        match name {
+            "happiness" => vec![up(48, 0.03), up(54, 0.03), apart(48, 54, 0.02)],
+            "sadness" => vec![up(21, 0.02), up(22, 0.02), down(48, 0.015), down(54, 0.015)],
+            "anger" => {
+                let together = ("21-22 together".into(), -apart(21, 22, 0.0).1, 0.015);
+                let mut all = vec![down(21, 0.02), down(22, 0.02), together];
+                all.extend(lids.map(|(a, b)| (format!("lids {a}-{b} closer"), -wider(a, b), 0.1)));
+                all
+            }
+            "fear" => {
+                let mut all = vec![up(19, 0.025), up(24, 0.025), apart(62, 66, 0.02)];
+                all.extend(lids.map(|(a, b)| (format!("lids {a}-{b} apart"), wider(a, b), 0.1)));
+                all
+            }
+            "disgust" => vec![up(51, 0.015), up(31, 0.01), up(35, 0.01)],
+            _ => vec![up(19, 0.04), up(24, 0.04), apart(62, 66, 0.08)],
+        }
+    }
+}
+
+fn check_head(name: &str, density: usize) {
+    let Some(head) = head(name, density) else { return };
+    for expression in ExpressionSet::bundled().six() {
+        let moved = head.moved(&expression.name, 1.0);
+        for (what, reached, least) in head.reached(&expression.name, &moved) {
+            assert!(reached >= least, "{name}, {density} bones, {}: {what} {reached:.4} < {least}", expression.name);
+        }
+        assert_eq!(head.folds(&moved), 0, "{name}, {density} bones, {}: triangles fold", expression.name);
+        for (above, below) in [(61, 67), (62, 66), (63, 65), (37, 41), (38, 40), (43, 47), (44, 46)] {
+            let gap = |points: &[Vec3]| points[head.marks[above]].y - points[head.marks[below]].y;
+            let least = gap(&head.points).min(0.0) - 0.003 * head.landmarks.eye_distance();
+            assert!(gap(&moved) >= least, "{name}, {density} bones, {}: {above} below {below}", expression.name);
+        }
+    }
+}
+
+#[test]
+fn few_bones_show_the_six() {
+    check_head(HEADS[0], 20);
+}
+
+#[test]
+fn forty_bones_show_the_six() {
+    HEADS.into_iter().for_each(|name| check_head(name, 40));
+}
+
+#[test]
+fn many_bones_show_the_six() {
+    check_head(HEADS[2], 80);
+}
+
+#[test]
+fn strength_nothing_is_rest_and_one_side_leaves_the_other() {
+    let Some(head) = head(HEADS[0], 40) else { return };
+    let still = head.moved("happiness", 0.0);
+    assert!(still.iter().zip(&head.points).all(|(a, b)| a.distance(*b) < 1e-5));
+    let moved = head.moved("lip_corner_pull_l", 1.0);
+    let way = |mark: usize| moved[head.marks[mark]].distance(head.points[head.marks[mark]]);
+    assert!(way(54) > 0.03 * head.landmarks.eye_distance(), "{}", way(54));
+    assert!(way(48) < 0.15 * way(54), "{} {}", way(48), way(54));
+}
+
+#[test]
+fn every_bundled_file_parses_and_comes_back() {
+    let files: Vec<_> = ExpressionSet::bundled_files().collect();
+    let set = ExpressionSet::parse(&files).unwrap();
+    assert_eq!(&set, ExpressionSet::bundled());
+    assert_eq!(set.six().count(), 6);
+    assert_eq!(set.expressions().len(), 7);
+    for (file, text) in files {
+        if file.ends_with(".units.ron") {
+            let units = Unit::parse_list(text, file).unwrap();
+            assert_eq!(units, Unit::parse_list(&Unit::list_to_text(&units).unwrap(), file).unwrap());
+        } else {
+            let expression = Expression::parse(text, file).unwrap();
+            assert_eq!(expression, Expression::parse(&expression.to_text().unwrap(), file).unwrap());
+        }
+    }
+    assert!(set.find("lip_corner_pull_r").is_some_and(|unit| unit.units[0].side == Sides::Right));
+    assert!(set.find("no_such_unit").is_none());
+}
+
+#[test]
+fn malformed_files_say_where() {
+    let check = |file: &str, text: &str, line: usize, says: &str| {
+        let error = ExpressionSet::parse(&[(file, text)]).unwrap_err();
+        assert!(error.file == file && error.line == line && error.message.contains(says), "{error}");
+    };
+    check("a.expr.ron", "", 1, "empty");
+    check("a.expr.ron", "(\n name: \"a\",\n units: [(unit: \"none\")],\n)", 3, "no unit");
+    check("a.expr.ron", "(\n name: \"A b\",\n units: [],\n)", 2, "a-z");
+    check("a.expr.ron", "(\n name: \"a\",\n units: [(unit: \"b\", strength: 1.5)],\n)", 3, "strength");
+    check("a.expr.ron", "(\n name: \"a\",\n colour: 1,\n units: [],\n)", 3, "colour");
+    check("a.expr.ron", &" ".repeat(300 << 10), 1, "KiB");
+    let unit = |inside: &str| format!("[\n (name: \"a\", moves: [\n  ({inside}, reach: (0.1, 0.1)),\n ]),\n]");
+    check("a.units.ron", &unit("at: [68], by: (0.0, 0.0, 0.0)"), 3, "landmark");
+    check("a.units.ron", &unit("at: [], by: (0.0, 0.0, 0.0)"), 3, "landmarks");
+    check("a.units.ron", &unit("at: [1], by: (0.0, NaN, 0.0)"), 3, "NaN");
+    check("a.units.ron", &unit("at: [1], by: (inf, 0.0, 0.0)"), 3, "inf");
+    check("a.units.ron", "[\n (name: \"a\"),\n (name: \"a\"),\n]", 3, "second");
+}
+
+/// A face as plain as can be, for what needs no head.
+fn plain() -> Landmarks {
+    let mut points = [Vec3::ZERO; 68];
+    for (mark, point) in points.iter_mut().enumerate() {
+        let across = (mark as f32 * 0.7).sin();
+        *point = Vec3::new(across * 0.5, mark as f32 * -0.02, 0.1 - across * across * 0.1);
+    }
+    points[36] = Vec3::new(-0.5, 0.0, 0.0);
+    points[45] = Vec3::new(0.5, 0.0, 0.0);
+    Landmarks { points, middle: 0.0, symmetric: true, confidence: 1.0, mouth_open: false }
+}
+
+#[test]
+fn blends_add_up_to_the_limit() {
+    let set = ExpressionSet::bundled();
+    let units: &UnitSet = set.unit_set();
+    let smile = set.get("happiness").unwrap();
+    let once = Mix::of(&[(smile, 1.0)], units);
+    assert!(Mix::of(&[(smile, 0.0)], units).is_rest());
+    assert!(Mix::of(&[(smile, f32::NAN)], units).is_rest());
+    let halves = Mix::of(&[(smile, 0.5), (smile, 0.5)], units);
+    for (a, b) in once.strengths.iter().flatten().zip(halves.strengths.iter().flatten()) {
+        assert!((a - b).abs() < 1e-6);
+    }
+    let thrice = Mix::of(&[(smile, 1.0), (smile, 1.0), (smile, 7.0)], units);
+    for (unit, strengths) in set.units().iter().zip(thrice.strengths) {
+        assert!(strengths.iter().all(|strength| (0.0..=unit.limit).contains(strength)), "{}", unit.name);
+    }
+}
+
+#[test]
+fn what_does_not_fit_together_is_survived() {
+    let set = ExpressionSet::bundled();
+    let wanted = [(set.get("surprise").unwrap(), 1.0)];
+    let mut landmarks = plain();
+    assert!(pose(set, &wanted, &[], &Weights::default(), &[], &landmarks).is_empty());
+    let bone = rigsmith::algo::face::bones::FaceBone {
+        position: landmarks.points[22],
+        kind: rigsmith::algo::face::bones::FaceBoneKind::Skin,
+        region: rigsmith::algo::face::bones::Region::Brow,
+        side: rigsmith::algo::face::bones::Side::Left,
+        label: "brow_01_l".into(),
+        pair: None,
+        fixed: None,
+    };
+    let bones = [bone];
+    let mix = Mix::of(&wanted, set.unit_set());
+    assert_ne!(pose_sampled(&mix, set.unit_set(), &bones, &landmarks)[0], BonePose::REST);
+    let points = [Vec3::ZERO, Vec3::X];
+    let mut weights = Weights::default();
+    weights.push([(2, 0.5), (9, 0.5)]);
+    let poses =
+        FittedFace::new(&points, &[[0, 1, 7]], &[true], &weights, &bones, &landmarks).pose(&mix, set.unit_set());
+    assert!(poses.len() == 1 && poses[0].translation.is_finite());
+    assert_eq!(apply(&points, &weights, &bones, &[]).len(), 2);
+    landmarks.points[45] = landmarks.points[36];
+    assert_eq!(pose_sampled(&mix, set.unit_set(), &bones, &landmarks), [BonePose::REST]);
+    landmarks.points[3].x = f32::NAN;
+    assert_eq!(pose(set, &wanted, &bones, &weights, &points, &landmarks), [BonePose::REST]);
+}
