@@ -3,6 +3,7 @@
 //! The method is that of "automatic placement of bones on face models": group the head in depth, put head and neck bones
 //! through the means of the middle, and one facial bone at each centroid of the facial mask.
 
+pub mod auto;
 pub mod axes;
 pub mod bones;
 pub mod depth_map;
