@@ -275,7 +275,7 @@ fn regions(ui: &mut Ui, shown: &Shown, known: &FaceRig, face: Option<&Face>, req
 fn region_name(kind: FaceBoneKind, region: Region) -> &'static str {
     match (kind, region) {
         (FaceBoneKind::Jaw, _) => "jaw pivot",
-        (FaceBoneKind::Eye, _) => "eyes",
+        (FaceBoneKind::Eye, _) | (_, Region::Eye) => "eyes",
         (_, Region::Forehead) => "forehead",
         (_, Region::Brow) => "brow",
         (_, Region::Lid) => "lid",

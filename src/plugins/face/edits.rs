@@ -8,7 +8,7 @@ use super::known::{FACE_GROUP, FaceRig, KnownBone, Placed};
 use crate::{
     algo::face::{
         auto::{AutoFace, FaceAnalysis},
-        bones::{FaceBone, FaceBoneKind, Region, Side},
+        bones::{FaceBone, FaceBoneKind, Region},
     },
     mesh::model::Weights,
     rig::{
@@ -49,7 +49,7 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
     });
     let host = known.head.and_then(|head| rig.joint(head)).map(|joint| joint.data.uid);
     let (neck, head, head_global) = match host {
-        Some(head) => (known.neck, head, Affine3A::from(glam_affine(rig, head))),
+        Some(head) => (known.neck, head, rig_affine(rig, head)),
         None => skull(rig, analysis, uids, &mut edits),
     };
     let feature = known.feature.unwrap_or_else(|| {
@@ -106,14 +106,9 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
     FaceEdits { edits, joints }
 }
 
-fn glam_affine(rig: &Rig, joint: Uid) -> glam::Mat4 {
+fn rig_affine(rig: &Rig, joint: Uid) -> Affine3A {
     let global = rig.rest_global(joint);
-    glam::Mat4::from_cols(
-        global.matrix3.x_axis.extend(0.0),
-        global.matrix3.y_axis.extend(0.0),
-        global.matrix3.z_axis.extend(0.0),
-        global.translation.extend(1.0),
-    )
+    Affine3A { matrix3: global.matrix3.into(), translation: global.translation.into() }
 }
 
 /// Makes neck and head. Their Y axes lie along their bones; X and Z are those of the head.
@@ -198,7 +193,7 @@ fn limits(bone: &FaceBone) -> ([(f32, f32); 3], [(f32, f32); 3]) {
         FaceBoneKind::Skin => match bone.region {
             Region::Brow => (0.1, 0.2, 0.14, 0.06),
             Region::Forehead => (0.06, 0.12, 0.08, 0.04),
-            Region::Lid => (0.06, 0.14, 0.16, 0.08),
+            Region::Lid | Region::Eye => (0.06, 0.14, 0.16, 0.08),
             Region::Nose => (0.08, 0.1, 0.06, 0.06),
             Region::Cheek => (0.1, 0.14, 0.1, 0.12),
             Region::Lip => (0.18, 0.2, 0.4, 0.16),
@@ -206,8 +201,6 @@ fn limits(bone: &FaceBone) -> ([(f32, f32); 3], [(f32, f32); 3]) {
             Region::Temple => (0.06, 0.08, 0.06, 0.04),
         },
     };
-    // A bone in the middle, too, may go either way.
-    let _ = Side::Middle;
     ([both(side), (-down, up), both(depth)], [both(25.0); 3])
 }
 

@@ -210,15 +210,14 @@ pub(super) fn land(
     for (entity, mut job, mesh, of) in &mut jobs {
         let Some(result) = check_ready(&mut job.task) else { continue };
         let shapes = job.shapes.clone();
-        let mut entity_commands = commands.entity(entity);
-        entity_commands.remove::<FaceJob>();
+        commands.entity(entity).remove::<FaceJob>();
         let result = result.and_then(|done| {
             let rig = rigs.get(of.0).map_err(|_| "the rig was closed meanwhile".to_owned())?;
             if done.kept.iter().any(|bone| rig.joint(bone.uid).is_none()) {
                 return Err("facial bones were deleted meanwhile; place the face again".to_owned());
             }
             let (edits, report) = done.edits(rig, mesh, shapes.as_deref(), &mut uids);
-            entity_commands.insert(Face {
+            commands.entity(entity).insert(Face {
                 analysis: done.analysis.clone(),
                 settings: done.settings.clone(),
                 rest: done.rest.clone(),

@@ -1,0 +1,61 @@
+//! The open end of a neck.
+
+use glam::Vec3;
+
+use crate::mesh::adjacency;
+
+/// A border of an open mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct End {
+    /// Mean of the border, weighted by its length.
+    pub center: Vec3,
+    /// Lower corner of its box.
+    pub low: Vec3,
+    /// Upper corner of its box.
+    pub high: Vec3,
+    length: f32,
+}
+
+impl End {
+    /// True if this is where a neck was cut from its body: large, behind or below the face, and not the rim of a mask,
+    /// which is as wide and as high as all of it.
+    pub fn is_neck(&self, low: Vec3, high: Vec3, center: Vec3) -> bool {
+        let (size, whole) = (self.high - self.low, high - low);
+        let rim = size.x > 0.85 * whole.x && size.y > 0.85 * whole.y;
+        let large = size.max_element() > 0.15 * whole.max_element();
+        let behind = self.center.z < center.z || self.center.y < center.y;
+        large && behind && !rim
+    }
+}
+
+/// The longest border of a mesh, if it has any.
+pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
+    let (welded, count) = adjacency::weld(points);
+    let mut place = vec![Vec3::ZERO; count];
+    for (point, number) in points.iter().zip(&welded) {
+        place[*number as usize] = *point;
+    }
+    let joined: Vec<[u32; 3]> = triangles
+        .iter()
+        .filter(|triangle| triangle.iter().all(|corner| (*corner as usize) < points.len()))
+        .map(|triangle| triangle.map(|corner| welded[corner as usize]))
+        .collect();
+    let edges: Vec<[u32; 2]> =
+        adjacency::edges(&joined).into_iter().filter(|edge| edge.triangles == 1).map(|edge| edge.points).collect();
+    let sides: Vec<[u32; 3]> = edges.iter().map(|[a, b]| [*a, *b, *b]).collect();
+    let (loop_of, loops) = adjacency::islands(&sides, count);
+    let mut ends: Vec<End> =
+        (0..loops).map(|_| End { center: Vec3::ZERO, low: Vec3::MAX, high: Vec3::MIN, length: 0.0 }).collect();
+    for [a, b] in edges {
+        let end = &mut ends[loop_of[a as usize] as usize];
+        let (a, b) = (place[a as usize], place[b as usize]);
+        let length = a.distance(b);
+        end.center += (a + b) * 0.5 * length;
+        end.length += length;
+        end.low = end.low.min(a).min(b);
+        end.high = end.high.max(a).max(b);
+    }
+    let mut end = ends.into_iter().filter(|end| end.length > 0.0).max_by(|a, b| a.length.total_cmp(&b.length))?;
+    end.center /= end.length;
+    Some(end)
+}
