@@ -7,7 +7,8 @@ use rigsmith::{
     algo::face::{
         bones::{FaceBone, FaceBonesSettings, place_bones},
         expression::{
-            BonePose, Expression, ExpressionSet, FittedFace, Mix, Sides, Unit, UnitSet, apply, pose, pose_sampled,
+            BonePose, Expression, ExpressionSet, FittedFace, Mix, Sides, Unit, UnitSet, apply, mend_folds, pose,
+            pose_sampled,
         },
         grouping::group_head,
         landmarks::Landmarks,
@@ -61,7 +62,8 @@ fn head(name: &str, density: usize) -> Option<Head> {
     let groups = group_head(&points, &triangles, &shells, &landmarks, &go_on).unwrap();
     let settings = FaceBonesSettings { bones: density, seed: 1, starts: 3, symmetric: true, extras: true };
     let bones = place_bones(&points, &triangles, &shells, &groups, &landmarks, &[], &settings, &go_on).unwrap().bones;
-    let weights = face_weights(&points, &triangles, &shells, &groups, &landmarks, &bones, &go_on).unwrap();
+    let mut weights = face_weights(&points, &triangles, &shells, &groups, &landmarks, &bones, &go_on).unwrap();
+    mend_folds(ExpressionSet::bundled(), &points, &triangles, &groups.mask, &mut weights, &bones, &landmarks);
     Some(Head { points, triangles, landmarks, marks, mask: groups.mask, bones, weights })
 }
 

@@ -11,6 +11,7 @@
 mod field;
 mod fitted;
 mod gates;
+mod mend;
 mod set;
 mod text;
 
@@ -26,6 +27,7 @@ use crate::mesh::{model::Weights, skinning::skin_points};
 
 pub use self::{
     fitted::FittedFace,
+    mend::mend_folds,
     set::{ExpressionSet, UnitSet},
     text::{Expression, ExpressionError, Gaze, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
 };

@@ -35,7 +35,7 @@ const APART: usize = 7;
 /// How strongly bones with common skin are held together.
 const STIFF: f64 = 0.002;
 /// How often bones are brought nearer to each other where skin folds.
-const ROUNDS: usize = 16;
+const ROUNDS: usize = 8;
 
 /// A head with its bones and weights, ready to be posed many times.
 pub struct FittedFace<'a> {

@@ -1,0 +1,206 @@
+//! Weights made smoother in the few places where an expression would fold the skin.
+//!
+//! Where lips or lids meet, the weights of a small triangle may change from one side to the other, and what parts the
+//! two turns it over. Holding the bones back would take the expression away; averaging the weights of those corners with
+//! their neighbours' does not show.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{Affine3A, Vec3, Vec3A};
+
+use super::{ExpressionSet, FittedFace, Mix, text::Expression};
+use crate::{
+    algo::face::{bones::FaceBone, landmarks::Landmarks},
+    mesh::{adjacency::weld, model::Weights},
+};
+
+/// How often bones are solved for again.
+const PASSES: usize = 3;
+/// How often weights are averaged in between.
+const ROUNDS: usize = 24;
+/// Rounds after which neighbours of the corners are averaged, too.
+const WIDEN: usize = 6;
+/// The most influences of a point.
+const INFLUENCES: usize = 8;
+
+type Influences = Vec<(u32, f32)>;
+
+/// Averages weights where one of the six expressions at full strength turns a triangle by more than a right angle.
+///
+/// All in head space; `mask` and `weights` as [`FittedFace::new`] takes them. Points at the same place keep the same
+/// weights. Gives the number of triangles that still fold. Cost: a few poses of every expression.
+pub fn mend_folds(
+    set: &ExpressionSet,
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    mask: &[bool],
+    weights: &mut Weights,
+    bones: &[FaceBone],
+    landmarks: &Landmarks,
+) -> usize {
+    if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
+        return 0;
+    }
+    let poses = |weights: &Weights| -> Vec<Vec<Affine3A>> {
+        let face = FittedFace::new(points, &[], mask, weights, bones, landmarks);
+        let pose = |expression: &Expression| face.pose(&Mix::of(&[(expression, 1.0)], set.unit_set()), set.unit_set());
+        let matrices = |expression| {
+            let moved = pose(expression).into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
+            [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
+        };
+        set.six().map(matrices).collect()
+    };
+    let mut left = 0;
+    let mut around: Option<Around> = None;
+    for _ in 0..PASSES {
+        let poses = poses(weights);
+        let mut own: BTreeMap<u32, Influences> = BTreeMap::new();
+        let mut folded = folded(points, triangles, 0..triangles.len() as u32, weights, &own, &poses);
+        left = folded.len();
+        if folded.is_empty() {
+            break;
+        }
+        let around = around.get_or_insert_with(|| Around::new(points, triangles));
+        for round in 0..ROUNDS {
+            let mut corners: BTreeSet<u32> = folded
+                .iter()
+                .filter_map(|&triangle| triangles.get(triangle as usize))
+                .flatten()
+                .map(|&corner| around.place_of[corner as usize])
+                .collect();
+            if round >= WIDEN {
+                let more: Vec<u32> = corners.iter().flat_map(|&place| around.next(place)).collect();
+                corners.extend(more);
+            }
+            let averaged: Vec<(u32, Influences)> =
+                corners.iter().map(|&place| (place, around.average(place, weights, &own))).collect();
+            for (place, influences) in averaged {
+                for &point in &around.points[place as usize] {
+                    own.insert(point, influences.clone());
+                }
+            }
+            let near: BTreeSet<u32> = own
+                .keys()
+                .flat_map(|&point| around.triangles[around.place_of[point as usize] as usize].iter().copied())
+                .collect();
+            folded = self::folded(points, triangles, near.into_iter(), weights, &own, &poses);
+            left = folded.len();
+            if folded.is_empty() {
+                break;
+            }
+        }
+        let mut mended = Weights::default();
+        for point in 0..points.len() {
+            match own.get(&(point as u32)) {
+                Some(influences) => mended.push(influences.iter().copied()),
+                None => mended.push(weights.of(point)),
+            }
+        }
+        *weights = mended;
+    }
+    left
+}
+
+/// What lies around each place of the welded surface.
+struct Around {
+    place_of: Vec<u32>,
+    points: Vec<Vec<u32>>,
+    triangles: Vec<Vec<u32>>,
+    corners: Vec<Vec<u32>>,
+}
+
+impl Around {
+    fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let (place_of, count) = weld(points);
+        let mut around = Self {
+            place_of,
+            points: vec![Vec::new(); count],
+            triangles: vec![Vec::new(); count],
+            corners: vec![Vec::new(); count],
+        };
+        for (point, &place) in around.place_of.iter().enumerate() {
+            around.points[place as usize].push(point as u32);
+        }
+        for (index, triangle) in triangles.iter().enumerate() {
+            let places = triangle.map(|corner| around.place_of[corner as usize]);
+            for place in places {
+                around.triangles[place as usize].push(index as u32);
+                around.corners[place as usize].extend(places.iter().filter(|&&other| other != place));
+            }
+        }
+        for corners in &mut around.corners {
+            corners.sort_unstable();
+            corners.dedup();
+        }
+        around
+    }
+
+    fn next(&self, place: u32) -> Vec<u32> {
+        self.corners[place as usize].clone()
+    }
+
+    /// Half its own weights, half the mean of its neighbours'.
+    fn average(&self, place: u32, weights: &Weights, own: &BTreeMap<u32, Influences>) -> Influences {
+        let mut sum: BTreeMap<u32, f32> = BTreeMap::new();
+        let mut add = |place: u32, share: f32| {
+            let Some(&point) = self.points[place as usize].first() else { return };
+            for (joint, weight) in influences(point, weights, own) {
+                *sum.entry(joint).or_default() += weight * share;
+            }
+        };
+        add(place, 0.5);
+        let next = &self.corners[place as usize];
+        for &other in next {
+            add(other, 0.5 / next.len() as f32);
+        }
+        let mut all: Influences = sum.into_iter().filter(|(_, weight)| *weight > 1e-4).collect();
+        all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        all.truncate(INFLUENCES);
+        let total: f32 = all.iter().map(|(_, weight)| weight).sum();
+        for (_, weight) in &mut all {
+            *weight /= total.max(1e-12);
+        }
+        all
+    }
+}
+
+fn influences(point: u32, weights: &Weights, own: &BTreeMap<u32, Influences>) -> Influences {
+    own.get(&point).cloned().unwrap_or_else(|| weights.of(point as usize).collect())
+}
+
+/// Those of some triangles that a pose turns over.
+fn folded(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    which: impl Iterator<Item = u32>,
+    weights: &Weights,
+    own: &BTreeMap<u32, Influences>,
+    poses: &[Vec<Affine3A>],
+) -> Vec<u32> {
+    let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
+    let turned = |index: &u32| {
+        let corners = triangles[*index as usize];
+        let rest = corners.map(|corner| points[corner as usize]);
+        let moving = |corner: &u32| match own.get(corner) {
+            Some(_) => true,
+            None => weights.of(*corner as usize).any(|(joint, _)| joint >= 2),
+        };
+        if !corners.iter().any(moving) {
+            return false;
+        }
+        let influences = corners.map(|corner| influences(corner, weights, own));
+        poses.iter().any(|matrices| {
+            let posed = [0, 1, 2].map(|k| {
+                let mut sum = Vec3A::ZERO;
+                for &(joint, weight) in &influences[k] {
+                    if let Some(matrix) = matrices.get(joint as usize) {
+                        sum += matrix.transform_point3a(rest[k].into()) * weight;
+                    }
+                }
+                Vec3::from(sum)
+            });
+            normal(rest).dot(normal(posed)) < 0.0
+        })
+    };
+    which.filter(turned).collect()
+}
