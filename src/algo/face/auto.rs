@@ -9,7 +9,7 @@ use glam::{Quat, Vec3};
 use super::{
     axes::{AxesError, HeadAxes, guess_axes},
     bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, place_bones},
-    expression::{BonePose, ExpressionSet, FittedFace, Mix, apply},
+    expression::{BonePose, ExpressionSet, FittedFace, mend_folds},
     grouping::{GroupingError, HeadGroups, group_head},
     head_bones::{HeadBones, HeadBonesError, head_bones},
     head_part::{HeadPartError, head_part},
@@ -83,7 +83,7 @@ pub enum FaceStep {
     Bones,
     /// Weights.
     Weights,
-    /// Trying the six expressions.
+    /// Trying the six expressions, and smoothing weights where they fold skin.
     Expressions,
     /// Moving bones to fit shapes.
     Fit,
@@ -346,24 +346,14 @@ impl FaceAnalysis {
             folds: 0,
         };
         begin(progress, FaceStep::Expressions)?;
-        face.folds = self.folds(&face, expressions);
+        face.folds =
+            mend_folds(expressions, points, triangles, &groups.mask, &mut face.weights, &face.bones, landmarks);
         Ok(face)
     }
 
     /// The head with given bones and weights, ready to show expressions.
     pub fn fitted<'a>(&'a self, bones: &'a [FaceBone], weights: &'a Weights) -> FittedFace<'a> {
         FittedFace::new(&self.points, &self.triangles, &self.groups.mask, weights, bones, &self.landmarks)
-    }
-
-    /// How many triangles all expressions together, each at full strength, turn by more than a right angle.
-    fn folds(&self, face: &AutoFace, expressions: &ExpressionSet) -> usize {
-        let ready = self.fitted(&face.bones, &face.weights);
-        let one = |expression| {
-            let poses = ready.pose(&Mix::of(&[(expression, 1.0)], expressions.unit_set()), expressions.unit_set());
-            let moved = apply(&self.points, &face.weights, &face.bones, &poses);
-            folded(&self.points, &moved, &self.triangles)
-        };
-        expressions.six().map(one).sum()
     }
 
     /// Moves the bones of a face, and weighs the points anew, so that the bones can show given shapes.
@@ -445,20 +435,6 @@ impl FaceAnalysis {
             None => point,
         }
     }
-}
-
-/// How many triangles turn by more than a right angle from `rest` to `moved`. Those without an area do not count.
-pub fn folded(rest: &[Vec3], moved: &[Vec3], triangles: &[[u32; 3]]) -> usize {
-    let normal = |points: &[Vec3], [a, b, c]: [u32; 3]| {
-        let [a, b, c] = [a, b, c].map(|corner| points[corner as usize]);
-        ((b - a).cross(c - a), (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared()))
-    };
-    let turns = |triangle: &&[u32; 3]| {
-        let (before, longest) = normal(rest, **triangle);
-        let (after, _) = normal(moved, **triangle);
-        before.length() > 1e-3 * longest && before.dot(after) < 0.0
-    };
-    triangles.iter().filter(turns).count()
 }
 
 /// Seeds that are tried where expressions fold skin over.
