@@ -80,9 +80,13 @@ impl Head {
     fn folds(&self, moved: &[Vec3]) -> usize {
         let normal = |points: &[Vec3], triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|corner| points[corner as usize]);
-            (b - a).cross(c - a)
+            ((b - a).cross(c - a), (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared()))
         };
-        self.triangles.iter().filter(|t| normal(&self.points, t).dot(normal(moved, t)) < 0.0).count()
+        let folds = |triangle: &&[u32; 3]| {
+            let (rest, longest) = normal(&self.points, triangle);
+            rest.length() > 1e-3 * longest && rest.dot(normal(moved, triangle).0) < 0.0
+        };
+        self.triangles.iter().filter(folds).count()
     }
 
     /// What an expression must reach, in eye distances (lids: in their opening), as (what, reached, least).

@@ -34,6 +34,8 @@ const PAIRS: [[usize; 2]; 9] =
 const APART: usize = 7;
 /// How strongly bones with common skin are held together.
 const STIFF: f64 = 0.002;
+/// Triangles of less area, as a share of their longest edge squared, are not looked at.
+pub(super) const SLIVER: f32 = 1e-3;
 /// How often bones are brought nearer to each other where skin folds.
 const ROUNDS: usize = 8;
 
@@ -107,10 +109,17 @@ impl<'a> FittedFace<'a> {
         let Some(gates) = Gates::new(landmarks) else { return face };
         face.gather(&gates, &unknown_of, mask);
         face.factorise();
+        // Slivers without an area have no side to turn.
+        let has_area = |[a, b, c]: [usize; 3]| {
+            let [a, b, c] = [a, b, c].map(|corner| points[corner]);
+            let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+            (b - a).cross(c - a).length() > SLIVER * longest
+        };
         face.moving = (0..triangles.len() as u32)
             .filter(|&index| {
                 let corners = triangles[index as usize].map(|corner| corner as usize);
                 corners.iter().all(|&corner| corner < points.len())
+                    && has_area(corners)
                     && corners.iter().any(|&corner| face.influences(corner).any(|(joint, _)| joint >= 2))
             })
             .collect();

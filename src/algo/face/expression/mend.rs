@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{Affine3A, Vec3, Vec3A};
 
-use super::{ExpressionSet, FittedFace, Mix, text::Expression};
+use super::{ExpressionSet, FittedFace, Mix, fitted::SLIVER, text::Expression};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks},
     mesh::{adjacency::weld, model::Weights},
@@ -185,7 +185,9 @@ fn folded(
             Some(_) => true,
             None => weights.of(*corner as usize).any(|(joint, _)| joint >= 2),
         };
-        if !corners.iter().any(moving) {
+        let [a, b, c] = rest;
+        let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+        if !corners.iter().any(moving) || normal(rest).length() <= SLIVER * longest {
             return false;
         }
         let influences = corners.map(|corner| influences(corner, weights, own));
