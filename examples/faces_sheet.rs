@@ -36,11 +36,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let columns = rows.first().map_or(0, Vec::len);
-    let size = Extent3d {
-        width: CELL.x * columns as u32,
-        height: CELL.y * rows.len() as u32,
-        depth_or_array_layers: 1,
-    };
+    let size =
+        Extent3d { width: CELL.x * columns as u32, height: CELL.y * rows.len() as u32, depth_or_array_layers: 1 };
     let first = rows.first().and_then(|row| row.first()).ok_or("give at least one head")?;
     let format = first.texture_descriptor.format;
     let mut bytes = vec![255; (size.width * size.height * 4) as usize];

@@ -235,7 +235,8 @@ fn describe(report: &mut Report, placed: &FaceReport) {
         ));
     }
     let skin = placed.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
-    report.line(format!("groups: face {face}, middle {middle}, back {back} points; facial mask {} points", placed.mask));
+    report
+        .line(format!("groups: face {face}, middle {middle}, back {back} points; facial mask {} points", placed.mask));
     report.line(format!(
         "{skin} facial bones, {} of jaw and eyes; square error {:.4} after {} rounds",
         placed.bones.len() - skin,
@@ -249,7 +250,8 @@ fn describe(report: &mut Report, placed: &FaceReport) {
     let milliseconds = |time: &std::time::Duration| time.as_secs_f64() * 1000.0;
     let sum: f64 = placed.times.iter().map(|(_, time)| milliseconds(time)).sum();
     report.line(format!("{sum:.0} ms"));
-    report.set("groups", json!({ "face": face, "middle": middle, "back": back, "cut": placed.cut, "mask": placed.mask }));
+    report
+        .set("groups", json!({ "face": face, "middle": middle, "back": back, "cut": placed.cut, "mask": placed.mask }));
     report.set("points", json!({ "head": head, "mesh": all }));
     report.set("heights", json!(placed.heights));
     report.set("confidence", placed.confidence);

@@ -28,14 +28,20 @@ pub struct PanelsPlugin;
 
 impl Plugin for PanelsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins((log::LogPlugin, skinning::SkinningPanelPlugin, face::FacePanelPlugin, poses::PosesPlugin, toasts::ToastsPlugin))
-            .add_panel(hierarchy::HierarchyPanel::default())
-            .add_panel(properties::PropertiesPanel::default())
-            .add_panel(skinning::SkinningPanel::default())
-            .add_panel(face::FacePanel::default())
-            .add_panel(poses::PosesPanel::default())
-            .add_panel(history::HistoryPanel::default())
-            .add_panel(log::LogPanel::default())
-            .add_overlay(toasts::Toasts::default());
+        app.add_plugins((
+            log::LogPlugin,
+            skinning::SkinningPanelPlugin,
+            face::FacePanelPlugin,
+            poses::PosesPlugin,
+            toasts::ToastsPlugin,
+        ))
+        .add_panel(hierarchy::HierarchyPanel::default())
+        .add_panel(properties::PropertiesPanel::default())
+        .add_panel(skinning::SkinningPanel::default())
+        .add_panel(face::FacePanel::default())
+        .add_panel(poses::PosesPanel::default())
+        .add_panel(history::HistoryPanel::default())
+        .add_panel(log::LogPanel::default())
+        .add_overlay(toasts::Toasts::default());
     }
 }

@@ -245,14 +245,16 @@ impl ControlModule {
             let constraint = match upper {
                 // A joint that may be driven together with the one above it, by inverse kinematics say, cannot follow in
                 // the rig's space: that would depend on where the one above ends up.
-                Some(upper) if self.axes == ControlAxes::Node && !self.follow_scale && !self.keep_pose => Constraint::Relative {
-                    driven: scope.uid(node),
-                    source: scope.uid(control),
-                    space: scope.uid(upper),
-                    translate: true,
-                    rotate: true,
-                    weight: Scalar::Value(1.0),
-                },
+                Some(upper) if self.axes == ControlAxes::Node && !self.follow_scale && !self.keep_pose => {
+                    Constraint::Relative {
+                        driven: scope.uid(node),
+                        source: scope.uid(control),
+                        space: scope.uid(upper),
+                        translate: true,
+                        rotate: true,
+                        weight: Scalar::Value(1.0),
+                    }
+                }
                 _ => self.following(scope, node, control, place),
             };
             scope.constrain("follow", node, 0, constraint)?;

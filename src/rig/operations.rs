@@ -271,7 +271,9 @@ impl Operation {
             Self::RenamePose(pose, name) => pose::rename(draft, *pose, name),
             Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),
             Self::Tags(operation) => tags::run(draft, operation),
-            Self::Edits(edits) | Self::Named { edits, .. } => edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?)),
+            Self::Edits(edits) | Self::Named { edits, .. } => {
+                edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?))
+            }
         }
     }
 }

@@ -9,7 +9,7 @@ use glam::{Quat, Vec3};
 use super::{
     axes::{AxesError, HeadAxes, guess_axes},
     bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, place_bones},
-    expression::{BonePose, ExpressionSet, FittedFace, mend_folds},
+    expression::{BonePose, ExpressionSet, FittedFace, count_folds, mend_folds},
     grouping::{GroupingError, HeadGroups, group_head},
     head_bones::{HeadBones, HeadBonesError, head_bones},
     head_part::{HeadPartError, head_part},
@@ -316,17 +316,9 @@ impl FaceAnalysis {
             symmetric: settings.symmetric,
             extras: settings.extras,
         };
-        let placed = place_bones(
-            points,
-            triangles,
-            shells,
-            groups,
-            landmarks,
-            fixed,
-            &how,
-            &within(progress, FaceStep::Bones),
-        )
-        .map_err(|error| cancelled(progress, FaceError::Bones(error)))?;
+        let placed =
+            place_bones(points, triangles, shells, groups, landmarks, fixed, &how, &within(progress, FaceStep::Bones))
+                .map_err(|error| cancelled(progress, FaceError::Bones(error)))?;
         begin(progress, FaceStep::Weights)?;
         let weights = face_weights(
             points,
@@ -346,8 +338,12 @@ impl FaceAnalysis {
             folds: 0,
         };
         begin(progress, FaceStep::Expressions)?;
-        face.folds =
-            mend_folds(expressions, points, triangles, &groups.mask, &mut face.weights, &face.bones, landmarks);
+        let mask = &groups.mask;
+        let left = mend_folds(expressions, points, triangles, mask, &mut face.weights, &face.bones, landmarks);
+        if left > 0 {
+            // What the weights still fold the solver may yet avoid.
+            face.folds = count_folds(expressions, points, triangles, mask, &face.weights, &face.bones, landmarks);
+        }
         Ok(face)
     }
 
@@ -385,18 +381,15 @@ impl FaceAnalysis {
         let shapes: Vec<Vec<Vec3>> = shapes.iter().map(own).collect();
         let start: Vec<Vec3> = face.bones.iter().map(|bone| bone.position).collect();
         let settings = FitSettings { bones: start.len(), start: &start, locked, ..FitSettings::default() };
-        let found = fit(&self.points, &self.triangles, &shapes, &settings, &within(progress, FaceStep::Fit)).map_err(
-            |error| if error == FitError::Cancelled { FaceError::Cancelled } else { FaceError::Fit(error) },
-        )?;
+        let found = fit(&self.points, &self.triangles, &shapes, &settings, &within(progress, FaceStep::Fit))
+            .map_err(|error| if error == FitError::Cancelled { FaceError::Cancelled } else { FaceError::Fit(error) })?;
         let mut face = face.clone();
         for (bone, position) in face.bones.iter_mut().zip(&found.positions) {
             bone.position = *position;
         }
         face.weights = self.with_neck(&found.weights, &face.weights);
-        let pose = |moved: &crate::algo::fit::BoneMove| BonePose {
-            translation: moved.translation,
-            rotation: moved.rotation,
-        };
+        let pose =
+            |moved: &crate::algo::fit::BoneMove| BonePose { translation: moved.translation, rotation: moved.rotation };
         let poses = found.moves.iter().map(|moves| moves.iter().map(pose).collect()).collect();
         Ok(Refitted { face, poses, error: found.error })
     }

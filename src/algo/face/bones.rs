@@ -5,6 +5,7 @@
 //! samples of both sides are folded onto one and its centroids mirrored, with a strip along the middle plane for bones on
 //! the plane. Jaw and eyes get bones of their own on top.
 
+mod extras;
 pub(crate) mod map;
 mod name;
 pub(crate) mod sample;
@@ -13,11 +14,7 @@ mod spread;
 use glam::Vec3;
 
 use crate::algo::{
-    face::{
-        grouping::HeadGroups,
-        landmarks::Landmarks,
-        shells::{ShellKind, Shells},
-    },
+    face::{grouping::HeadGroups, landmarks::Landmarks, shells::Shells},
     kmeans::KMeansError,
 };
 use map::{FaceMap, Part};
@@ -241,7 +238,7 @@ pub fn place_bones(
         .filter(|(_, seen)| **seen)
         .map(|(p, _)| f64::from(bones.iter().map(|b| b.position.distance_squared(*p)).fold(f32::INFINITY, f32::min)))
         .sum();
-    extras(points, shells, landmarks, &map, fixed, settings.extras, &mut bones);
+    extras::add(points, shells, landmarks, &map, fixed, settings.extras, &mut bones);
     if !progress(1.0) {
         return Err(FaceBonesError::Cancelled);
     }
@@ -427,43 +424,6 @@ fn nearest_on_triangle(c: &[Vec3; 3], p: Vec3) -> Vec3 {
         .unwrap_or(p)
 }
 
-/// Adds the bones of jaw and eyes: fixed ones where they are, others if `wanted` and the mesh has them.
-fn extras(
-    points: &[Vec3],
-    shells: &Shells,
-    landmarks: &Landmarks,
-    map: &FaceMap,
-    fixed: &[FixedBone],
-    wanted: bool,
-    bones: &mut Vec<FaceBone>,
-) {
-    let given = |kind: FaceBoneKind, side: Option<Side>| {
-        let is =
-            |f: &FixedBone| f.kind == kind && side.is_none_or(|s| (s == Side::Right) == (f.position.x < map.middle));
-        fixed.iter().position(is).map(|i| (fixed[i].position, Some(i)))
-    };
-    let ear: Vec3 = map.halves.iter().map(|h| h.jaw[8] + h.jaw[6]).sum::<Vec3>() / 4.0;
-    let own = (wanted && landmarks.mouth_open && map.trusted).then_some((ear.with_x(map.middle), None));
-    if let Some((position, fixed)) = given(FaceBoneKind::Jaw, None).or(own) {
-        bones.push(FaceBone { fixed, ..name::extra(position, FaceBoneKind::Jaw, Side::Middle) });
-    }
-    let first = bones.len();
-    for (kind, side) in [(ShellKind::LeftEye, Side::Left), (ShellKind::RightEye, Side::Right)] {
-        let ball = || {
-            let of = |(i, _): &(usize, &Vec3)| shells.kind(*i) == kind;
-            let ball: Vec<Vec3> = points.iter().enumerate().filter(of).map(|(_, &p)| p).collect();
-            ball_center(&ball).filter(|_| wanted).map(|center| (center, None))
-        };
-        if let Some((position, fixed)) = given(FaceBoneKind::Eye, Some(side)).or_else(ball) {
-            bones.push(FaceBone { fixed, ..name::extra(position, FaceBoneKind::Eye, side) });
-        }
-    }
-    if bones.len() == first + 2 {
-        bones[first].pair = Some(first + 1);
-        bones[first + 1].pair = Some(first);
-    }
-}
-
 /// The region of the face that a place on the skin lies in.
 pub fn region_of(position: Vec3, landmarks: &Landmarks) -> Region {
     name::region(FaceMap::new(landmarks, landmarks.symmetric, 1.0).part(position)).0
@@ -486,28 +446,4 @@ pub fn label(region: Region, side: Side, number: usize, kind: FaceBoneKind) -> S
         FaceBoneKind::Jaw => "jaw".to_owned(),
         FaceBoneKind::Eye => format!("eye_{}", side.letter()),
     }
-}
-
-/// The middle of an eyeball: that of the sphere which fits its points best, or of its box if there is none nearby.
-fn ball_center(ball: &[Vec3]) -> Option<Vec3> {
-    let low = ball.iter().copied().reduce(Vec3::min)?;
-    let high = ball.iter().copied().reduce(Vec3::max)?;
-    let middle = 0.5 * (low + high);
-    // |p|² = 2 c·p + d, relative to the middle of the box, by least squares.
-    let mut sums = glam::DMat4::ZERO;
-    let mut right = glam::DVec4::ZERO;
-    for p in ball {
-        let q = (*p - middle).as_dvec3();
-        let row = q.extend(1.0);
-        sums += glam::DMat4::from_cols(row * row.x, row * row.y, row * row.z, row * row.w);
-        right += row * q.length_squared();
-    }
-    let size = f64::from((high - low).max_element());
-    if sums.determinant().abs() > 1e-9 * size * size * size * size * size * size * (ball.len() as f64) {
-        let center = 0.5 * (sums.inverse() * right).truncate();
-        if center.is_finite() && center.length() < 0.5 * size {
-            return Some(middle + center.as_vec3());
-        }
-    }
-    Some(middle)
 }

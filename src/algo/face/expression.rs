@@ -27,7 +27,7 @@ use crate::mesh::{model::Weights, skinning::skin_points};
 
 pub use self::{
     fitted::FittedFace,
-    mend::mend_folds,
+    mend::{count_folds, mend_folds},
     set::{ExpressionSet, UnitSet},
     text::{Expression, ExpressionError, Gaze, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
 };

@@ -25,6 +25,7 @@ use crate::{
     },
     mesh::shapes::Shapes,
     plugins::{
+        RigSystems,
         face::{Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig},
         picking::{Pick, PickRequest},
         surface::{RigMesh, RigMeshes},
@@ -42,7 +43,7 @@ impl Plugin for FacePanelPlugin {
             .add_message::<FacePlaced>()
             .add_message::<Expressed>()
             .add_message::<Notice>()
-            .add_systems(Update, cancel)
+            .add_systems(Update, cancel.after(RigSystems::Build).before(RigSystems::Bind))
             .add_systems(Last, tell_results.before(LogSystems));
     }
 }
@@ -112,7 +113,8 @@ fn told(report: &FaceReport) -> String {
         1 => ", 1 of them kept as it was".to_owned(),
         more => format!(", {more} of them kept as they were"),
     };
-    let fitted = report.fit_error.map_or(String::new(), |error| format!("; the shapes are met to {error:.4} on average"));
+    let fitted =
+        report.fit_error.map_or(String::new(), |error| format!("; the shapes are met to {error:.4} on average"));
     format!("{skin} facial bones in {sum:.0} ms{kept}{fitted}.")
 }
 
@@ -229,14 +231,8 @@ impl FacePanel {
 
 /// One of the six axes, or what the mesh looks like.
 fn axis(ui: &mut Ui, name: &str, value: &mut Option<Vec3>) {
-    let axes = [
-        ("X", Vec3::X),
-        ("Y", Vec3::Y),
-        ("Z", Vec3::Z),
-        ("-X", Vec3::NEG_X),
-        ("-Y", Vec3::NEG_Y),
-        ("-Z", Vec3::NEG_Z),
-    ];
+    let axes =
+        [("X", Vec3::X), ("Y", Vec3::Y), ("Z", Vec3::Z), ("-X", Vec3::NEG_X), ("-Y", Vec3::NEG_Y), ("-Z", Vec3::NEG_Z)];
     let text = axes.iter().find(|(_, axis)| *value == Some(*axis)).map_or("Guess", |(name, _)| name);
     fields::labelled(ui, name, |ui| {
         egui::ComboBox::from_id_salt(name).selected_text(text).width(ui.available_width()).show_ui(ui, |ui| {

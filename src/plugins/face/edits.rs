@@ -72,11 +72,8 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
         let position = to_rig * bone.position;
         let global = Affine3A::from_rotation_translation(to_rig, position);
         let placed = Placed { kind: bone.kind, label: bone.label.clone(), position };
-        let kind = TagKind::Command {
-            module: "control".to_owned(),
-            params: control(bone, eye),
-            feature: Some(feature),
-        };
+        let kind =
+            TagKind::Command { module: "control".to_owned(), params: control(bone, eye), feature: Some(feature) };
         let tag = Tag { uid: uids.next_uid(), enabled: true, comment: placed.comment(), kind };
         let joint = JointData {
             uid: *uid,
@@ -96,7 +93,8 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
         // A partner that stays must not name what goes.
         let partner = rig.joint(bone.uid).and_then(|joint| joint.data.mirror);
         if let Some(partner) = partner.filter(|partner| stays.contains(partner)) {
-            let renewed = joints.contains(&partner) && face.bones.iter().zip(&joints).any(|(b, j)| *j == partner && b.pair.is_some());
+            let renewed = joints.contains(&partner)
+                && face.bones.iter().zip(&joints).any(|(b, j)| *j == partner && b.pair.is_some());
             if !renewed {
                 edits.push(RigEdit::SetMirror(partner, None));
             }
@@ -129,7 +127,8 @@ fn skull(
     let head_global = place(along(bones.head.tail - bones.head.head), bones.head.head);
     let end_global = place(along(bones.head.tail - bones.head.head), bones.head.tail);
     let mut add = |label: &str, kind: NodeKind, rest: RestTransform, parent: Option<Uid>, index: usize| {
-        let joint = JointData { uid: uids.next_uid(), label: Some(label.to_owned()), kind, rest, ..JointData::default() };
+        let joint =
+            JointData { uid: uids.next_uid(), label: Some(label.to_owned()), kind, rest, ..JointData::default() };
         let uid = joint.uid;
         edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent, index });
         uid
@@ -295,7 +294,8 @@ impl Table {
 
 /// At most eight influences, strongest first, summing to one.
 fn strongest(shares: &BTreeMap<u32, f32>) -> Vec<(u32, f32)> {
-    let mut list: Vec<(u32, f32)> = shares.iter().map(|(joint, share)| (*joint, *share)).filter(|(_, s)| *s > 1e-4).collect();
+    let mut list: Vec<(u32, f32)> =
+        shares.iter().map(|(joint, share)| (*joint, *share)).filter(|(_, s)| *s > 1e-4).collect();
     list.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     list.truncate(8);
     let sum: f32 = list.iter().map(|(_, share)| share).sum();

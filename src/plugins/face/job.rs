@@ -1,6 +1,7 @@
 //! Placing a face in the background.
 
 use std::{
+    collections::{BTreeMap, BTreeSet},
     sync::{
         Arc, Mutex,
         atomic::{AtomicBool, AtomicU32, Ordering},
@@ -22,7 +23,7 @@ use super::{
 use crate::{
     algo::face::{
         auto::{AutoFace, AutoSettings, FaceAnalysis, FaceError, FaceStep, Refitted},
-        bones::{FaceBoneKind, FixedBone},
+        bones::{FaceBone, FaceBoneKind, FixedBone, label},
         expression::{BonePose, ExpressionSet},
         grouping::HeadGroup,
     },
@@ -175,9 +176,7 @@ impl Work {
             kept.iter().map(|bone| FixedBone { position: turn * bone.position, kind: bone.kind }).collect();
         let bones = match &shapes {
             // Jaw and eyes come on top of the bones that are asked for.
-            Some(_) if !kept.is_empty() => {
-                kept.iter().filter(|b| b.kind == FaceBoneKind::Skin).count().max(1)
-            }
+            Some(_) if !kept.is_empty() => kept.iter().filter(|b| b.kind == FaceBoneKind::Skin).count().max(1),
             _ => settings.bones,
         };
         let how = AutoSettings { bones, ..settings.clone() };
@@ -185,7 +184,7 @@ impl Work {
         let fit = match &shapes {
             None => None,
             Some(shapes) => {
-                let locked = |bone: &crate::algo::face::bones::FaceBone| {
+                let locked = |bone: &FaceBone| {
                     let joint = bone.fixed.and_then(|fixed| rig.joint(kept.get(fixed)?.uid));
                     joint.is_some_and(|joint| joint.data.locked)
                 };
@@ -195,8 +194,40 @@ impl Work {
                 Some(fit)
             }
         };
+        rename(&mut face.bones, &kept);
         let times = progress.times(Instant::now());
         Ok(Done { analysis, settings, rest: mesh.rest.clone(), face, fit, kept, times })
+    }
+}
+
+/// Gives bones that stay the labels they have, and the others labels that no bone that stays has; pairs get a number in
+/// common.
+fn rename(bones: &mut [FaceBone], kept: &[KnownBone]) {
+    let stays = |bone: &FaceBone| bone.fixed.and_then(|fixed| kept.get(fixed));
+    let mut taken: BTreeSet<String> = kept.iter().map(|bone| bone.label.clone()).collect();
+    for at in 0..bones.len() {
+        if let Some(kept) = stays(&bones[at]) {
+            bones[at].label.clone_from(&kept.label);
+            continue;
+        }
+        let pair = bones[at].pair.filter(|pair| *pair > at && stays(&bones[*pair]).is_none());
+        let named = |bone: &FaceBone, number: usize| label(bone.region, bone.side, number, bone.kind);
+        let mut found = bones[at].label.clone();
+        let mut other = pair.map(|pair| bones[pair].label.clone());
+        let mut number = 1;
+        while taken.contains(&found) || other.as_ref().is_some_and(|other| taken.contains(other)) {
+            if bones[at].kind != FaceBoneKind::Skin || number > bones.len() + kept.len() {
+                break;
+            }
+            found = named(&bones[at], number);
+            other = pair.map(|pair| named(&bones[pair], number));
+            number += 1;
+        }
+        taken.insert(found.clone());
+        bones[at].label = found;
+        if let (Some(pair), Some(other)) = (pair, other) {
+            bones[pair].label = other;
+        }
     }
 }
 
@@ -264,14 +295,7 @@ impl Done {
     }
 
     /// A stored pose for each shape; those of the same name are replaced.
-    fn poses(
-        &self,
-        rig: &Rig,
-        fit: &Refitted,
-        shapes: &Shapes,
-        joints: &[Uid],
-        uids: &mut UidSource,
-    ) -> Vec<RigEdit> {
+    fn poses(&self, rig: &Rig, fit: &Refitted, shapes: &Shapes, joints: &[Uid], uids: &mut UidSource) -> Vec<RigEdit> {
         let frames: Vec<pose::Frame> = joints.iter().map(|uid| pose::Frame::of(rig, *uid, &self.analysis)).collect();
         let mut added = rig.stored_poses().len();
         let mut edits = Vec::new();
@@ -280,7 +304,7 @@ impl Done {
                 let offset = frame.offset(transform);
                 (!offset.is_rest(1e-7)).then_some((*uid, offset))
             };
-            let offsets: std::collections::BTreeMap<Uid, PoseOffset> =
+            let offsets: BTreeMap<Uid, PoseOffset> =
                 joints.iter().zip(&frames).zip(transforms).filter_map(offset).collect();
             let same = rig.stored_poses().iter().find(|pose| pose.name == *name);
             let stored = |uid: Uid| StoredPose { uid, name: name.clone(), offsets, ..StoredPose::default() };

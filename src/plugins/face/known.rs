@@ -61,9 +61,9 @@ impl Placed {
     pub fn read(comment: &str) -> Option<Self> {
         let (named, place) = comment.split_once(", placed at ")?;
         let kinds = [FaceBoneKind::Skin, FaceBoneKind::Jaw, FaceBoneKind::Eye];
-        let (kind, label) = kinds.into_iter().find_map(|kind| {
-            Some((kind, named.strip_prefix(kind_words(kind))?.strip_prefix(' ')?.to_owned()))
-        })?;
+        let (kind, label) = kinds
+            .into_iter()
+            .find_map(|kind| Some((kind, named.strip_prefix(kind_words(kind))?.strip_prefix(' ')?.to_owned())))?;
         let mut numbers = place.split(' ').map(|number| number.parse::<f32>().ok());
         let mut next = || numbers.next().flatten();
         Some(Self { kind, label, position: Vec3::new(next()?, next()?, next()?) })

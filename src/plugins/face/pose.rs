@@ -72,7 +72,8 @@ pub(super) fn express(
     mut told: MessageWriter<Expressed>,
 ) {
     for ExpressRequest { mesh: entity, strengths, preview } in requests.read() {
-        let found = meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, of.0, rigs.get(of.0).ok()?, face)));
+        let found =
+            meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, of.0, rigs.get(of.0).ok()?, face)));
         let Some((mesh, rig_entity, rig, face)) = found else {
             let result = Err("the mesh belongs to no rig; it may have been closed".to_owned());
             told.write(Expressed { mesh: *entity, result });

@@ -21,6 +21,8 @@ use crate::{
     mesh::model::Weights,
 };
 
+/// The most samples of the skin, besides landmarks.
+const SAMPLES: usize = 1600;
 /// What a landmark counts, as a share of the whole skin.
 const LANDMARK: f64 = 0.02;
 /// How strongly movements are held to what their own patch asks for, as a share of what the patch counts.
@@ -162,6 +164,7 @@ impl<'a> FittedFace<'a> {
     fn gather(&mut self, gates: &Gates, unknown_of: &[u32], mask: &[bool]) {
         let mut lower_share = vec![0.5_f32; self.points.len()];
         let mut samples = Vec::new();
+        let thinned = self.thinned(mask);
         for (index, &point) in self.points.iter().enumerate() {
             let Some(mut sample) = self.sample(index, point, unknown_of) else { continue };
             let (mut lower, mut all) = (0.0, 0.0);
@@ -175,7 +178,7 @@ impl<'a> FittedFace<'a> {
                 }
             }
             lower_share[index] = lower / all.max(1e-6);
-            if !mask.is_empty() && !mask.get(index).copied().unwrap_or(false) {
+            if !thinned.get(index).copied().unwrap_or(false) {
                 continue;
             }
             // Of lips that touch only the skin's own weights tell which is which.
@@ -234,6 +237,28 @@ impl<'a> FittedFace<'a> {
             }
         }
         self.samples = samples;
+    }
+
+    /// Which points of the mask become samples: all, or on a dense mesh about [`SAMPLES`] of them. A point and its mirror
+    /// image are taken or left together.
+    fn thinned(&self, mask: &[bool]) -> Vec<bool> {
+        let inside = |index: usize| mask.is_empty() || mask.get(index).copied().unwrap_or(false);
+        let count = (0..self.points.len()).filter(|&index| inside(index)).count();
+        if count <= SAMPLES {
+            return (0..self.points.len()).map(inside).collect();
+        }
+        let fine = 1000.0 / self.landmarks.eye_distance().max(f32::MIN_POSITIVE);
+        let limit = (SAMPLES as f64 / count as f64 * f64::from(u32::MAX)) as u64;
+        let taken = |point: &Vec3| {
+            let place = [(point.x - self.landmarks.middle).abs(), point.y, point.z];
+            let mut mixed = 0x9e37_79b9_7f4a_7c15_u64;
+            for value in place {
+                mixed = (mixed ^ ((value * fine).round() as i64 as u64)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                mixed ^= mixed >> 29;
+            }
+            (mixed >> 32) < limit
+        };
+        self.points.iter().enumerate().map(|(index, point)| inside(index) && taken(point)).collect()
     }
 
     /// A sample of a point, if bones move it at all.

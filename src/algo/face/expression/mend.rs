@@ -7,11 +7,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{Affine3A, Vec3, Vec3A};
+use rayon::prelude::*;
 
-use super::{ExpressionSet, FittedFace, Mix, fitted::SLIVER, text::Expression};
+use super::{ExpressionSet, FittedFace, Mix, apply, fitted::SLIVER, text::Expression};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks},
-    mesh::{adjacency::weld, model::Weights},
+    mesh::{adjacency::weld, model::Weights, skinning::skin_points},
 };
 
 /// How often bones are solved for again.
@@ -41,21 +42,23 @@ pub fn mend_folds(
     if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
         return 0;
     }
+    let six: Vec<&Expression> = set.six().collect();
     let poses = |weights: &Weights| -> Vec<Vec<Affine3A>> {
         let face = FittedFace::new(points, &[], mask, weights, bones, landmarks);
-        let pose = |expression: &Expression| face.pose(&Mix::of(&[(expression, 1.0)], set.unit_set()), set.unit_set());
-        let matrices = |expression| {
-            let moved = pose(expression).into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
+        let matrices = |expression: &&Expression| {
+            let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()), set.unit_set());
+            let moved = posed.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
             [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
         };
-        set.six().map(matrices).collect()
+        six.par_iter().map(matrices).collect()
     };
+    let with_area = with_area(points, triangles);
     let mut left = 0;
     let mut around: Option<Around> = None;
     for _ in 0..PASSES {
         let poses = poses(weights);
         let mut own: BTreeMap<u32, Influences> = BTreeMap::new();
-        let mut folded = folded(points, triangles, 0..triangles.len() as u32, weights, &own, &poses);
+        let mut folded = all_folded(points, triangles, &with_area, weights, &poses);
         left = folded.len();
         if folded.is_empty() {
             break;
@@ -99,6 +102,73 @@ pub fn mend_folds(
         *weights = mended;
     }
     left
+}
+
+/// How many triangles turn by more than a right angle in the six expressions at full strength, as a face shows them:
+/// with bones held together where skin would fold.
+///
+/// All in head space, as [`mend_folds`] takes it.
+pub fn count_folds(
+    set: &ExpressionSet,
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    mask: &[bool],
+    weights: &Weights,
+    bones: &[FaceBone],
+    landmarks: &Landmarks,
+) -> usize {
+    if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
+        return 0;
+    }
+    let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks);
+    let with_area = with_area(points, triangles);
+    let six: Vec<&Expression> = set.six().collect();
+    let folds = |expression: &&Expression| {
+        let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()), set.unit_set());
+        turned(points, triangles, &with_area, &apply(points, weights, bones, &posed)).len()
+    };
+    six.par_iter().map(folds).sum()
+}
+
+/// Triangles that are no slivers: those have no side to turn.
+fn with_area(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
+    let has_area = |index: &u32| {
+        let [a, b, c] = triangles[*index as usize].map(|corner| points[corner as usize]);
+        let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+        (b - a).cross(c - a).length() > SLIVER * longest
+    };
+    (0..triangles.len() as u32).filter(has_area).collect()
+}
+
+/// Those of some triangles whose normals turn by more than a right angle.
+fn turned(rest: &[Vec3], triangles: &[[u32; 3]], which: &[u32], posed: &[Vec3]) -> Vec<u32> {
+    let normal = |points: &[Vec3], corners: [u32; 3]| {
+        let [a, b, c] = corners.map(|corner| points[corner as usize]);
+        (b - a).cross(c - a)
+    };
+    let is_turned = |index: &u32| {
+        let corners = triangles[*index as usize];
+        normal(rest, corners).dot(normal(posed, corners)) < 0.0
+    };
+    which.iter().copied().filter(is_turned).collect()
+}
+
+/// Those that any of some poses turns over, in rising order.
+fn all_folded(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    which: &[u32],
+    weights: &Weights,
+    poses: &[Vec<Affine3A>],
+) -> Vec<u32> {
+    let of_pose = |matrices: &Vec<Affine3A>| {
+        let mut posed = Vec::new();
+        skin_points(points, weights, matrices, &mut posed);
+        turned(points, triangles, which, &posed)
+    };
+    let all: Vec<Vec<u32>> = poses.par_iter().map(of_pose).collect();
+    let all: BTreeSet<u32> = all.into_iter().flatten().collect();
+    all.into_iter().collect()
 }
 
 /// What lies around each place of the welded surface.

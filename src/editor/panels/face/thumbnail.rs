@@ -57,7 +57,8 @@ impl Pictures {
 /// The face from the front: nearest triangle a pixel, lit from above the camera.
 fn draw(points: &[Vec3], analysis: &FaceAnalysis) -> ColorImage {
     let marks = &analysis.landmarks.points;
-    let (low, high) = marks.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), mark| (low.min(*mark), high.max(*mark)));
+    let (low, high) =
+        marks.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), mark| (low.min(*mark), high.max(*mark)));
     let middle = 0.5 * (low + high);
     let side = 1.25 * (high - low).truncate().max_element().max(f32::MIN_POSITIVE);
     let scale = PIXELS as f32 / side;
@@ -97,11 +98,8 @@ fn draw(points: &[Vec3], analysis: &FaceAnalysis) -> ColorImage {
                     let [p, q, r] = triangle.map(|corner| normals[corner as usize]);
                     let normal = (u * p + v * q + w * r).normalize_or_zero();
                     let lit = 0.28 + 0.72 * normal.dot(light).abs();
-                    pixels[pixel] = Color32::from_rgb(
-                        (tone[0] * lit) as u8,
-                        (tone[1] * lit) as u8,
-                        (tone[2] * lit) as u8,
-                    );
+                    pixels[pixel] =
+                        Color32::from_rgb((tone[0] * lit) as u8, (tone[1] * lit) as u8, (tone[2] * lit) as u8);
                 }
             }
         }
