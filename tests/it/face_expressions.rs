@@ -59,7 +59,7 @@ fn head(name: &str, density: usize) -> Option<Head> {
     };
     let shells = find_shells(&points, &triangles);
     let go_on = |_: f32| true;
-    let groups = group_head(&points, &triangles, &shells, &landmarks, &go_on).unwrap();
+    let groups = group_head(&points, &triangles, &shells, &landmarks, None, &go_on).unwrap();
     let settings = FaceBonesSettings { bones: density, seed: 1, starts: 3, symmetric: true, extras: true };
     let bones = place_bones(&points, &triangles, &shells, &groups, &landmarks, &[], &settings, &go_on).unwrap().bones;
     let mut weights = face_weights(&points, &triangles, &shells, &groups, &landmarks, &bones, &go_on).unwrap();

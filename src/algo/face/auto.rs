@@ -250,8 +250,9 @@ impl FaceAnalysis {
         let shells = find_shells(&head, &faces);
         let landmarks = find_landmarks(&head, &faces, &shells).map_err(FaceError::Landmarks)?;
         step(FaceStep::Grouping)?;
-        let groups = group_head(&head, &faces, &shells, &landmarks, &within(progress, FaceStep::Grouping))
-            .map_err(|error| cancelled(progress, FaceError::Grouping(error)))?;
+        let groups =
+            group_head(&head, &faces, &shells, &landmarks, settings.groups, &within(progress, FaceStep::Grouping))
+                .map_err(|error| cancelled(progress, FaceError::Grouping(error)))?;
         step(FaceStep::HeadBones)?;
         let bones = head_bones(&head, &faces, &groups, &landmarks).map_err(FaceError::HeadBones)?;
         Ok(Self {

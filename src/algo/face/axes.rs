@@ -8,6 +8,7 @@ use glam::{Mat3, Quat, Vec3};
 use thiserror::Error;
 
 use super::{
+    head_part::{Body, snout},
     sections::border,
     shells::{ShellKind, find_shells},
 };
@@ -111,8 +112,16 @@ pub fn guess_axes(
     let (best, u, f) = scored.first().copied().unwrap_or((0.0, Vec3::Y, Vec3::Z));
     let margin = best - scored.get(1).map_or(f32::MIN, |next| next.0);
     let certain = signs.symmetric && margin >= CLEAR;
-    // A weak lead says nothing against what nearly all files do.
-    let (u, f) = if certain { (u, f) } else { scored.iter().map(|way| (way.1, way.2)).fold((u, f), usual) };
+    // A weak lead says nothing against what nearly all files do, and little against how beasts carry their heads.
+    let (u, f) = if certain {
+        (u, f)
+    } else if forward.is_none()
+        && let Some(looks) = beast(&turned, triangles, &signs)
+    {
+        (Vec3::Y, looks)
+    } else {
+        scored.iter().map(|way| (way.1, way.2)).fold((u, f), usual)
+    };
     let back = frame.inverse();
     let axes = HeadAxes { up: up.unwrap_or(back * u), forward: forward.unwrap_or(back * f) };
     Ok(AxesGuess { axes, certain })
@@ -122,6 +131,24 @@ pub fn guess_axes(
 fn usual(best: (Vec3, Vec3), way: (Vec3, Vec3)) -> (Vec3, Vec3) {
     if way == (Vec3::Y, Vec3::Z) { way } else { best }
 }
+
+/// Where a beast on four legs looks, if it is one with +y up.
+fn beast(points: &[Vec3], triangles: &[[u32; 3]], signs: &Signs) -> Option<Vec3> {
+    // Along x only where that is clearly not its width.
+    let along = if signs.skew.x > 2.0 * signs.skew.z + 0.05 { Vec3::X } else { Vec3::Z };
+    let turned: Vec<Vec3> = match along == Vec3::X {
+        true => points.iter().map(|point| Vec3::new(-point.z, point.y, point.x)).collect(),
+        false => points.to_vec(),
+    };
+    let higher = snout::carriage(&Body::new(&turned, triangles))?;
+    let says = higher + ROUGH * signs.rough.dot(along);
+    Some(if says < -FACES { -along } else { along })
+}
+
+/// How much a beast's detail says beside how it carries its head.
+const ROUGH: f32 = 1.0;
+/// A beast looks the unusual way only if this much says so.
+const FACES: f32 = 0.05;
 
 /// A lead in score from which a guess is certain.
 const CLEAR: f32 = 0.25;

@@ -87,7 +87,8 @@ const MOST_HEIGHTS: usize = 12;
 /// Groups a head in depth, and its middle in height.
 ///
 /// `points` are in head space (+x the character's left, +y up, +z forward), in any unit, and so are `landmarks`. The mask
-/// holds every skin point of the face group that does not lie below the jaw. `progress` hears how much is done and stops
+/// holds every skin point of the face group that does not lie below the jaw. `wanted` is the number of groups (2 or more)
+/// at which a person cut the history; of these, too, the front ones that hold landmarks are joined. `progress` hears how much is done and stops
 /// with `false`.
 ///
 /// # Errors
@@ -100,6 +101,7 @@ pub fn group_head(
     triangles: &[[u32; 3]],
     shells: &Shells,
     landmarks: &Landmarks,
+    wanted: Option<usize>,
     progress: &(dyn Fn(f32) -> bool + Sync),
 ) -> Result<HeadGroups, GroupingError> {
     if points.is_empty() || triangles.is_empty() {
@@ -116,7 +118,7 @@ pub fn group_head(
     }
     let eyes = landmarks.eye_distance();
     let rear = landmarks.points.iter().map(|point| point.z).fold(f32::MAX, f32::min);
-    let cut = cut(&borders, rear, eyes);
+    let cut = cut(&borders, rear, eyes, wanted);
     let of: Vec<HeadGroup> = depths
         .iter()
         .map(|depth| match depth {
@@ -167,10 +169,22 @@ struct Cut {
 }
 
 /// The least number of groups of which those in front, joined, hold all landmarks without reaching far behind them.
-fn cut(borders: &[f32], rear: f32, eyes: f32) -> Cut {
+///
+/// Where a number is `wanted`, that many groups, joined from the front just as far as landmarks reach.
+fn cut(borders: &[f32], rear: f32, eyes: f32, wanted: Option<usize>) -> Cut {
     let (nearest, farthest) = (rear - SLACK * eyes, rear - FARTHEST * eyes);
     // A border behind the face's has to exist, or there is no back.
     let behind = |taken: &[f32], face: f32| taken.iter().copied().find(|border| *border < face);
+    if let Some(wanted) = wanted {
+        let groups = wanted.clamp(2, borders.len() + 1);
+        let taken = &borders[..groups - 1];
+        let holding = taken.iter().copied().filter(|border| *border <= nearest).fold(f32::MIN, f32::max);
+        // Landmarks may reach behind every border: then all but the hindmost group are the face.
+        let hindmost = taken.iter().copied().fold(f32::MAX, f32::min);
+        let face = if holding > f32::MIN { holding } else { hindmost };
+        let middle = taken.iter().copied().filter(|border| *border < face).fold(f32::MIN, f32::max);
+        return Cut { groups, face, middle };
+    }
     let mut closest: Option<(f32, Cut)> = None;
     for groups in 3..=MOST_GROUPS.min(borders.len() + 1) {
         let taken = &borders[..groups - 1];

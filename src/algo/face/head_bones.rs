@@ -53,6 +53,12 @@ pub enum HeadBonesError {
 const NECK_WIDENS: f32 = 1.25;
 /// Where the skull's base is between chin and crown, at the highest: about the upper lip.
 const SKULL_BASE: f32 = 0.35;
+/// The shortest neck bone, as a share of the height from chin to crown.
+const SHORTEST: f32 = 0.2;
+/// How far inside an end a bone begins, as a share of the way.
+const EDGE: f32 = 0.06;
+/// How far from the middle of the neck its bone may be, as a share of the extent.
+const INWARD: f32 = 0.25;
 
 /// Places head and neck bones.
 ///
@@ -110,10 +116,12 @@ fn upright(shape: &Shape, end: Option<&border::End>, groups: &HeadGroups) -> Hea
         Vec::new()
     };
     let Some(neck) = NeckLine::new(&sections) else {
-        // No neck: a short one from the bottom of the head, or what a neck would be.
-        let joint = upper.with_y(chin + 0.5 * (skull - chin));
-        let root = joint.with_y(shape.low.y.min(chin) - 0.05 * (crown - chin));
-        return joined(root, joint, crown);
+        // No neck: a short one at the bottom of the head.
+        let (bottom, top) = column(shape, upper).unwrap_or((shape.low.y, crown));
+        let root = upper.with_y(bottom + EDGE * (top - bottom));
+        let joint = (chin + skull) * 0.5;
+        let shortest = root.y + SHORTEST * (crown - root.y);
+        return joined(root, upper.with_y(joint.max(shortest).min((root.y + crown) * 0.5)), crown);
     };
     // The neck's line passes the lower mean where that lies in the neck; a mean among the shoulders does not.
     let place = neck.at(groups.lower_mean.y);
@@ -125,8 +133,15 @@ fn upright(shape: &Shape, end: Option<&border::End>, groups: &HeadGroups) -> Hea
     } else {
         (chin + skull) * 0.5
     };
-    let joint = upper.with_y(meet.clamp(chin, skull));
-    joined(neck.at(neck.bottom) + shift, joint, crown)
+    let mut joint = upper.with_y(meet.clamp(chin, skull));
+    let mut root = neck.at(neck.bottom) + shift;
+    let shortest = SHORTEST * (crown - chin);
+    if joint.y - root.y < shortest {
+        // A neck cut close below the chin: from its end to the skull.
+        root = end.map_or(root, |end| end.center.lerp(joint, EDGE)).min(root.with_x(f32::MAX).with_z(f32::MAX));
+        joint.y = joint.y.max((root.y + shortest).min(skull));
+    }
+    joined(inward(shape, root), joint, crown)
 }
 
 /// The neck of a beast: behind the head, from its open end to the skull.
@@ -148,6 +163,16 @@ fn slanted(shape: &Shape, end: Vec3, center: Vec3, groups: &HeadGroups) -> HeadB
         .map_or(upper.y, |section| section.centroid.y);
     let joint = upper.with_y(passing.clamp(bottom + 0.2 * height, bottom + 0.6 * height));
     joined(first.centroid, joint, top)
+}
+
+/// A place in the neck, moved towards the middle of its horizontal section if it is near the skin.
+fn inward(shape: &Shape, place: Vec3) -> Vec3 {
+    let range = [place.y, place.y + 1e-4 * (shape.high.y - shape.low.y)];
+    let found = sections::sections(shape.points, shape.triangles, Vec3::Y, range, 2);
+    let Some(section) = found.first() else { return place };
+    let reach = Vec3::new(section.extent.y, 0.0, section.extent.x) * INWARD;
+    let off = (place - section.centroid).clamp(-reach, reach);
+    (section.centroid + off).with_y(place.y)
 }
 
 fn joined(root: Vec3, joint: Vec3, crown: f32) -> HeadBones {

@@ -1,14 +1,16 @@
 //! Head part: the head of a whole body or beast.
 //!
 //! A body stands on legs: near the ground its surface is two parts or more. From the head's extremity (the top of a
-//! biped, the front and top of a beast) planes walk into the body; where their sections are narrowest behind the head is
-//! the neck, and where they widen from there to the body it is cut.
+//! biped, the snout of a beast) planes or spheres walk into the body; where their sections are narrowest behind the head
+//! is the neck, and where they widen from there to the body it is cut.
 
 use glam::Vec3;
 use thiserror::Error;
 
 use super::sections::{Section, sections};
 use crate::mesh::adjacency;
+
+pub(super) mod snout;
 
 /// The head of a mesh.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +45,10 @@ const PLANES: usize = 64;
 const BIPED: f32 = 1.8;
 /// The neck ends where a section is this much wider than its narrowest.
 const WIDENS: f32 = 1.3;
+/// Sections of a head are so large at the least, as a share of the largest that may be its neck.
+const HEAD: f32 = 0.4;
+/// A body that lifts a leg is so much higher than its head.
+const LIFTED: f32 = 3.0;
 
 /// Finds the head of a mesh: all of it, or the head part of a body.
 ///
@@ -59,95 +65,169 @@ pub fn head_part(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<HeadPart, He
     }
     let whole =
         HeadPart { is_part: false, points: vec![true; points.len()], reason: "the mesh is a head".into(), cut: None };
-    let (welded, count) = adjacency::weld(points);
-    let joined: Vec<[u32; 3]> = triangles
-        .iter()
-        .filter(|triangle| triangle.iter().all(|corner| (*corner as usize) < points.len()))
-        .map(|triangle| triangle.map(|corner| welded[corner as usize]))
-        .collect();
-    let mut places = vec![Vec3::ZERO; count];
-    for (point, number) in points.iter().zip(&welded) {
-        places[*number as usize] = *point;
-    }
-    let (low, high) = places.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
-    let size = high - low;
-    if !(size.min_element() > 0.0) || ![0.06, 0.12].iter().all(|share| legs(&places, &joined, low, size, *share) >= 2) {
+    let body = Body::new(points, triangles);
+    if !(body.size().min_element() > 0.0) {
         return Ok(whole);
     }
-    let biped = size.y > BIPED * size.z;
-    let toward = if biped { Vec3::Y } else { Vec3::new(0.0, 1.0, 1.0).normalize() };
-    let (bottom, top) =
-        places.iter().map(|p| p.dot(toward)).fold((f32::MAX, f32::MIN), |(low, high), at| (low.min(at), high.max(at)));
-    // Sections along the inverse direction: the first is at the head.
-    let planes = sections(&places, &joined, -toward, [-top, -bottom], PLANES);
-    let at = -cut_at(&planes, if biped { 0.35 } else { 0.6 });
-    let above: Vec<[u32; 3]> = joined
-        .iter()
-        .filter(|triangle| triangle.iter().all(|corner| places[*corner as usize].dot(toward) >= at))
-        .copied()
-        .collect();
-    let (island_of, _) = adjacency::islands(&above, count);
-    let head = (0..count).max_by(|a, b| places[*a].dot(toward).total_cmp(&places[*b].dot(toward)));
-    let Some(head) = head.map(|place| island_of[place]) else { return Ok(whole) };
-    let mut inside = (Vec3::MAX, Vec3::MIN);
-    for (place, island) in places.iter().zip(&island_of) {
-        if *island == head {
-            inside = (inside.0.min(*place), inside.1.max(*place));
-        }
-    }
-    // Eyes and teeth are loose, and lie within the head's box; hands held high do not.
-    let within = |place: Vec3| place.cmpge(inside.0).all() && place.cmple(inside.1).all();
-    let keep: Vec<bool> = (0..count)
-        .map(|place| island_of[place] == head || (places[place].dot(toward) >= at && within(places[place])))
-        .collect();
+    let biped = body.is_biped();
+    let cut = match biped {
+        true => crown_cut(&body).filter(|(_, head)| body.stands(Some(*head))).map(|(cut, _)| cut),
+        false => Some(()).filter(|()| body.stands(None)).and_then(|()| snout::cut(&body)),
+    };
+    let Some(cut) = cut else { return Ok(whole) };
+    let keep = body.within(&cut);
     if keep.iter().filter(|keep| **keep).count() < 8 || keep.iter().all(|keep| *keep) {
         return Ok(whole);
     }
     let what = if biped { "a whole body" } else { "a whole beast" };
     Ok(HeadPart {
         is_part: true,
-        points: welded.iter().map(|number| keep[*number as usize]).collect(),
+        points: body.welded.iter().map(|number| keep[*number as usize]).collect(),
         reason: format!("the mesh is {what}: it stands on legs. Its head and neck are taken"),
-        cut: Some((toward * at, toward)),
+        cut: Some(cut.plane),
     })
 }
 
-/// How many parts of the surface there are below a share of the height, dust aside.
-fn legs(places: &[Vec3], joined: &[[u32; 3]], low: Vec3, size: Vec3, share: f32) -> usize {
-    let height = low.y + share * size.y;
-    let below: Vec<[u32; 3]> = joined
-        .iter()
-        .filter(|triangle| triangle.iter().any(|corner| places[*corner as usize].y < height))
-        .copied()
-        .collect();
-    let (island_of, islands) = adjacency::islands(&below, places.len());
-    let mut areas = vec![0.0_f32; islands];
-    for triangle in &below {
-        let [a, b, c] = triangle.map(|corner| places[corner as usize]);
-        areas[island_of[triangle[0] as usize] as usize] += (b - a).cross(c - a).length();
-    }
-    let largest = areas.iter().copied().fold(0.0, f32::max);
-    areas.iter().filter(|area| **area > 0.2 * largest).count()
+/// Where a head is cut from its body.
+pub(super) struct Cut {
+    /// How far each place is from the head's extremity.
+    away: Vec<f32>,
+    /// Up to where it is the head.
+    reach: f32,
+    /// The place at the extremity.
+    tip: usize,
+    /// A point and a normal towards the head.
+    plane: (Vec3, Vec3),
 }
 
-/// Where to cut, given sections from the head into the body: past the narrowest behind the head, where they widen.
-fn cut_at(planes: &[Section], farthest: f32) -> f32 {
-    let last = ((planes.len() as f32 * farthest) as usize).min(planes.len().saturating_sub(1));
-    let Some(end) = planes.get(last) else { return 0.0 };
-    let size = |index: usize| planes[index].size();
-    // The narrowest place that has something wider on either side, by the most.
+/// The cut of a body that stands upright, horizontal and below the topmost part, and the head's height above the
+/// narrowest place.
+fn crown_cut(body: &Body) -> Option<(Cut, f32)> {
+    let planes = sections(&body.places, &body.joined, Vec3::NEG_Y, [-body.high.y, -body.low.y], PLANES);
+    let sizes: Vec<f32> = planes.iter().map(Section::size).collect();
+    let last = (sizes.len() as f32 * 0.35) as usize;
+    let (narrow, end) = neck(&sizes, last, WIDENS)?;
+    let (narrow, end) = (-planes.get(narrow)?.at, planes.get(end)?);
+    let tip = (0..body.places.len()).max_by(|a, b| body.places[*a].y.total_cmp(&body.places[*b].y))?;
+    let cut = Cut {
+        away: body.places.iter().map(|place| body.high.y - place.y).collect(),
+        reach: body.high.y + end.at,
+        tip,
+        plane: (end.centroid, Vec3::Y),
+    };
+    Some((cut, body.high.y - narrow))
+}
+
+/// A mesh with points of one position made one.
+pub(super) struct Body {
+    welded: Vec<u32>,
+    pub(super) places: Vec<Vec3>,
+    pub(super) joined: Vec<[u32; 3]>,
+    pub(super) low: Vec3,
+    pub(super) high: Vec3,
+}
+
+impl Body {
+    /// Welds a mesh. Triangles with corners past the end are left out.
+    pub(super) fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let (welded, count) = adjacency::weld(points);
+        let joined: Vec<[u32; 3]> = triangles
+            .iter()
+            .filter(|triangle| triangle.iter().all(|corner| (*corner as usize) < points.len()))
+            .map(|triangle| triangle.map(|corner| welded[corner as usize]))
+            .collect();
+        let mut places = vec![Vec3::ZERO; count];
+        for (point, number) in points.iter().zip(&welded) {
+            places[*number as usize] = *point;
+        }
+        let (low, high) = places.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
+        Self { welded, places, joined, low, high }
+    }
+
+    pub(super) fn size(&self) -> Vec3 {
+        self.high - self.low
+    }
+
+    pub(super) fn is_biped(&self) -> bool {
+        self.size().y > BIPED * self.size().z
+    }
+
+    /// True if it stands on two legs or more, or stands on one and lifts another, being much higher than its `head`.
+    pub(super) fn stands(&self, head: Option<f32>) -> bool {
+        let two = |shares: [f32; 2]| shares.into_iter().all(|share| self.legs(share) >= 2);
+        two([0.06, 0.12]) || (head.is_some_and(|head| self.size().y > LIFTED * head) && two([0.2, 0.3]))
+    }
+
+    /// How many parts of the surface there are below a share of the height, dust aside.
+    fn legs(&self, share: f32) -> usize {
+        let height = self.low.y + share * self.size().y;
+        let below: Vec<[u32; 3]> = self
+            .joined
+            .iter()
+            .filter(|triangle| triangle.iter().any(|corner| self.places[*corner as usize].y < height))
+            .copied()
+            .collect();
+        let (island_of, islands) = adjacency::islands(&below, self.places.len());
+        let areas = self.areas(&below, &island_of, islands);
+        let largest = areas.iter().copied().fold(0.0, f32::max);
+        areas.iter().filter(|area| **area > 0.2 * largest).count()
+    }
+
+    /// The area of each island.
+    fn areas(&self, triangles: &[[u32; 3]], island_of: &[u32], islands: usize) -> Vec<f32> {
+        let mut areas = vec![0.0_f32; islands];
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|corner| self.places[corner as usize]);
+            areas[island_of[triangle[0] as usize] as usize] += (b - a).cross(c - a).length();
+        }
+        areas
+    }
+
+    /// The places of the head: what hangs together with its tip before the cut, and what is loose among it.
+    fn within(&self, cut: &Cut) -> Vec<bool> {
+        let near = |place: usize| cut.away[place] <= cut.reach;
+        let above: Vec<[u32; 3]> = self
+            .joined
+            .iter()
+            .filter(|triangle| triangle.iter().all(|corner| near(*corner as usize)))
+            .copied()
+            .collect();
+        let (island_of, _) = adjacency::islands(&above, self.places.len());
+        let head = island_of[cut.tip];
+        let mut inside = (Vec3::MAX, Vec3::MIN);
+        for (place, island) in self.places.iter().zip(&island_of) {
+            if *island == head {
+                inside = (inside.0.min(*place), inside.1.max(*place));
+            }
+        }
+        // Eyes and teeth are loose, and lie within the head's box; hands held high do not.
+        let boxed = |place: Vec3| place.cmpge(inside.0).all() && place.cmple(inside.1).all();
+        (0..self.places.len())
+            .map(|place| island_of[place] == head || (near(place) && boxed(self.places[place])))
+            .collect()
+    }
+}
+
+/// Where the neck is narrowest and where to cut it, given sizes of sections from the head into the body, of which the
+/// first `last` may be the neck: past the narrowest behind the head, where they widen.
+fn neck(sizes: &[f32], last: usize, widens: f32) -> Option<(usize, usize)> {
+    let last = last.min(sizes.len().checked_sub(1)?);
+    // A nose or a lip is no head.
+    let least = HEAD * sizes[..=last].iter().copied().fold(0.0, f32::max);
+    // The narrowest place that has something wider on either side, by the most; a waist farther off counts less.
     let mut best: Option<(f32, usize)> = None;
     let mut before = 0.0_f32;
     for index in 1..last {
-        before = before.max(size(index - 1));
-        let after = (index + 1..=(index + PLANES / 4).min(planes.len() - 1)).map(size).fold(0.0, f32::max);
-        let waist = before.min(after) / size(index).max(f32::MIN_POSITIVE);
-        if waist > 1.08 && best.is_none_or(|best| waist > best.0) {
-            best = Some((waist, index));
+        before = before.max(sizes[index - 1]);
+        let after = sizes[index + 1..=(index + PLANES / 4).min(sizes.len() - 1)].iter().copied().fold(0.0, f32::max);
+        let waist = before.min(after) / sizes[index].max(f32::MIN_POSITIVE);
+        let worth = waist * (1.0 - index as f32 / PLANES as f32);
+        if waist > 1.08 && before >= least && best.is_none_or(|best| worth > best.0) {
+            best = Some((worth, index));
         }
     }
     // Without a waist: half of how far the head may reach.
-    let Some((_, narrow)) = best else { return planes[last / 2].at.min(end.at) };
-    let wide = (narrow..=last).find(|index| size(*index) > WIDENS * size(narrow)).unwrap_or(last);
-    planes[wide.saturating_sub(1).max(narrow)].at
+    let Some((_, narrow)) = best else { return Some((last / 2, last / 2)) };
+    let wide = (narrow..=last).find(|index| sizes[*index] > widens * sizes[narrow]).unwrap_or(last);
+    Some((narrow, wide.saturating_sub(1).max(narrow)))
 }

@@ -89,7 +89,8 @@ pub enum LandmarkError {
 /// and up to six times that where no face is clear at first.
 ///
 /// # Errors
-/// [`LandmarkError`] for a point that is not finite, no skin, skin without depth, and where no front is seen.
+/// [`LandmarkError`] for a point that is not finite, no skin, skin without depth, and where nothing can be
+/// laid onto the front.
 pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) -> Result<Landmarks, LandmarkError> {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for (index, point) in points.iter().enumerate() {
@@ -152,6 +153,9 @@ type Sighting = (Landmarks, Vec3, Quat);
 /// The cosine of how far a face may be turned without being looked at again: 2 degrees.
 const LEAST_TURN: f32 = 0.9994;
 
+/// The confidence of landmarks where nothing looks like a face.
+const GUESSED: f32 = 0.05;
+
 /// Finds the landmarks of a face that looks along z, and the normal of its plane of symmetry. `exact` is where that
 /// plane is if the points mirror onto each other.
 fn look(
@@ -183,7 +187,10 @@ fn look(
         let poses = middles.iter().filter_map(|&middle| search::find_face(&coarse, &solid, middle, hint));
         poses.max_by(|a, b| a.worth.total_cmp(&b.worth))
     };
-    let mut pose = find(hint).or_else(|| find(None)).ok_or(LandmarkError::NoFront)?;
+    let seen = find(hint).or_else(|| find(None));
+    // Where nothing looks like a face, the mean face of a person as large as the front.
+    let guessed = seen.is_none();
+    let mut pose = seen.unwrap_or_else(|| search::guess(exact.unwrap_or((low.x + high.x) / 2.0), low, high));
     let (fine, _) = front(relief::close_up(&pose), points, triangles, |t| kind(t) != ShellKind::Inside);
     if exact.is_none() {
         let (x, y, d) = (pose.center.x, pose.center.y, pose.size);
@@ -211,6 +218,10 @@ fn look(
     let nose = measured.profile.nose > 0.08;
     let confidence =
         0.6 * ((pose.worth - 0.4) / 0.5).clamp(0.0, 1.0) + sure(measured.eyes) + sure(measured.lips && nose);
+    let confidence = if guessed { GUESSED } else { confidence };
+    if !found.iter().all(|point| point.is_finite()) {
+        return Err(LandmarkError::NoFront);
+    }
     Ok((Landmarks { points: found, middle, symmetric: exact.is_some(), confidence, mouth_open }, normal))
 }
 

@@ -204,6 +204,13 @@ pub(super) struct EyeHint {
     pub size: f32,
 }
 
+/// A face in the middle of a front from `low` to `high`, of a person's proportions.
+pub(super) fn guess(middle: f32, low: Vec3, high: Vec3) -> Pose {
+    let size = high - low;
+    let center = Vec2::new(middle, (low.y + high.y) / 2.0);
+    Pose { center, size: 0.55 * size.x.min(0.75 * size.y), gain: 1.0, tall: 1.0, ..Pose::default() }
+}
+
 /// The best place and size of a face whose plane of symmetry is at `middle`. `solid` tells what the head
 /// covers.
 pub(super) fn find_face(map: &DepthMap, solid: &[bool], middle: f32, hint: Option<EyeHint>) -> Option<Pose> {

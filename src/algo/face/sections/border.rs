@@ -40,8 +40,7 @@ pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
         .filter(|triangle| triangle.iter().all(|corner| (*corner as usize) < points.len()))
         .map(|triangle| triangle.map(|corner| welded[corner as usize]))
         .collect();
-    let edges: Vec<[u32; 2]> =
-        adjacency::edges(&joined).into_iter().filter(|edge| edge.triangles == 1).map(|edge| edge.points).collect();
+    let edges = lonely(&joined, count);
     let sides: Vec<[u32; 3]> = edges.iter().map(|[a, b]| [*a, *b, *b]).collect();
     let (loop_of, loops) = adjacency::islands(&sides, count);
     let mut ends: Vec<End> =
@@ -58,4 +57,37 @@ pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
     let mut end = ends.into_iter().filter(|end| end.length > 0.0).max_by(|a, b| a.length.total_cmp(&b.length))?;
     end.center /= end.length;
     Some(end)
+}
+
+/// Edges of one triangle only, by their ends.
+fn lonely(triangles: &[[u32; 3]], count: usize) -> Vec<[u32; 2]> {
+    let sides = || {
+        let edges = |triangle: &[u32; 3]| {
+            let [a, b, c] = *triangle;
+            [(a, b), (b, c), (c, a)]
+        };
+        triangles.iter().flat_map(edges).filter(|(a, b)| a != b).map(|(a, b)| (a.min(b), a.max(b)))
+    };
+    // Each edge goes to the list of its lower end; lists are short.
+    let mut starts = vec![0_u32; count + 1];
+    for (low, _) in sides() {
+        starts[low as usize + 1] += 1;
+    }
+    for place in 0..count {
+        starts[place + 1] += starts[place];
+    }
+    let mut filled = starts.clone();
+    let mut others = vec![0_u32; starts[count] as usize];
+    for (low, high) in sides() {
+        others[filled[low as usize] as usize] = high;
+        filled[low as usize] += 1;
+    }
+    let mut found = Vec::new();
+    for (place, ends) in starts.windows(2).enumerate() {
+        let list = &mut others[ends[0] as usize..ends[1] as usize];
+        list.sort_unstable();
+        let same = list.chunk_by(|a, b| a == b).filter(|same| same.len() == 1);
+        found.extend(same.map(|same| [place as u32, same[0]]));
+    }
+    found
 }
