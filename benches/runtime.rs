@@ -3,11 +3,12 @@
 //! Prints one JSON line; times are the least and the median of many frames. `--only NAME` runs one part, for a profiler.
 //!
 //! ```text
-//! cargo bench --no-default-features --bench runtime
+//! RIGSMITH_DATA=DATA cargo bench --no-default-features --bench runtime
 //! ```
 //!
 //! `everything` goes from sampled values (written to the poses of controls, as curves do) over programs, propagation and
-//! joints in the world to skinning matrices. Joints per microsecond are what Bevy's example `many_foxes` is compared by.
+//! joints in the world to skinning matrices. `foxes` is Bevy's example `many_foxes` without drawing, to be
+//! compared by joints per microsecond.
 
 use std::{
     hint::black_box,
@@ -17,6 +18,11 @@ use std::{
 };
 
 use bevy::{
+    animation::{
+        AnimatedBy, AnimationTargetId, animated_field,
+        animation_curves::{AnimatableCurve, AnimatableKeyframeCurve},
+    },
+    asset::uuid::Uuid,
     ecs::system::RunSystemOnce,
     math::{Affine3A, Quat, Vec3},
     prelude::*,
@@ -25,7 +31,8 @@ use bevy::{
 use rayon::prelude::*;
 use rigsmith::{
     build::Builder,
-    files::{RealDisk, load_template},
+    files::{RealDisk, load_model, load_template},
+    mesh::model::{Channel, ChannelTarget, Model, Trs},
     modules,
     plugins::runtime::{ControlPose, InstanceMode, NodeSlot, RigRuntime, RuntimeNodeOf, RuntimePlugin, spawn_instance},
     rig::{BuiltRig, NodeType, PoseOffset},
@@ -133,8 +140,87 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         note("everything_joints_per_us", times[3].map(|time| (joints * CROWD) as f64 / (time * 1e6)));
     }
+    if wanted("foxes") {
+        match std::env::var_os("RIGSMITH_DATA") {
+            Some(data) => {
+                let fox = load_model(&RealDisk, &Path::new(&data).join("gltf_skinned/Fox.glb"))?;
+                let (joints, times) = foxes(&fox).ok_or("the fox has no clip")?;
+                note("foxes_everything_ms", times.map(|time| time * 1e3));
+                note("foxes_joints_per_us", times.map(|time| (joints * CROWD) as f64 / (time * 1e6)));
+            }
+            None => eprintln!("foxes skipped: RIGSMITH_DATA names no folder with test meshes"),
+        }
+    }
     println!("{{{}}}", report.join(", "));
     Ok(())
+}
+
+/// What Bevy's example `many_foxes` does, without drawing: a thousand foxes play a clip of their file through Bevy's own
+/// animation, their transforms propagate, and skinning matrices are made. Joints of a fox, and seconds a frame.
+fn foxes(fox: &Model) -> Option<(usize, [f64; 2])> {
+    let clip = fox.clips.first()?;
+    let target = |node: usize| AnimationTargetId(Uuid::from_u128(node as u128 + 1));
+    let mut curves = AnimationClip::default();
+    for Channel { target: what, times, values, .. } in &clip.channels {
+        let vectors = || values.chunks_exact(3).map(Vec3::from_slice);
+        match what {
+            ChannelTarget::Translation(node) => {
+                let curve = AnimatableKeyframeCurve::new(times.iter().copied().zip(vectors())).ok()?;
+                let field = animated_field!(Transform::translation);
+                curves.add_curve_to_target(target(*node), AnimatableCurve::new(field, curve));
+            }
+            ChannelTarget::Rotation(node) => {
+                let turns = values.chunks_exact(4).map(Quat::from_slice);
+                let curve = AnimatableKeyframeCurve::new(times.iter().copied().zip(turns)).ok()?;
+                let field = animated_field!(Transform::rotation);
+                curves.add_curve_to_target(target(*node), AnimatableCurve::new(field, curve));
+            }
+            _ => {}
+        }
+    }
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), TransformPlugin, AnimationPlugin))
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
+    app.finish();
+    app.cleanup();
+    let world = app.world_mut();
+    let clip = world.resource_mut::<Assets<AnimationClip>>().add(curves);
+    let (graph, index) = AnimationGraph::from_clip(clip);
+    let graph = world.resource_mut::<Assets<AnimationGraph>>().add(graph);
+    let joints: Vec<usize> = fox.skins.first()?.joints.clone();
+    let mut placed: Vec<Vec<Entity>> = Vec::new();
+    for number in 0..CROWD {
+        let mut player = AnimationPlayer::default();
+        player.play(index).repeat().seek_to(number as f32 * 0.001);
+        let place = Transform::from_xyz((number % 40) as f32, 0.0, (number / 40) as f32);
+        let rig = world.spawn((place, player, AnimationGraphHandle(graph.clone()))).id();
+        let mut nodes: Vec<Entity> = Vec::new();
+        for (number, node) in fox.nodes.iter().enumerate() {
+            let Trs { translation, rotation, scale } = node.rest;
+            let above = node.parent.map_or(rig, |parent| nodes[parent]);
+            let place = Transform { translation, rotation, scale };
+            nodes.push(world.spawn((place, ChildOf(above), target(number), AnimatedBy(rig))).id());
+        }
+        placed.push(joints.iter().map(|joint| nodes[*joint]).collect());
+    }
+    for _ in 0..5 {
+        app.update();
+    }
+    let bind = Affine3A::from_translation(Vec3::Y);
+    let mut matrices = vec![Affine3A::IDENTITY; CROWD * joints.len()];
+    let times = timed(FRAMES, |_| {
+        app.update();
+        let mut globals = app.world_mut().query::<&GlobalTransform>();
+        let world = app.world();
+        let mut out = matrices.iter_mut();
+        for rig in &placed {
+            for (place, out) in globals.iter_many(world, rig).zip(&mut out) {
+                *out = place.affine() * bind;
+            }
+        }
+        black_box(&out);
+    });
+    Some((joints.len(), times))
 }
 
 /// A pose that differs from frame to frame.
