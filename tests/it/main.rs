@@ -24,6 +24,7 @@ mod face;
 mod face_bones;
 mod face_expressions;
 mod face_fit;
+mod face_grouping;
 mod face_landmarks;
 mod files;
 mod files_read;

@@ -88,7 +88,7 @@ pub fn head_bones(
     let center = (landmarks.points[36] + landmarks.points[45]) * 0.25 + groups.upper_mean * 0.5;
     let end = border::largest(points, triangles).filter(|end| end.is_neck(low, high, center));
     let bones = match end {
-        Some(end) if (end.center - center).normalize_or_zero().y > -0.6 => slanted(&shape, end.center, center, groups),
+        Some(end) if leaves_backwards(&end, center) => slanted(&shape, end.center, center, groups),
         end => upright(&shape, end.as_ref(), groups),
     };
     Ok(if landmarks.symmetric { centered(bones, landmarks.middle) } else { bones })
@@ -101,6 +101,13 @@ struct Shape<'a> {
     low: Vec3,
     high: Vec3,
     chin: f32,
+}
+
+/// True if a neck leaves the head backwards rather than downwards: by where its end is, and how the end is cut.
+fn leaves_backwards(end: &border::End, center: Vec3) -> bool {
+    let down = -(end.center - center).normalize_or_zero().y;
+    let cut = end.high - end.low;
+    down < 0.6 || (down < 0.9 && cut.y > cut.z)
 }
 
 /// A human neck: below the head.
@@ -137,9 +144,12 @@ fn upright(shape: &Shape, end: Option<&border::End>, groups: &HeadGroups) -> Hea
     let mut root = neck.at(neck.bottom) + shift;
     let shortest = SHORTEST * (crown - chin);
     if joint.y - root.y < shortest {
-        // A neck cut close below the chin: from its end to the skull.
-        root = end.map_or(root, |end| end.center.lerp(joint, EDGE)).min(root.with_x(f32::MAX).with_z(f32::MAX));
         joint.y = joint.y.max((root.y + shortest).min(skull));
+        // A neck cut close below the chin: towards its end.
+        let missing = shortest - (joint.y - root.y);
+        if let Some(end) = end.filter(|end| missing > 0.0 && end.center.y < root.y) {
+            root = root.lerp(end.center, (missing / (root.y - end.center.y)).min(1.0 - EDGE));
+        }
     }
     joined(inward(shape, root), joint, crown)
 }
@@ -152,17 +162,19 @@ fn slanted(shape: &Shape, end: Vec3, center: Vec3, groups: &HeadGroups) -> HeadB
     let sections = sections::sections(shape.points, shape.triangles, axis, [from + 0.04 * (to - from), to], 32);
     let (bottom, top) = column(shape, upper).unwrap_or((shape.low.y, shape.high.y));
     let height = top - bottom;
-    let Some(first) = sections.iter().find(|section| section.at >= from + 0.1 * (to - from)) else {
-        let joint = upper.with_y(bottom + 0.4 * height);
-        return joined(end, joint, top);
-    };
+    // The cut is ragged, so that the middle of its border says more than the first sections.
+    let root = end + axis * EDGE * (to - from);
     // Where the middle of the neck passes below the head's line; as high as the skull's base at the most.
     let passing = sections
         .iter()
         .min_by(|a, b| (a.centroid.z - upper.z).abs().total_cmp(&(b.centroid.z - upper.z).abs()))
         .map_or(upper.y, |section| section.centroid.y);
-    let joint = upper.with_y(passing.clamp(bottom + 0.2 * height, bottom + 0.6 * height));
-    joined(first.centroid, joint, top)
+    let mut joint = upper.with_y(passing.clamp(bottom + 0.2 * height, bottom + 0.6 * height));
+    let shortest = SHORTEST * height;
+    if root.distance(joint) < shortest {
+        joint.y = (root.y + shortest).clamp(joint.y, (bottom + 0.6 * height).max(joint.y));
+    }
+    joined(root, joint, top)
 }
 
 /// A place in the neck, moved towards the middle of its horizontal section if it is near the skin.
@@ -199,7 +211,8 @@ fn column(shape: &Shape, through: Vec3) -> Option<(f32, f32)> {
         let [p, q, r] = [a, b, c].map(|corner| Vec2::new(corner.x, corner.z) - at);
         let area = (q - p).perp_dot(r - p);
         let weights = Vec3::new(q.perp_dot(r), r.perp_dot(p), p.perp_dot(q)) / area;
-        if area != 0.0 && weights.min_element() >= 0.0 {
+        // A little more than the triangle, or a line along an edge slips through.
+        if area != 0.0 && weights.min_element() >= -1e-4 {
             let height = weights.dot(Vec3::new(a.y, b.y, c.y));
             bottom = bottom.min(height);
             top = top.max(height);

@@ -45,8 +45,6 @@ const PLANES: usize = 64;
 const BIPED: f32 = 1.8;
 /// The neck ends where a section is this much wider than its narrowest.
 const WIDENS: f32 = 1.3;
-/// Sections of a head are so large at the least, as a share of the largest that may be its neck.
-const HEAD: f32 = 0.4;
 /// A body that lifts a leg is so much higher than its head.
 const LIFTED: f32 = 3.0;
 
@@ -106,7 +104,7 @@ fn crown_cut(body: &Body) -> Option<(Cut, f32)> {
     let planes = sections(&body.places, &body.joined, Vec3::NEG_Y, [-body.high.y, -body.low.y], PLANES);
     let sizes: Vec<f32> = planes.iter().map(Section::size).collect();
     let last = (sizes.len() as f32 * 0.35) as usize;
-    let (narrow, end) = neck(&sizes, last, WIDENS)?;
+    let (narrow, end) = neck(&sizes, last, 0.0, WIDENS)?;
     let (narrow, end) = (-planes.get(narrow)?.at, planes.get(end)?);
     let tip = (0..body.places.len()).max_by(|a, b| body.places[*a].y.total_cmp(&body.places[*b].y))?;
     let cut = Cut {
@@ -209,11 +207,11 @@ impl Body {
 }
 
 /// Where the neck is narrowest and where to cut it, given sizes of sections from the head into the body, of which the
-/// first `last` may be the neck: past the narrowest behind the head, where they widen.
-fn neck(sizes: &[f32], last: usize, widens: f32) -> Option<(usize, usize)> {
+/// first `last` may be the neck: past the narrowest behind the head, where they widen. Sections of the head are at least a
+/// share `head` of the largest of those.
+fn neck(sizes: &[f32], last: usize, head: f32, widens: f32) -> Option<(usize, usize)> {
     let last = last.min(sizes.len().checked_sub(1)?);
-    // A nose or a lip is no head.
-    let least = HEAD * sizes[..=last].iter().copied().fold(0.0, f32::max);
+    let least = head * sizes[..=last].iter().copied().fold(0.0, f32::max);
     // The narrowest place that has something wider on either side, by the most; a waist farther off counts less.
     let mut best: Option<(f32, usize)> = None;
     let mut before = 0.0_f32;

@@ -9,6 +9,8 @@ use crate::mesh::adjacency;
 const FARTHEST: f32 = 0.55;
 /// The neck of a beast ends where a ring is this much longer than the shortest.
 const WIDENS: f32 = 1.06;
+/// Rings of a head are so long at the least, as a share of the longest that may be its neck: a nose is no head.
+const HEAD: f32 = 0.4;
 /// Feet are lower than this share of the height.
 const FEET: f32 = 0.12;
 /// How far out the ends of a beast begin, as a share of its half length.
@@ -34,7 +36,7 @@ pub(super) fn cut(body: &Body) -> Option<Cut> {
     let ground = body.low.y + FEET * body.size().y;
     let feet = body.places.iter().zip(&away).filter(|(place, _)| place.y < ground).map(|(_, away)| *away);
     let last = (feet.fold(f32::MAX, f32::min) / farthest).min(FARTHEST) * PLANES as f32;
-    let (_, end) = neck(&lengths, last as usize, WIDENS)?;
+    let (_, end) = neck(&lengths, last as usize, HEAD, WIDENS)?;
     let center = rings.get(end)?.center;
     let reach = farthest * (end + 1) as f32 / PLANES as f32;
     let toward = (from - center).try_normalize()?;
