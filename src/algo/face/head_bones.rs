@@ -218,7 +218,11 @@ fn column(shape: &Shape, through: Vec3) -> Option<(f32, f32)> {
             top = top.max(height);
         }
     }
-    (top > bottom).then_some((bottom, top))
+    match top > bottom {
+        true => Some((bottom, top)),
+        // It leaves through the open end.
+        false => (top > through.y).then_some((shape.low.y, top)),
+    }
 }
 
 /// The middle of an upright neck: x and z as straight functions of y.
