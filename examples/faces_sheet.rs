@@ -19,7 +19,7 @@ use rigsmith::{
 };
 
 /// Pixels of one picture of the sheet.
-const CELL: UVec2 = UVec2::new(176, 200);
+const CELL: UVec2 = UVec2::new(160, 176);
 
 /// Bones of the upper and of the lower row of each head.
 const DENSITIES: [usize; 2] = [20, 60];
@@ -72,8 +72,9 @@ fn row(head: &Path, bones: usize) -> Result<Vec<Image>, Box<dyn Error>> {
 }
 
 fn picture(bench: &Workbench, rig: bool) -> Result<Image, Box<dyn Error>> {
-    let drawing = RigDrawing { rig, grid: false, labels: LabelChoice::None, ..RigDrawing::default() };
-    let settings = PictureSettings { size: CELL, view: View::Front, drawing, ..PictureSettings::default() };
+    let drawing = RigDrawing { rig, grid: false, labels: LabelChoice::None, ball_scale: 0.4, ..RigDrawing::default() };
+    let bounds = bench.placed_face().map(|face| face.analysis.face_box());
+    let settings = PictureSettings { size: CELL, view: View::Front, drawing, bounds, ..PictureSettings::default() };
     let mesh = bench.mesh().ok_or("no mesh")?.clone();
     Ok(take_picture(bench.rig().clone(), vec![mesh], &settings)?)
 }

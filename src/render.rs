@@ -49,6 +49,8 @@ pub struct PictureSettings {
     pub selected: Vec<Uid>,
     /// What is behind everything.
     pub background: Color,
+    /// Least and greatest corner of the box that fills the picture, in the rig's space; all there is if `None`.
+    pub bounds: Option<[Vec3; 2]>,
 }
 
 impl Default for PictureSettings {
@@ -61,6 +63,7 @@ impl Default for PictureSettings {
             drawing: RigDrawing::default(),
             selected: Vec::new(),
             background: BACKGROUND,
+            bounds: None,
         }
     }
 }
@@ -213,9 +216,10 @@ struct Taken(Option<Image>);
 
 /// Points the camera so that everything is seen.
 fn aim(world: &mut World, rig: Entity, camera: Entity, settings: &PictureSettings) {
-    let bounds = match (world.get::<RigSurface>(rig), world.get::<Rig>(rig)) {
-        (Some(surface), _) => surface.bounds(),
-        (None, Some(rig)) if !rig.is_empty() => {
+    let bounds = match (settings.bounds, world.get::<RigSurface>(rig), world.get::<Rig>(rig)) {
+        (Some(bounds), ..) => bounds,
+        (None, Some(surface), _) => surface.bounds(),
+        (None, None, Some(rig)) if !rig.is_empty() => {
             // Bones of last joints reach about as far beyond them as those before.
             let places = rig.walk().flat_map(|joint| {
                 let place = rig.position(joint.data.uid);

@@ -185,11 +185,13 @@ fn picture(args: &FaceArgs, bench: &Workbench, report: &mut Report) -> Result<()
     let settings = PictureSettings {
         size: UVec2::new(900, 900),
         view: View::Front,
+        bounds: bench.placed_face().map(|face| face.analysis.face_box()),
         // Bones of a face that shows something would hide it.
         drawing: RigDrawing {
             rig: args.expression.is_empty(),
             grid: false,
             labels: LabelChoice::None,
+            ball_scale: 0.4,
             ..RigDrawing::default()
         },
         ..PictureSettings::default()

@@ -422,6 +422,18 @@ impl FaceAnalysis {
         self.axes.rotation().inverse()
     }
 
+    /// Least and greatest corner of a box around the face in the mesh's space, forehead and chin included.
+    pub fn face_box(&self) -> [Vec3; 2] {
+        let margin = 0.3 * self.landmarks.eye_distance();
+        let to_mesh = self.to_mesh();
+        let of = |points: &mut dyn Iterator<Item = Vec3>| {
+            points.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+        };
+        let [low, high] = of(&mut self.landmarks.points.iter().copied());
+        let grown = [low - Vec3::splat(margin), high + Vec3::new(margin, 1.6 * margin, margin)];
+        of(&mut grown.into_iter().map(|corner| to_mesh * corner))
+    }
+
     /// The number in the mesh of a point of the analysis.
     pub fn mesh_point(&self, point: usize) -> usize {
         match &self.part {
