@@ -64,7 +64,7 @@ pub fn head_part(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<HeadPart, He
     let whole =
         HeadPart { is_part: false, points: vec![true; points.len()], reason: "the mesh is a head".into(), cut: None };
     let body = Body::new(points, triangles);
-    if !(body.size().min_element() > 0.0) {
+    if body.size().is_nan() || body.size().min_element() <= 0.0 {
         return Ok(whole);
     }
     let biped = body.is_biped();

@@ -225,7 +225,7 @@ impl Moments {
             let lifted: Vec<Map> = direction.iter().enumerate().map(|(bone, d)| lift(bone, *d)).collect();
             let pulled: Vec<[DVec3; 2]> = (0..bones).map(|bone| lower(bone, &self.apply(bone, &lifted))).collect();
             let bend = dot(&direction, &pulled);
-            if !(bend > 0.0) {
+            if bend.is_nan() || bend <= 0.0 {
                 break;
             }
             let length = size / bend;

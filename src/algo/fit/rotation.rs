@@ -63,6 +63,7 @@ fn is_positive(m: DMat3, scale: f64) -> bool {
 }
 
 /// The eigenvector of the largest eigenvalue of Horn's matrix, by Jacobi's method.
+#[expect(clippy::needless_range_loop, reason = "indices are those of the matrix")]
 fn horn(m: [DVec3; 3], near: DMat3) -> DMat3 {
     let s = |a: usize, k: usize| m[a][k];
     let mut n = [

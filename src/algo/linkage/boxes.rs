@@ -101,8 +101,8 @@ impl Boxes {
             }
             let node = &self.levels[level as usize - 1][at as usize];
             let mut square = f32x8::ZERO;
-            for axis in 0..3 {
-                let out = (node.low[axis] - query[axis]).max(query[axis] - node.high[axis]).max(f32x8::ZERO);
+            for ((low, high), query) in node.low.iter().zip(&node.high).zip(query) {
+                let out = (*low - query).max(query - *high).max(f32x8::ZERO);
                 square += out * out;
             }
             let mut mask = square.cmp_le(f32x8::splat(within)).move_mask() as u32;
@@ -146,11 +146,11 @@ impl Node {
     }
 
     fn grow(&mut self, lane: usize, place: [f32; 3]) {
-        for axis in 0..3 {
-            let low = &mut self.low[axis].as_array_mut()[lane];
-            *low = low.min(place[axis]);
-            let high = &mut self.high[axis].as_array_mut()[lane];
-            *high = high.max(place[axis]);
+        for ((low, high), place) in self.low.iter_mut().zip(&mut self.high).zip(place) {
+            let low = &mut low.as_array_mut()[lane];
+            *low = low.min(place);
+            let high = &mut high.as_array_mut()[lane];
+            *high = high.max(place);
         }
     }
 

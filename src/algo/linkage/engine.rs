@@ -264,9 +264,9 @@ impl Engine {
         let (part_a, part_b) = (f64::from(a.span.size) / f64::from(size), f64::from(b.span.size) / f64::from(size));
         let mut mean = [0.0; 3];
         let mut apart = 0.0;
-        for axis in 0..3 {
-            mean[axis] = part_a * a.mean[axis] + part_b * b.mean[axis];
-            apart += (a.mean[axis] - b.mean[axis]) * (a.mean[axis] - b.mean[axis]);
+        for ((mean, a), b) in mean.iter_mut().zip(a.mean).zip(b.mean) {
+            *mean = part_a * a + part_b * b;
+            apart += (a - b) * (a - b);
         }
         let start = self.points.len() as u32;
         self.points.repeat(a.span);

@@ -150,7 +150,7 @@ impl Spreader<'_> {
         let middles = if PARTS[part].lateral {
             0
         } else {
-            let area: f64 = patches.iter().map(|p| p.corners.iter().map(|c| area(c)).sum::<f64>()).sum();
+            let area: f64 = patches.iter().map(|p| p.corners.iter().map(area).sum::<f64>()).sum();
             let most = count.saturating_sub(2 * slots.len());
             middle_count(&mut folded, count, on_plane.len(), most, area)
         };

@@ -463,6 +463,7 @@ fn cholesky(matrix: &mut [f64], size: usize) {
 }
 
 /// Solves for three right-hand sides at once.
+#[expect(clippy::needless_range_loop, reason = "indices are those of the matrix")]
 fn substitute(factor: &[f64], size: usize, right: &mut [[f64; 3]]) {
     for axis in 0..3 {
         for row in 0..size {

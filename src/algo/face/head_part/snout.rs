@@ -47,7 +47,7 @@ pub(super) fn cut(body: &Body) -> Option<Cut> {
 /// is carried higher than a rump or a tail. None if it does not stand on legs, or upright.
 pub fn carriage(body: &Body) -> Option<f32> {
     let size = body.size();
-    if !(size.min_element() > 0.0) || body.is_biped() || !body.stands(None) {
+    if size.is_nan() || size.min_element() <= 0.0 || body.is_biped() || !body.stands(None) {
         return None;
     }
     let middle = (body.low + body.high) * 0.5;

@@ -93,6 +93,7 @@ fn ball(shell: usize, members: &[Vec3], island: &Island, size: f32) -> Option<Ba
     })
 }
 
+#[expect(clippy::needless_range_loop, reason = "indices are those of the matrix")]
 fn solve(mut system: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     for column in 0..4 {
         let pivot = (column..4).max_by(|a, b| system[*a][column].abs().total_cmp(&system[*b][column].abs()))?;
