@@ -43,7 +43,7 @@ fn read(path: PathBuf) -> Mesh {
     if path.extension().is_some_and(|extension| extension == "glb") {
         let bytes = std::fs::read(path).unwrap();
         let model = read_gltf(&bytes, "beast", &mut |_: &str| Err::<Vec<u8>, String>(String::new())).unwrap();
-        return (model.points.iter().map(|point| (*point).into()).collect(), model.point_triangles());
+        return (model.points.clone(), model.point_triangles());
     }
     let text = std::fs::read_to_string(path).unwrap();
     let (mut points, mut triangles) = (Vec::new(), Vec::new());

@@ -216,11 +216,10 @@ fn same_on_both_sides() {
     let flipped: Vec<Vec3> = points.iter().map(|point| vec3(-point.x, point.y, point.z)).collect();
     let wound: Vec<[u32; 3]> = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
     let other = find(&(flipped, wound));
-    let mut back = found.points;
-    for index in 0..68 {
+    let back: [Vec3; 68] = std::array::from_fn(|index| {
         let point = other.points[mirrored(index)];
-        back[index] = vec3(-point.x, point.y, point.z);
-    }
+        vec3(-point.x, point.y, point.z)
+    });
     assert!(apart(&found.points, &back) < 3.0, "mirrored: {} %", apart(&found.points, &back));
 }
 
