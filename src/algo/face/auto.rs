@@ -4,12 +4,14 @@
 //! and neck bones); [`FaceAnalysis::rig`] is what depends on the density as well (facial bones and weights). Keep the
 //! analysis, and another density costs only the second half.
 
+mod refit;
+
 use glam::{Quat, Vec3};
 
 use super::{
     axes::{AxesError, HeadAxes, guess_axes},
     bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, place_bones},
-    expression::{BonePose, ExpressionSet, FittedFace, count_folds, mend_folds},
+    expression::{ExpressionSet, FittedFace, count_folds, mend_folds},
     grouping::{GroupingError, HeadGroups, group_head},
     head_bones::{HeadBones, HeadBonesError, head_bones},
     head_part::{HeadPartError, head_part},
@@ -17,10 +19,9 @@ use super::{
     shells::{Shells, find_shells},
     weights::{FaceWeightsError, face_weights},
 };
-use crate::{
-    algo::fit::{FitError, FitSettings, fit},
-    mesh::model::Weights,
-};
+use crate::{algo::fit::FitError, mesh::model::Weights};
+
+pub use refit::Refitted;
 
 /// How a face is rigged.
 #[derive(Debug, Clone, PartialEq)]
@@ -206,17 +207,6 @@ pub struct AutoFace {
     pub folds: usize,
 }
 
-/// A face whose bones were moved to fit shapes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Refitted {
-    /// The face.
-    pub face: AutoFace,
-    /// For each shape how each bone moves, in head space.
-    pub poses: Vec<Vec<BonePose>>,
-    /// Root mean square error over points and shapes, in the mesh's unit.
-    pub error: f32,
-}
-
 impl FaceAnalysis {
     /// Looks at a mesh.
     ///
@@ -351,70 +341,6 @@ impl FaceAnalysis {
     /// The head with given bones and weights, ready to show expressions.
     pub fn fitted<'a>(&'a self, bones: &'a [FaceBone], weights: &'a Weights) -> FittedFace<'a> {
         FittedFace::new(&self.points, &self.triangles, &self.groups.mask, weights, bones, &self.landmarks)
-    }
-
-    /// Moves the bones of a face, and weighs the points anew, so that the bones can show given shapes.
-    ///
-    /// `shapes` are displacements, one a point of the *mesh*, in the mesh's space and unit; `locked` says which bones must
-    /// stay. Returns the face, how its bones move in each shape (head space), and the root mean square error over points
-    /// and shapes. About two seconds for 57 shapes of 11,000 points and 40 bones.
-    ///
-    /// # Errors
-    /// [`FaceError::Fit`], or cancelled.
-    pub fn refit(
-        &self,
-        face: &AutoFace,
-        shapes: &[Vec<Vec3>],
-        locked: &[bool],
-        progress: FaceProgress,
-    ) -> Result<Refitted, FaceError> {
-        begin(progress, FaceStep::Fit)?;
-        let turn = self.axes.rotation();
-        let own = |shape: &Vec<Vec3>| -> Vec<Vec3> {
-            let moved = |point| shape.get(self.mesh_point(point)).map_or(Vec3::ZERO, |moved| turn * *moved);
-            (0..self.points.len()).map(moved).collect()
-        };
-        let wrong = shapes.iter().position(|shape| shape.len() != self.mesh_points);
-        if let Some(shape) = wrong {
-            let (has, points) = (shapes[shape].len(), self.mesh_points);
-            return Err(FaceError::Fit(FitError::ShapeLength { shape, has, points }));
-        }
-        let shapes: Vec<Vec<Vec3>> = shapes.iter().map(own).collect();
-        let start: Vec<Vec3> = face.bones.iter().map(|bone| bone.position).collect();
-        let settings = FitSettings { bones: start.len(), start: &start, locked, ..FitSettings::default() };
-        let found = fit(&self.points, &self.triangles, &shapes, &settings, &within(progress, FaceStep::Fit))
-            .map_err(|error| if error == FitError::Cancelled { FaceError::Cancelled } else { FaceError::Fit(error) })?;
-        let mut face = face.clone();
-        for (bone, position) in face.bones.iter_mut().zip(&found.positions) {
-            bone.position = *position;
-        }
-        face.weights = self.with_neck(&found.weights, &face.weights);
-        let pose =
-            |moved: &crate::algo::fit::BoneMove| BonePose { translation: moved.translation, rotation: moved.rotation };
-        let poses = found.moves.iter().map(|moves| moves.iter().map(pose).collect()).collect();
-        Ok(Refitted { face, poses, error: found.error })
-    }
-
-    /// Weights over the head (0) and bones (from 1) as weights over neck, head and bones: where the neck held a part of
-    /// what the bones leave, it still does.
-    fn with_neck(&self, fitted: &Weights, before: &Weights) -> Weights {
-        let mut weights = Weights::default();
-        for point in 0..fitted.len() {
-            let share = |joint: u32| before.of(point).filter(|(j, _)| *j == joint).map(|(_, w)| w).sum::<f32>();
-            let (neck, head) = (share(0), share(1));
-            let of_neck = if neck > 0.0 { neck / (neck + head) } else { 0.0 };
-            let mut list: Vec<(u32, f32)> = Vec::new();
-            for (joint, weight) in fitted.of(point) {
-                match joint {
-                    0 => list.extend([(0, weight * of_neck), (1, weight * (1.0 - of_neck))]),
-                    bone => list.push((bone + 1, weight)),
-                }
-            }
-            list.retain(|(_, weight)| *weight > 0.0);
-            list.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-            weights.push(list);
-        }
-        weights
     }
 
     /// A rotation from head space to the mesh's space.

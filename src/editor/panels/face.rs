@@ -122,8 +122,9 @@ fn told(report: &FaceReport) -> String {
 #[derive(Default)]
 pub struct FacePanel {
     settings: AutoSettings,
-    /// Fewest points of a bone are not asked for: the slider ends where faces end.
     shown: Option<Drawn>,
+    /// Strengths while a slider is dragged.
+    held: Option<BTreeMap<String, f32>>,
 }
 
 /// What was made of the face in one state of the rig.
@@ -158,7 +159,14 @@ impl EditorPanel for FacePanel {
             ui.separator();
             regions(ui, &shown, &drawn.known, world.get::<Face>(entity), requests);
             ui.separator();
-            expressions::show(ui, world, (shown.entity, &shown.rig), (entity, mesh), &mut drawn.pictures, requests);
+            expressions::show(
+                ui,
+                world,
+                (shown.entity, &shown.rig),
+                (entity, mesh),
+                (&mut drawn.pictures, &mut self.held),
+                requests,
+            );
             ui.separator();
             fit(ui, entity, mesh, &self.settings, requests);
         });

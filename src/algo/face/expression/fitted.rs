@@ -147,31 +147,7 @@ impl<'a> FittedFace<'a> {
             self.relax(&mut poses, &folded, if round < ROUNDS / 2 { 0.3 } else { 0.6 });
             folded = self.folded(&poses);
         }
-        // What cannot be brought apart is held back.
-        for _ in 0..ROUNDS {
-            if folded.is_empty() {
-                break;
-            }
-            self.hold_back(&mut poses, &folded);
-            folded = self.folded(&poses);
-        }
         poses
-    }
-
-    /// Makes the movements of the bones that move some corners smaller.
-    fn hold_back(&self, poses: &mut [BonePose], folded: &[[u32; 3]]) {
-        let mut held = vec![false; poses.len()];
-        for corner in folded.iter().flatten() {
-            for (joint, weight) in self.influences(*corner as usize) {
-                if let Some(held) = held.get_mut((joint as usize).wrapping_sub(2)).filter(|_| weight > 0.05) {
-                    *held = true;
-                }
-            }
-        }
-        for (pose, _) in poses.iter_mut().zip(&held).filter(|(_, held)| **held) {
-            pose.translation *= 0.8;
-            pose.rotation = glam::Quat::IDENTITY.lerp(pose.rotation, 0.8);
-        }
     }
 
     /// The influences of a point, none where `weights` is too short.

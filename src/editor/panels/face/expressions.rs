@@ -23,12 +23,14 @@ pub(super) fn show(
     world: &World,
     rig: (Entity, &Rig),
     (entity, mesh): (Entity, &RigMesh),
-    pictures: &mut Pictures,
+    (pictures, held): (&mut Pictures, &mut Option<BTreeMap<String, f32>>),
     requests: &mut Requests,
 ) {
     let set = set(world);
     let current = world.get::<Expressions>(entity).map(|shown| shown.0.clone()).unwrap_or_default();
-    let mut next = current.clone();
+    // While a slider is dragged, what was asked for last has yet to be shown.
+    let before = held.clone().unwrap_or(current);
+    let mut next = before.clone();
     let mut dragging = false;
     let mut let_go = false;
     let face = world.get::<Face>(entity);
@@ -70,8 +72,10 @@ pub(super) fn show(
         }
     });
     next.retain(|_, strength| *strength > 0.0);
-    if next != current || let_go {
-        requests.send(ExpressRequest { mesh: entity, strengths: next, preview: dragging && !let_go });
+    if next != before || let_go {
+        let preview = dragging && !let_go;
+        *held = preview.then(|| next.clone());
+        requests.send(ExpressRequest { mesh: entity, strengths: next, preview });
     }
 }
 
