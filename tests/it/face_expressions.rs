@@ -5,15 +5,16 @@ use std::path::PathBuf;
 use glam::Vec3;
 use rigsmith::{
     algo::face::{
-        bones::{FaceBone, FaceBonesSettings, place_bones},
+        auto::{AutoFace, AutoSettings, FaceAnalysis},
+        axes::HeadAxes,
+        bones::FaceBone,
         expression::{
-            BonePose, Expression, ExpressionSet, FittedFace, Mix, Sides, Unit, UnitSet, apply, mend_folds, pose,
-            pose_sampled,
+            BonePose, Expression, ExpressionSet, FittedFace, Mix, Sides, Unit, UnitSet, apply, pose, pose_sampled,
         },
         grouping::group_head,
+        head_bones::head_bones,
         landmarks::Landmarks,
         shells::find_shells,
-        weights::face_weights,
     },
     mesh::{
         model::Weights,
@@ -58,12 +59,23 @@ fn head(name: &str, density: usize) -> Option<Head> {
         mouth_open: true,
     };
     let shells = find_shells(&points, &triangles);
-    let go_on = |_: f32| true;
-    let groups = group_head(&points, &triangles, &shells, &landmarks, None, &go_on).unwrap();
-    let settings = FaceBonesSettings { bones: density, seed: 1, starts: 3, symmetric: true, extras: true };
-    let bones = place_bones(&points, &triangles, &shells, &groups, &landmarks, &[], &settings, &go_on).unwrap().bones;
-    let mut weights = face_weights(&points, &triangles, &shells, &groups, &landmarks, &bones, &go_on).unwrap();
-    mend_folds(ExpressionSet::bundled(), &points, &triangles, &groups.mask, &mut weights, &bones, &landmarks);
+    let groups = group_head(&points, &triangles, &shells, &landmarks, None, &|_| true).unwrap();
+    let analysis = FaceAnalysis {
+        axes: HeadAxes { up: Vec3::Y, forward: Vec3::Z },
+        certain: true,
+        part: None,
+        mesh_points: points.len(),
+        head_bones: head_bones(&points, &triangles, &groups, &landmarks).unwrap(),
+        points,
+        triangles,
+        shells,
+        landmarks,
+        groups,
+    };
+    let settings = AutoSettings { bones: density, ..AutoSettings::default() };
+    let face = analysis.rig(&[], &settings, ExpressionSet::bundled(), &|_, _| true).unwrap();
+    let AutoFace { bones, weights, .. } = face;
+    let FaceAnalysis { points, triangles, landmarks, groups, .. } = analysis;
     Some(Head { points, triangles, landmarks, marks, mask: groups.mask, bones, weights })
 }
 

@@ -69,11 +69,12 @@ fn a_click_makes_a_face_that_sliders_pose() {
 
     // An expression is one step, however long its slider is dragged.
     let happiness = written(&desk, "Happiness").expect("a slider for happiness");
+    let below = happiness.bottom()..happiness.bottom() + 30.0;
     let slider = desk
         .seen
         .iter()
-        .filter(|seen| seen.rect.top() > happiness.center().y && seen.value.parse::<f32>().is_ok())
-        .min_by(|a, b| a.rect.top().total_cmp(&b.rect.top()).then(a.rect.left().total_cmp(&b.rect.left())))
+        .filter(|seen| below.contains(&seen.rect.center().y) && seen.value.parse::<f32>().is_ok())
+        .min_by(|a, b| a.rect.left().total_cmp(&b.rect.left()))
         .expect("a slider below the name")
         .rect;
     let at = |share: f32| egui::pos2(slider.left() + share * slider.width(), slider.center().y);
