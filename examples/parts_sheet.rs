@@ -136,7 +136,7 @@ const PICTURES: [Picture; 16] = [
         moves: &[Move::Shift("chain_5", "cube", [0.0, 0.25, -0.3])],
     },
     Picture { template: "parts/jaw", mesh: None, view: View::Left, moves: &[Move::Set("jaw", "open", 1.0)] },
-    Picture { template: "parts/eye", mesh: None, view: View::Left, moves: &[Move::Set("eye", "blink", 1.0)] },
+    Picture { template: "hand", mesh: Some("hand.obj"), view: View::Top, moves: &[] },
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -70,13 +70,15 @@ fn a_click_makes_a_face_that_sliders_pose() {
     // An expression is one step, however long its slider is dragged.
     let happiness = written(&desk, "Happiness").expect("a slider for happiness");
     let below = happiness.bottom()..happiness.bottom() + 30.0;
-    let slider = desk
+    let number = desk
         .seen
         .iter()
         .filter(|seen| below.contains(&seen.rect.center().y) && seen.value.parse::<f32>().is_ok())
         .min_by(|a, b| a.rect.left().total_cmp(&b.rect.left()))
-        .expect("a slider below the name")
+        .expect("a number below the name")
         .rect;
+    // The rail lies before the number that it sets.
+    let slider = egui::Rect::from_x_y_ranges(happiness.left()..=number.left() - 8.0, number.y_range());
     let at = |share: f32| egui::pos2(slider.left() + share * slider.width(), slider.center().y);
     desk.drag(at(0.02), at(0.6));
     desk.frames(4);
