@@ -1,6 +1,6 @@
 //! Expressions on a rig: strengths become pose offsets of facial joints.
 
-use std::collections::BTreeMap;
+use std::{borrow::Cow, collections::BTreeMap};
 
 use bevy::prelude::*;
 
@@ -14,6 +14,7 @@ use crate::{
     mesh::model::Weights,
     plugins::{
         document::{Change, EditRequest},
+        history::RigHistory,
         surface::{RigMesh, SkinOf},
     },
     rig::{PoseOffset, RestTransform, Rig, RigEdit, SkinData, Uid, nearest::did_you_mean, operations::Operation},
@@ -67,14 +68,14 @@ pub(super) fn express(
     mut commands: Commands,
     mut requests: MessageReader<ExpressRequest>,
     meshes: Query<(&RigMesh, &SkinOf, Option<&Face>)>,
-    rigs: Query<&Rig>,
+    rigs: Query<(&Rig, Option<&RigHistory>)>,
     set: Res<FaceExpressions>,
     mut told: MessageWriter<Expressed>,
 ) {
     for ExpressRequest { mesh: entity, strengths, preview } in requests.read() {
         let found =
             meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, of.0, rigs.get(of.0).ok()?, face)));
-        let Some((mesh, rig_entity, rig, face)) = found else {
+        let Some((mesh, rig_entity, (rig, history), face)) = found else {
             let result = Err("the mesh belongs to no rig; it may have been closed".to_owned());
             told.write(Expressed { mesh: *entity, result });
             continue;
@@ -85,7 +86,9 @@ pub(super) fn express(
             _ => analyse(mesh),
         };
         let result = analysed.map_err(|error| error.to_string()).and_then(|face| {
-            let edits = expression_edits(rig, mesh, &face.analysis, &set.0, strengths)?;
+            // What is previewed is taken back before the next preview or edit.
+            let settled = history.map_or(Cow::Borrowed(rig), |history| history.settled(rig));
+            let edits = expression_edits(&settled, mesh, &face.analysis, &set.0, strengths)?;
             let operation = Operation::Named { name: "Express", edits };
             let change = if *preview { Change::Preview(operation) } else { Change::Do(operation) };
             if !*preview {
