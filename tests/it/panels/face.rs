@@ -84,7 +84,7 @@ fn a_click_makes_a_face_that_sliders_pose() {
     desk.frames(4);
     let shown = desk.app.world().get::<Expressions>(mesh).cloned().unwrap_or_default();
     assert!(shown.0.get("happiness").is_some_and(|strength| *strength > 0.2), "{shown:?}");
-    assert!(!desk.rig().pose().is_empty());
+    assert!(!desk.rig().pose().is_empty(), "{:?} {:?} {shown:?}", desk.steps(), desk.told());
     assert_eq!(desk.steps().0, 2, "the drag is one step");
     desk.click("Reset");
     desk.frames(4);

@@ -87,8 +87,9 @@ fn strength(ui: &mut Ui, name: &str, strengths: &mut BTreeMap<String, f32>) -> (
     if slider.changed() {
         strengths.insert(name.to_owned(), value);
     }
-    let typed = slider.changed() && !slider.dragged() && !slider.drag_stopped();
-    (slider.dragged(), slider.drag_stopped() || typed)
+    let held = slider.dragged() || slider.is_pointer_button_down_on();
+    let typed = slider.changed() && !held && !slider.drag_stopped();
+    (held, slider.drag_stopped() || typed)
 }
 
 fn capital(name: &str) -> String {
