@@ -2,7 +2,7 @@
 //!
 //! Smooth skinning decomposition with rigid bones (Le and Deng 2012, ACM Transactions on Graphics 31, 6): weights and
 //! rigid transforms are found in turn by least squares, each while the other stands still. Here the problem is brought
-//! down to sums over the points ([`moves`]) and to quadratic forms in a point's position ([`share`]), so that a round
+//! down to sums over the points (`moves`) and to quadratic forms in a point's position (`share`), so that a round
 //! costs little more than reading the shapes once. Bones that do little are taken away and begin anew where most is
 //! left to do.
 //!
