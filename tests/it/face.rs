@@ -22,13 +22,11 @@ use rigsmith::{
     rig::{NodeKind, Rig, Uid, operations::Operation},
 };
 
+use crate::heads;
+
 /// A file of the test data; `None`, with a word, where there is none.
 fn data(name: &str) -> Option<Model> {
-    let Some(folder) = std::env::var_os("RIGSMITH_DATA") else {
-        println!("skipped: RIGSMITH_DATA names no folder with test meshes");
-        return None;
-    };
-    Some(load_model(&RealDisk, &PathBuf::from(folder).join(name)).unwrap())
+    Some(heads::model(&heads::data(name)?.join(name)))
 }
 
 fn bundled(name: &str) -> Model {

@@ -11,8 +11,10 @@ use rigsmith::{
         shells::{ShellKind, Shells},
         weights::face_weights,
     },
-    mesh::{model::Weights, obj},
+    mesh::model::Weights,
 };
+
+use crate::heads;
 
 /// A mesh with all that bones need to know of it.
 struct Head {
@@ -69,27 +71,14 @@ impl Head {
 
     /// The head of the data that has true landmarks; `None`, and a line that says so, without the data.
     fn real() -> Option<Self> {
-        let Some(folder) = std::env::var_os("RIGSMITH_DATA") else {
-            eprintln!("skipped: RIGSMITH_DATA is not set");
-            return None;
-        };
-        let heads = std::path::Path::new(&folder).join("heads");
-        let file = std::fs::File::open(heads.join("ict_neutral.obj")).unwrap();
-        let model = obj::read_model(file, "ict_neutral", &Default::default(), &mut |_: &str| None).unwrap();
-        let text = std::fs::read_to_string(heads.join("ict_landmarks.json")).unwrap();
-        let all: serde_json::Value = serde_json::from_str(&text).unwrap();
-        let mut points = [Vec3::ZERO; 68];
-        let given = &all["heads"]["ict_neutral.obj"]["landmarks_multipie68_xyz"];
-        for (i, p) in points.iter_mut().enumerate() {
-            *p = Vec3::from_array(std::array::from_fn(|c| given[i][c].as_f64().unwrap() as f32));
-        }
-        let landmarks = Landmarks { points, middle: 0.0, symmetric: true, confidence: 1.0, mouth_open: true };
-        let mask = model
-            .points
-            .iter()
-            .map(|p| p.z > points[0].z && p.y > points[8].y + 0.4 * (11.0 - p.z) - 0.5 && p.y < points[24].y + 5.0)
-            .collect();
-        Some(Self::new(model.points.clone(), model.point_triangles(), mask, landmarks))
+        let folder = heads::data("facial bones")?;
+        let (points, triangles) = heads::mesh(&folder.join("heads/ict_neutral.obj"));
+        let landmarks = heads::true_landmarks(&points, &heads::truth(&folder));
+        let marks = landmarks.points;
+        let in_face =
+            |p: &Vec3| p.z > marks[0].z && p.y > marks[8].y + 0.4 * (11.0 - p.z) - 0.5 && p.y < marks[24].y + 5.0;
+        let mask = points.iter().map(in_face).collect();
+        Some(Self::new(points, triangles, mask, landmarks))
     }
 
     fn place(&self, fixed: &[FixedBone], settings: &FaceBonesSettings) -> Result<FaceBones, FaceBonesError> {

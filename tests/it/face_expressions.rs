@@ -1,7 +1,5 @@
 //! Expressions: their files, and what they do to real heads.
 
-use std::path::PathBuf;
-
 use glam::Vec3;
 use rigsmith::{
     algo::face::{
@@ -16,13 +14,10 @@ use rigsmith::{
         landmarks::Landmarks,
         shells::find_shells,
     },
-    mesh::{
-        model::Weights,
-        obj::{ObjSettings, read_model},
-    },
+    mesh::model::Weights,
 };
 
-const HEADS: [&str; 3] = ["ict_neutral.obj", "ict_identity_1.obj", "ict_identity_2.obj"];
+use crate::heads::{self, HEADS};
 
 /// A head with bones at its true landmarks.
 struct Head {
@@ -36,28 +31,10 @@ struct Head {
 }
 
 fn head(name: &str, density: usize) -> Option<Head> {
-    let Some(data) = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from) else {
-        eprintln!("skipped: RIGSMITH_DATA is not set");
-        return None;
-    };
-    let bytes = std::fs::read(data.join("heads").join(name)).unwrap();
-    let model = read_model(&bytes[..], name, &ObjSettings::default(), &mut |_| None).unwrap();
-    let text = std::fs::read_to_string(data.join("heads/ict_landmarks.json")).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let marks: Vec<usize> = json["landmark_vertex_indices"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|mark| mark.as_u64().unwrap() as usize)
-        .collect();
-    let (triangles, points) = (model.point_triangles(), model.points);
-    let landmarks = Landmarks {
-        points: std::array::from_fn(|mark| points[marks[mark]]),
-        middle: points[marks[33]].x,
-        symmetric: true,
-        confidence: 1.0,
-        mouth_open: true,
-    };
+    let folder = heads::data("expressions")?;
+    let (points, triangles) = heads::mesh(&folder.join(format!("heads/{name}.obj")));
+    let marks = heads::truth(&folder);
+    let landmarks = heads::true_landmarks(&points, &marks);
     let shells = find_shells(&points, &triangles);
     let groups = group_head(&points, &triangles, &shells, &landmarks, None, &|_| true).unwrap();
     let analysis = FaceAnalysis {

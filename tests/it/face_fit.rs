@@ -1,12 +1,13 @@
 //! Bones from shapes: known rigs come back, what holds of every result, real shapes, bad input.
 
-use std::{fs, path::Path};
-
 use glam::{Quat, Vec3};
 use rigsmith::{
     algo::fit::{Fit, FitError, FitSettings, fit, fit_moves, skinned},
-    mesh::{model::Weights, obj},
+    files::{RealDisk, load_shapes},
+    mesh::model::Weights,
 };
+
+use crate::heads;
 
 /// A flat sheet of `side` by `side` points, one unit wide.
 fn sheet(side: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
@@ -227,22 +228,9 @@ fn bad_input_is_an_error() {
 
 #[test]
 fn true_shapes_of_a_head() {
-    let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
-        println!("skipped: RIGSMITH_DATA is not set");
-        return;
-    };
-    let folder = Path::new(&data).join("heads");
-    let bytes = fs::read(folder.join("ict_neutral.obj")).unwrap();
-    let model = obj::read_model(&bytes[..], "head", &obj::ObjSettings::default(), &mut |_| None).unwrap();
-    let numbers: Vec<f32> = fs::read(folder.join("ict_expressions.f32"))
-        .unwrap()
-        .chunks_exact(4)
-        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-        .collect();
-    let shapes: Vec<Vec<Vec3>> = numbers
-        .chunks_exact(3 * model.points.len())
-        .map(|s| s.chunks_exact(3).map(Vec3::from_slice).collect())
-        .collect();
+    let Some(folder) = heads::data("fitting a head") else { return };
+    let model = heads::model(&folder.join("heads/ict_neutral.obj"));
+    let shapes = load_shapes(&RealDisk, &folder.join("heads/ict_expressions.json"), &model).unwrap().displacements;
     assert_eq!(shapes.len(), 57);
     for (bones, millimetres) in [(10, 0.75), (20, 0.50)] {
         let settings = FitSettings { bones, rounds: 4, ..FitSettings::default() };

@@ -1,23 +1,17 @@
 //! Axes, head part, groups, and head and neck bones: on what is no head, on real heads, bodies and beasts.
 
-use std::path::PathBuf;
-
 use glam::{Mat3, Vec3, vec3};
-use rigsmith::{
-    algo::face::{
-        axes::{AxesError, guess_axes},
-        grouping::{GroupingError, HeadGroup, HeadGroups, group_head},
-        head_bones::{HeadBones, HeadBonesError, head_bones},
-        head_part::{HeadPartError, head_part},
-        landmarks::{Landmarks, find_landmarks},
-        shells::{ShellKind, Shells, find_shells},
-    },
-    mesh::gltf::read_gltf,
+use rigsmith::algo::face::{
+    axes::{AxesError, guess_axes},
+    grouping::{GroupingError, HeadGroup, HeadGroups, group_head},
+    head_bones::{HeadBones, HeadBonesError, head_bones},
+    head_part::{HeadPartError, head_part},
+    landmarks::{Landmarks, find_landmarks},
+    shells::{ShellKind, Shells, find_shells},
 };
 
-type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
+use crate::heads::{HEADS, Mesh, data, mesh, truth};
 
-const HEADS: [&str; 3] = ["ict_neutral", "ict_identity_1", "ict_identity_2"];
 const BODIES: [&str; 7] = [
     "baby",
     "female_heavy_tpose",
@@ -28,48 +22,6 @@ const BODIES: [&str; 7] = [
     "male_young",
 ];
 const BEASTS: [&str; 4] = ["fox-fox.glb", "fox-dog.glb", "bird-eagle.glb", "spot.obj"];
-
-/// The folder of real meshes, or a line that says the test is skipped.
-fn data(what: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: {what} needs real meshes, set RIGSMITH_DATA");
-    }
-    folder
-}
-
-/// Positions in the file's order and triangles, since truth is told by position numbers.
-fn read(path: PathBuf) -> Mesh {
-    if path.extension().is_some_and(|extension| extension == "glb") {
-        let bytes = std::fs::read(path).unwrap();
-        let model = read_gltf(&bytes, "beast", &mut |_: &str| Err::<Vec<u8>, String>(String::new())).unwrap();
-        return (model.points.clone(), model.point_triangles());
-    }
-    let text = std::fs::read_to_string(path).unwrap();
-    let (mut points, mut triangles) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let place: Vec<f32> = words.map(|word| word.parse().unwrap()).collect();
-                points.push(vec3(place[0], place[1], place[2]));
-            }
-            Some("f") => {
-                let corners: Vec<u32> =
-                    words.map(|word| word.split('/').next().unwrap().parse::<u32>().unwrap() - 1).collect();
-                triangles.extend((1..corners.len() - 1).map(|i| [corners[0], corners[i], corners[i + 1]]));
-            }
-            _ => {}
-        }
-    }
-    (points, triangles)
-}
-
-fn truth(folder: &std::path::Path) -> Vec<usize> {
-    let text = std::fs::read_to_string(folder.join("heads/ict_landmarks.json")).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-    json["landmark_vertex_indices"].as_array().unwrap().iter().map(|index| index.as_u64().unwrap() as usize).collect()
-}
 
 /// A head with all that is found on it.
 struct Found {
@@ -266,7 +218,7 @@ fn mask_holds_the_face() {
     let Some(folder) = data("the facial mask") else { return };
     let truth = truth(&folder);
     for name in HEADS {
-        let found = Found::new(read(folder.join(format!("heads/{name}.obj"))));
+        let found = Found::new(mesh(&folder.join(format!("heads/{name}.obj"))));
         let mut told = found.landmarks.clone();
         told.points = std::array::from_fn(|index| found.points[truth[index]]);
         let by_truth = group_head(&found.points, &found.triangles, &found.shells, &told, None, &|_| true).unwrap();
@@ -286,7 +238,7 @@ fn mask_holds_the_face() {
 #[test]
 fn a_wanted_number_of_groups_is_cut() {
     let Some(folder) = data("another number of groups") else { return };
-    let found = Found::new(read(folder.join("heads/ict_neutral.obj")));
+    let found = Found::new(mesh(&folder.join("heads/ict_neutral.obj")));
     let truth = truth(&folder);
     for wanted in [0, 2, 4, 9, 40] {
         let Found { points, triangles, shells, landmarks, .. } = &found;
@@ -301,7 +253,7 @@ fn a_wanted_number_of_groups_is_cut() {
 #[test]
 fn symmetric_heads_have_symmetric_groups() {
     let Some(folder) = data("symmetry") else { return };
-    let found = Found::new(read(folder.join("heads/ict_neutral.obj")));
+    let found = Found::new(mesh(&folder.join("heads/ict_neutral.obj")));
     let middle = found.landmarks.middle;
     let HeadBones { neck, head } = found.bones;
     assert!([neck.head, neck.tail, head.tail].iter().all(|place| place.x == middle));
@@ -318,7 +270,7 @@ fn symmetric_heads_have_symmetric_groups() {
 #[test]
 fn units_do_not_matter() {
     let Some(folder) = data("scale") else { return };
-    let (points, triangles) = read(folder.join("heads/ict_identity_1.obj"));
+    let (points, triangles) = mesh(&folder.join("heads/ict_identity_1.obj"));
     let plain = Found::new((points.clone(), triangles.clone()));
     for scale in [0.01, 100.0] {
         let other = Found::new((points.iter().map(|point| *point * scale).collect(), triangles.clone()));
@@ -333,7 +285,7 @@ fn units_do_not_matter() {
             assert!(a.distance(b / scale) < 0.2, "{a} {b} at {scale}");
         }
     }
-    let body = read(folder.join("bodies/male_child_tpose/body.obj"));
+    let body = mesh(&folder.join("bodies/male_child_tpose/body.obj"));
     let part = head_part(&body.0, &body.1).unwrap();
     for scale in [0.01, 100.0] {
         let points: Vec<Vec3> = body.0.iter().map(|point| *point * scale).collect();
@@ -347,7 +299,7 @@ fn units_do_not_matter() {
 fn axes_are_found_however_a_head_stands() {
     let Some(folder) = data("axes") else { return };
     const AXES: [Vec3; 6] = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
-    let (points, triangles) = read(folder.join("heads/ict_identity_2.obj"));
+    let (points, triangles) = mesh(&folder.join("heads/ict_identity_2.obj"));
     for up in AXES {
         for forward in AXES.into_iter().filter(|forward| forward.dot(up) == 0.0) {
             let turn = Mat3::from_cols(up.cross(forward), up, forward);
@@ -365,7 +317,7 @@ fn axes_are_found_however_a_head_stands() {
 fn bodies_have_a_head_part() {
     let Some(folder) = data("the head of a body") else { return };
     for name in BODIES {
-        let (points, triangles) = read(folder.join(format!("bodies/{name}/body.obj")));
+        let (points, triangles) = mesh(&folder.join(format!("bodies/{name}/body.obj")));
         let part = head_part(&points, &triangles).unwrap();
         assert!(part.is_part, "{name} is taken for a head");
         let text = std::fs::read_to_string(folder.join(format!("bodies/{name}/joints.json"))).unwrap();
@@ -398,7 +350,7 @@ fn bodies_have_a_head_part() {
 fn beasts_have_a_head_part_wherever_they_look() {
     let Some(folder) = data("beasts") else { return };
     for name in BEASTS {
-        let (points, triangles) = read(folder.join("creatures").join(name));
+        let (points, triangles) = mesh(&folder.join("creatures").join(name));
         for back in [1.0, -1.0] {
             let points: Vec<Vec3> = points.iter().map(|point| *point * vec3(back, 1.0, back)).collect();
             let (low, high) = points.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));

@@ -1,54 +1,15 @@
 //! Landmarks: where the 68 points lie on heads that tell, and what holds on those that do not.
 
-use std::{collections::HashMap, path::PathBuf};
+use std::collections::HashMap;
 
 use glam::{Quat, Vec3, vec3};
 use rigsmith::algo::face::{
     depth_map::{DepthFrame, DepthMap},
-    landmarks::{LandmarkError, Landmarks, find_landmarks},
+    landmarks::{LandmarkError, Landmarks, find_landmarks, mirrored},
     shells::{ShellKind, Shells, find_shells},
 };
 
-type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
-
-/// The folder of real heads, or a line that says the test is skipped.
-fn data(what: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: {what} needs real heads, set RIGSMITH_DATA");
-    }
-    folder
-}
-
-/// Positions in the file's order and triangles, since truth is told by position numbers.
-fn read(path: PathBuf) -> Mesh {
-    let text = std::fs::read_to_string(path).unwrap();
-    let (mut points, mut triangles) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let place: Vec<f32> = words.map(|word| word.parse().unwrap()).collect();
-                points.push(vec3(place[0], place[1], place[2]));
-            }
-            Some("f") => {
-                let corners: Vec<u32> =
-                    words.map(|word| word.split('/').next().unwrap().parse::<u32>().unwrap() - 1).collect();
-                triangles.extend((1..corners.len() - 1).map(|i| [corners[0], corners[i], corners[i + 1]]));
-            }
-            _ => {}
-        }
-    }
-    (points, triangles)
-}
-
-const HEADS: [&str; 3] = ["ict_neutral", "ict_identity_1", "ict_identity_2"];
-
-fn truth(folder: &std::path::Path) -> Vec<usize> {
-    let text = std::fs::read_to_string(folder.join("heads/ict_landmarks.json")).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-    json["landmark_vertex_indices"].as_array().unwrap().iter().map(|index| index.as_u64().unwrap() as usize).collect()
-}
+use crate::heads::{HEADS, Mesh, data, mesh, truth};
 
 fn find((points, triangles): &Mesh) -> Landmarks {
     find_landmarks(points, triangles, &find_shells(points, triangles)).unwrap()
@@ -64,21 +25,6 @@ fn errors(points: &[Vec3], truth: &[usize], found: &Landmarks) -> Vec<f32> {
 fn apart(a: &[Vec3; 68], b: &[Vec3; 68]) -> f32 {
     let eyes = a[36].distance(a[45]);
     a.iter().zip(b).map(|(a, b)| 100.0 * a.distance(*b) / eyes).fold(0.0, f32::max)
-}
-
-fn mirrored(index: usize) -> usize {
-    match index {
-        0..=16 => 16 - index,
-        17..=26 => 43 - index,
-        31..=35 => 66 - index,
-        36..=39 | 42..=45 => 81 - index,
-        40 | 41 | 46 | 47 => 87 - index,
-        48..=54 => 102 - index,
-        55..=59 => 114 - index,
-        60..=64 => 124 - index,
-        65..=67 => 132 - index,
-        _ => index,
-    }
 }
 
 fn subdivided((points, triangles): &Mesh) -> Mesh {
@@ -117,7 +63,7 @@ fn near_the_truth() {
     let Some(folder) = data("near_the_truth") else { return };
     let truth = truth(&folder);
     for name in HEADS {
-        let mesh = read(folder.join(format!("heads/{name}.obj")));
+        let mesh = mesh(&folder.join(format!("heads/{name}.obj")));
         let found = find(&mesh);
         check_sensible(&found);
         let errors = errors(&mesh.0, &truth, &found);
@@ -135,7 +81,7 @@ fn near_the_truth() {
 fn stretched_heads() {
     let Some(folder) = data("stretched_heads") else { return };
     let truth = truth(&folder);
-    let (points, triangles) = read(folder.join("heads/ict_identity_1.obj"));
+    let (points, triangles) = mesh(&folder.join("heads/ict_identity_1.obj"));
     let pitch = |degrees: f32| Quat::from_rotation_x(degrees.to_radians());
     let bends: [(&str, &dyn Fn(Vec3) -> Vec3); 4] = [
         ("short", &|p| p * vec3(1.0, 0.85, 1.0)),
@@ -155,7 +101,7 @@ fn stretched_heads() {
 fn looking_aside() {
     let Some(folder) = data("looking_aside") else { return };
     let truth = truth(&folder);
-    let (points, triangles) = read(folder.join("heads/ict_identity_2.obj"));
+    let (points, triangles) = mesh(&folder.join("heads/ict_identity_2.obj"));
     for (axis, degrees) in [(Vec3::Y, 8.0f32), (Vec3::Y, -24.0), (Vec3::Z, 12.0)] {
         let turn = Quat::from_axis_angle(axis, degrees.to_radians());
         let turned: Vec<Vec3> = points.iter().map(|&point| turn * point).collect();
@@ -168,7 +114,7 @@ fn looking_aside() {
 #[test]
 fn any_unit_and_place() {
     let Some(folder) = data("any_unit_and_place") else { return };
-    let (points, triangles) = read(folder.join("heads/ict_identity_1.obj"));
+    let (points, triangles) = mesh(&folder.join("heads/ict_identity_1.obj"));
     let first = find(&(points.clone(), triangles.clone()));
     for (scale, shift) in [(0.01, Vec3::ZERO), (100.0, Vec3::ZERO), (1.0, vec3(30.0, -50.0, 20.0))] {
         let moved: Vec<Vec3> = points.iter().map(|&point| point * scale + shift).collect();
@@ -182,7 +128,7 @@ fn any_unit_and_place() {
 #[test]
 fn any_topology() {
     let Some(folder) = data("any_topology") else { return };
-    let mesh = read(folder.join("heads/ict_neutral.obj"));
+    let mesh = mesh(&folder.join("heads/ict_neutral.obj"));
     let first = find(&mesh);
     let finer = find(&subdivided(&mesh));
     assert!(apart(&first.points, &finer.points) < 1.0, "subdivided: {} %", apart(&first.points, &finer.points));
@@ -204,14 +150,14 @@ fn any_topology() {
 #[test]
 fn same_on_both_sides() {
     let Some(folder) = data("same_on_both_sides") else { return };
-    let (points, triangles) = read(folder.join("heads/ict_neutral.obj"));
+    let (points, triangles) = mesh(&folder.join("heads/ict_neutral.obj"));
     let found = find(&(points.clone(), triangles.clone()));
     assert!(found.symmetric);
     for index in 0..68 {
         let (a, b) = (found.points[index], found.points[mirrored(index)]);
         assert_eq!((2.0 * found.middle - a.x, a.y, a.z), (b.x, b.y, b.z), "landmark {index}");
     }
-    let (points, triangles) = read(folder.join("heads/ict_identity_2.obj"));
+    let (points, triangles) = mesh(&folder.join("heads/ict_identity_2.obj"));
     let found = find(&(points.clone(), triangles.clone()));
     let flipped: Vec<Vec3> = points.iter().map(|point| vec3(-point.x, point.y, point.z)).collect();
     let wound: Vec<[u32; 3]> = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
@@ -226,7 +172,7 @@ fn same_on_both_sides() {
 #[test]
 fn scan() {
     let Some(folder) = data("scan") else { return };
-    let found = find(&read(folder.join("heads/lee_perry_smith.obj")));
+    let found = find(&mesh(&folder.join("heads/lee_perry_smith.obj")));
     check_sensible(&found);
     assert!(!found.symmetric && found.confidence > 0.5);
 }
@@ -234,7 +180,7 @@ fn scan() {
 #[test]
 fn cow() {
     let Some(folder) = data("cow") else { return };
-    let (points, triangles) = read(folder.join("creatures/spot.obj"));
+    let (points, triangles) = mesh(&folder.join("creatures/spot.obj"));
     // Its front is the other way.
     let turned: Vec<Vec3> = points.iter().map(|point| vec3(-point.x, point.y, -point.z)).collect();
     let found = find(&(turned, triangles));

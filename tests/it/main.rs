@@ -42,6 +42,7 @@ mod gestures;
 mod gizmo;
 mod gltf;
 mod gltf_torture;
+mod heads;
 mod journal;
 mod journal_kill;
 mod kmeans;

@@ -78,6 +78,22 @@ pub enum LandmarkError {
     NoFront,
 }
 
+/// The number of the landmark at the same place on the other side.
+pub const fn mirrored(index: usize) -> usize {
+    match index {
+        0..=16 => 16 - index,
+        17..=26 => 43 - index,
+        31..=35 => 66 - index,
+        36..=39 | 42..=45 => 81 - index,
+        40 | 41 | 46 | 47 => 87 - index,
+        48..=54 => 102 - index,
+        55..=59 => 114 - index,
+        60..=64 => 124 - index,
+        65..=67 => 132 - index,
+        _ => index,
+    }
+}
+
 /// Finds the landmarks of a head.
 ///
 /// `points` in head space (x to the character's left, y up, z to the front) in any unit and at any place; `shells`
@@ -271,7 +287,7 @@ fn lay(
         let seen = seen.filter(|depth| (depth - offset - place.z).abs() < 0.35);
         let front = matches!(index, 7..=9 | 17..=35 | 48..=60 | 64);
         // On a head that is the same on both sides, one side is enough.
-        if !(front && seen.is_some()) && (exact.is_none() || index <= prior::mirrored(index)) {
+        if !(front && seen.is_some()) && (exact.is_none() || index <= mirrored(index)) {
             snapped.push(index);
         }
         relief.place(place.x, place.y, seen.unwrap_or(place.z + offset))
@@ -292,7 +308,7 @@ fn lay(
     }
     if let Some(middle) = exact {
         for index in 0..68 {
-            let (point, other) = (laid[index], prior::mirrored(index));
+            let (point, other) = (laid[index], mirrored(index));
             if other >= index {
                 laid[other] = vec3(2.0 * middle - point.x, point.y, point.z);
             }

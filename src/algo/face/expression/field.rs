@@ -11,7 +11,7 @@ use super::{
 };
 use crate::algo::face::{
     bones::{FaceBone, FaceBoneKind},
-    landmarks::Landmarks,
+    landmarks::{Landmarks, mirrored},
 };
 
 /// The field, ready to be sampled at points of the rest pose.
@@ -141,27 +141,6 @@ impl Move {
             narrow: [1.0 / one.reach.0.max(1e-3), 1.0 / one.reach.1.max(1e-3)],
             part: one.part,
         }
-    }
-}
-
-/// The landmark at the same place on the other side.
-fn mirrored(mark: usize) -> usize {
-    match mark {
-        0..=16 => 16 - mark,
-        17..=26 => 43 - mark,
-        31..=35 => 66 - mark,
-        36..=39 => 81 - mark,
-        40 => 47,
-        41 => 46,
-        42..=45 => 81 - mark,
-        46 => 41,
-        47 => 40,
-        48..=54 => 102 - mark,
-        55..=59 => 114 - mark,
-        60..=64 => 124 - mark,
-        65 => 67,
-        67 => 65,
-        _ => mark,
     }
 }
 

@@ -5,8 +5,8 @@ use glam::{Vec2, Vec3, vec2, vec3};
 
 use super::{
     eyes::EyeOpening,
-    mouth,
-    prior::{mean_landmarks, mirrored},
+    mirrored, mouth,
+    prior::mean_landmarks,
     profile::{Curve, Profile},
     relief::Relief,
     search::{Pose, fit_height},

@@ -6,21 +6,7 @@
 
 use glam::Vec3;
 
-/// The landmark on the other side.
-pub(super) const fn mirrored(index: usize) -> usize {
-    match index {
-        0..=16 => 16 - index,
-        17..=26 => 43 - index,
-        31..=35 => 66 - index,
-        36..=39 | 42..=45 => 81 - index,
-        40 | 41 | 46 | 47 => 87 - index,
-        48..=54 => 102 - index,
-        55..=59 => 114 - index,
-        60..=64 => 124 - index,
-        65..=67 => 132 - index,
-        _ => index,
-    }
-}
+use super::mirrored;
 
 /// The mean landmarks; the left half is the right half mirrored.
 pub(super) fn mean_landmarks() -> [Vec3; 68] {
