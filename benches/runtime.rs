@@ -206,21 +206,25 @@ fn foxes(fox: &Model) -> Option<(usize, [f64; 2])> {
     for _ in 0..5 {
         app.update();
     }
-    let bind = Affine3A::from_translation(Vec3::Y);
     let mut matrices = vec![Affine3A::IDENTITY; CROWD * joints.len()];
     let times = timed(FRAMES, |_| {
         app.update();
-        let mut globals = app.world_mut().query::<&GlobalTransform>();
-        let world = app.world();
-        let mut out = matrices.iter_mut();
-        for rig in &placed {
-            for (place, out) in globals.iter_many(world, rig).zip(&mut out) {
-                *out = place.affine() * bind;
-            }
-        }
-        black_box(&out);
+        skin(app.world_mut(), &placed, &mut matrices);
+        black_box(&matrices);
     });
     Some((joints.len(), times))
+}
+
+/// Skinning matrices of all joints, each rig's in one piece, on all threads.
+fn skin(world: &mut World, rigs: &[Vec<Entity>], matrices: &mut [Affine3A]) {
+    let bind = Affine3A::from_translation(Vec3::Y);
+    let globals = world.query::<&GlobalTransform>();
+    let (world, joints) = (&*world, rigs.first().map_or(1, Vec::len).max(1));
+    matrices.par_chunks_mut(joints).zip(rigs).for_each(|(matrices, rig)| {
+        for (place, matrix) in globals.iter_many_manual(world, rig).zip(matrices) {
+            *matrix = place.affine() * bind;
+        }
+    });
 }
 
 /// A pose that differs from frame to frame.
@@ -270,7 +274,6 @@ fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 4] {
             slots.filter_map(|slot| runtime.and_then(|runtime| runtime.entity(slot))).collect()
         })
         .collect();
-    let bind = Affine3A::from_translation(Vec3::Y);
     let mut matrices = vec![Affine3A::IDENTITY; joints.iter().map(Vec::len).sum()];
     let mut times = [const { Vec::new() }; 4];
     for frame in 0..FRAMES {
@@ -284,14 +287,7 @@ fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 4] {
         let sampled = start.elapsed();
         app.world_mut().run_schedule(PostUpdate);
         let ran = start.elapsed();
-        let mut globals = app.world_mut().query::<&GlobalTransform>();
-        let world = app.world();
-        let mut out = matrices.iter_mut();
-        for rig in &joints {
-            for (place, out) in globals.iter_many(world, rig).zip(&mut out) {
-                *out = place.affine() * bind;
-            }
-        }
+        skin(app.world_mut(), &joints, &mut matrices);
         let all = start.elapsed();
         black_box(&matrices);
         // The first frames grow lists.

@@ -103,7 +103,8 @@ impl RigRuntime {
         self.nodes.get(slot).copied().flatten()
     }
 
-    /// Says which entity stands for a slot. Controls are posed by it, joints and driven nodes are written to it.
+    /// Says which entity stands for a slot. Controls are posed by it, joints and driven nodes are written to it. It has to
+    /// have [`NodeSlot`] and [`RuntimeNodeOf`], as those of [`spawn_instance`] have.
     pub fn attach(&mut self, slot: usize, entity: Entity) {
         let Some(node) = self.state.program().nodes().get(slot) else { return };
         let is_control = node.kind == crate::rig::NodeType::Control && node.is_posable();
@@ -114,7 +115,7 @@ impl RigRuntime {
         let is_written = match self.mode {
             // A control that nothing drives stands where it was put.
             InstanceMode::Hierarchy => !is_control || node.is_driven,
-            InstanceMode::Direct => true,
+            InstanceMode::Direct => node.kind == crate::rig::NodeType::Joint,
         };
         let place = |list: &mut Vec<(u32, Entity)>, is_in: bool| {
             list.retain(|(known, _)| *known as usize != slot);

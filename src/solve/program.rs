@@ -17,6 +17,7 @@ mod hash;
 mod lower;
 mod op;
 mod order;
+mod places;
 mod run;
 mod state;
 
@@ -37,7 +38,7 @@ pub use state::{LANES, Memory, RigState};
 use self::{
     graph::{Driven, Graph, Step},
     op::{N, Op, Operand, Pose, Tables, X},
-    run::{Machine, Scratch},
+    run::{Alone, Machine, Scratch},
     state::SpringState,
 };
 use crate::{
@@ -417,16 +418,13 @@ fn skip_empty(graph: &mut Graph<'_>) {
 
 /// Runs what depends on no input, once for all.
 fn run_fixed(graph: &mut Graph<'_>, fixed: &[Step]) {
-    let mut machine = Machine::<false> {
+    let (x, n) = (&mut graph.x, &mut graph.n);
+    let mut machine = Machine {
         tables: &graph.tables,
-        x: &mut graph.x,
-        n: &mut graph.n,
-        poses: &[],
+        registers: Alone::<false> { x, n, poses: &[], changed: false, moved: &mut [] },
         springs: &mut [] as &mut [SpringState],
         scratch: &mut Scratch::default(),
         dt: 0.0,
-        changed: false,
-        moved: &mut [],
     };
     fixed.iter().for_each(|step| machine.run(&step.op));
 }

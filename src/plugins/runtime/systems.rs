@@ -1,13 +1,16 @@
 //! The systems that run rigs, in their order.
 
-use bevy::prelude::*;
+use bevy::{math::Affine3A, prelude::*};
 use rayon::prelude::*;
 
-use super::{ControlPose, DrivenMorphs, InstanceMode, RigRuntime, RuntimeNodeOf, spawn::transform};
+use super::{ControlPose, DrivenMorphs, InstanceMode, NodeSlot, RigRuntime, RuntimeNodeOf, spawn::transform};
 use crate::{
     rig::{PoseOffset, RestTransform},
     solve::program::{LANES, RigState},
 };
+
+/// So many instances, or more, hand out their joints on all threads.
+const CROWD: usize = 32;
 
 /// Instances that are handed to the threads at once. A list of fixed size needs no memory of its own each frame.
 const BATCH: usize = 256;
@@ -157,17 +160,33 @@ pub(super) fn show_morphs(
 /// Writes where joints are in the world, where only they are entities.
 pub(super) fn scatter_globals(
     rigs: Query<(&RigRuntime, &GlobalTransform), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
-    mut joints: Query<&mut GlobalTransform, Without<RigRuntime>>,
+    mut joints: Query<(&NodeSlot, &RuntimeNodeOf, &mut GlobalTransform), Without<RigRuntime>>,
 ) {
-    for (runtime, place) in &rigs {
-        if runtime.mode != InstanceMode::Direct {
-            continue;
-        }
-        let world = place.affine();
-        for (slot, entity) in &runtime.written {
-            if let Ok(mut joint) = joints.get_mut(*entity) {
-                *joint = GlobalTransform::from(world * runtime.state.global_at(*slot as usize).affine());
+    let is_direct = |(runtime, _): &(&RigRuntime, &GlobalTransform)| runtime.mode == InstanceMode::Direct;
+    let place = |runtime: &RigRuntime, world: &Affine3A, slot: usize| {
+        GlobalTransform::from(*world * runtime.state.global_at(slot).affine())
+    };
+    if rigs.iter().filter(is_direct).count() < CROWD {
+        for (runtime, world) in rigs.iter().filter(is_direct) {
+            for (slot, entity) in &runtime.written {
+                if let Ok((_, _, mut joint)) = joints.get_mut(*entity) {
+                    *joint = place(runtime, &world.affine(), *slot as usize);
+                }
             }
         }
+        return;
     }
+    // All joints there are, in the order of memory and on all threads; those of one rig mostly follow one another.
+    joints.par_iter_mut().for_each_init(
+        || (Entity::PLACEHOLDER, None),
+        |(last, rig), (NodeSlot(slot), RuntimeNodeOf(of), mut joint)| {
+            if last != of {
+                let found = rigs.get(*of).ok().filter(is_direct);
+                (*last, *rig) = (*of, found.map(|(runtime, world)| (runtime, world.affine())));
+            }
+            if let Some((runtime, world)) = rig {
+                *joint = place(runtime, world, *slot as usize);
+            }
+        },
+    );
 }

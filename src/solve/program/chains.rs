@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::{
     op::Link,
-    run::{Machine, Scratch, place, share},
+    run::{Machine, Registers, Scratch, place, share},
 };
 use crate::{
     mesh::model::Trs,
@@ -20,18 +20,18 @@ use crate::{
 };
 
 /// Two bones that reach for a goal.
-pub(super) fn two_bone<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+pub(super) fn two_bone<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let op = &machine.tables.two_bones[at as usize];
-    let before = op.links.map(|link| *machine.x(link.input));
+    let before = op.links.map(|link| machine.x(link.input));
     let weight = share(machine.n(op.weight));
     if weight <= 0.0 {
         return op.links.iter().zip(before).for_each(|(link, local)| machine.put(link.out, local));
     }
     let parent = machine.x(op.parent);
-    let root = place(parent, &before[0]);
+    let root = place(&parent, &before[0]);
     let mid = place(&root, &before[1]);
     let end = place(&mid, &before[2]);
-    let goal = *machine.x(op.goal);
+    let goal = machine.x(op.goal);
     let solution = TwoBone {
         root: root.translation,
         mid: mid.translation,
@@ -70,12 +70,12 @@ pub(super) fn two_bone<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: 
 }
 
 /// Rig transforms of a chain's joints as they stand, into the scratch memory.
-fn pose<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, parent: Trs, links: &[Link]) {
+fn pose<R: Registers>(machine: &mut Machine<'_, R>, parent: Trs, links: &[Link]) {
     let Scratch { globals, points, rotations, .. } = &mut *machine.scratch;
     globals.clear();
     let mut above = parent;
     for link in links {
-        above = place(&above, &machine.x[link.input.0 as usize]);
+        above = place(&above, &machine.registers.x(link.input));
         globals.push(above);
     }
     points.clear();
@@ -92,7 +92,7 @@ fn measure(scratch: &mut Scratch) -> f32 {
 }
 
 /// A chain of any length that reaches for a goal.
-pub(super) fn chain<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+pub(super) fn chain<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let tables = machine.tables;
     let op = &tables.chains[at as usize];
     let links = &tables.links[op.links.range()];
@@ -100,7 +100,7 @@ pub(super) fn chain<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32
     if weight <= 0.0 {
         return copy(machine, links);
     }
-    let (parent, goal) = (*machine.x(op.parent), *machine.x(op.goal));
+    let (parent, goal) = (machine.x(op.parent), machine.x(op.goal));
     let pole = op.pole.map(|pole| machine.x(pole).translation);
     pose(machine, parent, links);
     let total = measure(machine.scratch);
@@ -116,7 +116,7 @@ pub(super) fn chain<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32
         machine.scratch.joints.clear();
         machine.scratch.rotations.clear();
         for (at, link) in links.iter().enumerate() {
-            let local = machine.x[link.input.0 as usize];
+            let local = machine.x(link.input);
             let offset = above * local.translation;
             above *= local.scale;
             let rest = tables.bases[link.base as usize].rotation;
@@ -151,7 +151,7 @@ pub(super) fn chain<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32
     }
     let mut above = parent.rotation;
     for (at, link) in links.iter().enumerate() {
-        let before = *machine.x(link.input);
+        let before = machine.x(link.input);
         let rotation = machine.scratch.rotations[at];
         let after = Trs { rotation: (above.conjugate() * rotation).normalize(), ..before };
         above = rotation;
@@ -160,7 +160,7 @@ pub(super) fn chain<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32
 }
 
 /// A chain along a curve.
-pub(super) fn spline<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+pub(super) fn spline<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let tables = machine.tables;
     let op = &tables.splines[at as usize];
     let links = &tables.links[op.links.range()];
@@ -168,12 +168,12 @@ pub(super) fn spline<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u3
     let weight = share(machine.n(op.weight));
     let (true, [first, .., last]) = (weight > 0.0, registers) else { return copy(machine, links) };
     let (first, last) = (machine.x(*first).rotation, machine.x(*last).rotation);
-    let parent = *machine.x(op.parent);
+    let parent = machine.x(op.parent);
     pose(machine, parent, links);
     measure(machine.scratch);
     machine.scratch.controls.clear();
     for point in registers {
-        let point = machine.x[point.0 as usize].translation;
+        let point = machine.x(*point).translation;
         machine.scratch.controls.push(point);
     }
     // How far the last point has turned since it was built, as the first one sees it.
@@ -185,7 +185,7 @@ pub(super) fn spline<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u3
     solver.solve(&curve, &ArcTable::new(&curve), lengths, points, rotations);
     let mut above = parent;
     for (at, link) in links.iter().enumerate() {
-        let before = *machine.x(link.input);
+        let before = machine.x(link.input);
         let rotation = machine.scratch.rotations[at] * op.corrections[at];
         let global = Trs { translation: machine.scratch.points[at], rotation, scale: above.scale * before.scale };
         let after = Trs { scale: before.scale, ..relative(&above, &global) };
@@ -200,9 +200,9 @@ pub(super) fn frames(stretch: f32, up: Vec3) -> SplineIk {
 }
 
 /// Leaves a chain as it is.
-fn copy<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, links: &[Link]) {
+fn copy<R: Registers>(machine: &mut Machine<'_, R>, links: &[Link]) {
     for link in links {
-        let local = *machine.x(link.input);
+        let local = machine.x(link.input);
         machine.put(link.out, local);
     }
 }

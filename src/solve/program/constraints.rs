@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::{
     op::{SpringOp, TargetReg, UpReg},
-    run::{Machine, on, place, share},
+    run::{Machine, Registers, beside, on, place, share},
     state::SpringState,
 };
 use crate::{
@@ -18,23 +18,23 @@ use crate::{
 };
 
 /// Follows weighted targets.
-pub(super) fn transform<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+pub(super) fn transform<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let op = &machine.tables.transforms[at as usize];
-    let input = *machine.x(op.input);
+    let input = machine.x(op.input);
     let weight = share(machine.n(op.weight));
     let goal = if weight > 0.0 { followed(machine, &machine.tables.targets[op.targets.range()]) } else { None };
     if op.is_global {
         let global = match goal {
             Some(goal) if op.scale[0] => goal,
             Some(goal) => Trs { scale: machine.x(op.parent).scale * input.scale, ..goal },
-            None => place(machine.x(op.parent), &input),
+            None => place(&machine.x(op.parent), &input),
         };
         return machine.put(op.out, global);
     }
     let Some(goal) = goal else { return machine.put(op.out, input) };
-    let mut local = relative(machine.x(op.parent), &goal);
+    let mut local = beside(&machine.x(op.parent), &goal);
     if let Some(offset) = machine.pose(op.pose) {
-        local = on(offset, &local);
+        local = on(&offset, &local);
     }
     let mut out = input;
     for axis in 0..3 {
@@ -58,10 +58,10 @@ pub(super) fn transform<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at:
 }
 
 /// The blend of targets in the rig's space; `None` without weight.
-fn followed<const TRACK: bool>(machine: &Machine<'_, TRACK>, targets: &[TargetReg]) -> Option<Trs> {
+fn followed<R: Registers>(machine: &Machine<'_, R>, targets: &[TargetReg]) -> Option<Trs> {
     let place_of = |target: &TargetReg| {
         let node = machine.x(target.node);
-        target.offset.as_ref().map_or(*node, |offset| place(node, offset))
+        target.offset.as_ref().map_or(node, |offset| place(&node, offset))
     };
     let mut weighty = targets.iter().filter(|target| machine.n(target.weight) > 0.0);
     let (first, second) = (weighty.next()?, weighty.next());
@@ -82,9 +82,9 @@ fn turned(from: Quat, to: Quat, weight: f32) -> Quat {
 }
 
 /// Points an axis at weighted targets.
-pub(super) fn aim<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+pub(super) fn aim<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let op = &machine.tables.aims[at as usize];
-    let mut local = *machine.x(op.input);
+    let mut local = machine.x(op.input);
     let weight = share(machine.n(op.weight));
     let targets = machine.tables.targets[op.targets.range()].iter();
     let target = blend_points(targets.map(|target| (machine.x(target.node).translation, machine.n(target.weight))));
@@ -92,7 +92,7 @@ pub(super) fn aim<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) 
         && weight > 0.0
     {
         let parent = machine.x(op.parent);
-        let global = place(parent, &local);
+        let global = place(&parent, &local);
         let up = match op.up {
             UpReg::Direction(direction) => Up::Vector(direction),
             UpReg::Point(node) => Up::Point(machine.x(node).translation),
@@ -106,9 +106,9 @@ pub(super) fn aim<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) 
 }
 
 /// Keeps a transform between ends.
-pub(super) fn limit<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+pub(super) fn limit<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let op = &machine.tables.limits[at as usize];
-    let (input, base) = (*machine.x(op.input), &machine.tables.bases[op.base as usize]);
+    let (input, base) = (machine.x(op.input), &machine.tables.bases[op.base as usize]);
     let offset = relative(base, &input);
     let translation = op.translate.clamp(offset.translation);
     let rotation = op.rotate.clamp_rotation(offset.rotation, EulerOrder::Xyz);
@@ -128,10 +128,10 @@ pub(super) fn limit<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32
 }
 
 /// Lags behind, swings and settles.
-pub(super) fn spring<const TRACK: bool>(machine: &mut Machine<'_, TRACK>, at: u32) {
+pub(super) fn spring<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let op = &machine.tables.springs[at as usize];
-    let input = *machine.x(op.input);
-    let parent = *machine.x(op.parent);
+    let input = machine.x(op.input);
+    let parent = machine.x(op.parent);
     let weight = share(machine.n(op.weight));
     let motion = Spring { frequency: machine.n(op.frequency), damping: machine.n(op.damping) };
     let dt = machine.dt;

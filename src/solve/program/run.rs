@@ -5,6 +5,7 @@ use glam::{Quat, Vec3};
 use super::{
     chains, constraints,
     op::{N, Op, Pose, Span, Tables, X},
+    places::{Place, times, unit},
     state::SpringState,
 };
 use crate::{
@@ -33,38 +34,48 @@ pub(super) struct Scratch {
     pub values: Vec<f32>,
 }
 
-/// Registers and inputs of one run. With `TRACK`, it notes whether an operation changed any bit of what it wrote.
-pub(super) struct Machine<'a, const TRACK: bool> {
-    pub tables: &'a Tables,
+/// Where one instance's transforms and numbers are.
+pub(super) trait Registers {
+    /// A transform.
+    fn x(&self, register: X) -> Trs;
+
+    /// A number.
+    fn n(&self, register: N) -> f32;
+
+    /// Writes a transform.
+    fn put(&mut self, register: X, value: Trs);
+
+    /// Writes a number.
+    fn put_n(&mut self, register: N, value: f32);
+
+    /// The pose offset of a slot; `None` where there is none.
+    fn offset(&self, pose: Pose) -> Option<PoseOffset>;
+}
+
+/// The registers of an instance by itself. With `TRACK`, it notes whether an operation changed any bit of what it wrote.
+pub(super) struct Alone<'a, const TRACK: bool> {
     pub x: &'a mut [Trs],
     pub n: &'a mut [f32],
     pub poses: &'a [PoseOffset],
-    pub springs: &'a mut [SpringState],
-    pub scratch: &'a mut Scratch,
-    /// Seconds since the last run.
-    pub dt: f32,
     /// True if the last operation changed something.
     pub changed: bool,
     /// A bit for each of the first transforms, set when it changes.
     pub moved: &'a mut [u64],
 }
 
-impl<const TRACK: bool> Machine<'_, TRACK> {
-    /// A transform.
+impl<const TRACK: bool> Registers for Alone<'_, TRACK> {
     #[inline]
-    pub fn x(&self, X(register): X) -> &Trs {
-        &self.x[register as usize]
+    fn x(&self, X(register): X) -> Trs {
+        self.x[register as usize]
     }
 
-    /// A number.
     #[inline]
-    pub fn n(&self, N(register): N) -> f32 {
+    fn n(&self, N(register): N) -> f32 {
         self.n[register as usize]
     }
 
-    /// Writes a transform.
     #[inline]
-    pub fn put(&mut self, X(register): X, value: Trs) {
+    fn put(&mut self, X(register): X, value: Trs) {
         let slot = &mut self.x[register as usize];
         if TRACK && !same_bits(slot, &value) {
             self.changed = true;
@@ -75,9 +86,8 @@ impl<const TRACK: bool> Machine<'_, TRACK> {
         *slot = value;
     }
 
-    /// Writes a number.
     #[inline]
-    pub fn put_n(&mut self, N(register): N, value: f32) {
+    fn put_n(&mut self, N(register): N, value: f32) {
         let slot = &mut self.n[register as usize];
         if TRACK && slot.to_bits() != value.to_bits() {
             self.changed = true;
@@ -85,11 +95,52 @@ impl<const TRACK: bool> Machine<'_, TRACK> {
         *slot = value;
     }
 
+    #[inline]
+    fn offset(&self, pose: Pose) -> Option<PoseOffset> {
+        // Pose::NONE is past every list.
+        self.poses.get(pose.0 as usize).copied()
+    }
+}
+
+/// Runs operations on an instance.
+pub(super) struct Machine<'a, R> {
+    pub tables: &'a Tables,
+    pub registers: R,
+    pub springs: &'a mut [SpringState],
+    pub scratch: &'a mut Scratch,
+    /// Seconds since the last run.
+    pub dt: f32,
+}
+
+impl<R: Registers> Machine<'_, R> {
+    /// A transform.
+    #[inline]
+    pub fn x(&self, register: X) -> Trs {
+        self.registers.x(register)
+    }
+
+    /// A number.
+    #[inline]
+    pub fn n(&self, register: N) -> f32 {
+        self.registers.n(register)
+    }
+
+    /// Writes a transform.
+    #[inline]
+    pub fn put(&mut self, register: X, value: Trs) {
+        self.registers.put(register, value);
+    }
+
+    /// Writes a number.
+    #[inline]
+    pub fn put_n(&mut self, register: N, value: f32) {
+        self.registers.put_n(register, value);
+    }
+
     /// The pose offset of a slot; `None` where the node stands as built.
     #[inline]
-    pub fn pose(&self, pose: Pose) -> Option<&PoseOffset> {
-        // Pose::NONE is past every list.
-        self.poses.get(pose.0 as usize).filter(|offset| **offset != PoseOffset::IDENTITY)
+    pub fn pose(&self, pose: Pose) -> Option<PoseOffset> {
+        self.registers.offset(pose).filter(|offset| *offset != PoseOffset::IDENTITY)
     }
 
     /// Runs one operation.
@@ -100,13 +151,9 @@ impl<const TRACK: bool> Machine<'_, TRACK> {
                 let offset = self.pose(pose);
                 let above = self.x(parent);
                 let global = match (offset, base) {
-                    (None, 0) => *above,
-                    (None, _) => place(above, &self.tables.bases[base as usize]),
-                    (Some(PoseOffset { translation, rotation, scale }), 0) => {
-                        let rotation = rotation.normalize();
-                        place(above, &Trs { translation: *translation, rotation, scale: *scale })
-                    }
-                    (Some(offset), _) => place(above, &on(offset, &self.tables.bases[base as usize])),
+                    (None, 0) => above,
+                    (None, _) => place(&above, &self.tables.bases[base as usize]),
+                    (Some(offset), _) => place(&above, &on(&offset, &self.tables.bases[base as usize])),
                 };
                 self.put(out, global);
             }
@@ -116,28 +163,28 @@ impl<const TRACK: bool> Machine<'_, TRACK> {
                     local = on(&self.driven(drives), &local);
                 }
                 if let Some(offset) = self.pose(pose) {
-                    local = on(offset, &local);
+                    local = on(&offset, &local);
                 }
                 self.put(out, local);
             }
             Op::Drive { input, drives, out } => {
-                let local = on(&self.driven(drives), self.x(input));
+                let local = on(&self.driven(drives), &self.x(input));
                 self.put(out, local);
             }
             Op::Global { parent, local, out } => {
-                let global = place(self.x(parent), self.x(local));
+                let global = place(&self.x(parent), &self.x(local));
                 self.put(out, global);
             }
             Op::Turn { input, axis, angle, out } => {
-                let (mut local, angle) = (*self.x(input), self.n(angle));
+                let (mut local, angle) = (self.x(input), self.n(angle));
                 if angle != 0.0 && angle.is_finite() {
                     let turn = about(self.tables.axes[axis as usize], angle.to_radians());
-                    local.rotation = (local.rotation * turn).normalize();
+                    local.rotation = turned_on(local.rotation, turn);
                 }
                 self.put(out, local);
             }
             Op::Scale { input, axis, along, across, out } => {
-                let (mut local, axis) = (*self.x(input), self.tables.axes[axis as usize]);
+                let (mut local, axis) = (self.x(input), self.tables.axes[axis as usize]);
                 let (along, across) = (self.n(along), self.n(across));
                 local.scale *= Vec3::splat(across) + axis * axis * (along - across);
                 self.put(out, local);
@@ -145,7 +192,7 @@ impl<const TRACK: bool> Machine<'_, TRACK> {
             Op::Linear { input, factor, add, out } => self.put_n(out, factor * self.n(input) + add),
             Op::Choice { input, value, out } => self.put_n(out, (1.0 - (self.n(input) - value).abs()).max(0.0)),
             Op::Channel { pose, channel, out } => {
-                let offset = self.poses.get(pose.0 as usize).copied().unwrap_or_default();
+                let offset = self.registers.offset(pose).unwrap_or_default();
                 self.put_n(out, channel_of(&offset, channel));
             }
             Op::Product { a, b, out } => self.put_n(out, self.n(a) * self.n(b)),
@@ -165,7 +212,7 @@ impl<const TRACK: bool> Machine<'_, TRACK> {
                 let op = &self.tables.expressions[at as usize];
                 self.scratch.values.clear();
                 let inputs = &self.tables.numbers[op.inputs.range()];
-                self.scratch.values.extend(inputs.iter().map(|N(input)| self.n[*input as usize]));
+                self.scratch.values.extend(inputs.iter().map(|input| self.registers.n(*input)));
                 let value = op.expression.evaluate(&self.scratch.values).value;
                 self.put_n(op.out, value);
             }
@@ -244,21 +291,25 @@ pub(super) fn share(weight: f32) -> f32 {
 /// A transform relative to `parent`, in the space that the parent is in.
 #[inline]
 pub(super) fn place(parent: &Trs, local: &Trs) -> Trs {
-    Trs {
-        translation: parent.translation + parent.rotation * (parent.scale * local.translation),
-        rotation: parent.rotation * local.rotation,
-        scale: parent.scale * local.scale,
-    }
+    Place::from(parent).place(&local.into()).into()
 }
 
 /// A pose offset on top of a transform.
 #[inline]
 pub(super) fn on(offset: &PoseOffset, base: &Trs) -> Trs {
-    Trs {
-        translation: base.translation + base.rotation * (base.scale * offset.translation),
-        rotation: (base.rotation * offset.rotation).normalize(),
-        scale: base.scale * offset.scale,
-    }
+    Place::from(base).with(&offset.into()).into()
+}
+
+/// A transform relative to `parent`.
+#[inline]
+pub(super) fn beside(parent: &Trs, transform: &Trs) -> Trs {
+    Place::from(parent).relative(&transform.into()).into()
+}
+
+/// The rotation `first`, and `then` about the axes that it has turned.
+#[inline]
+fn turned_on(first: Quat, then: Quat) -> Quat {
+    Quat::from_array(unit(times(first.to_array(), then.to_array())))
 }
 
 /// A number of an offset: angles in degrees.

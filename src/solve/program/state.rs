@@ -1,13 +1,17 @@
 //! What differs between instances of a program.
 
+mod four;
+
 use std::{cell::RefCell, sync::Arc};
 
 use glam::{Affine3A, Vec3};
 
+use self::four::Four;
+pub use self::four::LANES;
 use super::{
     ContentHash, RigProgram, StateError,
     graph::valid,
-    run::{Machine, Scratch, on},
+    run::{Alone, Machine, Scratch, on},
 };
 use crate::{
     mesh::model::Trs,
@@ -75,9 +79,6 @@ pub struct RigState {
     moved: Vec<u64>,
 }
 
-/// Instances that one thread runs in step; see [`RigState::evaluate_together`].
-pub const LANES: usize = 4;
-
 /// Registers and memory that instances of a thread share.
 #[derive(Default)]
 struct Workspace {
@@ -85,8 +86,6 @@ struct Workspace {
     serial: u64,
     x: Vec<Trs>,
     n: Vec<f32>,
-    /// Of the instance that runs, in one piece near the registers: instances lie far apart in memory.
-    poses: Vec<PoseOffset>,
     scratch: Scratch,
 }
 
@@ -109,8 +108,6 @@ impl Workspace {
                 is_same = false;
             }
         }
-        self.poses.clear();
-        self.poses.extend_from_slice(&state.poses);
         if is_same { program.settings } else { 0 }
     }
 
@@ -124,23 +121,18 @@ impl Workspace {
         state.moved.fill(u64::MAX);
     }
 
-    fn machine<'a>(&'a mut self, state: &'a mut RigState, dt: f32) -> Machine<'a, false> {
-        Machine {
-            tables: &state.program.tables,
-            x: &mut self.x,
-            n: &mut self.n,
-            poses: &self.poses,
-            springs: &mut state.springs,
-            scratch: &mut self.scratch,
-            dt,
-            changed: false,
-            moved: &mut [],
-        }
+    fn run(&mut self, state: &mut RigState, first: usize, dt: f32) {
+        let registers =
+            Alone::<false> { x: &mut self.x, n: &mut self.n, poses: &state.poses, changed: false, moved: &mut [] };
+        let RigState { program, springs, .. } = state;
+        let mut machine = Machine { tables: &program.tables, registers, springs, scratch: &mut self.scratch, dt };
+        program.ops[first..].iter().for_each(|op| machine.run(op));
     }
 }
 
 thread_local! {
-    static WORKSPACES: RefCell<[Workspace; LANES]> = RefCell::default();
+    static WORKSPACE: RefCell<Workspace> = RefCell::default();
+    static FOUR: RefCell<Four> = RefCell::default();
 }
 
 impl RigState {
@@ -298,7 +290,7 @@ impl RigState {
         if !self.is_dirty(dt) {
             return false;
         }
-        WORKSPACES.with_borrow_mut(|[workspace, ..]| match self.memory {
+        WORKSPACE.with_borrow_mut(|workspace| match self.memory {
             Memory::Whole => {
                 self.moved.fill(0);
                 self.evaluate_whole(dt, &mut workspace.scratch);
@@ -306,9 +298,7 @@ impl RigState {
             }
             Memory::Results => {
                 let first = workspace.take(self);
-                let program = Arc::clone(&self.program);
-                let mut machine = workspace.machine(self, dt);
-                program.ops[first..].iter().for_each(|op| machine.run(op));
+                workspace.run(self, first, dt);
                 workspace.give(self);
             }
         });
@@ -318,8 +308,8 @@ impl RigState {
     /// As [`evaluate`](Self::evaluate), for several instances; true for those that ran.
     ///
     /// Instances of one program that remember [`Memory::Results`] run in step, one operation for all of them before the
-    /// next: joints of a chain wait for each other, joints of other instances do not, so that a processor has more to
-    /// do at once. The results are the same bits as of instances that run alone.
+    /// next, their numbers side by side, so that a processor computes all of them at once. The results are the same bits
+    /// as of instances that run alone.
     pub fn evaluate_together(mut states: [Option<&mut Self>; LANES], dt: f32) -> [bool; LANES] {
         let dt = elapsed(dt);
         let serial = states[0].as_ref().map(|state| state.program.serial);
@@ -333,21 +323,7 @@ impl RigState {
         if !is_alike {
             return [a, b, c, d].map(|state| state.evaluate(dt));
         }
-        WORKSPACES.with_borrow_mut(|[wa, wb, wc, wd]| {
-            let program = Arc::clone(&a.program);
-            let first = [wa.take(a), wb.take(b), wc.take(c), wd.take(d)];
-            let mut machines = [wa.machine(a, dt), wb.machine(b, dt), wc.machine(c, dt), wd.machine(d, dt)];
-            for (machine, first) in machines.iter_mut().zip(first) {
-                program.ops[first..program.settings].iter().for_each(|op| machine.run(op));
-            }
-            for op in &program.ops[program.settings..] {
-                machines.iter_mut().for_each(|machine| machine.run(op));
-            }
-            wa.give(a);
-            wb.give(b);
-            wc.give(c);
-            wd.give(d);
-        });
+        FOUR.with_borrow_mut(|four| four.evaluate([a, b, c, d], dt));
         [true; LANES]
     }
 
@@ -371,21 +347,22 @@ impl RigState {
             dirty.fill(0);
             moved.fill(u64::MAX);
             let tables = &program.tables;
-            let mut machine =
-                Machine::<false> { tables, x, n, poses, springs, scratch, dt, changed: false, moved: &mut [] };
+            let registers = Alone::<false> { x, n, poses, changed: false, moved: &mut [] };
+            let mut machine = Machine { tables, registers, springs, scratch, dt };
             program.ops.iter().for_each(|op| machine.run(op));
             return;
         }
         let tables = &program.tables;
-        let mut machine = Machine::<true> { tables, x, n, poses, springs, scratch, dt, changed: false, moved };
+        let registers = Alone::<true> { x, n, poses, changed: false, moved };
+        let mut machine = Machine { tables, registers, springs, scratch, dt };
         for word in 0..dirty.len() {
             while dirty[word] != 0 {
                 let bit = dirty[word].trailing_zeros() as usize;
                 dirty[word] &= dirty[word] - 1;
                 let at = word * 64 + bit;
-                machine.changed = false;
+                machine.registers.changed = false;
                 machine.run(&program.ops[at]);
-                if machine.changed {
+                if machine.registers.changed {
                     // Readers come later, so none is missed.
                     mark(dirty, program.op_readers.get(at));
                 }
