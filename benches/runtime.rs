@@ -6,9 +6,9 @@
 //! RIGSMITH_DATA=DATA cargo bench --no-default-features --bench runtime
 //! ```
 //!
-//! `everything` goes from sampled values (written to the poses of controls, as curves do) over programs, propagation and
-//! joints in the world to skinning matrices. `foxes` is Bevy's example `many_foxes` without drawing, to be
-//! compared by joints per microsecond.
+//! `everything` goes from sampled controls over programs, propagation and joints in the world to skinning matrices;
+//! `sampled_and_everything` also writes the poses of all controls first, as curves do. `foxes` is Bevy's example
+//! `many_foxes` without drawing, its curves sampled too, to be compared with the latter by joints per microsecond.
 
 use std::{
     hint::black_box,
@@ -135,10 +135,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     if wanted("everything") {
         let times = everything(&game);
-        for (name, times) in ["sample_ms", "frame_ms", "matrices_ms", "everything_ms"].iter().zip(&times) {
+        let names = ["sample_ms", "frame_ms", "matrices_ms", "everything_ms", "sampled_and_everything_ms"];
+        for (name, times) in names.iter().zip(&times) {
             note(name, times.map(|time| time * 1e3));
         }
-        note("everything_joints_per_us", times[3].map(|time| (joints * CROWD) as f64 / (time * 1e6)));
+        for (name, at) in [("everything_joints_per_us", 3), ("sampled_and_everything_joints_per_us", 4)] {
+            note(name, times[at].map(|time| (joints * CROWD) as f64 / (time * 1e6)));
+        }
     }
     if wanted("foxes") {
         match std::env::var_os("RIGSMITH_DATA") {
@@ -255,8 +258,8 @@ fn app() -> App {
     app
 }
 
-/// A thousand bipeds: sampling, everything in `PostUpdate`, skinning matrices, and the sum.
-fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 4] {
+/// A thousand bipeds: sampling, everything in `PostUpdate`, skinning matrices, the sum of the last two and of all.
+fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 5] {
     let mut app = app();
     let rigs: Vec<Entity> = (0..CROWD)
         .map(|number| {
@@ -275,7 +278,7 @@ fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 4] {
         })
         .collect();
     let mut matrices = vec![Affine3A::IDENTITY; joints.iter().map(Vec::len).sum()];
-    let mut times = [const { Vec::new() }; 4];
+    let mut times = [const { Vec::new() }; 5];
     for frame in 0..FRAMES {
         let start = Instant::now();
         let _ =
@@ -292,7 +295,7 @@ fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 4] {
         black_box(&matrices);
         // The first frames grow lists.
         if frame >= 5 {
-            for (times, time) in times.iter_mut().zip([sampled, ran - sampled, all - ran, all]) {
+            for (times, time) in times.iter_mut().zip([sampled, ran - sampled, all - ran, all - sampled, all]) {
                 times.push(time);
             }
         }

@@ -15,8 +15,9 @@ const CROWD: usize = 32;
 /// Instances that are handed to the threads at once. A list of fixed size needs no memory of its own each frame.
 const BATCH: usize = 256;
 
-/// Fewer instances than these are run by one thread.
-const FEW: usize = LANES;
+/// The same of joints, and how many of them a thread takes.
+const JOINTS: usize = 8192;
+const JOINT_RUN: usize = 512;
 
 /// Notes which instances have a control that changed.
 pub(super) fn note_controls(
@@ -58,21 +59,31 @@ pub(super) fn solve(
             }
         }
     };
-    let mut due = rigs.iter_mut().filter(|runtime| runtime.is_due || runtime.state.is_dirty(dt));
-    let mut batch = [const { None::<Mut<RigRuntime>> }; BATCH];
+    let due = rigs.iter_mut().filter(|runtime| runtime.is_due || runtime.state.is_dirty(dt));
+    in_batches::<BATCH, _>(due, LANES, run);
+}
+
+/// Runs a function on runs of `run` items, on all threads if there are more. Bevy's own parallel iteration would leave one
+/// of two processors to other tasks.
+fn in_batches<const SIZE: usize, T: Send>(
+    mut items: impl Iterator<Item = T>,
+    run: usize,
+    call: impl Fn(&mut [Option<T>]) + Send + Sync,
+) {
+    let mut batch = [const { None }; SIZE];
     loop {
         let mut count = 0;
-        for (place, runtime) in batch.iter_mut().zip(&mut due) {
-            *place = Some(runtime);
+        for (place, item) in batch.iter_mut().zip(&mut items) {
+            *place = Some(item);
             count += 1;
         }
         let ready = &mut batch[..count];
-        if count < FEW {
-            run(ready);
+        if count < run {
+            call(ready);
         } else {
-            ready.par_chunks_mut(LANES).for_each(run);
+            ready.par_chunks_mut(run).for_each(&call);
         }
-        if count < BATCH {
+        if count < SIZE {
             break;
         }
     }
@@ -177,16 +188,16 @@ pub(super) fn scatter_globals(
         return;
     }
     // All joints there are, in the order of memory and on all threads; those of one rig mostly follow one another.
-    joints.par_iter_mut().for_each_init(
-        || (Entity::PLACEHOLDER, None),
-        |(last, rig), (NodeSlot(slot), RuntimeNodeOf(of), mut joint)| {
-            if last != of {
+    in_batches::<JOINTS, _>(joints.iter_mut(), JOINT_RUN, |joints| {
+        let (mut last, mut rig) = (Entity::PLACEHOLDER, None);
+        for (NodeSlot(slot), RuntimeNodeOf(of), joint) in joints.iter_mut().flatten() {
+            if last != *of {
                 let found = rigs.get(*of).ok().filter(is_direct);
-                (*last, *rig) = (*of, found.map(|(runtime, world)| (runtime, world.affine())));
+                (last, rig) = (*of, found.map(|(runtime, world)| (runtime, world.affine())));
             }
-            if let Some((runtime, world)) = rig {
-                *joint = place(runtime, world, *slot as usize);
+            if let Some((runtime, world)) = &rig {
+                **joint = place(runtime, world, *slot as usize);
             }
-        },
-    );
+        }
+    });
 }
