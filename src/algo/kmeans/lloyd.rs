@@ -23,10 +23,28 @@ pub(super) struct State {
 const SLACK: f32 = 4e-6;
 /// A block before its first round.
 const NEVER: f64 = f64::NEG_INFINITY;
-/// After these rounds centroids that are of little use jump to where they are of more.
-const REARRANGE: [usize; 4] = [5, 10, 16, 24];
+/// Rounds after which centroids jump, where nothing better is known.
+pub(super) const JUMPS: &[usize] = &[5, 10, 16, 24];
+pub(super) const NO_JUMPS: &[usize] = &[];
+/// A stride that saves about half of the rounds.
+pub(super) const LONG: f32 = 1.8;
+/// Strides are as long as that while at least one point in so many changes its group.
+const RESTLESS: usize = 2048;
+/// Candidates hold until centroids have gone this part of how far the furthest of them may be.
+const AHEAD: f32 = 0.05;
 /// Blocks are handed out in runs of so many.
 const RUN: usize = 16;
+
+/// How rounds go.
+pub(super) struct Pace {
+    /// The most there may be.
+    pub(super) rounds: usize,
+    /// After these, centroids that are of little use jump to where they are of more.
+    pub(super) jumps: &'static [usize],
+    /// How far centroids go, in parts of the way to their points' mean, while many points change their group. Up to twice the
+    /// way the error does not rise; once few points change, it is the whole way.
+    pub(super) stride: f32,
+}
 
 /// Eight centroids; lanes without one are at infinity.
 struct Eight {
@@ -78,11 +96,11 @@ struct Block {
 type Change = (u32, u32, u32);
 const NOWHERE: u32 = u32::MAX;
 
-/// Runs until no point changes its group.
+/// Runs until no point changes its group, or for as many rounds as there may be.
 pub(super) fn run<const BOUNDS: bool>(
     space: &Space,
     seeds: Vec<Place>,
-    max_rounds: usize,
+    pace: &Pace,
     report: &dyn Fn(usize) -> Result<(), KMeansError>,
 ) -> Result<State, KMeansError> {
     let count = space.points.len();
@@ -129,18 +147,25 @@ pub(super) fn run<const BOUNDS: bool>(
             }
             sums[to as usize].add(place, 1);
         }
-        if changes.is_empty() || rounds >= max_rounds {
+        if changes.is_empty() || rounds >= pace.rounds {
             break;
         }
         rounds += 1;
         report(rounds)?;
         let fixed = space.fixed.len();
-        let swap = REARRANGE.contains(&rounds) && rearrange::worth(groups - fixed, count);
+        let swap = pace.jumps.contains(&rounds) && rearrange::worth(groups - fixed, count);
         let mut moved: Vec<Place> = centroids.places.clone();
         let mut empty = Vec::new();
+        let is_restless = rounds > 1 && changes.len() * RESTLESS > count;
+        let stride = if is_restless { pace.stride } else { 1.0 };
         for (group, sum) in sums.iter().enumerate().skip(fixed) {
             if sum.count > 0 {
-                moved[group] = sum.mean();
+                let (mean, from) = (sum.mean(), moved[group]);
+                moved[group] = if stride == 1.0 {
+                    mean
+                } else {
+                    [0, 1, 2].map(|axis| from[axis] + stride * (mean[axis] - from[axis]))
+                };
             } else {
                 empty.push(group);
             }
@@ -149,7 +174,7 @@ pub(super) fn run<const BOUNDS: bool>(
             refill(space, &centroids, &labels, &sums, &empty, &mut moved);
         }
         if swap {
-            rearrange::rearrange(space, &labels, &mut moved);
+            rearrange::rearrange(space, &labels, &mut moved, rearrange::CLEARLY, usize::MAX);
         }
         gone.go(&centroids.places, &moved);
         // The sums of ways lose digits as they grow, which the slack no longer covers: begin the bounds anew. After a
@@ -289,8 +314,8 @@ fn nearest(eights: &[Eight], point: Place) -> (u32, f32, f32) {
         let (dx, dy, dz) = (eight.x - x, eight.y - y, eight.z - z);
         let square = dx * dx + dy * dy + dz * dz;
         let closer = square.cmp_lt(least);
-        second = second.min(square.max(least));
-        least = least.min(square);
+        second = second.fast_min(square.fast_max(least));
+        least = least.fast_min(square);
         which = closer.blend(f32x8::splat(at as f32), which);
     }
     let (least, which, second) = (least.to_array(), which.to_array(), second.to_array());
@@ -316,8 +341,7 @@ impl Block {
             self.candidates.iter().fold(0.0_f32, |most, &group| most.max(gone.last[group as usize]))
         } else {
             // Enough for some rounds like the last.
-            let ahead = gone.furthest * 4.0;
-            self.choose(around, 2.0 * ahead, centroids);
+            let ahead = self.choose(around, gone.furthest * 4.0, centroids);
             self.complete = gone.most + f64::from(ahead);
             gone.furthest
         };
@@ -334,30 +358,33 @@ impl Block {
     }
 
     /// No point of the box is further from its two nearest than the second least of the furthest distances to the box.
-    fn choose(&mut self, (low, high): &(Place, Place), wider: f32, centroids: &Centroids) {
+    /// Holds until centroids have gone `ahead`, or further if that costs few candidates: how far is returned.
+    fn choose(&mut self, (low, high): &(Place, Place), ahead: f32, centroids: &Centroids) -> f32 {
         let (low, high) = (low.map(f32x8::splat), high.map(f32x8::splat));
         let mut least = f32x8::splat(f32::INFINITY);
         let mut second = least;
         for eight in &centroids.eights {
             let mut far = f32x8::ZERO;
             for (axis, value) in [eight.x, eight.y, eight.z].into_iter().enumerate() {
-                let out = (value - low[axis]).max(high[axis] - value);
+                let out = (value - low[axis]).fast_max(high[axis] - value);
                 far += out * out;
             }
-            second = second.min(far.max(least));
-            least = least.min(far);
+            second = second.fast_min(far.fast_max(least));
+            least = least.fast_min(far);
         }
         let mut all = [0.0; 16];
         all[..8].copy_from_slice(&least.to_array());
         all[8..].copy_from_slice(&second.to_array());
         all.sort_unstable_by(f32::total_cmp);
-        let reach = all[1].sqrt() + wider + 2.0 * SLACK;
+        let near = all[1].sqrt();
+        let ahead = ahead.max(near * AHEAD);
+        let reach = near + 2.0 * ahead + 2.0 * SLACK;
         let reach = f32x8::splat(reach * reach);
         self.candidates.clear();
         for (at, eight) in centroids.eights.iter().enumerate() {
             let mut near = f32x8::ZERO;
             for (axis, value) in [eight.x, eight.y, eight.z].into_iter().enumerate() {
-                let out = (low[axis] - value).max(value - high[axis]).max(f32x8::ZERO);
+                let out = (low[axis] - value).fast_max(value - high[axis]).fast_max(f32x8::ZERO);
                 near += out * out;
             }
             let mut mask = near.cmp_le(reach).move_mask() as u32;
@@ -369,6 +396,7 @@ impl Block {
                 }
             }
         }
+        ahead
     }
 }
 

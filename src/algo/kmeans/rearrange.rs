@@ -5,8 +5,8 @@ use super::{
     space::{Place, Space},
 };
 
-/// A jump must promise to gain so many times what it costs.
-const WORTH: f64 = 2.5;
+/// A jump is clearly worth it if it promises to gain so many times what it costs.
+pub(super) const CLEARLY: f64 = 2.5;
 
 /// What a group's points are like.
 #[derive(Clone, Copy, Default)]
@@ -23,8 +23,9 @@ pub(super) fn worth(free: usize, points: usize) -> bool {
 }
 
 /// Moves the centroids of groups whose points would hardly be worse off in the nearest other group to groups that gain most
-/// when they are cut in two. Fixed ones stay.
-pub(super) fn rearrange(space: &Space, labels: &[u32], centroids: &mut [Place]) {
+/// when they are cut in two, at most `most` of them, each if it promises to gain `worth` times what it costs. Fixed ones stay.
+pub(super) fn rearrange(space: &Space, labels: &[u32], centroids: &mut [Place], worth: f64, most: usize) {
+    let mut jumps = 0;
     let fixed = space.fixed.len();
     let mut spreads = vec![Spread::default(); centroids.len()];
     for (point, &label) in space.points.iter().zip(labels) {
@@ -60,7 +61,7 @@ pub(super) fn rearrange(space: &Space, labels: &[u32], centroids: &mut [Place]) 
         let Some((gain, halved, shift)) = gains.find(|&(_, halved, _)| !touched[halved] && halved != group) else {
             break;
         };
-        if gain <= loss * WORTH {
+        if gain <= loss * worth || jumps == most {
             break;
         }
         if halved == other {
@@ -69,6 +70,7 @@ pub(super) fn rearrange(space: &Space, labels: &[u32], centroids: &mut [Place]) 
         let middle = centroids[halved];
         centroids[halved] = [0, 1, 2].map(|axis| middle[axis] - shift[axis]);
         centroids[group] = [0, 1, 2].map(|axis| middle[axis] + shift[axis]);
+        jumps += 1;
         for group in [group, other, halved] {
             touched[group] = true;
         }

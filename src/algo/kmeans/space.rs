@@ -9,6 +9,11 @@ use crate::algo::linkage::kd::{self, Site};
 pub(super) const MAX_POINTS: usize = 1 << 28;
 /// Points are kept in blocks of this size.
 pub(super) const BLOCK: usize = 32;
+/// So many neighbours become one; in the order of points they are a box of their own.
+const COARSE: usize = 8;
+/// Fewer points than this do not need it, and fewer means to a group than this are too few.
+const MANY: usize = 1 << 15;
+const EACH: usize = 16;
 /// Whole numbers are parts of this of a unit.
 const PARTS: f64 = (1_u64 << 34) as f64;
 
@@ -46,18 +51,26 @@ impl Space {
             points.iter().enumerate().map(|(at, point)| Site { at: local(point), index: at as u32 }).collect();
         kd::order(&mut sites);
         let points: Vec<Place> = sites.iter().map(|site| site.at).collect();
-        let boxes = points
-            .chunks(BLOCK)
-            .map(|block| {
-                let first = block.first().copied().unwrap_or_default();
-                block.iter().fold((first, first), |(low, high), place| {
-                    let pick = |f: fn(f32, f32) -> f32, a: Place| [0, 1, 2].map(|axis| f(a[axis], place[axis]));
-                    (pick(f32::min, low), pick(f32::max, high))
-                })
-            })
-            .collect();
+        let boxes = boxes(&points);
         let index = sites.iter().map(|site| site.index).collect();
         Self { points, index, fixed: fixed.iter().map(local).collect(), boxes, middle, unit }
+    }
+
+    /// Means of neighbours that can stand for them; none where points are few.
+    pub(super) fn coarse(&self, groups: usize) -> Option<Self> {
+        let count = self.points.len();
+        if count < MANY || count / COARSE < groups * EACH {
+            return None;
+        }
+        let mean = |places: &[Place]| {
+            let sum =
+                places.iter().fold([0.0; 3], |sum, place| [0, 1, 2].map(|axis| sum[axis] + f64::from(place[axis])));
+            sum.map(|sum: f64| (sum / places.len() as f64) as f32)
+        };
+        let points: Vec<Place> = self.points.chunks(COARSE).map(mean).collect();
+        let index = (0..points.len() as u32).collect();
+        let boxes = boxes(&points);
+        Some(Self { points, index, fixed: self.fixed.clone(), boxes, middle: self.middle, unit: self.unit })
     }
 
     pub(super) fn answer(&self, state: State, fixed: &[Vec3]) -> KMeans {
@@ -74,6 +87,18 @@ impl Space {
             rounds: state.rounds,
         }
     }
+}
+
+/// The box of each block.
+fn boxes(points: &[Place]) -> Vec<(Place, Place)> {
+    let around = |block: &[Place]| {
+        let first = block.first().copied().unwrap_or_default();
+        block.iter().fold((first, first), |(low, high), place| {
+            let pick = |f: fn(f32, f32) -> f32, a: Place| [0, 1, 2].map(|axis| f(a[axis], place[axis]));
+            (pick(f32::min, low), pick(f32::max, high))
+        })
+    };
+    points.chunks(BLOCK).map(around).collect()
 }
 
 /// A sum of places that is exact in any order.

@@ -102,7 +102,7 @@ impl Boxes {
             let node = &self.levels[level as usize - 1][at as usize];
             let mut square = f32x8::ZERO;
             for ((low, high), query) in node.low.iter().zip(&node.high).zip(query) {
-                let out = (*low - query).max(query - *high).max(f32x8::ZERO);
+                let out = (*low - query).fast_max(query - *high).fast_max(f32x8::ZERO);
                 square += out * out;
             }
             let mut mask = square.cmp_le(f32x8::splat(within)).move_mask() as u32;
