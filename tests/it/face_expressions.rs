@@ -122,9 +122,8 @@ fn check_head(name: &str, density: usize) {
         assert_eq!(head.folds(&moved), 0, "{name}, {density} bones, {}: triangles fold", expression.name);
         for (above, below) in [(61, 67), (62, 66), (63, 65), (37, 41), (38, 40), (43, 47), (44, 46)] {
             let gap = |points: &[Vec3]| points[head.marks[above]].y - points[head.marks[below]].y;
-            // Lips that overlap in the mesh itself may do so a little more.
-            let (rest, eyes) = (gap(&head.points), head.landmarks.eye_distance());
-            let least = if rest < 0.0 { rest - 0.01 * eyes } else { -0.003 * eyes };
+            // Lips may overlap in the mesh itself.
+            let least = gap(&head.points).min(0.0) - 0.003 * head.landmarks.eye_distance();
             assert!(gap(&moved) >= least, "{name}, {density} bones, {}: {above} below {below}", expression.name);
         }
     }

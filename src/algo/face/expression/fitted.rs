@@ -38,8 +38,10 @@ const APART: usize = 7;
 const STIFF: f64 = 0.002;
 /// Triangles of less area, as a share of their longest edge squared, are not looked at.
 pub(super) const SLIVER: f32 = 1e-3;
-/// How often bones are brought nearer to each other where skin folds.
-const ROUNDS: usize = 8;
+/// How often bones are brought nearer to each other where skin folds, and by which part of the way: gently first, so that no
+/// more of an expression is lost than need be.
+const ROUNDS: usize = 20;
+const PARTS: [f32; 4] = [0.3, 0.6, 1.0, 2.0];
 
 /// A head with its bones and weights, ready to be posed many times.
 pub struct FittedFace<'a> {
@@ -59,6 +61,15 @@ pub struct FittedFace<'a> {
     moving: Vec<u32>,
     /// Points of lips and lids that must stay one above the other.
     apart: Vec<[u32; 2]>,
+}
+
+/// What is amiss with a pose.
+#[derive(Default)]
+struct Amiss {
+    /// The corners of triangles that turn over.
+    folded: Vec<[u32; 3]>,
+    /// Points of lips and lids of which the first should be above the second, and by how much is missing.
+    crossed: Vec<([u32; 2], f32)>,
 }
 
 /// A point of the skin that should follow the field.
@@ -130,8 +141,8 @@ impl<'a> FittedFace<'a> {
 
     /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of units.
     ///
-    /// Where triangles of the skin would turn over, lips or lids cross, the bones that move them are brought nearer to moving alike, again
-    /// and again. Cost: points times moves of the field.
+    /// Where triangles of the skin would turn over, the bones that move them are brought nearer to moving alike, again and
+    /// again; where lips or lids would cross, they are moved apart by as much. Cost: points times moves of the field.
     pub fn pose(&self, mix: &Mix, units: &UnitSet) -> Vec<BonePose> {
         let rest = vec![BonePose::REST; self.bones.len()];
         if mix.is_rest() {
@@ -139,13 +150,14 @@ impl<'a> FittedFace<'a> {
         }
         let Some(field) = Field::new(mix, units, self.bones, self.landmarks) else { return rest };
         let mut poses = self.solve(&field);
-        let mut folded = self.folded(&poses);
+        let mut amiss = self.amiss(&poses);
         for round in 0..ROUNDS {
-            if folded.is_empty() {
+            if amiss.folded.is_empty() && amiss.crossed.is_empty() {
                 break;
             }
-            self.relax(&mut poses, &folded, if round < ROUNDS / 2 { 0.3 } else { 0.6 });
-            folded = self.folded(&poses);
+            self.relax(&mut poses, &amiss.folded, PARTS[(round / 4).min(3)]);
+            self.part(&mut poses, &amiss.crossed);
+            amiss = self.amiss(&poses);
         }
         poses
     }
@@ -355,10 +367,10 @@ impl<'a> FittedFace<'a> {
         poses
     }
 
-    /// The corners of triangles that turn by more than a right angle, and of lips and lids that cross.
-    fn folded(&self, poses: &[BonePose]) -> Vec<[u32; 3]> {
+    /// Triangles that turn by more than a right angle, and lips and lids that cross.
+    fn amiss(&self, poses: &[BonePose]) -> Amiss {
         if self.moving.is_empty() && self.apart.is_empty() {
-            return Vec::new();
+            return Amiss::default();
         }
         let posed = apply(self.points, self.weights, self.bones, poses);
         let normal = |points: &[Vec3], corners: [u32; 3]| {
@@ -366,19 +378,52 @@ impl<'a> FittedFace<'a> {
             (b - a).cross(c - a)
         };
         let turned = |corners: &[u32; 3]| normal(self.points, *corners).dot(normal(&posed, *corners)) < 0.0;
-        let mut folded: Vec<[u32; 3]> =
-            self.moving.iter().map(|&index| self.triangles[index as usize]).filter(turned).collect();
+        let folded = self.moving.iter().map(|&index| self.triangles[index as usize]).filter(turned).collect();
         let slack = 0.002 * self.landmarks.eye_distance();
+        let mut crossed = Vec::new();
         for &[above, below] in &self.apart {
             let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
             let rest = gap(self.points);
             // Lips that touch at rest may go on touching.
             let least = if rest > slack { 0.3 * rest } else { rest - slack };
             if gap(&posed) < least {
-                folded.push([above, below, below]);
+                crossed.push(([above, below], least - gap(&posed)));
             }
         }
-        folded
+        Amiss { folded, crossed }
+    }
+
+    /// Raises the first of two points above the second by what is missing, moving bones as little as that takes.
+    fn part(&self, poses: &mut [BonePose], crossed: &[([u32; 2], f32)]) {
+        let mut more = vec![0.0_f32; poses.len()];
+        for &([above, below], missing) in crossed {
+            let mut shares = vec![0.0_f32; poses.len()];
+            for (point, sign) in [(above, 1.0), (below, -1.0)] {
+                for (joint, weight) in self.influences(point as usize) {
+                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < shares.len()) else {
+                        continue;
+                    };
+                    if self.bones[bone].kind == FaceBoneKind::Skin {
+                        shares[bone] += sign * weight;
+                    }
+                }
+            }
+            let square: f32 = shares.iter().map(|share| share * share).sum();
+            // Points that the same bones move alike cannot be parted.
+            if square < 0.01 {
+                continue;
+            }
+            for (more, share) in more.iter_mut().zip(shares) {
+                let asked = missing * share / square;
+                // Pairs side by side ask for much the same, which counts once.
+                if asked.abs() > more.abs() {
+                    *more = asked;
+                }
+            }
+        }
+        for (pose, more) in poses.iter_mut().zip(more).filter(|(_, more)| *more != 0.0) {
+            pose.translation = limited(pose.translation + Vec3::Y * more, self.landmarks);
+        }
     }
 
     /// Brings the bones that move some corners nearer to moving alike, by a part of the way.
@@ -415,7 +460,7 @@ impl<'a> FittedFace<'a> {
         }
         for ((pose, bone), (sum, weights)) in poses.iter_mut().zip(self.bones).zip(alike) {
             if bone.kind == FaceBoneKind::Skin && weights > 0.0 {
-                pose.translation += (sum / weights - pose.translation) * (part * weights.min(1.0));
+                pose.translation += (sum / weights - pose.translation) * (part * weights.min(1.0)).min(1.0);
             }
         }
     }

@@ -76,7 +76,12 @@ pub(crate) fn rows(
                         row.push((FIRST + bone as u32, value));
                     }
                 }
-                None if column == bones.len() + 1 => row.push((face.jaw.unwrap_or(HEAD), value)),
+                None if column == bones.len() + 1 => {
+                    // Between the corners, what the jaw carries inside the mouth ends at the upper lip.
+                    let is_upper = sides.lip(v) == Rim::Upper;
+                    let kept = if is_upper { 1.0 - inset(face, 0, face.places[v]) } else { 1.0 };
+                    row.push((face.jaw.unwrap_or(HEAD), value * kept));
+                }
                 None => row.push((HEAD, value)),
             }
         }
