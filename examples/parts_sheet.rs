@@ -37,7 +37,7 @@ struct Picture {
 enum Move {
     /// Sets the attribute of a node: label, name, value.
     Set(&'static str, &'static str, f32),
-    /// Moves a control in its own axes: label, shape, by how much.
+    /// Moves a control: label, shape, by how much in the axes of the rig (X to its left, Y up, Z to the front).
     Shift(&'static str, &'static str, [f32; 3]),
     /// Turns a control about X, Y, then Z: label, shape, degrees.
     Turn(&'static str, &'static str, [f32; 3]),
@@ -49,9 +49,9 @@ const PICTURES: [Picture; 16] = [
         mesh: Some("biped.obj"),
         view: View::Orbit(25.0, 5.0),
         moves: &[
-            Move::Shift("hand_l", "cube", [-0.05, 0.45, 0.12]),
-            Move::Shift("hand_r", "cube", [-0.02, -0.05, 0.2]),
-            Move::Shift("foot_l", "foot", [0.0, 0.16, 0.2]),
+            Move::Shift("hand_l", "cube", [-0.22, 0.3, 0.25]),
+            Move::Shift("hand_r", "cube", [0.1, 0.0, 0.3]),
+            Move::Shift("foot_l", "foot", [0.0, 0.2, 0.2]),
             Move::Turn("head", "square", [0.0, 25.0, 0.0]),
         ],
     },
@@ -83,8 +83,8 @@ const PICTURES: [Picture; 16] = [
     Picture {
         template: "parts/arm",
         mesh: None,
-        view: View::Front,
-        moves: &[Move::Shift("hand_l", "cube", [-0.12, 0.3, 0.15])],
+        view: View::Orbit(40.0, 15.0),
+        moves: &[Move::Shift("hand_l", "cube", [-0.2, 0.25, 0.15])],
     },
     Picture {
         template: "parts/leg",
@@ -125,18 +125,23 @@ const PICTURES: [Picture; 16] = [
         view: View::Left,
         moves: &[
             Move::Set("tail_1", "curve", 1.0),
-            Move::Shift("tail_6", "diamond", [0.0, -0.1, 0.3]),
-            Move::Shift("tail_4", "diamond", [0.0, 0.0, -0.1]),
+            Move::Shift("tail_6", "diamond", [0.0, 0.3, 0.1]),
+            Move::Shift("tail_4", "diamond", [0.0, -0.1, 0.0]),
         ],
     },
     Picture {
         template: "parts/ikfk_chain",
         mesh: None,
         view: View::Left,
-        moves: &[Move::Shift("chain_5", "cube", [0.0, 0.25, -0.3])],
+        moves: &[Move::Shift("chain_5", "cube", [0.0, -0.3, 0.25])],
     },
     Picture { template: "parts/jaw", mesh: None, view: View::Left, moves: &[Move::Set("jaw", "open", 1.0)] },
-    Picture { template: "hand", mesh: Some("hand.obj"), view: View::Top, moves: &[] },
+    Picture {
+        template: "hand",
+        mesh: Some("hand.obj"),
+        view: View::Orbit(-30.0, 15.0),
+        moves: &[Move::Set("hand_l", "curl", 0.35)],
+    },
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -187,6 +192,8 @@ fn dressed(rig: Rig, posed: &Rig, mesh: &Path) -> Result<(Rig, Vec<RigMesh>), Bo
 fn posed(template: &Rig, moves: &[Move]) -> Result<Rig, Box<dyn Error>> {
     let built = Builder::build(template, &Arc::new(modules::all()))?;
     let mut state = RigState::new(Arc::new(RigProgram::compile(&built, &CompileOptions::default())?));
+    state.evaluate(0.0);
+    let rest = state.clone();
     for step in moves {
         match step {
             Move::Set(label, name, value) => {
@@ -194,8 +201,10 @@ fn posed(template: &Rig, moves: &[Move]) -> Result<Rig, Box<dyn Error>> {
                 state.set_attribute(node, name, *value)?;
             }
             Move::Shift(label, shape, by) => {
-                let offset = PoseOffset { translation: Vec3::from(*by), ..PoseOffset::IDENTITY };
-                state.set_offset(find(&built, label, |node| has_shape(node, shape))?, offset)?;
+                let control = find(&built, label, |node| has_shape(node, shape))?;
+                let turned = rest.global(control).unwrap_or_default().rotation;
+                let translation = turned.inverse() * Vec3::from(*by);
+                state.set_offset(control, PoseOffset { translation, ..PoseOffset::IDENTITY })?;
             }
             Move::Turn(label, shape, degrees) => {
                 let rotation = rigsmith::build::degrees(Vec3::from(*degrees));

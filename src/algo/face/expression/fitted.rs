@@ -5,10 +5,12 @@
 //! points of the skin, landmarks counting most, held back a little towards what each bone's own patch asks for. With the
 //! weights fixed the matrix is the same for all expressions and factorised once.
 
+mod amiss;
+
 use glam::Vec3;
 
 use super::{
-    BonePose, Mix, UnitSet, apply,
+    BonePose, Mix, UnitSet,
     field::Field,
     gates::{Gates, Known},
     limited,
@@ -38,10 +40,12 @@ const APART: usize = 7;
 const STIFF: f64 = 0.002;
 /// Triangles of less area, as a share of their longest edge squared, are not looked at.
 pub(super) const SLIVER: f32 = 1e-3;
-/// How often bones are brought nearer to each other where skin folds, and by which part of the way: gently first, so that no
-/// more of an expression is lost than need be.
-const ROUNDS: usize = 20;
-const PARTS: [f32; 4] = [0.3, 0.6, 1.0, 2.0];
+/// By which part of the way bones are brought nearer to each other where skin folds, again and again.
+const GENTLY: [f32; 8] = [0.3, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6, 0.6];
+/// The same where that does not help.
+const FIRMLY: [f32; 12] = [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0];
+/// What may be lost by that, as a share of the furthest movement.
+const LOSS: f32 = 0.2;
 
 /// A head with its bones and weights, ready to be posed many times.
 pub struct FittedFace<'a> {
@@ -61,15 +65,6 @@ pub struct FittedFace<'a> {
     moving: Vec<u32>,
     /// Points of lips and lids that must stay one above the other.
     apart: Vec<[u32; 2]>,
-}
-
-/// What is amiss with a pose.
-#[derive(Default)]
-struct Amiss {
-    /// The corners of triangles that turn over.
-    folded: Vec<[u32; 3]>,
-    /// Points of lips and lids of which the first should be above the second, and by how much is missing.
-    crossed: Vec<([u32; 2], f32)>,
 }
 
 /// A point of the skin that should follow the field.
@@ -150,14 +145,17 @@ impl<'a> FittedFace<'a> {
         }
         let Some(field) = Field::new(mix, units, self.bones, self.landmarks) else { return rest };
         let mut poses = self.solve(&field);
-        let mut amiss = self.amiss(&poses);
-        for round in 0..ROUNDS {
-            if amiss.folded.is_empty() && amiss.crossed.is_empty() {
-                break;
+        let gently = self.mended(&mut poses, &GENTLY);
+        if gently > 0 {
+            let mut firm = poses.clone();
+            let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
+            let lost = |firm: &[BonePose]| {
+                let ways = firm.iter().zip(&poses).map(|(firm, pose)| firm.translation.distance(pose.translation));
+                ways.fold(0.0, f32::max)
+            };
+            if self.mended(&mut firm, &FIRMLY) < gently && lost(&firm) <= LOSS * furthest {
+                return firm;
             }
-            self.relax(&mut poses, &amiss.folded, PARTS[(round / 4).min(3)]);
-            self.part(&mut poses, &amiss.crossed);
-            amiss = self.amiss(&poses);
         }
         poses
     }
@@ -365,104 +363,6 @@ impl<'a> FittedFace<'a> {
             poses[bone].translation = limited(movement, self.landmarks);
         }
         poses
-    }
-
-    /// Triangles that turn by more than a right angle, and lips and lids that cross.
-    fn amiss(&self, poses: &[BonePose]) -> Amiss {
-        if self.moving.is_empty() && self.apart.is_empty() {
-            return Amiss::default();
-        }
-        let posed = apply(self.points, self.weights, self.bones, poses);
-        let normal = |points: &[Vec3], corners: [u32; 3]| {
-            let [a, b, c] = corners.map(|corner| points[corner as usize]);
-            (b - a).cross(c - a)
-        };
-        let turned = |corners: &[u32; 3]| normal(self.points, *corners).dot(normal(&posed, *corners)) < 0.0;
-        let folded = self.moving.iter().map(|&index| self.triangles[index as usize]).filter(turned).collect();
-        let slack = 0.002 * self.landmarks.eye_distance();
-        let mut crossed = Vec::new();
-        for &[above, below] in &self.apart {
-            let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
-            let rest = gap(self.points);
-            // Lips that touch at rest may go on touching.
-            let least = if rest > slack { 0.3 * rest } else { rest - slack };
-            if gap(&posed) < least {
-                crossed.push(([above, below], least - gap(&posed)));
-            }
-        }
-        Amiss { folded, crossed }
-    }
-
-    /// Raises the first of two points above the second by what is missing, moving bones as little as that takes.
-    fn part(&self, poses: &mut [BonePose], crossed: &[([u32; 2], f32)]) {
-        let mut more = vec![0.0_f32; poses.len()];
-        for &([above, below], missing) in crossed {
-            let mut shares = vec![0.0_f32; poses.len()];
-            for (point, sign) in [(above, 1.0), (below, -1.0)] {
-                for (joint, weight) in self.influences(point as usize) {
-                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < shares.len()) else {
-                        continue;
-                    };
-                    if self.bones[bone].kind == FaceBoneKind::Skin {
-                        shares[bone] += sign * weight;
-                    }
-                }
-            }
-            let square: f32 = shares.iter().map(|share| share * share).sum();
-            // Points that the same bones move alike cannot be parted.
-            if square < 0.01 {
-                continue;
-            }
-            for (more, share) in more.iter_mut().zip(shares) {
-                let asked = missing * share / square;
-                // Pairs side by side ask for much the same, which counts once.
-                if asked.abs() > more.abs() {
-                    *more = asked;
-                }
-            }
-        }
-        for (pose, more) in poses.iter_mut().zip(more).filter(|(_, more)| *more != 0.0) {
-            pose.translation = limited(pose.translation + Vec3::Y * more, self.landmarks);
-        }
-    }
-
-    /// Brings the bones that move some corners nearer to moving alike, by a part of the way.
-    fn relax(&self, poses: &mut [BonePose], folded: &[[u32; 3]], part: f32) {
-        let jaw = self.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw);
-        let jaw = jaw.map(|bone| (bone, poses[bone].affine(self.bones[bone].position)));
-        let mut alike = vec![(Vec3::ZERO, 0.0_f32); self.bones.len()];
-        for &corners in folded {
-            let mut mean = Vec3::ZERO;
-            for corner in corners {
-                for (joint, weight) in self.influences(corner as usize) {
-                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < poses.len()) else {
-                        continue;
-                    };
-                    mean += weight / 3.0
-                        * match jaw {
-                            Some((jaw, turn)) if jaw == bone => {
-                                let point = self.points[corner as usize];
-                                turn.transform_point3(point) - point
-                            }
-                            _ => poses[bone].translation,
-                        };
-                }
-            }
-            for corner in corners {
-                for (joint, weight) in self.influences(corner as usize) {
-                    let bone = (joint as usize).wrapping_sub(2);
-                    if let Some((sum, weights)) = alike.get_mut(bone) {
-                        *sum += mean * weight;
-                        *weights += weight;
-                    }
-                }
-            }
-        }
-        for ((pose, bone), (sum, weights)) in poses.iter_mut().zip(self.bones).zip(alike) {
-            if bone.kind == FaceBoneKind::Skin && weights > 0.0 {
-                pose.translation += (sum / weights - pose.translation) * (part * weights.min(1.0)).min(1.0);
-            }
-        }
     }
 }
 
