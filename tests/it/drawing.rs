@@ -19,7 +19,7 @@ use rigsmith::{
             ink::{Ink, Pen},
             label_places,
             shapes::{LEAST_BALL, Octahedron, ball_radius},
-            skeleton::{DrawnJoint, Emphasis, ball_radii, bones, draw_skeleton, drawn_joints},
+            skeleton::{DrawnJoint, Emphasis, FAN, ball_radii, bones, draw_skeleton, drawn_joints},
             theme::{Tint, group_tint},
         },
         viewport::{RigViewport, Sight},
@@ -153,6 +153,25 @@ fn bones_span_their_joints_and_close() {
     assert_eq!(list.len(), 3);
     let leaf = list[2];
     assert!(leaf.leaf && leaf.joint == 2 && leaf.tail.distance(Vec3::new(0.4, 0.4, 0.0)) < 1e-6);
+}
+
+#[test]
+fn many_bones_that_leave_one_joint_are_a_fan() {
+    let fan = |count: usize| {
+        let mut joints = vec![joint(1, [0.0; 3], None)];
+        joints.extend((0..count).map(|at| joint(2 + at as u64, [at as f32 * 0.1, 1.0, 0.0], Some(0))));
+        // One of them goes on.
+        joints.push(joint(99, [0.0, 2.0, 0.0], Some(1)));
+        joints
+    };
+    for (count, lines, tails) in [(FAN - 1, 0, FAN - 1), (FAN, FAN - 1, 1)] {
+        let list = bones(&fan(count));
+        assert_eq!(list.iter().filter(|bone| bone.fan).count(), lines, "{count} children");
+        assert_eq!(list.iter().filter(|bone| bone.leaf).count(), tails, "{count} children");
+    }
+    let joints = fan(FAN);
+    let radii = ball_radii(&joints, &bones(&joints), &sight(Vec3::new(0.0, 0.5, 3.0), Vec3::Y), 1.0);
+    assert!(radii[5] < radii[0], "balls beside each other leave room: {radii:?}");
 }
 
 #[test]

@@ -109,31 +109,45 @@ pub struct DrawnBone {
     pub tail: Vec3,
     /// True for the tail of a joint without children.
     pub leaf: bool,
+    /// True for one of so many that leave their joint that only lines leave room to see them.
+    pub fan: bool,
+}
+
+/// From so many children on, the bones to them are a fan: those of a face that hang on the head.
+pub const FAN: usize = 12;
+
+/// How many children each joint has.
+fn children(joints: &[DrawnJoint]) -> Vec<usize> {
+    let mut children = vec![0; joints.len()];
+    for parent in joints.iter().filter_map(|joint| joint.parent) {
+        children[parent] += 1;
+    }
+    children
 }
 
 /// All bones of a rig. A joint without children gets a tail as long as a third of the bone that leads to it, in the
-/// same direction.
+/// same direction, unless it is one of a fan.
 pub fn bones(joints: &[DrawnJoint]) -> Vec<DrawnBone> {
-    let mut has_child = vec![false; joints.len()];
+    let children = children(joints);
     let mut list = Vec::with_capacity(joints.len() * 2);
-    for joint in joints {
+    for (number, joint) in joints.iter().enumerate() {
         if let Some(parent) = joint.parent {
-            has_child[parent] = true;
-            list.push(DrawnBone { joint: parent, tail: joint.position, leaf: false });
+            // A chain that leaves a fan is a bone as any other.
+            let fan = children[parent] >= FAN && children[number] == 0 && joint.kind == NodeKind::Joint;
+            list.push(DrawnBone { joint: parent, tail: joint.position, leaf: false, fan });
         }
     }
     for (number, joint) in joints.iter().enumerate() {
-        let Some(parent) = joint.parent.filter(|_| !has_child[number] && joint.kind == NodeKind::Joint) else {
-            continue;
-        };
+        let is_leaf = children[number] == 0 && joint.kind == NodeKind::Joint;
+        let Some(parent) = joint.parent.filter(|parent| is_leaf && children[*parent] < FAN) else { continue };
         let tail = joint.position + (joint.position - joints[parent].position) / 3.0;
-        list.push(DrawnBone { joint: number, tail, leaf: true });
+        list.push(DrawnBone { joint: number, tail, leaf: true, fan: false });
     }
     list
 }
 
 /// Radii in pixels of the balls of all joints, by [`ball_radius`] of the shorter of the bone that leads to a joint and
-/// the longest that leaves it.
+/// the longest that leaves it; of a fan, by twice the way to the nearest joint beside it.
 pub fn ball_radii(joints: &[DrawnJoint], bones: &[DrawnBone], sight: &Sight, scale: f32) -> Vec<f32> {
     let pixels = |joint: usize, length: f32| {
         let pixel = sight.pixel_at(joints[joint].position);
@@ -144,9 +158,16 @@ pub fn ball_radii(joints: &[DrawnJoint], bones: &[DrawnBone], sight: &Sight, sca
         let length = joints[bone.joint].position.distance(bone.tail);
         leaving[bone.joint] = leaving[bone.joint].max(pixels(bone.joint, length));
     }
+    let children = children(joints);
     let entering = |number: usize| {
         let parent = joints[number].parent?;
-        Some(pixels(number, joints[number].position.distance(joints[parent].position)))
+        let to = |other: usize| joints[number].position.distance(joints[other].position);
+        let mut length = to(parent);
+        if children[parent] >= FAN && children[number] == 0 {
+            let beside = (0..joints.len()).filter(|other| *other != number && joints[*other].parent == Some(parent));
+            length = beside.map(to).filter(|way| *way > 0.0).fold(length, |least, way| least.min(2.0 * way));
+        }
+        Some(pixels(number, length))
     };
     (0..joints.len())
         .map(|number| {
@@ -213,6 +234,11 @@ impl Artist<'_> {
             let tint = self.outline(joint).map_or(self.theme.null, |(tint, _)| tint);
             self.pen.line([head, tail], 3.0, 0.0, self.theme.outline);
             self.pen.line([head, tail], 1.2, pixel, tint);
+            return;
+        }
+        if bone.fan {
+            self.pen.line([head, tail], 2.2, 0.0, self.theme.outline);
+            self.pen.line([head, tail], 0.9, 0.0, shade(tint, 0.8));
             return;
         }
         let width = (length * if bone.leaf { 0.11 } else { 0.085 }).max(1.8 * pixel);
