@@ -48,7 +48,7 @@ fn main() {
     let wanted = |name: &str| words.is_empty() || words.iter().any(|word| word == name);
     if wanted("linkage") {
         linkage(&once, 15_000, true);
-        linkage(&once, 20_000, false);
+        linkage(&once, 22_500, true);
         linkage(&twice, 100_000, false);
         line(&once);
     }
