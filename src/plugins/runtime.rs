@@ -115,7 +115,8 @@ impl RigRuntime {
         let is_written = match self.mode {
             // A control that nothing drives stands where it was put.
             InstanceMode::Hierarchy => !is_control || node.is_driven,
-            InstanceMode::Direct => node.kind == crate::rig::NodeType::Joint,
+            // Whatever has a place in the world: joints, and what people gave one.
+            InstanceMode::Direct => true,
         };
         let place = |list: &mut Vec<(u32, Entity)>, is_in: bool| {
             list.retain(|(known, _)| *known as usize != slot);

@@ -16,8 +16,8 @@ const CROWD: usize = 32;
 const BATCH: usize = 256;
 
 /// The same of joints, and how many of them a thread takes.
-const JOINTS: usize = 8192;
-const JOINT_RUN: usize = 512;
+const JOINTS: usize = 2048;
+const JOINT_RUN: usize = 256;
 
 /// Notes which instances have a control that changed.
 pub(super) fn note_controls(
