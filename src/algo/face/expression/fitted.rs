@@ -86,7 +86,7 @@ impl<'a> FittedFace<'a> {
     /// Prepares a head.
     ///
     /// All in head space. `triangles` are looked at for those that turn over (none given: no such check). `mask` says which points are skin of the face (none given: all that bones move); `weights` as
-    /// [`apply`] takes them. What does not fit together (too few weights, joints without a bone, triangles without
+    /// [`apply`](super::apply) takes them. What does not fit together (too few weights, joints without a bone, triangles without
     /// points) is passed over. Cost: points times influences squared, and bones cubed.
     pub fn new(
         points: &'a [Vec3],
