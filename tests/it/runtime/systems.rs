@@ -173,8 +173,9 @@ fn morph_targets_follow_by_name() {
 fn a_crowd_is_the_same_as_one() {
     let mut app = app();
     let program = program(in_games());
+    let place = |number: usize| Transform::from_xyz(number as f32, 0.0, 0.0);
     let rigs: Vec<Entity> =
-        (0..300).map(|_| instance(&mut app, &program, InstanceMode::Direct, Transform::IDENTITY)).collect();
+        (0..300).map(|number| instance(&mut app, &program, InstanceMode::Direct, place(number))).collect();
     for frame in 0..3 {
         for rig in &rigs {
             for control in ["cog", "arm_L_goal", "leg_R_goal", "head_control"] {
@@ -186,8 +187,14 @@ fn a_crowd_is_the_same_as_one() {
         app.update();
     }
     let first = app.world().get::<RigRuntime>(rigs[0]).unwrap().state().globals();
-    for rig in &rigs {
-        let other = app.world().get::<RigRuntime>(*rig).unwrap().state().globals();
+    for (number, rig) in rigs.iter().enumerate() {
+        let runtime = app.world().get::<RigRuntime>(*rig).unwrap();
+        let other = runtime.state().globals();
         assert!(first.iter().zip(other).all(|(a, b)| same_bits(a, b)));
+        for (slot, node) in program.nodes().iter().enumerate().filter(|(_, node)| node.kind == NodeType::Joint) {
+            let joint = app.world().get::<GlobalTransform>(runtime.entity(slot).unwrap()).unwrap();
+            let wanted = place(number).compute_affine() * other[slot].affine();
+            assert_eq!(joint.affine(), wanted, "{:?} of rig {number}", node.label);
+        }
     }
 }
