@@ -188,7 +188,7 @@ pub(super) fn scatter_globals(
         return;
     }
     // All joints there are, in the order of memory and on all threads; those of one rig mostly follow one another.
-    in_batches::<JOINTS, _>(joints.iter_mut(), JOINT_RUN, |joints| {
+    let hand_out = |joints: &mut [Option<(&NodeSlot, &RuntimeNodeOf, Mut<GlobalTransform>)>]| {
         let (mut last, mut rig) = (Entity::PLACEHOLDER, None);
         for (NodeSlot(slot), RuntimeNodeOf(of), joint) in joints.iter_mut().flatten() {
             if last != *of {
@@ -199,5 +199,7 @@ pub(super) fn scatter_globals(
                 **joint = place(runtime, world, *slot as usize);
             }
         }
-    });
+    };
+    // From within the pool: every batch that reached it from outside would wear its queue.
+    rayon::join(|| in_batches::<JOINTS, _>(joints.iter_mut(), JOINT_RUN, hand_out), || ());
 }
