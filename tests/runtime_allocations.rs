@@ -101,9 +101,8 @@ fn nothing_is_allocated_once_warm() {
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
         assert_eq!(frame_allocations(3, 100, mode), 0, "{mode:?}");
     }
-    // The queue by which work reaches rayon's threads is made of blocks of 63 entries; two systems reach for it in a frame,
-    // the one that runs programs and the one that hands out joints.
-    let (frames, queue) = (252, 2 * 252 / 63 + 1);
+    // The queue by which work reaches rayon's threads is made of blocks of 63 entries.
+    let (frames, queue) = (252, 252 / 63 + 1);
     let taken = frame_allocations(200, frames, InstanceMode::Direct);
     assert!(taken <= queue, "{taken} allocations in {frames} frames");
 }

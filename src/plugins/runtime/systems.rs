@@ -9,8 +9,8 @@ use crate::{
     solve::program::{LANES, RigState},
 };
 
-/// So many instances, or more, hand out their joints on all threads.
-const CROWD: usize = 32;
+/// More instances than are handed to the threads at once hand out their joints on all threads, too.
+const CROWD: usize = BATCH + 1;
 
 /// Instances that are handed to the threads at once. A list of fixed size needs no memory of its own each frame.
 const BATCH: usize = 256;

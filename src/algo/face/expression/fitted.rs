@@ -85,9 +85,10 @@ struct Sample {
 impl<'a> FittedFace<'a> {
     /// Prepares a head.
     ///
-    /// All in head space. `triangles` are looked at for those that turn over (none given: no such check). `mask` says which points are skin of the face (none given: all that bones move); `weights` as
-    /// [`apply`](super::apply) takes them. What does not fit together (too few weights, joints without a bone, triangles without
-    /// points) is passed over. Cost: points times influences squared, and bones cubed.
+    /// All in head space. `triangles` are looked at for those that turn over (none given: no such check). `mask` says which
+    /// points are skin of the face (none given: all that bones move); `weights` as [`apply`](super::apply) takes them. What
+    /// does not fit together (too few weights, joints without a bone, triangles without points) is passed over. Cost: points
+    /// times influences squared, and bones cubed.
     pub fn new(
         points: &'a [Vec3],
         triangles: &'a [[u32; 3]],
