@@ -7,10 +7,10 @@
 use std::{error::Error, path::Path, sync::Arc, time::Instant};
 
 use rigsmith::{
-    build::{Builder, Modules},
     files::{RealDisk, load_template},
     modules,
-    rig::{JointData, RestTransform, Rig, RigEdit, Tag, TagKind, Uid},
+    processor::{Builder, Modules},
+    rig::{JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid},
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         turn = !turn;
         let up = if turn { 0.5 } else { 0.25 };
         let kind = TagKind::Command { module: "null".into(), params: nulls(up), feature: None };
-        let edit = RigEdit::SetTag(last.0, Box::new(Tag { kind, ..last.1.clone() }));
+        let edit = RigEdit::SetTag(last.0, Box::new(TagData { kind, ..last.1.clone() }));
         if rig.apply(&edit).is_ok() {
             builder.touch(&rig, &edit);
             builder.run_all();
@@ -91,18 +91,18 @@ fn median(times: usize, mut work: impl FnMut()) -> f64 {
     taken[times / 2]
 }
 
-fn with_params(tag: &Tag, params: String) -> Tag {
+fn with_params(tag: &TagData, params: String) -> TagData {
     let kind = match &tag.kind {
         TagKind::Command { module, feature, .. } => {
             TagKind::Command { module: module.clone(), params, feature: *feature }
         }
         feature => feature.clone(),
     };
-    Tag { kind, ..tag.clone() }
+    TagData { kind, ..tag.clone() }
 }
 
 /// The first control in the list without a feature, with its parameters at two sizes.
-fn control(rig: &Rig, builder: &Builder, modules: &Arc<Modules>) -> Option<(Uid, Tag, [String; 2])> {
+fn control(rig: &Rig, builder: &Builder, modules: &Arc<Modules>) -> Option<(Uid, TagData, [String; 2])> {
     for entry in builder.list() {
         let tag = rig.joint(entry.joint)?.data.tags.iter().find(|tag| tag.uid == entry.command)?;
         let TagKind::Command { module, params, feature: None } = &tag.kind else { continue };
@@ -122,7 +122,7 @@ fn nulls(up: f32) -> String {
 }
 
 /// A hundred joints with ten commands each.
-fn thousand() -> (Rig, (Uid, Tag)) {
+fn thousand() -> (Rig, (Uid, TagData)) {
     let mut rig = Rig::new(Uid(1), "thousand");
     let mut last = None;
     for number in 0..100 {
@@ -137,7 +137,7 @@ fn thousand() -> (Rig, (Uid, Tag)) {
         for command in 0..10 {
             let uid = Uid(1000 + 10 * number + command);
             let kind = TagKind::Command { module: "null".into(), params: nulls(0.5), feature: None };
-            let tag = Tag { uid, enabled: true, comment: String::new(), kind };
+            let tag = TagData { uid, enabled: true, comment: String::new(), kind };
             last = Some((Uid(10 + number), tag.clone()));
             edits.push(RigEdit::AddTag { joint: Uid(10 + number), tag: Box::new(tag), index: 10 });
         }
@@ -151,7 +151,7 @@ fn thousand() -> (Rig, (Uid, Tag)) {
     (rig, chosen.unwrap_or_else(|| (Uid(0), empty())))
 }
 
-fn empty() -> Tag {
+fn empty() -> TagData {
     let kind = TagKind::Command { module: String::new(), params: String::new(), feature: None };
-    Tag { uid: Uid(0), enabled: false, comment: String::new(), kind }
+    TagData { uid: Uid(0), enabled: false, comment: String::new(), kind }
 }

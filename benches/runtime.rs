@@ -30,11 +30,11 @@ use bevy::{
 };
 use rayon::prelude::*;
 use rigsmith::{
-    build::Builder,
     files::{RealDisk, load_model, load_template},
     mesh::model::{Channel, ChannelTarget, Model, Trs},
     modules,
-    plugins::runtime::{ControlPose, InstanceMode, NodeSlot, RigRuntime, RuntimeNodeOf, RuntimePlugin, spawn_instance},
+    plugins::runtime::{ControlPose, InstanceMode, NodeOf, NodeSlot, RigRuntime, RuntimePlugin, spawn_instance},
+    processor::Builder,
     rig::{BuiltRig, NodeType, PoseOffset},
     solve::program::{CompileOptions, Exposed, Keep, LANES, Memory, RigProgram, RigState},
 };
@@ -281,12 +281,11 @@ fn everything(program: &Arc<RigProgram>) -> [[f64; 2]; 5] {
     let mut times = [const { Vec::new() }; 5];
     for frame in 0..FRAMES {
         let start = Instant::now();
-        let _ =
-            app.world_mut().run_system_once(move |mut poses: Query<(&mut ControlPose, &NodeSlot, &RuntimeNodeOf)>| {
-                poses.par_iter_mut().for_each(|(mut pose, slot, rig)| {
-                    *pose = sample(frame + rig.0.index().index() as usize, slot.0 as usize).into();
-                });
+        let _ = app.world_mut().run_system_once(move |mut poses: Query<(&mut ControlPose, &NodeSlot, &NodeOf)>| {
+            poses.par_iter_mut().for_each(|(mut pose, slot, rig)| {
+                *pose = sample(frame + rig.0.index().index() as usize, slot.0 as usize).into();
             });
+        });
         let sampled = start.elapsed();
         app.world_mut().run_schedule(PostUpdate);
         let ran = start.elapsed();

@@ -12,7 +12,7 @@ use std::{hint::black_box, time::Instant};
 use bevy::math::{Quat, Vec3};
 use rigsmith::solve::{
     expression::Expression,
-    fabrik::{Effort, fabrik},
+    fabrik::{IterationSettings, fabrik},
     two_bone::TwoBone,
 };
 
@@ -38,12 +38,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let lengths = [0.25; 8];
     let chain: Vec<Vec3> = (0..9).map(|i| Vec3::new(0.01 * (i * i) as f32, 0.25 * i as f32, 0.0)).collect();
-    let effort = Effort { tolerance: 1e-4, iterations: 16, bend: Vec3::Z };
+    let settings = IterationSettings { tolerance: 1e-4, iterations: 16, bend: Vec3::Z };
     let mut points = chain.clone();
     let seconds = best(50, || {
         for limb in &limbs {
             points.copy_from_slice(&chain);
-            black_box(fabrik(&mut points, &lengths, limb.goal, &effort));
+            black_box(fabrik(&mut points, &lengths, limb.goal, &settings));
         }
     });
     report.push(format!("\"fabrik_8_bones_us\": {:.4}", each(seconds)));

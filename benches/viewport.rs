@@ -1,13 +1,18 @@
 //! What a frame costs while somebody works on a mesh of a million triangles.
 //!
 //! ```text
-//! cargo bench --bench viewport --no-default-features
+//! cargo bench --bench viewport --no-default-features [--features draw]
 //! ```
 //!
 //! A scripted session on the bundled character, each triangle cut into 36, in an app with `RigPlugins` and no window:
 //! prints the median and the longest time of `App::update` for each thing people do, in milliseconds, and how far the
 //! surface lags behind a joint that moves. While loading and posing, background tasks run beside; all other phases wait for
-//! them first. Between frames the thread sleeps for the rest of 8 ms, as it would wait for a screen.
+//! them first. Between frames the thread sleeps for the rest of 8 ms, as it would wait for a screen. With the feature `draw`
+//! frames that show such a mesh and draw a thousand joints follow.
+
+#[cfg(feature = "draw")]
+#[path = "viewport/display.rs"]
+mod display;
 
 use std::{
     collections::HashMap,
@@ -46,10 +51,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut app = headless_app(1);
     app.finish();
     app.cleanup();
-    let rig = app.world_mut().spawn(RigBundle { rig: template.rig, ..default() }).id();
+    let rig = app.world_mut().spawn(template.rig).id();
     let mut session = Session { app, rig, times: Vec::new() };
     println!("{:<44} {:>8} {:>8} {:>8}", "milliseconds a frame", "median", "99 %", "longest");
     session.run(model, skin);
+    #[cfg(feature = "draw")]
+    display::run();
     Ok(())
 }
 
@@ -369,5 +376,5 @@ fn near_weights(rig: &Rig, points: &[Vec3]) -> SkinData {
         }
         weights.push([(near[0].1, 0.7), (near[1].1, 0.2), (near[2].1, 0.07), (near[3].1, 0.03)]);
     }
-    SkinData { joints: joints.into_iter().map(|(uid, _)| uid).collect(), weights, at_rest: true }
+    SkinData { joints: joints.into_iter().map(|(uid, _)| uid).collect(), weights, at_rest: true, ..Default::default() }
 }

@@ -388,6 +388,7 @@ fn read_rig(bodies: &Path, body: &str, rig: &str) -> Skeleton {
             parent: bones[name]["parent"].as_str().and_then(|p| names.iter().position(|n| n == p)),
             tail: None,
             deforms: true,
+            twist: None,
         })
         .collect();
     let tails = names.iter().map(|name| vector(&bones[name]["tail"])).collect();

@@ -7,9 +7,9 @@ use std::{error::Error, fmt::Write, sync::Arc};
 
 use bevy::{math::Vec3, reflect::Reflect};
 use rigsmith::{
-    build::{BuildScope, Builder, Creation, ModuleError, RigModule},
     mesh::model::Trs,
     modules,
+    processor::{BuildScope, Builder, Creation, ModuleError, RigModule},
     rig::{
         Constraint, NodeType, PoseOffset, Rig, Scalar, TagKind, Uid, UidSource,
         operations::{Operation, TagOperation},

@@ -7,12 +7,12 @@ use std::{collections::HashMap, error::Error, path::Path, sync::Arc};
 use bevy::math::{Quat, UVec2, Vec3};
 use rigsmith::{
     algo::{view::View, weights::WeightSettings},
-    build::Builder,
     files::{RealDisk, load_model, load_template, save_atomic},
     headless::Workbench,
     mesh::model::Trs,
     modules,
     plugins::{drawing::RigDrawing, surface::RigMesh},
+    processor::Builder,
     render::{PictureSettings, take_picture},
     rig::{
         BuiltNode, BuiltRig, JointData, PoseOffset, RestTransform, Rig, RigEdit, RigJoint, Uid, operations::Operation,
@@ -207,7 +207,7 @@ fn posed(template: &Rig, moves: &[Move]) -> Result<Rig, Box<dyn Error>> {
                 state.set_offset(control, PoseOffset { translation, ..PoseOffset::IDENTITY })?;
             }
             Move::Turn(label, shape, degrees) => {
-                let rotation = rigsmith::build::degrees(Vec3::from(*degrees));
+                let rotation = rigsmith::processor::degrees(Vec3::from(*degrees));
                 state.set_offset(
                     find(&built, label, |node| has_shape(node, shape))?,
                     PoseOffset::from_rotation(rotation),

@@ -99,7 +99,7 @@ fn main() -> AppExit {
             Err(error) => eprintln!("{error}"),
         }
     }
-    let rig = world.spawn(RigBundle { rig, ..default() }).id();
+    let rig = world.spawn(rig).id();
     let mesh = world.spawn((RigMesh::new(mesh_uid, model, skeleton.nodes), SkinOf(rig))).id();
     if !edits.is_empty() {
         world.write_message(EditRequest::operation(rig, Operation::Edits(edits)));

@@ -1,4 +1,4 @@
-//! One algorithm a file: plain functions over slices, with their errors and sources.
+//! Algorithms, one a file: plain functions over slices, with their errors and sources.
 
 pub mod face;
 pub mod fit;

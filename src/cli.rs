@@ -1,15 +1,19 @@
 //! The command line: one subcommand a file.
 //!
-//! Exit codes: 0 done, 1 the input is at fault, 2 the command was used wrongly. With `--json` the answer is one JSON
+//! Exit codes: 0 done, 1 the input is at fault, 2 the command was used wrongly. With `--json` the result is one JSON
 //! object on standard output, errors included.
 
 mod build;
 mod check;
 mod convert;
 mod demo;
+#[cfg(feature = "render")]
+mod device_selection;
 mod face;
 mod info;
 mod modules;
+mod outputs;
+mod pose;
 mod progress;
 #[cfg(feature = "render")]
 mod render;
@@ -25,6 +29,7 @@ use crate::{
     algo::weights::{Method, WeightSettings},
     mesh::gltf::GltfWriteSettings,
 };
+use outputs::InPlaceArgs;
 use report::{Failure, Report};
 
 /// Rig characters in minutes: sketch a skeleton into a mesh, skin it, export it.
@@ -51,25 +56,27 @@ enum Command {
     Skin(skin::SkinArgs),
     /// Place a face in a head: bones, weights and expressions
     Face(face::FaceArgs),
-    /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where that makes sense
+    /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where possible
     Convert(convert::ConvertArgs),
     /// Say what is in a file
     Info(info::InfoArgs),
     /// Look for problems in files
     Check(check::CheckArgs),
-    /// Carry out the commands of a rig and save what they build
+    /// Run the commands of a rig and save the built rig
     Build(build::BuildArgs),
-    /// List what commands can do
+    /// Build a rig, pose it by its controls as an app does, and save the character or a picture
+    Pose(pose::PoseArgs),
+    /// List the modules of commands, or describe one
     Modules(modules::ModulesArgs),
     /// Take a picture of a mesh, a template or a project, without a window
     #[cfg(feature = "render")]
     Render(render::RenderArgs),
 }
 
-/// How weights are computed.
+/// Options of the computation of weights.
 #[derive(Args, Debug, Clone)]
 struct WeightArgs {
-    /// How the mesh is bound to the joints
+    /// Method that binds the mesh to the joints
     #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
     method: MethodArg,
     /// Width of the blend between joints: 1 is usual, less is harder, more is softer
@@ -105,13 +112,13 @@ impl WeightArgs {
     }
 }
 
-/// How characters are written.
+/// Options of exported characters.
 #[derive(Args, Debug, Clone)]
 struct ExportArgs {
     /// Influences written for each vertex; more than 4 need a second set that not every program reads
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
     influences: u8,
-    /// Write all joints, not only those with weights and their ancestors
+    /// Write all joints, not only joints with weights and their ancestors
     #[arg(long)]
     all_joints: bool,
 }
@@ -139,14 +146,15 @@ const SEED: u64 = 0x5249_4753_4D49_5448;
 /// A file to write.
 type Output = PathBuf;
 
-/// Opens the window on a file, or on the bundled character, and returns when it is closed; or says in a line why it cannot.
+/// Function that opens the window on a file, or on the bundled character, and returns when it is closed; its error is a
+/// line with the reason.
 pub type OpenWindow<'a> = &'a dyn Fn(Option<PathBuf>) -> Result<ExitCode, String>;
 
-/// Runs the command line of this process. `window` opens the editor, which this module does not know.
+/// Runs the command line of this process. `window` opens the editor, which this module does not depend on.
 pub fn main(window: OpenWindow) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        // Help and version are answers; only wrong usage has to be told to programs, too.
+        // Help and version are results; only wrong usage is reported as JSON.
         Err(error) if error.use_stderr() && std::env::args().any(|argument| argument == "--json") => {
             return report::finish(Err(Failure::Usage(error.to_string().trim_end().to_owned())), true);
         }
@@ -169,6 +177,7 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Build(args)) => build::run(&args),
+        Some(Command::Pose(args)) => pose::run(&args),
         Some(Command::Modules(args)) => Ok(modules::run(&args)),
         #[cfg(feature = "render")]
         Some(Command::Render(args)) => render::run(&args),

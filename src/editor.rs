@@ -1,7 +1,7 @@
 //! The editing window: panels and tools over the plugins.
 //!
-//! Nothing here changes a rig itself. Panels read the world and hand in [`Requests`](panel::Requests); tools read what
-//! the pointer does in the viewport and write the same requests that gesture lists and games write.
+//! The editor never changes a rig directly. Panels read the world and return [`Requests`](panel::Requests); tools read
+//! pointer events of the viewport and write the same requests that gesture lists and games write.
 
 pub mod actions;
 pub mod app;
@@ -30,6 +30,6 @@ pub mod tools;
 
 use bevy::prelude::*;
 
-/// The rig that is edited. Its meshes are in its [`RigMeshes`](crate::plugins::surface::RigMeshes).
+/// The edited rig. Its meshes are in its [`RigMeshes`](crate::plugins::surface::RigMeshes).
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ActiveRig(pub Entity);

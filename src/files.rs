@@ -1,15 +1,18 @@
 //! The one file layer: everything Rigsmith saves or reads goes through here.
 //!
-//! - [`save_atomic`] and [`save_all_atomic`] leave the old file or the finished one, whatever fails: each writes a
-//!   temporary file beside its target, syncs it, and renames it over the target.
+//! - [`save_atomic`] leaves the old file or the finished one, whatever fails: it writes a temporary file beside its target,
+//!   syncs it, reads it back, and renames it over the target.
+//! - [`save_set`] does so for a main file with companions, such as a `.gltf` with its buffer and images. Companions have names
+//!   with the hash of their content, so that no file is ever replaced by one.
 //! - [`read_capped`] and [`open`] answer a missing, empty, oversized or forbidden file with an error that says what to do.
 //! - [`journal`] keeps every edit as it is made, and gives it back after a crash.
 //! - [`ModelFolder`] finds the textures and buffers that a model names, and nothing outside the model's folder.
 //! - [`Disk`] is what they stand on. [`RealDisk`] is the file system; [`FaultyDisk`] fails at a chosen operation in a chosen
 //!   manner, so that a test can try every one of them (as SQLite's tests do), including tests of games that save rigs.
 //!
-//! Temporary files are named `.rigsmith-XXXXXXXXXXXXXXXX.tmp` (16 hexadecimal digits). A killed process can leave one
-//! behind: watchers and listings skip what [`is_temp_name`] recognises, and [`remove_stale_temps`] clears them away.
+//! Temporary files are named `.rigsmith-XXXXXXXXXXXXXXXX.tmp` (16 hexadecimal digits). A killed process can leave some
+//! behind: watchers and listings skip what [`is_temp_name`] recognises, and the next save in the folder clears them away, as
+//! does [`remove_stale_temps`].
 //!
 //! Readers and writers elsewhere in the crate take bytes or `Read`, and never a path.
 
@@ -17,21 +20,24 @@ mod atomic;
 mod disk;
 mod fault;
 mod folder;
+mod identity;
 pub mod journal;
 mod load;
 mod project;
 mod read;
 mod shapes;
 mod store;
+mod verify;
 
-pub use atomic::{SaveError, SaveStep, is_temp_name, remove_stale_temps, save_all_atomic, save_atomic};
-pub use disk::{Disk, DiskFile, Entry, EntryKind, RealDisk};
+pub use atomic::{FileSet, SaveError, SaveStep, is_temp_name, remove_stale_temps, save_atomic, save_set};
+pub use disk::{Disk, DiskFile, Entry, EntryKind, Hold, RealDisk};
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
+pub use identity::is_same_file;
 pub use load::{FileKind, LoadError, load_gestures, load_model, load_rig_text, load_skin, load_template, stem};
 pub use project::{
-    LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectToSave, load_project,
-    project_files, store_project,
+    LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectToSave,
+    load_project, project_files, store_project,
 };
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};

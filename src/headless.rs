@@ -1,7 +1,9 @@
-//! One rig and its mesh without a window: what the command line, pipelines and tests work with.
+//! A rig and its mesh without a window, for the command line, pipelines and tests.
 //!
-//! A [`Workbench`] is an app with [`RigPlugins`] and a rig in it. It drives the very
-//! plugins that a window drives, and waits for their background work.
+//! A [`Workbench`] is an app with [`RigPlugins`] and a rig in it. It drives the same plugins as the window, and waits
+//! for their background work.
+
+pub mod posing;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -15,7 +17,8 @@ use crate::{
     mesh::{model::Model, shapes::Shapes},
     plugins::{
         RigPlugins,
-        document::{EditRefused, EditRequest, RigBundle},
+        commands::Built,
+        document::{EditRefused, EditRequest},
         face::{ExpressRequest, Expressed, Face, FaceJob, FacePlaced, FaceReport, FaceRequest},
         gesture::{Gesture, GestureAnswer, GestureScript},
         skinning::{BindRequest, Bound, SkinningJob},
@@ -23,7 +26,7 @@ use crate::{
         task_pools,
     },
     rig::{
-        Rig, RigEdit, SkinData, Uid, UidSource,
+        BuiltRig, Rig, RigEdit, SkinData, Uid, UidSource,
         character::{Character, character, import_skeleton},
         operations::Operation,
     },
@@ -37,38 +40,38 @@ pub fn headless_app(seed: u64) -> App {
     app
 }
 
-/// One rig, at most one mesh, and the plugins that work on them.
+/// An app with one rig, at most one mesh, and the plugins that work on them.
 pub struct Workbench {
     app: App,
     rig: Entity,
     mesh: Option<Entity>,
 }
 
-/// Why the workbench did not do what it was asked for.
+/// Error of the workbench.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WorkbenchError {
     /// An edit was refused.
     #[error("{0}")]
     Refused(String),
-    /// There is no mesh.
+    /// The workbench has no mesh.
     #[error("no mesh is open; open one first")]
     NoMesh,
 }
 
 impl Workbench {
-    /// An empty rig. The same seed gives the same uids.
+    /// A workbench with an empty rig. The same seed gives the same uids.
     pub fn new(seed: u64, name: &str) -> Self {
         let mut app = headless_app(seed);
         app.finish();
         app.cleanup();
         let uid = app.world_mut().resource_mut::<UidSource>().next_uid();
-        let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(uid, name), ..default() }).id();
+        let rig = app.world_mut().spawn(Rig::new(uid, name)).id();
         Self { app, rig, mesh: None }
     }
 
-    /// A rig that was loaded.
+    /// A workbench with a loaded rig.
     pub fn with_rig(seed: u64, rig: Rig) -> Self {
-        // A rig made with the same seed has its first uids already.
+        // A rig made with the same seed uses its first uids already.
         let known = rig.walk().map(|joint| joint.data.uid).chain([rig.uid()]);
         let seed = known.fold(seed, |seed, uid| seed.rotate_left(1) ^ uid.0);
         let mut bench = Self::new(seed, "");
@@ -77,7 +80,7 @@ impl Workbench {
         bench
     }
 
-    /// Opens a mesh below the rig. Its own skeleton and weights come in as joints, unless `mesh_only`.
+    /// Opens a mesh below the rig. Its own skeleton and weights are imported, unless `mesh_only`.
     pub fn open(&mut self, model: Model, mesh_only: bool) -> Result<(), WorkbenchError> {
         let world = self.app.world_mut();
         let mut uids = world.resource_mut::<UidSource>();
@@ -95,14 +98,14 @@ impl Workbench {
         if edits.is_empty() { Ok(()) } else { self.operate(Operation::Edits(edits)) }
     }
 
-    /// Runs one operation, one step of the history.
+    /// Runs one operation as one step of the history.
     pub fn operate(&mut self, operation: Operation) -> Result<(), WorkbenchError> {
         self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
         self.app.update();
         self.refused().map_or(Ok(()), Err)
     }
 
-    /// Makes gestures and returns an answer for each.
+    /// Carries out gestures and returns an answer for each.
     pub fn gestures(&mut self, gestures: Vec<Gesture>) -> Vec<GestureAnswer> {
         self.app.world_mut().entity_mut(self.rig).insert(GestureScript::new(gestures));
         loop {
@@ -112,6 +115,12 @@ impl Workbench {
                 return script.answers.clone();
             }
         }
+    }
+
+    /// Gives the rig what its commands built, so that meshes are bound to the built joints and exported with them.
+    pub fn set_built(&mut self, built: Arc<BuiltRig>) {
+        self.app.world_mut().entity_mut(self.rig).insert(Built(built));
+        self.app.update();
     }
 
     /// Computes weights for the mesh. `progress` is told how much is done, 0 to 1, now and then.
@@ -127,7 +136,7 @@ impl Workbench {
             self.app.update();
             let bound = self.app.world_mut().resource_mut::<Messages<Bound>>().drain().last();
             if let Some(bound) = bound {
-                // The edit that binds the weights is carried out in the next frame.
+                // The edit that binds the weights is applied in the next frame.
                 self.app.update();
                 let refused = self.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().last();
                 return match (bound.result, refused) {
@@ -143,8 +152,8 @@ impl Workbench {
         }
     }
 
-    /// Places a face in the mesh, or moves the face's bones to fit shapes. `progress` is told the step that runs and how
-    /// much is done, 0 to 1, now and then.
+    /// Places a face in the mesh, or moves the face's bones to fit shapes. `progress` is called with the current step
+    /// and the finished share, 0 to 1, now and then.
     pub fn face(
         &mut self,
         settings: AutoSettings,
@@ -157,7 +166,7 @@ impl Workbench {
             self.app.update();
             let placed = self.app.world_mut().resource_mut::<Messages<FacePlaced>>().drain().last();
             if let Some(placed) = placed {
-                // The edit that makes the face is carried out in the next frame.
+                // The edit that makes the face is applied in the next frame.
                 self.app.update();
                 let report = placed.result.map_err(WorkbenchError::Refused)?;
                 return self.refused().map_or(Ok(report), Err);
@@ -171,7 +180,7 @@ impl Workbench {
         }
     }
 
-    /// Shows expressions and units by name, each with a strength from 0 to 1, in place of those there are.
+    /// Shows expressions and units by name, each with a strength from 0 to 1, in place of the current ones.
     pub fn express(&mut self, strengths: BTreeMap<String, f32>) -> Result<(), WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
@@ -181,7 +190,7 @@ impl Workbench {
         self.refused().map_or(Ok(()), Err)
     }
 
-    /// What is known about the mesh's face.
+    /// Analysis of the mesh's face, if there is one.
     pub fn placed_face(&self) -> Option<&Face> {
         self.app.world().get::<Face>(self.mesh?)
     }
@@ -191,13 +200,13 @@ impl Workbench {
         refused.map(|refused| WorkbenchError::Refused(refused.reason))
     }
 
-    /// Binds given weights.
+    /// Binds the mesh with given weights.
     pub fn bind(&mut self, skin: SkinData) -> Result<(), WorkbenchError> {
         let uid = self.mesh().ok_or(WorkbenchError::NoMesh)?.uid;
         self.operate(Operation::Edits(vec![RigEdit::SetSkin(uid, Some(Arc::new(skin)))]))
     }
 
-    /// The rig as it stands.
+    /// The rig in its current state.
     pub fn rig(&self) -> &Rig {
         static EMPTY: std::sync::LazyLock<Rig> = std::sync::LazyLock::new(Rig::default);
         self.app.world().get::<Rig>(self.rig).unwrap_or(&EMPTY)
@@ -213,11 +222,17 @@ impl Workbench {
         self.rig().skin(self.mesh()?.uid).map(Arc::as_ref)
     }
 
-    /// The mesh with the rig's joints and weights, to be written.
+    /// What the rig's commands built, if they did.
+    pub fn built(&self) -> Option<&BuiltRig> {
+        self.app.world().get::<Built>(self.rig).map(|built| &*built.0)
+    }
+
+    /// The mesh with the rig's joints (the built ones of a rig that is built) and weights, to be written.
     pub fn character(&self) -> Model {
         match self.mesh() {
             Some(mesh) => character(&Character {
                 rig: self.rig(),
+                built: self.built(),
                 file: &mesh.file,
                 rest: &mesh.rest,
                 nodes: &mesh.nodes,
@@ -225,12 +240,19 @@ impl Workbench {
             }),
             None => {
                 let empty = Model { name: self.rig().about().name.clone(), ..default() };
-                character(&Character { rig: self.rig(), file: &empty, rest: &empty, nodes: &[], skin: None })
+                character(&Character {
+                    rig: self.rig(),
+                    built: self.built(),
+                    file: &empty,
+                    rest: &empty,
+                    nodes: &[],
+                    skin: None,
+                })
             }
         }
     }
 
-    /// The app, for what is not offered here.
+    /// The app, for functions that the workbench does not offer.
     pub fn app_mut(&mut self) -> &mut App {
         &mut self.app
     }

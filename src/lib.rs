@@ -1,13 +1,13 @@
 #![doc = include_str!("../README.md")]
 
 pub mod algo;
-pub mod build;
 pub mod files;
 pub mod headless;
 pub mod mesh;
 pub mod modules;
 pub mod plugins;
 pub mod prelude;
+pub mod processor;
 pub mod rig;
 pub mod solve;
 pub mod test_app;

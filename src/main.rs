@@ -19,7 +19,7 @@ fn open_window(file: Option<PathBuf>) -> Result<ExitCode, String> {
     }
 }
 
-/// There is no editor in this build.
+/// Reports that this build has no editor.
 #[cfg(not(feature = "editor"))]
 fn open_window(_file: Option<PathBuf>) -> Result<ExitCode, String> {
     Err("this build has no editor; build with the feature `editor`".to_owned())

@@ -1,9 +1,11 @@
-//! Geometry on plain slices: models, their readers and writers, and the surface that rays meet.
+//! Geometry on plain slices: models, their readers and writers, and the surface for ray queries.
 //!
-//! Nothing here knows Bevy's `App`, rendering or the file system: readers take bytes or `Read`, writers return bytes.
+//! This module does not depend on Bevy's `App`, rendering or the file system: readers take bytes or `Read`, writers
+//! return bytes.
 
 pub mod adjacency;
 pub mod gltf;
+pub mod influences;
 pub mod model;
 pub mod obj;
 pub mod ray;
@@ -12,3 +14,7 @@ pub mod shapes;
 pub mod skinning;
 pub mod surface;
 pub mod voxels;
+
+/// Takes a companion of the file that is written (a buffer, an image, a material library) with the name that it would have
+/// alone, and returns the name that it gets.
+pub type CompanionSink<'a> = dyn FnMut(&str, Vec<u8>) -> String + 'a;

@@ -1,6 +1,6 @@
 //! Command modules: what a tag can do, one a file.
 //!
-//! A module is a type whose fields are the parameters of its tag; see [`RigModule`](crate::build::RigModule). A module
+//! A module is a type whose fields are the parameters of its tag; see [`RigModule`](crate::processor::RigModule). A module
 //! needs its own file and one line in [`register`]; one from outside is registered the same way with
 //! [`Modules::add`].
 
@@ -32,7 +32,7 @@ pub mod spring;
 pub mod stretch;
 pub mod twist;
 
-use crate::build::Modules;
+use crate::processor::Modules;
 
 /// Registers every module of this crate.
 pub fn register(modules: &mut Modules) {

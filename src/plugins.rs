@@ -1,6 +1,26 @@
 //! The engine as Bevy plugins: one plugin a file, each public, replaceable and usable alone where that makes sense.
+//!
+//! # Who writes what
+//!
+//! A rig is told by components ([`schema`]). The document ([`Rig`](crate::rig::Rig)) stays the truth; the entities follow
+//! it, and what somebody else writes to them is taken up in the next frame.
+//!
+//! | component | written by | somebody else writes it |
+//! | --- | --- | --- |
+//! | `Rig` | the edit path ([`document`]) | only with [`document::EditRequest`]; a replaced component is another document without its history |
+//! | [`NodeLabel`](schema::NodeLabel), [`InGroup`](schema::InGroup), [`RestTransform`](crate::rig::RestTransform), `ChildOf` of a joint | the document | an edit, one step of the history a frame; a value that the document refuses is put back and told once |
+//! | [`LocalGroup`](schema::LocalGroup), [`Tag`](schema::Tag), [`CommandTag`](schema::CommandTag), [`FeatureTag`](schema::FeatureTag), [`TagOf`](schema::TagOf), the order of [`Tags`](schema::Tags), [`InFeature`](schema::InFeature) | the document | an edit, as above |
+//! | a spawned [`Joint`](schema::Joint) below a rig or joint, a tag on a joint, a group of a rig | | added to the document; the entity stays the same and gets a [`Uid`](crate::rig::Uid) |
+//! | a despawned joint, tag or group | | deleted, joints with their subtree; undoing spawns others |
+//! | `Transform` of a joint or created node | the program, and the document where its pose changes | becomes the node's pose in the same frame, within the channels and limits of a control; a driven node answers with what its constraints make of it |
+//! | [`Attributes`](schema::Attributes) | the program, and the document where its values change | drives the rig in the same frame; a driven value is put back |
+//! | `GlobalTransform` of a node | propagation, corrected where Bevy would shear | overwritten |
+//! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`commands::CommandReport`], [`commands::Built`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; an inserted `Uid` is put back and told, the others stand until the build writes them |
+//! | label, group, rest and parent of a created node, and the node itself | the build | put back and told: change the command instead |
+//! | `Name` of joints, groups and nodes | the label or name | stands until that changes |
 
 pub mod commands;
+pub mod controls;
 #[cfg(feature = "draw")]
 pub mod display;
 pub mod document;
@@ -10,9 +30,11 @@ pub mod face;
 pub mod gesture;
 pub mod history;
 pub mod journal;
+pub mod landing;
 pub mod picking;
 pub mod placement;
 pub mod runtime;
+pub mod schema;
 pub mod selection;
 pub mod skinning;
 pub mod stroke;
@@ -26,12 +48,13 @@ use bevy::{
     transform::systems::sync_simple_transforms,
 };
 
-/// Everything a rig needs, head-less.
+/// Plugins of rigs, without window and renderer.
 ///
 /// | plugin | gives |
 /// | --- | --- |
 /// | [`document::DocumentPlugin`] | rigs, their joint entities, the one edit path, undo and redo |
 /// | [`commands::CommandsPlugin`] | tags as entities, building, stepping and rolling back |
+/// | [`controls::ControlsPlugin`] | which controls are visible; switches without a jump |
 /// | [`surface::SurfacePlugin`] | the posed surface that rays meet |
 /// | [`picking::PickingPlugin`] | selecting joints |
 /// | [`placement::PlacementPlugin`] | placing joints with rays |
@@ -40,7 +63,7 @@ use bevy::{
 /// | [`skinning::SkinningPlugin`] | automatic weights in the background |
 /// | [`face::FacePlugin`] | faces: bones, weights and expressions |
 /// | [`runtime::RuntimePlugin`] | compiled rigs that run each frame |
-/// | [`journal::JournalPlugin`] | every change in a safe place, for rigs that ask for it |
+/// | [`journal::JournalPlugin`] | every change stored at once, for rigs that request it |
 pub struct RigPlugins;
 
 impl PluginGroup for RigPlugins {
@@ -48,6 +71,7 @@ impl PluginGroup for RigPlugins {
         PluginGroupBuilder::start::<Self>()
             .add(document::DocumentPlugin)
             .add(commands::CommandsPlugin)
+            .add(controls::ControlsPlugin)
             .add(surface::SurfacePlugin)
             .add(picking::PickingPlugin)
             .add(placement::PlacementPlugin)
@@ -60,32 +84,32 @@ impl PluginGroup for RigPlugins {
     }
 }
 
-/// When the systems of rigs run. Unless they say otherwise they are in `Update`, in this order.
+/// Order of the systems of rigs. Unless they say otherwise they are in `Update`, in this order.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RigSystems {
-    /// Scripted gestures become requests.
+    /// Turns scripted gestures into requests.
     Script,
-    /// Pick requests change selections.
+    /// Carries out pick requests, which change selections.
     Pick,
-    /// Place and stroke requests become edit requests.
+    /// Turns place and stroke requests into edit requests.
     Gesture,
-    /// Edit, undo and redo requests change rigs: the only place where rigs change.
+    /// Carries out edit, undo and redo requests: the only place where rigs change.
     Edits,
-    /// Joint entities follow their rig.
+    /// Updates joint entities after their rig.
     Build,
-    /// Meshes follow their weights; background skinning starts and lands.
+    /// Updates meshes after their weights; starts background skinning and takes over its results.
     Bind,
-    /// In `PostUpdate`, between Bevy's animation and its propagation of transforms: rigs run.
+    /// Runs rigs in `PostUpdate`, between Bevy's animation and its propagation of transforms.
     Solve,
-    /// In `PostUpdate`, at the end of the propagation of transforms: joints of instances in games get their place in the
-    /// world.
+    /// Writes world transforms of instances' joints in games, in `PostUpdate`, at the end of the propagation of
+    /// transforms.
     Scatter,
-    /// In `PostUpdate`, after transforms have propagated: surfaces follow the pose.
+    /// Updates surfaces after the pose, in `PostUpdate`, after transforms have propagated.
     Surface,
 }
 
-/// Task pools in which a long task (weights, a file) does not keep a short one (the surface of a pose, a stroke) waiting:
-/// at least four background threads, where Bevy takes one on a small machine. Set it on `MinimalPlugins` or
+/// Task pools in which a long task (weights, a file) does not delay a short one (the surface of a pose, a stroke): at
+/// least four background threads, where Bevy takes one on a small machine. Set it on `MinimalPlugins` or
 /// `DefaultPlugins` of the first app in a process.
 pub fn task_pools() -> TaskPoolPlugin {
     let mut task_pool_options = TaskPoolOptions::default();
@@ -111,7 +135,7 @@ pub(crate) fn configure_sets(app: &mut App) {
         PostUpdate,
         (
             RigSystems::Solve.after(AnimationSystems).before(TransformSystems::Propagate),
-            // Within, so that whatever runs after propagation sees these joints, too.
+            // The set is inside the propagation, so that systems after it see these joints, too.
             RigSystems::Scatter.in_set(TransformSystems::Propagate).after(sync_simple_transforms),
             RigSystems::Surface.after(TransformSystems::Propagate),
         ),

@@ -1,4 +1,4 @@
-//! What a game or tool that uses Rigsmith needs most.
+//! Common imports of games and tools that use Rigsmith.
 
 pub use crate::{
     algo::{
@@ -9,7 +9,7 @@ pub use crate::{
     },
     plugins::{
         RigPlugins, RigSystems,
-        document::{Change, EditRefused, EditRequest, Edited, Joint, JointOf, RigBundle, Selection, Symmetry},
+        document::{Change, EditRefused, EditRequest, Edited, Joint, NodeOf, Selection, Symmetry},
         gesture::{Gesture, GestureScript},
         picking::{HoverJoint, HoverRequest, Pick, PickRequest, Picked},
         placement::{PlaceRequest, Placed},

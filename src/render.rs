@@ -2,7 +2,10 @@
 //!
 //! [`take_picture`] runs an app of its own: the same plugins that draw in the window draw into an image.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::OnceLock,
+    time::{Duration, Instant},
+};
 
 use bevy::{
     app::PluginGroupBuilder,
@@ -13,6 +16,7 @@ use bevy::{
         RenderPlugin,
         pipelined_rendering::PipelinedRenderingPlugin,
         render_resource::TextureFormat,
+        settings::{RenderCreation, WgpuSettings},
         view::screenshot::{Screenshot, ScreenshotCaptured},
     },
     window::ExitCondition,
@@ -22,8 +26,9 @@ use crate::{
     algo::view::View,
     plugins::{
         RigPlugins,
+        commands::{BuildRequest, BuildStep},
         display::{DisplayJob, DisplayPlugin, MeshDisplay, ViewportLights},
-        document::{RigBundle, Selection, Symmetry},
+        document::Selection,
         drawing::{BACKGROUND, DrawingPlugin, RigDrawing},
         surface::{RigMesh, RigSurface, SkinOf},
         task_pools,
@@ -32,24 +37,26 @@ use crate::{
     rig::{Rig, Uid},
 };
 
-/// What a picture shows, and how.
+/// Settings of a picture.
 #[derive(Debug, Clone)]
 pub struct PictureSettings {
     /// Width and height in pixels.
     pub size: UVec2,
-    /// From where.
+    /// Direction of the camera.
     pub view: View,
-    /// True for a picture without perspective.
+    /// Orthographic projection if `true`.
     pub orthographic: bool,
-    /// How the mesh is shown.
+    /// Display of the mesh.
     pub display: MeshDisplay,
-    /// What is drawn of the rig, and the grid.
+    /// Drawing of the rig, and of the grid.
     pub drawing: RigDrawing,
-    /// Joints that are shown as selected; the last one is the active one.
+    /// Joints shown as selected; the last one is the active one.
     pub selected: Vec<Uid>,
-    /// What is behind everything.
+    /// Colour of the background.
     pub background: Color,
-    /// Least and greatest corner of the box that fills the picture, in the rig's space; all there is if `None`.
+    /// True to build the rig and let it run before the picture is taken: controls are shown then.
+    pub build: bool,
+    /// Least and greatest corner of the box that fills the picture, in the rig's space; the whole character if `None`.
     pub bounds: Option<[Vec3; 2]>,
 }
 
@@ -63,41 +70,43 @@ impl Default for PictureSettings {
             drawing: RigDrawing::default(),
             selected: Vec::new(),
             background: BACKGROUND,
+            build: false,
             bounds: None,
         }
     }
 }
 
-/// Why there is no picture.
+/// Error of taking a picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PictureError {
-    /// No graphics adapter.
+    /// No graphics adapter is available.
     #[error(
         "there is no graphics adapter, not even a software one; install a Vulkan driver (Debian: mesa-vulkan-drivers)"
     )]
     NoAdapter,
-    /// The size makes no picture.
+    /// The size is zero or too large.
     #[error("a picture of {0} x {1} pixels cannot be made; choose 1 to {MAX_SIZE} for both")]
     Size(u32, u32),
-    /// It took too long.
+    /// The renderer did not finish in time.
     #[error("the renderer did not finish within {0} seconds; try a smaller picture or mesh")]
     Late(u64),
-    /// The picture came back in a form that cannot be saved.
+    /// The picture has a format that cannot be saved.
     #[error("the renderer's picture cannot be encoded: {0}")]
     Encode(String),
 }
 
-/// Widest and highest picture, in pixels.
+/// Largest width and height of a picture, in pixels.
 pub const MAX_SIZE: u32 = 8192;
 
-/// How long a picture may take.
+/// Time limit of a picture.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// Frames drawn after everything has arrived: what a frame changes is seen in the next one, and uploads take one more.
+/// Number of frames drawn after everything has loaded: a change of one frame appears in the next one, and uploads take
+/// one more.
 const SETTLE: usize = 4;
 
-/// Takes a picture of a rig with its meshes as the rig's pose holds them. The same input gives the same picture on the
-/// same adapter.
+/// Takes a picture of a rig with its meshes in the rig's pose. The same input gives the same picture on the same
+/// adapter.
 ///
 /// # Errors
 /// See [`PictureError`].
@@ -120,11 +129,13 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
 
     let world = app.world_mut();
     let has_mesh = !meshes.is_empty();
-    let bundle =
-        RigBundle { rig, selection: Selection(settings.selected.clone()), symmetry: Symmetry(None), ..default() };
+    let bundle = (rig, Selection(settings.selected.clone()));
     let entity = world.spawn(bundle).id();
     for mesh in meshes {
         world.spawn((mesh, SkinOf(entity)));
+    }
+    if settings.build {
+        world.write_message(BuildRequest { rig: entity, step: BuildStep::All });
     }
     let target = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
     let target = world.resource_mut::<Assets<Image>>().add(target);
@@ -139,7 +150,7 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
 
     let deadline = Instant::now() + LIMIT;
     let late = || PictureError::Late(LIMIT.as_secs());
-    // The surface says how large the posed mesh is.
+    // The surface gives the size of the posed mesh.
     loop {
         app.update();
         let world = app.world_mut();
@@ -182,27 +193,42 @@ pub fn png(image: Image) -> Result<Vec<u8>, PictureError> {
     Ok(bytes.into_inner())
 }
 
-/// What there is to draw with: the adapter's name, and whether it is a program. `None` if there is nothing.
+/// Name of the graphics adapter, and whether it is a software renderer. `None` without an adapter.
 pub fn adapter() -> Option<(String, bool)> {
-    let backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all());
-    let descriptor = wgpu::InstanceDescriptor { backends, ..wgpu::InstanceDescriptor::new_without_display_handle() };
-    let instance = wgpu::Instance::new(descriptor);
-    let adapters = bevy::tasks::block_on(instance.enumerate_adapters(backends));
-    let mut list: Vec<(String, bool)> = adapters
-        .iter()
-        .map(|adapter| adapter.get_info())
-        .map(|info| (info.name.clone(), info.device_type == wgpu::DeviceType::Cpu))
-        .collect();
+    let mut list: Vec<(String, bool)> =
+        adapters(backends()).into_iter().map(|info| (info.name, info.device_type == wgpu::DeviceType::Cpu)).collect();
     list.sort_by_key(|(_, software)| *software);
     list.into_iter().next()
 }
 
+/// Interfaces that pictures are drawn through: those that `WGPU_BACKEND` names, else the system's own ones.
+///
+/// OpenGL serves only where there is no other: a search for it complains on standard error where there is no display.
+fn backends() -> wgpu::Backends {
+    static FOUND: OnceLock<wgpu::Backends> = OnceLock::new();
+    *FOUND.get_or_init(|| {
+        let native = || {
+            if adapters(wgpu::Backends::PRIMARY).is_empty() { wgpu::Backends::all() } else { wgpu::Backends::PRIMARY }
+        };
+        wgpu::Backends::from_env().unwrap_or_else(native)
+    })
+}
+
+fn adapters(backends: wgpu::Backends) -> Vec<wgpu::AdapterInfo> {
+    let descriptor = wgpu::InstanceDescriptor { backends, ..wgpu::InstanceDescriptor::new_without_display_handle() };
+    let instance = wgpu::Instance::new(descriptor);
+    let adapters = bevy::tasks::block_on(instance.enumerate_adapters(backends));
+    adapters.iter().map(|adapter| adapter.get_info()).collect()
+}
+
 /// Bevy's own plugins for drawing without a window.
 pub fn bevy_plugins() -> PluginGroupBuilder {
+    let settings = WgpuSettings { backends: Some(backends()), ..default() };
+    let render_creation = RenderCreation::Automatic(Box::new(settings));
     let plugins = DefaultPlugins
         .set(task_pools())
         .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
-        .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+        .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
         .disable::<LogPlugin>()
         .disable::<PipelinedRenderingPlugin>();
     #[cfg(feature = "editor")]
@@ -210,17 +236,17 @@ pub fn bevy_plugins() -> PluginGroupBuilder {
     plugins
 }
 
-/// The picture, once it has come back.
+/// The picture, once the renderer has returned it.
 #[derive(Resource, Default)]
 struct Taken(Option<Image>);
 
-/// Points the camera so that everything is seen.
+/// Points the camera so that the whole character is visible.
 fn aim(world: &mut World, rig: Entity, camera: Entity, settings: &PictureSettings) {
     let bounds = match (settings.bounds, world.get::<RigSurface>(rig), world.get::<Rig>(rig)) {
         (Some(bounds), ..) => bounds,
         (None, Some(surface), _) => surface.bounds(),
         (None, None, Some(rig)) if !rig.is_empty() => {
-            // Bones of last joints reach about as far beyond them as those before.
+            // Bones of last joints extend about as far beyond them as the bones before.
             let places = rig.walk().flat_map(|joint| {
                 let place = rig.position(joint.data.uid);
                 let above = joint.parent.filter(|_| joint.children.is_empty()).map(|parent| rig.position(parent));

@@ -1,4 +1,4 @@
-//! What a rig is: plain data and rules. No systems, no rendering, no files.
+//! Rigs as plain data and rules. No systems, no rendering, no files.
 //!
 //! [`Rig`] is the whole document; [`RigEdit`] is the only way it changes, each edit with its exact inverse.
 
@@ -6,27 +6,21 @@ pub mod bake;
 mod built;
 pub mod character;
 mod constraint;
+pub mod deform;
 mod document;
 pub mod edit;
 pub mod feature;
-pub mod form;
-mod format;
+pub mod format;
 mod group;
 mod joint;
 pub mod label;
 pub mod nearest;
 pub mod operations;
 mod pose;
-pub mod project;
 pub mod reference;
-mod scan;
 pub mod shapes;
-pub mod skin;
-mod source;
 pub mod step;
 mod tag;
-pub mod template;
-pub mod text;
 mod uid;
 
 pub use built::{
@@ -38,12 +32,15 @@ pub use constraint::{
 };
 pub use document::{Rig, RigAbout, SkinData};
 pub use edit::{EditError, RigEdit};
+pub use format::source::SourceError;
+pub use format::{project, skin, template, text};
+pub(crate) use format::{
+    scan::{elements, fields},
+    source::{parse_ron, ron_options, utf8},
+};
 pub use group::GroupData;
 pub use joint::{JointData, NodeKind, RestTransform, RigJoint};
 pub use pose::{AttributeValues, PoseOffset, StoredPose};
 pub use reference::{NodeRef, NodeRefs};
-pub(crate) use scan::{elements, fields};
-pub use source::SourceError;
-pub(crate) use source::{parse_ron, ron_options, utf8};
-pub use tag::{Tag, TagKind};
+pub use tag::{TagData, TagKind};
 pub use uid::{Uid, UidError, UidSource};

@@ -1,9 +1,9 @@
 //! The solvers of the runtime: one a file, plain functions over borrowed inputs and outputs.
 //!
-//! None allocates while it solves (building a curve or an expression does), none keeps the world, and none fails: what
-//! a degenerate input (no length, parallel directions, a goal on the root, a scale of zero, a number that is not
-//! finite) comes to is part of each solver's documentation. Poses are in the rig's space and angles in radians unless
-//! said otherwise. The same input gives the same bits.
+//! No solver allocates (building a curve or an expression does), keeps state or fails: the result of a degenerate input
+//! (no length, parallel directions, a goal on the root, a scale of zero, a number that is not finite) is part of each
+//! solver's documentation. Poses are in the rig's space and angles in radians unless said otherwise. The same input
+//! gives the same bits.
 
 pub mod aim;
 pub mod ccd;

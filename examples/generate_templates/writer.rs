@@ -10,7 +10,7 @@ use bevy::math::{Quat, Vec3};
 use rigsmith::{
     modules,
     rig::{
-        GroupData, JointData, RestTransform, Rig, RigAbout, RigEdit, Tag, TagKind, Uid, UidSource,
+        GroupData, JointData, RestTransform, Rig, RigAbout, RigEdit, TagData, TagKind, Uid, UidSource,
         label::{label_side, mirrored_label},
         operations::{Axis, Operation, PasteTo, PasteWhat, TagClipboard, TagOperation, TagScope},
         reference::{NameKind, NameScope, Names, bind_names, refresh_names},
@@ -232,7 +232,7 @@ impl Writer {
     }
 
     fn bind(&mut self) {
-        let tags: Vec<(Uid, Tag)> =
+        let tags: Vec<(Uid, TagData)> =
             self.rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.clone()))).collect();
         let aliases: BTreeMap<Uid, &String> = self.aliases.iter().map(|(alias, tag)| (*tag, alias)).collect();
         let mut edits = Vec::new();
@@ -265,7 +265,7 @@ impl Writer {
         if self.aliases.insert(alias.clone(), uid).is_some() {
             self.fail(format!("there are two tags {alias}"));
         }
-        let tag = Tag { uid, enabled: true, comment: String::new(), kind };
+        let tag = TagData { uid, enabled: true, comment: String::new(), kind };
         self.edit(RigEdit::AddTag { joint, tag: Box::new(tag), index: usize::MAX });
     }
 

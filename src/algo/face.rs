@@ -1,7 +1,7 @@
-//! Faces: from a head mesh to facial bones, weights and expressions, without a person placing anything.
+//! Faces: facial bones, weights and expressions from a head mesh, without manual placement.
 //!
-//! The method is that of "automatic placement of bones on face models": group the head in depth, put head and neck bones
-//! through the means of the middle, and one facial bone at each centroid of the facial mask.
+//! The method is that of "automatic placement of bones on face models": group the head in depth, put head and neck
+//! bones through the means of the middle group, and one facial bone at each centroid of the facial mask.
 
 pub mod auto;
 pub mod axes;

@@ -1,18 +1,17 @@
-//! Bones from shapes: where bones should be, and how they should move, so that a mesh follows given shapes.
+//! Bones from shapes: positions, weights and movements of bones with which a mesh follows given shapes.
 //!
 //! Smooth skinning decomposition with rigid bones (Le and Deng 2012, ACM Transactions on Graphics 31, 6): weights and
-//! rigid transforms are found in turn by least squares, each while the other stands still. Here the problem is brought
-//! down to sums over the points (`moves`) and to quadratic forms in a point's position (`share`), so that a round
-//! costs little more than reading the shapes once. Bones that do little are taken away and begin anew where most is
-//! left to do.
+//! rigid transforms are found in turn by least squares, each with the other fixed. The problem is reduced to sums over
+//! the points (`moves`) and to quadratic forms in a point's position (`share`), so that a round costs little more than
+//! reading the shapes once. Bones that contribute little are moved to the regions with the largest remaining error.
 //!
-//! Joint 0 of the weights is the head: it stands still in every shape, and holds what no bone moves.
+//! Joint 0 of the weights is the head: it does not move in any shape, and takes the weight that no bone takes.
 
+mod bone_reseed;
 mod convex;
 mod moves;
 mod place;
 mod problem;
-mod renew;
 mod rotation;
 mod share;
 mod start;
@@ -22,30 +21,30 @@ use glam::{Quat, Vec3};
 use crate::mesh::model::Weights;
 use moves::{Moments, Rigid};
 use problem::Problem;
-use share::{Columns, Sharing, share};
+use share::{Columns, ShareSettings, share};
 
-/// The most influences a point may have.
+/// Largest number of influences of a point.
 pub const MAX_INFLUENCES: usize = 8;
-/// How strongly bones are held at rest, as a share of their own mass.
+/// Stiffness that holds bones at rest, as a share of their own mass.
 const STIFFNESS: f64 = 1e-4;
 /// Weights below this are dropped at the end.
 const PRUNE: f64 = 1e-3;
 
-/// How [`fit`] works.
+/// Settings of [`fit`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitSettings<'a> {
     /// The number of bones, without the head.
     pub bones: usize,
-    /// The most joints that move a point, the head included: 1 to 8.
+    /// The largest number of joints that move a point, the head included: 1 to 8.
     pub influences: usize,
-    /// How often weights and transforms are found in turn.
+    /// Number of rounds; each finds weights and transforms in turn.
     pub rounds: usize,
-    /// How strongly a point's weights are pulled towards its neighbours': 0 not at all, 1 visibly.
+    /// Strength of the pull of a point's weights towards its neighbours': 0 none, 1 visible.
     pub smoothing: f32,
-    /// Where the first bones begin, in the space of the points; bones beyond these are placed freely. Bones keep their
+    /// First positions of bones, in the space of the points; bones beyond these are placed freely. Bones keep their
     /// order.
     pub start: &'a [Vec3],
-    /// For each entry of `start` whether that bone must stay where it is; missing ones may move.
+    /// Marks entries of `start` that must stay; missing entries may move.
     pub locked: &'a [bool],
 }
 
@@ -55,20 +54,20 @@ impl Default for FitSettings<'_> {
     }
 }
 
-/// How a bone moves in one shape: turned about its own position, then shifted.
+/// Movement of a bone in one shape: a rotation about its own position, then a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoneMove {
-    /// The turn about the bone's position.
+    /// Rotation about the bone's position.
     pub rotation: Quat,
-    /// The shift after the turn, in the unit of the points.
+    /// Shift after the rotation, in the unit of the points.
     pub translation: Vec3,
 }
 
 impl BoneMove {
-    /// A bone at rest.
+    /// The movement of a bone at rest.
     pub const REST: Self = Self { rotation: Quat::IDENTITY, translation: Vec3::ZERO };
 
-    /// Where the bone at `position` takes `point`.
+    /// Moves `point` with the bone at `position`.
     pub fn apply(&self, position: Vec3, point: Vec3) -> Vec3 {
         position + self.rotation * (point - position) + self.translation
     }
@@ -77,82 +76,82 @@ impl BoneMove {
 /// Bones that make a mesh follow shapes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// Where the bones are at rest, in the space of the points.
+    /// Rest positions of the bones, in the space of the points.
     pub positions: Vec<Vec3>,
     /// Weights of all points: joint 0 is the head, `1 + i` is bone `i`.
     pub weights: Weights,
-    /// For each shape how each bone moves.
+    /// Movements of all bones for each shape.
     pub moves: Vec<Vec<BoneMove>>,
-    /// The square root of the mean, over all points and shapes, of the squared distance to where the shape has the
-    /// point; in the unit of the points.
+    /// Root mean square, over all points and shapes, of the distance between the skinned point and the shape's point;
+    /// in the unit of the points.
     pub error: f32,
 }
 
-/// Why there is no fit.
+/// Error of a fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// Nothing to fit.
+    /// No shapes to fit.
     #[error("there are no shapes to fit: give at least one")]
     NoShapes,
-    /// A shape of another mesh.
+    /// A shape with another number of points than the mesh.
     #[error("shape {shape} has {has} points, the mesh {points}: shapes must be of the same mesh in the same order")]
     ShapeLength {
         /// Index of the first such shape.
         shape: usize,
-        /// How many points it has.
+        /// Number of points of the shape.
         has: usize,
-        /// How many the mesh has.
+        /// Number of points of the mesh.
         points: usize,
     },
-    /// A displacement that is not a number.
+    /// A displacement that is not finite.
     #[error("shape {shape} is not finite at point {point}: repair the shape")]
     Shape {
         /// Index of the first such shape.
         shape: usize,
-        /// The first such point.
+        /// Index of the first such point.
         point: usize,
     },
-    /// A point that is not a number.
+    /// A point that is not finite.
     #[error("point {point} of the mesh is not finite: repair the mesh")]
     Point {
         /// Index of the first such point.
         point: usize,
     },
-    /// A triangle corner that does not exist.
+    /// A triangle with a corner that does not exist.
     #[error("triangle {triangle} has a corner past the last point: the mesh is damaged")]
     Triangle {
         /// Index of the first such triangle.
         triangle: usize,
     },
-    /// All shapes are the mesh at rest.
+    /// Shapes that are all equal to the mesh at rest.
     #[error("no shape moves any point: give displacements from the rest mesh that are not all zero")]
     NothingMoves,
-    /// No bones are wanted.
+    /// A request for zero bones.
     #[error("no bones were asked for: ask for at least one")]
     NoBones,
-    /// More bones than there is to move.
+    /// More bones than moving points.
     #[error("{bones} bones were asked for, but the shapes move {moving} points only: ask for fewer bones")]
     TooManyBones {
-        /// How many were asked for.
+        /// Number of bones requested.
         bones: usize,
-        /// How many points move.
+        /// Number of moving points.
         moving: usize,
     },
     /// Zero or too many influences.
     #[error("{influences} influences a point were asked for: ask for 1 to {MAX_INFLUENCES}")]
     Influences {
-        /// How many were asked for.
+        /// Number of influences requested.
         influences: usize,
     },
-    /// Positions that do not fit the number of bones.
+    /// More positions than bones.
     #[error("{start} bones have a position to start from, but only {bones} were asked for")]
     TooManyStarts {
-        /// How many positions there are.
+        /// Number of positions.
         start: usize,
-        /// How many bones were asked for.
+        /// Number of bones requested.
         bones: usize,
     },
-    /// A position that is not a number.
+    /// A position that is not finite.
     #[error("bone {bone} is not at a finite place: move it first")]
     Start {
         /// Index of the first such bone.
@@ -161,29 +160,29 @@ pub enum FitError {
     /// Weights of another mesh or other bones.
     #[error("the weights are for {points} points and joint {joint}, the mesh or the bones are others: bind again")]
     Weights {
-        /// How many points they have.
+        /// Number of points of the weights.
         points: usize,
-        /// The last joint they name.
+        /// Largest joint of the weights.
         joint: usize,
     },
-    /// The progress callback asked to stop.
+    /// Cancelled by the progress callback.
     #[error("fitting was cancelled")]
     Cancelled,
 }
 
 /// Finds bones, weights and movements that bring the mesh `rest` as near as possible to all `shapes`.
 ///
-/// `shapes` are displacements, one a point of `rest`, in the same space and unit, which may be any. `triangles` only say
-/// which points are neighbours, for the smoothing. `progress` is called with the share of work done, 0 to 1, and cancels
-/// with `false`.
+/// `shapes` are displacements, one a point of `rest`, in the same space and unit, which may be any. `triangles` only
+/// define the neighbours of points, for the smoothing. `progress` is called with the share of work done, 0 to 1, and
+/// cancels by returning `false`.
 ///
-/// Each point gets one to [`FitSettings::influences`] joints, strongest first, positive, summing to one; points that
-/// no shape moves belong to the head alone. The result does not depend on the number of threads. Cost: a round is
-/// linear in points times shapes times bones (some ten of them a point); 9,000 moving points, 57 shapes and 40 bones
-/// take about three seconds on two cores.
+/// Each point gets one to [`FitSettings::influences`] joints, strongest first, positive, summing to one; points that no
+/// shape moves belong to the head alone. The result does not depend on the number of threads. Cost: a round is linear
+/// in points times shapes times bones (some ten of them a point); 9,000 moving points, 57 shapes and 40 bones take
+/// about three seconds on two cores.
 ///
 /// # Errors
-/// [`FitError`]: nothing to fit, input that is not finite or does not fit together, or cancelled.
+/// [`FitError`]: no shapes or movements, input that is not finite or inconsistent, or cancelled.
 pub fn fit(
     rest: &[Vec3],
     triangles: &[[u32; 3]],
@@ -210,10 +209,11 @@ pub fn fit(
     for round in 0..rounds {
         let done = |part: f32| 0.05 + 0.9 * (round as f32 + part) / rounds as f32;
         let columns = Columns::new(&problem, &moves);
-        let near = Near { problem: &problem, centers: &centers, influences: &influences, bones, anywhere: &renewed };
+        let near =
+            BoneCandidates { problem: &problem, centers: &centers, influences: &influences, bones, anywhere: &renewed };
         let candidates = |point: usize, out: &mut Vec<u32>| near.of(point, out);
         let smoothing = f64::from(smoothing) * 0.01;
-        let sharing = Sharing { most: settings.influences, smoothing, candidates: &candidates };
+        let sharing = ShareSettings { most: settings.influences, smoothing, candidates: &candidates };
         let left;
         (influences, left) = share(&problem, &columns, &influences, &sharing);
         step(done(0.5))?;
@@ -221,10 +221,10 @@ pub fn fit(
         moments.improve(&mut moves, 1, 2);
         centers = (0..bones).map(|bone| moments.center(bone)).collect();
         renewed.clear();
-        // What begins anew needs some rounds to settle.
+        // A moved bone needs some rounds to settle.
         if round % 2 == 1 && 5 * round < 4 * rounds && round + 4 < rounds {
             let (first, most) = (settings.start.len(), bones.div_ceil(10));
-            renewed = renew::renew(&problem, &columns, &mut influences, &mut moves, &left, first, most);
+            renewed = bone_reseed::renew(&problem, &columns, &mut influences, &mut moves, &left, first, most);
         }
         step(done(1.0))?;
     }
@@ -235,13 +235,13 @@ pub fn fit(
     Ok(Fit { positions, weights, moves, error })
 }
 
-/// Finds how bones with known weights have to move to bring the mesh `rest` as near as possible to each of `shapes`.
+/// Finds the movements of bones with known weights that bring the mesh `rest` as near as possible to each of `shapes`.
 ///
-/// `positions` and `weights` are as in [`Fit`]. Returns the movements, for each shape how each bone moves, and the error
-/// as in [`Fit::error`].
+/// `positions` and `weights` are as in [`Fit`]. Returns the movements of all bones for each shape, and the error as in
+/// [`Fit::error`].
 ///
 /// # Errors
-/// As for [`fit`], and [`FitError::Weights`].
+/// Errors of [`fit`], and [`FitError::Weights`].
 pub fn fit_moves(
     rest: &[Vec3],
     positions: &[Vec3],
@@ -275,7 +275,7 @@ pub fn fit_moves(
     Ok((moves, error))
 }
 
-/// Where the bones take all points of `rest`: linear blend skinning.
+/// Skins all points of `rest` by linear blend skinning.
 ///
 /// `positions`, `weights` and `moves` (of one shape) are as in [`Fit`] and must fit together.
 pub fn skinned(rest: &[Vec3], positions: &[Vec3], weights: &Weights, moves: &[BoneMove]) -> Vec<Vec3> {
@@ -286,7 +286,7 @@ pub fn skinned(rest: &[Vec3], positions: &[Vec3], weights: &Weights, moves: &[Bo
     rest.iter().enumerate().map(one).collect()
 }
 
-/// [`Fit::error`], from the result itself.
+/// Computes [`Fit::error`] from the result itself.
 fn error(
     rest: &[Vec3],
     positions: &[Vec3],
@@ -321,19 +321,19 @@ fn check(settings: &FitSettings) -> Result<(), FitError> {
     }
 }
 
-/// Which bones a point may follow.
-struct Near<'a> {
+/// Candidate bones of a point.
+struct BoneCandidates<'a> {
     problem: &'a Problem,
     /// Mass and centre of each bone; empty in the first round.
     centers: &'a [(f64, glam::DVec3)],
     influences: &'a [Vec<(u32, f64)>],
     bones: usize,
-    /// Bones that have no points yet.
+    /// Bones without points, which are candidates everywhere.
     anywhere: &'a [u32],
 }
 
-impl Near<'_> {
-    /// The nearest bones, those that the point follows already, those of its neighbours and new ones; sorted.
+impl BoneCandidates<'_> {
+    /// Collects the nearest bones, the bones of the point and of its neighbours, and bones without points; sorted.
     fn of(&self, point: usize, out: &mut Vec<u32>) {
         const NEAREST: usize = 8;
         if self.bones <= NEAREST || self.centers.is_empty() {

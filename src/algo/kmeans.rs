@@ -1,21 +1,22 @@
 //! k-means: groups of points around centroids, with the least square error.
 //!
-//! Seeds are spread over dense regions ("Automatic placement of bones on face models", section 3.2): each next one is drawn
-//! in proportion to the points' squared distances from the seeds so far, the best of several draws kept (Arthur and
-//! Vassilvitskii, "k-means++", 2007), so a seed is likely where many points are far from any. Then points go to their nearest
-//! centroid and centroids to their points' mean, until no point changes its group (Lloyd).
+//! Seeds are spread over dense regions ("Automatic placement of bones on face models", section 3.2): each next one is
+//! drawn in proportion to the points' squared distances from the seeds so far, the best of several draws kept (Arthur
+//! and Vassilvitskii, "k-means++", 2007), so a seed is likely where many points are far from any. Then points go to
+//! their nearest centroid and centroids to their points' mean, until no point changes its group (Lloyd).
 //!
-//! In the first rounds, centroids jump from where two groups might as well be one to where one might better be two, which
-//! such rounds alone never do. Of many points, means of eight neighbours each are grouped first: that is quick enough to try
-//! jumps until none lowers the error, and leaves little to do for all points.
+//! In the first rounds, centroids jump from groups that could be merged with a neighbour to groups that should be
+//! split, which Lloyd's rounds alone never do. For many points, means of eight neighbours each are grouped first: that
+//! is fast enough to try jumps until none lowers the error, and leaves little work for the points themselves.
 //!
-//! Bounds say for most points that nothing can have changed: how far the own centroid is at most and any other at
-//! least (Hamerly, "Making k-means even faster", 2010). They are kept as differences from the way that centroids have gone
-//! since the start, so a point whose bounds hold is not written at all, and a block of them is not even read. Bounds only ever
-//! spare comparisons that could not change anything, so the answer is that of [`kmeans_plain`] to the last bit.
+//! Bounds show for most points that their group cannot have changed: the largest distance of the own centroid and the
+//! least distance of any other (Hamerly, "Making k-means even faster", 2010). They are stored relative to the distance
+//! that centroids have moved since the start, so a point whose bounds hold is not written, and a block of such points
+//! is not even read. Bounds only avoid comparisons without effect, so the result is that of [`kmeans_plain`] to the
+//! last bit.
 //!
-//! Sums are kept in whole numbers (parts of 2⁻³⁴ of the extent), which makes them exact in any order: points that change
-//! their group are added and taken away, on any number of threads.
+//! Sums are integers (in units of 2⁻³⁴ of the extent), which makes them exact in any order: points that change their
+//! group are added and subtracted, on any number of threads.
 
 mod coarse;
 mod lloyd;
@@ -28,19 +29,20 @@ use thiserror::Error;
 
 use self::space::Space;
 
-/// Called now and then with the part that is done (0 to 1, never falling); `false` cancels.
+/// Progress callback, called now and then with the finished share (0 to 1, never falling); it cancels by returning
+/// `false`.
 pub type Progress<'a> = &'a (dyn Fn(f32) -> bool + Sync);
 
-/// What [`kmeans`] is to do.
+/// Settings of [`kmeans`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct KMeansSettings {
-    /// How many groups, fixed ones included.
+    /// Number of groups, fixed ones included.
     pub groups: usize,
-    /// How often to begin with other seeds; the least error is kept. At least one is made.
+    /// Number of starts with different seeds; the least error is kept. At least one is made.
     pub starts: usize,
-    /// What the seeds are drawn from.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// No start goes on for more rounds than this, though points still change their groups.
+    /// Largest number of rounds of a start, even if points still change their groups.
     pub max_rounds: usize,
 }
 
@@ -50,76 +52,76 @@ impl Default for KMeansSettings {
     }
 }
 
-/// Groups of points.
+/// Result of [`kmeans`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct KMeans {
-    /// The middle of each group; fixed ones first, as they were given.
+    /// The centroid of each group; fixed ones first, in their given order.
     pub centroids: Vec<Vec3>,
-    /// The group of each point: the nearest centroid, of equally near ones the first.
+    /// The group of each point: the nearest centroid, the first of equally near ones.
     pub labels: Vec<u32>,
     /// Sum over all points of the squared distance to their centroid.
     pub square_error: f64,
-    /// How many rounds the best start took.
+    /// Number of rounds of the best start.
     pub rounds: usize,
 }
 
-/// Why points cannot be grouped.
+/// Error of grouping points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum KMeansError {
-    /// Nothing was asked for.
+    /// A request for zero groups.
     #[error("0 groups were asked for; ask for at least 1")]
     NoGroups,
-    /// Groups would be empty.
+    /// More groups than points.
     #[error("{groups} groups are more than {points} points; ask for fewer groups")]
     MoreGroupsThanPoints {
-        /// How many groups were asked for.
+        /// Number of groups requested.
         groups: usize,
-        /// How many points there are.
+        /// Number of points.
         points: usize,
     },
-    /// Groups would be empty, since points coincide.
+    /// More groups than different points.
     #[error("{groups} groups are more than {distinct} different places of points; ask for fewer groups")]
     MoreGroupsThanPlaces {
-        /// How many groups were asked for.
+        /// Number of groups requested.
         groups: usize,
-        /// How many different points there are.
+        /// Number of different points.
         distinct: usize,
     },
-    /// More centroids are fixed than groups were asked for.
+    /// More fixed centroids than groups.
     #[error("{fixed} fixed centroids are more than {groups} groups; ask for more groups or fix fewer")]
     MoreFixedThanGroups {
-        /// How many centroids are fixed.
+        /// Number of fixed centroids.
         fixed: usize,
-        /// How many groups were asked for.
+        /// Number of groups requested.
         groups: usize,
     },
-    /// A coordinate of a point is infinite or not a number.
+    /// A point that is not finite.
     #[error("point {point} has a coordinate that is not a finite number; remove it or repair the mesh")]
     NotFinite {
-        /// Its index.
+        /// Index of the point.
         point: usize,
     },
-    /// A coordinate of a fixed centroid is infinite or not a number.
+    /// A fixed centroid that is not finite.
     #[error("fixed centroid {centroid} has a coordinate that is not a finite number")]
     FixedNotFinite {
-        /// Its index.
+        /// Index of the centroid.
         centroid: usize,
     },
     /// More points than can be summed.
     #[error("{points} points are more than {} that can be grouped; simplify the mesh first", space::MAX_POINTS)]
     TooMany {
-        /// How many were given.
+        /// Number of points.
         points: usize,
     },
-    /// The caller's progress function said stop.
+    /// Cancelled by the progress callback.
     #[error("grouping was cancelled")]
     Cancelled,
 }
 
-/// Groups points around centroids; `fixed` ones come first in the answer, never move and count among the groups.
+/// Groups points around centroids; `fixed` ones come first in the result, never move and count among the groups.
 ///
-/// The answer depends on points, fixed centroids and settings alone, not on the number of threads. A group that loses
-/// all its points begins anew at the point that is furthest from its centroid.
+/// The result depends on points, fixed centroids and settings alone, not on the number of threads. A group that loses
+/// all its points is moved to the point that is furthest from its centroid.
 pub fn kmeans(
     points: &[Vec3],
     fixed: &[Vec3],
@@ -129,7 +131,7 @@ pub fn kmeans(
     run::<true>(points, fixed, settings, progress)
 }
 
-/// The same as [`kmeans`] without any bounds: all distances in all rounds. For comparison.
+/// Groups points as [`kmeans`] does, without any bounds: all distances in all rounds. For comparison.
 pub fn kmeans_plain(
     points: &[Vec3],
     fixed: &[Vec3],
@@ -151,7 +153,7 @@ fn run<const BOUNDS: bool>(
     let coarse = space.coarse(settings.groups);
     let mut best: Option<lloyd::State> = None;
     for start in 0..starts {
-        // The number of rounds is not known, so a start's part is halved again and again.
+        // The number of rounds is not known, so each round halves the remaining share of a start.
         let report = |round: usize| {
             let part = 1.0 - 1.0 / (1.0 + round as f32 / 16.0);
             if progress((start as f32 + part) / starts as f32) { Ok(()) } else { Err(KMeansError::Cancelled) }
@@ -170,8 +172,8 @@ fn run<const BOUNDS: bool>(
                 (seeds, lloyd::JUMPS, 1.0)
             }
         };
-        let pace = lloyd::Pace { rounds: settings.max_rounds, jumps, stride };
-        let state = lloyd::run::<BOUNDS>(&space, seeds, &pace, &report)?;
+        let schedule = lloyd::Schedule { rounds: settings.max_rounds, jumps, stride };
+        let state = lloyd::run::<BOUNDS>(&space, seeds, &schedule, &report)?;
         if best.as_ref().is_none_or(|best| state.square_error < best.square_error) {
             best = Some(state);
         }

@@ -3,17 +3,16 @@
 //! Exact for the mean Euclidean distance, in linear memory and far from quadratic time. Average linkage is *reducible*
 //! (two clusters that merge come no nearer to any third), so all pairs of clusters that are each other's nearest may be
 //! merged at once, in any order, and give one and the same history (Murtagh, "A survey of recent advances in
-//! hierarchical clustering algorithms", 1983). What remains is to find nearest clusters without looking at all pairs of
-//! points:
+//! hierarchical clustering algorithms", 1983). Nearest clusters are found without visiting all pairs of points:
 //!
-//! 1. While there are many clusters, each keeps its mean and its variance. With Δ between two means, the mean distance lies
-//!    in |Δ| ≤ d ≤ √(Δ² + var + var) (Jensen's inequality both ways), which leaves a handful of candidates; a hierarchy of
-//!    boxes over the means finds them, and sums over their pairs of points decide.
-//! 2. Once a few hundred clusters are left, a matrix of all mean distances is filled, far pairs from their moments up to the
-//!    fourth with a proven bound on the rest, and kept by Lance and Williams' formula.
+//! 1. While there are many clusters, each keeps its mean and its variance. With Δ between two means, the mean distance
+//!    lies in |Δ| ≤ d ≤ √(Δ² + var + var) (Jensen's inequality both ways), which leaves a handful of candidates; a
+//!    hierarchy of boxes over the means finds them, and sums over their pairs of points decide.
+//! 2. Once a few hundred clusters are left, a matrix of all mean distances is filled, far pairs from their moments up
+//!    to the fourth with a proven bound on the rest, and kept by Lance and Williams' formula.
 //!
-//! Sums decide in single precision only where their error cannot matter; near ties are summed again in double precision,
-//! and ties go to the clusters that were there first. So the answer depends on the points alone.
+//! Sums decide in single precision only where their error cannot matter; near ties are summed again in double
+//! precision, and ties go to the clusters that were there first. So the answer depends on the points alone.
 
 mod boxes;
 mod dense;
@@ -28,29 +27,30 @@ mod search;
 use glam::Vec3;
 use thiserror::Error;
 
-/// Called now and then with the part that is done (0 to 1, never falling); `false` cancels.
+/// Progress callback, called now and then with the finished share (0 to 1, never falling); it cancels by returning
+/// `false`.
 pub type Progress<'a> = &'a (dyn Fn(f32) -> bool + Sync);
 
-/// More points than this are refused: clusters are numbered in 32 bits, and one bit is kept.
+/// Largest number of points: clusters have 32-bit numbers, of which one bit is reserved.
 const MAX_POINTS: usize = (1 << 30) - 1;
 
-/// One merge of two clusters. Points are clusters 0 to n - 1, merge `i` makes cluster n + i.
+/// Merge of two clusters. Points are clusters 0 to n - 1, merge `i` makes cluster n + i.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Merge {
     /// The cluster with the lower number.
     pub first: u32,
     /// The cluster with the higher number.
     pub second: u32,
-    /// Their distance when they were merged.
+    /// Distance of the two clusters.
     pub height: f32,
-    /// Points in the merged cluster.
+    /// Number of points in the merged cluster.
     pub size: u32,
 }
 
 /// The whole merge history, by height.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Dendrogram {
-    /// How many points there are.
+    /// Number of points.
     pub points: usize,
     /// The merges, lowest first; one fewer than points.
     pub merges: Vec<Merge>,
@@ -63,7 +63,7 @@ impl Dendrogram {
     pub fn cut(&self, groups: usize) -> Vec<u32> {
         let points = self.points;
         let applied = points.saturating_sub(groups.max(1)).min(self.merges.len());
-        // From the last merge applied down, both parts belong to what their whole belongs to.
+        // From the last applied merge down, both parts get the label of their whole.
         let mut owner: Vec<u32> = (0..(points + applied) as u32).collect();
         for (index, merge) in self.merges[..applied].iter().enumerate().rev() {
             let whole = owner[points + index];
@@ -94,25 +94,25 @@ impl Dendrogram {
     }
 }
 
-/// Why points cannot be clustered.
+/// Error of clustering points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum LinkageError {
-    /// A coordinate is infinite or not a number.
+    /// A coordinate that is not finite.
     #[error("point {point} has a coordinate that is not a finite number; remove it or repair the mesh")]
     NotFinite {
-        /// Its index.
+        /// Index of the point.
         point: usize,
     },
-    /// Nothing to cluster.
+    /// No points to cluster.
     #[error("there are no points to group; pick a mesh with vertices")]
     Empty,
-    /// More than clusters can be numbered.
+    /// More points than clusters can be numbered.
     #[error("{points} points are more than {MAX_POINTS} that can be grouped; simplify the mesh first")]
     TooMany {
-        /// How many were given.
+        /// Number of points.
         points: usize,
     },
-    /// The caller's progress function said stop.
+    /// Cancelled by the progress callback.
     #[error("grouping was cancelled")]
     Cancelled,
 }
@@ -148,8 +148,7 @@ pub fn average_linkage_1d(values: &[f32], progress: Progress) -> Result<Dendrogr
 
 /// Average linkage of points in space by the mean *squared* distance: an instant preview of [`average_linkage`].
 ///
-/// The mean squared distance is Δ² + var + var exactly, so no pair of points is ever looked at. Heights are in squared
-/// units.
+/// The mean squared distance is Δ² + var + var exactly, so no pair of points is visited. Heights are in squared units.
 pub fn squared_linkage(points: &[Vec3], progress: Progress) -> Result<Dendrogram, LinkageError> {
     check(points)?;
     engine::run::<true>(points, progress)

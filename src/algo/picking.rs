@@ -1,19 +1,19 @@
-//! Picking: which joint the user means.
+//! Picking: the joint that a click refers to.
 //!
-//! A click means the joint spatially nearest to where its ray first meets the mesh (Pencil Rigger, section 3.1), so small
-//! joints are easy to hit. Clicking the same spot again cycles through the next nearest, which that paper leaves to the
-//! future. Where the ray misses the mesh, distances are measured on the view plane instead.
+//! A click picks the joint nearest in space to the first hit of its ray on the mesh (Pencil Rigger, section 3.1), so
+//! small joints are easy to hit. Clicking the same spot again cycles through the next nearest joints, which that paper
+//! leaves to the future. If the ray misses the mesh, distances are measured on the view plane instead.
 
 use glam::{Vec2, Vec3};
 
 use super::view::ViewPlane;
 use crate::mesh::surface::Surface;
 
-/// The joints that a click at `point` may mean, nearest first; empty only if there are none.
+/// The joints that a click at `point` may pick, nearest first; empty only without joints.
 ///
-/// `joints` are positions in the surface's space; those that are not finite are never picked. `reach` is a length in
-/// model units (some pixels at the current zoom): the list holds the nearest joint, the next nearest, and all joints within
-/// twice the nearest one's distance plus `reach`. One ray; O(joints · log joints).
+/// `joints` are positions in the surface's space; joints that are not finite are never picked. `reach` is a length in
+/// model units (some pixels at the current zoom): the list holds the nearest joint, the next nearest, and all joints
+/// within twice the nearest one's distance plus `reach`. One ray; O(joints · log joints).
 pub fn candidates(surface: &Surface, plane: &ViewPlane, point: Vec2, joints: &[Vec3], reach: f32) -> Vec<usize> {
     let ray = plane.ray(point);
     let mut hits = Vec::new();
@@ -21,7 +21,7 @@ pub fn candidates(surface: &Surface, plane: &ViewPlane, point: Vec2, joints: &[V
     candidates_at(hits.first().map(|hit| ray.at(hit.distance)), plane, point, joints, reach)
 }
 
-/// As [`candidates`], where the ray's first hit is known.
+/// Candidates as [`candidates`] gives them, for a known first hit of the ray.
 pub fn candidates_at(
     first_hit: Option<Vec3>,
     plane: &ViewPlane,
@@ -35,7 +35,7 @@ pub fn candidates_at(
     }
 }
 
-/// As [`candidates`], measured on the view plane: for a click beside the mesh.
+/// Candidates as [`candidates`] gives them, measured on the view plane: for a click beside the mesh.
 pub fn nearest_on_plane(plane: &ViewPlane, point: Vec2, joints: &[Vec3], reach: f32) -> Vec<usize> {
     let distance = |joint: &Vec3| plane.project(*joint).map_or(f32::NAN, |place| place.distance(point));
     nearest(joints.iter().map(distance), reach)
@@ -48,18 +48,18 @@ pub fn in_box(plane: &ViewPlane, corners: [Vec2; 2], joints: &[Vec3]) -> Vec<usi
     (0..joints.len()).filter(|&i| plane.project(joints[i]).is_some_and(inside)).collect()
 }
 
-/// Indices by rising distance, as far as they are near; equal distances by index.
+/// Indices by rising distance up to the limit; equal distances by index.
 fn nearest(distances: impl Iterator<Item = f32>, reach: f32) -> Vec<usize> {
     let mut order: Vec<(f32, usize)> =
         distances.enumerate().map(|(i, d)| (d, i)).filter(|(d, _)| d.is_finite()).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let limit = order.first().map_or(0.0, |&(least, _)| 2.0 * least + reach.max(0.0));
-    // The second nearest always takes part, so that a second click never does nothing.
+    // The second nearest is always included, so that a second click always has an effect.
     let near = order.partition_point(|&(d, _)| d <= limit).max(2).min(order.len());
     order.into_iter().take(near).map(|(_, i)| i).collect()
 }
 
-/// Remembers the last click, so that the next one at the same spot takes the next joint.
+/// State of repeated clicks: a click at the same spot as the last one picks the next joint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PickCycle {
     last: Option<(Vec2, Vec<usize>, usize)>,
@@ -68,8 +68,9 @@ pub struct PickCycle {
 impl PickCycle {
     /// The joint that a click at `point` picks from `candidates` (nearest first).
     ///
-    /// A click within `same_spot` of the last one, with the same candidates in whatever order, takes the one after the last
-    /// picked in the order of the first click, and starts over after the furthest. Any other click takes the nearest.
+    /// A click within `same_spot` of the last one, with the same candidates in any order, picks the candidate after the
+    /// last picked one in the order of the first click, and starts over after the furthest. Any other click picks the
+    /// nearest.
     pub fn click(&mut self, point: Vec2, same_spot: f32, candidates: &[usize]) -> Option<usize> {
         let next = self.next(point, same_spot, candidates);
         match (&mut self.last, next) {
@@ -79,7 +80,7 @@ impl PickCycle {
         self.last.as_ref().map(|(_, order, picked)| order[*picked])
     }
 
-    /// What [`PickCycle::click`] would pick.
+    /// The joint that [`PickCycle::click`] would pick.
     pub fn peek(&self, point: Vec2, same_spot: f32, candidates: &[usize]) -> Option<usize> {
         match (&self.last, self.next(point, same_spot, candidates)) {
             (Some((_, order, _)), Some(next)) => Some(order[next]),
@@ -87,7 +88,7 @@ impl PickCycle {
         }
     }
 
-    /// The place in the order of the last click that a click goes on to; `None` if it is not at the same spot.
+    /// The index in the order of the last click that the next click picks; `None` if it is not at the same spot.
     fn next(&self, point: Vec2, same_spot: f32, candidates: &[usize]) -> Option<usize> {
         let (spot, order, picked) = self.last.as_ref()?;
         let same = spot.distance(point) <= same_spot

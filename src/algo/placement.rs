@@ -1,9 +1,9 @@
 //! Placing a joint in depth: a ray through the surface, and a point between its hits.
 //!
-//! A joint goes to the midpoint of the closest and the furthest hit; to the hit itself if there is only one; nowhere if
-//! there is none (Pencil Rigger, section 3.2). A depth other than one half reaches any point between the two, which that
-//! paper's section 5.1 leaves to the future. Where a ray goes through several volumes, an arm before a torso or one leg
-//! behind the other, [`PlaceSettings::volume`] takes the entry and exit of one of them instead.
+//! A joint is placed at the midpoint of the closest and the furthest hit, at the hit itself if there is only one, and
+//! not at all without hits (Pencil Rigger, section 3.2). A depth other than one half reaches any point between the two,
+//! which that paper's section 5.1 leaves to the future. If a ray goes through several volumes, such as an arm before a
+//! torso or one leg behind the other, [`PlaceSettings::volume`] takes the entry and exit of one of them instead.
 
 use glam::Vec3;
 
@@ -12,13 +12,13 @@ use crate::mesh::{
     surface::{Surface, Volume, volumes},
 };
 
-/// How a ray's hits become a position.
+/// Settings of the conversion of a ray's hits to a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaceSettings {
-    /// 0 at the near hit, 1 at the far hit; clamped, and one half if it is not a number.
+    /// Depth: 0 at the near hit, 1 at the far hit; clamped, and one half for NaN.
     pub depth: f32,
-    /// `None` spans the closest and the furthest hit. `Some(n)` takes the n-th entry/exit pair from the camera, counted
-    /// from one and starting over after the last; 0 counts as 1.
+    /// Volume: `None` spans the closest and the furthest hit. `Some(n)` takes the n-th entry/exit pair from the camera,
+    /// counted from one and starting over after the last; 0 counts as 1.
     pub volume: Option<u32>,
 }
 
@@ -29,34 +29,34 @@ impl Default for PlaceSettings {
 }
 
 impl PlaceSettings {
-    /// The depth to use: within 0 and 1.
+    /// The depth clamped to 0 to 1.
     pub fn depth(&self) -> f32 {
         if self.depth.is_nan() { 0.5 } else { self.depth.clamp(0.0, 1.0) }
     }
 }
 
-/// What a ray says about where a joint should go.
+/// Position of a joint that is placed with a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Placement {
-    /// The ray meets nothing: no joint.
+    /// No joint: the ray misses the surface.
     Nothing,
-    /// The ray meets the surface once: the joint goes there.
+    /// A joint at the only hit of the ray.
     Single {
-        /// The hit.
+        /// Position of the hit, in the surface's space.
         position: Vec3,
     },
-    /// The ray meets the surface at least twice.
+    /// A joint between two hits.
     Between {
-        /// Where the joint goes.
+        /// Position of the joint, in the surface's space.
         position: Vec3,
         /// The near end of the span that the depth runs along.
         near: Vec3,
-        /// The far end of it.
+        /// The far end of the span.
         far: Vec3,
-        /// Which volume that span is, counted from one, if one was asked for.
+        /// Number of the span's volume, from one, if one was requested.
         volume: Option<u32>,
-        /// How many volumes the ray goes through. More than one is worth telling the user: the midpoint of the closest
-        /// and furthest hit may lie between them, outside of everything.
+        /// Number of volumes on the ray. More than one is worth a note to the user: the midpoint of the closest and
+        /// furthest hit may lie between volumes, outside the body.
         volumes: u32,
     },
 }
@@ -71,16 +71,16 @@ impl Placement {
     }
 }
 
-/// Where a joint goes that is placed with `ray`: one query of the surface.
+/// Places a joint with `ray`: one query of the surface.
 pub fn place(surface: &Surface, ray: &Ray, settings: PlaceSettings) -> Placement {
     let mut hits = Vec::new();
     surface.hits(ray, &mut hits);
     place_hits(ray, &hits, settings)
 }
 
-/// Where a joint goes, given all `hits` of `ray`, nearest first.
+/// Places a joint, given all `hits` of `ray`, nearest first.
 ///
-/// A volume is asked for but the hits make no pair (an open sheet): the span of all hits is taken.
+/// If a volume is requested but the hits make no pair (an open sheet), the span of all hits is taken.
 pub fn place_hits(ray: &Ray, hits: &[Hit], settings: PlaceSettings) -> Placement {
     let (first, last) = match hits {
         [] => return Placement::Nothing,

@@ -1,14 +1,14 @@
-//! A freehand stroke becomes a chain of joints.
+//! Strokes: a chain of joints from a freehand stroke.
 //!
-//! Pencil Rigger (section 5.3) plans it so: a joint at both ends; then, while some point of the stroke lies too far from
-//! the line between two neighbours, a joint at the furthest point on either side of that line, again and again; and
-//! each joint placed in depth like a click. Two things are added here, because a hand is not that steady and a midpoint
-//! of hits is not that central: the stroke stays in the volume it runs in (one leg of two, the arm before the torso), and
-//! each joint takes one step to the centroid of the limb's cross-section.
+//! Pencil Rigger (section 5.3) proposes a joint at both ends; then, while some point of the stroke lies too far from
+//! the line between two neighbours, a joint at the furthest point on either side of that line, recursively; and each
+//! joint is placed in depth like a click. Two steps are added here, because a hand is unsteady and a midpoint of hits
+//! is not central: the stroke stays in the volume it runs in (one leg of two, the arm before the torso), and each joint
+//! takes one step to the centroid of the limb's cross-section.
 //!
 //! The work is in two parts. [`StrokeSamples`] follows the stroke through the mesh with rays, once. From these samples
-//! [`StrokeSamples::chain`] chooses joints, which takes microseconds, so that a preview can vary the threshold or
-//! the number of joints while the user watches.
+//! [`StrokeSamples::chain`] chooses joints, which takes microseconds, so that a preview can vary the threshold or the
+//! number of joints while the user watches.
 
 mod axis;
 mod corners;
@@ -32,26 +32,26 @@ use self::{
 use super::{placement::PlaceSettings, view::ViewPlane};
 use crate::mesh::{ray::Hit, surface::Surface};
 
-/// The most joints a stroke becomes, whatever is asked for.
+/// Largest number of joints of a stroke, for any setting.
 pub const MAX_JOINTS: usize = 1000;
 
-/// Less of a volume than this many radii under a joint is its edge.
+/// Depth of a volume, in radii, below which a joint is at the volume's edge.
 const EDGE: f32 = 0.5;
-/// How much of the volume, in depth, lies between a joint and either side of it at least.
+/// Least share of the volume's depth between a joint and either side of the volume.
 const MARGIN: f32 = 0.15;
 
-/// The fewest joints of a [limb](ChainChoice::Limb).
+/// The least number of joints of a [limb](ChainChoice::Limb).
 const LIMB_JOINTS: usize = 3;
 
-/// How a stroke is placed in depth.
+/// Settings of a stroke's placement in depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrokeSettings {
-    /// Depth and volume, as for a click. The volume is chosen where the stroke starts, and again where it divides (a pelvis
-    /// into legs); in between the stroke stays in it. Without a number it is the volume that a click there would hit, or
-    /// the nearest if the stroke runs much more closely along the middle of that one. A depth other than one half
-    /// is kept: recentring then only moves the joint across the view.
+    /// Depth and volume, as for a click. The volume is chosen at the start of the stroke, and again where it divides (a
+    /// pelvis into legs); in between the stroke stays in its volume. Without a number it is the volume that a click
+    /// there would hit, or the nearest one if the stroke runs much more closely along the middle of that one. A depth
+    /// other than one half is kept: recentring then only moves the joint across the view.
     pub place: PlaceSettings,
-    /// Whether each joint takes one step to the centroid of the limb's section.
+    /// Recentring: each joint takes one step to the centroid of the limb's section.
     pub recentre: bool,
 }
 
@@ -61,34 +61,34 @@ impl Default for StrokeSettings {
     }
 }
 
-/// Which joints a stroke becomes.
+/// Choice of the joints of a stroke.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ChainChoice {
-    /// Joints wherever the stroke strays further than this from the line between two neighbours; model units on the
-    /// view plane. Zero, negative or NaN makes a joint of every point of the stroke.
+    /// Joints wherever the stroke is further than this from the line between two neighbours; model units on the view
+    /// plane. Zero, negative or NaN makes a joint of every point of the stroke.
     Threshold(f32),
-    /// As [`ChainChoice::Threshold`], but never fewer than three joints: a limb that is drawn straight has a joint to bend
-    /// at all the same, where it fits the limb best.
+    /// Joints as for [`ChainChoice::Threshold`], but at least three: a limb drawn straight gets a joint to bend at,
+    /// where it fits the limb best.
     Limb(f32),
     /// Exactly this many joints, where they fit the stroke and the limb best; fewer than two count as two, more than
     /// [`MAX_JOINTS`] as that many.
     Joints(usize),
 }
 
-/// Why a stroke cannot become a chain.
+/// Error of making a chain of a stroke.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum StrokeError {
-    /// Fewer than two different finite points.
+    /// A stroke with fewer than two different finite points.
     #[error(
         "the stroke has {finite} usable points of {given}, which make no line: draw at least two different points in the view"
     )]
     TooShort {
-        /// Points given.
+        /// Number of points given.
         given: usize,
-        /// Finite points among them, repetitions counted once.
+        /// Number of finite points, repetitions counted once.
         finite: usize,
     },
-    /// No point of the stroke lies over the mesh.
+    /// A stroke without a point over the mesh.
     #[error("the stroke does not cross the mesh in this view: draw it over the mesh, or turn the view")]
     Misses,
 }
@@ -96,48 +96,48 @@ pub enum StrokeError {
 /// A joint of a chain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedJoint {
-    /// Where it goes, in the surface's space.
+    /// Position in the surface's space.
     pub position: Vec3,
     /// Radius of the circle with the area of the limb's section here; `None` if the surface is open here or recentring is off.
     pub radius: Option<f32>,
-    /// The point of the stroke it stands for, on the view plane.
+    /// The point of the stroke for this joint, on the view plane.
     pub source: Vec2,
-    /// Hits of the ray through that point; 1 means that the joint lies on the surface.
+    /// Number of hits of the ray through that point; 1 means that the joint lies on the surface.
     pub hits: usize,
 }
 
-/// What the user should hear about a stroke.
+/// Note to the user about a stroke.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StrokeNote {
-    /// The stroke begins or ends beside the mesh; the end joint stands at the nearest point of the stroke that is over it.
+    /// The stroke begins or ends beside the mesh; the end joint is at the nearest point of the stroke over the mesh.
     EndMoved {
-        /// True for the stroke's start, false for its end.
+        /// End of the stroke: `true` for its start.
         start: bool,
     },
-    /// Where the stroke starts, the ray goes through several volumes, of which this one, counted from one, was taken.
+    /// The ray at the start of the stroke goes through several volumes; one of them was chosen.
     VolumeChosen {
-        /// The volume taken.
+        /// Number of the chosen volume, from one.
         volume: u32,
-        /// How many there are.
+        /// Number of volumes.
         of: u32,
     },
-    /// Some inner joints were left out because the mesh has a gap where they would be.
+    /// Some inner joints were left out because the mesh has a gap at their places.
     JointsLeftOut {
-        /// How many.
+        /// Number of joints left out.
         count: usize,
     },
 }
 
-/// The joints a stroke becomes, in the stroke's order: each is the parent of the next.
+/// The joints of a stroke, in the stroke's order: each is the parent of the next.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StrokeChain {
     /// The joints; at least one, two unless both ends fall on one point.
     pub joints: Vec<PlacedJoint>,
-    /// What the user should hear.
+    /// Notes to the user.
     pub notes: Vec<StrokeNote>,
 }
 
-/// A stroke followed through the mesh: everything a chain is chosen from.
+/// A stroke followed through the mesh: all the data from which chains are chosen.
 #[derive(Debug, Clone)]
 pub struct StrokeSamples {
     plane: ViewPlane,
@@ -170,7 +170,8 @@ impl StrokeSamples {
         };
         let follow = |volume| Track::follow(surface, plane, &path, volume, None).map(with_axis);
         let (mut track, mut axis) = follow(settings.place.volume).ok_or(StrokeError::Misses)?;
-        // A volume that the stroke leaves soon is not what it follows: a hand before the hip at which a leg begins.
+        // A volume that the stroke leaves soon is not its limb: for example a hand before the hip at which a leg
+        // begins.
         if settings.place.volume.is_none() && (track.samples.len() as f32) < 0.8 * SAMPLES as f32 {
             let others = (0..track.volumes_at_start as usize).rev();
             let others = others.filter_map(|first| Track::follow(surface, plane, &path, None, Some(first)));
@@ -183,14 +184,15 @@ impl StrokeSamples {
         }
         if settings.place.volume.is_none()
             && track.ambiguous
-            && let Some(near) = follow(Some(1)).filter(|near| is_meant(near, (&track, axis.as_ref())))
+            && let Some(near) = follow(Some(1)).filter(|near| follows_front(near, (&track, axis.as_ref())))
         {
             (track, axis) = near;
         }
         Ok(Self { plane: *plane, settings, path, track, axis, fan })
     }
 
-    /// Midway through the volume under the stroke, at even lengths along it, in the surface's space; at least one place.
+    /// Points midway through the volume under the stroke, at even lengths along it, in the surface's space; at least
+    /// one.
     pub fn middles(&self) -> impl Iterator<Item = Vec3> {
         self.track.samples.iter().map(|sample| sample.middle)
     }
@@ -224,7 +226,7 @@ impl StrokeSamples {
         let mut before = None;
         for at in places {
             let at = at.clamp(first, last);
-            // Several joints beyond the mesh's edge all land on its last point: one is enough.
+            // Several joints beyond the mesh's edge are all placed at its last point: one is enough.
             if before == Some(at) {
                 continue;
             }
@@ -253,7 +255,7 @@ impl StrokeSamples {
             Some((centroid, radius)) if self.settings.recentre && depth == 0.5 => {
                 self.kept_inside(surface, centroid, ray.at(span.middle()), radius, at, hits)
             }
-            // The chosen depth, at the place across the view that the section asks for.
+            // The chosen depth, at the section's centroid across the view.
             Some((centroid, _)) if self.settings.recentre => {
                 let ray = self.plane.project(centroid).map_or(ray, |point| self.plane.ray(point));
                 surface.hits(&ray, hits);
@@ -267,9 +269,9 @@ impl StrokeSamples {
 }
 
 impl StrokeSamples {
-    /// A joint moved from `position` as little as puts it well inside of the volume: in depth, or, where the ray through it
-    /// meets no more than an edge of that, towards `anchor`, which is inside. Sections that are open or carried on from
-    /// elsewhere may have led it out.
+    /// A joint moved from `position` by the least distance that puts it well inside of the volume: in depth, or, if the
+    /// ray through it meets only an edge of the volume, towards `anchor`, which is inside. Sections that are open or
+    /// extrapolated may have led the joint out.
     fn kept_inside(
         &self,
         surface: &Surface,
@@ -296,9 +298,9 @@ impl StrokeSamples {
     }
 }
 
-/// Whether a stroke means the volumes nearest to the camera rather than those that a click would take: it runs along their
-/// middle much more closely, an arm before the torso, or stays over them much longer.
-fn is_meant(near: &(Track, Option<Axis>), usual: (&Track, Option<&Axis>)) -> bool {
+/// Returns `true` if a stroke follows the volumes nearest to the camera rather than those that a click would hit: it
+/// runs along their middle much more closely (an arm before the torso), or stays over them much longer.
+fn follows_front(near: &(Track, Option<Axis>), usual: (&Track, Option<&Axis>)) -> bool {
     let (near_length, usual_length) = (near.0.samples.len() as f32, usual.0.samples.len() as f32);
     let closer = match (&near.1, usual.1) {
         (Some(near), Some(usual)) => {
@@ -309,7 +311,7 @@ fn is_meant(near: &(Track, Option<Axis>), usual: (&Track, Option<&Axis>)) -> boo
     near_length >= 0.9 * usual_length && (closer || usual_length < 0.8 * near_length)
 }
 
-/// Samples and chooses in one call; see [`StrokeSamples`] for previews.
+/// Samples a stroke and chooses its joints in one call; see [`StrokeSamples`] for previews.
 ///
 /// # Errors
 /// As [`StrokeSamples::new`].

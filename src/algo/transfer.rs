@@ -1,8 +1,8 @@
-//! Skin weights of one mesh for another of about the same shape.
+//! Transfer of skin weights from one mesh to another of about the same shape.
 //!
 //! After Abdrashitov and others 2023, "Robust skin weights transfer via weight inpainting": a point takes the weights
-//! of the closest point of the source where that is near and faces the same way; all other points are inpainted from
-//! those by a sparse solve on the target's vertex graph.
+//! of the closest point of the source if that is near and faces the same way; all other points are inpainted from these
+//! by a sparse solve on the target's vertex graph.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -15,16 +15,16 @@ use crate::mesh::{model::Weights, surface::Surface};
 pub struct TransferMesh<'a> {
     /// Positions.
     pub points: &'a [Vec3],
-    /// Corners of triangles over `points`; those out of range are ignored.
+    /// Corners of triangles over `points`; triangles with a corner out of range are ignored.
     pub triangles: &'a [[u32; 3]],
 }
 
-/// How [`transfer_weights`] works.
+/// Settings of [`transfer_weights`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferSettings {
-    /// Closest points further than this share of the diagonal of the source's box are not trusted.
+    /// Largest distance of a trusted closest point, as a share of the diagonal of the source's box.
     pub distance: f32,
-    /// Closest points where the cosine of the angle between both normals is less than this are not trusted.
+    /// Least cosine of the angle between both normals at a trusted closest point.
     pub cosine: f32,
     /// The largest number of influences of a point.
     pub influences: usize,
@@ -37,22 +37,23 @@ impl Default for TransferSettings {
     }
 }
 
-/// Where the weights of the target's points came from; the counts add up to its points.
+/// Sources of the weights of the target's points; the counts add up to the number of points.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TransferReport {
-    /// A point of the source is at the same place: its weights unchanged.
+    /// Points at the place of a source point, with its weights unchanged.
     pub copied: usize,
-    /// The closest point of the source, near and facing the same way.
+    /// Points with the weights of the closest source point, which is near and faces the same way.
     pub matched: usize,
-    /// Inpainted from matched points around.
+    /// Points inpainted from matched points around.
     pub inpainted: usize,
-    /// The closest point of the source although it is far or faces another way, as nothing around matched.
+    /// Points with the weights of the closest source point although it is far or faces another way, because no point
+    /// around matched.
     pub nearest: usize,
-    /// Points without weights: they are not finite.
+    /// Points without weights, because they are not finite.
     pub empty: usize,
 }
 
-/// Why weights cannot be transferred.
+/// Error of transferring weights.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TransferError {
     /// The weights are not those of the source mesh.
@@ -63,7 +64,7 @@ pub enum TransferError {
         /// The number of points of the weights.
         weights: usize,
     },
-    /// Nothing to take weights from.
+    /// A source without weights.
     #[error("no finite point of the source mesh has weights: bind it first")]
     NoWeights,
 }
@@ -71,9 +72,9 @@ pub enum TransferError {
 /// Transfers weights from `source` to `target`.
 ///
 /// Both meshes are in one space, in any unit; joint indices stay as they are. All finite points of the target get
-/// weights that sum to one (copied ones stay as they were). A shell that is inside-out against the source is
-/// recognised by the majority of its points. Independent of the number of threads. Cost: a closest-point query a point
-/// and a sparse factorisation of what is inpainted.
+/// weights that sum to one (copied ones stay as they were). A shell that is inside-out against the source is recognised
+/// by the majority of its points. Independent of the number of threads. Cost: a closest-point query a point and a
+/// sparse factorisation over the inpainted points.
 ///
 /// # Errors
 /// [`TransferError`]: the weights do not fit the source, or it has none.
@@ -106,7 +107,7 @@ pub fn transfer_weights(
         let side = if facing < 0.0 { -1.0 } else { 1.0 };
         for &n in &island {
             let Some(found) = &closest[n as usize] else { continue };
-            // Without a normal on either side there is nothing to compare.
+            // Without a normal on either side, directions cannot be compared.
             let blind = found.normal == Vec3::ZERO || normals[n as usize] == Vec3::ZERO;
             let trusted = near(n) && (blind || cosine(n) * side >= settings.cosine);
             if found.same || (trusted && !found.influences.is_empty()) {
@@ -149,14 +150,14 @@ enum From {
 /// The closest point of the source.
 struct Closest {
     distance: f32,
-    /// Zero if the source has none there.
+    /// Normal of the source, zero without one.
     normal: Vec3,
     influences: Sparse,
-    /// A weighted point of the source is at the very same place.
+    /// Marks a weighted point of the source at the very same place.
     same: bool,
 }
 
-/// What weights are taken from.
+/// Source of the weights.
 struct Source<'a> {
     mesh: TransferMesh<'a>,
     weights: &'a Weights,
@@ -235,7 +236,7 @@ fn node_normals(graph: &Graph, mesh: TransferMesh) -> Vec<Vec3> {
         let corner = |i: usize| mesh.points.get(triangle[i] as usize).and_then(|_| graph.node(triangle[i] as usize));
         if let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) {
             let (pa, pb, pc) = (graph.place(a), graph.place(b), graph.place(c));
-            // Scaled edge by edge, so that tiny units do not underflow.
+            // Edges are scaled first, so that tiny units do not underflow.
             let (u, v) = (pb - pa, pc - pa);
             let area = u.length() * v.length();
             let normal = u.normalize_or_zero().cross(v.normalize_or_zero()) * area.max(f32::MIN_POSITIVE);
@@ -245,7 +246,7 @@ fn node_normals(graph: &Graph, mesh: TransferMesh) -> Vec<Vec3> {
         }
     }
     for normal in &mut normals {
-        // Through the largest component first: squares of tiny numbers vanish.
+        // The largest component is divided out first: squares of tiny numbers vanish.
         let largest = normal.abs().max_element();
         *normal =
             if largest > 0.0 && largest.is_finite() { (*normal / largest).normalize_or_zero() } else { Vec3::ZERO };

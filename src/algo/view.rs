@@ -1,7 +1,7 @@
-//! The plane a user draws in: from points on it to rays into the model, and back.
+//! View planes: the plane that a user draws on, with the mapping from its points to rays into the model, and back.
 //!
-//! Points of a view plane are lengths along the view's right and up axes, in model units, from the plane's origin
-//! (for clicks and strokes in files: the model's origin). An orthographic plane looks along its normal everywhere; a
+//! Points of a view plane are lengths along the view's right and up axes, in model units, from the plane's origin (for
+//! clicks and strokes in files: the model's origin). An orthographic plane looks along its normal everywhere; a
 //! perspective one looks from an eye through the point.
 
 use bevy::math::ops;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::ray::Ray;
 
-/// Where the camera stands, for a character that has Y up and faces +Z.
+/// Position of the camera, for a character that has Y up and faces +Z.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub enum View {
     /// The camera is on +Z and sees the face; right is +X, the character's left.
@@ -55,7 +55,7 @@ impl View {
     }
 }
 
-/// A plane to draw in.
+/// A plane to draw on.
 ///
 /// `right` and `up` have unit length and are perpendicular; the camera stands on the side of `right × up`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,15 +66,15 @@ pub struct ViewPlane {
     pub right: Vec3,
     /// Direction of the second coordinate.
     pub up: Vec3,
-    /// The camera's place for a perspective view; `None` for an orthographic one.
+    /// The camera's position for a perspective view; `None` for an orthographic one.
     pub eye: Option<Vec3>,
-    /// How far before the plane the rays of an orthographic view start: beyond everything there is to hit.
+    /// Distance before the plane at which the rays of an orthographic view start: beyond the whole surface.
     pub standoff: f32,
 }
 
 impl ViewPlane {
-    /// An orthographic plane through the model's origin. `bounds` are the least and greatest corner of all there is to
-    /// hit; empty or non-finite bounds count as the unit cube.
+    /// An orthographic plane through the model's origin. `bounds` are the least and greatest corner of the surface;
+    /// empty or non-finite bounds count as the unit cube.
     pub fn orthographic(view: View, bounds: [Vec3; 2]) -> Self {
         let [right, up, towards] = view.axes();
         let [low, high] = if bounds[0].cmple(bounds[1]).all() && bounds[0].is_finite() && bounds[1].is_finite() {
@@ -87,8 +87,8 @@ impl ViewPlane {
         Self { origin: Vec3::ZERO, right, up, eye: None, standoff }
     }
 
-    /// A perspective plane: the camera stands at `eye` and its picture plane goes through `origin`, square to the view's
-    /// axes. Points on the plane have the same lengths as in the orthographic view of that plane.
+    /// A perspective plane: the camera stands at `eye` and its picture plane goes through `origin`, at right angles to
+    /// the view's axis. Points on the plane have the same lengths as in the orthographic view of that plane.
     pub fn perspective(view: View, eye: Vec3, origin: Vec3) -> Self {
         let [right, up, _] = view.axes();
         Self { origin, right, up, eye: Some(eye), standoff: 0.0 }
@@ -104,7 +104,7 @@ impl ViewPlane {
         self.origin + self.right * point.x + self.up * point.y
     }
 
-    /// The ray that a click at `point` means.
+    /// The ray of a click at `point`.
     pub fn ray(&self, point: Vec2) -> Ray {
         let on_plane = self.lift(point);
         let towards = self.towards();
@@ -114,7 +114,8 @@ impl ViewPlane {
         }
     }
 
-    /// Where `position` appears on the plane. `None` in a perspective view for what is level with or behind the eye.
+    /// Coordinates of `position` on the plane. `None` in a perspective view for a position level with or behind the
+    /// eye.
     pub fn project(&self, position: Vec3) -> Option<Vec2> {
         let flat = |p: Vec3| Vec2::new((p - self.origin).dot(self.right), (p - self.origin).dot(self.up));
         let Some(eye) = self.eye else { return Some(flat(position)) };

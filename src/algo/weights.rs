@@ -22,6 +22,7 @@ mod heat;
 pub(crate) mod laplacian;
 pub(crate) mod ldl;
 mod sight;
+mod twist;
 pub mod voxel_bind;
 
 use std::ops::Range;
@@ -31,6 +32,7 @@ use glam::Vec3;
 use crate::mesh::model::Weights;
 use bind::{Bound, Source};
 use finish::Shaping;
+use twist::Limbs;
 
 /// A joint as the binding sees it, in the space of the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +45,19 @@ pub struct WeightJoint {
     pub tail: Option<Vec3>,
     /// False for joints that must not move points; what they hold goes to the nearest ancestor that deforms.
     pub deforms: bool,
+    /// The bone whose twist the joint shares, for twist joints: they have no flesh of their own but take shares of
+    /// the bone's, linearly between one twist joint and the next.
+    pub twist: Option<TwistBone>,
+}
+
+/// A bone with twist joints along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwistBone {
+    /// Index of the joint that the bone begins at, no twist joint itself. It holds what is not twisted against it: the
+    /// start of the bone, or the end if there is a twist joint at the start.
+    pub joint: usize,
+    /// Where the bone ends.
+    pub end: Vec3,
 }
 
 /// Which method binds.
@@ -135,6 +150,12 @@ pub enum WeightError {
         /// Index of such a joint.
         joint: usize,
     },
+    /// A twist joint whose bone does not exist.
+    #[error("twist joint {joint} names a bone that does not exist, ends nowhere or is that of another twist joint")]
+    Twist {
+        /// Index of such a joint.
+        joint: usize,
+    },
     /// A triangle corner that does not exist.
     #[error("triangle {triangle} has a corner past the last point: the mesh is damaged")]
     Triangle {
@@ -191,15 +212,16 @@ pub fn skin_weights(
     step(0.0)?;
     let shaping = Shaping::new(points.len(), rigid, locks, settings);
     let mut report = WeightReport { points: points.len(), ..WeightReport::default() };
-    let free = shaping.free_joints(joints);
-    if let [only] = free[..] {
+    let limbs = Limbs::new(joints, &shaping.free_joints(joints));
+    let finish = |of: &dyn Fn(usize) -> Vec<(u32, f32)>| shaping.finish(|point| of(point).into_iter(), points.len());
+    if let [only] = limbs.free[..] {
         report.given = points.len();
-        return Ok((shaping.finish(|_| [(only, 1.0)].into_iter(), points.len()), report));
+        return Ok((finish(&|point| limbs.spread(points[point], [(only, 1.0)].into_iter())), report));
     }
     // Rigid parts neither spread heat nor hide bones.
     let soft: Vec<[u32; 3]> =
         triangles.iter().copied().filter(|t| !t.iter().any(|&p| shaping.is_given(p as usize))).collect();
-    let Bound { place, weights, sources } = bind::bind(points, &soft, joints, &free, settings, progress)?;
+    let Bound { place, weights, sources } = bind::bind(points, &soft, &limbs.joints, &limbs.free, settings, progress)?;
     for (point, &place) in place.iter().enumerate() {
         let count = match sources[place as usize] {
             _ if shaping.is_given(point) => &mut report.given,
@@ -210,7 +232,7 @@ pub fn skin_weights(
         };
         *count += 1;
     }
-    let result = shaping.finish(|point| weights.of(place[point] as usize), points.len());
+    let result = finish(&|point| limbs.spread(points[point], weights.of(place[point] as usize)));
     step(1.0)?;
     Ok((result, report))
 }

@@ -1,21 +1,29 @@
 //! `rigsmith build`: carries out the commands of a rig.
 
-use std::{collections::BTreeSet, path::PathBuf, sync::Arc};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, progress::Progress, skin};
+use super::{
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, convert::mark_joints, progress::Progress, skin,
+};
 use crate::{
-    build::{Builder, CommandState},
     files::{FileKind, RealDisk, load_model, store_model, store_rig},
     headless::Workbench,
-    mesh::model::{Model, SkinBinding, Trs},
+    mesh::{
+        gltf::GltfWriteSettings,
+        model::{Model, Trs},
+    },
     modules,
+    processor::{Builder, CommandState},
     rig::{
         BuiltRig, Rig, RigEdit, Uid,
         bake::baked,
-        character::inverse_bind,
         feature::{FeatureError, choose_switch, features_named, set_feature},
     },
     solve::program::{CompileOptions, RigProgram, RigState},
@@ -48,6 +56,8 @@ pub(super) struct BuildArgs {
     weights: WeightArgs,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
 }
 
 pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
@@ -59,6 +69,9 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     if args.mesh.is_some() && args.output.as_deref().is_none_or(|path| FileKind::of(path) == Some(FileKind::Template)) {
         return Err(Failure::Usage("--mesh is for a character; write one with -o NAME.glb".to_owned()));
     }
+    let inputs: Vec<&Path> =
+        [Some(&args.rig), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let mut report = Report::default();
     let mut rig = skin::load_rig(&args.rig, &mut report)?;
     switch_features(&mut rig, &args.feature)?;
@@ -66,7 +79,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     let mut builder = Builder::new(Arc::new(modules::all()));
     builder.sync(&rig);
     let outcome = builder.run_to(args.until.unwrap_or(usize::MAX));
-    let built = builder.built();
+    let built = Arc::new(builder.built());
     let lines = trace(&mut report, &rig, &builder, &outcome.executed);
     if args.trace {
         report.lines.extend(lines);
@@ -190,39 +203,49 @@ fn write(
     args: &BuildArgs,
     output: &Output,
     rig: &Rig,
-    built: &BuiltRig,
+    built: &Arc<BuiltRig>,
     posed: &[Trs],
     report: &mut Report,
 ) -> Result<Vec<String>, Failure> {
-    let skeleton = baked(rig, built);
     if FileKind::of(output) == Some(FileKind::Template) {
-        return Ok(store_rig(&RealDisk, output, &skeleton)?);
+        return Ok(store_rig(&RealDisk, output, &baked(rig, built))?);
     }
+    let (model, settings) = character_of(rig, built, posed, args.mesh.as_deref(), &args.weights, &args.export, report)?;
+    Ok(store_model(&RealDisk, output, &model, &settings)?)
+}
+
+/// The built skeleton as posed, with a mesh skinned to it if there is one, and how it is written. `posed` holds the place
+/// of each built node relative to its parent.
+pub(super) fn character_of(
+    rig: &Rig,
+    built: &BuiltRig,
+    posed: &[Trs],
+    mesh: Option<&Path>,
+    weights: &WeightArgs,
+    export: &ExportArgs,
+    report: &mut Report,
+) -> Result<(Model, GltfWriteSettings), Failure> {
+    let skeleton = baked(rig, built);
     let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
-    // Readers know joints by the skins that they are in, also where nothing is skinned.
-    let bare = SkinBinding {
-        name: skeleton.about().name.clone(),
-        joints: (0..joints.len()).collect(),
-        inverse_binds: joints.iter().map(|joint| inverse_bind(&skeleton.rest_global(*joint))).collect(),
-    };
-    let mut bench = Workbench::with_rig(SEED, skeleton);
-    if let Some(mesh) = &args.mesh {
+    let mut bench = Workbench::with_rig(SEED, rig.clone());
+    bench.set_built(Arc::new(built.clone()));
+    if let Some(mesh) = mesh {
         let model = load_model(&RealDisk, mesh)?;
         report.notes(model.notes.iter().cloned());
         bench.open(model, true)?;
         let mut progress = Progress::new("skinning");
-        let weights = bench.skin(args.weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
+        let bound = bench.skin(weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
         drop(progress);
-        skin::describe_weights(report, &weights);
+        skin::describe_weights(report, &bound);
     }
     let mut model = bench.character();
-    pose(&mut model, &joints, built, posed);
-    if args.mesh.is_none() && !joints.is_empty() {
-        model.skins = vec![bare];
+    if mesh.is_none() {
+        mark_joints(&mut model, &skeleton);
     }
-    let mut settings = args.export.settings();
-    settings.all_joints |= args.mesh.is_none();
-    Ok(store_model(&RealDisk, output, &model, &settings)?)
+    pose(&mut model, &joints, built, posed);
+    let mut settings = export.settings();
+    settings.all_joints |= mesh.is_none();
+    Ok((model, settings))
 }
 
 /// Where every node of the built rig is with the rig's pose, relative to its parent.

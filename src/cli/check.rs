@@ -10,14 +10,14 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report, skin::load_rig};
 use crate::{
-    build::{BuildError, BuildProblem, Builder, ModuleError, Modules, locate, review},
     files::{FileKind, LoadError, RealDisk, load_gestures, load_model, load_project, load_skin, read_capped},
     mesh::{
         adjacency::{edges, islands, weld},
         model::Model,
     },
     modules,
-    rig::{Rig, SourceError, Tag, TagKind, Uid, template},
+    processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, locate, review},
+    rig::{Rig, SourceError, TagData, TagKind, Uid, template},
     solve::program::{CompileOptions, RigProgram},
 };
 
@@ -128,7 +128,7 @@ fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, text: &str) -> Option<S
     let problem = RigProgram::compile(&built, &CompileOptions::default()).err()?.to_string();
     let named = problem.split("command ").skip(1).filter_map(|rest| rest.get(..16)?.parse::<Uid>().ok());
     let found = named.filter_map(|uid| rig.find_tag(uid)).next();
-    let Some((joint, Tag { uid, kind: TagKind::Command { module, .. }, .. })) = found else {
+    let Some((joint, TagData { uid, kind: TagKind::Command { module, .. }, .. })) = found else {
         return Some(SourceError::at(text, 0, problem));
     };
     let error = BuildError {

@@ -4,12 +4,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{ExportArgs, Failure, Output, Report, SEED, progress::spinning, skin::load_rig};
+use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, progress::spinning, skin::load_rig};
 use crate::{
     files::{FileKind, RealDisk, load_model, stem, store_model, store_rig},
     headless::Workbench,
-    mesh::gltf::GltfWriteSettings,
-    rig::{Rig, UidSource, character::import_skeleton},
+    mesh::{
+        gltf::GltfWriteSettings,
+        model::{Model, SkinBinding},
+    },
+    rig::{
+        Rig, Uid, UidSource,
+        character::{import_skeleton, inverse_bind},
+    },
 };
 
 /// Arguments of `rigsmith convert`.
@@ -21,10 +27,13 @@ pub(super) struct ConvertArgs {
     output: Output,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
 }
 
 pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
     use FileKind::{Glb, Gltf, Obj, RigText, Template};
+    args.in_place.check(&[&args.input], Some(&args.output), &[])?;
     let (from, to) = (FileKind::of(&args.input), FileKind::of(&args.output));
     let mut report = Report::default();
     let notes = match (from, to) {
@@ -56,7 +65,9 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
         (Some(RigText | Template), Some(Gltf | Glb)) => {
             let bench = Workbench::with_rig(SEED, load_rig(&args.input, &mut report)?);
             let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
-            store_model(&RealDisk, &args.output, &bench.character(), &settings)?
+            let mut model = bench.character();
+            mark_joints(&mut model, bench.rig());
+            store_model(&RealDisk, &args.output, &model, &settings)?
         }
         _ => {
             return Err(Failure::Usage(format!(
@@ -71,4 +82,16 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// Lists all joints in a skin: readers know joints by the skins that they are in, also where nothing is skinned.
+pub(super) fn mark_joints(model: &mut Model, rig: &Rig) {
+    let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+    if model.skins.is_empty() && !joints.is_empty() {
+        model.skins = vec![SkinBinding {
+            name: rig.about().name.clone(),
+            joints: (0..joints.len()).collect(),
+            inverse_binds: joints.iter().map(|joint| inverse_bind(&rig.rest_global(*joint))).collect(),
+        }];
+    }
 }

@@ -1,14 +1,14 @@
-//! `rigsmith` alone: the whole job on the bundled character.
+//! `rigsmith` without a command: the whole workflow on the bundled character.
 
 use std::path::Path;
 
-use super::{Failure, Report, SEED, sketch::skin_and_store};
+use super::{Failure, Report, SEED, sketch::skin};
 use crate::{
     algo::weights::WeightSettings,
-    files::{RealDisk, read_capped, save_atomic},
+    files::{ReadError, RealDisk, read_capped, save_atomic},
     headless::Workbench,
     mesh::{
-        gltf::GltfWriteSettings,
+        gltf::{GltfWriteSettings, write_glb},
         obj::{ObjSettings, read_model},
     },
     plugins::gesture::read_gestures,
@@ -18,7 +18,7 @@ use crate::{
 const MESH: &[u8] = include_bytes!("../../assets/models/biped.obj");
 const GESTURES: &[u8] = include_bytes!("../../assets/gestures/biped.ron");
 
-/// Does it without a window; `reason` says why.
+/// Runs the workflow without a window; `reason` says why there is none.
 pub(super) fn run(reason: Option<&str>) -> Result<Report, Failure> {
     let mut report = Report::default();
     if let Some(reason) = reason {
@@ -36,10 +36,14 @@ pub(super) fn run(reason: Option<&str>) -> Result<Report, Failure> {
         report.notes.push(format!("gesture {} ({}): {}", answer.number, answer.gesture, answer.message));
     }
     report.line(format!("sketched {} joints with {strokes} gestures into {faces} faces", bench.rig().len()));
-    save_template(&bench, Path::new("biped.rig.ron"), &mut report)?;
-    let glb = Path::new("biped.glb");
-    skin_and_store(&mut bench, glb, WeightSettings::default(), &GltfWriteSettings::default(), &mut report)?;
-    report.line("wrote biped.glb: drop it into any glTF viewer, Blender or a Bevy game");
+    let template = write_template(bench.rig());
+    save_new(Path::new("biped.rig.ron"), template.as_bytes(), "the template", &mut report)?;
+    skin(&mut bench, WeightSettings::default(), &mut report)?;
+    let glb = write_glb(&bench.character(), &GltfWriteSettings::default());
+    let glb = glb.map_err(|error| Failure::Input(Box::new(error)))?;
+    if save_new(Path::new("biped.glb"), &glb, "the character", &mut report)? {
+        report.line("drop it into any glTF viewer, Blender or a Bevy game");
+    }
     report.line("");
     report.line("Go on with:");
     report.line("  rigsmith info biped.glb                               what is in a file");
@@ -52,18 +56,20 @@ pub(super) fn run(reason: Option<&str>) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Writes the template, unless there is one that somebody has worked on.
-fn save_template(bench: &Workbench, path: &Path, report: &mut Report) -> Result<(), Failure> {
-    let text = write_template(bench.rig());
-    match read_capped(&RealDisk, path, 64 << 20) {
-        Ok(there) if there != text.as_bytes() => {
-            report.notes.push(format!("kept the {} that is there, which differs", path.display()));
+/// Writes a file that nobody has named, unless there is another that somebody may have worked on. True if it is there now.
+fn save_new(path: &Path, bytes: &[u8], what: &str, report: &mut Report) -> Result<bool, Failure> {
+    let name = path.display();
+    match read_capped(&RealDisk, path, 1 << 30) {
+        Ok(there) if there != bytes => {
+            report.notes.push(format!("kept the {name} that is there, which differs"));
+            return Ok(false);
         }
-        Ok(_) => report.line(format!("{} is there already", path.display())),
-        Err(_) => {
-            save_atomic(&RealDisk, path, text.as_bytes()).map_err(|error| Failure::Input(Box::new(error)))?;
-            report.line(format!("wrote the template {}", path.display()));
+        Ok(_) => report.line(format!("{name} is there already")),
+        Err(ReadError::Missing { .. }) => {
+            save_atomic(&RealDisk, path, bytes).map_err(|error| Failure::Input(Box::new(error)))?;
+            report.line(format!("wrote {what} {name}"));
         }
+        Err(error) => return Err(Failure::Input(Box::new(error))),
     }
-    Ok(())
+    Ok(true)
 }

@@ -1,13 +1,17 @@
-//! `rigsmith face`: a head mesh becomes a face with bones, weights and expressions.
+//! `rigsmith face`: bones, weights and expressions for a head mesh.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bevy::math::Vec3;
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, Output, Report, SEED,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED,
     progress::{Progress, spinning},
 };
 use crate::{
@@ -27,16 +31,16 @@ use crate::{
 pub(super) struct FaceArgs {
     /// The mesh: a head, or a body whose head is found. .obj, .gltf or .glb
     mesh: PathBuf,
-    /// Bones of the facial skin: the density. Jaw and eyes come on top
+    /// Number of bones on the facial skin: the density. Jaw and eyes come on top
     #[arg(long, value_name = "K", default_value_t = 40)]
     bones: usize,
-    /// Up in the mesh, if the guess is wrong
+    /// Up direction in the mesh, if the guess is wrong
     #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true)]
     up: Option<Vec3>,
-    /// Where the face looks in the mesh, if the guess is wrong
+    /// View direction of the face in the mesh, if the guess is wrong
     #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true)]
     forward: Option<Vec3>,
-    /// What the first centroids are drawn with; the same seed gives the same bytes
+    /// Seed of the first centroids; the same seed gives the same bytes
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Without pairs of bones on both sides
@@ -55,11 +59,13 @@ pub(super) struct FaceArgs {
     /// shape is kept as a stored pose
     #[arg(long, value_name = "SHAPES")]
     fit: Option<PathBuf>,
-    /// What to write: .glb or .gltf for the character, .rig.ron for the rig, .png for a picture
+    /// Output file: .glb or .gltf for the character, .rig.ron for the rig, .png for a picture
     #[arg(short, long)]
     output: Output,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
 }
 
 fn axis(text: &str) -> Result<Vec3, String> {
@@ -76,28 +82,34 @@ fn axis(text: &str) -> Result<Vec3, String> {
 }
 
 fn strength(text: &str) -> Result<(String, f32), String> {
-    let wanted = || "write NAME=STRENGTH, such as happiness=0.8".to_owned();
-    let (name, strength) = text.split_once('=').ok_or_else(wanted)?;
+    let output_kind = || "write NAME=STRENGTH, such as happiness=0.8".to_owned();
+    let (name, strength) = text.split_once('=').ok_or_else(output_kind)?;
     match strength.trim().parse::<f32>() {
         Ok(number) if (0.0..=1.0).contains(&number) => Ok((name.trim().to_owned(), number)),
         Ok(number) if number.is_finite() => Err(format!("{number} is not from 0 to 1")),
-        _ => Err(wanted()),
+        _ => Err(output_kind()),
     }
 }
 
-/// What is written.
+/// Kind of output.
 #[derive(Clone, Copy, PartialEq)]
-enum Wanted {
+enum OutputKind {
     Character,
     Rig,
     Picture,
 }
 
 pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
-    let wanted = wanted(args)?;
+    let output_kind = output_kind(args)?;
+    #[cfg(feature = "render")]
+    if matches!(output_kind, OutputKind::Picture) {
+        super::device_selection::restart_without();
+    }
     if args.bones == 0 {
         return Err(Failure::Usage("--bones 0 makes no face; ask for at least 1".to_owned()));
     }
+    let inputs: Vec<&Path> = std::iter::once(&args.mesh).chain(&args.fit).map(PathBuf::as_path).collect();
+    args.in_place.check(&inputs, Some(&args.output), &[])?;
     let mut report = Report::default();
     let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
     report.notes(model.notes.iter().cloned());
@@ -123,27 +135,27 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
         express(args, &mut bench, &mut report)?;
     }
     report.set("joints", bench.rig().len());
-    match wanted {
-        Wanted::Rig => report.notes(store_rig(&RealDisk, &args.output, bench.rig())?),
-        Wanted::Character => {
+    match output_kind {
+        OutputKind::Rig => report.notes(store_rig(&RealDisk, &args.output, bench.rig())?),
+        OutputKind::Character => {
             let mut model = bench.character();
             pose(&mut model.nodes, bench.rig());
             let settings = args.export.settings();
             report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
         }
-        Wanted::Picture => picture(args, &bench, &mut report)?,
+        OutputKind::Picture => picture(args, &bench, &mut report)?,
     }
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
 }
 
-fn wanted(args: &FaceArgs) -> Result<Wanted, Failure> {
+fn output_kind(args: &FaceArgs) -> Result<OutputKind, Failure> {
     let is_png = args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
     match FileKind::of(&args.output) {
-        Some(FileKind::Glb | FileKind::Gltf) => Ok(Wanted::Character),
-        Some(FileKind::Template) => Ok(Wanted::Rig),
-        None if is_png && cfg!(feature = "render") => Ok(Wanted::Picture),
+        Some(FileKind::Glb | FileKind::Gltf) => Ok(OutputKind::Character),
+        Some(FileKind::Template) => Ok(OutputKind::Rig),
+        None if is_png && cfg!(feature = "render") => Ok(OutputKind::Picture),
         _ if is_png => Err(Failure::Usage("this build draws no pictures; write .glb, .gltf or .rig.ron".to_owned())),
         _ => {
             let message = format!("cannot write `{}`; give .glb, .gltf, .rig.ron or .png", args.output.display());
@@ -154,14 +166,14 @@ fn wanted(args: &FaceArgs) -> Result<Wanted, Failure> {
 
 fn express(args: &FaceArgs, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
     let strengths: BTreeMap<String, f32> = args.expression.iter().cloned().collect();
-    // A name that is wrong is wrong use; what is wrong with the face is not.
+    // A wrong name is wrong usage; a fault of the face is not.
     mixed(ExpressionSet::bundled(), &strengths).map_err(|reason| Failure::Usage(format!("--expression: {reason}")))?;
     bench.express(strengths.clone())?;
     report.set("expressions", json!(strengths));
     Ok(())
 }
 
-/// Puts the exported joints where the pose has them; bind poses stay.
+/// Sets the exported joints to their posed transforms; bind poses stay.
 fn pose(nodes: &mut [crate::mesh::model::Node], rig: &Rig) {
     for (node, joint) in nodes.iter_mut().zip(rig.walk()) {
         if rig.offset(joint.data.uid).is_some() {
@@ -186,7 +198,7 @@ fn picture(args: &FaceArgs, bench: &Workbench, report: &mut Report) -> Result<()
         size: UVec2::new(900, 900),
         view: View::Front,
         bounds: bench.placed_face().map(|face| face.analysis.face_box()),
-        // Bones of a face that shows something would hide it.
+        // Bones would hide a face that shows an expression.
         drawing: RigDrawing {
             rig: args.expression.is_empty(),
             grid: false,
@@ -211,7 +223,7 @@ fn picture(_: &FaceArgs, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
     Err(Failure::Usage("this build draws no pictures; write .glb, .gltf or .rig.ron".to_owned()))
 }
 
-/// Says what was placed.
+/// Reports the placed face.
 fn describe(report: &mut Report, placed: &FaceReport) {
     let [face, middle, back] = placed.groups;
     let [head, all] = placed.points;

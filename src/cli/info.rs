@@ -1,4 +1,4 @@
-//! `rigsmith info`: what is in a file.
+//! `rigsmith info`: content of a file.
 
 use std::path::PathBuf;
 
@@ -108,8 +108,8 @@ fn describe_model(report: &mut Report, model: &Model) {
     report.line(format!("{} objects: {}", model.objects.len(), names.join(", ")));
     report.line(format!(
         "{} materials, {} images, {morphs} morph targets, {joints} joints, {} clips",
-        model.looks.materials.len(),
-        model.looks.images.len(),
+        model.material_set.materials.len(),
+        model.material_set.images.len(),
         model.clips.len()
     ));
     if let Some(unweighted) = unweighted {
@@ -123,8 +123,8 @@ fn describe_model(report: &mut Report, model: &Model) {
     report.set("triangles", triangles);
     report.set("box", json!([low.to_array(), high.to_array()]));
     report.set("objects", names.iter().map(|name| json!(name)).collect::<Vec<Value>>());
-    report.set("materials", model.looks.materials.len());
-    report.set("images", model.looks.images.len());
+    report.set("materials", model.material_set.materials.len());
+    report.set("images", model.material_set.images.len());
     report.set("morph_targets", morphs);
     report.set("joints", joints);
     report.set("clips", model.clips.iter().map(|clip| json!(clip.name)).collect::<Vec<Value>>());

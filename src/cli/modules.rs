@@ -1,4 +1,4 @@
-//! `rigsmith modules`: what commands can do.
+//! `rigsmith modules`: description of the command modules.
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use crate::{modules, rig::nearest::did_you_mean};
 /// Arguments of `rigsmith modules`.
 #[derive(Args, Debug)]
 pub(super) struct ModulesArgs {
-    /// Only these
+    /// Names of the modules; all without any
     names: Vec<String>,
 }
 

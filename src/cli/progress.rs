@@ -7,7 +7,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Shows how far one piece of work is.
+/// Progress of one piece of work.
 pub(super) struct Progress {
     what: &'static str,
     since: Instant,
@@ -16,12 +16,12 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Begins; nothing is shown yet.
+    /// Starts the work; nothing is shown yet.
     pub fn new(what: &'static str) -> Self {
         Self { what, since: Instant::now(), bar: None, terminal: std::io::stderr().is_terminal() }
     }
 
-    /// Tells how much is done, 0 to 1.
+    /// Updates the finished share, 0 to 1.
     pub fn at(&mut self, part: f32) {
         if !self.terminal || self.since.elapsed() < Duration::from_secs(1) {
             return;
@@ -44,7 +44,7 @@ impl Drop for Progress {
     }
 }
 
-/// Runs work that cannot say how far it is, with a spinner after the first second.
+/// Runs work without known progress, with a spinner after the first second.
 pub(super) fn spinning<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     if !std::io::stderr().is_terminal() {
         return work();

@@ -1,16 +1,23 @@
 //! `rigsmith render`: a picture of a mesh, a template, a character or a project.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use bevy::math::UVec2;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::{Failure, Output, Report, SEED, progress::spinning};
+use super::{
+    Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, device_selection,
+    pose::{self, PoseSteps},
+    progress::{Progress, spinning},
+    skin,
+};
 use crate::{
     algo::view::View,
     files::{FileKind, MeshState, RealDisk, load_model, load_project, load_rig_text, load_template, save_atomic},
+    headless::Workbench,
     plugins::{
+        commands::BuildStep,
         display::{MeshDisplay, WeightColors},
         drawing::{LabelChoice, RigDrawing},
         surface::RigMesh,
@@ -31,13 +38,13 @@ pub(super) struct RenderArgs {
     /// The picture to write, a .png
     #[arg(short, long)]
     output: Output,
-    /// From where
+    /// View of the camera
     #[arg(long, value_enum, default_value_t = ViewArg::Front)]
     view: ViewArg,
-    /// From anywhere: yaw and pitch in degrees, starting from the front; YAW,PITCH
+    /// View from any direction: yaw and pitch in degrees, starting from the front; YAW,PITCH
     #[arg(long, value_name = "YAW,PITCH", value_parser = orbit, allow_hyphen_values = true)]
     orbit: Option<(f32, f32)>,
-    /// Without perspective
+    /// Orthographic projection, without perspective
     #[arg(long)]
     orthographic: bool,
     /// Width and height in pixels
@@ -46,39 +53,44 @@ pub(super) struct RenderArgs {
     /// The stored pose of a project to show; `rest` for the rest pose
     #[arg(long, value_name = "NAME")]
     pose: Option<String>,
-    /// Without the rig
+    /// Hide the rig
     #[arg(long)]
     no_rig: bool,
-    /// Without the grid
+    /// Hide the grid
     #[arg(long)]
     no_grid: bool,
-    /// With the names of joints
+    /// Show the names of joints
     #[arg(long)]
     labels: bool,
-    /// The mesh half transparent
+    /// Show the mesh half transparent
     #[arg(long)]
     xray: bool,
-    /// With the edges of the mesh
+    /// Show the edges of the mesh
     #[arg(long)]
     wireframe: bool,
-    /// Weights as colours: those of the joint with this label, or `all`
+    /// Build the rig, and show its controls
+    #[arg(long)]
+    build: bool,
+    #[command(flatten)]
+    steps: PoseSteps,
+    /// Show weights as colours: those of the joint with this label, or `all`
     #[arg(long, value_name = "JOINT")]
     weights: Option<String>,
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy)]
 enum ViewArg {
-    /// The face
+    /// The front, with the face
     Front,
-    /// From behind
+    /// The back
     Back,
     /// The character's left side
     Left,
     /// The character's right side
     Right,
-    /// From above
+    /// The top
     Top,
-    /// From below
+    /// The bottom
     Bottom,
 }
 
@@ -96,20 +108,29 @@ fn size(text: &str) -> Result<(u32, u32), String> {
     Ok((number(width)?, number(height)?))
 }
 
-/// What is shown.
+/// Content of the picture.
 struct Scene {
     rig: Rig,
     meshes: Vec<RigMesh>,
 }
 
 pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
+    device_selection::restart_without();
     if args.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
         return Err(Failure::Usage(format!("cannot draw into `{}`; write a .png", args.output.display())));
     }
+    InPlaceArgs::default().check(&[&args.file], Some(&args.output), &[])?;
     let mut report = Report::default();
     let mut scene = read(args, &mut report)?;
     if let Some(pose) = &args.pose {
         strike(&mut scene.rig, pose)?;
+    }
+    let is_built = args.build || !args.steps.is_empty();
+    if is_built {
+        let writes = pose::parsed(&args.steps)?;
+        let mut bench = Workbench::with_rig(SEED, scene.rig);
+        pose::run_steps(&mut bench, &args.steps, &writes)?;
+        scene.rig = bench.posed_document()?;
     }
     let (rig, meshes) = (scene.rig, scene.meshes);
     let (weights, selected) = match args.weights.as_deref() {
@@ -148,6 +169,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
             ..RigDrawing::default()
         },
         selected,
+        build: is_built,
         ..PictureSettings::default()
     };
     if let Some((name, true)) = adapter() {
@@ -161,6 +183,34 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     report.set("output", args.output.display().to_string());
     report.set("size", json!([args.size.0, args.size.1]));
     Ok(report)
+}
+
+/// Draws a posed rig, with a mesh skinned to what it builds if there is one.
+pub(super) fn picture_of(
+    rig: Rig,
+    mesh: Option<&Path>,
+    weights: &WeightArgs,
+    output: &Path,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let mut bench = Workbench::with_rig(SEED, rig);
+    bench.build(BuildStep::All);
+    let mut meshes = Vec::new();
+    if let Some(mesh) = mesh {
+        let model = load_model(&RealDisk, mesh)?;
+        report.notes(model.notes.iter().cloned());
+        bench.open(model, true)?;
+        let mut progress = Progress::new("skinning");
+        let bound = bench.skin(weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
+        drop(progress);
+        skin::describe_weights(report, &bound);
+        meshes.extend(bench.mesh().cloned());
+    }
+    let settings = PictureSettings { build: true, ..PictureSettings::default() };
+    let picture = |error| Failure::Input(Box::new(error));
+    let rig = bench.rig().clone();
+    let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;
+    save_atomic(&RealDisk, output, &png(image).map_err(picture)?).map_err(|error| Failure::Input(Box::new(error)))
 }
 
 fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
@@ -191,10 +241,10 @@ fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
                 if mesh.rig != rig.uid() {
                     continue;
                 }
-                match mesh.state {
+                match mesh.shape {
                     // The notes name it already.
                     MeshState::Missing { .. } => {}
-                    MeshState::Open { model, .. } => meshes.push(RigMesh::new(mesh.uid, *model, mesh.nodes)),
+                    MeshState::Open { model, .. } => meshes.push(RigMesh::new(mesh.uid, *model, mesh.nodes.to_vec())),
                 }
             }
             Ok(Scene { rig, meshes })

@@ -1,4 +1,4 @@
-//! What a command says, to people and to programs.
+//! Results of commands, for people and for programs.
 
 use std::{io::Write, process::ExitCode};
 
@@ -10,18 +10,18 @@ use crate::{
     headless::WorkbenchError,
 };
 
-/// The answer of a command that was done (or that found fault with its input and still has an answer).
+/// The result of a command that ran (also of one that found a fault in its input and still has a result).
 #[derive(Default)]
 pub(super) struct Report {
     /// Lines for people.
     pub lines: Vec<String>,
     /// Warnings for people, on standard error.
     pub notes: Vec<String>,
-    /// The answer for programs.
+    /// Result for programs.
     pub json: Map<String, Value>,
-    /// A whole answer for programs that is no object.
+    /// Result for programs that is not an object.
     pub list: Option<Value>,
-    /// True if the answer is that the input is at fault.
+    /// Marks a result that reports a fault of the input.
     pub at_fault: bool,
 }
 
@@ -42,11 +42,11 @@ impl Report {
     }
 }
 
-/// Why a command was not done.
+/// Error of a command.
 pub(super) enum Failure {
-    /// The input is at fault: exit code 1.
+    /// Fault of the input: exit code 1.
     Input(Box<dyn std::error::Error>),
-    /// The command was used wrongly: exit code 2.
+    /// Wrong usage of the command: exit code 2.
     Usage(String),
 }
 
@@ -84,7 +84,7 @@ impl From<WorkbenchError> for Failure {
     }
 }
 
-/// An error in a text file, shown with the line it is in.
+/// Error in a text file, shown with its source line.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 #[error("{message}")]
 struct InSource {
@@ -96,7 +96,7 @@ struct InSource {
     place: SourceSpan,
 }
 
-/// Prints the answer and returns the exit code.
+/// Prints the result and returns the exit code.
 pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
     let (code, answer) = match result {
         Ok(report) => {
@@ -137,7 +137,7 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Prints lines; a reader that closed the pipe is no error.
+/// Prints lines; a closed pipe is no error.
 fn print<'a>(lines: impl IntoIterator<Item = &'a str>) {
     let mut out = std::io::stdout().lock();
     for line in lines {
@@ -165,7 +165,7 @@ fn show(error: &(dyn std::error::Error + 'static)) {
     }
 }
 
-/// An error with its causes, as far as their texts say more.
+/// Text of an error and of its causes, as far as they add anything.
 fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

@@ -1,4 +1,4 @@
-//! `rigsmith sketch`: gestures on a mesh become a skeleton.
+//! `rigsmith sketch`: a skeleton from gestures on a mesh.
 
 use std::path::{Path, PathBuf};
 
@@ -6,37 +6,39 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, Output, Report, SEED, WeightArgs,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     progress::{Progress, spinning},
 };
 use crate::{
     files::{FileKind, RealDisk, load_gestures, load_model, stem, store_model, store_rig},
     headless::Workbench,
-    mesh::gltf::GltfWriteSettings,
     rig::Rig,
 };
 
 /// Arguments of `rigsmith sketch`.
 #[derive(Args, Debug)]
 pub(super) struct SketchArgs {
-    /// The mesh: .obj, .gltf or .glb. A skeleton in it is where the sketch begins
+    /// The mesh: .obj, .gltf or .glb. The sketch begins with its skeleton, if it has one
     mesh: PathBuf,
     /// The gestures, a list in RON such as [Stroke(points: [(0.0, 0.9), (0.0, 1.4)], joints: 3)]
     gestures: PathBuf,
-    /// What to write: .rig, .rig.ron, or the skinned character as .glb or .gltf
+    /// Output file: .rig, .rig.ron, or the skinned character as .glb or .gltf
     #[arg(short, long)]
     output: Output,
-    /// Leave a skeleton that the mesh brings along aside
+    /// Ignore a skeleton in the mesh file
     #[arg(long)]
     mesh_only: bool,
     #[command(flatten)]
     weights: WeightArgs,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
 }
 
 pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
     let kind = output_kind(&args.output)?;
+    args.in_place.check(&[&args.mesh, &args.gestures], Some(&args.output), &[])?;
     let gestures = load_gestures(&RealDisk, &args.gestures)?;
     let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
     let mut report = Report::default();
@@ -78,31 +80,31 @@ fn save(
 ) -> Result<(), Failure> {
     match kind {
         FileKind::Template | FileKind::RigText => report.notes(store_rig(&RealDisk, path, bench.rig())?),
-        _ => skin_and_store(bench, path, args.weights.settings(), &args.export.settings(), report)?,
+        _ => {
+            skin(bench, args.weights.settings(), report)?;
+            let write = || store_model(&RealDisk, path, &bench.character(), &args.export.settings());
+            report.notes(spinning("writing", write)?);
+        }
     }
     report.line(format!("wrote {}", path.display()));
     report.set("output", path.display().to_string());
     Ok(())
 }
 
-/// Binds the mesh with automatic weights and writes the character.
-pub(super) fn skin_and_store(
+/// Binds the mesh with automatic weights.
+pub(super) fn skin(
     bench: &mut Workbench,
-    path: &Path,
     settings: crate::algo::weights::WeightSettings,
-    export: &GltfWriteSettings,
     report: &mut Report,
 ) -> Result<(), Failure> {
     let mut progress = Progress::new("skinning");
     let weights = bench.skin(settings, Vec::new(), &mut |part| progress.at(part))?;
     drop(progress);
     super::skin::describe_weights(report, &weights);
-    let notes = spinning("writing", || store_model(&RealDisk, path, &bench.character(), export))?;
-    report.notes(notes);
     Ok(())
 }
 
-/// Says for programs what a rig holds.
+/// Adds a description of the rig for programs.
 pub(super) fn describe_rig(report: &mut Report, rig: &Rig) {
     let globals = rig.rest_globals();
     let joints: Vec<Value> = rig

@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::{
-    ExportArgs, Failure, Output, Report, SEED, WeightArgs,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     progress::{Progress, spinning},
 };
 use crate::{
@@ -39,7 +39,7 @@ pub(super) struct SkinArgs {
     /// Take the weights from a .skin file: as they are if the mesh is the same, transferred if it has changed
     #[arg(long, value_name = "FILE")]
     weights_from: Option<PathBuf>,
-    /// Save the weights to a .skin file, too
+    /// Save the weights to a .skin file, too; it may be neither an input nor the output
     #[arg(long, value_name = "FILE")]
     save_weights: Option<PathBuf>,
     /// Let an object of the mesh move with one joint only, by their names: OBJECT=JOINT
@@ -49,6 +49,8 @@ pub(super) struct SkinArgs {
     weights: WeightArgs,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
 }
 
 pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
@@ -56,6 +58,16 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
         let message = format!("cannot skin into `{}`; write .glb, .gltf or .skin", args.output.display());
         return Err(Failure::Usage(message));
     }
+    if let Some(path) = args.save_weights.as_ref().filter(|path| FileKind::of(path) != Some(FileKind::Skin)) {
+        return Err(Failure::Usage(format!("--save-weights `{}`: weights are saved as .skin", path.display())));
+    }
+    let inputs: Vec<&Path> = [Some(&args.rig), Some(&args.mesh), args.weights_from.as_ref()]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    let further: Vec<_> = args.save_weights.iter().map(|path| ("--save-weights", path.as_path())).collect();
+    args.in_place.check(&inputs, Some(&args.output), &further)?;
     let mut report = Report::default();
     let rig = load_rig(&args.rig, &mut report)?;
     let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
@@ -144,12 +156,7 @@ pub(super) fn skin_file(bench: &Workbench) -> Result<SkinFile, Failure> {
     let (Some(mesh), Some(skin)) = (bench.mesh(), bench.weights()) else {
         return Err(Failure::Input("there are no weights to save; skin the mesh first".into()));
     };
-    let joint = |uid: &Uid| {
-        let label = bench.rig().joint(*uid).and_then(|joint| joint.data.label.clone()).unwrap_or_default();
-        SkinJoint { uid: uid.0, label }
-    };
-    let joints = skin.joints.iter().map(joint).collect();
-    SkinFile::new(joints, skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true)
+    SkinFile::new(SkinJoint::list(bench.rig(), skin), skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true)
         .map_err(|error| Failure::Input(Box::new(error)))
 }
 
@@ -158,10 +165,19 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
     let file = load_skin(&RealDisk, path)?;
     let rig = bench.rig();
     let mut joints = Vec::with_capacity(file.joints().len());
-    for joint in file.joints() {
+    let found = |joint: &SkinJoint| {
         let by_label = || rig.find_label(&joint.label).filter(|_| !joint.label.is_empty());
-        let uid = Some(Uid(joint.uid)).filter(|uid| rig.joint(*uid).is_some()).or_else(by_label);
-        let uid = uid.ok_or_else(|| {
+        Some(Uid(joint.uid)).filter(|uid| rig.joint(*uid).is_some()).or_else(by_label)
+    };
+    // A joint that a command created is not in the document: the joint that it was made for holds its share.
+    let mut subjects = SkinJoint::subjects(file.joints());
+    for subject in subjects.values_mut() {
+        let joint = file.joints().iter().find(|joint| joint.uid == subject.0);
+        *subject = joint.and_then(found).unwrap_or(*subject);
+    }
+    for joint in file.joints() {
+        let created = || Some(Uid(joint.uid)).filter(|uid| subjects.contains_key(uid));
+        let uid = found(joint).or_else(created).ok_or_else(|| {
             Failure::Input(
                 format!(
                     "`{}`: the rig has no joint {} (\"{}\"); skin with the rig that the weights were made for",
@@ -212,7 +228,7 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
         );
         weights
     };
-    bench.bind(SkinData { joints, weights, at_rest: true })?;
+    bench.bind(SkinData { joints, weights, at_rest: true, subjects })?;
     Ok(())
 }
 

@@ -1,93 +1,94 @@
-//! Everything a key, a menu or a button can ask for, by name.
+//! Actions of keys, menus and buttons, by name.
 //!
-//! Keys are bound to actions in [`keys`](super::keys); whoever carries an action out reads [`ActionRequest`] messages.
+//! Keys are bound to actions in [`keys`](super::keys); the systems that carry actions out read [`ActionRequest`]
+//! messages.
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::mode::Mode;
 
-/// One thing a person can ask for with a key, a menu entry or a button.
+/// An action that a person can request with a key, a menu entry or a button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Action {
-    /// Changes the mode.
+    /// Changes the mode of the pointer.
     Mode(Mode),
-    /// An empty project.
+    /// Begins an empty project.
     New,
     /// Asks for a file to open.
     Open,
-    /// Saves the project where it was saved before, or asks.
+    /// Saves the project to its file, or asks for one.
     Save,
-    /// Asks where to save the project.
+    /// Asks for a file and saves the project there.
     SaveAs,
-    /// Asks where to export the character, or the template.
+    /// Asks for a file and exports the character, or the template.
     Export,
     /// Closes the window, after asking about unsaved changes.
     Quit,
-    /// Takes the last step back.
+    /// Undoes the last step.
     Undo,
-    /// Does the last undone step again.
+    /// Redoes the last undone step.
     Redo,
-    /// Deletes the selected joints; what hangs below them moves up.
+    /// Deletes the selected joints; their children move up.
     Delete,
-    /// Deletes the selected joints and all that hangs below them.
+    /// Deletes the selected joints with their hierarchies.
     DeleteHierarchy,
     /// Selects all joints.
     SelectAll,
-    /// Selects none.
+    /// Clears the selection.
     SelectNone,
-    /// Makes the other side of the selected joints.
+    /// Makes or updates the other side of the selected joints.
     MirrorSelected,
-    /// Live symmetry on or off.
+    /// Turns live symmetry on or off.
     Symmetry,
-    /// Whether children move along with their parent.
+    /// Turns the movement of children with their parent on or off.
     MoveChildren,
-    /// Takes what is being drawn or dragged.
+    /// Accepts the current drawing or drag.
     Accept,
-    /// Drops what is being drawn or dragged.
+    /// Drops the current drawing or drag.
     Cancel,
-    /// The next volume under the pointer.
+    /// Takes the next volume under the pointer.
     NextVolume,
     /// Computes weights for all meshes.
     Skin,
-    /// Takes the pose of the selected joints back, or of all if none is selected.
+    /// Resets the pose of the selected joints, or of all if none is selected.
     ResetPose,
-    /// Keeps the pose under a name.
+    /// Stores the pose under a name.
     StorePose,
-    /// World, local or view axes for gizmos.
+    /// Switches gizmos between world, local and view axes.
     GizmoSpace,
-    /// Shows the selected joints, or everything if none is selected.
+    /// Frames the selected joints, or the whole character if none is selected.
     FrameSelected,
-    /// Shows everything.
+    /// Frames the whole character.
     FrameAll,
-    /// From the front.
+    /// Shows the front view.
     ViewFront,
-    /// From behind.
+    /// Shows the back view.
     ViewBack,
-    /// From the character's left.
+    /// Shows the view from the character's left.
     ViewLeft,
-    /// From the character's right.
+    /// Shows the view from the character's right.
     ViewRight,
-    /// From above.
+    /// Shows the top view.
     ViewTop,
-    /// From below.
+    /// Shows the bottom view.
     ViewBottom,
-    /// Perspective or orthographic.
+    /// Switches between perspective and orthographic projection.
     Projection,
-    /// The mesh half transparent.
+    /// Makes the mesh half transparent, or opaque.
     XRay,
-    /// The edges of the mesh.
+    /// Shows or hides the edges of the mesh.
     Wireframe,
-    /// Labels of all joints.
+    /// Shows or hides the labels of all joints.
     Labels,
-    /// Axes of the selected joints.
+    /// Shows or hides the axes of the selected joints.
     LocalAxes,
-    /// The grid.
+    /// Shows or hides the grid.
     Grid,
-    /// The keys and what they do.
+    /// Shows or hides the list of keys.
     Help,
 }
 
-/// Asks for an action.
+/// Request for an action.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ActionRequest(pub Action);

@@ -1,4 +1,4 @@
-//! The window: what it is made of, and when it cannot be opened.
+//! The window: its plugins, and the errors of opening it.
 
 use std::{path::PathBuf, time::Duration};
 
@@ -43,25 +43,25 @@ use crate::plugins::{
     task_pools,
 };
 
-/// What to open, and how.
+/// Options of opening the window.
 #[derive(Debug, Clone, Default)]
 pub struct EditorOptions {
     /// The file to open; the bundled character without one.
     pub file: Option<PathBuf>,
 }
 
-/// Why the window could not be opened. One line, said before the work is done without it.
+/// Error of opening the window, in one line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NoWindow {
-    /// No display.
+    /// No display is available.
     #[error("there is no display to open a window on ({0})")]
     Display(String),
-    /// No graphics adapter.
+    /// No graphics adapter is available.
     #[error(
         "there is no graphics adapter, not even a software one; install a Vulkan driver (Debian: mesa-vulkan-drivers)"
     )]
     Adapter,
-    /// The window system refused.
+    /// The window system refused the window.
     #[error("the window could not be opened: {0}")]
     Refused(String),
 }
@@ -75,7 +75,7 @@ pub fn run(options: EditorOptions) -> Result<AppExit, NoWindow> {
     if crate::render::adapter().is_none() {
         return Err(NoWindow::Adapter);
     }
-    // The event loop is made while plugins are built; where the display refuses it, Bevy panics.
+    // The event loop is created while plugins are built; if the display refuses it, Bevy panics.
     let built = std::panic::catch_unwind(|| {
         let mut app = App::new();
         app.add_plugins(EditorPlugin { options });
@@ -91,13 +91,13 @@ pub fn run(options: EditorOptions) -> Result<AppExit, NoWindow> {
     }
 }
 
-/// Everything the window is made of, Bevy's own plugins included.
+/// The plugins of the window, Bevy's own included.
 pub struct EditorPlugin {
-    /// What to open.
+    /// Options of the window.
     pub options: EditorOptions,
 }
 
-/// What to open at the start.
+/// File to open at the start.
 #[derive(Resource, Debug, Clone)]
 struct OpenFirst(OpenRequest);
 
@@ -157,7 +157,7 @@ impl Plugin for EditorPlugin {
     }
 }
 
-/// The camera that panels are drawn by: above the others, seeing nothing itself.
+/// Spawns the camera that draws the panels: above the other cameras, without a scene of its own.
 fn spawn_interface(mut commands: Commands, mut settings: ResMut<EguiGlobalSettings>) {
     settings.auto_create_primary_context = false;
     commands.spawn((
@@ -180,7 +180,7 @@ fn open_first(first: Res<OpenFirst>, mut requests: MessageWriter<OpenRequest>) {
     requests.write(first.0.clone());
 }
 
-/// Says so if a program draws instead of a graphics card.
+/// Sends a notice if a program draws instead of a graphics card.
 fn say_adapter(adapter: Option<Res<RenderAdapterInfo>>, mut notices: MessageWriter<Notice>) {
     let Some(adapter) = adapter else { return };
     if adapter.device_type == wgpu::DeviceType::Cpu {
@@ -189,7 +189,7 @@ fn say_adapter(adapter: Option<Res<RenderAdapterInfo>>, mut notices: MessageWrit
     }
 }
 
-/// Modes, undo and redo.
+/// Carries out changes of mode, undo and redo.
 fn carry_out(
     mut actions: MessageReader<ActionRequest>,
     mut mode: ResMut<Mode>,
@@ -211,16 +211,16 @@ fn carry_out(
     }
 }
 
-/// How long the window draws on after the last event: what a click did is on the screen some frames after it, and panels
-/// fold and scroll that long.
+/// Time that the window keeps drawing after the last event: the effect of a click appears some frames after it, and
+/// panels fold and scroll that long.
 const AFTERGLOW: Duration = Duration::from_millis(600);
 
-/// How many frames are drawn after the last event, where frames take long: panels find their places, the viewport follows
-/// them, the camera follows the viewport, and the skeleton is drawn anew for it.
+/// Number of frames drawn after the last event if frames take long: panels are laid out, the viewport follows them, the
+/// camera follows the viewport, and the skeleton is drawn again for it.
 const AFTER_FRAMES: u32 = 8;
 
-/// Panels are told of Shift, Ctrl and Alt before every frame, and draw another frame after whatever they are told: they are
-/// told only when one of them changes, or the window would never sleep.
+/// Drops unchanged modifier events. Panels receive Shift, Ctrl and Alt before every frame and draw another frame after
+/// any event; without this filter the window would never sleep.
 fn drop_old_modifiers(mut inputs: Query<&mut EguiInput>, mut last: Local<Option<Modifiers>>) {
     for mut input in &mut inputs {
         input.events.retain(|event| match event {
@@ -230,8 +230,7 @@ fn drop_old_modifiers(mut inputs: Query<&mut EguiInput>, mut last: Local<Option<
     }
 }
 
-/// Draws on after something happened, and as long as something goes on in the background; else the window sleeps until
-/// somebody does something.
+/// Keeps the window drawing after an event and while background work runs; otherwise it sleeps until the next event.
 fn keep_drawing(
     mut events: MessageReader<WindowEvent>,
     mut edited: MessageReader<Edited>,

@@ -1,4 +1,4 @@
-//! The camera of the viewport: it turns about a point, and stays where the user put it.
+//! The camera of the viewport: it orbits a point, and keeps the position that the user chose.
 //!
 //! | | mouse | trackpad | pen |
 //! | --- | --- | --- | --- |
@@ -46,11 +46,11 @@ impl Plugin for CameraPlugin {
     }
 }
 
-/// What the viewport sees of the active rig; `None` while there is nothing to see it with.
+/// View of the active rig through the viewport's camera; `None` without a camera or rig.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
 pub struct ViewportSight(pub Option<Sight>);
 
-/// Set to show everything as soon as there is something to show: after a file was opened.
+/// Request to frame the whole character as soon as it is loaded, set after a file was opened.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FrameWhenReady(pub bool);
 
@@ -78,7 +78,7 @@ fn spawn_camera(mut commands: Commands) {
     ));
 }
 
-/// Keeps [`ViewportSight`] true: after the last frame's transforms have propagated, before tools read it.
+/// Updates [`ViewportSight`] after the last frame's transforms have propagated, before tools read it.
 fn see(
     cameras: Query<(&GlobalTransform, &Projection, &RigViewport), With<PanOrbitCamera>>,
     rig: Option<Res<ActiveRig>>,
@@ -94,7 +94,7 @@ fn see(
     sight.set_if_neq(ViewportSight(next));
 }
 
-/// Views, framing and projection.
+/// Carries out changes of view, framing and projection.
 fn carry_out(
     mut actions: MessageReader<ActionRequest>,
     mut cameras: Query<(&mut PanOrbitCamera, &mut Projection)>,
@@ -136,7 +136,7 @@ fn carry_out(
     }
 }
 
-/// The projection, without perspective or with it.
+/// The orthographic or the perspective projection.
 fn projected(orthographic: bool) -> Projection {
     if orthographic {
         Projection::Orthographic(OrthographicProjection {
@@ -150,7 +150,7 @@ fn projected(orthographic: bool) -> Projection {
     }
 }
 
-/// Where the camera stands, as projects keep it.
+/// Position of the camera in the form that projects store.
 pub fn kept(orbit: &PanOrbitCamera, projection: &Projection) -> ProjectCamera {
     ProjectCamera {
         yaw: orbit.target_yaw,
@@ -161,7 +161,7 @@ pub fn kept(orbit: &PanOrbitCamera, projection: &Projection) -> ProjectCamera {
     }
 }
 
-/// Puts the camera where a project has it.
+/// Restores the camera's position from a project.
 pub fn take(kept: &ProjectCamera, orbit: &mut PanOrbitCamera, projection: &mut Projection) {
     orbit.target_yaw = kept.yaw;
     orbit.target_pitch = kept.pitch;
@@ -174,7 +174,7 @@ pub fn take(kept: &ProjectCamera, orbit: &mut PanOrbitCamera, projection: &mut P
     }
 }
 
-/// Bounds in the world of a rig's surface and joints; a cube of one unit if there is neither.
+/// Bounds in world space of a rig's surface and joints; a cube of one unit without either.
 fn everything(
     surface: Option<&RigSurface>,
     place: &GlobalTransform,
@@ -203,7 +203,7 @@ fn extent([low, high]: [Vec3; 2]) -> f32 {
     (high - low).max_element().max(1e-6)
 }
 
-/// Turns the camera without moving what it looks at.
+/// Turns the camera about its focus.
 fn turn(camera: &mut PanOrbitCamera, view: View) {
     let (yaw, pitch) = angles(view);
     camera.target_yaw = yaw;
@@ -225,7 +225,7 @@ pub fn angles(view: View) -> (f32, f32) {
     }
 }
 
-/// Moves the camera so that a box fills the viewport, from where it looks now.
+/// Moves the camera so that a box fills the viewport, in the current view direction.
 fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2) {
     let aspect = if size.y > 0.0 { size.x / size.y } else { 1.5 };
     let degrees = |radians: f32| radians.to_degrees();
@@ -237,7 +237,7 @@ fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2) {
     camera.force_update = true;
 }
 
-/// Shows everything once the mesh of a file that was opened is there.
+/// Frames the whole character once the mesh of an opened file is loaded.
 fn frame_when_ready(
     mut wanted: ResMut<FrameWhenReady>,
     rig: Option<Res<ActiveRig>>,
@@ -258,7 +258,7 @@ fn frame_when_ready(
     wanted.0 = false;
 }
 
-/// Gives the camera the buttons that are its own now, and takes the wheel away while a tool has it.
+/// Assigns the mouse buttons to the camera, and withholds the wheel while a tool uses it.
 fn steer(
     mut cameras: Query<&mut PanOrbitCamera>,
     area: Res<ViewportArea>,
@@ -286,7 +286,7 @@ fn steer(
     }
 }
 
-/// Draws into the part of the window that the panels leave.
+/// Restricts drawing to the part of the window that the panels leave free.
 fn fit_viewport(
     area: Res<ViewportArea>,
     windows: Query<&Window, With<PrimaryWindow>>,
@@ -311,7 +311,7 @@ fn fit_viewport(
     }
 }
 
-/// Keeps the distance to the focus known and the clipping planes beyond everything.
+/// Updates the distance to the focus, and keeps the clipping planes beyond the whole scene.
 fn keep_depths(
     mut cameras: Query<(&mut PanOrbitCamera, &Transform, &mut Projection, &mut RigViewport), Changed<Transform>>,
 ) {
@@ -328,7 +328,7 @@ fn keep_depths(
                 changed(perspective.near, near).then_some(Projection::Perspective(next))
             }
             Projection::Orthographic(orthographic) => {
-                // The camera stands in the middle between the planes: far enough not to cut into the mesh.
+                // The camera is in the middle between the planes: far enough not to cut into the mesh.
                 let framed = orbit.zoom_upper_limit.unwrap_or_default() * 0.1;
                 let far = 2.0 * framed.max(orbit.target_radius * 5.0);
                 let next = OrthographicProjection { near: 0.0, far, ..orthographic.clone() };

@@ -1,7 +1,7 @@
 //! The window's frame: menu and toolbar above, status line below, panels docked around the viewport.
 //!
-//! Everything is drawn in one system that lends the world out for reading; what panels ask for is carried out after
-//! the last of them.
+//! One system draws the whole window with read access to the world; the requests of panels are carried out after the
+//! last panel.
 
 use bevy::{ecs::system::SystemState, prelude::*, window::PrimaryWindow};
 use bevy_egui::{EguiContext, EguiPrimaryContextPass, PrimaryEguiContext, egui};
@@ -15,7 +15,7 @@ use super::{
     status, style, toolbar,
 };
 
-/// Draws the window.
+/// Plugin that draws the window.
 pub struct DockPlugin;
 
 impl Plugin for DockPlugin {
@@ -24,10 +24,10 @@ impl Plugin for DockPlugin {
     }
 }
 
-/// The name of the tab that is the viewport.
+/// Name of the viewport's tab.
 pub const VIEWPORT: &str = "Viewport";
 
-/// Where the panels are; remembered between runs.
+/// Arrangement of the panels; stored between runs.
 #[derive(Resource, Clone, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Layout {
@@ -48,12 +48,12 @@ impl Default for Layout {
 }
 
 impl Layout {
-    /// True if a panel is shown.
+    /// Returns `true` if a panel is shown.
     pub fn shows(&self, title: &str) -> bool {
         self.dock.iter_all_tabs().any(|(_, tab)| tab == title)
     }
 
-    /// Shows or hides a panel. The viewport stays.
+    /// Shows or hides a panel. The viewport always stays.
     pub fn toggle(&mut self, title: &str) {
         if title == VIEWPORT {
             return;
@@ -66,7 +66,7 @@ impl Layout {
         }
     }
 
-    /// Drops panels that do not exist (of another version), and brings the viewport back if it is not there.
+    /// Drops panels that do not exist (of another version), and restores a missing viewport.
     pub fn repair(&mut self, known: &[&str]) {
         self.dock.retain_tabs(|tab| tab == VIEWPORT || known.contains(&tab.as_str()));
         if !self.shows(VIEWPORT) {
@@ -75,7 +75,7 @@ impl Layout {
     }
 }
 
-/// Draws everything, then carries out what was asked for.
+/// Draws the window, then carries out the requests of its panels.
 fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<PrimaryEguiContext>>>) {
     let context = match state.get_mut(world) {
         Ok(mut contexts) => contexts.single_mut().ok().map(|mut context| context.get_mut().clone()),
@@ -119,13 +119,13 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
     remember_area(world, viewport);
     if !requests.is_empty() {
         trace!("drawing on: panels asked for something");
-        // What was asked for is done in the next frame, which nothing else may bring about.
+        // Requests take effect in the next frame, which has to be requested, too.
         world.write_message(bevy::window::RequestRedraw);
     }
     requests.carry_out(world);
 }
 
-/// Tells the pointer and the camera where the viewport is.
+/// Publishes the viewport's area for the pointer and the camera.
 fn remember_area(world: &mut World, viewport: Option<egui::Rect>) {
     let scale = world.query_filtered::<&Window, With<PrimaryWindow>>().single(world).map_or(1.0, Window::scale_factor);
     let Some(mut area) = world.get_resource_mut::<ViewportArea>() else { return };
@@ -183,7 +183,7 @@ impl TabViewer for Tabs<'_> {
         }
     }
 
-    /// The viewport reaches the edges of its place.
+    /// The viewport has no margin.
     fn tab_style_override(&self, tab: &String, style: &egui_dock::TabStyle) -> Option<egui_dock::TabStyle> {
         (tab == VIEWPORT).then(|| {
             let mut style = style.clone();

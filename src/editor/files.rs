@@ -1,8 +1,8 @@
-//! Files in the window: opening, saving and exporting, and never losing work on the way.
+//! Files in the window: opening, saving and exporting without loss of work.
 //!
-//! Everything that reads or writes a file does so in the background, from a snapshot or into a document that takes the
-//! place of the open one only when it is whole. What would lose unsaved changes asks first; see [`dialog`] for the
-//! questions. Every document has a journal from its first frame; see [`recovery`] for what a crash left.
+//! Files are read and written in the background, from a snapshot or into a document that replaces the open one only
+//! when it is complete. Actions that would lose unsaved changes ask first; see [`dialog`] for the questions. Every
+//! document has a journal from its first frame; see [`recovery`] for work left by a crash.
 
 pub mod dialog;
 mod dialog_view;
@@ -12,7 +12,10 @@ mod save;
 mod template;
 mod view;
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use bevy::{
     ecs::system::SystemState,
@@ -38,9 +41,12 @@ use super::{
     recovery,
     settings::EditorSettings,
 };
-use crate::plugins::{RigSystems, journal::JournalTrouble};
+use crate::{
+    files::{RealDisk, remove_stale_temps},
+    plugins::{RigSystems, journal::JournalTrouble},
+};
 
-/// Opens, saves and exports files.
+/// Plugin that opens, saves and exports files.
 pub struct FilesPlugin;
 
 impl Plugin for FilesPlugin {
@@ -60,15 +66,15 @@ impl Plugin for FilesPlugin {
             .init_resource::<EditorSettings>()
             .init_resource::<FrameWhenReady>()
             .add_overlay(dialog_view::DialogView::default())
-            .add_systems(Startup, recovery::look)
+            .add_systems(Startup, (recovery::look, clear_leftovers).chain())
             .add_systems(Update, attend.before(RigSystems::Script));
     }
 }
 
-/// Asks to open something instead of what is open.
+/// Request to open a document in place of the open one.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub enum OpenRequest {
-    /// The character that comes with Rigsmith.
+    /// The bundled character.
     Bundled,
     /// An empty rig without a mesh.
     Empty,
@@ -76,21 +82,21 @@ pub enum OpenRequest {
     File(PathBuf),
 }
 
-/// What goes on once unsaved changes are out of the way.
+/// Action that follows once unsaved changes are saved or discarded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Then {
-    /// Something else is opened.
+    /// Opens another document.
     Open(OpenRequest),
-    /// What was opened in the meantime takes the document's place.
+    /// Replaces the document by the one that was loaded in the meantime.
     Land,
     /// A crashed session's work is recovered from its journal.
     Recover(PathBuf),
-    /// The window closes.
+    /// Closes the window.
     Quit,
 }
 
-/// What [`recovery`] and [`render_errors`](super::render_errors) need of the parts.
-pub(super) mod parts {
+/// Parts shared with [`recovery`] and [`render_errors`](super::render_errors).
+pub(super) mod loading {
     pub(in crate::editor) use super::{
         document::{Context, MeshSource, places},
         open::{Landing, Opened, Work, begin, bundled_model, document, hash_of, project, spawn},
@@ -107,7 +113,7 @@ type Inbox<'w, 's> = (
     MessageReader<'w, 's, JournalTrouble>,
 );
 
-/// Does everything about files, before this frame's edits: what is saved and what the journal counts agree then.
+/// Handles all file actions before this frame's edits, so that the saved state and the journal's count agree.
 fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
     let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles)) = inbox.get_mut(world) else {
         return;
@@ -152,12 +158,29 @@ fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
     }
 }
 
+/// Removes what saves that were cut off left in the folders where the editor saves.
+fn clear_leftovers(settings: Res<EditorSettings>, state: Res<StateFolder>) {
+    let recent = settings.recent.iter().filter_map(|path| path.parent());
+    let folders: BTreeSet<PathBuf> = recent.map(Path::to_path_buf).chain(state.0.clone()).collect();
+    let task = open::spawn(move || {
+        for folder in folders {
+            match remove_stale_temps(&RealDisk, &folder) {
+                Ok(0) => {}
+                Ok(count) => info!("removed {count} unfinished files from {}", folder.display()),
+                // A recent folder may be gone.
+                Err(error) => debug!("{} cannot be looked through: {error}", folder.display()),
+            }
+        }
+    });
+    task.detach();
+}
+
 /// The open document's entity.
 fn active(world: &World) -> Option<Entity> {
     world.get_resource::<ActiveRig>().map(|rig| rig.0).filter(|rig| world.get::<OpenDocument>(*rig).is_some())
 }
 
-/// The name of a file, for people.
+/// Name of a file, for people.
 fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
@@ -174,7 +197,7 @@ fn act(world: &mut World, action: Action) {
     }
 }
 
-/// Opens something, after asking about unsaved changes where it would take the document's place.
+/// Opens a document; asks about unsaved changes first if it would replace the open one.
 fn request_open(world: &mut World, request: OpenRequest) {
     if let OpenRequest::File(path) = &request {
         if let Err(reason) = open::recognise(path) {
@@ -182,7 +205,7 @@ fn request_open(world: &mut World, request: OpenRequest) {
             return;
         }
         if open::is_rig_file(path) && template::has_mesh(world) {
-            // It is put onto the mesh, which undo takes back.
+            // A template is put onto the open mesh, which undo takes back.
             open::start(world, request);
             return;
         }
@@ -190,7 +213,7 @@ fn request_open(world: &mut World, request: OpenRequest) {
     after_asking(world, Then::Open(request));
 }
 
-/// Goes on at once if nothing would be lost, else asks.
+/// Proceeds at once if nothing would be lost, else asks.
 pub(super) fn after_asking(world: &mut World, then: Then) {
     match active(world).filter(|rig| is_unsaved(world, *rig)) {
         Some(rig) => {
@@ -201,7 +224,7 @@ pub(super) fn after_asking(world: &mut World, then: Then) {
     }
 }
 
-/// Goes on; changes that are unsaved now are not wanted.
+/// Proceeds; unsaved changes are discarded.
 fn proceed(world: &mut World, then: Then) {
     match then {
         Then::Open(request) => open::start(world, request),
@@ -211,7 +234,7 @@ fn proceed(world: &mut World, then: Then) {
     }
 }
 
-/// Ends the journal, so that nothing is offered the next time, and closes the window.
+/// Ends the journal, so that no recovery is offered the next time, and closes the window.
 fn quit(world: &mut World) {
     if world.resource_mut::<Saving>().wait_for(Then::Quit) {
         return;
@@ -220,7 +243,7 @@ fn quit(world: &mut World) {
     world.write_message(AppExit::Success);
 }
 
-/// Saves the project where it was saved before, or asks where.
+/// Saves the project to its file, or asks for one.
 fn save(world: &mut World, then: Option<Then>) {
     let Some(rig) = active(world) else { return };
     match world.get::<OpenDocument>(rig).and_then(|document| document.project.clone()) {
@@ -269,7 +292,7 @@ fn dialog_answered(world: &mut World, question: Question, answer: Answer) {
     }
 }
 
-/// `name* - Rigsmith`, the star while there are unsaved changes.
+/// Sets the title to `name* - Rigsmith`, with the star while there are unsaved changes.
 fn show_title(world: &mut World) {
     let mut windows = world.query_filtered::<&mut Window, With<PrimaryWindow>>();
     if windows.iter(world).next().is_none() {
@@ -283,7 +306,7 @@ fn show_title(world: &mut World) {
     }
 }
 
-/// What the window's title says.
+/// Title of the window.
 pub fn title(world: &World) -> String {
     let Some(rig) = active(world) else { return "Rigsmith".to_owned() };
     let name = world.get::<OpenDocument>(rig).map(|document| document.name.as_str()).unwrap_or_default();
@@ -291,7 +314,7 @@ pub fn title(world: &World) -> String {
     format!("{name}{star} - Rigsmith")
 }
 
-/// True if the open document has changes that are in no file.
+/// Returns `true` if the open document has changes that are in no file.
 pub fn has_unsaved_changes(world: &World) -> bool {
     active(world).is_some_and(|rig| is_unsaved(world, rig))
 }

@@ -1,4 +1,4 @@
-//! The keys and what they do, over everything until it is closed.
+//! List of keys and actions, over the whole window until it is closed.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -10,7 +10,7 @@ use super::{
     style,
 };
 
-/// Adds the list of keys.
+/// Plugin of the list of keys.
 pub struct HelpPlugin;
 
 impl Plugin for HelpPlugin {
@@ -19,13 +19,13 @@ impl Plugin for HelpPlugin {
     }
 }
 
-/// True while the list is shown.
+/// Visibility of the list.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct HelpShown(pub bool);
 
 struct Help;
 
-/// What the pointer does, for people who look for it.
+/// Actions of the pointer, for the list.
 const POINTER: &[(&str, &str)] = &[
     ("Left", "the mode's tool"),
     ("Middle drag, or Alt + left drag", "orbit"),
@@ -44,7 +44,7 @@ fn toggle(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<HelpShown
     }
 }
 
-/// What an action does, in a few words.
+/// Description of an action, in a few words.
 pub fn describe(action: Action) -> String {
     let text = match action {
         Action::Mode(mode) => return format!("{} mode", mode.name()),

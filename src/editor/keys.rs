@@ -1,6 +1,4 @@
-//! Which key asks for which action.
-//!
-//! Every action has at most one default key, and no key has two. People may bind others in the settings file.
+//! Key bindings: the action of each key.
 
 use bevy::{
     input::{
@@ -17,10 +15,10 @@ use super::{
     actions::{Action, ActionRequest},
     files::dialog::Dialog,
     mode::Mode,
-    pointer::Held,
+    pointer::ModifierKeys,
 };
 
-/// Turns keys into actions.
+/// Plugin that turns key presses into actions.
 pub struct KeysPlugin;
 
 impl Plugin for KeysPlugin {
@@ -35,7 +33,7 @@ impl Plugin for KeysPlugin {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Chord {
-    /// The key as people call it: `A`, `1`, `Tab`, `Delete`, `F2`.
+    /// Name of the key: `A`, `1`, `Tab`, `Delete`, `F2`.
     pub key: String,
     /// Control, or Command.
     pub control: bool,
@@ -45,7 +43,7 @@ pub struct Chord {
     pub alt: bool,
 }
 
-/// Why a text names no key.
+/// Error of a text that names no key.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` names no key; write one such as `S`, `Ctrl+S`, `Shift+F`, `Tab` or `F2`")]
 pub struct ChordError(String);
@@ -90,7 +88,7 @@ impl std::fmt::Display for Chord {
 #[serde(transparent)]
 pub struct KeyBindings(pub Vec<(Chord, Action)>);
 
-/// The keys as they come.
+/// Default bindings.
 const DEFAULTS: &[(&str, Action)] = &[
     ("Q", Action::Mode(Mode::Select)),
     ("A", Action::Mode(Mode::Place)),
@@ -159,14 +157,14 @@ impl KeyBindings {
         self.0.iter().find(|(_, known)| *known == action).map(|(chord, _)| chord)
     }
 
-    /// Chords that ask for two different things.
+    /// Chords bound to two actions.
     pub fn doubles(&self) -> Vec<&Chord> {
         let twice = |number: usize| self.0[..number].iter().any(|(chord, _)| *chord == self.0[number].0);
         (0..self.0.len()).filter(|number| twice(*number)).map(|number| &self.0[number].0).collect()
     }
 }
 
-/// The name of a key as people call it: letters by what they type, everything else by its place.
+/// Name of a key: letters by the character they type, all other keys by their position.
 pub fn key_name(input: &KeyboardInput) -> Option<String> {
     if let Key::Character(text) = &input.logical_key {
         let mut letters = text.chars();
@@ -181,18 +179,18 @@ pub fn key_name(input: &KeyboardInput) -> Option<String> {
     (!name.is_empty() && !name.contains(' ')).then(|| name.to_owned())
 }
 
-/// Turns presses into actions, unless a text field has the keyboard.
+/// Turns key presses into actions, unless a text field has the keyboard focus.
 fn press_keys(
     mut keys: MessageReader<KeyboardInput>,
     mut lost: MessageReader<WindowFocused>,
-    mut held: Local<Held>,
+    mut held: Local<ModifierKeys>,
     bindings: Res<KeyBindings>,
     dialog: Option<Res<Dialog>>,
     mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>,
     mut actions: MessageWriter<ActionRequest>,
 ) {
     if lost.read().any(|focus| !focus.focused) {
-        *held = Held::default();
+        *held = ModifierKeys::default();
     }
     if keys.is_empty() {
         return;
@@ -206,7 +204,7 @@ fn press_keys(
         let Some(key) = key_name(input) else { continue };
         let chord = Chord { key, control: held.control, shift: held.shift, alt: held.alt };
         match bindings.action(&chord) {
-            // Saving is never what a text field does with its keys.
+            // Text fields do not use these chords.
             Some(action) if !typing || matches!(action, Action::Save | Action::SaveAs | Action::Help) => {
                 actions.write(ActionRequest(action));
             }

@@ -1,4 +1,4 @@
-//! The names of joints over the viewport, in letters of the window.
+//! Joint labels over the viewport, in the window's font.
 
 use bevy::prelude::*;
 use bevy_egui::egui;

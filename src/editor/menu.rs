@@ -1,4 +1,4 @@
-//! The menu bar: everything there is, with its key.
+//! The menu bar: all actions, with their keys.
 
 use std::path::PathBuf;
 

@@ -1,9 +1,9 @@
-//! What the pointer does in the viewport.
+//! Modes: the action of the pointer in the viewport.
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What the pointer does in the viewport now. Tools run while it is theirs; nothing is deleted by changing it.
+/// Mode of the pointer in the viewport. Tools run in their modes; changing the mode deletes nothing.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum Mode {
     /// Clicks select joints, drags select boxes.
@@ -45,7 +45,7 @@ impl Mode {
     }
 }
 
-/// True while `mode` is on: a run condition of tools.
+/// Run condition of tools: `mode` is the current one.
 pub fn in_mode(mode: Mode) -> impl FnMut(Option<Res<Mode>>) -> bool + Clone {
     move |now| now.is_some_and(|now| *now == mode)
 }

@@ -1,77 +1,77 @@
-//! What the editor tells people: toasts, the log and the status line.
+//! Notices for people: toasts, the log and the status line.
 
 use bevy::prelude::*;
 
-/// How much a notice matters.
+/// Importance of a notice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Severity {
-    /// Something happened.
+    /// Information about an event.
     Info,
-    /// Something was done as asked.
+    /// Success of a requested action.
     Done,
-    /// Something is not quite as wished.
+    /// Warning about an unwanted result.
     Warning,
-    /// Something could not be done; the text says what to do.
+    /// Failure of an action; the text says what to do.
     Error,
 }
 
-/// Something that happened: shown as a toast and kept in the log.
+/// A notice: shown as a toast and kept in the log.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct Notice {
-    /// How much it matters.
+    /// Importance.
     pub severity: Severity,
     /// One or two sentences.
     pub text: String,
-    /// True to keep it out of the toasts.
+    /// Keeps the notice out of the toasts if `true`.
     pub quiet: bool,
 }
 
 impl Notice {
-    /// Something happened.
+    /// A notice about an event.
     pub fn info(text: impl Into<String>) -> Self {
         Self { severity: Severity::Info, text: text.into(), quiet: false }
     }
 
-    /// Something was done as asked.
+    /// A notice about a success.
     pub fn done(text: impl Into<String>) -> Self {
         Self { severity: Severity::Done, text: text.into(), quiet: false }
     }
 
-    /// Something is not quite as wished.
+    /// A warning.
     pub fn warning(text: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, text: text.into(), quiet: false }
     }
 
-    /// Something could not be done.
+    /// A notice about a failure.
     pub fn error(text: impl Into<String>) -> Self {
         Self { severity: Severity::Error, text: text.into(), quiet: false }
     }
 
-    /// For the log only.
+    /// Restricts the notice to the log.
     pub fn quiet(self) -> Self {
         Self { quiet: true, ..self }
     }
 }
 
-/// The status line. Tools write it when it changes; what it says is true before the click.
+/// The status line. Tools update it when it changes, so that it describes a click before it is made.
 #[derive(Resource, Debug, Clone, PartialEq, Eq, Default)]
 pub struct StatusLine {
-    /// What a click or drag would do now.
+    /// Effect of a click or drag.
     pub hint: String,
-    /// Why it cannot do what the mode is for, if so.
+    /// Reason why the mode's action is not possible, if so.
     pub obstacle: Option<String>,
-    /// What moves, only while it moves.
+    /// Description of the current movement, only while it lasts.
     pub banner: Option<String>,
 }
 
 impl StatusLine {
-    /// Says what a click would do, and nothing against it. Leaves the banner.
+    /// Sets the hint and clears the obstacle. Keeps the banner.
     pub fn say(&mut self, hint: impl Into<String>) {
         self.hint = hint.into();
         self.obstacle = None;
     }
 
-    /// Says why a click would do nothing. Leaves the banner.
+    /// Sets the obstacle. Keeps the banner.
     pub fn cannot(&mut self, why: impl Into<String>) {
         self.obstacle = Some(why.into());
     }

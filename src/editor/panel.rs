@@ -1,9 +1,9 @@
-//! Panels: one file each. They read the world and hand in requests; they never change it.
+//! Panels: one file each. They read the world and return requests; they never change it.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
 
-/// What panels ask for, carried out after all of them have been drawn.
+/// Requests of panels, carried out after all panels have been drawn.
 #[derive(Default)]
 pub struct Requests {
     list: Vec<Box<dyn FnOnce(&mut World) + Send>>,
@@ -22,12 +22,12 @@ impl Requests {
         self.list.push(Box::new(move |world| world.insert_resource(resource)));
     }
 
-    /// True if nothing was asked for.
+    /// Returns `true` without requests.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
-    /// Carries them out, in order.
+    /// Carries the requests out, in order.
     pub fn carry_out(self, world: &mut World) {
         for request in self.list {
             request(world);
@@ -37,40 +37,40 @@ impl Requests {
 
 /// A panel in the dock.
 pub trait EditorPanel: Send + Sync + 'static {
-    /// Its name, on the tab and in saved layouts.
+    /// Name on the tab and in saved layouts.
     fn title(&self) -> &'static str;
 
-    /// Draws it. Called once or more a frame, so it must not count on being called once.
+    /// Draws the panel. Called once or more a frame, so it must not rely on a single call.
     fn show(&mut self, ui: &mut egui::Ui, world: &World, requests: &mut Requests);
 }
 
-/// Something drawn over everything else: dialogs, prompts, toasts.
+/// An overlay above the whole window: dialogs, prompts, toasts.
 pub trait EditorOverlay: Send + Sync + 'static {
-    /// Draws it.
+    /// Draws the overlay.
     fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests);
 }
 
-/// Something painted over the viewport: labels, rubber bands, numbers beside the pointer.
+/// A painter above the viewport: labels, rubber bands, numbers beside the pointer.
 pub trait ViewportPainter: Send + Sync + 'static {
     /// Paints into `painter`, whose clip rectangle is the viewport; `area` is the viewport in window coordinates.
     fn paint(&mut self, painter: &egui::Painter, area: egui::Rect, world: &World);
 
-    /// Widgets over the viewport (a small bar for the threshold of a stroke, for example).
+    /// Draws widgets above the viewport (a small bar for the threshold of a stroke, for example).
     fn widgets(&mut self, _ui: &mut egui::Ui, _area: egui::Rect, _world: &World, _requests: &mut Requests) {}
 }
 
-/// All panels, overlays and painters, in the order they were added.
+/// Panels, overlays and painters, in the order in which they were added.
 #[derive(Resource, Default)]
 pub struct Panels {
-    /// In the dock.
+    /// Panels in the dock.
     pub panels: Vec<Box<dyn EditorPanel>>,
-    /// Over everything.
+    /// Overlays above the window.
     pub overlays: Vec<Box<dyn EditorOverlay>>,
-    /// Over the viewport.
+    /// Painters above the viewport.
     pub painters: Vec<Box<dyn ViewportPainter>>,
 }
 
-/// Adds to [`Panels`].
+/// Extension of [`App`] that adds to [`Panels`].
 pub trait PanelApp {
     /// Adds a panel to the dock.
     fn add_panel(&mut self, panel: impl EditorPanel) -> &mut Self;

@@ -1,7 +1,7 @@
 //! The panels of the dock, one file each, and the toasts over it.
 //!
-//! Each panel reads the active rig anew whenever it is drawn and keeps only what the rig does not know: what is folded,
-//! what is being typed. Long lists draw the rows that can be seen and nothing else.
+//! Each panel reads the active rig whenever it is drawn and keeps only state that is not part of the rig: folded
+//! entries, text being typed. Long lists draw the visible rows only.
 
 pub mod face;
 pub mod hierarchy;
@@ -12,16 +12,16 @@ pub mod properties;
 pub mod skinning;
 pub mod toasts;
 
+mod displayed_rig;
 mod fields;
 mod groups;
 mod list;
-mod shown;
 
 use bevy::prelude::*;
 
 use super::panel::PanelApp;
 
-pub use shown::joint_name;
+pub use displayed_rig::joint_name;
 
 /// Adds all panels, the toasts, and the systems behind the log and the skinning panel.
 pub struct PanelsPlugin;

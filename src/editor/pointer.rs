@@ -1,4 +1,4 @@
-//! What the pointer does over the viewport, after panels, popups and the camera have taken what is theirs.
+//! Pointer input over the viewport, after panels, popups and the camera have taken their share.
 //!
 //! Places are logical pixels from the viewport's top left corner, y down. All movements between two frames arrive, so
 //! strokes stay smooth at any frame rate. A pen is a pointer like any other.
@@ -10,7 +10,7 @@ use bevy::{
 };
 use bevy_egui::{EguiContext, PrimaryEguiContext, egui};
 
-/// Turns what the window reports into [`ViewportPointer`] messages.
+/// Plugin that turns window events into [`ViewportPointer`] messages.
 pub struct PointerPlugin;
 
 impl Plugin for PointerPlugin {
@@ -23,42 +23,42 @@ impl Plugin for PointerPlugin {
     }
 }
 
-/// One thing the pointer did in the viewport.
+/// An event of the pointer in the viewport.
 #[derive(Message, Debug, Clone, Copy, PartialEq)]
 pub struct ViewportPointer {
-    /// Where, in logical pixels from the viewport's top left corner. During a drag it may lie outside.
+    /// Position in logical pixels from the viewport's top left corner. During a drag it may lie outside.
     pub at: Vec2,
-    /// What.
+    /// Kind of the event.
     pub act: PointerAct,
-    /// Keys held.
-    pub held: Held,
+    /// Modifier keys held.
+    pub held: ModifierKeys,
 }
 
-/// What a pointer did. Presses, drags and releases are those of the tool's button (left, or the pen's tip).
+/// Kind of a pointer event. Presses, drags and releases are those of the tool's button (left, or the pen's tip).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PointerAct {
-    /// Moved without a button.
+    /// The pointer moved without a button.
     Moved,
-    /// Left the viewport.
+    /// The pointer left the viewport.
     Left,
     /// The button went down.
     Pressed,
-    /// Moved with the button down.
+    /// The pointer moved with the button down.
     Dragged,
-    /// The button went up; `dragged` is true if it moved more than a click may, `count` is 2 for a double click.
+    /// The button went up.
     Released {
-        /// True for the end of a drag, false for a click.
+        /// End of a drag (`true`, the pointer moved further than in a click), or a click (`false`).
         dragged: bool,
-        /// Clicks in a row.
+        /// Number of clicks in a row: 2 for a double click.
         count: u8,
     },
-    /// The wheel turned by so many notches while the tool had asked for it (see [`WheelUse`]); up is positive.
+    /// The wheel turned by this number of notches while the tool had requested it (see [`WheelUse`]); up is positive.
     Wheel(f32),
 }
 
 /// Modifier keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Held {
+pub struct ModifierKeys {
     /// Shift.
     pub shift: bool,
     /// Control, or Command.
@@ -67,9 +67,9 @@ pub struct Held {
     pub alt: bool,
 }
 
-impl Held {
-    /// Takes a key into account; true if it is a modifier. Events of one frame are taken in their order, so that a quick
-    /// Ctrl+Z within a slow frame still is one.
+impl ModifierKeys {
+    /// Updates the modifiers for a key event; returns `true` if the key is a modifier. Events of one frame are handled
+    /// in their order, so that a quick Ctrl+Z within a slow frame is recognised.
     pub fn follow(&mut self, input: &KeyboardInput) -> bool {
         let down = input.state == ButtonState::Pressed;
         match input.key_code {
@@ -84,67 +84,67 @@ impl Held {
     }
 }
 
-/// Who gets the wheel while it turns over the viewport.
+/// Receiver of the wheel over the viewport.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum WheelUse {
-    /// It zooms.
+    /// The camera, which zooms.
     #[default]
     Zoom,
-    /// The tool gets it; with Control it still zooms.
+    /// The tool; with Control the wheel still zooms.
     Tool,
 }
 
-/// Where the viewport is in the window and where the pointer is in it.
+/// Area of the viewport in the window, and the pointer's position in it.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
 pub struct ViewportArea {
     /// The viewport's top left corner in the window, logical pixels.
     pub min: Vec2,
-    /// Its size, logical pixels.
+    /// Size in logical pixels.
     pub size: Vec2,
-    /// Physical pixels a logical one.
+    /// Number of physical pixels per logical one.
     pub scale: f32,
     /// The pointer over the viewport, from its top left corner; `None` elsewhere.
     pub pointer: Option<Vec2>,
 }
 
-/// What the pointer was doing at the end of the last frame.
+/// State of the pointer at the end of the last frame.
 #[derive(Resource, Debug, Clone, Copy, Default)]
 pub struct PointerState {
-    /// Where, in the window.
+    /// Position in the window.
     at: Vec2,
-    /// Where the tool's button went down, while it is down and the tool has it.
+    /// Position of the press, while the tool has the button.
     pressed: Option<Vec2>,
-    /// True once it has moved more than a click may.
+    /// Marks that the pointer has moved further than in a click.
     dragged: bool,
-    /// The last click: where, when, and how many in a row.
+    /// The last click: position, time, and number in a row.
     last_click: Option<(Vec2, f64, u8)>,
-    /// True while another button, or Alt, moves the camera.
+    /// Marks that another button, or Alt, moves the camera.
     camera: bool,
 }
 
 impl PointerState {
-    /// True while a tool drags, or the camera does.
+    /// Returns `true` while a tool or the camera drags.
     pub fn is_busy(&self) -> bool {
         self.pressed.is_some() || self.camera
     }
 
-    /// True while a drag moves the camera.
+    /// Returns `true` while a drag moves the camera.
     pub fn is_camera(&self) -> bool {
         self.camera
     }
 
-    /// True while a tool has the button.
+    /// Returns `true` while a tool has the button.
     pub fn is_captured(&self) -> bool {
         self.pressed.is_some()
     }
 }
 
-/// How far a click may move, in logical pixels.
+/// Largest movement of a click, in logical pixels.
 const CLICK_REACH: f32 = 4.0;
-/// How long the clicks of a double click may lie apart, in seconds.
+/// Largest time between the clicks of a double click, in seconds.
 const DOUBLE_CLICK: f64 = 0.4;
 
-/// Reads the window's events in their order. What lies under a panel, a popup or a dialog is not the viewport's.
+/// Reads the window's events in their order. Events over a panel, a popup or a dialog do not belong to the viewport.
 pub(super) fn follow_pointer(
     mut events: MessageReader<WindowEvent>,
     windows: Query<Entity, With<PrimaryWindow>>,
@@ -153,7 +153,7 @@ pub(super) fn follow_pointer(
     time: Res<Time<Real>>,
     mut area: ResMut<ViewportArea>,
     mut state: ResMut<PointerState>,
-    mut modifiers: Local<Held>,
+    mut modifiers: Local<ModifierKeys>,
     mut pointer: MessageWriter<ViewportPointer>,
 ) {
     if events.is_empty() {
@@ -170,7 +170,7 @@ pub(super) fn follow_pointer(
             && context.dragged_id().is_none()
             && context.layer_id_at(egui::pos2(at.x, at.y)).is_none_or(|layer| layer.order == egui::Order::Background)
     };
-    let mut send = |at: Vec2, act: PointerAct, held: Held, area: &ViewportArea| {
+    let mut send = |at: Vec2, act: PointerAct, held: ModifierKeys, area: &ViewportArea| {
         pointer.write(ViewportPointer { at: at - area.min, act, held });
     };
     for event in events.read() {
@@ -178,7 +178,7 @@ pub(super) fn follow_pointer(
             WindowEvent::KeyboardInput(input) => {
                 modifiers.follow(input);
             }
-            WindowEvent::WindowFocused(focus) if !focus.focused => *modifiers = Held::default(),
+            WindowEvent::WindowFocused(focus) if !focus.focused => *modifiers = ModifierKeys::default(),
             WindowEvent::CursorMoved(moved) if moved.window == window => {
                 state.at = moved.position;
                 let here = over(state.at, &area);

@@ -1,9 +1,9 @@
-//! Whether there is a display, found out before Bevy needs it: it would panic.
+//! Probe for a display, before Bevy needs one and would panic without it.
 
-/// Looks for a display to open a window on.
+/// Probes for a display to open a window on.
 ///
 /// # Errors
-/// What is missing, in a few words.
+/// A short text about the missing display.
 pub fn display() -> Result<(), String> {
     if cfg!(not(all(unix, not(target_os = "macos")))) {
         return Ok(());
@@ -16,7 +16,7 @@ pub fn display() -> Result<(), String> {
     if answers(&name) { Ok(()) } else { Err(format!("nothing answers at DISPLAY={name}")) }
 }
 
-/// True if something listens where an X display of that name would.
+/// Returns `true` if an X display of that name accepts connections.
 #[cfg(unix)]
 fn answers(name: &str) -> bool {
     use std::{net::TcpStream, os::unix::net::UnixStream, path::Path};
@@ -24,7 +24,7 @@ fn answers(name: &str) -> bool {
     let Ok(number) = rest.split('.').next().unwrap_or_default().parse::<u16>() else { return false };
     if host.is_empty() || host == "unix" {
         let path = format!("/tmp/.X11-unix/X{number}");
-        // Without the file a server may still listen under the abstract name; then the window system decides.
+        // Without the socket file a server may still listen under the abstract name; then the window system decides.
         return !Path::new(&path).exists() && abstract_socket(&path) || UnixStream::connect(path).is_ok();
     }
     TcpStream::connect((host, 6000 + number)).is_ok()

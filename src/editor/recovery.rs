@@ -12,7 +12,7 @@ use super::{
     files::{
         Loading, Then, after_asking,
         dialog::{Answer, Dialog, Question},
-        parts::{
+        loading::{
             Context, Landing, MeshSource, Opened, Work, begin, bundled_model, document, hash_of, places, project, spawn,
         },
     },
@@ -23,14 +23,17 @@ use crate::{
     files::{
         Disk, FileKind, RealDisk,
         journal::{
-            Basis, Ending, MAX_JOURNAL, PendingJournal, Recovered, journal_beside, pending_journal, pending_journals,
-            recover,
+            Basis, Condition, MAX_JOURNAL, Origin, PendingJournal, RecordKind, Recovered, Restored, journal_beside,
+            pending_journal, pending_journals, project_beside, recover,
         },
         load_model, read_capped, stem,
     },
     plugins::surface::RigMesh,
     rig::Rig,
 };
+
+/// Gaps and skipped changes that are told one by one.
+const MAX_TOLD: usize = 20;
 
 /// What is known about work that a crash left.
 #[derive(Resource, Default)]
@@ -109,15 +112,27 @@ pub(super) fn answered(world: &mut World, mut list: Vec<PendingJournal>, answer:
     }
 }
 
-/// What a journal's work was on, for people.
-pub(super) fn describe(pending: &PendingJournal) -> String {
-    match pending.origin.path() {
-        Some(path) => stem(path),
-        None => match &pending.origin {
-            crate::files::journal::Origin::Bundled(_) => "the bundled character".to_owned(),
-            _ => "an empty rig".to_owned(),
-        },
+/// One line about work that can be recovered: what it was on, how much it is and what is wrong with it.
+pub fn describe(pending: &PendingJournal) -> String {
+    let on = match &pending.origin {
+        Origin::Bundled(_) => "the bundled character".to_owned(),
+        Origin::Empty => "an empty rig".to_owned(),
+        Origin::Mesh { path, .. } | Origin::Template { path, .. } | Origin::Project { path, .. } => stem(path),
+        Origin::Unknown => {
+            project_beside(&pending.path).map_or_else(|| "unknown work".to_owned(), |project| stem(&project))
+        }
+    };
+    let edits = if pending.changes == 1 { "1 edit".to_owned() } else { format!("{} edits", pending.changes) };
+    match &pending.condition {
+        Condition::Unreadable(error) => format!("{on}: {error}"),
+        Condition::Damaged(_) => format!("{on}: {edits}, {}", pending.condition),
+        Condition::Whole => format!("{on}: {edits}"),
     }
+}
+
+/// True if something of the work can be recovered.
+pub fn can_recover(pending: &PendingJournal) -> bool {
+    !matches!(pending.condition, Condition::Unreadable(_))
 }
 
 /// Recovers in the background.
@@ -129,7 +144,10 @@ pub(super) fn start(world: &mut World, journal: PathBuf) {
 /// Makes the document again as the journal has it.
 fn restore(journal: &Path) -> Result<Landing, String> {
     let bytes = read_capped(&RealDisk, journal, MAX_JOURNAL).map_err(|error| error.to_string())?;
-    let recovered = recover(&bytes).map_err(|error| format!("`{}`: {error}", journal.display()))?;
+    let mut recovered = recover(&bytes).map_err(|error| format!("`{}`: {error}", journal.display()))?;
+    if let Some(project) = project_beside(journal).filter(|project| project.is_file()) {
+        recovered.assume_project(&project);
+    }
     let basis = recovered.basis(hash_of);
     let (mut opened, base) = match (basis, recovered.project()) {
         (Basis::Project { .. } | Basis::Changed, Some(path)) => {
@@ -139,23 +157,58 @@ fn restore(journal: &Path) -> Result<Landing, String> {
         }
         _ => (with_meshes(&recovered), None),
     };
-    let replayed = recovered.replay(basis, base);
-    if let Some(reason) = &replayed.refused {
-        let total = recovered.changes().len();
-        opened.notes.push(format!(
-            "the weights and joints of the last {} of {total} changes could not be made again: {reason}; their journal \
-             is kept",
-            total - replayed.applied
-        ));
-    }
-    if let Ending::Torn { lost, .. } = recovered.ending {
-        opened.notes.push(format!("the last {lost} bytes of the journal were damaged and are left out"));
-    }
+    let restored = recovered.restore(basis, base);
+    tell_losses(&recovered, &restored, basis, &mut opened);
     opened.pending = None;
     opened.origin = recovered.origin().clone();
-    opened.rig = replayed.rig.clone();
-    opened.work = Some(Box::new(Work { recovered, replayed, journal: journal.to_owned() }));
+    opened.rig = restored.replayed.rig.clone();
+    opened.work = Some(Box::new(Work { recovered, restored, journal: journal.to_owned() }));
     Ok(document(opened))
+}
+
+/// Says what of the work is lost.
+fn tell_losses(recovered: &Recovered, restored: &Restored, basis: Basis, opened: &mut Opened) {
+    if let Some(reason) = &restored.replayed.refused {
+        let total = recovered.changes().len();
+        opened.warnings.push(format!(
+            "the weights and joints of the last {} of {total} changes could not be made again: {reason}; their journal \
+             is kept",
+            total - restored.replayed.applied
+        ));
+    }
+    if !recovered.is_damaged() {
+        return;
+    }
+    let (made, records) = (restored.replayed.applied, recovered.records());
+    let edits = recovered.changes().len();
+    let mut summary =
+        format!("the journal was damaged: {records} could be read, {made} of their {edits} edits were made");
+    if records.lost > 0 || !restored.skipped.is_empty() {
+        summary.push_str("; look over the rig, the log lists what is missing");
+    }
+    opened.warnings.push(summary);
+    if basis == Basis::Changed {
+        opened
+            .warnings
+            .push("the project is not as it was when the work began, so some of it may be missing".to_owned());
+    }
+    if basis == Basis::Journal && recovered.base().is_none() {
+        opened.warnings.push("the rig that the work started with is lost: what does not need it was made".to_owned());
+    }
+    let lost_context = recovered.gaps().iter().any(|gap| gap.kind == Some(RecordKind::Context));
+    if opened.meshes.is_empty() && basis == Basis::Journal && lost_context {
+        opened.warnings.push("the list of open meshes is lost; open the mesh again".to_owned());
+    }
+    let gaps = recovered.gaps().iter().map(ToString::to_string);
+    let skipped = restored.skipped.iter();
+    let skipped =
+        skipped.map(|skipped| format!("edit {} ({}) is left out: {}", skipped.change + 1, skipped.name, skipped.why));
+    let mut lines = gaps.chain(skipped);
+    opened.notes.extend(lines.by_ref().take(MAX_TOLD));
+    match lines.count() {
+        0 => {}
+        more => opened.notes.push(format!("and {more} more places")),
+    }
 }
 
 /// The meshes that were open, as far as they can be opened again.
@@ -179,7 +232,7 @@ fn with_meshes(recovered: &Recovered) -> Opened {
                 opened.meshes.push((RigMesh::new(mesh.uid, model, nodes), mesh.source));
             }
             Err(reason) => opened
-                .notes
+                .warnings
                 .push(format!("a mesh of the project is not there: {reason}; the rig was recovered without it")),
         }
     }

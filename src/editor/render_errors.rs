@@ -1,4 +1,5 @@
-//! When drawing fails: the work is made safe first, then drawing is tried again; the program never just quits.
+//! Recovery from rendering failures: the work is saved first, then rendering is tried again; the program never just
+//! quits.
 
 use std::{
     path::PathBuf,
@@ -16,7 +17,7 @@ use bevy::{
 
 use super::{
     ActiveRig,
-    files::{OpenDocument, has_unsaved_changes, parts},
+    files::{OpenDocument, has_unsaved_changes, loading},
     notice::Notice,
 };
 use crate::{
@@ -25,7 +26,7 @@ use crate::{
     rig::step::{Committed, StepSink},
 };
 
-/// Makes work safe when the renderer or the program fails.
+/// Plugin that saves the work when the renderer or the program fails.
 pub struct RenderErrorsPlugin;
 
 impl Plugin for RenderErrorsPlugin {
@@ -35,7 +36,7 @@ impl Plugin for RenderErrorsPlugin {
     }
 }
 
-/// What went wrong with drawing so far.
+/// Record of rendering failures.
 #[derive(Resource, Debug, Default)]
 pub struct RenderTrouble {
     /// Failures in a row, with less than a minute between them.
@@ -45,20 +46,20 @@ pub struct RenderTrouble {
 }
 
 impl RenderTrouble {
-    /// True once drawing was given up.
+    /// Returns `true` once rendering was given up.
     pub fn has_stopped(&self) -> bool {
         self.has_stopped
     }
 }
 
-/// How often drawing is tried again.
+/// Number of attempts after a failure.
 const TRIES: u32 = 3;
-/// After how long without trouble the count starts again.
+/// Time without failures after which the count starts again.
 const CALM: Duration = Duration::from_secs(60);
-/// How long is waited for the disk.
+/// Longest wait for the disk.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What is to be done about a failure of the renderer.
+/// Decides about a failure of the renderer.
 fn handle(error: &RenderError, world: &mut World, _render_world: &mut World) -> RenderErrorPolicy {
     if world.get_resource_or_init::<RenderTrouble>().has_stopped {
         return RenderErrorPolicy::StopRendering;
@@ -77,13 +78,13 @@ fn handle(error: &RenderError, world: &mut World, _render_world: &mut World) -> 
         return RenderErrorPolicy::Recover(RenderCreation::Automatic(Box::default()));
     }
     trouble.has_stopped = true;
-    // The window can show nothing any more.
+    // The window cannot show anything any more.
     error!("drawing failed {TRIES} times in a row ({reason}) and has stopped; {safe}. Start rigsmith again to go on");
     eprintln!("rigsmith: drawing has stopped ({reason}); {safe}. Start rigsmith again to go on.");
     RenderErrorPolicy::StopRendering
 }
 
-/// Puts all work into a safe place, and says where it is.
+/// Saves all work, and returns a text about its place.
 fn make_safe(world: &mut World) -> String {
     let Some(rig) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else {
         return "nothing was open".to_owned();
@@ -105,14 +106,14 @@ fn make_safe(world: &mut World) -> String {
 
 /// Writes a copy of the project beside the journal.
 fn rescue(world: &mut World, rig: Entity) -> Result<PathBuf, String> {
-    let (mut snapshot, is_bundled) = parts::snapshot(world, rig).ok_or("nothing is open")?;
+    let (mut snapshot, is_bundled) = loading::snapshot(world, rig).ok_or("nothing is open")?;
     let document = world.get::<OpenDocument>(rig).ok_or("nothing is open")?;
     let journal = document.journal().path();
     let folder = journal.as_deref().and_then(std::path::Path::parent).map(std::path::Path::to_path_buf);
     let folder = folder.unwrap_or_else(std::env::temp_dir);
     let path = folder.join(format!("{}-rescue.rigsmith.ron", document.name));
     if is_bundled {
-        let bundled = parts::place_bundled(&path)?;
+        let bundled = loading::place_bundled(&path)?;
         for mesh in snapshot.meshes.iter_mut().filter(|mesh| mesh.path.as_os_str().is_empty()) {
             mesh.path.clone_from(&bundled);
         }
@@ -148,7 +149,7 @@ pub(super) fn watched(journal: Journal) -> RigJournal {
     RigJournal::new(Watched(journal))
 }
 
-/// Waits for the journal before a panic takes its way.
+/// Flushes the journal before the panic is handled.
 fn flush_on_panic() {
     static INSTALLED: Once = Once::new();
     INSTALLED.call_once(|| {

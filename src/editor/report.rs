@@ -1,6 +1,7 @@
-//! What the window shows, as a line of JSON in a file: for programs that drive the window with mouse and keyboard.
+//! Report of the window's state, as a line of JSON in a file: for programs that drive the window with mouse and
+//! keyboard.
 //!
-//! Off unless `RIGSMITH_WINDOW_REPORT` names the file. It is replaced whenever something in it changes, in one rename.
+//! The report is off unless `RIGSMITH_WINDOW_REPORT` names the file. Every change replaces the file in one rename.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -25,7 +26,7 @@ use crate::{
     rig::Rig,
 };
 
-/// Writes the report if the environment asks for it.
+/// Plugin that writes the report if the environment requests it.
 pub struct ReportPlugin;
 
 impl Plugin for ReportPlugin {
@@ -36,40 +37,40 @@ impl Plugin for ReportPlugin {
     }
 }
 
-/// What the window shows.
+/// State of the window.
 #[derive(Serialize, Deserialize, Debug, Clone, PartialEq, Default)]
 #[serde(default)]
 pub struct WindowReport {
     /// The mode's name.
     pub mode: String,
-    /// True while a file is being opened, weights are computed or the surface is being prepared.
+    /// Marks that a file is being opened, weights are computed or the surface is being prepared.
     pub busy: bool,
-    /// True while a question is asked: where to save, what to do with unsaved work.
+    /// Marks an open question: a file to save to, or unsaved work.
     pub asked: bool,
-    /// Joints of the rig.
+    /// Number of joints of the rig.
     pub joints: usize,
-    /// How many joints are selected.
+    /// Number of selected joints.
     pub selected: usize,
     /// Names of the steps.
     pub steps: Vec<String>,
-    /// How many steps are in effect.
+    /// Number of steps in effect.
     pub head: usize,
-    /// Meshes that have weights.
+    /// Number of meshes with weights.
     pub skinned: usize,
-    /// Joints that do not stand as they rest.
+    /// Number of joints that are not at rest.
     pub posed: usize,
-    /// Where joints appear, in pixels of the window, by uid.
+    /// Positions of joints in pixels of the window, by uid.
     pub places: BTreeMap<String, [f32; 2]>,
     /// The viewport in the window: left, top, width and height.
     pub viewport: [f32; 4],
-    /// The pixels of the window in which the corners of the unit cube at the rig's origin would appear:
-    /// (0,0,0), (1,0,0), (0,1,0), (0,0,1). Enough to aim in an orthographic view.
+    /// Positions in pixels of the window of the corners (0,0,0), (1,0,0), (0,1,0) and (0,0,1) of the unit cube at the
+    /// rig's origin. They are enough to aim in an orthographic view.
     pub axes: [Option<[f32; 2]>; 4],
     /// The status line.
     pub status: String,
 }
 
-/// Where the report goes.
+/// File of the report.
 #[derive(Resource)]
 struct ReportFile {
     path: PathBuf,

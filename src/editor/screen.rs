@@ -1,4 +1,4 @@
-//! Switches of what is shown, and the window's way of showing it.
+//! Display switches, and their application to the window.
 
 use bevy::prelude::*;
 

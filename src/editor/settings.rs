@@ -1,4 +1,4 @@
-//! What the editor remembers between runs: recent files, switches, keys and where the panels are.
+//! Settings stored between runs: recent files, switches, keys and the layout of panels.
 
 use std::{path::PathBuf, time::Duration};
 
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::files::{RealDisk, read_capped, save_atomic};
 
-/// Adds the settings, the switches in them, and their file.
+/// Plugin of the settings, their switches, and their file.
 pub struct SettingsPlugin;
 
 impl Plugin for SettingsPlugin {
@@ -31,27 +31,27 @@ impl Plugin for SettingsPlugin {
     }
 }
 
-/// Switches and lists that are kept.
+/// Stored switches and lists.
 #[derive(Resource, Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(default)]
 pub struct EditorSettings {
-    /// Files that were opened, the last one first.
+    /// Recently opened files, the last one first.
     pub recent: Vec<PathBuf>,
-    /// True to let children move along with their parent.
+    /// Moves children along with their parent if `true`.
     pub move_children: bool,
     /// The axes of gizmos.
     pub gizmo_space: GizmoSpace,
 }
 
-/// The axes that gizmos move, turn and scale along.
+/// Axes along which gizmos move, turn and scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum GizmoSpace {
-    /// Those of the world.
+    /// Axes of the world.
     #[default]
     World,
-    /// Those of the joint.
+    /// Axes of the joint.
     Local,
-    /// Those of the screen.
+    /// Axes of the screen.
     View,
 }
 
@@ -65,7 +65,7 @@ impl GizmoSpace {
         }
     }
 
-    /// The next one.
+    /// The next setting in the cycle.
     pub fn next(self) -> Self {
         match self {
             Self::World => Self::Local,
@@ -76,7 +76,7 @@ impl GizmoSpace {
 }
 
 impl EditorSettings {
-    /// Puts a file at the top of the recent ones; ten are kept.
+    /// Adds a file at the top of the recent files; ten are kept.
     pub fn remember(&mut self, path: PathBuf) {
         self.recent.retain(|known| *known != path);
         self.recent.insert(0, path);
@@ -84,12 +84,12 @@ impl EditorSettings {
     }
 }
 
-/// Where settings are kept, and whether they can be.
+/// File of the settings, and whether it can be written.
 #[derive(Resource, Default)]
 pub struct SettingsFile {
     path: Option<PathBuf>,
     refused: bool,
-    /// What was saved last, or found at the start.
+    /// Text that was last saved, or found at the start.
     text: Option<String>,
     looked: Duration,
     saving: Option<Task<Result<(), String>>>,
@@ -98,18 +98,18 @@ pub struct SettingsFile {
 /// The content of the file.
 #[derive(Serialize, Deserialize, Default)]
 #[serde(default)]
-struct Kept {
+struct SettingsContent {
     settings: EditorSettings,
     keys: Option<KeyBindings>,
     layout: Option<Layout>,
 }
 
-/// The most bytes of settings that are read.
+/// Largest number of bytes of settings that are read.
 const MAX_BYTES: u64 = 1 << 20;
-/// How often it is looked for changes while the window is in use.
+/// Interval of checks for changes while the window is in use.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// The folder for what the editor keeps: `RIGSMITH_CONFIG`, or the user's configuration folder.
+/// Folder of the settings: `RIGSMITH_CONFIG`, or the user's configuration folder.
 pub fn folder() -> Option<PathBuf> {
     let chosen = std::env::var_os("RIGSMITH_CONFIG").filter(|folder| !folder.is_empty()).map(PathBuf::from);
     chosen.or_else(|| directories::ProjectDirs::from("", "", "rigsmith").map(|dirs| dirs.config_dir().to_owned()))
@@ -119,7 +119,7 @@ fn read(world: &mut World) {
     let Some(path) = folder().map(|folder| folder.join("settings.ron")) else { return };
     let text = read_capped(&RealDisk, &path, MAX_BYTES).ok().and_then(|bytes| String::from_utf8(bytes).ok());
     if let Some(text) = text {
-        match ron::from_str::<Kept>(&text) {
+        match ron::from_str::<SettingsContent>(&text) {
             Ok(kept) => {
                 world.insert_resource(kept.settings);
                 if let Some(keys) = kept.keys {
@@ -141,7 +141,7 @@ fn read(world: &mut World) {
             Err(error) => {
                 let text = format!("{}:{error}: the settings are not read; correct or delete the file", path.display());
                 world.write_message(Notice::warning(text));
-                // What somebody wrote there by hand is not overwritten.
+                // A file with manual edits is not overwritten.
                 world.resource_mut::<SettingsFile>().refused = true;
             }
         }
@@ -159,7 +159,7 @@ fn switch(mut actions: MessageReader<ActionRequest>, mut settings: ResMut<Editor
     }
 }
 
-/// Saves what changed, at most once a second, and at once when the window closes.
+/// Saves changed settings, at most once a second, and at once when the window closes.
 fn write(
     mut file: ResMut<SettingsFile>,
     settings: Res<EditorSettings>,
@@ -185,8 +185,8 @@ fn write(
     file.looked = time.elapsed();
     let Some(path) = file.path.clone().filter(|_| !file.refused && file.saving.is_none()) else { return };
     let keys = (*keys != KeyBindings::default()).then(|| keys.clone());
-    let kept = Kept { settings: settings.clone(), keys, layout: layout.map(|layout| layout.clone()) };
-    // Panels may have been moved by any frame, and tell nobody: the text is what shows it.
+    let kept = SettingsContent { settings: settings.clone(), keys, layout: layout.map(|layout| layout.clone()) };
+    // Any frame may move panels without an event: a change shows in the text only.
     let Ok(text) = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::default()) else { return };
     if file.text.as_ref() == Some(&text) {
         return;

@@ -1,4 +1,4 @@
-//! The line at the bottom: what a click would do now, and why it cannot.
+//! The status line at the bottom: effect of a click, or the reason why it has none.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -44,7 +44,7 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World) {
     });
 }
 
-/// What goes on in the background.
+/// Description of background work.
 fn doing(world: &World) -> Option<String> {
     if let Some(loading) = world.get_resource::<Loading>()
         && let Some(what) = loading.what()

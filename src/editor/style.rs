@@ -1,12 +1,12 @@
-//! How the window looks: dark, quiet, one accent colour.
+//! Style of the window: dark, quiet, one accent colour.
 
 use bevy_egui::egui::{self, Color32, CornerRadius, FontId, Margin, Stroke, TextStyle};
 
-/// What is chosen, on, or about to happen.
+/// Colour of chosen, active or imminent items.
 pub const ACCENT: Color32 = Color32::from_rgb(255, 158, 44);
-/// What stands against what the user wants.
+/// Colour of obstacles.
 pub const OBSTACLE: Color32 = Color32::from_rgb(255, 190, 90);
-/// Quiet text.
+/// Colour of quiet text.
 pub const QUIET: Color32 = Color32::from_rgb(150, 154, 162);
 
 const BACKGROUND: Color32 = Color32::from_rgb(36, 38, 43);

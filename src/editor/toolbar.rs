@@ -1,4 +1,4 @@
-//! The modes and switches people use all the time.
+//! The toolbar: modes and frequent switches.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -76,7 +76,7 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
     });
 }
 
-/// What a mode is for.
+/// Purpose of a mode, for its tooltip.
 fn purpose(mode: Mode) -> &'static str {
     match mode {
         Mode::Select => "Click joints, drag boxes",

@@ -1,4 +1,4 @@
-//! What the pointer does in each mode: tools read it and write the same requests that gesture lists and games write.
+//! Tools: in each mode a tool reads the pointer and writes the same requests that gesture lists and games write.
 //!
 //! | tool | modes | does |
 //! | --- | --- | --- |
@@ -9,8 +9,8 @@
 //! | [`weights`] | Weights | shows what the selected joint moves |
 //! | [`symmetry`] | all | the plane of live mirroring |
 //!
-//! What a tool is about to do lies in its resource, from which [`ghosts`] draws it; nothing of the rig changes before
-//! the request.
+//! The planned action of a tool is in its resource, from which [`ghosts`] draws it; the rig does not change before the
+//! request.
 
 pub mod actions;
 pub mod ghosts;
@@ -71,21 +71,22 @@ impl Plugin for ToolsPlugin {
     }
 }
 
-/// When tools run. The first three are in `Update`, before the systems of rigs, so that what a click does is seen in the
-/// same frame; the last is in `PostUpdate`, where rigs, poses and surfaces are what they will be on the screen.
+/// Order of the tools. The first three sets are in `Update`, before the systems of rigs, so that the effect of a click
+/// appears in the same frame; the last is in `PostUpdate`, when rigs, poses and surfaces have their final state of the
+/// frame.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ToolSystems {
-    /// What the pointer does goes to the tool that has it, as [`ToolPointer`].
+    /// Routes pointer events to their tool, as [`ToolPointer`].
     Route,
-    /// Keys, menus and buttons that need no pointer.
+    /// Carries out actions of keys, menus and buttons that need no pointer.
     Actions,
-    /// Tools write requests.
+    /// Runs the tools, which write requests.
     Tools,
-    /// Tools say what they are about to do: ghosts, the status line, who gets the wheel.
+    /// Shows the planned actions of tools: ghosts, the status line, the use of the wheel.
     Show,
 }
 
-/// Who has the pointer.
+/// Tool that owns the pointer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Tool {
     /// Selecting, in every mode that does not draw.
@@ -109,20 +110,20 @@ impl Tool {
     }
 }
 
-/// What the pointer did, with the tool that has it.
+/// A pointer event, with the tool that owns it.
 #[derive(Message, Debug, Clone, Copy, PartialEq)]
 pub struct ToolPointer {
     /// The tool.
     pub tool: Tool,
-    /// What.
+    /// The pointer event.
     pub pointer: ViewportPointer,
 }
 
-/// The tool that has the button: a drag stays with the tool it began with, whatever becomes of the mode.
+/// The tool that has the button: a drag stays with the tool it began with, whatever the mode becomes.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PointerOwner(pub Option<Tool>);
 
-/// True while the pointer is over a handle of a gizmo, so that a press is the gizmo's. Written by gizmos.
+/// Marks that the pointer is over a handle of a gizmo, so that a press belongs to the gizmo. Written by gizmos.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GizmoHover(pub bool);
 
@@ -146,7 +147,7 @@ fn route(
     }
 }
 
-/// The wheel is the tool's where it changes what is shown, and zooms everywhere else.
+/// Gives the wheel to a tool that uses it; elsewhere it zooms.
 fn give_wheel(
     mode: Res<Mode>,
     place: Res<place::PlaceTool>,

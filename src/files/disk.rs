@@ -7,6 +7,15 @@ use std::{
     time::SystemTime,
 };
 
+/// Bytes that are read back at a time.
+const BLOCK: usize = 1 << 16;
+
+/// How often, and how long apart, a folder is tried to be locked: for 30 seconds in all.
+#[cfg(unix)]
+const FOLDER_ATTEMPTS: usize = 3000;
+#[cfg(unix)]
+const FOLDER_PAUSE: std::time::Duration = std::time::Duration::from_millis(10);
+
 /// What a path leads to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EntryKind {
@@ -49,12 +58,21 @@ pub trait DiskFile: Send {
         Ok(())
     }
 
+    /// Tells whether the disk returns exactly `bytes` for the whole file; true where it cannot be read through this handle.
+    fn reads_back(&mut self, bytes: &[u8]) -> io::Result<bool> {
+        let _ = bytes;
+        Ok(true)
+    }
+
     /// Another handle of the same file, through which it can be synced while this one goes on writing; an error where
     /// there is none.
     fn another(&self) -> io::Result<Box<dyn DiskFile>> {
         Err(io::ErrorKind::Unsupported.into())
     }
 }
+
+/// A lock that lasts until it is dropped.
+pub type Hold = Box<dyn Send>;
 
 /// The operations on files that Rigsmith uses. Each call may fail on its own; none is assumed to be atomic but `rename`.
 pub trait Disk: Send + Sync {
@@ -95,6 +113,23 @@ pub trait Disk: Send + Sync {
     fn is_locked(&self, path: &Path) -> io::Result<bool> {
         self.entry(path, true).map(|_| false)
     }
+
+    /// Keeps the file at `path` from being [locked](DiskFile::lock), for one who removes what dead processes left; `None`
+    /// while a process that lives has it locked, [`Unsupported`](io::ErrorKind::Unsupported) where files cannot be locked.
+    fn hold(&self, path: &Path) -> io::Result<Option<Hold>> {
+        let _ = path;
+        Err(io::ErrorKind::Unsupported.into())
+    }
+
+    /// Waits until no other save that changes companions runs in `folder` and keeps others waiting; `None` where folders
+    /// cannot be locked.
+    ///
+    /// # Errors
+    /// [`WouldBlock`](io::ErrorKind::WouldBlock) if the wait takes longer than any save does.
+    fn lock_folder(&self, folder: &Path) -> io::Result<Option<Hold>> {
+        let _ = folder;
+        Ok(None)
+    }
 }
 
 /// The file system of this machine.
@@ -131,7 +166,7 @@ impl Disk for RealDisk {
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        let file = fs::OpenOptions::new().write(true).create_new(true).open(path)?;
+        let file = fs::OpenOptions::new().read(true).write(true).create_new(true).open(path)?;
         Ok(Box::new(RealFile(file)))
     }
 
@@ -188,6 +223,28 @@ impl Disk for RealDisk {
         // Some file systems know no locks; then nobody can tell.
         Ok(matches!(fs::File::open(path)?.try_lock_shared(), Err(fs::TryLockError::WouldBlock)))
     }
+
+    fn hold(&self, path: &Path) -> io::Result<Option<Hold>> {
+        let file = fs::File::open(path)?;
+        match file.try_lock_shared() {
+            Ok(()) => Ok(Some(Box::new(file))),
+            Err(fs::TryLockError::WouldBlock) => Ok(None),
+            Err(fs::TryLockError::Error(_)) => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+
+    #[cfg(unix)]
+    fn lock_folder(&self, folder: &Path) -> io::Result<Option<Hold>> {
+        let folder = fs::File::open(folder)?;
+        for _ in 0..FOLDER_ATTEMPTS {
+            match folder.try_lock() {
+                Ok(()) => return Ok(Some(Box::new(folder))),
+                Err(fs::TryLockError::WouldBlock) => std::thread::sleep(FOLDER_PAUSE),
+                Err(fs::TryLockError::Error(_)) => return Ok(None),
+            }
+        }
+        Err(io::ErrorKind::WouldBlock.into())
+    }
 }
 
 struct RealFile(fs::File);
@@ -225,6 +282,23 @@ impl DiskFile for RealFile {
             Err(fs::TryLockError::WouldBlock) => Err(io::ErrorKind::WouldBlock.into()),
             // Some file systems know no locks.
             Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(()),
+        }
+    }
+
+    fn reads_back(&mut self, mut bytes: &[u8]) -> io::Result<bool> {
+        io::Seek::rewind(&mut self.0)?;
+        let mut block = vec![0; BLOCK.min(bytes.len() + 1)];
+        loop {
+            let count = match io::Read::read(&mut self.0, &mut block) {
+                Ok(0) => return Ok(bytes.is_empty()),
+                Ok(count) => count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error),
+            };
+            match bytes.split_at_checked(count) {
+                Some((read, rest)) if block.starts_with(read) => bytes = rest,
+                _ => return Ok(false),
+            }
         }
     }
 

@@ -10,7 +10,7 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use super::disk::{Disk, DiskFile, Entry};
+use super::disk::{Disk, DiskFile, Entry, Hold};
 
 /// The manner in which an operation fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -219,6 +219,14 @@ impl Disk for FaultyDisk {
     fn is_locked(&self, path: &Path) -> io::Result<bool> {
         self.inner.run("is_locked", |disk| disk.is_locked(path))
     }
+
+    fn hold(&self, path: &Path) -> io::Result<Option<Hold>> {
+        self.inner.run("hold", |disk| disk.hold(path))
+    }
+
+    fn lock_folder(&self, folder: &Path) -> io::Result<Option<Hold>> {
+        self.inner.run("lock_folder", |disk| disk.lock_folder(folder))
+    }
 }
 
 struct FaultyFile {
@@ -285,6 +293,16 @@ impl DiskFile for FaultyFile {
 
     fn lock(&mut self) -> io::Result<()> {
         self.file.lock()
+    }
+
+    fn reads_back(&mut self, bytes: &[u8]) -> io::Result<bool> {
+        match self.inner.step("reads_back") {
+            None | Some(Fault::Short) => self.file.reads_back(bytes),
+            Some(fault) => {
+                self.inner.settle(fault);
+                Err(fault.error())
+            }
+        }
     }
 }
 

@@ -5,8 +5,12 @@
 //! included. A record is with the kernel within milliseconds, which survives the death of the process, and on the disk
 //! a moment later, which survives a power cut; neither holds up the caller. A clean [`close`](Journal::close) removes
 //! the file, so that a file whose process is gone is work to be offered back: [`pending_journals`] lists them,
-//! [`recover`] reads one up to the first record that is torn or damaged, [`Recovered::replay`] makes the rig again, and
-//! [`Journal::resume`] goes on with it.
+//! [`recover`] reads one, [`Recovered::restore`] makes the rig again, and [`Journal::resume`] goes on with it.
+//!
+//! **Damage.** Each record has a checksum of its own, so that [`recover`] takes every one that is sound and tells the
+//! [`Gap`]s between them; [`Recovered::restore`] makes all changes again that the rig still takes and tells those that it
+//! left out. Only a whole journal whose changes are all saved is ever removed unasked. [`Journal::resume`] keeps a damaged
+//! one under the ending `.damaged`, and deleting it is for people to decide.
 //!
 //! **Saving.** [`Journal::saving`] notes which content the project file is about to get (the hash of its
 //! [`project_files`](crate::files::project_files)) and which changes are in it; after the file is in place, [`Journal::saved`] starts the journal anew on it, beside it. A crash between any two of
@@ -17,13 +21,20 @@
 //! and everything is written again as soon as one of them works.
 //!
 //! The file: magic `RIGJRNL\0`, format, session (a random number that all checksums depend on), then frames of length,
-//! kind, number, payload and checksum. Payloads are RON; weights are binary, once each.
+//! kind, number, payload and checksum. Payloads are RON; weights are binary, once each. The rig that the work started with
+//! is there twice.
 
 mod encode;
 mod frame;
+mod gap;
+mod lossy_timeline;
 mod place;
 mod read;
+mod restore;
+mod scan;
+mod summary;
 mod sync;
+mod tally;
 mod text;
 mod thread;
 mod writer;
@@ -32,10 +43,15 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-pub use frame::{JOURNAL_FORMAT, MAX_RECORD};
-pub use place::{JournalPlaces, PendingJournal, file_hash_at, journal_beside, pending_journal, pending_journals};
+pub use frame::{JOURNAL_FORMAT, MAX_RECORD, RecordKind};
+pub use gap::{Damage, Gap, RecordCount};
+pub use place::{
+    Condition, JournalPlaces, PendingJournal, file_hash_at, journal_beside, pending_journal, pending_journals,
+    project_beside,
+};
 pub use read::{Basis, Ending, JournalError, MAX_JOURNAL, Recovered, recover};
-pub use writer::{Journal, JournalStart};
+pub use restore::{Restored, SkipReason, Skipped};
+pub use writer::{Journal, JournalStart, Resumed};
 
 pub use crate::rig::skin::content_hash as file_hash;
 
@@ -68,13 +84,15 @@ pub enum Origin {
         /// Its hash when it was opened or saved.
         hash: u64,
     },
+    /// Not known any more, because that part of the journal is damaged. Never written.
+    Unknown,
 }
 
 impl Origin {
     /// The file; `None` if there is none.
     pub fn path(&self) -> Option<&std::path::Path> {
         match self {
-            Self::Empty | Self::Bundled(_) => None,
+            Self::Empty | Self::Bundled(_) | Self::Unknown => None,
             Self::Mesh { path, .. } | Self::Template { path, .. } | Self::Project { path, .. } => Some(path),
         }
     }
@@ -113,6 +131,11 @@ impl Content {
     /// Starts again from a saved project.
     fn rebase(&mut self, mark: &SaveMark) {
         let contained = usize::try_from(mark.position.saturating_sub(self.first)).unwrap_or(usize::MAX);
+        self.rebase_after(mark, contained);
+    }
+
+    /// Starts again from a saved project that holds the first `contained` changes.
+    fn rebase_after(&mut self, mark: &SaveMark, contained: usize) {
         let contained = contained.min(self.changes.len());
         self.changes.drain(..contained);
         self.first = self.first.saturating_add(contained as u64);

@@ -135,7 +135,10 @@ pub fn load_model(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
 }
 
 /// Runs a reader on a thread of its own, so that a panic in a dependency is an error here.
-fn surviving<T: Send>(path: &Path, read: impl FnOnce() -> Result<T, LoadError> + Send) -> Result<T, LoadError> {
+pub(super) fn surviving<T: Send>(
+    path: &Path,
+    read: impl FnOnce() -> Result<T, LoadError> + Send,
+) -> Result<T, LoadError> {
     std::thread::scope(|scope| {
         let worker = std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, read);
         match worker {
@@ -199,7 +202,7 @@ pub(super) fn load_project_file(disk: &dyn Disk, path: &Path) -> Result<ReadProj
     read_project(&bytes).map_err(|source| in_source(path, &bytes, source))
 }
 
-fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadError {
+pub(super) fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadError {
     LoadError::Source { path: path.into(), text: String::from_utf8_lossy(bytes).into_owned(), source }
 }
 

@@ -36,20 +36,26 @@ pub struct ProjectToSave {
     pub journal: Option<JournalReference>,
 }
 
-/// A mesh of a project that is saved.
+/// A mesh of a project and its geometry: a [`MeshShape`] to save, or a [`MeshState`] as it was found.
 #[derive(Debug, Clone)]
-pub struct MeshToSave {
+pub struct ProjectMesh<S> {
     /// Identity.
     pub uid: Uid,
     /// The rig that moves it.
     pub rig: Uid,
-    /// Where its file is.
+    /// Where its file is, or should be.
     pub path: PathBuf,
     /// The joint that each node of the file became.
     pub nodes: Arc<[Uid]>,
     /// Its geometry.
-    pub shape: MeshShape,
+    pub shape: S,
 }
+
+/// A mesh of a project that is saved.
+pub type MeshToSave = ProjectMesh<MeshShape>;
+
+/// A mesh of a project as opened.
+pub type LoadedMesh = ProjectMesh<MeshState>;
 
 /// The geometry of a project's mesh, as far as there is any.
 #[derive(Debug, Clone)]
@@ -102,21 +108,6 @@ pub struct LoadedProject {
     pub journal: Option<JournalReference>,
     /// What was passed over, transferred or missing, a sentence each.
     pub notes: Vec<String>,
-}
-
-/// A mesh of a project as opened.
-#[derive(Debug)]
-pub struct LoadedMesh {
-    /// Identity.
-    pub uid: Uid,
-    /// The rig that moves it.
-    pub rig: Uid,
-    /// Where its file is, or should be.
-    pub path: PathBuf,
-    /// The joint that each node of the file became.
-    pub nodes: Vec<Uid>,
-    /// The mesh, if it was found.
-    pub state: MeshState,
 }
 
 /// What became of a project's mesh.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Disk, FileKind, SaveError, save_all_atomic, save_atomic, stem};
+use super::{Disk, FileKind, FileSet, LoadError, SaveError, save_atomic, save_set, stem, verify};
 use crate::{
     mesh::{
         gltf::{GltfError, GltfWriteSettings, write_glb, write_gltf},
@@ -73,6 +73,34 @@ pub enum StoreError {
         /// What is wrong with them.
         source: SkinError,
     },
+    /// The file would hold nothing.
+    #[error("`{}` was not written: {what}; nothing was changed", path.display())]
+    Nothing {
+        /// The file.
+        path: PathBuf,
+        /// The reason, and what to do.
+        what: &'static str,
+    },
+    /// Our own reader refuses what was about to be written.
+    #[error("`{}` was not written, because it could not be read again ({source}); nothing was changed; save in another format and report this", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The reader's answer.
+        source: Box<LoadError>,
+    },
+    /// Our own reader finds less than was about to be written.
+    #[error("`{}` was not written, because only {read} of {written} {what} could be read again; nothing was changed; save in another format and report this", path.display())]
+    Lost {
+        /// The file.
+        path: PathBuf,
+        /// The kind of thing that is counted.
+        what: &'static str,
+        /// How many the model has.
+        written: usize,
+        /// How many came back.
+        read: usize,
+    },
     /// Its name has no ending that fits.
     #[error("`{}`: {wanted}", path.display())]
     Kind {
@@ -83,7 +111,11 @@ pub enum StoreError {
     },
 }
 
-/// Saves a model as `.glb`, `.gltf` (with its buffer and images beside it) or `.obj` (with its materials).
+/// Saves a model as `.glb`, `.gltf` (with its buffer and images beside it) or `.obj` (with its materials), after reading back
+/// what is to be written. Returns what the format could not keep, a sentence each.
+///
+/// # Errors
+/// [`StoreError`]; what was there before is still there. A model that the format would hold nothing of is an error, too.
 pub fn store_model(
     disk: &dyn Disk,
     path: &Path,
@@ -91,37 +123,39 @@ pub fn store_model(
     settings: &GltfWriteSettings,
 ) -> Result<Vec<String>, StoreError> {
     let gltf_error = |source| StoreError::Gltf { path: path.into(), source };
-    match FileKind::of(path) {
-        Some(FileKind::Glb) => {
-            save_atomic(disk, path, &write_glb(model, settings).map_err(gltf_error)?)?;
-            Ok(Vec::new())
+    let nothing = |what| Err(StoreError::Nothing { path: path.into(), what });
+    let kind = FileKind::of(path);
+    let has_faces = model.face_count() > 0;
+    match kind {
+        Some(FileKind::Glb | FileKind::Gltf) if !has_faces && model.nodes.is_empty() => {
+            return nothing("there is neither a mesh nor a joint to write; give a file that has one");
         }
+        Some(FileKind::Obj) if !has_faces => {
+            return nothing("there is no mesh to write, and .obj holds nothing else; give a file that has one");
+        }
+        _ => {}
+    }
+    let mut set = FileSet::new(path);
+    let mut notes = Vec::new();
+    match kind {
+        Some(FileKind::Glb) => set.finish(write_glb(model, settings).map_err(gltf_error)?),
         Some(FileKind::Gltf) => {
-            let stem = stem(path);
-            let written = write_gltf(model, settings, &stem).map_err(gltf_error)?;
-            let mut files: Vec<(PathBuf, Vec<u8>)> =
-                written.images.into_iter().map(|(name, bytes)| (path.with_file_name(name), bytes)).collect();
-            if !written.bin.is_empty() {
-                files.push((path.with_file_name(format!("{stem}.bin")), written.bin));
-            }
-            files.push((path.into(), written.json));
-            save_all_atomic(disk, &files)?;
-            Ok(Vec::new())
+            let mut companion = |plain: &str, bytes| set.add(disk, plain, bytes);
+            let json = write_gltf(model, settings, &stem(path), &mut companion).map_err(gltf_error)?;
+            set.finish(json);
         }
         Some(FileKind::Obj) => {
-            let library = format!("{}.mtl", stem(path));
             let posed = (!model.skins.is_empty()).then(|| model.at_rest());
-            let written = write_obj(posed.as_ref().unwrap_or(model), &library);
-            let beside = |name: &str| path.with_file_name(name);
-            let mut files: Vec<(PathBuf, Vec<u8>)> =
-                written.images.into_iter().map(|(name, bytes)| (beside(&name), bytes)).collect();
-            files.extend(written.mtl.map(|bytes| (beside(&library), bytes)));
-            files.push((path.into(), written.obj));
-            save_all_atomic(disk, &files)?;
-            Ok(lost_in_obj(model))
+            let mut companion = |plain: &str, bytes| set.add(disk, plain, bytes);
+            let obj = write_obj(posed.as_ref().unwrap_or(model), &stem(path), &mut companion);
+            set.finish(obj);
+            notes = lost_in_obj(model);
         }
-        _ => Err(StoreError::Kind { path: path.into(), wanted: "a model is saved as .glb, .gltf or .obj" }),
+        _ => return Err(StoreError::Kind { path: path.into(), wanted: "a model is saved as .glb, .gltf or .obj" }),
     }
+    verify::model(&set, model)?;
+    save_set(disk, &set)?;
+    Ok(notes)
 }
 
 /// What OBJ has no place for, as a note.
@@ -147,12 +181,14 @@ pub fn store_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>,
             if text.len() > template::MAX_BYTES {
                 return Err(StoreError::TooLarge { path: path.into(), mebibytes: text.len() >> 20 });
             }
+            verify::template(path, text.as_bytes())?;
             save_atomic(disk, path, text.as_bytes())?;
             Ok(Vec::new())
         }
         Some(FileKind::RigText) => {
             let written =
                 text::write(&rig_text(rig)).map_err(|source| StoreError::RigText { path: path.into(), source })?;
+            verify::rig_text(path, written.text.as_bytes())?;
             save_atomic(disk, path, written.text.as_bytes())?;
             Ok(written
                 .relabelled
@@ -168,5 +204,10 @@ pub fn store_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>,
 
 /// Saves weights as `.skin`.
 pub fn store_skin(disk: &dyn Disk, path: &Path, skin: &SkinFile) -> Result<(), StoreError> {
-    Ok(save_atomic(disk, path, &skin.write())?)
+    if FileKind::of(path) != Some(FileKind::Skin) {
+        return Err(StoreError::Kind { path: path.into(), wanted: "weights are saved as .skin" });
+    }
+    let bytes = skin.write();
+    verify::skin(path, &bytes)?;
+    Ok(save_atomic(disk, path, &bytes)?)
 }

@@ -1,6 +1,6 @@
-//! How triangles hang together: points at one position, edges, and loose islands.
+//! Connectivity of triangles: points at one position, edges, and loose islands.
 //!
-//! Mesh files split points at seams and often share none at all. What belongs together is therefore decided by
+//! Mesh files split points at seams, and many share no points between triangles. Connectivity is therefore decided by
 //! position: two points are one when their coordinates are exactly equal.
 
 use std::hash::{BuildHasherDefault, Hasher};
@@ -101,7 +101,7 @@ pub fn islands(triangles: &[[u32; 3]], count: usize) -> (Vec<u32>, usize) {
     (numbers, found as usize)
 }
 
-/// The root of `point`, halving the path on the way.
+/// Finds the root of `point` and halves the path on the way.
 fn root(parents: &mut [u32], mut point: u32) -> u32 {
     while parents[point as usize] != point {
         let above = parents[parents[point as usize] as usize];

@@ -1,13 +1,13 @@
 //! glTF 2.0 and GLB, read into a [`Model`] and written from one.
 //!
-//! Files come from anywhere, so everything a reader could trip over is checked here before it is used: the container,
-//! the JSON's size in memory, every reference between objects, every range of bytes, the node hierarchy, every URI.
-//! What does not fit becomes a [`GltfError`] that names the file and the place in it as a JSON pointer
-//! (`/accessors/3/byteOffset`); what is merely odd is repaired or left out and said in [`Model::notes`].
-//! The memory a file may take is bounded by [`memory_limit`]; images count apart, up to [`MAX_IMAGE_BYTES`].
+//! Files come from anywhere, so the reader checks everything before it uses it: the container, the JSON's size in
+//! memory, every reference between objects, every range of bytes, the node hierarchy, every URI. Invalid data becomes a
+//! [`GltfError`] that names the file and the place in it as a JSON pointer (`/accessors/3/byteOffset`); oddities are
+//! repaired or left out and reported in [`Model::notes`]. The memory a file may take is bounded by [`memory_limit`];
+//! images count apart, up to [`MAX_IMAGE_BYTES`].
 //!
 //! Reading, in the order it happens: the container and its JSON, the typed and checked document, buffers and images,
-//! the hierarchy (which nodes matter, and where they are), meshes and weights, clips. Sections cited in the code are
+//! the hierarchy (the nodes to keep and their transforms), meshes and weights, clips. Sections cited in the code are
 //! those of the glTF 2.0 specification (Khronos, version 2.0.1).
 
 mod accessor;
@@ -19,14 +19,14 @@ mod document;
 mod geometry;
 mod hierarchy;
 mod json;
-mod looks;
+mod materials;
 mod matrix;
 mod primitive;
 mod skin;
 mod uri;
 mod write;
 
-pub use write::{GltfFiles, GltfWriteSettings, write_glb, write_gltf};
+pub use write::{GltfWriteSettings, write_glb, write_gltf};
 
 use crate::mesh::model::Model;
 use budget::{Budget, Notes};
@@ -39,7 +39,7 @@ pub fn memory_limit(input: u64) -> u64 {
     (64 << 20) + input.saturating_mul(16)
 }
 
-/// Why a glTF file could not be read or a model not be written.
+/// Error of reading a glTF file or of writing a model as glTF.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GltfError {
     /// The bytes are not a whole glTF or GLB file.
@@ -47,9 +47,9 @@ pub enum GltfError {
     Container {
         /// The file's name as given to the reader.
         file: String,
-        /// Where in the file.
+        /// Byte offset in the file.
         offset: usize,
-        /// What is wrong and what was expected.
+        /// Description of the fault and of the expected bytes.
         what: String,
     },
     /// The JSON is not well-formed.
@@ -61,17 +61,17 @@ pub enum GltfError {
         line: usize,
         /// Column in the JSON, from 1.
         column: usize,
-        /// What the parser says.
+        /// The parser's message.
         what: String,
     },
-    /// The JSON is well-formed but what it says cannot be right.
+    /// The JSON is well-formed but its content is invalid.
     #[error("{file}: {place}: {what}")]
     Invalid {
         /// The file's name as given to the reader.
         file: String,
         /// JSON pointer to the offending value.
         place: String,
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
     /// The file cannot be read without an extension that is not supported.
@@ -84,7 +84,7 @@ pub enum GltfError {
         /// The extension.
         name: String,
     },
-    /// A buffer or image outside the file could not be had.
+    /// A buffer or image outside the file could not be loaded.
     #[error("{file}: {place}: \"{uri}\": {what}")]
     External {
         /// The file's name as given to the reader.
@@ -93,7 +93,7 @@ pub enum GltfError {
         place: String,
         /// The URI, shortened.
         uri: String,
-        /// Why not.
+        /// Reason of the failure.
         what: String,
     },
     /// Reading would take more memory than the file's size justifies.
@@ -101,7 +101,7 @@ pub enum GltfError {
     TooLarge {
         /// The file's name as given to the reader.
         file: String,
-        /// JSON pointer to what asked for the memory.
+        /// JSON pointer to the object that asked for the memory.
         place: String,
         /// The limit in bytes.
         limit: u64,
@@ -109,7 +109,7 @@ pub enum GltfError {
     /// The model to write is not consistent, or glTF cannot hold it.
     #[error("the model cannot be written as glTF: {what}")]
     Model {
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
     /// Points of a skinned object have no influence.
@@ -152,13 +152,13 @@ impl GltfError {
     }
 }
 
-/// Reads a `.gltf` or `.glb` file (told apart by content).
+/// Reads a `.gltf` or `.glb` file (distinguished by its content).
 ///
-/// `name` is the file's name or path; errors begin with it and [`Model::name`] is its stem. `external` loads what the
-/// file refers to: it is called with a path that has been percent-decoded and checked to be relative, with `/` between
-/// its parts, and below the file's folder; its error text ends up in ours. What it returns counts as part of the file,
-/// so how much it reads is for it to limit. A buffer that cannot be loaded is an error, an image that cannot be loaded
-/// a note.
+/// `name` is the file's name or path; errors begin with it and [`Model::name`] is its stem. `external` loads the files
+/// that it refers to: it is called with a path that has been percent-decoded and checked to be relative, with `/`
+/// between its parts, and below the file's folder; its error text becomes part of the returned error. The bytes it
+/// returns count as part of the file; it has to limit how many it reads. A buffer that cannot be loaded is an error, an
+/// image that cannot be loaded a note.
 ///
 /// * Nodes kept: joints, nodes moved by a clip, and the ancestors of both, depth first. A matrix becomes a
 ///   [`Trs`](crate::mesh::model::Trs).
@@ -169,7 +169,8 @@ impl GltfError {
 /// * Missing normals are computed; several sets of joints and weights are merged, duplicates added up, sums made one.
 ///
 /// # Errors
-/// Any [`GltfError`] but the two about writing. Costs time and memory linear in the file and what it unrolls to.
+/// Any [`GltfError`] but the two about writing. Costs time and memory linear in the file and in the geometry it
+/// describes.
 pub fn read_gltf(
     bytes: &[u8],
     name: &str,
@@ -192,7 +193,7 @@ fn read(
     let source = accessor::Source::new(&document, &buffers, &budget);
 
     let mut model = Model { name: stem(name).to_owned(), ..Default::default() };
-    model.looks = looks::read(&source, external, &notes)?;
+    model.material_set = materials::read(&source, external, &notes)?;
     let hierarchy = hierarchy::Hierarchy::new(&source, &notes)?;
     model.nodes = hierarchy.kept_nodes(&source)?;
     model.skins = skin::read_bindings(&source, &hierarchy, &notes)?;
@@ -202,7 +203,7 @@ fn read(
     Ok(model)
 }
 
-/// A path's last part without its extension.
+/// Last part of a path without its extension.
 fn stem(name: &str) -> &str {
     let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
     match file.rsplit_once('.') {

@@ -1,37 +1,37 @@
-//! A model: what a mesh file holds, whatever its format.
+//! A model: the content of a mesh file, whatever its format.
 //!
 //! Readers fill it and writers take it; the rig, the skin and the surface work on its flat arrays. Positions live in
-//! one list of [`Model::points`] for the whole file, because weights, rays and volumes do not care where a texture
-//! seam splits a vertex; what a renderer needs besides lives in [`Part`]s, whose vertices refer to points.
+//! one list of [`Model::points`] for the whole file, because weights, rays and volumes do not depend on texture seams
+//! that split vertices; the other vertex attributes of a renderer live in [`Part`]s, whose vertices refer to points.
 
 use glam::{Affine3A, Mat4, Quat, Vec2, Vec3, Vec4};
 use serde_json::{Map, Value};
 
-/// A whole mesh file in memory: geometry, looks, and, where the file has them, a skeleton, weights and clips.
+/// A whole mesh file in memory: geometry, materials, and, where the file has them, a skeleton, weights and clips.
 ///
-/// Units and axes are the file's own (Y is up and the character faces +Z in all bundled models). Points of objects
-/// with a [`Object::skin`] are in that skin's bind space; all others are in model space.
+/// Units and axes are the file's own (Y is up and the character faces +Z in all bundled models). Points of objects with
+/// a [`Object::skin`] are in that skin's bind space; all others are in model space.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Model {
     /// The file's name without folder and extension, or the scene's name.
     pub name: String,
-    /// Every position. An OBJ's `v` lines in order; a glTF's vertices, primitive after primitive.
+    /// Positions of all points: an OBJ's `v` lines in order, or a glTF's vertices, primitive after primitive.
     pub points: Vec<Vec3>,
     /// Named objects: body, eyes, clothes. A part belongs to exactly one.
     pub objects: Vec<Object>,
-    /// What is drawn: faces of one object with one material.
+    /// Drawable parts: the faces of one object with one material.
     pub parts: Vec<Part>,
     /// Materials, textures and images.
-    pub looks: Looks,
+    pub material_set: MaterialSet,
     /// Nodes of the file that are joints, carry joints, or are moved by a clip; parents before children.
     pub nodes: Vec<Node>,
-    /// How joints hold points; see [`Object::skin`].
+    /// Bind poses of skinned objects; see [`Object::skin`].
     pub skins: Vec<SkinBinding>,
     /// Influences of every point over [`Model::nodes`]; `None` if nothing is skinned.
     pub weights: Option<Weights>,
     /// Animation clips over [`Model::nodes`].
     pub clips: Vec<Clip>,
-    /// What the reader met and did not keep, a sentence each, for the user.
+    /// Sentences for the user about content that the reader met and did not keep.
     pub notes: Vec<String>,
 }
 
@@ -42,8 +42,8 @@ pub struct Object {
     pub name: String,
     /// Index into [`Model::skins`] if the object is skinned.
     pub skin: Option<usize>,
-    /// Index into [`Model::nodes`] of the node that carries an object without a skin (a rigid part). Its points are
-    /// in model space at the nodes' rest transforms.
+    /// Index into [`Model::nodes`] of the node that carries an object without a skin (a rigid part). The object's
+    /// points are in model space at the nodes' rest transforms.
     pub node: Option<usize>,
     /// Names of the morph targets, shared by the object's parts.
     pub morph_names: Vec<String>,
@@ -59,7 +59,7 @@ pub struct Object {
 pub struct Part {
     /// Index into [`Model::objects`].
     pub object: usize,
-    /// Index into [`Looks::materials`].
+    /// Index into [`MaterialSet::materials`].
     pub material: Option<usize>,
     /// The point (index into [`Model::points`]) of each vertex.
     pub vertices: Vec<u32>,
@@ -82,7 +82,7 @@ pub struct Part {
 /// Polygons of any size: face `i` has the corners `corners[starts[i]..starts[i + 1]]`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Faces {
-    /// One entry a face and one more at the end; empty when there are no faces.
+    /// Index in `corners` of the first corner of each face, and the number of corners at the end; empty without faces.
     pub starts: Vec<u32>,
     /// Vertex indices.
     pub corners: Vec<u32>,
@@ -94,7 +94,7 @@ impl Faces {
         self.starts.len().saturating_sub(1)
     }
 
-    /// True if there is no face.
+    /// Returns `true` without faces.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -105,7 +105,7 @@ impl Faces {
     }
 }
 
-/// One morph target of a part: displacements for each vertex; lists are empty where the file has none.
+/// One morph target of a part: displacements for each vertex. Lists are empty where the file has none.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Morph {
     /// Displacements of positions, in the same space as the object's points.
@@ -116,11 +116,12 @@ pub struct Morph {
     pub tangents: Vec<Vec3>,
 }
 
-/// Materials and what they use, as glTF JSON objects carried unread, so that nothing in them is lost.
+/// Materials with their textures, samplers and images, as glTF JSON objects carried unread, so that nothing in them is
+/// lost.
 ///
 /// Indices inside them refer to the lists here, as in a glTF file. OBJ materials are translated on reading.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Looks {
+pub struct MaterialSet {
     /// glTF material objects.
     pub materials: Vec<Value>,
     /// glTF texture objects.
@@ -140,16 +141,16 @@ pub struct Looks {
 pub struct Image {
     /// The name in the file, or the file's name.
     pub name: String,
-    /// For example `image/png`.
+    /// Media type, for example `image/png`.
     pub mime: String,
     /// The encoded bytes.
     pub bytes: Vec<u8>,
-    /// Other fields of the glTF image object, carried unread.
+    /// The remaining fields of the glTF image object, carried unread.
     pub rest: Map<String, Value>,
 }
 
 /// A transform relative to its parent: scale first, then rotation, then translation.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Trs {
     /// Translation.
@@ -170,18 +171,18 @@ impl Trs {
     /// The transform that changes nothing.
     pub const IDENTITY: Self = Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE };
 
-    /// As an affine matrix.
+    /// The transform as an affine matrix.
     pub fn affine(&self) -> Affine3A {
         Affine3A::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
     }
 
-    /// A place in this transform's space, in the space around it.
+    /// Maps a position in this transform's space to the space around it.
     pub fn transform_point(&self, point: Vec3) -> Vec3 {
         self.translation + self.rotation * (self.scale * point)
     }
 
-    /// What has to be multiplied to `parent` to give this transform. A direction in which the parent has no size is
-    /// taken as it is.
+    /// The transform that gives this one when `parent` is multiplied by it. Along an axis on which the parent's scale
+    /// is zero, the value is taken unchanged.
     pub fn relative_to(&self, parent: &Self) -> Self {
         let back = parent.rotation.inverse();
         let divided = |a: f32, by: f32| if by == 0.0 { a } else { a / by };
@@ -196,7 +197,7 @@ impl Trs {
     }
 }
 
-/// One after the other, as Bevy multiplies two transforms: scales axis by axis, so that there is never any shear.
+/// Product of two transforms, as Bevy multiplies them: scales axis by axis, so that there is never any shear.
 impl std::ops::Mul for Trs {
     type Output = Self;
 
@@ -218,7 +219,7 @@ pub struct Node {
     pub parent: Option<usize>,
     /// Rest transform, relative to the parent.
     pub rest: Trs,
-    /// True if the node is a joint (listed in a skin or marked so by us); false if it only carries others.
+    /// Marks a joint (listed in a skin, or marked as one by this crate); a node without the mark only carries others.
     pub joint: bool,
     /// The glTF `extras` of the node, carried unread.
     pub extras: Option<Value>,
@@ -238,9 +239,9 @@ pub struct SkinBinding {
 /// Influences of points: point `p` has the entries `starts[p]..starts[p + 1]`, strongest first, summing to one (or none).
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Weights {
-    /// One entry a point and one more at the end.
+    /// Index of the first influence of each point, and the number of influences at the end.
     pub starts: Vec<u32>,
-    /// The joint of each influence (what it indexes is said where the weights are used).
+    /// The joint of each influence; the owner of the weights says which list it indexes.
     pub joints: Vec<u32>,
     /// The weight of each influence, positive.
     pub values: Vec<f32>,
@@ -252,7 +253,7 @@ impl Weights {
         self.starts.len().saturating_sub(1)
     }
 
-    /// True if there is no point.
+    /// Returns `true` without points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -281,7 +282,7 @@ impl Weights {
 pub struct Clip {
     /// The name in the file.
     pub name: String,
-    /// One animated property each.
+    /// Channels, one for each animated property.
     pub channels: Vec<Channel>,
     /// The glTF `extras` of the animation, carried unread.
     pub extras: Option<Value>,
@@ -290,9 +291,9 @@ pub struct Clip {
 /// The keys of one property of one node or object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// What is animated.
+    /// The animated property.
     pub target: ChannelTarget,
-    /// Between keys.
+    /// Interpolation between keys.
     pub interpolation: Interpolation,
     /// Key times in seconds, rising.
     pub times: Vec<f32>,
@@ -301,7 +302,7 @@ pub struct Channel {
     pub values: Vec<f32>,
 }
 
-/// What a [`Channel`] animates.
+/// The property that a [`Channel`] animates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ChannelTarget {
     /// Translation of a node (index into [`Model::nodes`]).
@@ -314,13 +315,13 @@ pub enum ChannelTarget {
     MorphWeights(usize),
 }
 
-/// How a channel runs between its keys.
+/// Interpolation of a channel between its keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Interpolation {
-    /// Straight (spherical for rotations).
+    /// Linear (spherical for rotations).
     #[default]
     Linear,
-    /// Holds each key.
+    /// Constant from each key to the next.
     Step,
     /// Cubic Hermite spline with tangents.
     CubicSpline,

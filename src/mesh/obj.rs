@@ -1,12 +1,12 @@
 //! Wavefront OBJ: read in parallel into arrays, made into a [`Model`], and written.
 //!
-//! [`read_obj`] fills [`ObjArrays`], which hold what the file says and nothing else, and can be used again for the next
-//! file without allocating. [`to_model`] makes a [`Model`] of them: polygons triangulated, corners welded into
-//! vertices, normals made where there are none, materials translated to glTF's. [`read_model`] does both and asks its
-//! caller for the files that an OBJ refers to. [`write_obj`] is the way back.
+//! [`read_obj`] fills [`ObjArrays`], which hold the file's statements and nothing else, and can be used again for the
+//! next file without allocating. [`to_model`] makes a [`Model`] of them: it triangulates polygons, welds corners into
+//! vertices, computes missing normals and translates materials to glTF's. [`read_model`] does both and asks its caller
+//! for the files that an OBJ refers to. [`write_obj`] writes a model.
 //!
-//! The format is that of Wavefront's "Advanced Visualizer" manual, appendix B1, as far as polygons go, and what
-//! exporters made of it since: vertex colours after the position, physically based materials. Curves, surfaces, lines
+//! The format is that of Wavefront's "Advanced Visualizer" manual, appendix B1, as far as polygons go, with two later
+//! extensions of exporters: vertex colours after the position, and physically based materials. Curves, surfaces, lines
 //! and points are left out with a note.
 
 mod block;
@@ -14,7 +14,7 @@ mod collect;
 mod color;
 mod corner_table;
 mod error;
-mod looks;
+mod materials;
 mod mtl;
 mod names;
 mod normals;
@@ -34,20 +34,20 @@ use crate::mesh::model::Model;
 
 pub use self::{
     error::{LineProblem, ObjError},
-    looks::Sidecar,
+    materials::Sidecar,
     mtl::{ObjMaterial, ObjTexture, read_mtl},
     names::ObjNames,
     paths::{library_names, safe_relative_path},
-    write::{ObjFiles, write_obj},
+    write::write_obj,
 };
 
-/// No index, no name: a corner without texture coordinate or normal, a face outside any object.
+/// Marks a missing index or name: a corner without texture coordinate or normal, a face outside any object.
 pub const NONE: u32 = u32::MAX;
 
-/// No list may hold more: indices keep one bit to themselves.
+/// Largest length of a list: one bit of each index is reserved.
 pub const MAX_ELEMENTS: usize = i32::MAX as usize;
 
-/// What an OBJ file says, as flat lists.
+/// Content of an OBJ file as flat lists.
 ///
 /// Indices count from 0 and are all in range after a successful read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -60,7 +60,7 @@ pub struct ObjArrays {
     pub texcoords: Vec<[f32; 2]>,
     /// `vn`: normals as the file gives them, of any length.
     pub normals: Vec<[f32; 3]>,
-    /// Where each face's corners start, and one more at the end; empty if there are no faces.
+    /// Index in `corners` of the first corner of each face, and the number of corners at the end; empty without faces.
     pub face_starts: Vec<u32>,
     /// The position of each corner.
     pub corners: Vec<u32>,
@@ -68,18 +68,19 @@ pub struct ObjArrays {
     pub corner_texcoords: Vec<u32>,
     /// The normal of each corner or [`NONE`]; empty if no corner has one.
     pub corner_normals: Vec<u32>,
-    /// What holds for which faces, in the order of the faces; the first run starts at face 0.
+    /// Runs of faces that share object, group, material and smoothing, in the order of the faces; the first starts at
+    /// face 0.
     pub runs: Vec<ObjRun>,
     /// The names that the runs refer to.
     pub names: ObjNames,
-    /// What follows `mtllib`, one entry a statement: often one file name, but see [`library_names`].
+    /// Text after each `mtllib` statement: often one file name, but see [`library_names`].
     pub material_libraries: Vec<String>,
-    /// What the file holds and these arrays do not, a sentence each.
+    /// Sentences about content of the file that these arrays do not hold.
     pub notes: Vec<String>,
-    spare: pipeline::Spare,
+    spare: pipeline::SpareBlocks,
 }
 
-/// Faces that share object, group, material and smoothing group. It ends where the next one starts.
+/// Faces that share object, group, material and smoothing group. A run ends where the next one starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ObjRun {
     /// The first face.
@@ -127,7 +128,7 @@ impl ObjArrays {
         self.runs[run].first_face as usize..end
     }
 
-    /// True if all lists fit together and all indices are in range, as after a successful read.
+    /// Checks that all lists fit together and all indices are in range, as after a successful read.
     pub fn is_consistent(&self) -> bool {
         let corners = self.corners.len();
         let [points, texcoords, normals] = [self.positions.len(), self.texcoords.len(), self.normals.len()];
@@ -163,7 +164,7 @@ impl ObjArrays {
     }
 }
 
-/// How to read.
+/// Settings of [`read_obj`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ObjSettings {
     /// Threads for files larger than one block; 0 for as many as the machine has, up to 8. The result is the same.
@@ -178,13 +179,13 @@ impl Default for ObjSettings {
     }
 }
 
-/// Reads an OBJ file into `arrays`, replacing what they hold and keeping their memory.
+/// Reads an OBJ file into `arrays`, replacing their content and keeping their memory.
 ///
 /// The reader is read to its end in blocks of [`ObjSettings::block_bytes`], by several threads in turn if there is more
 /// than one block; it needs no buffer of its own. Bytes are read as `&mut &bytes[..]` or just `&bytes[..]`.
 ///
-/// Time and memory are linear in the file: besides the arrays, which grow by a quarter at most past what they hold, two
-/// to three blocks a thread.
+/// Time and memory are linear in the file. Memory is that of the arrays, which are at most a quarter larger than their
+/// content, and two to three blocks a thread.
 ///
 /// # Errors
 /// A malformed line, an index out of range, a coordinate that is not finite ([`ObjError::Line`]), a failing reader, or
@@ -193,7 +194,7 @@ pub fn read_obj(reader: impl Read + Send, arrays: &mut ObjArrays, settings: &Obj
     pipeline::read(reader, arrays, settings)
 }
 
-/// Makes a model of what was read.
+/// Makes a model of arrays that [`read_obj`] filled.
 ///
 /// - [`Model::points`] are all positions in the order of the file, used or not.
 /// - Objects are those of `o`, or of `g` where the file has no `o`, in the order of their first faces; faces before the
@@ -223,7 +224,7 @@ pub fn to_model(arrays: &ObjArrays, name: &str, sidecar: &mut Sidecar) -> Result
 /// Reads an OBJ file into a model: [`read_obj`], then [`to_model`].
 ///
 /// # Errors
-/// Those of [`read_obj`], and [`ObjError::NoGeometry`] for a file without any vertex. A file with vertices and without
+/// Errors of [`read_obj`], and [`ObjError::NoGeometry`] for a file without any vertex. A file with vertices and without
 /// faces is a model of points, with a note.
 pub fn read_model(
     reader: impl Read + Send,

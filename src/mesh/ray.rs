@@ -1,13 +1,13 @@
-//! Rays and hits, shared by the surface and everything that asks it.
+//! Rays and hits, shared by the surface and its callers.
 
 use glam::Vec3;
 
 /// A half line in the space of the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it starts.
+    /// Start of the ray.
     pub origin: Vec3,
-    /// Where it goes; unit length.
+    /// Direction of the ray, of unit length.
     pub direction: Vec3,
 }
 
@@ -18,13 +18,14 @@ impl Ray {
     }
 }
 
-/// Where a ray crosses the surface.
+/// Crossing of a ray and the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// Distance from the ray's origin, not negative.
     pub distance: f32,
     /// Index of the triangle that was hit.
     pub triangle: u32,
-    /// True if the ray goes in (it meets the triangle's counter-clockwise side), false if it comes out.
+    /// Direction of the crossing: `true` if the ray goes in (it meets the triangle's counter-clockwise side), `false`
+    /// if it comes out.
     pub entering: bool,
 }

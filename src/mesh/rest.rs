@@ -1,15 +1,15 @@
-//! Models at rest: what a file's mesh looks like before anyone moves a joint.
+//! Models at rest: a file's mesh before anyone moves a joint.
 //!
-//! A skinned glTF mesh is stored in its bind pose, and its joints may rest in another. What people see, and draw a
-//! skeleton into, is the mesh at the joints' rest transforms.
+//! A skinned glTF mesh is stored in its bind pose, and its joints may rest in another pose. Users see, and draw a
+//! skeleton into, the mesh at the joints' rest transforms.
 
 use glam::{Affine3A, Mat3A, Mat4, Vec3, Vec3A};
 
 use super::model::{Model, SkinBinding};
 
 impl Model {
-    /// The model with points, normals, tangents and morph targets where its joints hold them at rest, and without
-    /// skins. Exact copies where the bind pose is the rest pose, to about a millionth of the model's size.
+    /// Computes the model with points, normals, tangents and morph targets skinned to the joints' rest transforms, and
+    /// without skins. Where bind and rest pose agree to about a millionth of the model's size, values are exact copies.
     pub fn at_rest(&self) -> Model {
         let globals = self.rest_globals();
         let palettes: Vec<Option<Vec<Affine3A>>> =
@@ -61,7 +61,7 @@ impl Model {
     }
 }
 
-/// For every node the matrix from bind space to model space at rest, or `None` if all are the identity.
+/// Matrices of all nodes from bind space to model space at rest, or `None` if all are the identity.
 fn rest_palette(skin: &SkinBinding, globals: &[Affine3A], nodes: usize) -> Option<Vec<Affine3A>> {
     let mut palette = vec![Affine3A::IDENTITY; nodes];
     let mut moved = false;

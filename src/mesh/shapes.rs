@@ -10,53 +10,53 @@ use super::model::Model;
 pub struct Shapes {
     /// A name for each shape.
     pub names: Vec<String>,
-    /// For each shape one displacement a point, in the mesh's space and unit.
+    /// Displacements of each shape, one a point, in the mesh's space and unit.
     pub displacements: Vec<Vec<Vec3>>,
 }
 
-/// Why shapes could not be read.
+/// Error of reading shapes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ShapeError {
-    /// The model has none.
+    /// The model has no morph targets.
     #[error("there are no morph targets; export them with the mesh")]
     NoMorphs,
-    /// The shapes are of another mesh.
+    /// The shape belongs to another mesh: its number of points differs.
     #[error("shape \"{name}\" has {found} points, the mesh has {wanted}; shapes must be of the same mesh")]
     Points {
-        /// The shape.
+        /// Name of the shape.
         name: String,
-        /// Its points.
+        /// Number of points of the shape.
         found: usize,
-        /// The mesh's points.
+        /// Number of points of the mesh.
         wanted: usize,
     },
-    /// A number that is not finite.
+    /// A displacement is not finite.
     #[error("shape \"{name}\", point {point}: the displacement is not finite")]
     NotFinite {
-        /// The shape.
+        /// Name of the shape.
         name: String,
         /// Index of the first such point.
         point: usize,
     },
-    /// The index is no JSON of this kind.
+    /// The index is not JSON with the expected fields.
     #[error("{0}; wanted is an object with \"vertices\" (a number) and \"names\" (a list)")]
     Index(String),
     /// The numbers are too few or too many.
     #[error("the numbers take {found} bytes, {names} shapes of {vertices} points need {wanted}")]
     Length {
-        /// Bytes there are.
+        /// Number of bytes given.
         found: usize,
-        /// Bytes there should be.
+        /// Number of bytes expected.
         wanted: usize,
-        /// Shapes of the index.
+        /// Number of shapes in the index.
         names: usize,
-        /// Points of the index.
+        /// Number of points in the index.
         vertices: usize,
     },
 }
 
 impl Shapes {
-    /// The morph targets of a model, over its points. Targets of one name in several parts are one shape.
+    /// Reads the morph targets of a model, over its points. Targets of one name in several parts are one shape.
     ///
     /// # Errors
     /// [`ShapeError::NoMorphs`], [`ShapeError::NotFinite`].
@@ -85,7 +85,7 @@ impl Shapes {
         Ok(shapes)
     }
 
-    /// Adds the shape that takes the points of a mesh to those of another.
+    /// Adds the shape that moves the points of a mesh from `rest` to `points`.
     ///
     /// # Errors
     /// [`ShapeError::Points`], [`ShapeError::NotFinite`].
@@ -98,8 +98,8 @@ impl Shapes {
         self.check(rest.len())
     }
 
-    /// Reads raw displacements: `index` is JSON that says how many vertices there are and how the shapes are called,
-    /// `numbers` are little-endian 32-bit floats, shape by shape, vertex by vertex, x, y and z.
+    /// Reads raw displacements: `index` is JSON with the number of vertices and the names of the shapes; `numbers` are
+    /// little-endian 32-bit floats, shape by shape, vertex by vertex, x, y and z.
     ///
     /// # Errors
     /// All but [`ShapeError::NoMorphs`].

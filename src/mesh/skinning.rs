@@ -23,7 +23,7 @@ pub fn skin_points(points: &[Vec3], weights: &Weights, matrices: &[Affine3A], ou
     });
 }
 
-/// Where one point of a mesh goes: the same result, to the bit, as [`skin_points`] gives for it.
+/// Skins one point of a mesh: the same result, to the bit, as [`skin_points`] gives for it.
 pub fn skin_point(index: usize, point: Vec3, weights: &Weights, matrices: &[Affine3A]) -> Vec3 {
     let (Some(&start), Some(&end)) = (weights.starts.get(index), weights.starts.get(index + 1)) else { return point };
     let range = start as usize..end as usize;

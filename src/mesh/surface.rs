@@ -1,8 +1,8 @@
-//! The surface that rays meet: closest, furthest and all hits on the posed mesh, and the closest point.
+//! Ray queries on the posed mesh: closest, furthest and all hits, and the closest point.
 //!
 //! A hit is found once however many triangles share the place, no ray slips between neighbours, and a closed mesh is
-//! entered exactly as often as it is left, at any unit scale. Errors of rounding are relative to how far the surface
-//! lies from the ray's origin and the ray's origin from the space's.
+//! entered exactly as often as it is left, at any unit scale. Rounding errors are relative to the distance of the
+//! surface from the ray's origin, and of the ray's origin from the origin of the space.
 //!
 //! The hierarchy has eight children a node; a node and a packet of four triangles take 128 bytes each, since rays in a
 //! large mesh mostly wait for memory. A million triangles take 50 MB.
@@ -40,31 +40,31 @@ pub struct Surface {
     triangles: usize,
 }
 
-/// The point of a surface closest to a given one.
+/// The point of a surface closest to a given point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
-    /// Where it is.
+    /// Position on the surface.
     pub point: Vec3,
     /// The triangle it lies on, as an index into the triangles the surface was built from.
     pub triangle: u32,
-    /// Its weights over the triangle's three corners; they sum to one.
+    /// Barycentric weights over the triangle's three corners; they sum to one.
     pub barycentric: Vec3,
-    /// How far it is from the given point.
+    /// Distance from the given point.
     pub distance: f32,
 }
 
-/// Why a surface could not take other positions.
+/// Error of moving a surface to other positions.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SurfaceError {
-    /// Not the mesh it was built from.
+    /// The positions are not those of the mesh that the surface was built from.
     #[error("the surface was built from {expected} points but is refitted with {found}: build it again")]
     PointCount {
-        /// How many points it was built from.
+        /// Number of points that the surface was built from.
         expected: usize,
-        /// How many were given.
+        /// Number of points given.
         found: usize,
     },
-    /// A position that no box can hold.
+    /// A position is not finite or too far from the origin to have a bounding box.
     #[error(
         "point {point} is not finite or further than 1e18 from the origin: repair the pose, or build the surface again to leave out its triangles"
     )]
@@ -112,8 +112,8 @@ impl Surface {
 
     /// The first and the last hit along `ray`; the same one twice if there is only one.
     ///
-    /// `near` is at the distance of the first of [`Surface::hits`]. Two searches, one from each end, so that little between is
-    /// visited.
+    /// `near` is at the distance of the first of [`Surface::hits`]. Two searches, one from each end, visit little of
+    /// the surface between.
     pub fn near_far(&self, ray: &Ray) -> Option<(Hit, Hit)> {
         let (frame, boxes) = self.prepare(ray)?;
         let near = self.tree.nearest(&frame, &boxes)?;
@@ -121,7 +121,7 @@ impl Surface {
         Some((near.hit(), far.hit()))
     }
 
-    /// All hits along `ray`, sorted by distance; `out` is overwritten.
+    /// Collects all hits along `ray`, sorted by distance; `out` is overwritten.
     ///
     /// A crossing at an edge or corner that several triangles share counts once. A closed mesh of consistent winding
     /// is entered as often as it is left.
@@ -131,6 +131,11 @@ impl Surface {
             self.tree.all(&frame, &boxes, &mut crossings);
         }
         resolve(&mut crossings, |slot| self.tree.slot(slot).1, out);
+    }
+
+    /// True if a triangle crosses `ray` at a distance from `from` to `to`: cheaper than asking for the first hit.
+    pub fn crosses(&self, ray: &Ray, from: f32, to: f32) -> bool {
+        self.prepare(ray).is_some_and(|(frame, boxes)| self.tree.crosses(&frame, &boxes, from, to))
     }
 
     /// The point of the surface closest to `point`; `None` if the surface is empty or `point` is not finite. Of
@@ -148,7 +153,7 @@ impl Surface {
         (!bounds.is_empty()).then_some((bounds.low, bounds.high))
     }
 
-    /// How many triangles the surface has; those left out are not counted.
+    /// Number of triangles in the surface; triangles that were left out are not counted.
     pub fn triangle_count(&self) -> usize {
         self.triangles
     }

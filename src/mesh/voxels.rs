@@ -1,9 +1,9 @@
 //! Solid voxels of any triangle soup: open, leaky, self-intersecting, inside-out or in many shells.
 //!
 //! Surface voxels come from a conservative triangle/box overlap test (Schwarz and Seidel 2010, "Fast parallel surface
-//! and solid voxelization on GPUs"), the inside from a flood of the outside. Where holes let the flood in, parity and
-//! winding of straight lines along the three axes vote on what is inside, so that a body with many faces missing
-//! still has one.
+//! and solid voxelization on GPUs"), the inside from a flood of the outside. Where holes let the flood in, straight
+//! lines along the three axes vote by parity and winding on whether a cell is inside, so that a body with many missing
+//! faces still has an inside.
 
 mod enclose;
 mod raster;
@@ -12,17 +12,17 @@ use glam::Vec3;
 
 /// The largest number of cells along one axis.
 pub const MAX_RESOLUTION: usize = 1024;
-/// The largest number of cells of a grid; a finer wish is coarsened.
+/// Largest number of cells of a grid; a finer resolution is coarsened.
 const MAX_CELLS: f64 = 8.0e6;
-/// The largest number of cell columns visited while triangles are drawn, besides those that many small triangles
-/// need at any resolution; a finer wish is coarsened.
+/// Largest number of cell columns visited while triangles are drawn, besides those that many small triangles need at
+/// any resolution; a finer resolution is coarsened.
 const MAX_WORK: f64 = 2.0e7;
 /// Columns that every triangle may visit: a few along each axis.
 const WORK_EACH: f64 = 12.0;
 /// Empty cells around the mesh, so that the outside is connected and samples near the border have neighbours.
 const MARGIN: usize = 2;
 
-/// Why there are no voxels.
+/// Error of making voxels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum VoxelizeError {
     /// A triangle refers to a point that does not exist.
@@ -144,7 +144,7 @@ impl Voxels {
         self.ranks.last().copied().unwrap_or(0) as usize
     }
 
-    /// True if no cell is solid.
+    /// Returns `true` if no cell is solid.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -159,7 +159,7 @@ impl Voxels {
         self.cell
     }
 
-    /// How many cells were found to be inside although the flood of the outside reached them through holes.
+    /// Number of cells found to be inside although the flood of the outside reached them through holes.
     pub fn rescued(&self) -> usize {
         self.rescued
     }
@@ -175,7 +175,7 @@ impl Voxels {
         Vec3::from_array([0, 1, 2].map(|a| (self.origin[a] + (cell[a] as f64 + 0.5) * self.cell) as f32))
     }
 
-    /// The cell around a position in grid units, if it is in the grid.
+    /// The cell that contains a position in grid units, if it is in the grid.
     pub fn cell_at(&self, grid: [f64; 3]) -> Option<[usize; 3]> {
         let inside = (0..3).all(|a| grid[a] >= 0.0 && grid[a] < self.dims[a] as f64);
         inside.then(|| grid.map(|g| g as usize))
@@ -193,7 +193,8 @@ impl Voxels {
         (bits & bit != 0).then(|| (self.ranks[word] + (bits & (bit - 1)).count_ones()) as usize)
     }
 
-    /// True if the cell is solid and its centre lies inside the mesh, false for the outer half of the surface layer.
+    /// Returns `true` for a solid cell whose centre lies inside the mesh, `false` for the outer half of the surface
+    /// layer.
     #[inline]
     pub fn is_core(&self, [x, y, z]: [usize; 3]) -> bool {
         x < self.dims[0]
@@ -202,9 +203,8 @@ impl Voxels {
             && self.core[self.word(y, z) + x / 64] >> (x % 64) & 1 != 0
     }
 
-    /// Calls `visit` for the up to 26 solid neighbours of a solid cell, in x, y, z order, with the dense index of each, how
-    /// many axes less one the step to it moves along (0 over a face, 1 over an edge, 2 over a corner), and whether it is
-    /// a core cell.
+    /// Calls `visit` for the up to 26 solid neighbours of a solid cell, in x, y, z order, with the dense index of each,
+    /// the kind of step to it (0 over a face, 1 over an edge, 2 over a corner), and whether it is a core cell.
     #[inline]
     pub fn neighbours(&self, [x, y, z]: [usize; 3], mut visit: impl FnMut(usize, usize, bool)) {
         // Solid cells lie inside the empty margin, so all neighbours are in the grid.

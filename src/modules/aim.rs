@@ -5,7 +5,7 @@ use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, Axis, BuildScope, ModuleError, NodeId, RigModule, TargetParams, check_finite},
+    processor::{Amount, Axis, BuildScope, ModuleError, NodeId, RigModule, TargetParams, check_finite},
     rig::{
         AimUp, Constraint, Scalar,
         reference::{NodeRef, NodeRefs},
@@ -27,7 +27,7 @@ pub enum AimUpMode {
 /// Turns nodes so that an axis points at weighted targets. Role: `constraint`, for each node.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::aim::AimModule};
+/// # use rigsmith::{processor::RigModule, modules::aim::AimModule};
 /// let params = r#"(targets: "@command control#00000000000000aa", aim: z, up_axis: y, direction: (0.0, 1.0, 0.0))"#;
 /// # assert!(rigsmith::modules::all().load(AimModule::NAME, params).is_ok());
 /// ```

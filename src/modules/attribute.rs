@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, ModuleError, RigModule},
+    processor::{BuildScope, ModuleError, RigModule},
     rig::{
         Attribute, AttributeKind,
         reference::{NodeRef, NodeRefs},
@@ -14,7 +14,7 @@ use crate::{
 /// Adds an attribute to nodes.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::attribute::AttributeModule};
+/// # use rigsmith::{processor::RigModule, modules::attribute::AttributeModule};
 /// let params = r#"(node: "@this", name: "follow", min: 0.0, max: 1.0, default: 0.5)"#;
 /// # assert!(rigsmith::modules::all().load(AttributeModule::NAME, params).is_ok());
 /// ```

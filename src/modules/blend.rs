@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, ModuleError, RigModule},
+    processor::{Amount, BuildScope, ModuleError, RigModule},
     rig::{
         Constraint, Scalar,
         reference::{NodeRef, NodeRefs},
@@ -15,7 +15,7 @@ use crate::{
 /// for each node.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::blend::BlendModule};
+/// # use rigsmith::{processor::RigModule, modules::blend::BlendModule};
 /// let params = r#"(
 ///     nodes: "@hierarchy this",
 ///     a: "@command duplicate_chain#00000000000000aa",

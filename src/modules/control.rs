@@ -5,8 +5,8 @@ use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, degrees},
     mesh::model::Trs,
+    processor::{BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, degrees},
     rig::{
         Channels, Constraint, ControlData, Limits, NodeType, Scalar, Target,
         nearest::did_you_mean,
@@ -46,7 +46,7 @@ pub enum ShapeAxes {
 /// place.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::control::ControlModule};
+/// # use rigsmith::{processor::RigModule, modules::control::ControlModule};
 /// let params = r#"(shape: "cube", size: 0.1, limits: (rotate: ((-90.0, 90.0), (None, None), (None, None))))"#;
 /// # assert!(rigsmith::modules::all().load(ControlModule::NAME, params).is_ok());
 /// ```

@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, ModuleError, RigModule},
+    processor::{BuildScope, ModuleError, RigModule},
     rig::{
         Channel, Constraint, KeyEase,
         reference::{NodeRef, NodeRefs},
@@ -14,7 +14,7 @@ use crate::{
 /// Drives a number by another one along keys: fingers by a curl, a corrective shape by an elbow.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::driven_key::DrivenKey};
+/// # use rigsmith::{processor::RigModule, modules::driven_key::DrivenKey};
 /// let params = r#"(
 ///     driver: "@command control/hand_l#00000000000000aa",
 ///     driver_attribute: "curl",

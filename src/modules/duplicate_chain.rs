@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, Creation, ModuleError, NodeId, RigModule},
+    processor::{BuildScope, Creation, ModuleError, NodeId, RigModule},
     rig::{
         NodeType,
         reference::{NodeRefs, Source, Top},
@@ -25,7 +25,7 @@ pub enum CopyKind {
 /// Copies nodes with their hierarchy. Role: `copy`.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::duplicate_chain::DuplicateChainModule};
+/// # use rigsmith::{processor::RigModule, modules::duplicate_chain::DuplicateChainModule};
 /// let params = r#"(joints: "@hierarchy this", suffix: "ik")"#;
 /// # assert!(rigsmith::modules::all().load(DuplicateChainModule::NAME, params).is_ok());
 /// ```

@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, ModuleError, RigModule},
+    processor::{BuildScope, ModuleError, RigModule},
     rig::{Channel, Constraint, reference::NodeRefs},
     solve::expression::Expression as Compiled,
 };
@@ -12,7 +12,7 @@ use crate::{
 /// Drives a number by arithmetic over others; see [`expression`](crate::solve::expression) for the language.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::expression::Expression};
+/// # use rigsmith::{processor::RigModule, modules::expression::Expression};
 /// let params = r#"(
 ///     text: "clamp(curl * 90, 0, 90) + 0.5 * spread",
 ///     inputs: [

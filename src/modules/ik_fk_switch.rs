@@ -5,8 +5,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule},
     mesh::model::Trs,
+    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule},
     rig::{
         AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
         reference::{NodeRef, NodeRefs},
@@ -19,7 +19,7 @@ use crate::{
 /// weight. Everything is made here: no `ik_handle` or `parent` is needed for these joints.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::ik_fk_switch::IkFkSwitch};
+/// # use rigsmith::{processor::RigModule, modules::ik_fk_switch::IkFkSwitch};
 /// let params = r#"(
 ///     start: "@joint upper_arm_l#0000000000000001",
 ///     end: "@joint hand_l#0000000000000003",

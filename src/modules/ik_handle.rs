@@ -5,14 +5,14 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, Ik, IkSolver, JointAngles, ModuleError, RigModule},
+    processor::{Amount, BuildScope, Ik, IkSolver, JointAngles, ModuleError, RigModule},
     rig::reference::{NodeRef, NodeRefs},
 };
 
 /// Makes a chain of joints reach for a goal.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::ik_handle::IkHandle};
+/// # use rigsmith::{processor::RigModule, modules::ik_handle::IkHandle};
 /// let params = r#"(
 ///     start: "@this",
 ///     end: "@joint hand_l#0000000000000003",

@@ -4,8 +4,8 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, Creation, ModuleError, RigModule},
     mesh::model::Trs,
+    processor::{BuildScope, Creation, ModuleError, RigModule},
     rig::{
         NodeType,
         reference::{NodeRef, NodeRefs},
@@ -18,7 +18,7 @@ const MOST: u32 = 64;
 /// Puts joints evenly between a joint and its child, which is hung below the last of them. Role: `joint`.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::insert_joints::InsertJointsModule};
+/// # use rigsmith::{processor::RigModule, modules::insert_joints::InsertJointsModule};
 /// let params = r#"(joint: "@this", count: 3)"#;
 /// # assert!(rigsmith::modules::all().load(InsertJointsModule::NAME, params).is_ok());
 /// ```

@@ -6,7 +6,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, ModuleError, RigModule},
+    processor::{BuildScope, ModuleError, RigModule},
     rig::{
         LayerData, LayerDisplay,
         reference::{NodeRef, NodeRefs},
@@ -16,7 +16,7 @@ use crate::{
 /// Puts nodes into a layer.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::layer::LayerModule};
+/// # use rigsmith::{processor::RigModule, modules::layer::LayerModule};
 /// let params = r#"(nodes: "@any type:control", name: "controls", display: reference)"#;
 /// # assert!(rigsmith::modules::all().load(LayerModule::NAME, params).is_ok());
 /// ```

@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, ModuleError, RigModule, check_limits},
+    processor::{BuildScope, ModuleError, RigModule, check_limits},
     rig::{
         Constraint, Limits,
         reference::{NodeRef, NodeRefs},
@@ -14,7 +14,7 @@ use crate::{
 /// Keeps nodes within ends, whatever drives them. Role: `constraint`, for each node.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::limit::LimitModule};
+/// # use rigsmith::{processor::RigModule, modules::limit::LimitModule};
 /// let params = r#"(nodes: "@this", limits: (rotate: ((0.0, 150.0), (0.0, 0.0), (0.0, 0.0))))"#;
 /// # assert!(rigsmith::modules::all().load(LimitModule::NAME, params).is_ok());
 /// ```

@@ -8,8 +8,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, Creation, ModuleError, NodeId, RigModule, check_finite},
     mesh::model::Trs,
+    processor::{BuildScope, Creation, ModuleError, NodeId, RigModule, check_finite},
     rig::{
         NodeType,
         label::mirrored_label,
@@ -21,7 +21,7 @@ use crate::{
 /// Makes the mirror image of joints as joints of their own. Role: `joint`.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::mirror_joints::MirrorJointsModule};
+/// # use rigsmith::{processor::RigModule, modules::mirror_joints::MirrorJointsModule};
 /// let params = r#"(joints: "@hierarchy this", opposed: true)"#;
 /// # assert!(rigsmith::modules::all().load(MirrorJointsModule::NAME, params).is_ok());
 /// ```

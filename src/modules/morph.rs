@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::driven_key::check_keys;
 use crate::{
-    build::{BuildScope, ModuleError, RigModule},
+    processor::{BuildScope, ModuleError, RigModule},
     rig::{
         AttributeKind, Constraint, KeyEase, Output,
         reference::{NodeRef, NodeRefs},
@@ -15,7 +15,7 @@ use crate::{
 /// Gives a control an attribute that is the weight of a morph target.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::morph::Morph};
+/// # use rigsmith::{processor::RigModule, modules::morph::Morph};
 /// let params = r#"(control: "@command control/jaw#00000000000000aa", morph: "smile", attribute: "smile")"#;
 /// # rigsmith::modules::all().load(Morph::NAME, params).map(|_| ()).unwrap();
 /// ```

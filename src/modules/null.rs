@@ -5,8 +5,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, Creation, ModuleError, RigModule, check_finite, degrees},
     mesh::model::Trs,
+    processor::{BuildScope, Creation, ModuleError, RigModule, check_finite, degrees},
     rig::{
         NodeType,
         reference::{NodeRef, NodeRefs},
@@ -16,7 +16,7 @@ use crate::{
 /// Makes a null for each of some nodes. Role: `null`.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::null::NullModule};
+/// # use rigsmith::{processor::RigModule, modules::null::NullModule};
 /// let params = r#"(at: "@this", world: true, creation: (name: "arm_root"))"#;
 /// # assert!(rigsmith::modules::all().load(NullModule::NAME, params).is_ok());
 /// ```

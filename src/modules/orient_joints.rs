@@ -5,8 +5,8 @@ use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Axis, BuildScope, ModuleError, NodeId, RigModule, check_finite},
     mesh::model::Trs,
+    processor::{Axis, BuildScope, ModuleError, NodeId, RigModule, check_finite},
     rig::{
         NodeType,
         reference::{NodeRefs, Source, Top},
@@ -43,7 +43,7 @@ pub enum EndMode {
 /// Turns joints so that one axis lies along the bone and another points up. Joints stay where they are.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::orient_joints::OrientJointsModule};
+/// # use rigsmith::{processor::RigModule, modules::orient_joints::OrientJointsModule};
 /// let params = r#"(joints: "@hierarchy this", along: y, up_axis: z, up: plane, direction: (0.0, 0.0, 1.0))"#;
 /// # assert!(rigsmith::modules::all().load(OrientJointsModule::NAME, params).is_ok());
 /// ```

@@ -4,14 +4,14 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, FollowParams, ModuleError, RigModule, TargetParams},
+    processor::{Amount, BuildScope, FollowParams, ModuleError, RigModule, TargetParams},
     rig::reference::{NodeRef, NodeRefs},
 };
 
 /// Lets nodes follow the place of weighted targets. Role: `constraint`, for each node.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::point::PointModule};
+/// # use rigsmith::{processor::RigModule, modules::point::PointModule};
 /// let params = r#"(node: "@this", targets: "@command control#00000000000000aa", keep_offset: true)"#;
 /// # assert!(rigsmith::modules::all().load(PointModule::NAME, params).is_ok());
 /// ```

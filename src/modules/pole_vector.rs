@@ -5,8 +5,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, Creation, ModuleError, RigModule, TargetParams, check_finite},
     mesh::model::Trs,
+    processor::{Amount, BuildScope, Creation, ModuleError, RigModule, TargetParams, check_finite},
     rig::{Constraint, NodeType, reference::NodeRefs},
 };
 
@@ -14,7 +14,7 @@ use crate::{
 /// with the role `pole`. With targets, the pole follows them, with the role `constraint`.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::pole_vector::PoleVectorModule};
+/// # use rigsmith::{processor::RigModule, modules::pole_vector::PoleVectorModule};
 /// let params = r#"(chain: "@hierarchy this pick:0,1,2", pole: "@command control#00000000000000aa", distance: 0.8)"#;
 /// # assert!(rigsmith::modules::all().load(PoleVectorModule::NAME, params).is_ok());
 /// ```

@@ -5,8 +5,8 @@ use glam::{Mat3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, Creation, ModuleError, NodeId, RigModule},
     mesh::model::Trs,
+    processor::{Amount, BuildScope, Creation, ModuleError, NodeId, RigModule},
     rig::{
         AttributeKind, Channel, Constraint, KeyEase, NodeType, Output, Scalar, Target,
         reference::{NodeRef, NodeRefs},
@@ -19,7 +19,7 @@ use crate::{
 /// last carries the node with the role `goal`, to which the leg's inverse kinematics go.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::reverse_foot::ReverseFoot};
+/// # use rigsmith::{processor::RigModule, modules::reverse_foot::ReverseFoot};
 /// let params = r#"(
 ///     ankle: "@joint foot_l#0000000000000003",
 ///     ball: "@joint ball_l#0000000000000004",

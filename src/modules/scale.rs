@@ -4,14 +4,14 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, FollowParams, ModuleError, RigModule, TargetParams},
+    processor::{Amount, BuildScope, FollowParams, ModuleError, RigModule, TargetParams},
     rig::reference::{NodeRef, NodeRefs},
 };
 
 /// Lets nodes scale like weighted targets. Role: `constraint`, for each node.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::scale::ScaleModule};
+/// # use rigsmith::{processor::RigModule, modules::scale::ScaleModule};
 /// let params = r#"(node: "@this", targets: "@command control#00000000000000aa", keep_offset: true)"#;
 /// # assert!(rigsmith::modules::all().load(ScaleModule::NAME, params).is_ok());
 /// ```

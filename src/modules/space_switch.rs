@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, Creation, ModuleError, RigModule},
+    processor::{BuildScope, Creation, ModuleError, RigModule},
     rig::{
         AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
         reference::{NodeRef, NodeRefs},
@@ -17,7 +17,7 @@ use crate::{
 /// control itself stays free.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::space_switch::SpaceSwitch};
+/// # use rigsmith::{processor::RigModule, modules::space_switch::SpaceSwitch};
 /// let params = r#"(
 ///     control: "@command control/hand_l#00000000000000aa",
 ///     spaces: "@command control/root#00000000000000a0 + @joint chest#0000000000000005 + @joint head#0000000000000007",

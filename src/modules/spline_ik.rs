@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, ModuleError, RigModule},
+    processor::{Amount, BuildScope, ModuleError, RigModule},
     rig::{
         Constraint,
         reference::{NodeRef, NodeRefs},
@@ -14,7 +14,7 @@ use crate::{
 /// Lays a chain of joints along a curve through controls: spines, necks, tails.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::spline_ik::SplineIk};
+/// # use rigsmith::{processor::RigModule, modules::spline_ik::SplineIk};
 /// let params = r#"(
 ///     start: "@joint spine_1#0000000000000001",
 ///     end: "@joint chest#0000000000000005",

@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, ModuleError, RigModule},
+    processor::{Amount, BuildScope, ModuleError, RigModule},
     rig::{
         Constraint,
         reference::{NodeRef, NodeRefs},
@@ -14,7 +14,7 @@ use crate::{
 /// Lets nodes lag behind what moves them, swing and settle: hair, tails, ears, antennas.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::spring::Spring};
+/// # use rigsmith::{processor::RigModule, modules::spring::Spring};
 /// let params = r#"(nodes: "@hierarchy this", frequency: 3.0, damping: 0.3)"#;
 /// # rigsmith::modules::all().load(Spring::NAME, params).map(|_| ()).unwrap();
 /// ```

@@ -5,7 +5,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{Amount, BuildScope, ModuleError, RigModule},
+    processor::{Amount, BuildScope, ModuleError, RigModule},
     rig::{
         Constraint,
         reference::{NodeRef, NodeRefs},
@@ -15,7 +15,7 @@ use crate::{
 /// Scales nodes along an axis by how far two others are apart, and keeps their volume.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::stretch::Stretch};
+/// # use rigsmith::{processor::RigModule, modules::stretch::Stretch};
 /// let params = r#"(
 ///     start: "@command control/hips#00000000000000a0",
 ///     end: "@command control/chest#00000000000000a1",

@@ -5,8 +5,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    build::{BuildScope, Creation, ModuleError, NodeId, RigModule},
     mesh::model::Trs,
+    processor::{BuildScope, Creation, ModuleError, NodeId, RigModule},
     rig::{
         Constraint, NodeType, Scalar,
         reference::{NodeRef, NodeRefs},
@@ -19,7 +19,7 @@ use crate::{
 /// `counter`.
 ///
 /// ```
-/// # use rigsmith::{build::RigModule, modules::twist::Twist};
+/// # use rigsmith::{processor::RigModule, modules::twist::Twist};
 /// let params = r#"(start: "@joint forearm_l#0000000000000002", end: "@joint hand_l#0000000000000003", count: 2)"#;
 /// # rigsmith::modules::all().load(Twist::NAME, params).map(|_| ()).unwrap();
 /// ```

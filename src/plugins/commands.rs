@@ -1,30 +1,31 @@
 //! The command processor in an app: rigs that are built, and everything about their commands as components.
 //!
-//! Tags stand in the world as entities, below their joint ([`TagOf`]), and follow the document as joints do. A
-//! [`BuildRequest`] builds a rig, steps it or rolls it back; a rig that has been built follows every edit from then on
+//! A [`BuildRequest`] builds a rig, steps it or rolls it back; a rig that has been built follows every edit from then on
 //! unless [`BuildStep::Follow`] says otherwise. State, error and time of each command are on the entity of its tag
-//! ([`CommandReport`]). Created nodes are entities with [`CreatedBy`]; one that is rolled back is parked: it keeps its
-//! entity, without its components and disabled, until it comes back.
+//! ([`CommandReport`]). Created nodes and constraints are entities with [`CreatedBy`]; a node that is rolled back is
+//! parked: it keeps its entity, without its components and disabled, until it comes back.
 
+mod constraints;
 mod nodes;
 mod run;
-mod tags;
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use bevy::prelude::*;
 
-pub use nodes::{BuiltEntities, Control, CreatedBy, CreatedNodes, CreatedRole, Null, Parked};
 pub use run::{Programs, RunFailure};
-pub use tags::{CommandTag, FeatureCommands, FeatureTag, InFeature, TagComment, TagEnabled, TagEntities, TagOf, Tags};
 
-use super::{
-    RigSystems, configure_sets,
-    document::{Edited, JointEntities},
+use super::{RigSystems, configure_sets, document::Edited};
+pub use super::{
+    document::{TagEntities, entities::BuiltEntities},
+    schema::{
+        Attributes, CommandTag, Constrains, Control, CreatedBy, CreatedNodes, CreatedRole, FeatureCommands, FeatureTag,
+        InFeature, NodeLayer, Null, Parked, Tag, TagOf, Tags,
+    },
 };
 use crate::{
-    build::{BuildError, BuildRange, Builder, CommandStatus, Modules, RigModule, RunReport},
     modules,
+    processor::{BuildError, BuildRange, Builder, CommandStatus, Modules, RigModule, RunReport},
     rig::{BuiltRig, Rig, RigEdit, Uid, step::Committed},
 };
 
@@ -37,12 +38,13 @@ impl Plugin for CommandsPlugin {
         if !app.world().contains_resource::<RigModules>() {
             app.insert_resource(RigModules(Arc::new(modules::all())));
         }
+        app.register_required_components::<Rig, BuiltEntities>();
         app.init_resource::<Programs>().add_message::<BuildRequest>().add_message::<BuildDone>().add_systems(
             Update,
-            (tags::follow_tags, build_rigs, nodes::follow_nodes, (run::run_built, report_commands))
+            (build_rigs, nodes::follow_nodes, constraints::follow_constraints, (run::run_built, report_commands))
                 .chain()
                 .in_set(RigSystems::Build)
-                .after(super::document::follow_rigs),
+                .after(super::document::follow::follow_tags),
         );
     }
 }
@@ -112,7 +114,7 @@ pub struct BuildDone {
     pub report: RunReport,
 }
 
-/// The processor of a rig; there from its first [`BuildRequest`] on.
+/// The processor of a rig; there from its first [`BuildRequest`] on. Immutable: a [`BuildRequest`] changes what is built.
 #[derive(Component)]
 pub struct Processor {
     builder: Builder,
@@ -135,21 +137,24 @@ impl Processor {
 
 /// What a rig's commands have built so far; changes whenever that does.
 #[derive(Component, Debug, Clone, Default)]
+#[component(immutable)]
 pub struct Built(pub Arc<BuiltRig>);
 
 /// The error that a rig's build stands at; not there if there is none.
 #[derive(Component, Debug, Clone, PartialEq)]
+#[component(immutable)]
 pub struct BuildFailure(pub BuildError);
 
 /// Where a command stands, how long it took and why it failed: on the entity of its tag, for rigs that are built.
 #[derive(Component, Debug, Clone, PartialEq)]
+#[component(immutable)]
 pub struct CommandReport(pub CommandStatus);
 
 fn build_rigs(
     mut commands: Commands,
     mut requests: MessageReader<BuildRequest>,
     mut edited: MessageReader<Edited>,
-    mut rigs: Query<(&Rig, Option<&mut Processor>)>,
+    mut rigs: Query<(&Rig, Option<&mut Processor>, Option<&Built>, Has<BuildFailure>)>,
     modules: Res<RigModules>,
     mut done: MessageWriter<BuildDone>,
 ) {
@@ -168,7 +173,7 @@ fn build_rigs(
         }
     }
     for (entity, edits, complete) in changed {
-        let Ok((rig, Some(mut processor))) = rigs.get_mut(entity) else { continue };
+        let Ok((rig, Some(mut processor), built, failed)) = rigs.get_mut(entity) else { continue };
         let processor = &mut *processor;
         match complete && edits.len() < 16 {
             true => edits.iter().for_each(|edit| processor.builder.touch(rig, edit)),
@@ -177,11 +182,11 @@ fn build_rigs(
         if processor.follow {
             let goal = processor.goal.unwrap_or(usize::MAX);
             let report = processor.builder.run_to(goal);
-            finish(&mut commands, entity, &processor.builder, report, &mut done);
+            finish(&mut commands, entity, &processor.builder, (built, failed), report, &mut done);
         }
     }
     for BuildRequest { rig: entity, step } in requests.read() {
-        let Ok((rig, processor)) = rigs.get_mut(*entity) else {
+        let Ok((rig, processor, built, failed)) = rigs.get_mut(*entity) else {
             warn!("entity {entity} is no rig and cannot be built; it may have been closed");
             continue;
         };
@@ -200,13 +205,13 @@ fn build_rigs(
             }
         };
         let report = carry_out(processor, rig, step);
-        finish(&mut commands, *entity, &processor.builder, report, &mut done);
+        finish(&mut commands, *entity, &processor.builder, (built, failed), report, &mut done);
         if is_fresh {
             let processor = std::mem::replace(
                 processor,
                 Processor { builder: Builder::new(modules.0.clone()), goal: None, follow: true },
             );
-            commands.entity(*entity).insert(processor);
+            commands.entity(*entity).try_insert(processor);
         }
     }
 }
@@ -246,35 +251,47 @@ fn carry_out(processor: &mut Processor, rig: &Rig, step: &BuildStep) -> RunRepor
     report
 }
 
+/// Puts what was built onto the rig, if it is other than before.
 fn finish(
     commands: &mut Commands,
     rig: Entity,
     builder: &Builder,
+    (before, had_failed): (Option<&Built>, bool),
     report: RunReport,
     done: &mut MessageWriter<BuildDone>,
 ) {
     let mut entity = commands.entity(rig);
-    entity.insert(Built(Arc::new(builder.built())));
+    let built = builder.built();
+    if before.is_none_or(|before| *before.0 != built) {
+        entity.try_insert(Built(Arc::new(built)));
+    }
     match &report.error {
-        Some(error) => entity.insert(BuildFailure(error.clone())),
-        None => entity.remove::<BuildFailure>(),
-    };
+        Some(error) => {
+            entity.try_insert(BuildFailure(error.clone()));
+        }
+        None if had_failed => {
+            entity.try_remove::<BuildFailure>();
+        }
+        None => {}
+    }
     done.write(BuildDone { rig, report });
 }
 
 /// Puts state, error and time of each command onto the entity of its tag.
 fn report_commands(
     mut commands: Commands,
-    rigs: Query<(&Processor, &TagEntities), (Changed<Built>, With<JointEntities>)>,
+    mut done: MessageReader<BuildDone>,
+    rigs: Query<(&Processor, &TagEntities)>,
     reports: Query<&CommandReport>,
 ) {
-    for (processor, tags) in &rigs {
+    let built: BTreeSet<Entity> = done.read().map(|done| done.rig).collect();
+    for (processor, tags) in built.into_iter().filter_map(|rig| rigs.get(rig).ok()) {
         for entry in processor.builder.list() {
             let Some(entity) = tags.get(entry.command) else { continue };
             let Some(status) = processor.builder.status(entry.command) else { continue };
             let report = CommandReport(status);
             if reports.get(entity).ok() != Some(&report) {
-                commands.entity(entity).insert(report);
+                commands.entity(entity).try_insert(report);
             }
         }
     }

@@ -1,27 +1,27 @@
 //! The mesh on the screen: solid with its materials, see-through, with its edges, or coloured by its weights.
 //!
 //! A [`RigMesh`](super::surface::RigMesh) is data. This plugin shows it: Bevy meshes, materials and images are built in
-//! the background and handed to the renderer piece by piece, so that no frame waits for a large model. Weights move
-//! the pieces on the graphics card as they move [`RigSurface`](super::surface::RigSurface), the surface that
-//! rays meet, so that the picture and picking agree.
+//! the background and handed to the renderer piece by piece, so that no frame waits for a large model. Weights move the
+//! pieces on the graphics card as they move [`RigSurface`](super::surface::RigSurface), the surface of ray queries, so
+//! that the picture and picking agree.
 //!
-//! No editor is needed: a game that has [`DefaultPlugins`] and [`RigPlugins`](super::RigPlugins) adds
-//! [`DisplayPlugin`] and gives its camera [`ViewportLights`] or lights of its own. What is drawn are children of the
-//! mesh's entity, which becomes a child of its rig; hide and show it with its [`Visibility`].
+//! No editor is needed: a game that has [`DefaultPlugins`] and [`RigPlugins`](super::RigPlugins) adds [`DisplayPlugin`]
+//! and gives its camera [`ViewportLights`] or lights of its own. The drawn pieces are children of the mesh's entity,
+//! which becomes a child of its rig; hide and show it with its [`Visibility`].
 
 mod build;
 mod colors;
 mod follow;
 mod layer;
 mod lights;
-mod looks;
+mod materials;
 mod plan;
 mod textures;
 mod wire;
 
 use bevy::{prelude::*, window::RequestRedraw};
 
-use self::follow::{EdgeMaterials, dress_pieces, follow_skins, land_jobs, place_meshes, start_jobs};
+use self::follow::{EdgeMaterials, assign_materials, follow_skins, land_jobs, place_meshes, start_jobs};
 pub use self::{
     colors::{joint_color, weight_color},
     lights::ViewportLights,
@@ -30,7 +30,7 @@ pub use self::{
 use super::{RigSystems, configure_sets};
 use crate::rig::Uid;
 
-/// Shows the meshes of rigs. Needs Bevy's rendering plugins, as in [`DefaultPlugins`].
+/// Plugin that shows the meshes of rigs. Needs Bevy's rendering plugins, as in [`DefaultPlugins`].
 pub struct DisplayPlugin;
 
 impl Plugin for DisplayPlugin {
@@ -44,59 +44,60 @@ impl Plugin for DisplayPlugin {
             .configure_sets(Update, DisplaySystems.after(RigSystems::Bind))
             .add_systems(
                 Update,
-                (place_meshes, start_jobs, land_jobs, follow_skins, dress_pieces).chain().in_set(DisplaySystems),
+                (place_meshes, start_jobs, land_jobs, follow_skins, assign_materials).chain().in_set(DisplaySystems),
             );
     }
 }
 
-/// In `Update`, after [`RigSystems::Bind`]: what is drawn follows meshes, weights, rest poses and [`MeshDisplay`].
+/// System set in `Update`, after [`RigSystems::Bind`]: updates the picture after meshes, weights, rest poses and
+/// [`MeshDisplay`].
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DisplaySystems;
 
-/// How meshes are shown.
+/// Display settings of meshes.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MeshDisplay {
-    /// What surfaces look like while no weights are shown.
+    /// Shading of surfaces while no weights are shown.
     pub shading: Shading,
-    /// True to see through the mesh, and both of its sides.
+    /// Shows the mesh half transparent, with both of its sides, if `true`.
     pub xray: bool,
-    /// True to draw the edges of its polygons.
+    /// Draws the edges of the mesh's polygons if `true`.
     pub wireframe: bool,
     /// Weights as colours.
     pub weights: WeightColors,
 }
 
-/// What surfaces look like.
+/// Shading of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Shading {
-    /// With the file's materials; like clay where it has none.
+    /// Shaded with the file's materials; a clay material for parts without one.
     #[default]
     Shaded,
-    /// Like clay, without materials.
+    /// Shaded with a clay material everywhere.
     Clay,
 }
 
-/// Which weights are shown as colours.
+/// Weights that are shown as colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum WeightColors {
     /// None.
     #[default]
     Off,
-    /// Those of one joint, from dark blue (little) over red to yellow (all); grey where it has none at all.
+    /// Weights of one joint, from dark blue (little) over red to yellow (all); grey for none.
     Joint(Uid),
-    /// Those of all joints: each has a colour of its own, mixed where several hold the surface.
+    /// Weights of all joints: each has a colour of its own, and several influences mix.
     AllJoints,
 }
 
-/// Meshes and textures of a mesh that are still being built or handed to the renderer; on the entity with the
-/// [`RigMesh`](super::surface::RigMesh), and gone when all is on the screen.
+/// Progress of meshes and textures that are still being built or handed to the renderer; on the entity with the
+/// [`RigMesh`](super::surface::RigMesh), and removed when all is on the screen.
 #[derive(Component, Debug)]
 pub struct DisplayJob {
     done: f32,
 }
 
 impl DisplayJob {
-    /// How much is done, 0 to 1.
+    /// Finished share, 0 to 1.
     pub fn fraction(&self) -> f32 {
         self.done
     }
@@ -111,11 +112,11 @@ pub enum DisplayPiece {
     Edges,
 }
 
-/// Something of a mesh cannot be shown.
+/// Message about a part of a mesh that cannot be shown.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct DisplayNote {
     /// The mesh.
     pub mesh: Uid,
-    /// What and why, in a sentence for people.
+    /// Description with the reason, a sentence for people.
     pub text: String,
 }

@@ -1,12 +1,13 @@
-//! Drawing: rigs over their meshes, what tools are about to make, the grid.
+//! Drawing: rigs over their meshes, ghosts of tools, the grid.
 //!
 //! A rig's picture is one mesh of coloured triangles, built on the processor for the view of the [`RigViewport`]
-//! camera. Its vertices name their depth themselves, in a part of the depth buffer that is in front of everything else:
-//! so bones hide each other properly and are never hidden by the mesh, without a second camera and its passes. The
-//! picture is built again only when the rig, its pose, what is selected or hovered, the view or [`RigDrawing`] changed.
+//! camera. Its vertices carry their own depth, in a part of the depth buffer in front of everything else: so bones hide
+//! each other properly and are never hidden by the mesh, without a second camera and its passes. The picture is built
+//! again only after a change of the rig, its pose, the selection, the hovered joint, the view or [`RigDrawing`].
 //!
-//! Sizes in pixels are logical pixels. Where several cameras are marked, the first one active by order counts.
+//! Sizes in pixels are logical pixels. If several cameras are marked, the first active one by order counts.
 
+mod controls;
 pub mod ghosts;
 pub mod grid;
 pub mod ink;
@@ -20,14 +21,14 @@ pub mod theme;
 use bevy::{asset::AssetEventSystems, camera::CameraUpdateSystems, camera::visibility::VisibilitySystems, prelude::*};
 
 pub use ghosts::{GhostJoint, Ghosts};
-pub use labels::{LETTER, LabelWish, label_places};
+pub use labels::{LETTER, LabelCandidate, label_places};
 pub use theme::{BACKGROUND, Theme};
 
 use super::RigSystems;
 #[cfg(doc)]
 use super::viewport::RigViewport;
 
-/// Adds the drawing of rigs. Works without a renderer, too, building pictures that nobody sees.
+/// Plugin that draws rigs. Works without a renderer, too, and then builds pictures that are not shown.
 pub struct DrawingPlugin;
 
 impl Plugin for DrawingPlugin {
@@ -36,14 +37,14 @@ impl Plugin for DrawingPlugin {
         app.init_resource::<RigDrawing>()
             .init_resource::<Ghosts>()
             .init_resource::<DrawingCounts>()
-            .init_resource::<systems::Looks>()
+            .init_resource::<systems::PictureMaterials>()
             .configure_sets(
                 PostUpdate,
                 DrawingSystems
                     .after(TransformSystems::Propagate)
                     .after(CameraUpdateSystems)
                     .after(RigSystems::Surface)
-                    // The renderer takes a picture's data once: a change must be told in the frame in which it is made.
+                    // The renderer takes a picture's data once: a change must be sent in the frame in which it is made.
                     .before(AssetEventSystems)
                     .before(VisibilitySystems::VisibilityPropagate),
             )
@@ -62,27 +63,29 @@ impl Plugin for DrawingPlugin {
     }
 }
 
-/// Where pictures of rigs are built: in `PostUpdate`, after transforms have propagated and before visibility is worked
-/// out.
+/// System set in `PostUpdate` that builds pictures of rigs, after transforms have propagated and before visibility is
+/// computed.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DrawingSystems;
 
-/// What is drawn, and how.
+/// Settings of the drawing.
 #[derive(Resource, Debug, Clone, PartialEq)]
 pub struct RigDrawing {
-    /// The rigs.
+    /// Draws rigs if `true`.
     pub rig: bool,
-    /// Labels of which joints.
+    /// The controls of built rigs.
+    pub controls: bool,
+    /// Choice of the labels.
     pub labels: LabelChoice,
-    /// Whether this plugin writes the labels itself, with lines; false where a window paints [`RigLabels`] with letters.
+    /// Draws labels with line strokes if `true`; `false` where a window paints [`RigLabels`] with a font.
     pub write_labels: bool,
-    /// The local axes of selected joints.
+    /// Draws the local axes of selected joints if `true`.
     pub axes: bool,
-    /// The ground grid and the world's axes.
+    /// Draws the ground grid and the world's axes if `true`.
     pub grid: bool,
-    /// The symmetry plane of rigs with live mirroring.
+    /// Draws the symmetry plane of rigs with live mirroring if `true`.
     pub plane: bool,
-    /// Multiplies the size of joint balls; 1 is usual.
+    /// Factor of the size of joint balls; 1 is usual.
     pub ball_scale: f32,
     /// Colours.
     pub theme: Theme,
@@ -92,6 +95,7 @@ impl Default for RigDrawing {
     fn default() -> Self {
         Self {
             rig: true,
+            controls: true,
             labels: LabelChoice::None,
             write_labels: true,
             axes: false,
@@ -103,32 +107,32 @@ impl Default for RigDrawing {
     }
 }
 
-/// Which joints have their labels shown.
+/// Choice of the joints whose labels are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LabelChoice {
-    /// None.
+    /// No labels.
     #[default]
     None,
-    /// Those selected and the one hovered.
+    /// Labels of selected joints and of the hovered one.
     Selected,
-    /// As many as there is room for, those selected first.
+    /// As many labels as fit, those of selected joints first.
     All,
 }
 
-/// The labels of a rig where they are to be painted: pixels from the viewport's top left corner to the left end and
-/// half the height of each text. On every rig that has been drawn; empty while [`RigDrawing::labels`] is off.
+/// Labels of a rig with their positions: pixels from the viewport's top left corner to the left end of each text, at
+/// half its height. The component is on every rig that has been drawn, and empty while [`RigDrawing::labels`] is off.
 #[derive(Component, Debug, Clone, PartialEq, Default)]
 pub struct RigLabels(pub Vec<(Vec2, String)>);
 
-/// How often pictures were built: to see that idle frames build none.
+/// Numbers of built pictures, which show that idle frames build none.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DrawingCounts {
-    /// Rigs.
+    /// Pictures of rigs.
     pub rigs: u64,
-    /// Ghosts.
+    /// Pictures of ghosts.
     pub ghosts: u64,
-    /// Symmetry planes.
+    /// Pictures of symmetry planes.
     pub planes: u64,
-    /// The grid.
+    /// Pictures of the grid.
     pub grid: u64,
 }

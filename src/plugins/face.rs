@@ -1,12 +1,11 @@
 //! Faces: bones placed in the background, bound, and moved by expressions.
 //!
-//! A [`FaceRequest`] looks at a mesh in a task and lands as one edit: joints, weights, a group and tags, so that it can
-//! be undone, and what a person changed since stays when another density is asked for. An [`ExpressRequest`] poses the
-//! facial joints.
+//! A [`FaceRequest`] analyses a mesh in a task and ends as one edit: joints, weights, a group and tags, so that it can
+//! be undone. Manual changes stay when another density is requested. An [`ExpressRequest`] poses the facial joints.
 
 mod edits;
 mod job;
-mod known;
+mod placed_bones;
 mod pose;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
@@ -24,10 +23,10 @@ use crate::{
 };
 
 pub use job::FaceJob;
-pub use known::{FaceRig, KnownBone};
+pub use placed_bones::{FaceRig, PlacedBone};
 pub use pose::{expressed_points, mixed};
 
-/// Adds automatic faces.
+/// Plugin of automatic faces.
 pub struct FacePlugin;
 
 impl Plugin for FacePlugin {
@@ -36,6 +35,7 @@ impl Plugin for FacePlugin {
         app.init_resource::<FaceExpressions>()
             .add_message::<FaceRequest>()
             .add_message::<FacePlaced>()
+            .add_message::<super::landing::ResultHeld>()
             .add_message::<ExpressRequest>()
             .add_message::<Expressed>()
             .add_systems(
@@ -48,7 +48,7 @@ impl Plugin for FacePlugin {
     }
 }
 
-/// The expressions and units that faces can show.
+/// The available expressions and units.
 #[derive(Resource, Clone)]
 pub struct FaceExpressions(pub Arc<ExpressionSet>);
 
@@ -58,14 +58,14 @@ impl Default for FaceExpressions {
     }
 }
 
-/// Asks to place a face in a mesh, to place it again with other settings, or to move its bones to fit shapes.
+/// Request to place a face in a mesh, to place it again with other settings, or to move its bones to fit shapes.
 #[derive(Message, Debug, Clone)]
 pub struct FaceRequest {
     /// The entity with the mesh.
     pub mesh: Entity,
-    /// How.
+    /// Settings.
     pub settings: AutoSettings,
-    /// Shapes that the bones are moved to fit, such as those that an artist has sculpted.
+    /// Shapes to fit the bones to, such as an artist's sculpted shapes.
     pub fit: Option<Arc<Shapes>>,
 }
 
@@ -74,71 +74,71 @@ pub struct FaceRequest {
 pub struct FacePlaced {
     /// The mesh.
     pub mesh: Entity,
-    /// What was placed, or why nothing was.
+    /// Report of the placed face, or the reason why none was placed.
     pub result: Result<FaceReport, String>,
 }
 
-/// What came of a [`FaceRequest`].
+/// Report of a [`FaceRequest`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FaceReport {
-    /// Points of face, middle and back.
+    /// Numbers of points of face, middle and back.
     pub groups: [usize; 3],
-    /// Where the merge history was cut before front groups were joined.
+    /// Number of groups at the cut of the merge history, before front groups were joined.
     pub cut: usize,
     /// Heights of the last merges, highest first.
     pub heights: Vec<f32>,
-    /// Points of the facial mask.
+    /// Number of points of the facial mask.
     pub mask: usize,
-    /// Points of the head and of the whole mesh.
+    /// Numbers of points of the head and of the whole mesh.
     pub points: [usize; 2],
-    /// True if only a part of the mesh was taken for the head.
+    /// Marks a head that is only a part of the mesh.
     pub is_part: bool,
-    /// False if the axes are a weak guess.
+    /// Certainty of the axes; `false` for a weak guess.
     pub certain: bool,
-    /// How sure the landmarks are, 0 to 1.
+    /// Confidence of the landmarks, 0 to 1.
     pub confidence: f32,
     /// The bones, in the mesh's space.
     pub bones: Vec<FaceBone>,
     /// Square error of the grouping of the mask.
     pub square_error: f64,
-    /// Rounds of grouping.
+    /// Rounds of the clustering.
     pub rounds: usize,
-    /// Triangles that the six expressions fold over.
+    /// Number of triangles that the six expressions fold over.
     pub folds: usize,
-    /// Bones that a person had touched and that stayed.
+    /// Number of bones that a person had edited, which stayed.
     pub kept: usize,
     /// Root mean square error of the fit over points and shapes, in the mesh's unit.
     pub fit_error: Option<f32>,
-    /// How long each step took.
+    /// Duration of each step.
     pub times: Vec<(&'static str, Duration)>,
 }
 
-/// What is known about the face of a mesh; beside the mesh, and not saved: it is found again when it is needed.
+/// Analysis of a mesh's face; beside the mesh, and not saved: it is computed again when it is needed.
 #[derive(Component, Clone)]
 pub struct Face {
     /// The analysis of the mesh.
     pub analysis: Arc<FaceAnalysis>,
-    /// How it was made.
+    /// Settings of the analysis.
     pub settings: AutoSettings,
-    /// What was analysed.
+    /// The analysed mesh.
     rest: Arc<Model>,
 }
 
 impl Face {
-    /// True if this is what an analysis of `rest` with these settings gives.
+    /// Returns `true` if an analysis of `rest` with these settings would be the same.
     fn serves(&self, rest: &Arc<Model>, settings: &AutoSettings) -> bool {
         Arc::ptr_eq(&self.rest, rest) && self.settings.same_head(settings)
     }
 }
 
-/// Asks for expressions and units by name, each with a strength from 0 to 1, in place of those there are.
+/// Request for expressions and units by name, each with a strength from 0 to 1, in place of the current ones.
 #[derive(Message, Debug, Clone)]
 pub struct ExpressRequest {
     /// The entity with the mesh.
     pub mesh: Entity,
-    /// Which, and how strong.
+    /// Strengths by name.
     pub strengths: BTreeMap<String, f32>,
-    /// True while a slider is dragged: shown, but not yet a step of the history.
+    /// Shows a preview without a step of the history if `true`, while a slider is dragged.
     pub preview: bool,
 }
 
@@ -147,10 +147,10 @@ pub struct ExpressRequest {
 pub struct Expressed {
     /// The mesh.
     pub mesh: Entity,
-    /// Why nothing is shown, if so.
+    /// Success, or the reason why nothing is shown.
     pub result: Result<(), String>,
 }
 
-/// What a face shows at present; beside the mesh.
+/// Current strengths of a face by name; beside the mesh.
 #[derive(Component, Debug, Clone, PartialEq, Default)]
 pub struct Expressions(pub BTreeMap<String, f32>);

@@ -1,7 +1,7 @@
-//! Lists of gestures: what a person does with clicks and strokes, written down.
+//! Lists of gestures: clicks and strokes as data.
 //!
 //! A [`GestureScript`] on a rig drives the same requests that a window sends, one gesture a frame, and keeps an answer
-//! for each. The command line, tests and tutorials use it; nothing in it can do what a person could not.
+//! for each. The command line, tests and tutorials use it; a script can do nothing that a person could not.
 
 mod script;
 
@@ -16,10 +16,10 @@ use crate::{
 
 pub use script::{GestureAnswer, GestureScript};
 
-/// The longest gesture file that is read, in bytes.
+/// Largest size of a gesture file in bytes.
 pub const MAX_BYTES: usize = 16 << 20;
 
-/// Adds gesture scripts.
+/// Plugin of gesture scripts.
 pub struct GesturePlugin;
 
 impl Plugin for GesturePlugin {
@@ -29,85 +29,86 @@ impl Plugin for GesturePlugin {
     }
 }
 
-/// One gesture. Points are along the view's right and up axes, in model units, from the model's origin; the view is
-/// orthographic. [`Gesture::View`], [`Gesture::Depth`], [`Gesture::Volume`], [`Gesture::Mirror`],
-/// [`Gesture::Recentre`] and [`Gesture::Reach`] hold for the gestures after them until changed.
+/// A gesture. Points are along the view's right and up axes, in model units, from the model's origin; the view is
+/// orthographic. [`Gesture::View`], [`Gesture::Depth`], [`Gesture::Volume`], [`Gesture::Mirror`], [`Gesture::Recentre`]
+/// and [`Gesture::Reach`] hold for the gestures after them until changed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Gesture {
-    /// Looks from somewhere else. The first view is the front.
+    /// Changes the view. The first view is the front.
     View(View),
     /// Places a joint.
     Click((f32, f32)),
-    /// Draws a stroke: a chain; or, unless `joints` is given, a joint in the bone it crosses, or the end of what it
-    /// scribbles over. A stroke that starts on a joint continues from it.
+    /// Draws a stroke: a chain; or, unless `joints` is given, a joint inserted into the bone that it crosses, or the
+    /// deletion of joints under a scribble. A stroke that starts on a joint continues from it.
     Stroke {
-        /// At least two points.
+        /// Points of the stroke, two or more.
         points: Vec<(f32, f32)>,
-        /// Joints wherever the stroke strays further than this from the line between two neighbours; 2 % of the
-        /// model's size if neither this nor `joints` is given.
+        /// Largest distance of the stroke from the line between two neighbouring joints; 2 % of the model's size if
+        /// neither this nor `joints` is given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         threshold: Option<f32>,
-        /// Exactly this many joints.
+        /// Exact number of joints.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         joints: Option<usize>,
     },
-    /// Where between the nearest and the furthest hit joints are placed: 0 near, 1 far, 0.5 at the start.
+    /// Depth of placed joints between the nearest and the furthest hit: 0 near, 1 far, 0.5 at the start.
     Depth(f32),
-    /// Which entry/exit pair of the ray joints are placed in, counted from one at the camera; 0, as at the start, for
+    /// Entry/exit pair of the ray in which joints are placed, counted from one at the camera; 0, as at the start, for
     /// the whole span.
     Volume(u32),
     /// Turns mirroring across x = 0 on or off.
     Mirror(bool),
-    /// Whether joints of strokes step to the middle of the limb; true at the start.
+    /// Turns recentring of strokes on or off; on at the start.
     Recentre(bool),
-    /// How near, in model units, counts as on a joint; half a percent of the model's size at the start.
+    /// Largest distance, in model units, at which a point is on a joint; half a percent of the model's size at the
+    /// start.
     Reach(f32),
-    /// Selects the joint that a click here means; again at the same spot: the next nearest.
+    /// Selects the joint that a click here picks; again at the same spot: the next nearest.
     Select((f32, f32)),
-    /// Adds the joint that a click here means to the selection.
+    /// Adds the joint that a click here picks to the selection.
     Add((f32, f32)),
     /// Selects all joints in a box between two corners.
     Box((f32, f32), (f32, f32)),
     /// Selects the joint with this label.
     SelectLabel(String),
-    /// Selects everything.
+    /// Selects all joints.
     SelectAll,
-    /// Selects nothing, so that the next joint becomes a root.
+    /// Clears the selection, so that the next joint becomes a root.
     Deselect,
     /// Names the active joint.
     Label(String),
     /// Names the joints of the chain that ends at the active joint, first to last.
     Labels(Vec<String>),
-    /// Moves the active joint along the view plane, keeping its depth; what hangs below stays.
+    /// Moves the active joint along the view plane, keeping its depth; its children stay.
     Move((f32, f32)),
-    /// Moves the active joint to a point of the rig's space; what hangs below stays.
+    /// Moves the active joint to a point of the rig's space; its children stay.
     MoveTo((f32, f32, f32)),
-    /// Turns the selected joints about the view's axis (degrees, counter-clockwise) with all that hangs below.
+    /// Turns the selected joints about the view's axis (degrees, counter-clockwise) with their hierarchies.
     Rotate(f32),
-    /// Scales the selected joints about the active one, with all that hangs below.
+    /// Scales the selected joints about the active one, with their hierarchies.
     Scale(f32),
-    /// Puts a joint into the bone above the active joint, at this point of the view.
+    /// Inserts a joint into the bone above the active joint, at this point of the view.
     Insert((f32, f32)),
-    /// Deletes the selected joints; what hangs below moves up.
+    /// Deletes the selected joints; their children move up.
     Delete,
-    /// Deletes the selected joints and all that hangs below.
+    /// Deletes the selected joints with their hierarchies.
     DeleteHierarchy,
-    /// Hangs all selected joints but the active one below the active one.
+    /// Moves all selected joints but the active one below the active one.
     Parent,
     /// Makes the selected joints roots.
     Unparent,
     /// Turns the selected joints so that this axis points along their bone.
     Orient(Axis),
-    /// Makes or renews the other side of the selected joints and all that hangs below.
+    /// Makes or updates the other side of the selected joints and of their hierarchies.
     MirrorSelected,
     /// Puts the selected joints into a local group, with a colour if the second value is given.
     Group(String, Option<(f32, f32, f32)>),
-    /// Protects the selected joints' weights from skinning, or no longer.
+    /// Locks the selected joints' weights against skinning, or unlocks them.
     Lock(bool),
-    /// Takes the last change back.
+    /// Undoes the last change.
     Undo,
-    /// Does the last undone change again.
+    /// Redoes the last undone change.
     Redo,
 }
 

@@ -3,19 +3,18 @@
 use std::{borrow::Cow, sync::Arc};
 
 use bevy::prelude::*;
-use undo::{Edit, Record};
 
 use super::selection::Selection;
 use crate::rig::{
-    Rig, RigEdit, Uid, UidSource,
+    Rig, RigEdit, UidSource,
     operations::{MirrorPlane, Operation, OperationError, Outcome},
-    step::{Step, Timeline},
+    step::{Committed, Step, UndoStacks},
 };
 
 /// The steps that were done to a rig.
 #[derive(Component, Default)]
 pub struct RigHistory {
-    record: Record<Entry>,
+    stacks: UndoStacks,
     preview: Option<Preview>,
 }
 
@@ -36,41 +35,13 @@ pub struct Recorded {
     pub notes: Vec<String>,
 }
 
-/// A step in the record.
-struct Entry {
-    step: Arc<Step>,
-    /// True until the step is recorded: its edits have been applied already.
-    applied: bool,
-}
-
-/// What steps work on.
-#[derive(Default)]
-struct Editable {
-    rig: Rig,
-    selection: Vec<Uid>,
-    /// True while a history is restored, when the rig is as it shall be already.
-    inert: bool,
-}
-
-impl Edit for Entry {
-    type Target = Editable;
-    type Output = Result<Arc<Step>, String>;
-
-    fn edit(&mut self, target: &mut Editable) -> Self::Output {
-        if !std::mem::take(&mut self.applied) && !target.inert {
-            apply_all(&mut target.rig, &self.step.forward)?;
-        }
-        target.selection.clone_from(&self.step.after);
-        Ok(self.step.clone())
-    }
-
-    fn undo(&mut self, target: &mut Editable) -> Self::Output {
-        if !target.inert {
-            apply_all(&mut target.rig, &self.step.backward)?;
-        }
-        target.selection.clone_from(&self.step.before);
-        Ok(self.step.clone())
-    }
+/// True if edits delete a joint. Created nodes stay selected: their commands may build them again.
+fn removes(edits: &[RigEdit], joint: crate::rig::Uid) -> bool {
+    edits.iter().any(|edit| match edit {
+        RigEdit::RemoveJoint(removed) => *removed == joint,
+        RigEdit::Batch(edits) => removes(edits, joint),
+        _ => false,
+    })
 }
 
 fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), String> {
@@ -79,16 +50,8 @@ fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), String> {
 
 impl RigHistory {
     /// A history that was kept, for a rig in which its steps are in effect already.
-    pub fn restored(timeline: &Timeline) -> Self {
-        let mut record = Record::new();
-        let mut target = Editable { inert: true, ..default() };
-        for step in timeline.done.iter().chain(timeline.undone.iter().rev()) {
-            let _ = record.edit(&mut target, Entry { step: step.clone(), applied: true });
-        }
-        for _ in &timeline.undone {
-            let _ = record.undo(&mut target);
-        }
-        Self { record, preview: None }
+    pub fn restored(stacks: &UndoStacks) -> Self {
+        Self { stacks: stacks.clone(), preview: None }
     }
 
     /// Runs an operation and records it as one step. Joints that the operation deleted leave the selection. A preview is
@@ -103,7 +66,7 @@ impl RigHistory {
     ) -> Result<Recorded, OperationError> {
         self.cancel_preview(rig);
         let outcome = operation.run(rig, uids, symmetry)?;
-        Ok(self.record(rig, selection, operation.name(), outcome))
+        Ok(self.record(selection, operation.name(), outcome))
     }
 
     /// Shows what an operation would do: the rig changes, its history does not. What was previewed before is taken back
@@ -125,9 +88,9 @@ impl RigHistory {
     }
 
     /// Records what is previewed as one step; `None` if nothing is.
-    pub fn commit_preview(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Recorded> {
+    pub fn commit_preview(&mut self, selection: &mut Selection) -> Option<Recorded> {
         let Preview { name, outcome } = self.preview.take()?;
-        Some(self.record(rig, selection, name, outcome))
+        Some(self.record(selection, name, outcome))
     }
 
     /// Takes back what is previewed, to the bit; false if nothing is.
@@ -153,11 +116,11 @@ impl RigHistory {
     }
 
     /// Records what has been applied already.
-    fn record(&mut self, rig: &mut Rig, selection: &mut Selection, name: &'static str, outcome: Outcome) -> Recorded {
+    fn record(&mut self, selection: &mut Selection, name: &'static str, outcome: Outcome) -> Recorded {
         let before = selection.0.clone();
         let after = outcome
             .selected
-            .unwrap_or_else(|| before.iter().copied().filter(|joint| rig.joint(*joint).is_some()).collect());
+            .unwrap_or_else(|| before.iter().copied().filter(|node| !removes(&outcome.edits, *node)).collect());
         let name = Cow::Borrowed(name);
         // What changed nothing is no step: undoing it would seem to do nothing.
         if outcome.edits.is_empty() && after == before {
@@ -165,46 +128,48 @@ impl RigHistory {
         }
         let step = Step { name: name.clone(), forward: outcome.edits, backward: outcome.inverses, before, after };
         let step = Arc::new(step);
-        let entry = Entry { step: step.clone(), applied: true };
-        let recorded = self.with(rig, selection, |record, target| record.edit(target, entry));
-        debug_assert!(recorded.is_ok(), "a step that was applied already cannot fail");
+        selection.0.clone_from(&step.after);
+        self.stacks.follow(&Committed::Done(step.clone()));
         Recorded { name, step: Some(step), notes: outcome.notes }
     }
 
     /// Takes the last step back and returns it, or `None` if there is none. A preview is taken back before.
     pub fn undo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
         self.cancel_preview(rig);
-        self.with(rig, selection, Record::undo)
+        let step = self.stacks.done.last()?.clone();
+        if let Err(error) = apply_all(rig, &step.backward) {
+            return Some(Err(error));
+        }
+        selection.0.clone_from(&step.before);
+        self.stacks.follow(&Committed::Undone(step.clone()));
+        Some(Ok(step))
     }
 
     /// Does the last undone step again and returns it, or `None` if there is none. A preview is taken back before.
     pub fn redo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
         self.cancel_preview(rig);
-        self.with(rig, selection, Record::redo)
+        let step = self.stacks.undone.last()?.clone();
+        if let Err(error) = apply_all(rig, &step.forward) {
+            return Some(Err(error));
+        }
+        selection.0.clone_from(&step.after);
+        self.stacks.follow(&Committed::Redone(step.clone()));
+        Some(Ok(step))
+    }
+
+    /// True if a step that was undone can be done again.
+    pub fn can_redo(&self) -> bool {
+        !self.stacks.undone.is_empty()
     }
 
     /// Names of all steps, oldest first, and how many of them are in effect.
     pub fn steps(&self) -> (Vec<&str>, usize) {
-        (self.record.entries().map(|entry| entry.as_ref().step.name.as_ref()).collect(), self.record.head())
+        let UndoStacks { done, undone } = &self.stacks;
+        (done.iter().chain(undone.iter().rev()).map(|step| step.name.as_ref()).collect(), done.len())
     }
 
     /// The last step in effect; the same one again after undo and redo, and after nothing else.
     pub fn last(&self) -> Option<&Arc<Step>> {
-        let before = self.record.head().checked_sub(1)?;
-        self.record.entries().nth(before).map(|entry| &entry.as_ref().step)
-    }
-
-    fn with<T>(
-        &mut self,
-        rig: &mut Rig,
-        selection: &mut Selection,
-        change: impl FnOnce(&mut Record<Entry>, &mut Editable) -> T,
-    ) -> T {
-        let mut target =
-            Editable { rig: std::mem::take(rig), selection: std::mem::take(&mut selection.0), inert: false };
-        let result = change(&mut self.record, &mut target);
-        *rig = target.rig;
-        selection.0 = target.selection;
-        result
+        self.stacks.done.last()
     }
 }

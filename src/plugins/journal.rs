@@ -1,8 +1,8 @@
-//! Every committed edit, in a safe place at once.
+//! Journals: every committed edit is stored at once.
 //!
 //! A rig with a [`RigJournal`] hands each change to a [`StepSink`] in the frame in which it was made: there is no timer
-//! that a long gesture could hold up. Where the sink puts them is its business;
-//! [`Journal`](crate::files::journal::Journal) is an append-only file.
+//! that a long gesture could hold up. The sink decides about the place; [`Journal`](crate::files::journal::Journal) is
+//! an append-only file.
 
 use std::{
     sync::{Arc, Mutex, PoisonError},
@@ -11,15 +11,13 @@ use std::{
 
 use bevy::prelude::*;
 
-use super::{
-    RigSystems, configure_sets,
-    document::{Edited, RigBundle},
-    history::RigHistory,
-    selection::Selection,
+use super::{RigSystems, configure_sets, document::Edited, history::RigHistory, selection::Selection};
+use crate::rig::{
+    Rig,
+    step::{Committed, Replayed, StepSink},
 };
-use crate::rig::step::{Committed, Replayed, StepSink};
 
-/// Adds journals; does nothing for rigs without a [`RigJournal`].
+/// Plugin of journals; does nothing for rigs without a [`RigJournal`].
 pub struct JournalPlugin;
 
 impl Plugin for JournalPlugin {
@@ -35,17 +33,17 @@ impl Plugin for JournalPlugin {
     }
 }
 
-/// Where the changes of a rig go. Remove it to stop.
+/// Sink of the changes of a rig. Remove the component to stop.
 #[derive(Component, Clone)]
 pub struct RigJournal {
     sink: Arc<dyn StepSink>,
-    told: Arc<Mutex<Option<Arc<str>>>>,
+    reported: Arc<Mutex<Option<Arc<str>>>>,
 }
 
 impl RigJournal {
     /// Sends the changes of the rig to `sink` from now on.
     pub fn new(sink: impl StepSink + 'static) -> Self {
-        Self { sink: Arc::new(sink), told: Arc::default() }
+        Self { sink: Arc::new(sink), reported: Arc::default() }
     }
 
     /// Hands over a change that was made outside the edit path of the plugins.
@@ -53,26 +51,26 @@ impl RigJournal {
         self.sink.record(committed);
     }
 
-    /// Waits until every change so far is safe, at most for `limit`: before quitting, or when the renderer fails.
+    /// Waits until every change so far is stored, at most for `limit`: before quitting, or when the renderer fails.
     ///
     /// # Errors
-    /// Why they are not safe, in words for people.
+    /// The reason why changes are not stored, in words for people.
     pub fn flush(&self, limit: Duration) -> Result<(), String> {
         self.sink.flush(limit)
     }
 
-    /// The reason why changes are not safe at the moment; `None` while they are.
+    /// The reason why changes cannot be stored at the moment; `None` while they can.
     pub fn trouble(&self) -> Option<Arc<str>> {
         self.sink.trouble()
     }
 }
 
-/// A rig's changes can no longer be kept safe, or can again. Told once each time.
+/// Message that a rig's changes can no longer be stored, or can be again. Sent once each time.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct JournalTrouble {
     /// The rig.
     pub rig: Entity,
-    /// What is wrong and what to do; `None` once all changes, the earlier ones included, are safe again.
+    /// Description of the problem with a hint; `None` once all changes, the earlier ones included, are stored again.
     pub reason: Option<Arc<str>>,
 }
 
@@ -87,20 +85,19 @@ fn record_edits(mut edited: MessageReader<Edited>, journals: Query<&RigJournal>)
 fn report_trouble(journals: Query<(Entity, &RigJournal)>, mut trouble: MessageWriter<JournalTrouble>) {
     for (rig, journal) in &journals {
         let reason = journal.trouble();
-        let mut told = journal.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if *told != reason {
-            told.clone_from(&reason);
+        let mut reported = journal.reported.lock().unwrap_or_else(PoisonError::into_inner);
+        if *reported != reason {
+            reported.clone_from(&reason);
             trouble.write(JournalTrouble { rig, reason });
         }
     }
 }
 
-/// The components of a rig that was replayed: document, selection and history.
-pub fn replayed_bundle(replayed: &Replayed) -> RigBundle {
-    RigBundle {
-        rig: replayed.rig.clone(),
-        selection: Selection(replayed.selection.clone().unwrap_or_default()),
-        history: RigHistory::restored(&replayed.timeline),
-        ..default()
-    }
+/// The components of a replayed rig: document, selection and history.
+pub fn replayed_bundle(replayed: &Replayed) -> (Rig, Selection, RigHistory) {
+    (
+        replayed.rig.clone(),
+        Selection(replayed.selection.clone().unwrap_or_default()),
+        RigHistory::restored(&replayed.stacks),
+    )
 }

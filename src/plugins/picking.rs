@@ -1,8 +1,8 @@
-//! Picking: which joints the user means.
+//! Picking: selecting joints with clicks and boxes.
 //!
-//! A click means the joint nearest to where its ray first meets the *posed* mesh (Pencil Rigger, section 3.1), so small
-//! joints are easy to hit. Clicking the same spot again cycles through the next nearest; where the ray misses the mesh,
-//! distances are measured on the view plane.
+//! A click picks the joint nearest to the first hit of its ray on the *posed* mesh (Pencil Rigger, section 3.1), so
+//! small joints are easy to hit. Clicking the same spot again cycles through the next nearest; if the ray misses the
+//! mesh, distances are measured on the view plane.
 //!
 //! Clicks wait while the surface is behind the pose; hovering does not.
 
@@ -14,7 +14,9 @@ use bevy::{
 
 use super::{
     RigSystems, configure_sets,
-    document::{Hovered, JointEntities, JointOf, Selection},
+    controls::outline::{ControlNodes, control_at},
+    document::{Hovered, JointEntities, NodeOf, Selection},
+    schema::RigNodes,
     surface::{Answer, RigMeshes, RigSurface, answer},
 };
 use crate::{
@@ -25,13 +27,14 @@ use crate::{
     rig::{Rig, Uid},
 };
 
-/// Adds joint picking.
+/// Plugin of joint picking.
 pub struct PickingPlugin;
 
 impl Plugin for PickingPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.init_resource::<LastClick>()
+            .init_resource::<PickControls>()
             .add_message::<PickRequest>()
             .add_message::<HoverRequest>()
             .add_message::<HoverJoint>()
@@ -40,27 +43,27 @@ impl Plugin for PickingPlugin {
     }
 }
 
-/// Asks to change what is selected.
+/// Request to change the selection.
 #[derive(Message, Debug, Clone)]
 pub struct PickRequest {
     /// The rig.
     pub rig: Entity,
-    /// What to pick.
+    /// Joints to pick.
     pub what: Pick,
-    /// True to add to the selection (a joint that is selected already becomes the active one); false to replace it.
+    /// Adds to the selection if `true` (a selected joint becomes the active one), replaces it if `false`.
     pub add: bool,
 }
 
-/// What a [`PickRequest`] picks. View planes are in the rig's space.
+/// Joints that a [`PickRequest`] picks. View planes are in the rig's space.
 #[derive(Debug, Clone)]
 pub enum Pick {
-    /// The joint that a click at a point of the view plane means.
+    /// The joint picked by a click at a point of the view plane.
     Click {
         /// The view.
         plane: ViewPlane,
         /// The point.
         point: Vec2,
-        /// How far apart, in model units, clicks still count as the same spot.
+        /// Largest distance, in model units, of clicks at the same spot.
         reach: f32,
     },
     /// All joints in a box between two opposite corners.
@@ -70,7 +73,7 @@ pub enum Pick {
         /// The corners.
         corners: [Vec2; 2],
     },
-    /// These joints.
+    /// The listed joints.
     Joints(Vec<Uid>),
     /// All joints.
     All,
@@ -78,10 +81,10 @@ pub enum Pick {
     None,
 }
 
-/// Tells where the pointer is over a view of a rig. [`Hovered`] then follows what a click there would pick, also when the
-/// rig, its pose or the selection change under a pointer that rests, until the next request.
+/// Position of the pointer over a view of a rig. [`Hovered`] then follows the joint that a click there would pick, also
+/// when the rig, its pose or the selection change under a resting pointer, until the next request.
 ///
-/// While the mesh's surface is being built nothing changes; while it is behind the pose, so is the answer.
+/// While the mesh's surface is being built nothing changes; while it is behind the pose, so is [`Hovered`].
 #[derive(Message, Debug, Clone, Copy)]
 pub struct HoverRequest {
     /// The rig.
@@ -90,8 +93,8 @@ pub struct HoverRequest {
     pub what: Option<(ViewPlane, Vec2, f32)>,
 }
 
-/// Names the joint that the pointer is at where no view is: in a list, for example. [`Hovered`] follows while the pointer
-/// is over no view of that rig.
+/// The joint under the pointer outside of any view: in a list, for example. [`Hovered`] follows it while the pointer is
+/// over no view of that rig.
 #[derive(Message, Debug, Clone, Copy)]
 pub struct HoverJoint {
     /// The rig.
@@ -100,19 +103,19 @@ pub struct HoverJoint {
     pub joint: Option<Uid>,
 }
 
-/// Where the pointer rests.
+/// Position of a resting pointer.
 struct HoverSpot {
     plane: ViewPlane,
     point: Vec2,
     reach: f32,
 }
 
-/// What was picked.
+/// Result of a [`PickRequest`].
 #[derive(Message, Debug, Clone)]
 pub struct Picked {
     /// The rig.
     pub rig: Entity,
-    /// The joints that the request meant; empty if it met none.
+    /// The picked joints; empty if the request hit none.
     pub joints: Vec<Uid>,
 }
 
@@ -132,7 +135,7 @@ pub fn posed_joints(
     .collect()
 }
 
-/// The last click, which the next one at the same spot goes on from.
+/// The last click, which the next one at the same spot continues.
 #[derive(Resource, Default)]
 struct LastClick {
     at: Option<(Entity, ViewPlane)>,
@@ -140,7 +143,7 @@ struct LastClick {
 }
 
 impl LastClick {
-    /// Forgets it if `plane` is another view, or a view of another rig.
+    /// Forgets the last click if `plane` is another view, or a view of another rig.
     fn look(&mut self, rig: Entity, plane: &ViewPlane, reach: f32) {
         if !self.is_seen(rig, plane, reach) {
             self.cycle.reset();
@@ -159,10 +162,27 @@ impl LastClick {
     }
 }
 
-/// What a pick looks at.
-type Seen<'a> = (&'a Rig, &'a JointEntities, &'a GlobalTransform, Option<&'a RigSurface>, Option<&'a RigMeshes>);
+/// Components of a rig that a pick reads.
+type PickItem<'a> = (
+    &'a Rig,
+    &'a JointEntities,
+    &'a GlobalTransform,
+    Option<&'a RigSurface>,
+    Option<&'a RigMeshes>,
+    Option<&'a RigNodes>,
+);
 
-/// An edit may change which joints lie under the last click.
+/// Whether clicks meet controls before joints: while people pose, not while they draw a skeleton.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PickControls(pub bool);
+
+impl Default for PickControls {
+    fn default() -> Self {
+        Self(true)
+    }
+}
+
+/// Forgets the last click after an edit, which may change the joints under it.
 fn forget_click(changed: Query<Entity, Changed<Rig>>, mut last: ResMut<LastClick>) {
     if last.at.is_some_and(|(rig, _)| changed.contains(rig)) {
         *last = LastClick::default();
@@ -172,20 +192,22 @@ fn forget_click(changed: Query<Entity, Changed<Rig>>, mut last: ResMut<LastClick
 fn pick(
     mut requests: MessageReader<PickRequest>,
     mut waiting: Local<Vec<(PickRequest, Option<u64>)>>,
-    rigs: Query<Seen>,
+    rigs: Query<PickItem>,
     mut selections: Query<&mut Selection>,
     joints: Query<&GlobalTransform>,
+    controls: ControlNodes,
+    picks_controls: Res<PickControls>,
     mut last: ResMut<LastClick>,
     mut picked: MessageWriter<Picked>,
 ) {
     waiting.extend(requests.read().map(|request| (request.clone(), None)));
-    // Requests are answered in their order: what comes after a click that waits, waits too.
+    // Requests are answered in their order: a request after a waiting click waits, too.
     let mut busy: Vec<Entity> = Vec::new();
     waiting.retain_mut(|(request, since)| {
         let (Ok(seen), Ok(mut selection)) = (rigs.get(request.rig), selections.get_mut(request.rig)) else {
             return false;
         };
-        let (rig, entities, place, surface, meshes) = seen;
+        let (rig, entities, place, surface, meshes, nodes) = seen;
         if busy.contains(&request.rig) {
             return true;
         }
@@ -193,6 +215,11 @@ fn pick(
             Pick::None => Vec::new(),
             Pick::All => rig.walk().map(|joint| joint.data.uid).collect(),
             Pick::Joints(joints) => joints.iter().copied().filter(|joint| rig.joint(*joint).is_some()).collect(),
+            Pick::Click { plane, point, reach }
+                if let Some(control) = met(&controls, &picks_controls, place, nodes, plane, *point, *reach) =>
+            {
+                vec![control]
+            }
             Pick::Click { plane, point, reach } => {
                 let Answer::Now(surface) = answer(since, meshes.is_some(), surface) else {
                     busy.push(request.rig);
@@ -221,7 +248,21 @@ fn pick(
     });
 }
 
-/// The joints that a click may mean, as indices into `posed`.
+/// The control whose outline a click meets.
+fn met(
+    controls: &ControlNodes,
+    picks_controls: &PickControls,
+    place: &GlobalTransform,
+    nodes: Option<&RigNodes>,
+    plane: &ViewPlane,
+    point: Vec2,
+    reach: f32,
+) -> Option<Uid> {
+    let visible = picks_controls.0.then(|| controls.visible(nodes, place.affine().inverse()))?;
+    control_at(&visible, plane, point, reach)
+}
+
+/// The joints that a click may pick, as indices into `posed`.
 fn candidates(
     posed: &[(Uid, Vec3)],
     surface: Option<&RigSurface>,
@@ -235,15 +276,17 @@ fn candidates(
     picking::candidates_at(hit.map(|hit| ray.at(hit.distance)), plane, point, &positions, reach)
 }
 
-/// Keeps [`Hovered`] at what a click under the pointer would pick. Looks again only when something changed.
+/// Updates [`Hovered`] to the joint that a click under the pointer would pick. Queries again only after a change.
 fn hover(
     mut requests: MessageReader<HoverRequest>,
     mut named: MessageReader<HoverJoint>,
     mut spots: Local<EntityHashMap<HoverSpot>>,
-    rigs: Query<Seen>,
+    rigs: Query<PickItem>,
     changed: Query<(), Or<(Changed<Rig>, Changed<RigSurface>, Changed<GlobalTransform>)>>,
-    moved: Query<&JointOf, Changed<GlobalTransform>>,
+    moved: Query<&NodeOf, Changed<GlobalTransform>>,
     joints: Query<&GlobalTransform>,
+    controls: ControlNodes,
+    picks_controls: Res<PickControls>,
     last: Res<LastClick>,
     mut hovered: Query<&mut Hovered>,
 ) {
@@ -270,6 +313,12 @@ fn hover(
         let (Ok(seen), Ok(mut hovered)) = (rigs.get(rig), hovered.get_mut(rig)) else { continue };
         let joint = match spots.get(&rig) {
             None => None,
+            Some(spot)
+                if let Some(control) =
+                    met(&controls, &picks_controls, seen.2, seen.5, &spot.plane, spot.point, spot.reach) =>
+            {
+                Some(control)
+            }
             Some(spot) => match under(spot, rig, seen, &joints, &last) {
                 Some(joint) => joint,
                 None => continue,
@@ -284,11 +333,11 @@ fn hover(
     }
 }
 
-/// What a click would pick; the outer `None` as long as the surface is being built.
+/// The joint that a click would pick; the outer `None` while the surface is being built.
 fn under(
     spot: &HoverSpot,
     entity: Entity,
-    (rig, entities, place, surface, meshes): Seen,
+    (rig, entities, place, surface, meshes, _): PickItem,
     joints: &Query<&GlobalTransform>,
     last: &LastClick,
 ) -> Option<Option<Uid>> {

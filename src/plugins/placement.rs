@@ -1,8 +1,8 @@
 //! Placing joints with rays (Pencil Rigger, section 3.2).
 //!
 //! The joint goes to the midpoint of the closest and the furthest hit of a ray through the posed mesh, becomes a child
-//! of the selected joint or a root, and is selected. Where the ray meets nothing, nothing happens, and [`Placed`] says so.
-//! While the surface is behind the pose, requests wait for it.
+//! of the selected joint or a root, and is selected. If the ray misses the mesh, nothing happens, and [`Placed`]
+//! reports it. While the surface is behind the pose, requests wait for it.
 
 use bevy::prelude::*;
 
@@ -14,10 +14,10 @@ use super::{
 use crate::{
     algo::placement::{PlaceSettings, Placement, place_hits},
     mesh::ray::Ray,
-    rig::{Rig, operations::Operation},
+    rig::{Rig, Uid, operations::Operation},
 };
 
-/// Adds placing.
+/// Plugin of placing joints.
 pub struct PlacementPlugin;
 
 impl Plugin for PlacementPlugin {
@@ -29,7 +29,7 @@ impl Plugin for PlacementPlugin {
     }
 }
 
-/// Asks to place a joint.
+/// Request to place a joint.
 #[derive(Message, Debug, Clone)]
 pub struct PlaceRequest {
     /// The rig.
@@ -45,8 +45,35 @@ pub struct PlaceRequest {
 pub struct Placed {
     /// The rig.
     pub rig: Entity,
-    /// What the ray met, and where the joint goes.
+    /// Hits of the ray, and the position of the joint.
     pub placement: Placement,
+}
+
+/// Joint that a [`PlaceRequest`] adds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlacedJoint {
+    /// What the ray meets.
+    pub placement: Placement,
+    /// The joint that it hangs on: the active one of the selection.
+    pub parent: Option<Uid>,
+    /// Where it rests, in the rig's space; `None` where the ray meets nothing.
+    pub rest: Option<Vec3>,
+}
+
+/// Joint that a ray places, without placing it: the request and its preview are the same.
+pub fn joint_at(
+    rig: &Rig,
+    selection: &Selection,
+    surface: Option<&RigSurface>,
+    ray: &Ray,
+    settings: PlaceSettings,
+) -> PlacedJoint {
+    let hits = surface.map(|surface| surface.hits(ray)).unwrap_or_default();
+    let placement = place_hits(ray, &hits, settings);
+    let parent = selection.active();
+    // On a posed mesh the joint rests where its parent's pose brings it to what was clicked.
+    let rest = placement.position().map(|position| rig.rest_from_pose(parent).transform_point3(position));
+    PlacedJoint { placement, parent, rest }
 }
 
 pub(super) fn place(
@@ -60,12 +87,8 @@ pub(super) fn place(
     waiting.retain_mut(|(PlaceRequest { rig, ray, settings }, since)| {
         let Ok((document, selection, surface, has_mesh)) = rigs.get(*rig) else { return false };
         let Answer::Now(surface) = answer(since, has_mesh, surface) else { return true };
-        let hits = surface.map(|surface| surface.hits(ray)).unwrap_or_default();
-        let placement = place_hits(ray, &hits, *settings);
-        if let Some(position) = placement.position() {
-            let parent = selection.active();
-            // On a posed mesh the joint rests where its parent's pose brings it to what was clicked.
-            let position = document.rest_from_pose(parent).transform_point3(position);
+        let PlacedJoint { placement, parent, rest } = joint_at(document, selection, surface, ray, *settings);
+        if let Some(position) = rest {
             edits.write(EditRequest::operation(*rig, Operation::Place { position, parent }));
         }
         placed.write(Placed { rig: *rig, placement });

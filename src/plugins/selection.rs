@@ -1,10 +1,10 @@
-//! Which joints of a rig are selected.
+//! Selection: the selected joints of a rig.
 
 use bevy::prelude::*;
 
 use crate::rig::Uid;
 
-/// Selected joints of a rig; the last one is active: the parent of what is placed next.
+/// Selected joints of a rig; the last one is active: the parent of the next placed joint.
 #[derive(Component, Debug, Clone, PartialEq, Eq, Default)]
 pub struct Selection(pub Vec<Uid>);
 
@@ -15,6 +15,6 @@ impl Selection {
     }
 }
 
-/// The joint under the pointer: what a click would pick now.
+/// The joint under the pointer, which a click would pick.
 #[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Hovered(pub Option<Uid>);

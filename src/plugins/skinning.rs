@@ -1,6 +1,7 @@
 //! Automatic weights, computed in the background and bound as one undoable edit.
 
 use std::{
+    collections::BTreeMap,
     ops::Range,
     sync::{
         Arc,
@@ -14,14 +15,22 @@ use bevy::{
 };
 
 use super::{
-    RigSystems, configure_sets,
+    RigSystems,
+    commands::Built,
+    configure_sets,
     document::EditRequest,
+    history::RigHistory,
+    landing::{JobBasis, Landing, ResultHeld, landing},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
-    algo::weights::{Locks, WeightError, WeightJoint, WeightReport, WeightSettings, skin_weights},
+    algo::weights::{Locks, TwistBone, WeightError, WeightJoint, WeightReport, WeightSettings, skin_weights},
     mesh::model::Weights,
-    rig::{NodeKind, Rig, RigEdit, SkinData, Uid, operations::Operation},
+    rig::{
+        BuiltRig, Rig, RigEdit, SkinData, Uid,
+        deform::{DeformSkeleton, replaced_joints},
+        operations::Operation,
+    },
 };
 
 /// Adds automatic skinning.
@@ -32,6 +41,7 @@ impl Plugin for SkinningPlugin {
         configure_sets(app);
         app.add_message::<BindRequest>()
             .add_message::<Bound>()
+            .add_message::<ResultHeld>()
             .add_systems(Update, (start_skinning, land_skinning).chain().in_set(RigSystems::Bind));
     }
 }
@@ -61,8 +71,14 @@ pub struct Bound {
 pub struct SkinningJob {
     progress: Arc<AtomicU32>,
     cancelled: Arc<AtomicBool>,
-    task: Task<Result<(Arc<SkinData>, WeightReport), WeightError>>,
+    task: Task<Computed>,
+    /// The part of the document that the weights are computed from.
+    basis: JobBasis,
+    /// Weights that are finished and wait; see [`landing`](super::landing).
+    held: Option<Computed>,
 }
+
+type Computed = Result<(Arc<SkinData>, WeightReport), WeightError>;
 
 impl SkinningJob {
     /// How much is done, 0 to 1.
@@ -82,12 +98,14 @@ impl Drop for SkinningJob {
     }
 }
 
-/// What weights are computed from: the joints of a rig in the order of [`Rig::walk`].
+/// What weights are computed from: the joints of a [`DeformSkeleton`], in its order.
 pub struct SkinningInput {
     /// The joints.
     pub joints: Vec<WeightJoint>,
     /// Their uids.
     pub uids: Vec<Uid>,
+    /// The nodes that created ones were made for.
+    pub subjects: BTreeMap<Uid, Uid>,
     /// Which of them are locked.
     pub locked: Vec<bool>,
     /// The weights there are, over the same joints.
@@ -97,21 +115,21 @@ pub struct SkinningInput {
 }
 
 impl SkinningInput {
-    /// Gathers what a rig says about a mesh. Objects that hang on a joint in their file are rigid, too.
-    pub fn new(rig: &Rig, mesh: &RigMesh, rigid: &[(usize, Uid)]) -> Self {
-        let globals = rig.rest_globals();
-        let uids: Vec<Uid> = globals.iter().map(|(uid, _)| *uid).collect();
-        let number = |uid: Uid| uids.iter().position(|other| *other == uid);
-        let numbers: std::collections::HashMap<Uid, usize> =
-            uids.iter().enumerate().map(|(number, uid)| (*uid, number)).collect();
-        let joints = rig.walk().zip(&globals).map(|(joint, (_, global))| WeightJoint {
-            head: global.translation,
-            parent: joint.parent.and_then(|parent| numbers.get(&parent).copied()),
+    /// Gathers what a rig, and what its commands built, say about a mesh. Objects that hang on a joint in their file
+    /// are rigid, too; joints that commands created are locked with the node that they were made for.
+    pub fn new(rig: &Rig, built: Option<&BuiltRig>, mesh: &RigMesh, rigid: &[(usize, Uid)]) -> Self {
+        let skeleton = DeformSkeleton::new(rig, built);
+        let joints = skeleton.joints().iter().map(|joint| WeightJoint {
+            head: joint.rest.translation,
+            parent: joint.parent,
             tail: None,
-            deforms: joint.data.kind == NodeKind::Joint,
+            deforms: joint.deforms,
+            twist: joint.twist.map(|twist| TwistBone { joint: twist.joint, end: twist.end }),
         });
         let joints = joints.collect();
-        let locked = rig.walk().map(|joint| joint.data.locked).collect();
+        let uids = skeleton.joints().iter().map(|joint| joint.uid).collect();
+        let is_locked = |uid: Uid| rig.joint(uid).is_some_and(|joint| joint.data.locked);
+        let locked = skeleton.joints().iter().map(|joint| is_locked(joint.subject.unwrap_or(joint.uid))).collect();
         let carried = mesh.rest.objects.iter().enumerate().filter_map(|(object, data)| {
             let joint = mesh.nodes.get(data.node?)?;
             Some((object, *joint))
@@ -121,7 +139,7 @@ impl SkinningInput {
             carried.filter(|(object, _)| chosen.iter().all(|(other, _)| other != object)).collect();
         let mut ranges = Vec::new();
         for (object, joint) in chosen.into_iter().chain(carried) {
-            let Some(joint) = number(joint) else { continue };
+            let Some(joint) = skeleton.index(joint) else { continue };
             let points = mesh.rest.parts.iter().filter(|part| part.object == object).flat_map(|part| &part.vertices);
             let mut points: Vec<u32> = points.copied().collect();
             points.sort_unstable();
@@ -130,16 +148,9 @@ impl SkinningInput {
                 ranges.push((run[0]..run[run.len() - 1] + 1, joint as u32));
             }
         }
-        let existing = rig.skin(mesh.uid).map(|skin| {
-            let node_of: Vec<Option<usize>> = skin.joints.iter().map(|uid| numbers.get(uid).copied()).collect();
-            let mut weights = Weights::default();
-            for point in 0..skin.weights.len() {
-                let influences = skin.weights.of(point);
-                weights.push(influences.filter_map(|(joint, w)| Some((node_of[joint as usize]? as u32, w))));
-            }
-            weights
-        });
-        Self { joints, uids, locked, existing, rigid: ranges }
+        let existing = rig.skin(mesh.uid).map(|skin| replaced_joints(&skin.weights, &skeleton.holders(rig, skin)));
+        let subjects = skeleton.subjects();
+        Self { joints, uids, subjects, locked, existing, rigid: ranges }
     }
 
     /// Computes the weights of a mesh.
@@ -154,7 +165,8 @@ impl SkinningInput {
         let locks = locks.map(|weights| Locks { weights, joints: &self.locked });
         let (weights, report) =
             skin_weights(&mesh.rest.points, &mesh.triangles, &self.joints, &self.rigid, locks, settings, progress)?;
-        Ok((Arc::new(SkinData { joints: self.uids.clone(), weights, at_rest: true }), report))
+        let (joints, subjects) = (self.uids.clone(), self.subjects.clone());
+        Ok((Arc::new(SkinData { joints, weights, at_rest: true, subjects }), report))
     }
 }
 
@@ -162,45 +174,69 @@ fn start_skinning(
     mut commands: Commands,
     mut requests: MessageReader<BindRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
-    rigs: Query<&Rig>,
+    rigs: Query<(&Rig, Option<&Built>)>,
     mut bound: MessageWriter<Bound>,
 ) {
     for request in requests.read() {
         let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
-        let Some((mesh, rig)) = found else {
+        let Some((mesh, (rig, built))) = found else {
             let result = Err("the mesh belongs to no rig; it may have been closed".to_owned());
             bound.write(Bound { mesh: request.mesh, result });
             continue;
         };
+        let basis = JobBasis::of(rig, mesh.uid);
         let (rig, mesh, request) = (rig.clone(), mesh.clone(), request.clone());
+        let built = built.map(|built| built.0.clone());
         let entity = request.mesh;
         let progress = Arc::new(AtomicU32::new(0));
         let cancelled = Arc::new(AtomicBool::new(false));
         let (told, stop) = (progress.clone(), cancelled.clone());
         let task = AsyncComputeTaskPool::get().spawn(async move {
-            let input = SkinningInput::new(&rig, &mesh, &request.rigid);
+            let input = SkinningInput::new(&rig, built.as_deref(), &mesh, &request.rigid);
             input.compute(&mesh, &request.settings, &|part| {
                 told.store(part.to_bits(), Ordering::Relaxed);
                 !stop.load(Ordering::Relaxed)
             })
         });
-        commands.entity(entity).insert(SkinningJob { progress, cancelled, task });
+        commands.entity(entity).insert(SkinningJob { progress, cancelled, task, basis, held: None });
     }
 }
 
 fn land_skinning(
     mut commands: Commands,
     mut jobs: Query<(Entity, &mut SkinningJob, &RigMesh, &SkinOf)>,
+    rigs: Query<(&Rig, &RigHistory)>,
     mut edits: MessageWriter<EditRequest>,
     mut bound: MessageWriter<Bound>,
+    mut held: MessageWriter<ResultHeld>,
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
-        let Some(result) = check_ready(&mut job.task) else { continue };
-        let result = result.map_err(|error| error.to_string()).map(|(skin, report)| {
-            let edit = RigEdit::SetSkin(mesh.uid, Some(skin));
-            edits.write(EditRequest::operation(of.0, Operation::Edits(vec![edit])));
-            report
-        });
+        let was_held = job.held.is_some();
+        let finished = if was_held { job.held.take() } else { check_ready(&mut job.task) };
+        let Some(result) = finished else { continue };
+        let result = match (result, rigs.get(of.0)) {
+            (Err(error), _) => Err(error.to_string()),
+            (Ok(_), Err(_)) => Err("the rig was closed meanwhile".to_owned()),
+            (Ok((skin, report)), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
+                Landing::Hold => {
+                    job.held = Some(Ok((skin, report)));
+                    if !was_held && history.can_redo() {
+                        let reason = "the weights are ready, but binding them now would lose the steps that were \
+                                      undone; redo them, or go on editing, and the weights follow if they still fit";
+                        held.write(ResultHeld { mesh: entity, reason: reason.to_owned() });
+                    }
+                    continue;
+                }
+                Landing::Drop => Err("the joints were changed while the weights were computed; the weights were \
+                                      dropped: skin the mesh again"
+                    .to_owned()),
+                Landing::Commit => {
+                    let edit = RigEdit::SetSkin(mesh.uid, Some(skin));
+                    edits.write(EditRequest::operation(of.0, Operation::Edits(vec![edit])));
+                    Ok(report)
+                }
+            },
+        };
         bound.write(Bound { mesh: entity, result });
         commands.entity(entity).remove::<SkinningJob>();
     }

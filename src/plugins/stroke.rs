@@ -1,9 +1,9 @@
 //! Strokes: freehand lines that become chains, insert joints, or erase them (Pencil Rigger, section 5.3).
 //!
-//! Following a stroke takes some thousand rays, which on a large mesh is more than a frame has: it runs in a background
-//! task, and the chain comes a frame or two later. A preview does the same with a [`FollowedStroke`].
+//! Following a stroke takes some thousand rays, which on a large mesh takes longer than a frame: it runs in a
+//! background task, and the chain comes a frame or two later. A preview does the same with a [`FollowedStroke`].
 
-mod followed;
+mod chain_preview;
 mod parent;
 mod plan;
 
@@ -12,7 +12,7 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-pub use followed::FollowedStroke;
+pub use chain_preview::FollowedStroke;
 pub use parent::{ParentReason, StrokeParent, StrokeTips, nearest_parent, stroke_parent};
 pub use plan::{StrokePlan, StrokeScene, plan_stroke, stroke_kind};
 
@@ -30,7 +30,7 @@ use crate::{
     rig::{Rig, Uid, operations::MirrorPlane},
 };
 
-/// Adds strokes.
+/// Plugin of strokes.
 pub struct StrokePlugin;
 
 impl Plugin for StrokePlugin {
@@ -50,78 +50,78 @@ impl Plugin for StrokePlugin {
     }
 }
 
-/// Asks to turn a stroke into what it means.
+/// Request to interpret a stroke and carry it out.
 #[derive(Message, Debug, Clone)]
 pub struct StrokeRequest {
     /// The rig.
     pub rig: Entity,
     /// The view it was drawn in, in the rig's space.
     pub plane: ViewPlane,
-    /// Its points on the view plane.
+    /// Points of the stroke on the view plane.
     pub points: Vec<Vec2>,
-    /// Where joints go along it.
+    /// Choice of the joints along it.
     pub choice: ChainChoice,
     /// Depth, volume and recentring.
     pub settings: StrokeSettings,
-    /// True if the stroke must become a chain, whatever it crosses.
+    /// Forces a chain if `true`, whatever the stroke crosses.
     pub chain_only: bool,
-    /// How near, in model units, a stroke must come to a joint to mean it.
+    /// Largest distance, in model units, of a stroke from a joint that it starts or ends on.
     pub reach: f32,
-    /// What a chain hangs on whose stroke starts on no joint.
+    /// Rule for the parent of a chain whose stroke starts on no joint.
     pub parent: StrokeParent,
-    /// The chain, if a preview has chosen it from this very stroke: it is taken as it is.
+    /// The chain, if a preview has chosen it from this very stroke: it is taken unchanged.
     pub chain: Option<StrokeChain>,
 }
 
-/// What became of a stroke.
+/// Answer to a [`StrokeRequest`].
 #[derive(Message, Debug, Clone)]
 pub struct StrokeDone {
     /// The rig.
     pub rig: Entity,
-    /// What it meant.
+    /// Result of the stroke.
     pub result: StrokeResult,
 }
 
-/// What a stroke meant.
+/// Result of a stroke.
 #[derive(Debug, Clone)]
 pub enum StrokeResult {
-    /// A chain was added; `parent` is the joint it hangs on.
+    /// A chain was added.
     Chain {
-        /// The joints and what to tell the user.
+        /// The joints, with notes for the user.
         chain: StrokeChain,
-        /// The joint that the chain continues or hangs on.
+        /// The joint that the chain continues from or is attached to.
         parent: Option<Uid>,
-        /// Why that one.
+        /// Reason for that parent.
         why: ParentReason,
     },
-    /// A joint was put into the bone above this joint.
+    /// A joint was inserted into the bone above this joint.
     Inserted {
         /// The joint at the bone's end.
         child: Uid,
     },
     /// These joints were deleted.
     Erased(Vec<Uid>),
-    /// Nothing happened, for this reason.
+    /// The stroke had no effect, for this reason.
     Nothing(String),
 }
 
-/// Strokes that have no answer yet, in the order they came.
+/// Strokes without an answer yet, in the order of their requests.
 #[derive(Resource, Default)]
 struct WaitingStrokes(Vec<WaitingStroke>);
 
 struct WaitingStroke {
     request: StrokeRequest,
-    /// The state of the surface that it was drawn on.
+    /// Number of the state of the surface that it was drawn on.
     since: Option<u64>,
-    /// Its chain, once that is being computed.
+    /// Task that computes its chain.
     chain: Option<Task<FoundChain>>,
 }
 
-/// What following a stroke finds.
+/// Result of following a stroke.
 pub type FoundChain = Result<StrokeChain, StrokeError>;
 
-/// What a stroke is drawn on.
-type Drawn<'a> = (
+/// Components of a rig that a stroke reads.
+type StrokeTarget<'a> = (
     &'a Rig,
     &'a Selection,
     &'a JointEntities,
@@ -135,7 +135,7 @@ type Drawn<'a> = (
 fn stroke(
     mut requests: MessageReader<StrokeRequest>,
     mut waiting: ResMut<WaitingStrokes>,
-    rigs: Query<Drawn>,
+    rigs: Query<StrokeTarget>,
     joints: Query<&GlobalTransform>,
     mut edits: MessageWriter<EditRequest>,
     mut done: MessageWriter<StrokeDone>,
@@ -173,8 +173,8 @@ fn stroke(
                 let posed = posed_joints(rig, entities, place, &joints);
                 let scene = StrokeScene { rig, selection, symmetry, tips, surface, posed: &posed };
                 match act(request, &scene, found, &mut edits) {
-                    Acted::Done(result) => Some(result),
-                    Acted::Follows(task) => {
+                    StrokeOutcome::Done(result) => Some(result),
+                    StrokeOutcome::Follows(task) => {
                         *chain = Some(task);
                         None
                     }
@@ -187,33 +187,33 @@ fn stroke(
     });
 }
 
-/// What came of looking at a stroke.
-enum Acted {
+/// Outcome of processing a stroke.
+enum StrokeOutcome {
     Done(StrokeResult),
     Follows(Task<FoundChain>),
 }
 
-/// Does what a stroke means; if that is a chain, it must be `found` first.
+/// Carries out a stroke; the chain of a chain stroke must be `found` first.
 fn act(
     request: &StrokeRequest,
     scene: &StrokeScene,
     found: Option<FoundChain>,
     edits: &mut MessageWriter<EditRequest>,
-) -> Acted {
+) -> StrokeOutcome {
     let known = found.or_else(|| request.chain.clone().map(Ok));
     let plan = match plan_stroke(request, scene, known) {
         StrokePlan::NeedsChain => match find_chain(request, scene.surface, scene.symmetry.0) {
             Found::Now(chain) => plan_stroke(request, scene, Some(chain)),
-            Found::Later(task) => return Acted::Follows(task),
+            Found::Later(task) => return StrokeOutcome::Follows(task),
         },
         ready => ready,
     };
     match plan {
         StrokePlan::Ready { operation, result } => {
-            edits.write_batch(operation.map(|operation| EditRequest::operation(request.rig, operation)));
-            Acted::Done(result)
+            edits.write_batch(operation.map(|operation| EditRequest::operation(request.rig, *operation)));
+            StrokeOutcome::Done(result)
         }
-        StrokePlan::NeedsChain => Acted::Done(StrokeResult::Nothing("the stroke became no chain".to_owned())),
+        StrokePlan::NeedsChain => StrokeOutcome::Done(StrokeResult::Nothing("the stroke became no chain".to_owned())),
     }
 }
 
@@ -222,7 +222,7 @@ enum Found {
     Later(Task<FoundChain>),
 }
 
-/// Surfaces of no more triangles answer the rays of a stroke in less than a millisecond.
+/// Largest number of triangles of a surface that answers the rays of a stroke in less than a millisecond.
 const FEW_TRIANGLES: usize = 4096;
 
 fn find_chain(request: &StrokeRequest, surface: &RigSurface, symmetry: Option<MirrorPlane>) -> Found {
@@ -237,7 +237,7 @@ fn find_chain(request: &StrokeRequest, surface: &RigSurface, symmetry: Option<Mi
     if is_small { Found::Now(find()) } else { Found::Later(AsyncComputeTaskPool::get().spawn(async move { find() })) }
 }
 
-/// Remembers which joints strokes left selected, until somebody picks them.
+/// Records the joints that strokes left selected, until a person picks them.
 fn note_tips(
     mut commands: Commands,
     mut done: MessageReader<StrokeDone>,

@@ -1,30 +1,32 @@
-//! The posed surface of a rig: what rays meet.
+//! The posed surface of a rig, for ray queries.
 //!
-//! Bevy's own `MeshRayCast` gives one hit a mesh, in the bind pose. Placing needs all hits on the mesh as it stands
-//! now, so a rig has a [`RigSurface`] over all its meshes.
+//! Bevy's own `MeshRayCast` gives one hit a mesh, in the bind pose. Placing needs all hits on the mesh in its current
+//! pose, so a rig has a [`RigSurface`] over all its meshes.
 //!
-//! Nothing here is proportional to the mesh on the main thread. Reading the mesh, skinning its points and building or
+//! No work on the main thread is proportional to the mesh. Reading the mesh, skinning its points and building or
 //! refitting the hierarchy run in a background task, one at a time for a rig; while it runs, the latest pose waits and
-//! those between are left out. Until a task lands, rays meet the surface as it last landed: a fraction of a second
-//! behind for the first one (which has none: it meets nothing), some hundredths for a pose. Whoever changes a rig by
-//! what a ray meets waits for the surface to catch up with the pose that the user saw ([`RigSurface::shows`]), so that
-//! results never depend on timing; a preview need not. Meshes of few points are refreshed within the frame.
+//! those between are left out. Until a task ends, rays meet the last finished surface: a fraction of a second behind
+//! for the first one (rays meet nothing until it is ready), some hundredths for a pose. A request that changes a rig by
+//! a ray's hits waits for the surface to catch up with the pose that the user saw ([`RigSurface::shows`]), so that
+//! results never depend on timing; a preview need not wait. Meshes of few points are refreshed within the frame.
 
 mod refresh;
 
-use std::{collections::HashMap, sync::Arc};
+use std::sync::Arc;
 
 use bevy::{
     ecs::entity::EntityHashSet,
-    math::{Affine3, Affine3A},
+    math::Affine3A,
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
 use self::refresh::{PosedMesh, Refresh, Refreshed, are_same, are_same_meshes, bend, is_same};
 use super::{
-    RigSystems, configure_sets,
-    document::{Joint, JointEntities, JointOf},
+    RigSystems,
+    commands::{Built, BuiltEntities},
+    configure_sets,
+    document::{Joint, JointEntities, NodeOf},
 };
 use crate::{
     mesh::{
@@ -32,13 +34,16 @@ use crate::{
         ray::{Hit, Ray},
         surface::Surface,
     },
-    rig::{Rig, Uid},
+    rig::{
+        Rig, Uid,
+        deform::{DeformJoint, DeformSkeleton},
+    },
 };
 
-/// Meshes of no more points are refreshed at once, which takes less than a millisecond.
+/// Largest number of points of meshes that are refreshed at once, which takes less than a millisecond.
 const FEW_POINTS: usize = 2048;
 
-/// Adds the posed surface.
+/// Plugin of the posed surface.
 pub struct SurfacePlugin;
 
 impl Plugin for SurfacePlugin {
@@ -48,14 +53,14 @@ impl Plugin for SurfacePlugin {
     }
 }
 
-/// A mesh that a rig moves; beside it stands [`SkinOf`].
+/// A mesh that a rig moves; its entity also has [`SkinOf`].
 #[derive(Component, Debug, Clone)]
 pub struct RigMesh {
     /// Identity, by which the rig names the mesh's weights.
     pub uid: Uid,
     /// The mesh as its file has it.
     pub file: Arc<Model>,
-    /// The mesh where its file's joints hold it at rest; shared with `file` if that has no skins.
+    /// The mesh skinned to its file's joints at rest; shared with `file` if that has no skins.
     pub rest: Arc<Model>,
     /// The joint that each node of the file became.
     pub nodes: Arc<[Uid]>,
@@ -64,10 +69,10 @@ pub struct RigMesh {
 }
 
 impl RigMesh {
-    /// Takes a model as it was read; `nodes` are the joints that its nodes became.
+    /// Makes the component of a model; `nodes` are the joints that its nodes became.
     ///
     /// Linear in the size of the model, some tens of milliseconds for a million triangles: call it in the task that
-    /// reads the file and spawn what comes out of it.
+    /// reads the file and spawn the result.
     pub fn new(uid: Uid, file: Model, nodes: Vec<Uid>) -> Self {
         let triangles = file.point_triangles().into();
         let file = Arc::new(file);
@@ -78,7 +83,7 @@ impl RigMesh {
 
 impl Drop for RigMesh {
     fn drop(&mut self) {
-        // Handing a large model's memory back takes longer than a frame has.
+        // Freeing a large model takes longer than a frame.
         if Arc::strong_count(&self.triangles) == 1 {
             let arrays =
                 (std::mem::take(&mut self.file), std::mem::take(&mut self.rest), std::mem::take(&mut self.triangles));
@@ -97,20 +102,20 @@ pub struct SkinOf(pub Entity);
 #[relationship_target(relationship = SkinOf, linked_spawn)]
 pub struct RigMeshes(Vec<Entity>);
 
-/// The surface of all meshes of a rig as they stand now, in the rig's space.
+/// The surface of all meshes of a rig in their current pose, in the rig's space.
 ///
-/// `Changed<RigSurface>` tells that another pose was asked for, or that one has landed. An app that sleeps while nothing
-/// moves must run frames while the surface [is stale](RigSurface::is_stale).
+/// `Changed<RigSurface>` reports that another pose was requested, or that a refresh has ended. An app that sleeps while
+/// nothing moves must run frames while the surface [is stale](RigSurface::is_stale).
 #[derive(Component)]
 pub struct RigSurface {
-    /// The surface that answers, and the number of the state that it shows.
+    /// The current surface, and the number of the state that it shows.
     landed: Option<(Arc<Surface>, u64)>,
-    /// Whether it can be refitted.
+    /// Marks a surface that can be refitted to any pose.
     is_whole: bool,
-    /// The state that it should show, and its number.
+    /// The state that it should show.
     wanted: Vec<PosedMesh>,
     number: u64,
-    /// The refresh under way, and what it will show.
+    /// The current refresh, and the number of the state that it will show.
     task: Option<(Task<Refreshed>, u64)>,
     /// The meshes that `landed` was built from, or that the task builds from.
     built: Vec<PosedMesh>,
@@ -119,7 +124,7 @@ pub struct RigSurface {
 }
 
 impl RigSurface {
-    /// All places where a ray crosses the surface, nearest first; none until it is ready.
+    /// Hits of a ray on the surface, nearest first; none until it is ready.
     ///
     /// Microseconds, whatever the size of the mesh.
     pub fn hits(&self, ray: &Ray) -> Vec<Hit> {
@@ -130,20 +135,21 @@ impl RigSurface {
         hits
     }
 
-    /// The surface as it last landed; `None` while the first hierarchy is being built.
+    /// The last finished surface; `None` while the first hierarchy is being built.
     pub fn ready(&self) -> Option<&Surface> {
         self.landed.as_ref().map(|(surface, _)| surface.as_ref())
     }
 
-    /// The same, to be kept and asked in another thread: it stays as it is while the rig's surface goes on.
+    /// The last finished surface for queries on another thread: it stays unchanged while the rig's surface is updated.
     ///
-    /// For work that follows many rays ([`FollowedStroke`](super::stroke::FollowedStroke)). Let it go soon: while somebody
-    /// holds it, the next pose needs a copy.
+    /// For work that follows many rays ([`FollowedStroke`](super::stroke::FollowedStroke)). Drop it soon: while a clone
+    /// is held, the next pose needs a copy.
     pub fn shared(&self) -> Option<Arc<Surface>> {
         self.landed.as_ref().map(|(surface, _)| surface.clone())
     }
 
-    /// Whether the meshes or the pose have changed since what [`RigSurface::ready`] shows, or nothing is ready.
+    /// Returns `true` if the meshes or the pose have changed since the state that [`RigSurface::ready`] shows, or
+    /// nothing is ready.
     pub fn is_stale(&self) -> bool {
         !self.shows(self.number)
     }
@@ -153,7 +159,7 @@ impl RigSurface {
         self.number
     }
 
-    /// Whether it shows that state, or a later one.
+    /// Returns `true` if the surface shows that state, or a later one.
     pub fn shows(&self, number: u64) -> bool {
         self.landed.as_ref().is_some_and(|(_, landed)| *landed >= number)
     }
@@ -179,7 +185,7 @@ impl RigSurface {
         surface
     }
 
-    /// Starts the refresh that is due, unless one is under way.
+    /// Starts the pending refresh, unless one is running.
     fn start(&mut self) {
         if self.task.is_some() || !self.is_stale() {
             return;
@@ -222,7 +228,7 @@ impl Drop for RigSurface {
     }
 }
 
-/// Drops in the background what may be large.
+/// Drops a possibly large value in the background.
 fn discard<T: Send + 'static>(value: T) {
     // Without a pool (no app was ever made) it is dropped right here.
     if let Some(pool) = AsyncComputeTaskPool::try_get() {
@@ -230,19 +236,19 @@ fn discard<T: Send + 'static>(value: T) {
     }
 }
 
-/// How a request that asks the surface is to go on.
+/// Answer to a request that queries the surface.
 pub(super) enum Answer<'a> {
-    /// The surface shows what the user saw; `None`: the rig has no mesh.
+    /// The surface shows the state that the user saw; `None` if the rig has no mesh.
     Now(Option<&'a RigSurface>),
-    /// Not yet: ask again in the next frame.
+    /// The surface is behind: the request has to ask again in the next frame.
     Wait,
 }
 
-/// Whether a request can be answered. `since` belongs to the request and is `None` when it comes.
+/// Decides whether a request can be answered. `since` belongs to the request and is `None` at first.
 pub(super) fn answer<'a>(since: &mut Option<u64>, has_mesh: bool, surface: Option<&'a RigSurface>) -> Answer<'a> {
     match surface {
         Some(surface) => {
-            // The surface counts anew after its last mesh was closed and another opened.
+            // The numbers start again after the last mesh was closed and another opened.
             let since = (*since.get_or_insert(surface.wanted())).min(surface.wanted());
             if surface.shows(since) { Answer::Now(Some(surface)) } else { Answer::Wait }
         }
@@ -251,7 +257,7 @@ pub(super) fn answer<'a>(since: &mut Option<u64>, has_mesh: bool, surface: Optio
     }
 }
 
-/// Takes what background tasks have finished, before anyone asks.
+/// Takes over finished background tasks, before any query.
 fn land_surfaces(mut surfaces: Query<&mut RigSurface>) {
     for mut surface in &mut surfaces {
         let running = &mut surface.bypass_change_detection().task;
@@ -264,33 +270,57 @@ fn land_surfaces(mut surfaces: Query<&mut RigSurface>) {
     }
 }
 
+type FollowedRigs<'a> = (
+    Entity,
+    Ref<'a, Rig>,
+    Ref<'a, RigMeshes>,
+    &'a JointEntities,
+    Option<Ref<'a, Built>>,
+    Option<Ref<'a, BuiltEntities>>,
+    &'a GlobalTransform,
+    Option<&'a mut RigSurface>,
+);
+
 /// Notices that a rig's meshes, weights or pose changed, and has the surface follow.
 fn refresh_surfaces(
     mut commands: Commands,
-    mut rigs: Query<(Entity, Ref<Rig>, Ref<RigMeshes>, &JointEntities, &GlobalTransform, Option<&mut RigSurface>)>,
+    mut rigs: Query<FollowedRigs>,
     without: Query<Entity, (With<RigSurface>, Without<RigMeshes>)>,
     meshes: Query<Ref<RigMesh>>,
-    moved: Query<&JointOf, (With<Joint>, Changed<GlobalTransform>)>,
-    joints: Query<&GlobalTransform, With<Joint>>,
+    moved: Query<&NodeOf, (With<Joint>, Changed<GlobalTransform>)>,
+    joints: Query<Ref<GlobalTransform>, With<Joint>>,
 ) {
     for rig in &without {
         commands.entity(rig).remove::<RigSurface>();
     }
     let moved: EntityHashSet = moved.iter().map(|of| of.0).collect();
-    for (entity, rig, bound, entities, place, surface) in &mut rigs {
+    for (entity, rig, bound, entities, built, created, place, surface) in &mut rigs {
         let models = || bound.iter().filter_map(|mesh| meshes.get(mesh).ok());
-        let is_changed = rig.is_changed() || bound.is_changed() || moved.contains(&entity);
+        let has_moved = |(_, created)| joints.get(created).is_ok_and(|place| place.is_changed());
+        let is_changed = rig.is_changed()
+            || bound.is_changed()
+            || moved.contains(&entity)
+            || built.as_ref().is_some_and(|built| built.is_changed())
+            || created.as_ref().is_some_and(|created| created.is_changed() || created.iter().any(has_moved));
         if surface.is_some() && !is_changed && !models().any(|mesh| mesh.is_changed()) {
             continue;
         }
         let mut models: Vec<Ref<RigMesh>> = models().collect();
         models.sort_by_key(|mesh| mesh.uid);
         let is_skinned = models.iter().any(|mesh| rig.skin(mesh.uid).is_some());
-        let pose = if is_skinned { moves(&rig, entities, place, &joints) } else { HashMap::new() };
+        let pose = is_skinned.then(|| {
+            let skeleton = DeformSkeleton::new(&rig, built.as_ref().map(|built| &*built.0));
+            let entity = |joint| entities.get(joint).or_else(|| created.as_ref()?.get(joint));
+            let moves = moves(&skeleton, entity, place, &joints);
+            (skeleton, moves)
+        });
         let wanted = models.iter().map(|mesh| PosedMesh {
             rest: mesh.rest.clone(),
             triangles: mesh.triangles.clone(),
-            bend: rig.skin(mesh.uid).and_then(|skin| bend(skin, &pose)),
+            bend: rig.skin(mesh.uid).zip(pose.as_ref()).and_then(|(skin, (skeleton, moves))| {
+                let holders = skeleton.holders(&rig, skin);
+                bend(skin, &holders.iter().map(|holder| moves[(*holder)?]).collect::<Vec<_>>())
+            }),
         });
         let wanted: Vec<PosedMesh> = wanted.collect();
         match surface {
@@ -307,18 +337,18 @@ fn refresh_surfaces(
     }
 }
 
-/// Matrices from rest to pose, in the rig's space, of the joints that have moved.
+/// Matrices from rest to pose, in the rig's space, of the joints of a skeleton; `None` for those that have not moved.
 fn moves(
-    rig: &Rig,
-    entities: &JointEntities,
+    skeleton: &DeformSkeleton,
+    entity: impl Fn(Uid) -> Option<Entity>,
     place: &GlobalTransform,
-    joints: &Query<&GlobalTransform, With<Joint>>,
-) -> HashMap<Uid, Affine3A> {
+    joints: &Query<Ref<GlobalTransform>, With<Joint>>,
+) -> Vec<Option<Affine3A>> {
     let to_rig = place.affine().inverse();
-    let moved = |(uid, rest): (Uid, Affine3)| {
-        let pose = to_rig * joints.get(entities.get(uid)?).ok()?.affine();
-        let rest = Affine3A::from(rest);
-        (!is_same(&pose, &rest)).then(|| (uid, pose * rest.inverse()))
+    let moved = |joint: &DeformJoint| {
+        let pose = to_rig * joints.get(entity(joint.uid)?).ok()?.affine();
+        let rest = Affine3A::from(joint.rest);
+        (!is_same(&pose, &rest)).then(|| pose * rest.inverse())
     };
-    rig.rest_globals().into_iter().filter_map(moved).collect()
+    skeleton.joints().iter().map(moved).collect()
 }

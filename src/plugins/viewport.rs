@@ -1,13 +1,13 @@
-//! The camera through which people see and edit a rig: from pixels to rays and back.
+//! The viewport's camera: conversion of pixels to rays and back.
 
 use bevy::prelude::*;
 
 use crate::{algo::view::ViewPlane, mesh::ray::Ray};
 
-/// Vertical field of view of perspective cameras, in radians: that of a 50 mm lens, about.
+/// Vertical field of view of perspective cameras, in radians: approximately that of a 50 mm lens.
 pub const FIELD_OF_VIEW: f32 = 0.55;
 
-/// Where a camera must look, and from how far, so that a box fills the picture: the point, and the distance to it.
+/// Target point of a camera and its distance from it with which a box fills the picture.
 ///
 /// `bounds` are the box's least and greatest corner; `axes` the view's right, up and towards-the-camera axes; `aspect`
 /// is the picture's width over its height. For an orthographic camera the same distance gives the same size at the
@@ -21,11 +21,11 @@ pub fn framing(bounds: [Vec3; 2], axes: [Vec3; 3], aspect: f32) -> (Vec3, f32) {
     ((low + high) * 0.5, distance.max(1e-3))
 }
 
-/// Marks the camera through which people see and edit rigs.
+/// Marks the camera of the viewport.
 #[derive(Component, Debug, Clone, Copy)]
 pub struct RigViewport {
-    /// How far before the camera the point lies that it turns about, in world units. Strokes in a perspective view are
-    /// measured on the plane at that distance.
+    /// Distance from the camera of the point that it orbits, in world units. Strokes in a perspective view are measured
+    /// on the plane at that distance.
     pub focus: f32,
 }
 
@@ -35,12 +35,12 @@ impl Default for RigViewport {
     }
 }
 
-/// What a viewport sees, as numbers: enough to turn pixels into rays into a rig's space and places into pixels.
+/// View through a camera as numbers: enough to convert pixels to rays in a rig's space and positions to pixels.
 ///
 /// Pixels are logical, from the viewport's top left corner, y down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sight {
-    /// The plane square to the view through what the camera turns about, in the rig's space.
+    /// The plane perpendicular to the view through the camera's orbit point, in the rig's space.
     pub plane: ViewPlane,
     /// Length of a logical pixel on that plane, in the rig's units.
     pub pixel: f32,
@@ -49,9 +49,10 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// What a camera sees of a rig that stands at `place`.
+    /// View through a camera of a rig at `place`.
     ///
-    /// `size` is the viewport's in logical pixels. `None` if it is empty, or the projection is none of a person's.
+    /// `size` is the viewport's in logical pixels. `None` if it is empty, or the projection is neither perspective nor
+    /// orthographic.
     pub fn new(
         camera: &GlobalTransform,
         projection: &Projection,
@@ -76,7 +77,7 @@ impl Sight {
             Projection::Orthographic(orthographic) => (None, orthographic.area.height()),
             Projection::Custom(_) => return None,
         };
-        // Rays of an orthographic view start behind the camera as well, so that coming near never cuts the mesh open.
+        // Rays of an orthographic view start behind the camera as well, so that a near camera never cuts the mesh open.
         let standoff = unit * focus * 1e3;
         let plane = ViewPlane { origin, right: right / unit, up: up / unit, eye: plane_eye, standoff };
         let pixel = height * unit / size.y;
@@ -99,12 +100,12 @@ impl Sight {
         self.plane.ray(self.point(at))
     }
 
-    /// Where a place of the rig's space appears, in pixels; `None` behind the camera.
+    /// Pixel of a position in the rig's space; `None` behind the camera.
     pub fn project(&self, position: Vec3) -> Option<Vec2> {
         self.plane.project(position).map(|point| self.pixel_of(point))
     }
 
-    /// Length in the rig's units of a logical pixel at a place.
+    /// Length in the rig's units of a logical pixel at a position.
     pub fn pixel_at(&self, position: Vec3) -> f32 {
         match self.plane.eye {
             None => self.pixel,
@@ -117,7 +118,7 @@ impl Sight {
         }
     }
 
-    /// The unit direction from a place towards the camera.
+    /// The unit direction from a position towards the camera.
     pub fn towards(&self, position: Vec3) -> Vec3 {
         let fallback = self.plane.towards();
         self.plane.eye.map_or(fallback, |eye| (eye - position).try_normalize().unwrap_or(fallback))

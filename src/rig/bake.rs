@@ -1,15 +1,15 @@
-//! A built rig as an ordinary skeleton: what is left when commands have done their work.
+//! Baking: a built rig as an ordinary skeleton without commands.
 
 use std::collections::HashSet;
 
 use super::{BuiltRig, GroupData, JointData, NodeKind, NodeType, Rig, RigEdit, Uid};
 
-/// A rig without tags that holds the joints of a built one, and what they hang on. Uids, labels and groups stay, so
-/// that weights fit; controls and nulls that carry no joint are left out, the others become nulls.
+/// Makes a rig without tags from the joints of a built one and the nodes that carry them. Uids, labels and groups stay,
+/// so that weights fit; controls and nulls that carry no joint are left out, other nodes become nulls.
 pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
     let mut kept: HashSet<usize> = HashSet::new();
     for (at, node) in built.nodes.iter().enumerate() {
-        let mut next = (node.kind == NodeType::Joint).then_some(at);
+        let mut next = (node.kind == NodeType::Joint || node.origin.is_none()).then_some(at);
         while let Some(at) = next.filter(|at| kept.insert(*at)) {
             next = built.nodes[at].parent;
         }
@@ -23,7 +23,7 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
         let source = rig.joint(node.uid).map(|joint| &joint.data);
         let joint = JointData {
             uid: node.uid,
-            // What commands made carries the label of someone else: its name tells more.
+            // A created node bears the label of another joint; its own name says more.
             label: if source.is_some() {
                 node.label.as_deref().map(str::to_owned)
             } else {
@@ -41,7 +41,7 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
     }
     edits.extend(rig.skins().map(|(mesh, skin)| RigEdit::SetSkin(mesh, Some(skin.clone()))));
     for edit in edits {
-        // A rotation that is too far from a unit is all that can be refused; the joint is left out then.
+        // The edit can only be refused for a rotation that is far from a unit quaternion; the joint is left out then.
         let _ = baked.apply(&edit);
     }
     baked

@@ -1,5 +1,5 @@
-//! A built rig as plain data: what commands have made of a document, in the form that the runtime, exporters and
-//! readers of the result take.
+//! A built rig as plain data: the result of a document's commands, in the form that the runtime, exporters and readers
+//! of the result take.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -13,27 +13,27 @@ use crate::mesh::model::Trs;
 pub struct BuiltRig {
     /// Joints of the document and nodes that commands created: parents before children.
     pub nodes: Vec<BuiltNode>,
-    /// What drives them, in the order of creation: constraints on one node run in this order.
+    /// Constraints that drive the nodes, in the order of creation: constraints on one node run in this order.
     pub constraints: Vec<BuiltConstraint>,
-    /// Switches that can be thrown without a jump.
+    /// Switches that can be matched, so that throwing them makes no jump.
     pub switches: Vec<Arc<SwitchData>>,
 }
 
-/// A switch between two ways of moving the same nodes, with what is needed to throw it without a jump: see
+/// A switch between two ways of moving the same nodes, with the data that throws it without a jump: see
 /// `solve::matching`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SwitchData {
-    /// The command tag that made it.
+    /// Uid of the command tag that made the switch.
     pub command: Uid,
-    /// The node that carries the attribute.
+    /// Uid of the node that carries the attribute.
     pub control: Uid,
-    /// The attribute that is switched.
+    /// Name of the attribute that is switched.
     pub attribute: Arc<str>,
-    /// What is matched.
+    /// Nodes to match.
     pub matching: Matching,
 }
 
-/// What stays in place while a switch is thrown.
+/// Nodes that stay in place while a switch is thrown.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Matching {
     /// A limb between forward (0) and inverse (1) kinematics.
@@ -44,38 +44,38 @@ pub enum Matching {
         fk: Vec<Uid>,
         /// The goal of the inverse kinematics.
         goal: Uid,
-        /// Where the end stands in the goal's space.
+        /// Transform of the end in the goal's space.
         goal_offset: Trs,
         /// The pole, if there is one.
         pole: Option<Uid>,
     },
-    /// A control between several spaces: it stays where it is.
+    /// A control between several spaces, which stays in place.
     Space {
         /// The control that must not move.
         control: Uid,
     },
 }
 
-/// One node of a built rig.
+/// A node of a built rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuiltNode {
     /// Identity: a joint's own uid, or one that follows from the command, the role and the subject.
     pub uid: Uid,
     /// The name in files and lists; need not be unique.
     pub name: Arc<str>,
-    /// What it is.
+    /// Kind of the node.
     pub kind: NodeType,
     /// Index of the parent in [`BuiltRig::nodes`], smaller than the node's own; `None` below the rig itself.
     pub parent: Option<usize>,
-    /// Where it stands relative to its parent before any pose: the built base.
+    /// Transform relative to the parent without any pose: the built base.
     pub base: Trs,
-    /// The label that references find it by.
+    /// Label by which references find the node.
     pub label: Option<Arc<str>>,
     /// The local group.
     pub group: Option<Uid>,
-    /// Who made it; `None` for joints of the document.
+    /// Command that made the node; `None` for joints of the document.
     pub origin: Option<Arc<Origin>>,
-    /// How it is drawn and moved, if people move it.
+    /// Appearance and free channels, if people move the node.
     pub control: Option<Arc<ControlData>>,
     /// The layer it is shown in.
     pub layer: Option<Arc<LayerData>>,
@@ -83,62 +83,62 @@ pub struct BuiltNode {
     pub attributes: Arc<[Attribute]>,
 }
 
-/// Which command made a node, and what for.
+/// Command that made a node, with the node's purpose.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Origin {
     /// The command tag.
     pub command: Uid,
     /// The module of the command.
     pub module: Arc<str>,
-    /// What the module says the node is for.
+    /// Purpose of the node, named by the module.
     pub role: Arc<str>,
-    /// The node that it was made for.
+    /// Uid of the node that it was made for.
     pub subject: Uid,
-    /// Which of several for the same purpose.
+    /// Number among several nodes for the same purpose.
     pub number: u32,
 }
 
-/// A constraint and the identity that its command gave it.
+/// A constraint with its identity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuiltConstraint {
     /// Identity.
     pub uid: Uid,
-    /// The command tag that made it.
+    /// Uid of the command tag that made the constraint.
     pub command: Uid,
-    /// What it does.
+    /// Kind and parameters.
     pub constraint: Arc<Constraint>,
 }
 
-/// What a node of a built rig is.
+/// Kind of a node of a built rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub enum NodeType {
-    /// Moves the mesh.
+    /// A joint, which moves the mesh.
     #[default]
     Joint,
-    /// Carries other nodes; nobody moves it by hand.
+    /// A node that carries others and is not moved by hand.
     Null,
-    /// Moved by people and by animation.
+    /// A control, moved by people and by animation.
     Control,
 }
 
-/// How a control looks and what of it can be moved.
-#[derive(Debug, Clone, PartialEq)]
+/// Appearance of a control and its free channels.
+#[derive(bevy::reflect::Reflect, Debug, Clone, PartialEq)]
 pub struct ControlData {
-    /// The shape's name in the library of wire shapes.
+    /// Name of the shape in the library of wire shapes.
     pub shape: String,
     /// sRGB colour, 0 to 1 each.
     pub color: [f32; 3],
-    /// The shape's size in the rig's units: half of its width.
+    /// Size of the shape in the rig's units: half of its width.
     pub size: f32,
-    /// Where the shape is drawn, relative to the control.
+    /// Transform of the shape relative to the control.
     pub offset: Trs,
-    /// Which channels people move and keys are set on.
+    /// Channels that people move and set keys on.
     pub channels: Channels,
-    /// How far each channel goes; see [`Limits`].
+    /// Range of each channel; see [`Limits`].
     pub limits: Limits,
 }
 
-/// Which of the nine transform channels are free: translation, rotation and scale, each along X, Y and Z.
+/// Free channels of the nine transform channels: translation, rotation and scale, each along X, Y and Z.
 #[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Channels {
@@ -156,7 +156,7 @@ impl Default for Channels {
     }
 }
 
-/// Lowest and highest values of a pose offset's channels; `None` where there is no end.
+/// Lowest and highest values of a pose offset's channels; `None` for an open end.
 ///
 /// Translation in units of the node's parent, rotation in degrees as angles about X, Y and Z in that order, scale as
 /// factors.
@@ -172,8 +172,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The same ends on the other side of the character: translation along X and turns about Y and Z the other way
-    /// round.
+    /// The limits on the other side of the character: translation along X and rotations about Y and Z with swapped,
+    /// negated ends.
     pub fn mirrored(mut self) -> Self {
         let over = |ends: &mut (Option<f32>, Option<f32>)| {
             *ends = (ends.1.map(|end| -end), ends.0.map(|end| -end));
@@ -186,50 +186,50 @@ impl Limits {
 }
 
 /// A named set of nodes that are shown together.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, PartialEq)]
 pub struct LayerData {
     /// The layer's name.
     pub name: String,
-    /// Hidden if false.
+    /// Visibility of the layer.
     pub visible: bool,
-    /// How its nodes are shown.
+    /// Display of the layer's nodes.
     pub display: LayerDisplay,
     /// sRGB colour that replaces the nodes' own.
     pub color: Option<[f32; 3]>,
 }
 
-/// How the nodes of a layer are shown.
+/// Display of the nodes of a layer.
 #[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LayerDisplay {
-    /// As they are.
+    /// Normal lines.
     #[default]
     Normal,
     /// Grey lines that cannot be picked.
     Template,
-    /// As they are, but not to be picked.
+    /// Normal lines that cannot be picked.
     Reference,
 }
 
-/// A named value on a node, for people and animation to set and for constraints to read.
+/// A named value on a node, set by people and animation and read by constraints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attribute {
     /// The name, unique on its node.
     pub name: Arc<str>,
-    /// Numbers or choices.
+    /// Kind of the values: a number or a choice.
     pub kind: AttributeKind,
-    /// The value until somebody sets another; for choices, the number of the choice.
+    /// The value until another is set; for choices, the number of the choice.
     pub default: f32,
 }
 
 impl Attribute {
-    /// The nearest value that the attribute can have.
+    /// The nearest allowed value.
     pub fn clamp(&self, value: f32) -> f32 {
         self.kind.clamp(value, self.default)
     }
 }
 
-/// What values an attribute has.
+/// Kind of an attribute's values.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AttributeKind {
     /// A number between two ends, each of which may be open.
@@ -239,12 +239,12 @@ pub enum AttributeKind {
         /// The highest value.
         max: Option<f32>,
     },
-    /// One of several names; the value is its number, and values between two blend.
+    /// A choice of several names; the value is the number of the name, and values between two blend.
     Choice(Vec<String>),
 }
 
 impl AttributeKind {
-    /// The nearest value of that kind; `otherwise` for what is not finite.
+    /// The nearest allowed value; `otherwise` replaces a value that is not finite.
     pub fn clamp(&self, value: f32, otherwise: f32) -> f32 {
         let value = if value.is_finite() { value } else { otherwise };
         match self {
@@ -273,7 +273,7 @@ impl BuiltRig {
         self.nodes.iter().find(|node| node.label.as_deref() == Some(label))
     }
 
-    /// The node that a command made for a purpose.
+    /// The nodes that a command made for a purpose.
     pub fn find_role(&self, command: Uid, role: &str) -> impl Iterator<Item = &BuiltNode> {
         self.nodes.iter().filter(move |node| {
             node.origin.as_ref().is_some_and(|origin| origin.command == command && *origin.role == *role)

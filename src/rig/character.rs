@@ -1,12 +1,17 @@
-//! Between models and rigs: a skeleton that came with a mesh, and a mesh that leaves with a skeleton.
+//! Conversion between models and rigs: a skeleton imported with a mesh, and a mesh exported with a skeleton.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{borrow::Cow, collections::HashMap, sync::Arc};
 
 use bevy::math::{Affine3, Mat4};
 
 use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Model, Node, SkinBinding, Weights},
-    rig::{JointData, NodeKind, Rig, RigEdit, SkinData, Uid, UidSource, text::RigText},
+    rig::{
+        BuiltRig, JointData, NodeKind, Rig, RigEdit, SkinData, Uid, UidSource,
+        bake::baked,
+        deform::{DeformSkeleton, replaced_joints},
+        text::RigText,
+    },
 };
 
 /// A mesh file's skeleton as edits, and its weights.
@@ -34,9 +39,8 @@ pub fn import_skeleton(model: &Model, uids: &mut UidSource) -> ImportedSkeleton 
         RigEdit::AddJoint { joint: Box::new(joint), parent: node.parent.map(|parent| nodes[parent]), index: usize::MAX }
     });
     let edits = edits.collect();
-    let skin =
-        model.weights.clone().map(|weights| Arc::new(SkinData { joints: nodes.clone(), weights, at_rest: false }));
-    ImportedSkeleton { edits, nodes, skin }
+    let skin = model.weights.clone().map(|weights| SkinData { joints: nodes.clone(), weights, ..SkinData::default() });
+    ImportedSkeleton { edits, nodes, skin: skin.map(Arc::new) }
 }
 
 /// Turns a `.rig` text into edits that add its joints, parents before children, and returns their uids in its order.
@@ -83,13 +87,15 @@ pub fn rig_text(rig: &Rig) -> RigText {
     RigText { joints: joints.collect() }
 }
 
-/// What [`character`] puts together.
+/// Parts from which [`character`] makes a model.
 pub struct Character<'a> {
     /// The rig.
     pub rig: &'a Rig,
+    /// What its commands built, if they did: the character then has the built joints.
+    pub built: Option<&'a BuiltRig>,
     /// The mesh as its file has it.
     pub file: &'a Model,
-    /// The mesh where its file's joints hold it at rest.
+    /// The mesh skinned to its file's joints at rest.
     pub rest: &'a Model,
     /// The joint that each node of the file became.
     pub nodes: &'a [Uid],
@@ -97,11 +103,12 @@ pub struct Character<'a> {
     pub skin: Option<&'a SkinData>,
 }
 
-/// A model of the mesh with the rig's joints, weights and what remains of the file's clips.
+/// A model of the mesh with the rig's joints, weights and the remaining channels of the file's clips.
 ///
-/// Joints stand in the order of [`Rig::walk`]; labels become names. Without weights the mesh stays unskinned.
+/// Joints are in the order of [`Rig::walk`]; labels become names. Without weights the mesh stays unskinned.
 pub fn character(parts: &Character) -> Model {
-    let Character { rig, file, rest, nodes: file_nodes, skin } = parts;
+    let Character { rig: document, built, file, rest, nodes: file_nodes, skin } = parts;
+    let rig = &*built.map_or(Cow::Borrowed(*document), |built| Cow::Owned(baked(document, built)));
     let globals = rig.rest_globals();
     let place: HashMap<Uid, usize> = globals.iter().enumerate().map(|(number, (uid, _))| (*uid, number)).collect();
     let node_of: Vec<Option<usize>> = file_nodes.iter().map(|uid| place.get(uid).copied()).collect();
@@ -122,7 +129,8 @@ pub fn character(parts: &Character) -> Model {
         })
         .collect();
     model.clips = file.clips.iter().filter_map(|clip| remaining_clip(clip, &node_of)).collect();
-    model.weights = skin.map(|skin| remapped(skin, &place));
+    let skeleton = DeformSkeleton::new(document, *built);
+    model.weights = skin.map(|skin| remapped(skin, document, &skeleton, &place));
     for object in &mut model.objects {
         object.node = object.node.and_then(|node| node_of.get(node).copied().flatten());
     }
@@ -150,8 +158,8 @@ pub(crate) fn inverse_bind(global: &Affine3) -> Mat4 {
     Mat4::from_cols_array(&columns)
 }
 
-/// The file's bind poses over the rig's joints. A joint that was moved at rest since takes its part of the mesh along
-/// unmoved: what its matrix did to the mesh at rest stays the same.
+/// The file's bind poses over the rig's joints. A joint that was moved at rest after the import does not move the mesh:
+/// its matrix keeps its former effect on the mesh at rest.
 fn rebound(file: &Model, node_of: &[Option<usize>], globals: &[(Uid, Affine3)]) -> Vec<SkinBinding> {
     let file_globals = file.rest_globals();
     let bind = |skin: &SkinBinding| {
@@ -169,24 +177,24 @@ fn rebound(file: &Model, node_of: &[Option<usize>], globals: &[(Uid, Affine3)]) 
     file.skins.iter().map(bind).collect()
 }
 
-/// Weights over the nodes of the exported model. Influences of joints that were deleted since go to the others.
-fn remapped(skin: &SkinData, place: &HashMap<Uid, usize>) -> Weights {
-    let node_of: Vec<Option<usize>> = skin.joints.iter().map(|uid| place.get(uid).copied()).collect();
-    if node_of.iter().enumerate().all(|(number, node)| *node == Some(number)) {
-        return skin.weights.clone();
+/// Weights over the nodes of the exported model. Joints that are not built hand their influences to whoever holds them
+/// meanwhile; those of joints that were deleted since go to the others.
+fn remapped(skin: &SkinData, rig: &Rig, skeleton: &DeformSkeleton, place: &HashMap<Uid, usize>) -> Weights {
+    let holders = skeleton.holders(rig, skin).into_iter();
+    let node_of: Vec<Option<usize>> =
+        holders.map(|holder| place.get(&skeleton.joints()[holder?].uid).copied()).collect();
+    let weights = replaced_joints(&skin.weights, &node_of);
+    if node_of.iter().all(Option::is_some) {
+        return weights;
     }
-    let mut weights = Weights::default();
-    for point in 0..skin.weights.len() {
-        let kept: Vec<(u32, f32)> = skin
-            .weights
-            .of(point)
-            .filter_map(|(joint, value)| Some((node_of.get(joint as usize).copied().flatten()? as u32, value)))
-            .collect();
-        let complete = kept.len() == skin.weights.of(point).len();
-        let sum: f32 = kept.iter().map(|(_, value)| value).sum();
-        weights.push(kept.into_iter().map(|(joint, value)| (joint, if complete { value } else { value / sum })));
+    let mut complete = Weights::default();
+    for point in 0..weights.len() {
+        let is_whole =
+            skin.weights.of(point).all(|(joint, _)| node_of.get(joint as usize).is_some_and(Option::is_some));
+        let sum: f32 = if is_whole { 1.0 } else { weights.of(point).map(|(_, value)| value).sum() };
+        complete.push(weights.of(point).map(|(joint, value)| (joint, value / sum)));
     }
-    weights
+    complete
 }
 
 fn remaining_clip(clip: &Clip, node_of: &[Option<usize>]) -> Option<Clip> {

@@ -1,7 +1,7 @@
-//! Constraints as data: what moves a node besides its parent and its pose.
+//! Constraints as data: movements of nodes other than by their parents and poses.
 //!
-//! Several constraints on one node run in the order of their creation; each takes what the ones before it left. Where a
-//! constraint reads another node, it reads where that node ends up in the same frame.
+//! Several constraints on one node run in the order of their creation; each starts from the result of those before it.
+//! A constraint reads the final transforms of other nodes in the same frame.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::mesh::model::Trs;
 /// A number that is fixed or follows an attribute in every frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Scalar {
-    /// Always the same.
+    /// A constant number.
     Value(f32),
     /// `factor` times the value of an attribute, plus `add`.
     Attribute {
@@ -22,12 +22,12 @@ pub enum Scalar {
         node: Uid,
         /// The attribute's name.
         name: Arc<str>,
-        /// What the value is multiplied with.
+        /// Factor of the attribute's value.
         factor: f32,
-        /// What is added.
+        /// Number added to the product.
         add: f32,
     },
-    /// 1 where an attribute is `value`, falling to 0 at a distance of 1: the weight of one choice of several.
+    /// Weight of one choice of several: 1 if the attribute is `value`, falling to 0 at a distance of 1.
     Choice {
         /// The node that has the attribute.
         node: Uid,
@@ -36,27 +36,27 @@ pub enum Scalar {
         /// The choice.
         value: f32,
     },
-    /// A channel of a node's pose offset: what a person or an animation did to it.
+    /// A channel of a node's pose offset, which a person or an animation sets.
     Channel {
         /// The node.
         node: Uid,
-        /// Which number of its offset: translation in units, rotation in degrees, scale as a factor.
+        /// Channel of the offset: translation in units, rotation in degrees, scale as a factor.
         channel: Channel,
     },
 }
 
 impl Scalar {
-    /// An attribute as it is.
+    /// The value of an attribute.
     pub fn attribute(node: Uid, name: impl Into<Arc<str>>) -> Self {
         Self::Attribute { node, name: name.into(), factor: 1.0, add: 0.0 }
     }
 
-    /// One minus an attribute.
+    /// One minus the value of an attribute.
     pub fn inverse(node: Uid, name: impl Into<Arc<str>>) -> Self {
         Self::Attribute { node, name: name.into(), factor: -1.0, add: 1.0 }
     }
 
-    /// The node it reads, if it reads one.
+    /// The node that the number depends on, if any.
     pub fn node(&self) -> Option<Uid> {
         match self {
             Self::Value(_) => None,
@@ -71,7 +71,7 @@ impl Default for Scalar {
     }
 }
 
-/// One number of a transform.
+/// One channel of a transform.
 #[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Channel {
     /// Translation along X.
@@ -95,30 +95,30 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// True if the same number on the other side of a character is not the mirrored pose, but its negative is: joints of
-    /// pairs have mirrored axes, X turned over.
+    /// Returns `true` for a channel whose value has to be negated on the other side of a character: joints of pairs
+    /// have mirrored axes, with X turned over.
     pub fn is_turned_over(self) -> bool {
         matches!(self, Self::TranslateX | Self::RotateY | Self::RotateZ)
     }
 }
 
-/// Something that a node follows.
+/// A node that another node follows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
-    /// The node that is followed.
+    /// Uid of the target.
     pub node: Uid,
-    /// Its share; shares of all targets are divided by their sum. Below zero counts as zero.
+    /// Weight of the target; weights of all targets are divided by their sum. A negative weight counts as zero.
     pub weight: Scalar,
-    /// Where the driven node stands in the target's space: kept offset. Identity to lie on the target.
+    /// Offset of the driven node in the target's space; the identity to coincide with the target.
     pub offset: Trs,
 }
 
-/// Where the up axis of an aim points.
+/// Direction of the up axis of an aim.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AimUp {
     /// A direction in the rig's space.
     Direction(Vec3),
-    /// Towards a node.
+    /// The direction towards a node.
     Node(Uid),
     /// A direction in the space of a node.
     Axis(Uid, Vec3),
@@ -127,16 +127,16 @@ pub enum AimUp {
 /// Lowest and highest angles of one joint of a chain, in degrees about X, Y and Z in that order, relative to its base.
 pub type AngleLimits = [(Option<f32>, Option<f32>); 3];
 
-/// How a chain of more than two bones reaches its goal.
+/// Solver of a chain of more than two bones.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ChainSolver {
-    /// Forward and backward reaching.
+    /// Forward and backward reaching (FABRIK).
     Fabrik,
     /// Cyclic coordinate descent; limits in the order of the chain's joints (may be shorter).
     Ccd(Vec<AngleLimits>),
 }
 
-/// What a driven number goes to.
+/// Destination of a driven number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Output {
     /// A number of a node's transform, added to its base (factors are multiplied).
@@ -147,73 +147,73 @@ pub enum Output {
     Morph(Arc<str>),
 }
 
-/// How a driven key runs between its keys.
+/// Interpolation between the keys of a driven key.
 #[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum KeyEase {
     /// The value of the key before.
     Step,
-    /// A straight line.
+    /// Linear.
     Linear,
     /// Smooth, without overshoot.
     #[default]
     Smooth,
 }
 
-/// What moves one or several nodes.
+/// A constraint: a movement of one or several nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Constraint {
-    /// Follows weighted targets in the channels that are on: parent, point, orient and scale constraints, blends of two
+    /// Follows weighted targets in the enabled channels: parent, point, orient and scale constraints, blends of two
     /// transforms, switches of spaces.
     Transform {
-        /// The node.
+        /// The driven node.
         driven: Uid,
-        /// What it follows, in order.
+        /// Targets, in order.
         targets: Vec<Target>,
-        /// Which axes of the translation follow (the driven node's parent's axes).
+        /// Axes of the translation that follow (axes of the driven node's parent).
         translate: [bool; 3],
-        /// Which angles follow (about X, Y and Z in that order, in the driven node's parent's space).
+        /// Angles that follow (about X, Y and Z in that order, in the space of the driven node's parent).
         rotate: [bool; 3],
-        /// Which factors follow.
+        /// Factors that follow.
         scale: [bool; 3],
-        /// 0 leaves the node as it is, 1 follows.
+        /// Weight: 0 leaves the node unchanged, 1 follows.
         weight: Scalar,
-        /// True to follow with the pose offset of the driven node on top, so that it can still be moved by hand.
+        /// Adds the pose offset of the driven node on top if `true`, so that it can still be moved by hand.
         keep_pose: bool,
     },
-    /// Stands to its parent as one node stands to another: a joint of a limb that follows its control, and can still be
-    /// driven together with the joints above it, on whose place the other two do not depend.
+    /// Copies the transform of one node relative to another: a joint of a limb that follows its control, and can still
+    /// be driven together with the joints above it. The other two nodes do not depend on those joints.
     Relative {
-        /// The node.
+        /// The driven node.
         driven: Uid,
-        /// The node that it follows.
+        /// The node that is copied.
         source: Uid,
-        /// The node that stands for the driven node's parent.
+        /// The node that takes the role of the driven node's parent.
         space: Uid,
-        /// The position follows.
+        /// Position follows if `true`.
         translate: bool,
-        /// The rotation follows.
+        /// Rotation follows if `true`.
         rotate: bool,
-        /// 0 leaves the node as it is, 1 follows.
+        /// Weight: 0 leaves the node unchanged, 1 follows.
         weight: Scalar,
     },
     /// Turns a node so that one of its axes points at weighted targets.
     Aim {
-        /// The node.
+        /// The driven node.
         driven: Uid,
-        /// What it looks at; offsets are not used.
+        /// Targets of the axis; their offsets are not used.
         targets: Vec<Target>,
         /// The axis that points, in the node's space.
         aim: Vec3,
-        /// The axis that is kept up, in the node's space.
+        /// The axis that is turned up, in the node's space.
         up: Vec3,
-        /// Where up is.
+        /// Up direction.
         world_up: AimUp,
-        /// Turned by this after aiming.
+        /// Rotation after aiming.
         offset: Quat,
-        /// 0 leaves the node as it is, 1 aims.
+        /// Weight: 0 leaves the node unchanged, 1 aims.
         weight: Scalar,
     },
-    /// Two bones that reach for a goal.
+    /// Two-bone inverse kinematics towards a goal.
     TwoBone {
         /// First joint (shoulder, hip).
         root: Uid,
@@ -221,17 +221,17 @@ pub enum Constraint {
         mid: Uid,
         /// End (wrist, ankle): a child of the second.
         end: Uid,
-        /// Where the end goes.
+        /// Goal of the end.
         goal: Uid,
-        /// The side to which the second joint bends; without one it bends as it stands.
+        /// The side to which the second joint bends; `None` keeps the current bend.
         pole: Option<Uid>,
-        /// Direction in which a straight chain bends, in the space of the first joint.
+        /// Direction in which a straight limb bends, in the space of the first joint.
         prefer: Vec3,
-        /// 0 leaves the chain as it is, 1 reaches.
+        /// Weight: 0 leaves the chain unchanged, 1 reaches.
         weight: Scalar,
-        /// Share of the length over which the chain eases into being straight, 0 to 1.
+        /// Share of the length over which the limb slows down before full stretch, 0 to 1.
         soft: Scalar,
-        /// 0 keeps lengths, 1 stretches to the goal.
+        /// Stretch: 0 keeps lengths, 1 stretches to the goal.
         stretch: Scalar,
         /// Longest stretch as a factor.
         max_stretch: f32,
@@ -240,21 +240,21 @@ pub enum Constraint {
         /// The end's rotation in the goal's space; `None` if the end keeps its own rotation.
         orient_end: Option<Quat>,
     },
-    /// A chain of any length that reaches for a goal.
+    /// Inverse kinematics of a chain of any length towards a goal.
     Chain {
         /// Joints from the root to the end, each a child of the one before.
         joints: Vec<Uid>,
-        /// Where the end goes.
+        /// Goal of the end.
         goal: Uid,
         /// The side to which a straight chain bends.
         pole: Option<Uid>,
-        /// The method.
+        /// Solver.
         solver: ChainSolver,
-        /// Rounds, at most.
+        /// Largest number of rounds.
         iterations: u32,
-        /// Distance from the goal that is near enough, as a share of the chain's length.
+        /// Distance from the goal at which the solver stops, as a share of the chain's length.
         tolerance: f32,
-        /// 0 leaves the chain as it is, 1 reaches.
+        /// Weight: 0 leaves the chain unchanged, 1 reaches.
         weight: Scalar,
         /// The end's rotation in the goal's space; `None` if the end keeps its own rotation.
         orient_end: Option<Quat>,
@@ -263,85 +263,86 @@ pub enum Constraint {
     Spline {
         /// Joints from the first to the last, each a child of the one before.
         joints: Vec<Uid>,
-        /// Nodes that the curve runs by, from start to end: two or more. The first and the last also give the twist.
+        /// Nodes of the curve's control points, from start to end: two or more. The first and the last also give the
+        /// twist.
         points: Vec<Uid>,
-        /// 0 keeps lengths, 1 spreads the joints over the whole curve.
+        /// Stretch: 0 keeps lengths, 1 spreads the joints over the whole curve.
         stretch: Scalar,
         /// Twist along the chain in degrees, besides that of the first and last nodes.
         twist: Scalar,
-        /// 0 leaves the chain as it is, 1 follows.
+        /// Weight: 0 leaves the chain unchanged, 1 follows.
         weight: Scalar,
     },
-    /// Shares of the twist of one node about an axis for others.
+    /// Gives other nodes shares of the twist of one node about an axis.
     Twist {
-        /// The node whose twist is taken.
+        /// The node whose twist is measured.
         source: Uid,
         /// The node against which the twist is measured; the parent of the source if `None`.
         reference: Option<Uid>,
         /// The axis along the bone, in the source's space.
         axis: Vec3,
-        /// Nodes that turn about the same axis of theirs, with their share of the twist.
+        /// Nodes that turn about the same axis of their own space, with their share of the twist.
         driven: Vec<(Uid, Scalar)>,
     },
-    /// Scales nodes by how far two others are apart.
+    /// Scales nodes by the distance of two others.
     Stretch {
-        /// From here,
+        /// First end of the distance.
         start: Uid,
-        /// to here.
+        /// Second end of the distance.
         end: Uid,
         /// The distance at which nothing is stretched, in the rig's units.
         rest: f32,
         /// The axis that stretches, in the driven nodes' space.
         axis: Vec3,
-        /// 0 keeps the other two axes, 1 keeps the volume.
+        /// Volume preservation: 0 keeps the other two axes, 1 keeps the volume.
         volume: Scalar,
         /// The lowest and highest factor.
         range: (f32, f32),
-        /// What is stretched.
+        /// Nodes that are scaled.
         driven: Vec<Uid>,
-        /// 0 is no stretch.
+        /// Weight: 0 is no stretch.
         weight: Scalar,
     },
-    /// Keeps the transform of a node, relative to its base, between ends.
+    /// Limits the transform of a node, relative to its base.
     Limit {
-        /// The node.
+        /// The limited node.
         driven: Uid,
-        /// The ends.
+        /// Lowest and highest values.
         limits: Limits,
     },
-    /// A node that lags behind, swings and settles.
+    /// A spring: the node lags behind, swings and settles.
     Spring {
-        /// The node.
+        /// The node with the spring.
         driven: Uid,
-        /// Swings a second.
+        /// Frequency in swings per second.
         frequency: Scalar,
-        /// 0 swings for ever, 1 settles without swinging.
+        /// Damping: 0 swings for ever, 1 settles without swinging.
         damping: Scalar,
-        /// 0 leaves the node as it is.
+        /// Weight: 0 leaves the node unchanged.
         weight: Scalar,
-        /// Lag of the position.
+        /// Lag of the position if `true`.
         translate: bool,
-        /// Lag of the direction in which the node's children lie.
+        /// Lag of the direction towards the node's children if `true`.
         rotate: bool,
     },
-    /// A number that follows another along keys.
+    /// A number driven by another along keys.
     DrivenKey {
-        /// The number that drives.
+        /// The driving number.
         driver: Scalar,
         /// Keys: (driver, value), driver increasing; flat before the first and after the last.
         keys: Vec<(f32, f32)>,
-        /// The run between keys.
+        /// Interpolation between keys.
         ease: KeyEase,
-        /// What is driven.
+        /// Destination of the number.
         output: Output,
     },
     /// A number that is calculated.
     Expression {
         /// Arithmetic over the names of the inputs.
         text: String,
-        /// Names and what they stand for.
+        /// Names with their values.
         inputs: Vec<(String, Scalar)>,
-        /// What is driven.
+        /// Destination of the number.
         output: Output,
     },
     /// The pivots of a foot that rolls over heel, ball and toe.
@@ -369,24 +370,43 @@ pub enum Constraint {
     },
 }
 
-/// Something that a constraint depends on or changes.
+/// Data that a constraint depends on or changes.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Dependency {
-    /// Where a node ends up.
+    /// The final transform of a node.
     Node(Uid),
     /// The value of an attribute.
     Attribute(Uid, Arc<str>),
 }
 
 impl Constraint {
-    /// What it reads, besides the nodes that it drives and their parents; with repetitions.
+    /// The kind in words.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Transform { .. } => "transform",
+            Self::Relative { .. } => "relative",
+            Self::Aim { .. } => "aim",
+            Self::TwoBone { .. } => "two-bone",
+            Self::Chain { .. } => "chain",
+            Self::Spline { .. } => "spline",
+            Self::Twist { .. } => "twist",
+            Self::Stretch { .. } => "stretch",
+            Self::Limit { .. } => "limit",
+            Self::Spring { .. } => "spring",
+            Self::DrivenKey { .. } => "driven key",
+            Self::Expression { .. } => "expression",
+            Self::Foot { .. } => "foot",
+        }
+    }
+
+    /// The data that the constraint reads, besides the nodes that it drives and their parents; with repetitions.
     pub fn reads(&self) -> Vec<Dependency> {
         let mut reads = Vec::new();
         let scalar = |reads: &mut Vec<Dependency>, scalar: &Scalar| match scalar {
             Scalar::Attribute { node, name, .. } | Scalar::Choice { node, name, .. } => {
                 reads.push(Dependency::Attribute(*node, name.clone()));
             }
-            // A pose offset is an input: nothing in the rig changes it.
+            // A pose offset is an input: no constraint changes it.
             Scalar::Value(_) | Scalar::Channel { .. } => {}
         };
         match self {
@@ -438,7 +458,7 @@ impl Constraint {
         reads
     }
 
-    /// The nodes and attributes that it changes.
+    /// The nodes and attributes that the constraint changes.
     pub fn drives(&self) -> Vec<Dependency> {
         let nodes = |nodes: &[Uid]| nodes.iter().copied().map(Dependency::Node).collect();
         match self {

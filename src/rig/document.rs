@@ -9,10 +9,10 @@ use bevy::{math::Affine3, prelude::*};
 
 use crate::{
     mesh::model::Weights,
-    rig::{AttributeValues, GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, Tag, Uid},
+    rig::{AttributeValues, GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, TagData, Uid},
 };
 
-/// A rig (= global group). Reading is free; changing goes through [`Rig::apply`](crate::rig::edit) only.
+/// A rig (= global group). Reading is free; [`Rig::apply`](crate::rig::edit) alone changes it.
 #[derive(Component, Debug, Clone, PartialEq, Default)]
 pub struct Rig {
     pub(super) uid: Uid,
@@ -23,25 +23,25 @@ pub struct Rig {
     /// The joint of every tag, so that neither adding nor finding one needs a search.
     pub(super) tags: HashMap<Uid, Uid>,
     pub(super) skins: BTreeMap<Uid, Arc<SkinData>>,
-    /// The current pose; only joints and created nodes that do not stand as they rest.
+    /// The current pose: offsets of joints and created nodes that are not at rest.
     pub(super) pose: BTreeMap<Uid, PoseOffset>,
-    /// Attributes that somebody has set, by node and name; no node without any.
+    /// Attributes that have been set, by node and name; a node without any has no entry.
     pub(super) values: AttributeValues,
     pub(super) poses: Vec<StoredPose>,
 }
 
-/// What a template's header tells people.
+/// Header of a template, for people.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct RigAbout {
     /// The rig's name.
     pub name: String,
-    /// The version of the template's content, as its author counts.
+    /// Version of the template's content, chosen by its author.
     pub version: String,
-    /// For example `character`, `part`, `prop`.
+    /// Kind of the rig, for example `character`, `part`, `prop`.
     pub kind: String,
-    /// Who made it.
+    /// Author of the rig.
     pub author: String,
-    /// A few sentences.
+    /// Description in a few sentences.
     pub description: String,
     /// File name of a picture beside the template.
     pub preview: Option<String>,
@@ -50,13 +50,17 @@ pub struct RigAbout {
 /// Weights of one mesh over joints of the rig.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct SkinData {
-    /// The joint that each joint index of the weights means.
+    /// The joint for each joint index of the weights.
     pub joints: Vec<Uid>,
     /// Influences of every point of the mesh.
     pub weights: Weights,
-    /// True if the weights hold the mesh as it stands at rest; false if they came with the mesh file and hold its
-    /// points in the file's bind pose.
+    /// Space of the weights: `true` if they were computed for the mesh at rest; `false` if they came with the mesh file
+    /// and belong to its points in the file's bind pose.
     pub at_rest: bool,
+    /// For each joint that a command created, the node that it was made for: it holds the share of a joint that is not
+    /// built at the moment.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub subjects: BTreeMap<Uid, Uid>,
 }
 
 impl Rig {
@@ -96,13 +100,13 @@ impl Rig {
     }
 
     /// The tag with that uid, and the joint that carries it.
-    pub fn find_tag(&self, uid: Uid) -> Option<(&RigJoint, &Tag)> {
+    pub fn find_tag(&self, uid: Uid) -> Option<(&RigJoint, &TagData)> {
         let joint = self.joints.get(self.tags.get(&uid)?)?;
         let tag = joint.data.tags.iter().find(|tag| tag.uid == uid)?;
         Some((joint, tag))
     }
 
-    /// True if a joint, group, tag or stored pose has that uid.
+    /// Returns `true` if a joint, group, tag or stored pose has that uid.
     pub fn is_taken(&self, uid: Uid) -> bool {
         self.joints.contains_key(&uid)
             || self.tags.contains_key(&uid)
@@ -115,7 +119,7 @@ impl Rig {
         self.joints.len()
     }
 
-    /// True if there is no joint.
+    /// Returns `true` without joints.
     pub fn is_empty(&self) -> bool {
         self.joints.is_empty()
     }
@@ -128,7 +132,7 @@ impl Rig {
         }
     }
 
-    /// All joints, parents before children, siblings in authored order.
+    /// Joints of the rig, parents before children, siblings in authored order.
     pub fn walk(&self) -> impl Iterator<Item = &RigJoint> {
         self.walk_from(self.roots.iter().rev().copied().collect())
     }
@@ -191,7 +195,7 @@ impl Rig {
     }
 
     /// The rest transform that puts a joint at `global` (rig space) below `parent`. A parent that is flat in one
-    /// direction has no inverse; then the transform is taken as it is.
+    /// direction has no inverse; then the transform is taken unchanged.
     pub fn local_rest(&self, parent: Option<Uid>, global: &Affine3) -> RestTransform {
         let parent = parent.map_or(Affine3::IDENTITY, |parent| self.rest_global(parent));
         if parent == Affine3::IDENTITY {
@@ -206,7 +210,7 @@ impl Rig {
         self.skins.get(&mesh)
     }
 
-    /// All bound meshes with weights.
+    /// Weights of all bound meshes, by the mesh's uid.
     pub fn skins(&self) -> impl Iterator<Item = (Uid, &Arc<SkinData>)> {
         self.skins.iter().map(|(mesh, skin)| (*mesh, skin))
     }

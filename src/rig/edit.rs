@@ -1,7 +1,8 @@
-//! The one way a rig changes: edits with exact inverses.
+//! Edits: the only way to change a rig, each with an exact inverse.
 //!
-//! [`Rig::apply`] either changes the rig and returns the edit that takes it back, or changes nothing and says why.
-//! Everything bigger (placing, mirroring, deleting a joint but keeping its children) is a list of these.
+//! [`Rig::apply`] either changes the rig and returns the edit that takes the change back, or changes nothing and
+//! returns the reason. Larger changes (placing, mirroring, deleting a joint but keeping its children) are lists of
+//! edits.
 
 mod poses;
 mod shared;
@@ -14,73 +15,73 @@ use serde::{Deserialize, Serialize};
 use crate::{
     mesh::model::Weights,
     rig::{
-        GroupData, JointData, PoseOffset, RestTransform, Rig, RigJoint, StoredPose, Tag, TagKind, Uid,
+        GroupData, JointData, PoseOffset, RestTransform, Rig, RigJoint, StoredPose, TagData, TagKind, Uid,
         document::{RigAbout, SkinData},
-        source::ron_options,
+        format::source::ron_options,
     },
 };
 
-/// One change of a rig.
+/// A change of a rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum RigEdit {
     /// Adds a joint as the `index`-th child of `parent` (the `index`-th root for `None`; past the end: last).
     AddJoint {
         /// The joint.
         joint: Box<JointData>,
-        /// Its parent.
+        /// Uid of its parent.
         parent: Option<Uid>,
-        /// Its place among the siblings.
+        /// Index among the siblings.
         index: usize,
     },
-    /// Removes a joint that has no children, and its part of the current pose.
+    /// Removes a joint without children, and its part of the current pose.
     RemoveJoint(Uid),
-    /// Gives a joint another rest transform, relative to its parent.
+    /// Sets the rest transform of a joint, relative to its parent.
     SetRest(Uid, RestTransform),
-    /// Moves a joint with all below it to another parent; its rest transform stays as it is, relative to the parent.
+    /// Moves a joint with its hierarchy to another parent; its rest transform stays unchanged, relative to the parent.
     SetParent {
         /// The joint.
         joint: Uid,
-        /// Its next parent.
+        /// Uid of the new parent.
         parent: Option<Uid>,
-        /// Its place among the siblings there.
+        /// Index among the siblings there.
         index: usize,
     },
     /// Renames a joint.
     SetLabel(Uid, Option<String>),
     /// Puts a joint into a local group.
     SetGroup(Uid, Option<Uid>),
-    /// Names the joint on the other side, one way; pair both.
+    /// Sets the joint on the other side, one way; a pair needs both directions.
     SetMirror(Uid, Option<Uid>),
-    /// Protects a joint's weights from automatic skinning, or no longer.
+    /// Locks a joint's weights against automatic skinning, or unlocks them.
     SetLocked(Uid, bool),
     /// Adds a tag as the `index`-th of a joint.
     AddTag {
         /// The joint.
         joint: Uid,
         /// The tag.
-        tag: Box<Tag>,
-        /// Its place.
+        tag: Box<TagData>,
+        /// Index of the tag.
         index: usize,
     },
     /// Removes a tag of a joint.
     RemoveTag(Uid, Uid),
     /// Replaces the tag of a joint that has the same uid.
-    SetTag(Uid, Box<Tag>),
+    SetTag(Uid, Box<TagData>),
     /// Adds a local group.
     AddLocalGroup(GroupData, usize),
-    /// Removes a local group that no joint is in.
+    /// Removes a local group without joints.
     RemoveLocalGroup(Uid),
     /// Replaces the local group that has the same uid.
     SetLocalGroup(GroupData),
     /// Changes name, version, author and the like.
     SetAbout(Box<RigAbout>),
-    /// Binds a mesh with weights, replaces them, or lets the mesh go.
+    /// Binds a mesh with weights, replaces them, or unbinds the mesh.
     SetSkin(Uid, #[serde(with = "shared")] Option<Arc<SkinData>>),
-    /// Poses a joint or a created node: what is added to its rest transform, or to where it was built; `None` puts it
-    /// back there. A node need not be built at the moment: its pose waits for it.
+    /// Poses a joint or a created node by an offset on top of its rest transform or built base; `None` resets it. The
+    /// node need not be built at the moment: its pose waits for it.
     SetOffset(Uid, Option<PoseOffset>),
-    /// Sets an attribute of a joint or created node; `None` gives it the value again that its command says. The node
-    /// need not be built at the moment.
+    /// Sets an attribute of a joint or created node; `None` resets it to the default of its command. The node need not
+    /// be built at the moment.
     SetAttributeValue(Uid, String, Option<f32>),
     /// Adds a stored pose as the `index`-th.
     AddStoredPose(Box<StoredPose>, usize),
@@ -88,58 +89,58 @@ pub enum RigEdit {
     RemoveStoredPose(Uid),
     /// Replaces the stored pose that has the same uid.
     SetStoredPose(Box<StoredPose>),
-    /// Several edits as one: all or none.
+    /// Several edits as one: all are applied or none.
     Batch(Vec<RigEdit>),
 }
 
-/// Why an edit was refused. The rig is as it was.
+/// Error of applying an edit. The rig is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EditError {
-    /// No such joint.
+    /// A joint that does not exist.
     #[error("there is no joint {0} in the rig; it may have been deleted: select another")]
     NoJoint(Uid),
-    /// No such group.
+    /// A group that does not exist.
     #[error("there is no local group {0} in the rig; create it first")]
     NoGroup(Uid),
-    /// No such tag.
+    /// A tag that does not exist on the joint.
     #[error("joint {0} has no tag {1}; it may have been deleted")]
     NoTag(Uid, Uid),
-    /// No such stored pose.
+    /// A stored pose that does not exist.
     #[error("there is no stored pose {0} in the rig; it may have been deleted: choose another")]
     NoPose(Uid),
-    /// The uid is taken.
+    /// A uid that is taken.
     #[error("uid {0} is already used in the rig; give the added thing another uid")]
     Taken(Uid),
-    /// The joint has children.
+    /// A joint that has children.
     #[error("joint {0} has children; delete or reparent them first")]
     HasChildren(Uid),
-    /// The group has joints.
+    /// A group that has joints.
     #[error("local group {0} still has joints; take them out first")]
     GroupInUse(Uid),
-    /// The parent lies below the joint.
+    /// A parent below the joint.
     #[error("joint {joint} cannot hang below {parent}, which hangs below it; choose a parent outside its hierarchy")]
     Cycle {
-        /// The joint to move.
+        /// The joint to reparent.
         joint: Uid,
-        /// The parent that was asked for.
+        /// The requested parent.
         parent: Uid,
     },
-    /// A number is not finite or a rotation is not of unit length.
+    /// A transform with a number that is not finite or a rotation that is not of unit length.
     #[error("joint {0} would get a transform that is not finite or not a rotation; check the numbers")]
     BadTransform(Uid),
-    /// The value of an attribute is not finite.
+    /// An attribute's value that is not finite.
     #[error("attribute \"{1}\" of {0} would get a value that is not finite; use another")]
     BadValue(Uid, String),
-    /// Weights do not fit.
+    /// Weights over joints that do not exist.
     #[error("the weights name {0} joints that the rig does not have; skin the mesh again")]
     BadSkin(usize),
-    /// Weights contradict themselves.
+    /// Weights that are inconsistent.
     #[error("the weights are not finite or their lists do not fit together; skin the mesh again")]
     BadWeights,
-    /// A colour is not finite.
+    /// A colour that is not finite.
     #[error("the colour of local group {0} is not finite; use numbers from 0 to 1")]
     BadColor(Uid),
-    /// The parameters of a tag are no RON.
+    /// Parameters of a tag that are not RON.
     #[error("the parameters of tag {0} are not RON text: {1}; correct them, or write () for none")]
     BadParams(Uid, String),
 }
@@ -233,7 +234,7 @@ impl Rig {
             match self.apply(edit) {
                 Ok(inverse) => inverses.push(inverse),
                 Err(error) => {
-                    // What was done so far is taken back; inverses of applied edits cannot be refused.
+                    // The edits so far are undone; inverses of applied edits cannot be refused.
                     for inverse in inverses.iter().rev() {
                         let undone = self.apply(inverse);
                         debug_assert!(undone.is_ok(), "an inverse was refused: {undone:?}");
@@ -268,7 +269,7 @@ impl Rig {
         }
     }
 
-    /// Takes a joint out of its parent's list; returns its former place.
+    /// Removes a joint from its parent's list; returns its former parent and index.
     fn detach(&mut self, uid: Uid) -> Result<(Option<Uid>, usize), EditError> {
         let parent = self.joints.get(&uid).ok_or(EditError::NoJoint(uid))?.parent;
         let siblings = self.siblings_mut(parent)?;
@@ -297,7 +298,7 @@ impl Rig {
         let data = JointData { tags, ..data.clone() };
         let uid = data.uid;
         self.joints.insert(uid, RigJoint { data, parent, children: Vec::new() });
-        // A joint leaves with its part of the pose; what waited for this one goes on waiting then.
+        // A joint leaves with its part of the pose; a pose that waits for the uid keeps waiting then.
         Ok(match self.pose.get(&uid) {
             Some(offset) => RigEdit::Batch(vec![RigEdit::RemoveJoint(uid), RigEdit::SetOffset(uid, Some(*offset))]),
             None => RigEdit::RemoveJoint(uid),
@@ -338,7 +339,7 @@ impl Rig {
 
     fn set_skin(&mut self, mesh: Uid, skin: Option<&Arc<SkinData>>) -> Result<RigEdit, EditError> {
         if let Some(skin) = skin {
-            // Joints that were deleted after skinning stay named: undoing the deletion brings their weights back.
+            // Joints deleted after skinning stay in the list: undoing the deletion brings their weights back.
             let beyond = skin.weights.joints.iter().filter(|j| **j as usize >= skin.joints.len()).count();
             if beyond > 0 {
                 return Err(EditError::BadSkin(beyond));
@@ -355,11 +356,11 @@ impl Rig {
     }
 }
 
-/// How deep brackets may nest in a tag's parameters, so that the template around them can still be read.
+/// Largest depth of brackets in a tag's parameters, so that the template around them can still be read.
 const PARAMS_DEPTH: usize = 100;
 
-/// The tag as the rig keeps it: parameters without white space and comments around them.
-fn checked(tag: &Tag) -> Result<Tag, EditError> {
+/// The tag in its stored form: parameters without white space and comments around them.
+fn checked(tag: &TagData) -> Result<TagData, EditError> {
     let mut tag = tag.clone();
     if let TagKind::Command { params, .. } = &mut tag.kind {
         let options = ron_options().with_recursion_limit(PARAMS_DEPTH);
@@ -381,6 +382,6 @@ fn is_whole(weights: &Weights) -> bool {
     rising
         && ends == weights.joints.len()
         && ends == weights.values.len()
-        // Counted rather than searched: several times as fast, and there may be millions.
+        // Counting is several times as fast as searching, and there may be millions.
         && weights.values.iter().filter(|w| !w.is_finite()).count() == 0
 }

@@ -11,11 +11,11 @@ use std::collections::{BTreeSet, HashMap};
 
 use serde::{Deserialize, Serialize};
 
-use crate::rig::{JointData, Rig, RigEdit, Tag, TagKind, Uid, nearest::did_you_mean};
+use crate::rig::{JointData, Rig, RigEdit, TagData, TagKind, Uid, nearest::did_you_mean};
 
 pub use kinds::{FeatureKind, FeatureKinds, UnknownKind};
 
-/// What tells a combined feature from others.
+/// Key of a combined feature.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct FeatureKey {
     /// The local group; `None` for joints without one.
@@ -31,11 +31,11 @@ pub struct FeatureKey {
 pub struct CombinedFeature {
     /// Group, kind and name.
     pub key: FeatureKey,
-    /// Whether its tags are enabled, whatever their switch.
+    /// State of its tags, whatever their switch.
     pub state: FeatureState,
-    /// Its parts with a switch, in the order of the document.
+    /// Parts with a switch, in the order of the document.
     pub switches: Vec<FeatureSwitch>,
-    /// All its tags, in the order of the document.
+    /// Tags of the feature, in the order of the document.
     pub tags: Vec<Uid>,
 }
 
@@ -44,24 +44,24 @@ pub struct CombinedFeature {
 pub struct FeatureSwitch {
     /// The secondary name.
     pub name: String,
-    /// Whether the part's tags are enabled.
+    /// State of the part's tags.
     pub state: FeatureState,
     /// The part's tags.
     pub tags: Vec<Uid>,
 }
 
-/// Whether tags that act together are enabled.
+/// State of tags that act together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FeatureState {
-    /// All are.
+    /// All tags are enabled.
     On,
-    /// None is.
+    /// No tag is enabled.
     Off,
-    /// Some are.
+    /// Some tags are enabled.
     Mixed,
 }
 
-/// Why features were not turned on or off.
+/// Error of turning features on or off.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FeatureError {
     /// No such feature.
@@ -75,9 +75,9 @@ pub enum FeatureError {
     NoSwitch(String, String, String),
 }
 
-/// True if a build runs the command (or counts the feature): it is enabled, and so are its joint's local group and its
-/// feature. A feature that has been deleted turns nothing off.
-pub fn is_active(rig: &Rig, joint: &JointData, tag: &Tag) -> bool {
+/// Returns `true` if a build runs the command (or counts the feature): it is enabled, and so are its joint's local
+/// group and its feature. A deleted feature turns nothing off.
+pub fn is_active(rig: &Rig, joint: &JointData, tag: &TagData) -> bool {
     let in_group = joint.group.and_then(|group| rig.group(group)).is_none_or(|group| group.enabled);
     let in_feature = match &tag.kind {
         TagKind::Command { feature: Some(feature), .. } => feature_enabled(rig, *feature),
@@ -91,7 +91,7 @@ fn feature_enabled(rig: &Rig, feature: Uid) -> bool {
 }
 
 /// The commands of a feature tag, in the order of the document, with their joints.
-pub fn commands_of(rig: &Rig, feature: Uid) -> impl Iterator<Item = (Uid, &Tag)> {
+pub fn commands_of(rig: &Rig, feature: Uid) -> impl Iterator<Item = (Uid, &TagData)> {
     let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(move |tag| (joint.data.uid, tag)));
     tags.filter(move |(_, tag)| matches!(tag.kind, TagKind::Command { feature: Some(own), .. } if own == feature))
 }
@@ -123,7 +123,7 @@ pub fn combined_features(rig: &Rig) -> Vec<CombinedFeature> {
     found.into_iter().map(|(feature, parts)| with_switches(feature, &parts)).collect()
 }
 
-/// The combined features with that name, of any kind and in any local group; what a person who types a name means.
+/// The combined features with that name, of any kind and in any local group, as for a name that a person types.
 ///
 /// # Errors
 /// [`FeatureError::NoName`] with the nearest names if there is none.
@@ -156,8 +156,8 @@ pub fn set_switch(rig: &Rig, key: &FeatureKey, switch: &str, on: bool) -> Result
     Ok(enabling(rig, part.tags.iter().map(|tag| (*tag, on))))
 }
 
-/// The edits that turn one part of a combined feature on and all other parts with a switch off; what has no switch
-/// belongs to all parts and is turned on.
+/// The edits that turn one part of a combined feature on and all other parts with a switch off; tags without a switch
+/// belong to all parts and are turned on.
 ///
 /// # Errors
 /// [`FeatureError::NoFeature`] and [`FeatureError::NoSwitch`].
@@ -169,7 +169,7 @@ pub fn choose_switch(rig: &Rig, key: &FeatureKey, switch: &str) -> Result<Vec<Ri
 }
 
 impl CombinedFeature {
-    /// The names of the parts that are on.
+    /// Names of the parts that are on.
     pub fn active_switches(&self) -> impl Iterator<Item = &str> {
         self.switches.iter().filter(|part| part.state == FeatureState::On).map(|part| part.name.as_str())
     }
@@ -220,11 +220,11 @@ fn part<'a>(feature: &'a CombinedFeature, switch: &str) -> Result<&'a FeatureSwi
     })
 }
 
-/// The edits that enable tags or not; those that are so already need none.
+/// The edits that enable or disable tags; tags in the wanted state need none.
 fn enabling(rig: &Rig, tags: impl Iterator<Item = (Uid, bool)>) -> Vec<RigEdit> {
     let edit = |(tag, enabled)| {
         let (joint, tag) = rig.find_tag(tag)?;
-        let next = Tag { enabled, ..tag.clone() };
+        let next = TagData { enabled, ..tag.clone() };
         (tag.enabled != enabled).then(|| RigEdit::SetTag(joint.data.uid, Box::new(next)))
     };
     tags.filter_map(edit).collect()

@@ -1,14 +1,14 @@
-//! Joints: what a skeleton is made of.
+//! Joints: the nodes of a skeleton.
 
 use bevy::{math::Affine3, prelude::*};
 use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    rig::{Tag, Uid},
+    rig::{TagData, Uid},
 };
 
-/// Where a joint stands at rest, relative to its parent (or to the rig for a root).
+/// Rest transform of a joint, relative to its parent (or to the rig for a root).
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[reflect(Component)]
 pub struct RestTransform {
@@ -27,18 +27,18 @@ impl Default for RestTransform {
 }
 
 impl RestTransform {
-    /// A transform that only moves.
+    /// A rest transform with a translation only.
     pub fn from_translation(translation: Vec3) -> Self {
         Self { translation, ..default() }
     }
 
-    /// As an affine matrix.
+    /// The transform as an affine matrix.
     pub fn affine(&self) -> Affine3 {
         Affine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
     }
 
     /// The nearest translation, rotation and scale to a matrix (shear is lost). A scale that differs from one by
-    /// rounding only is one, so that moving joints about does not make them grow.
+    /// rounding only becomes one, so that repeated moves do not make joints grow.
     pub fn from_affine(affine: &Affine3) -> Self {
         let (scale, rotation, translation) = affine.to_scale_rotation_translation();
         let snapped = |factor: f32| if (factor - 1.0).abs() < 1e-5 { 1.0 } else { factor };
@@ -46,7 +46,7 @@ impl RestTransform {
         Self { translation, rotation: rotation.normalize(), scale }
     }
 
-    /// True if every number is finite and the rotation has a length.
+    /// Returns `true` if every number is finite and the rotation has unit length.
     pub fn is_valid(&self) -> bool {
         self.translation.is_finite()
             && self.scale.is_finite()
@@ -79,22 +79,22 @@ impl From<Trs> for RestTransform {
     }
 }
 
-/// What a node of the skeleton is for.
+/// Kind of a node of the skeleton.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum NodeKind {
-    /// Moves the mesh.
+    /// A joint, which moves the mesh.
     #[default]
     Joint,
-    /// Only carries other nodes; never gets weights (an imported armature node, for example).
+    /// A node that only carries others and never gets weights (an imported armature node, for example).
     Null,
 }
 
-/// Everything a joint is, without its place in the hierarchy.
+/// Data of a joint, without its place in the hierarchy.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct JointData {
     /// Identity.
     pub uid: Uid,
-    /// The name people see; unique or not, with any characters.
+    /// The name people see; any characters, not necessarily unique.
     pub label: Option<String>,
     /// The local group the joint belongs to.
     pub group: Option<Uid>,
@@ -102,18 +102,18 @@ pub struct JointData {
     pub kind: NodeKind,
     /// Rest pose.
     pub rest: RestTransform,
-    /// The joint on the other side. Pairs are known by uid, never by name; both name each other.
+    /// The joint on the other side. Pairs are identified by uid, never by name; both refer to each other.
     pub mirror: Option<Uid>,
-    /// True if automatic skinning must leave this joint's weights alone.
+    /// Lock: automatic skinning leaves the weights of a locked joint unchanged.
     pub locked: bool,
     /// Tags in order.
-    pub tags: Vec<Tag>,
+    pub tags: Vec<TagData>,
 }
 
 /// A joint in a [`crate::rig::Rig`]: its data and its place.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RigJoint {
-    /// What it is.
+    /// Data of the joint.
     pub data: JointData,
     /// The parent joint; `None` for a root.
     pub parent: Option<Uid>,

@@ -1,17 +1,17 @@
 //! Labels of the left and right side.
 
-/// The label of the joint on the other side, or `None` if the label names no side.
+/// The mirrored label, for the joint on the other side, or `None` if the label names no side.
 ///
-/// Known are endings `_l`/`_r`, `.l`/`.r`, `-l`/`-r` and the words `left`/`right` anywhere, in lower, upper or title
-/// case. A side's ending may be followed by a number, as Blender writes it (`hand.L.001`).
+/// The recognised sides are endings `_l`/`_r`, `.l`/`.r`, `-l`/`-r` and the words `left`/`right` anywhere, in lower,
+/// upper or title case. A side's ending may be followed by a number, as Blender writes it (`hand.L.001`).
 pub fn mirrored_label(label: &str) -> Option<String> {
     swap_ending(label).or_else(|| swap_start(label)).or_else(|| swap_word(label))
 }
 
-/// Which side a label names: `-1` right, `1` left, `0` none.
+/// Side that a label names: `-1` right, `1` left, `0` none.
 pub fn label_side(label: &str) -> i32 {
     let Some(other) = mirrored_label(label) else { return 0 };
-    // The two labels differ first where the side is written.
+    // The first difference of the two labels is at the side.
     let differing = label.chars().zip(other.chars()).find(|(a, b)| a != b);
     match differing.map(|(a, _)| a.to_ascii_lowercase()) {
         Some('l') => 1,
@@ -35,7 +35,7 @@ fn is_separator(c: char) -> bool {
 }
 
 fn swap_ending(label: &str) -> Option<String> {
-    // `hand.L.001`: look before a trailing separator and number.
+    // `hand.L.001`: the side is before a trailing separator and number.
     let without_number = label.trim_end_matches(|c: char| c.is_ascii_digit());
     let stem = match without_number.strip_suffix(is_separator) {
         Some(stem) if without_number.len() < label.len() => stem,

@@ -1,4 +1,4 @@
-//! Names that were probably meant: for errors about names that nobody knows.
+//! Suggestions of similar names, for errors about unknown names.
 
 /// The names nearest to `name`, best first, at most `most` of them; names that have little in common are left out.
 ///
@@ -24,8 +24,8 @@ pub fn nearest<S: AsRef<str>>(name: &str, among: impl IntoIterator<Item = S>, mo
     found.into_iter().take(most).map(|(_, name)| name).collect()
 }
 
-/// The end of an error's sentence about a name that nobody knows: `; did you mean "a" or "b"?`, or all there are if
-/// they are few and none is near, or nothing.
+/// The end of an error's sentence about an unknown name: `; did you mean "a" or "b"?`, or all names if they are few and
+/// none is near, or nothing.
 pub fn did_you_mean<S: AsRef<str>>(name: &str, among: impl IntoIterator<Item = S>) -> String {
     let mut all: Vec<String> = among.into_iter().map(|name| name.as_ref().to_owned()).collect();
     all.sort_unstable();
@@ -48,7 +48,7 @@ pub fn listed<S: AsRef<str>>(names: &[S], word: &str) -> String {
     }
 }
 
-/// Long names are compared by their beginnings, so that nonsense costs little.
+/// Number of characters that are compared, so that very long names cost little.
 const LONGEST: usize = 64;
 
 fn folded(name: &str) -> Vec<char> {

@@ -1,8 +1,8 @@
-//! What people do to a rig, in terms of edits.
+//! Operations: changes of a rig that people make, as lists of edits.
 //!
-//! An [`Operation`] is one thing a person asked for: place a joint, move three, delete one and keep its children. It
-//! runs in a [`Draft`], which applies edits one after another through [`Rig::apply`] and takes them all back if one is
-//! refused. With symmetry on, an operation does the same to the joints on the other side; pairs are known by uid.
+//! An [`Operation`] is one request of a person: place a joint, move three, delete one and keep its children. It runs in
+//! a [`Draft`], which applies edits one after another through [`Rig::apply`] and takes them all back if one is refused.
+//! With symmetry on, an operation also changes the joints on the other side; pairs are identified by uid.
 
 mod draft;
 mod frame;
@@ -24,124 +24,124 @@ pub use tags::{CopiedIdentifiers, CopiedJoint, PasteTo, PasteWhat, TagClipboard,
 
 use crate::rig::{EditError, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
 
-/// One thing a person asks of a rig. Positions and transforms are in the rig's space.
+/// A change of a rig that a person requests. Positions and transforms are in the rig's space.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Operation {
     /// Adds a joint at a position as a child of `parent`, or as a root, and selects it.
     Place {
-        /// Where.
+        /// Position of the joint.
         position: Vec3,
-        /// Below which joint.
+        /// Parent of the joint.
         parent: Option<Uid>,
     },
     /// Adds a chain of joints, the first as a child of `parent`, and selects the last.
     Chain {
-        /// Where, in order.
+        /// Positions of the joints, in order.
         positions: Vec<Vec3>,
-        /// Below which joint.
+        /// Parent of the first joint.
         parent: Option<Uid>,
     },
-    /// Puts a joint into the bone that ends at `child`, and selects it.
+    /// Inserts a joint into the bone that ends at `child`, and selects it.
     Insert {
         /// The joint at the bone's end.
         child: Uid,
-        /// Where.
+        /// Position of the joint.
         position: Vec3,
     },
-    /// Deletes joints; what hangs below them goes too, or moves up to their parent.
+    /// Deletes joints; their hierarchies are deleted too, or move up to their parents.
     Delete {
-        /// Which.
+        /// Joints to delete.
         joints: Vec<Uid>,
-        /// True to keep what hangs below.
+        /// Keeps the joints below if `true`.
         keep_children: bool,
     },
     /// Puts each joint at a position.
     Move {
-        /// Which, and where to.
+        /// Joints and their positions.
         to: Vec<(Uid, Vec3)>,
-        /// True to take along what hangs below; else it stays in place.
+        /// Moves the joints below along if `true`; else they stay in place.
         with_children: bool,
     },
-    /// Turns joints about a pivot.
+    /// Rotates joints about a pivot.
     Rotate {
-        /// Which.
+        /// Joints to rotate.
         joints: Vec<Uid>,
-        /// The turn.
+        /// Rotation, in the rig's axes.
         rotation: Quat,
-        /// About which point; each joint about itself for `None`.
+        /// Pivot; `None` rotates each joint about itself.
         pivot: Option<Vec3>,
-        /// True to take along what hangs below; else it stays in place.
+        /// Moves the joints below along if `true`; else they stay in place.
         with_children: bool,
     },
-    /// Scales joints about a pivot: their distances from it and, where it is the joint itself, their rest scale.
+    /// Scales joints about a pivot: their distances from it and, if the joint is its own pivot, their rest scale.
     Scale {
-        /// Which.
+        /// Joints to scale.
         joints: Vec<Uid>,
         /// Factors along the axes, none zero.
         scale: Vec3,
         /// The axes, as a rotation of the rig's.
         axes: Quat,
-        /// About which point; each joint about itself for `None`.
+        /// Pivot; `None` scales each joint about itself.
         pivot: Option<Vec3>,
-        /// True to take along what hangs below; else it stays in place.
+        /// Moves the joints below along if `true`; else they stay in place.
         with_children: bool,
     },
-    /// Gives joints rest transforms, each relative to its parent.
+    /// Sets rest transforms of joints, each relative to its parent.
     Rest {
-        /// Which, and what they get.
+        /// Joints and their rest transforms.
         to: Vec<(Uid, RestTransform)>,
-        /// True to take along what hangs below; else it stays in place.
+        /// Moves the joints below along if `true`; else they stay in place.
         with_children: bool,
     },
-    /// Hangs joints below another (or makes them roots) without moving them.
+    /// Reparents joints (or makes them roots) without moving them.
     Reparent {
-        /// Which.
+        /// Joints to reparent.
         joints: Vec<Uid>,
-        /// Below which joint.
+        /// New parent.
         parent: Option<Uid>,
     },
-    /// Renames joints; an empty name takes the label away.
+    /// Renames joints; an empty name removes the label.
     Labels(Vec<(Uid, String)>),
-    /// Turns joints so that an axis of theirs points along their bone; nothing else moves.
+    /// Orients joints so that one of their axes points along their bone; no other joint moves.
     Orient {
-        /// Which.
+        /// Joints to orient.
         joints: Vec<Uid>,
         /// The axis that points along the bone.
         along: Axis,
     },
-    /// Makes or renews the other side of joints and all that hangs below them.
+    /// Makes or updates the other side of joints and of their hierarchies.
     Mirror {
-        /// Which.
+        /// Joints to mirror.
         joints: Vec<Uid>,
     },
     /// Puts joints into the local group with that name, which is created with the colour if there is none.
     Group {
-        /// Which.
+        /// Joints to group.
         joints: Vec<Uid>,
         /// The group's name; empty takes the joints out of their groups.
         name: String,
         /// Colour for a group that has to be created, or to be recoloured.
         color: Option<[f32; 3]>,
     },
-    /// Protects joints from automatic skinning, or no longer.
+    /// Locks joints against automatic skinning, or unlocks them.
     Lock(Vec<Uid>, bool),
-    /// Poses joints: what is put on top of each one's rest transform. Partners get the mirror image.
+    /// Poses joints by offsets on top of their rest transforms. Partners get the mirror image.
     Pose(Vec<(Uid, PoseOffset)>),
-    /// Puts joints and their partners to rest; all joints if none is listed.
+    /// Resets joints and their partners to rest; all joints if none is listed.
     ResetPose(Vec<Uid>),
-    /// Keeps the current pose under a name; a stored pose of that name is replaced.
+    /// Stores the current pose under a name; a stored pose of that name is replaced.
     StorePose(String),
-    /// Makes a stored pose the current one; joints that it does not name stand as they rest.
+    /// Makes a stored pose the current one; joints without an entry in it are reset to rest.
     ApplyPose(Uid),
     /// Renames a stored pose.
     RenamePose(Uid, String),
     /// Deletes a stored pose; the current pose stays.
     DeletePose(Uid),
-    /// Does something to tags.
+    /// Changes tags.
     Tags(TagOperation),
-    /// Edits as they are.
+    /// Applies edits.
     Edits(Vec<RigEdit>),
-    /// Edits as they are, under a name of their own.
+    /// Applies edits under a given name.
     Named {
         /// A few words for the history panel.
         name: &'static str,
@@ -150,25 +150,25 @@ pub enum Operation {
     },
 }
 
-/// Why an operation did nothing.
+/// Error of an operation. The rig is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OperationError {
-    /// An edit was refused.
+    /// A refused edit.
     #[error(transparent)]
     Edit(#[from] EditError),
-    /// Tags could not be changed.
+    /// An error of a change of tags.
     #[error(transparent)]
     Tag(#[from] TagError),
-    /// A number makes no sense.
+    /// A number that is not valid.
     #[error("{0}")]
     BadNumber(&'static str),
-    /// The bone to insert into does not exist.
+    /// A bone that does not exist.
     #[error("joint {0} is a root: there is no bone above it to insert into")]
     NoBone(Uid),
-    /// A pose needs a name.
+    /// A pose without a name.
     #[error("a stored pose needs a name; type one")]
     NoName,
-    /// Another pose has the name.
+    /// A pose name that is taken.
     #[error("there is a stored pose \"{0}\" already; choose another name, or delete that pose first")]
     PoseName(String),
 }
@@ -206,7 +206,8 @@ impl Operation {
         }
     }
 
-    /// Runs the operation on a rig: all of it, or none of it and an error. `symmetry` is the plane of live mirroring.
+    /// Runs the operation on a rig: applies all of it, or nothing and returns an error. `symmetry` is the plane of live
+    /// mirroring.
     pub fn run(
         &self,
         rig: &mut Rig,
@@ -323,8 +324,8 @@ fn named_group(draft: &mut Draft, name: &str, color: Option<[f32; 3]>) -> Result
     Ok(Some(group.uid))
 }
 
-/// Colours of groups whose colour nobody chose; told apart also by people with a colour vision deficiency
-/// (the palette of Okabe and Ito 2008, without black).
+/// Colours of groups without a chosen colour, distinguishable with a colour vision deficiency, too (the palette of
+/// Okabe and Ito 2008, without black).
 const GROUP_COLORS: [[f32; 3]; 7] = [
     [0.90, 0.62, 0.00],
     [0.34, 0.71, 0.91],

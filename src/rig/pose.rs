@@ -1,7 +1,7 @@
-//! Poses: what is put on top of the rest pose.
+//! Poses: offsets on top of the rest pose.
 //!
-//! Rest and pose never mix: a pose is a list of offsets from rest, one for each joint that does not stand as it rests.
-//! Changing the rest pose keeps the offsets, and changing a pose never touches the rest pose.
+//! Rest and pose never mix: a pose is a list of offsets from rest, one for each joint that is not at rest. Changing the
+//! rest pose keeps the offsets, and changing a pose never touches the rest pose.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -10,10 +10,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::rig::{RestTransform, Rig, Uid};
 
-/// What a pose adds to the rest transform of one joint, in the joint's own space at rest.
+/// Offset of a pose from the rest transform of one joint, in the joint's own space at rest.
 ///
-/// Both are multiplied as Bevy multiplies two [`Transform`]s: the translation is moved and turned by rest, rotations
-/// follow one another, scales are multiplied axis by axis. So there is never any shear, and the way back is exact.
+/// Rest transform and offset are multiplied as Bevy multiplies two [`Transform`]s: the translation is moved and turned
+/// by rest, rotations follow one another, scales are multiplied axis by axis. So there is never any shear, and the way
+/// back is exact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseOffset {
     /// Translation in the joint's space at rest.
@@ -31,16 +32,16 @@ impl Default for PoseOffset {
 }
 
 impl PoseOffset {
-    /// The joint as it rests.
+    /// The offset of a joint at rest.
     pub const IDENTITY: Self = Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE };
 
-    /// An offset that only turns.
+    /// An offset with a rotation only.
     pub fn from_rotation(rotation: Quat) -> Self {
         Self { rotation, ..Self::IDENTITY }
     }
 
-    /// The offset that takes a joint from `rest` to `posed`, both relative to its parent. What a rest scale of zero
-    /// hides stays at rest.
+    /// The offset that takes a joint from `rest` to `posed`, both relative to its parent. An axis with a rest scale of
+    /// zero keeps its rest values.
     pub fn between(rest: &RestTransform, posed: &Transform) -> Self {
         let back = rest.rotation.inverse();
         let divided = |value: f32, by: f32, otherwise: f32| if by == 0.0 { otherwise } else { value / by };
@@ -60,7 +61,7 @@ impl PoseOffset {
         }
     }
 
-    /// Where a joint with that rest transform stands, relative to its parent.
+    /// Posed transform of a joint with that rest transform, relative to its parent.
     pub fn on(&self, rest: &RestTransform) -> Transform {
         if *self == Self::IDENTITY {
             return (*rest).into();
@@ -72,14 +73,14 @@ impl PoseOffset {
         }
     }
 
-    /// True if the joint stands as it rests, to `tolerance` (of lengths, factors and half the sine of the angle).
+    /// Returns `true` if the joint is at rest, to `tolerance` (of lengths, factors and half the sine of the angle).
     pub fn is_rest(&self, tolerance: f32) -> bool {
         self.translation.abs().max_element() <= tolerance
             && self.rotation.xyz().abs().max_element() <= tolerance
             && (self.scale - Vec3::ONE).abs().max_element() <= tolerance
     }
 
-    /// True if every number is finite and the rotation has a length.
+    /// Returns `true` if every number is finite and the rotation has unit length.
     pub fn is_valid(&self) -> bool {
         let Self { translation, rotation, scale } = *self;
         RestTransform { translation, rotation, scale }.is_valid()
@@ -89,41 +90,41 @@ impl PoseOffset {
 /// Values of attributes, by node and name.
 pub type AttributeValues = BTreeMap<Uid, BTreeMap<String, f32>>;
 
-/// A pose that was kept under a name.
+/// A pose stored under a name.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StoredPose {
     /// Identity.
     pub uid: Uid,
     /// The name people see.
     pub name: String,
-    /// Offsets of the joints and created nodes that do not stand as they rest. A joint that was deleted since, or a node
-    /// that is not built at present, may be named: its part of the pose waits for it.
+    /// Offsets of the joints and created nodes that are not at rest. Entries of deleted joints and of nodes that are
+    /// not built at present stay: their part of the pose waits for them.
     pub offsets: BTreeMap<Uid, PoseOffset>,
     /// Attributes that were set.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: AttributeValues,
 }
 
-/// Poses of a rig.
+/// Poses.
 impl Rig {
-    /// What the current pose adds to the rest transform of a joint, or to where a created node was built; `None` for one
-    /// that stands as it rests.
+    /// The current pose's offset on top of the rest transform of a joint or the built base of a created node; `None` at
+    /// rest.
     pub fn offset(&self, joint: Uid) -> Option<&PoseOffset> {
         self.pose.get(&joint)
     }
 
-    /// The current pose: offsets of all joints and created nodes that do not stand as they rest. Nodes that are not
-    /// built at present keep theirs.
+    /// The current pose: offsets of all joints and created nodes that are not at rest. Nodes that are not built at
+    /// present keep their offsets.
     pub fn pose(&self) -> &BTreeMap<Uid, PoseOffset> {
         &self.pose
     }
 
-    /// The value that somebody has set an attribute of a joint or created node to.
+    /// The value that an attribute of a joint or created node has been set to.
     pub fn attribute_value(&self, node: Uid, name: &str) -> Option<f32> {
         self.values.get(&node)?.get(name).copied()
     }
 
-    /// All attributes that somebody has set. Nodes that are not built at present keep theirs.
+    /// Attributes that have been set. Nodes that are not built at present keep theirs.
     pub fn attribute_values(&self) -> &AttributeValues {
         &self.values
     }
@@ -138,7 +139,7 @@ impl Rig {
         self.poses.iter().find(|pose| pose.uid == uid)
     }
 
-    /// Where a joint stands in the current pose, relative to its parent. Identity for an unknown joint.
+    /// Transform of a joint in the current pose, relative to its parent. Identity for an unknown joint.
     pub fn posed_local(&self, joint: Uid) -> Transform {
         let Some(data) = self.joint(joint).map(|joint| &joint.data) else { return Transform::IDENTITY };
         self.pose.get(&joint).map_or_else(|| data.rest.into(), |offset| offset.on(&data.rest))
@@ -150,8 +151,9 @@ impl Rig {
         self.ancestors(joint).fold(own, |global, above| affine(&self.posed_local(above.data.uid)) * global)
     }
 
-    /// Takes a place as the pose of `joint` holds it to where it is at rest, both in the rig's space: what is placed on the
-    /// posed mesh, to hang on `joint`, rests there. Exactly the identity for `None` and where no joint above is posed.
+    /// Matrix from posed to rest positions for children of `joint`, both in the rig's space: a joint placed on the
+    /// posed mesh below `joint` rests at the mapped position. Exactly the identity for `None` and if no joint above is
+    /// posed.
     pub fn rest_from_pose(&self, joint: Option<Uid>) -> Affine3 {
         let Some(joint) = joint else { return Affine3::IDENTITY };
         let is_posed = self.pose.contains_key(&joint)

@@ -1,9 +1,9 @@
-//! References to nodes without names: what a command works on.
+//! References: the nodes that a command works on, selected without names.
 //!
-//! A [`NodeRef`] says where nodes come from (a joint, what a command creates, ...), narrows that down (group, label,
-//! type, role) and picks some of what is left. It holds uids only, so renaming breaks nothing, and it may point at
-//! nodes that an earlier command has yet to create. A parameter holds a union of them, [`NodeRefs`], which is one
-//! string in files.
+//! A [`NodeRef`] has a source of nodes (a joint, the nodes of a command, ...), filters (group, label, type, role) and a
+//! choice of places in the filtered list. It holds uids only, so renaming breaks nothing, and it may point at nodes
+//! that an earlier command has yet to create. A parameter holds a union of them, [`NodeRefs`], which is one string in
+//! files.
 //!
 //! # Text form
 //!
@@ -23,7 +23,7 @@
 //!            | "group:" ( "any" | "own" | named )          local group; any if left out
 //!            | "label:" named                              nodes with the label of that joint or command
 //!            | "type:" type { "," type }                   kinds of node; any if left out
-//!            | "role:" name                                what the creating command says the node is for
+//!            | "role:" name                                purpose of the node, named by the creating command
 //!            | "pick:" ( "all" | "none" | place { "," place } )  which of them, in that order; all if left out
 //! place      = "START" | "MIDDLE" | "END" | number         numbers count from 0
 //! named      = [ name ] "#" uid | name                     the latter only where names can be looked up
@@ -54,8 +54,8 @@ pub use params::{
 };
 pub(in crate::rig) use params::{map_text_fields, map_uids};
 
-/// One reference: an ordered list of nodes once it is resolved, parents first, siblings as authored, then in the order
-/// of creation.
+/// A reference. It resolves to an ordered list of nodes: parents first, siblings as authored, then in the order of
+/// creation.
 #[derive(Reflect, Debug, Clone, PartialEq, Eq, Hash, Default)]
 #[reflect(Default)]
 pub struct NodeRef {
@@ -67,11 +67,11 @@ pub struct NodeRef {
     pub label: Option<Uid>,
     /// Kinds of node; empty for any.
     pub types: NodeTypes,
-    /// Where the nodes come from.
+    /// Source of the nodes.
     pub source: Source,
-    /// What the command that creates the nodes says they are for.
+    /// Role of the nodes, as the creating command names it.
     pub role: Option<String>,
-    /// Which of the nodes that are left.
+    /// Choice of nodes from the filtered list.
     pub pick: Pick,
 }
 
@@ -90,7 +90,7 @@ pub enum RigScope {
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[reflect(Default)]
 pub enum GroupScope {
-    /// All, and nodes without one.
+    /// Nodes of all groups, and nodes without one.
     #[default]
     Any,
     /// The group of the joint that carries the tag (nodes without a group if it has none).
@@ -99,18 +99,18 @@ pub enum GroupScope {
     Group(Uid),
 }
 
-/// Where the nodes of a reference come from.
+/// Source of a reference's nodes.
 #[derive(Reflect, Debug, Clone, PartialEq, Eq, Hash, Default)]
 #[reflect(Default)]
 pub enum Source {
-    /// Every node: joints of the document and what commands created so far.
+    /// Every node: joints of the document and nodes that commands have created so far.
     #[default]
     Any,
     /// The joint that carries the tag.
     This,
     /// The joints of the document.
     Joints,
-    /// One joint.
+    /// A single joint.
     Joint(Uid),
     /// A joint and the joints below it.
     Hierarchy(Top),
@@ -131,27 +131,27 @@ pub enum Top {
     Joint(Uid),
 }
 
-/// Which nodes of a list.
+/// Choice of nodes from a list.
 #[derive(Reflect, Debug, Clone, PartialEq, Eq, Hash, Default)]
 #[reflect(Default)]
 pub enum Pick {
-    /// All of them, in their order.
+    /// All nodes, in their order.
     #[default]
     All,
-    /// These, in this order.
+    /// The nodes at these places, in this order.
     List(Vec<PickAt>),
 }
 
-/// One place in a list of nodes.
+/// A place in a list of nodes.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PickAt {
     /// The first.
     Start,
-    /// The one in the middle; of two, the second.
+    /// The middle one; the later of two.
     Middle,
     /// The last.
     End,
-    /// Counted from 0.
+    /// The node of this number, counted from 0.
     Number(u32),
 }
 
@@ -193,10 +193,10 @@ impl NodeTypes {
     pub const JOINT: Self = Self(1);
     /// Controls.
     pub const CONTROL: Self = Self(1 << 1);
-    /// Nodes that only carry others.
+    /// Nodes that only carry others (nulls).
     pub const NULL: Self = Self(1 << 2);
 
-    /// Every kind with its name in the text form.
+    /// Names of the kinds in the text form.
     pub const NAMES: [(&'static str, Self); 3] =
         [("joint", Self::JOINT), ("control", Self::CONTROL), ("null", Self::NULL)];
 
@@ -205,12 +205,12 @@ impl NodeTypes {
         Self(self.0 | other.0)
     }
 
-    /// True if the set is empty, that is, if any kind will do.
+    /// Returns `true` if the set is empty, which stands for any kind.
     pub const fn is_any(self) -> bool {
         self.0 == 0
     }
 
-    /// True if a node of these kinds is meant.
+    /// Returns `true` if the set admits a node of these kinds.
     pub const fn allows(self, node: Self) -> bool {
         self.0 == 0 || self.0 & node.0 != 0
     }
@@ -251,7 +251,7 @@ impl NodeRef {
         Source::This.into()
     }
 
-    /// One joint.
+    /// A single joint.
     pub fn joint(joint: Uid) -> Self {
         Source::Joint(joint).into()
     }
@@ -266,32 +266,32 @@ impl NodeRef {
         Source::Module(name.into()).into()
     }
 
-    /// Only nodes with that role.
+    /// The reference restricted to nodes with a role.
     pub fn with_role(self, role: impl Into<String>) -> Self {
         Self { role: Some(role.into()), ..self }
     }
 
-    /// Only nodes of these kinds.
+    /// The reference restricted to nodes of these kinds.
     pub fn of_types(self, types: NodeTypes) -> Self {
         Self { types, ..self }
     }
 
-    /// Only nodes in these local groups.
+    /// The reference restricted to nodes in these local groups.
     pub fn in_group(self, group: GroupScope) -> Self {
         Self { group, ..self }
     }
 
-    /// Only nodes with the label of that joint or command.
+    /// The reference restricted to nodes with the label of that joint or command.
     pub fn labelled(self, bearer: Uid) -> Self {
         Self { label: Some(bearer), ..self }
     }
 
-    /// Only these of the list.
+    /// The reference restricted to these places of its list.
     pub fn picking(self, places: impl Into<Vec<PickAt>>) -> Self {
         Self { pick: Pick::List(places.into()), ..self }
     }
 
-    /// Every uid in the reference, with what it names.
+    /// Uids in the reference, with the kind of object of each.
     pub fn uids_mut(&mut self) -> impl Iterator<Item = (NameKind, &mut Uid)> {
         let rig = match &mut self.rig {
             RigScope::Own => None,
@@ -310,7 +310,7 @@ impl NodeRef {
         source.into_iter().chain(rig).chain(group).chain(label)
     }
 
-    /// Every uid in the reference, with what it names.
+    /// Uids in the reference, with the kind of object of each.
     pub fn uids(&self) -> impl Iterator<Item = (NameKind, Uid)> {
         let mut copy = self.clone();
         let list: Vec<_> = copy.uids_mut().map(|(kind, uid)| (kind, *uid)).collect();
@@ -332,7 +332,7 @@ impl NodeRefs {
     /// A reference to nothing.
     pub const NONE: Self = Self(Vec::new());
 
-    /// True if there is no reference at all.
+    /// Returns `true` without references.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -345,7 +345,7 @@ impl NodeRefs {
     /// Reads the text form; a name without a uid is looked up.
     ///
     /// # Errors
-    /// [`ReferenceError`] with the place of what is not understood, unknown or ambiguous, and the nearest matches.
+    /// [`ReferenceError`] with the place of malformed text or of an unknown or ambiguous name, and the nearest matches.
     pub fn parse(text: &str, names: &dyn Names) -> Result<Self, ReferenceError> {
         text::read(text, Some(names)).map(Self)
     }

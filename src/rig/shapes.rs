@@ -1,8 +1,8 @@
 //! Wire shapes of controls, by name: lines in unit size.
 //!
-//! Every shape reaches from -1 to 1 at its widest. Flat ones lie in the plane of X and Z and face along Y; those with a
-//! direction point along Z, or along Y if they stand. A control draws them `size` times as large, turned and moved by
-//! its shape's offset.
+//! Every shape reaches from -1 to 1 at its widest. Flat ones lie in the plane of X and Z and face along Y; shapes with
+//! a direction point along Z, or along Y if they are upright. A control draws its shape scaled by `size` and
+//! transformed by the shape's offset.
 
 use std::{collections::BTreeMap, f32::consts::TAU, sync::LazyLock};
 
@@ -68,7 +68,7 @@ fn arc(radius: f32, from: f32, to: f32, pieces: usize) -> Vec<Vec3> {
 
 fn circle(radius: f32) -> Vec<Vec3> {
     let mut points = arc(radius, 0.0, 1.0, 32);
-    // Closed to the bit.
+    // The last point equals the first to the bit.
     points[32] = points[0];
     points
 }
@@ -133,7 +133,7 @@ fn four_arrows() -> Vec<Vec3> {
     turned(&quarter, 4)
 }
 
-/// A run of points repeated around Y (a quarter turn each for 4), closed.
+/// A run of points repeated `times` times around Y (a quarter turn each for 4), closed.
 fn turned(points: &[(f32, f32)], times: usize) -> Vec<Vec3> {
     let mut all = Vec::with_capacity(points.len() * times + 1);
     for turn in 0..times {
@@ -161,7 +161,7 @@ fn locator() -> Lines {
     vec![vec![Vec3::NEG_X, Vec3::X], vec![Vec3::NEG_Y, Vec3::Y], vec![Vec3::NEG_Z, Vec3::Z]]
 }
 
-/// A stick with a ball, standing on the control.
+/// A stick with a ball, upright on the control.
 fn pin() -> Lines {
     let ball = |point: Vec3| Vec3::new(point.x * 0.25, 0.75 + point.z * 0.25, 0.0);
     let ring = circle(1.0);
@@ -175,7 +175,7 @@ fn half_circle() -> Vec<Vec3> {
     points
 }
 
-/// A circle with four arrow heads, for turning.
+/// A circle with four arrow heads, for rotations.
 fn ring_arrows() -> Lines {
     let head = |turn: f32| {
         let (s, c) = (sin(TAU * turn), cos(TAU * turn));
@@ -193,7 +193,7 @@ fn spiral() -> Vec<Vec3> {
     (0..=72).map(at).collect()
 }
 
-/// Facing along Z: two lids and an iris in the plane of X and Y.
+/// An eye that faces along Z: two lids and an iris in the plane of X and Y.
 fn eye() -> Lines {
     let lid = |sign: f32| {
         let at = |i: usize| {

@@ -1,4 +1,4 @@
-//! Steps: what one gesture did to a rig, whole, so that it can be taken back, done again, kept in a file and replayed.
+//! Steps: the changes of one gesture, which can be undone, redone, stored in a file and replayed.
 
 use std::{borrow::Cow, fmt, sync::Arc, time::Duration};
 
@@ -7,33 +7,33 @@ use crate::rig::{EditError, Rig, RigEdit, Uid};
 /// Edits that were applied together, and the selection around them.
 #[derive(Clone, PartialEq)]
 pub struct Step {
-    /// What was done, in a few words.
+    /// Description of the step, in a few words.
     pub name: Cow<'static, str>,
     /// The edits, in the order they were applied.
     pub forward: Vec<RigEdit>,
     /// The edits that take them back, in the order to apply them.
     pub backward: Vec<RigEdit>,
-    /// What was selected before.
+    /// Selection before the step.
     pub before: Vec<Uid>,
-    /// What was selected afterwards.
+    /// Selection after the step.
     pub after: Vec<Uid>,
 }
 
-/// Short, because weights inside would fill pages.
+/// The debug form is short, because weights would fill pages.
 impl fmt::Debug for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Step({:?}, {} edits)", self.name, self.forward.len())
     }
 }
 
-/// A change that has been made to a rig and its history.
+/// A change that has been made to a rig, with its place in the history.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Committed {
-    /// Something new: what had been undone can no longer be done again.
+    /// A new step: undone steps can no longer be redone.
     Done(Arc<Step>),
-    /// The last step in effect was taken back.
+    /// The last step in effect was undone.
     Undone(Arc<Step>),
-    /// The last step taken back was done again.
+    /// The last undone step was redone.
     Redone(Arc<Step>),
 }
 
@@ -45,7 +45,7 @@ impl Committed {
         }
     }
 
-    /// The edits that were applied, in order, and what was selected afterwards.
+    /// The applied edits, in order, and the selection after them.
     pub fn effect(&self) -> (&[RigEdit], &[Uid]) {
         match self {
             Self::Done(step) | Self::Redone(step) => (&step.forward, &step.after),
@@ -54,29 +54,30 @@ impl Committed {
     }
 }
 
-/// Takes what is committed to a safe place, in order. Every function returns at once but [`StepSink::flush`].
+/// Sink of committed changes, which stores them safely and in order. Every function but [`StepSink::flush`] returns at
+/// once.
 pub trait StepSink: Send + Sync {
     /// Takes one change.
     fn record(&self, committed: Committed);
 
-    /// The reason why changes do not reach their place at the moment; `None` while all is well.
+    /// The reason why changes cannot be stored at the moment; `None` while they can.
     fn trouble(&self) -> Option<Arc<str>>;
 
-    /// Waits until everything recorded so far is safe, at most for `limit`; else says why it is not.
+    /// Waits until all recorded changes are stored, at most for `limit`; returns the reason if they are not.
     fn flush(&self, limit: Duration) -> Result<(), String>;
 }
 
 /// The steps of a history.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Timeline {
+pub struct UndoStacks {
     /// Steps in effect, oldest first.
     pub done: Vec<Arc<Step>>,
-    /// Steps taken back; the last one is done again first.
+    /// Undone steps; the last one is redone first.
     pub undone: Vec<Arc<Step>>,
 }
 
-impl Timeline {
-    /// Follows a change. A step that is not known yet (it was done before the timeline began) takes its place in it.
+impl UndoStacks {
+    /// Follows a change. An unknown step (one done before the stacks began) is inserted.
     pub fn follow(&mut self, committed: &Committed) {
         match committed {
             Committed::Done(step) => {
@@ -98,12 +99,12 @@ impl Timeline {
         }
     }
 
-    /// True if undoing would take back this very step.
+    /// Returns `true` if undoing would undo this very step.
     pub fn undoes(&self, step: &Arc<Step>) -> bool {
         self.done.last().is_some_and(|last| Arc::ptr_eq(last, step))
     }
 
-    /// True if redoing would do this very step.
+    /// Returns `true` if redoing would redo this very step.
     pub fn redoes(&self, step: &Arc<Step>) -> bool {
         self.undone.last().is_some_and(|next| Arc::ptr_eq(next, step))
     }
@@ -114,31 +115,31 @@ impl Timeline {
 pub struct Replayed {
     /// The document.
     pub rig: Rig,
-    /// What was selected after the last change; `None` if there was none.
+    /// Selection after the last change; `None` without changes.
     pub selection: Option<Vec<Uid>>,
     /// The history of the replayed changes.
-    pub timeline: Timeline,
-    /// How many changes are in the document.
+    pub stacks: UndoStacks,
+    /// Number of changes in the document.
     pub applied: usize,
-    /// Why the change after those could not be made; it and all later ones are missing.
+    /// Error of the first change that could not be made; it and all later ones are missing.
     pub refused: Option<EditError>,
 }
 
-/// Makes changes on `rig` again. The first `contained` of them are in it already and only become history.
+/// Applies changes to `rig` again. The first `contained` of them are already in it and only become history.
 ///
-/// A change that the rig refuses ends the replay; it is then left out as a whole.
+/// A change that the rig refuses ends the replay and is left out as a whole.
 pub fn replay(mut rig: Rig, changes: &[Committed], contained: usize) -> Replayed {
     let mut replayed = Replayed::default();
     for (number, committed) in changes.iter().enumerate() {
         let (edits, selection) = committed.effect();
         if number >= contained {
-            // As one edit, so that a refusal leaves nothing half done.
+            // The edits are applied as one, so that a refusal leaves nothing half done.
             if let Err(error) = rig.apply(&RigEdit::Batch(edits.to_vec())) {
                 replayed.refused = Some(error);
                 break;
             }
         }
-        replayed.timeline.follow(committed);
+        replayed.stacks.follow(committed);
         replayed.selection = Some(selection.to_vec());
         replayed.applied += 1;
     }

@@ -1,23 +1,23 @@
-//! Tags: what a joint is told to do.
+//! Tags: instructions on joints.
 //!
 //! A command tag names a module and its parameters; a feature tag names a switch that turns commands on and off. The
-//! parameters stay text here: only the module that owns them knows their types, so tags of modules that are not
-//! installed travel through unharmed.
+//! parameters stay text here: only their module knows their types, so tags of modules that are not installed are
+//! preserved.
 
 use serde::{Deserialize, Serialize};
 
 use crate::rig::Uid;
 
-/// One tag on a joint.
+/// A tag on a joint.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Tag {
+pub struct TagData {
     /// Identity.
     pub uid: Uid,
     /// A disabled tag is skipped by a build.
     pub enabled: bool,
     /// A note for people.
     pub comment: String,
-    /// What the tag is.
+    /// Kind of the tag with its data.
     pub kind: TagKind,
 }
 

@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 
 /// A 64-bit random number that identifies a rig, group, joint or tag for good; written as 16 hexadecimal digits.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[component(immutable)]
 #[reflect(Component)]
 pub struct Uid(pub u64);
 
@@ -44,14 +45,14 @@ impl<'de> Deserialize<'de> for Uid {
     }
 }
 
-/// Makes uids; the same seed makes the same ones (SplitMix64).
+/// Source of uids; the same seed gives the same uids (SplitMix64).
 #[derive(Resource, Debug, Clone, PartialEq, Eq)]
 pub struct UidSource {
     state: u64,
 }
 
 impl UidSource {
-    /// A source that repeats itself for the same seed.
+    /// A source that gives the same uids for the same seed.
     pub fn seeded(seed: u64) -> Self {
         Self { state: seed }
     }

@@ -4,10 +4,10 @@ use bevy::math::{Quat, Vec3};
 
 use crate::solve::rotate::{between_frames, direction, perpendicular_or_any, unit};
 
-/// What the up axis of an aimed joint turns to.
+/// Direction that the up axis of an aimed joint turns to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Up {
-    /// As near as it can be to where it is now.
+    /// The current direction of the up axis, as far as the aim allows.
     Keep,
     /// A direction in the rig's space, any length.
     Vector(Vec3),
@@ -34,9 +34,9 @@ impl Default for Aim {
 impl Aim {
     /// The rotation (rig space) of a joint at `position`, now turned by `current`, that aims at `target`.
     ///
-    /// With the target on the joint, or input that is not finite, it is `current`. An up direction in line with the aim
-    /// counts as [`Up::Keep`]; where that is in line, too, any perpendicular direction serves. An aim axis without
-    /// length counts as Y; the up axis is used as far as it is perpendicular to the aim axis.
+    /// With the target on the joint, or input that is not finite, the result is `current`. An up direction in line with
+    /// the aim counts as [`Up::Keep`]; if the current up axis is in line, too, any perpendicular direction is used. An
+    /// aim axis without length counts as Y; the up axis is used as far as it is perpendicular to the aim axis.
     #[inline]
     pub fn solve(&self, position: Vec3, target: Vec3, up: Up, current: Quat) -> Quat {
         let current = unit(current);
@@ -48,7 +48,7 @@ impl Aim {
             Up::Vector(vector) => vector,
             Up::Point(point) => point - position,
         };
-        // Last the axis that the aim has just left: perpendicular whenever the kept up axis is not.
+        // The last candidate is the previous aim axis: perpendicular whenever the current up axis is not.
         let up = perpendicular_or_any(aim, &[wanted, current * up_axis, current * axis]);
         between_frames([axis, up_axis], [aim, up])
     }

@@ -7,7 +7,7 @@
 use bevy::math::{Quat, Vec3};
 
 use crate::solve::{
-    fabrik::{Effort, Outcome},
+    fabrik::{IterationResult, IterationSettings},
     limit::JointLimit,
     rotate::{about, arc, direction, perpendicular_or_any, unit},
 };
@@ -15,43 +15,43 @@ use crate::solve::{
 /// A joint of a chain, relative to the joint above it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CcdJoint {
-    /// Its position in the space of the joint above (for the first joint: of the chain's parent).
+    /// Position in the space of the joint above (for the first joint: of the chain's parent).
     pub offset: Vec3,
-    /// Its rotation at rest, from which limits count, a unit quaternion.
+    /// Rotation at rest, from which limits count, a unit quaternion.
     pub rest: Quat,
-    /// How far it may turn.
+    /// Limit of the rotation.
     pub limit: JointLimit,
 }
 
-/// A chain as [`ccd`] takes it.
+/// Input of [`ccd`]: a chain and the space that it hangs in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CcdChain<'a> {
     /// Joints from root to tip.
     pub joints: &'a [CcdJoint],
     /// Position of the end in the space of the last joint.
     pub end: Vec3,
-    /// Position of the space that the first joint is relative to, in the rig's space.
+    /// Position of the parent space of the first joint, in the rig's space.
     pub position: Vec3,
-    /// Rotation of that space.
+    /// Rotation of the parent space of the first joint, in the rig's space.
     pub rotation: Quat,
 }
 
-/// The turn that starts a chain off which stands in line with its goal, in radians.
+/// First turn of a chain that is straight and in line with its goal, in radians.
 const NUDGE: f32 = 0.1;
 
 /// Turns the joints of a chain so that its end is on `goal` (rig space), or as near as limits allow.
 ///
 /// `rotations` holds the joints' rotations relative to the joint above, and then the solved ones, always within the
 /// limits. `posed` receives position and rotation of each joint in the rig's space; both are as long as the chain
-/// (what is longer is left alone; a shorter one shortens the chain). `O(joints)` a pass. A goal that is not finite
-/// leaves the rotations as they are but for their limits.
+/// (extra entries are left alone; a shorter list shortens the chain). `O(joints)` a pass. A goal that is not finite
+/// leaves the rotations unchanged but for their limits.
 pub fn ccd(
     chain: &CcdChain,
     goal: Vec3,
-    effort: &Effort,
+    settings: &IterationSettings,
     rotations: &mut [Quat],
     posed: &mut [(Vec3, Quat)],
-) -> Outcome {
+) -> IterationResult {
     let count = chain.joints.len().min(rotations.len()).min(posed.len());
     let (joints, rotations, posed) = (&chain.joints[..count], &mut rotations[..count], &mut posed[..count]);
     for (rotation, joint) in rotations.iter_mut().zip(joints) {
@@ -59,31 +59,31 @@ pub fn ccd(
     }
     let mut end = pose(chain, joints, rotations, posed);
     if count == 0 || !(goal.is_finite() && end.is_finite()) {
-        return Outcome::default();
+        return IterationResult::default();
     }
     let mut iterations = 0;
-    if end.distance(goal) > effort.tolerance && in_line(posed, end, goal) {
+    if end.distance(goal) > settings.tolerance && in_line(posed, end, goal) {
         let line = direction(end - posed[0].0).or_else(|| direction(goal - posed[0].0)).unwrap_or(Vec3::X);
-        let axis = line.cross(perpendicular_or_any(line, &[effort.bend]));
+        let axis = line.cross(perpendicular_or_any(line, &[settings.bend]));
         for i in 0..count {
-            // The first turns towards the bend and all others back.
+            // The first joint turns towards the bend and all others back.
             let angle = if i == 0 { NUDGE } else { -NUDGE };
             turn(chain, joints, rotations, posed, i, about(axis, angle));
         }
         end = pose(chain, joints, rotations, posed);
     }
-    while iterations < effort.iterations && end.distance(goal) > effort.tolerance {
+    while iterations < settings.iterations && end.distance(goal) > settings.tolerance {
         for i in (0..count).rev() {
             let (position, _) = posed[i];
             let ends = direction(end - position).zip(direction(goal - position));
             let Some((from, to)) = ends else { continue };
-            let turned = turn(chain, joints, rotations, posed, i, arc(from, to, effort.bend));
+            let turned = turn(chain, joints, rotations, posed, i, arc(from, to, settings.bend));
             end = position + turned * (end - position);
         }
         end = pose(chain, joints, rotations, posed);
         iterations += 1;
     }
-    Outcome { iterations, distance: end.distance(goal) }
+    IterationResult { iterations, distance: end.distance(goal) }
 }
 
 /// The nearest local rotation that the joint's limit allows.
@@ -95,13 +95,13 @@ fn limited(joint: &CcdJoint, rotation: Quat) -> Quat {
     (rest * joint.limit.clamp(rest.conjugate() * rotation)).normalize()
 }
 
-/// Rotation that joint `i` is relative to.
+/// Rotation of the space that joint `i` is relative to, in the rig's space.
 fn above(chain: &CcdChain, posed: &[(Vec3, Quat)], i: usize) -> Quat {
     if i == 0 { unit(chain.rotation) } else { posed[i - 1].1 }
 }
 
-/// Turns joint `i` as far towards `by` (rig space) as its limit allows; the turn that it made. Joints below are not
-/// posed again.
+/// Turns joint `i` towards `by` (rig space) as far as its limit allows; returns the turn that it made. Joints below
+/// keep their old poses.
 fn turn(
     chain: &CcdChain,
     joints: &[CcdJoint],
@@ -117,7 +117,7 @@ fn turn(
     (posed[i].1 * before.conjugate()).normalize()
 }
 
-/// Poses all joints; the end's position.
+/// Poses all joints; returns the position of the end.
 fn pose(chain: &CcdChain, joints: &[CcdJoint], rotations: &[Quat], posed: &mut [(Vec3, Quat)]) -> Vec3 {
     let (mut position, mut rotation) = (chain.position, unit(chain.rotation));
     for (i, joint) in joints.iter().enumerate() {
@@ -128,7 +128,7 @@ fn pose(chain: &CcdChain, joints: &[CcdJoint], rotations: &[Quat], posed: &mut [
     position + rotation * chain.end
 }
 
-/// True if neither a joint nor the end leaves the line from the first joint to `goal`.
+/// Returns `true` if the joints and the end lie on the line from the first joint to `goal`.
 fn in_line(posed: &[(Vec3, Quat)], end: Vec3, goal: Vec3) -> bool {
     let root = posed[0].0;
     let points = || posed.iter().map(|(position, _)| *position).chain([end, goal]);

@@ -1,15 +1,15 @@
 //! Driven keys: a curve from one number to another.
 //!
-//! Between keys a curve holds, goes straight or runs smoothly; slopes that are left open are chosen so that it never
-//! overshoots its keys (Fritsch and Butland, "A method for constructing local monotone piecewise cubic interpolants",
-//! SIAM J. Sci. Stat. Comput. 5(2), 1984).
+//! Between keys a curve holds, goes straight or runs smoothly; slopes that are left open are chosen so that the curve
+//! never overshoots its keys (Fritsch and Butland, "A method for constructing local monotone piecewise cubic
+//! interpolants", SIAM J. Sci. Stat. Comput. 5(2), 1984).
 
 use thiserror::Error;
 
-/// How a curve runs from a key to the next.
+/// Interpolation of a curve from a key to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Interpolation {
-    /// Holds the value up to the next key.
+    /// Constant: the value of the key up to the next one.
     Constant,
     /// A straight line.
     Linear,
@@ -18,13 +18,13 @@ pub enum Interpolation {
     Smooth,
 }
 
-/// How a curve goes on before its first and after its last key.
+/// Extrapolation of a curve before its first and after its last key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub enum Beyond {
-    /// With the value of that key.
+pub enum Extrapolation {
+    /// Constant: the value of the end key.
     #[default]
     Hold,
-    /// Straight, with the slope that the curve has there.
+    /// Linear: a straight line with the slope of the curve at its end.
     Linear,
 }
 
@@ -36,11 +36,11 @@ pub struct CurveKey {
     pub x: f32,
     /// The driven value.
     pub y: f32,
-    /// How the curve runs from here to the next key.
+    /// Interpolation from this key to the next.
     pub interpolation: Interpolation,
-    /// Slope (driven by driving units) on the way in; chosen if open.
+    /// Slope (driven by driving units) before the key; chosen if open.
     pub slope_in: Option<f32>,
-    /// Slope on the way out; chosen if open.
+    /// Slope after the key; chosen if open.
     pub slope_out: Option<f32>,
 }
 
@@ -51,16 +51,16 @@ impl CurveKey {
     }
 }
 
-/// What is wrong with the keys of a curve. Keys are counted from 1.
+/// Error in the keys of a curve. Keys are counted from 1.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CurveError {
-    /// There is no key.
+    /// The curve has no key.
     #[error("the curve has no key; give it at least one")]
     Empty,
     /// A number is not finite.
     #[error("key {key} of the curve holds a number that is not finite; give it finite x, y and slopes")]
     NotFinite {
-        /// The key.
+        /// Number of the key, from 1.
         key: usize,
     },
     /// Keys are not in order.
@@ -69,16 +69,16 @@ pub enum CurveError {
          keys and leave only one at each x"
     )]
     Order {
-        /// The later key.
+        /// Number of the later key, from 1.
         key: usize,
-        /// Its x.
+        /// The later key's x.
         x: f32,
         /// The x of the key before it.
         before: f32,
     },
 }
 
-/// A key ready to use.
+/// A key with both slopes filled in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Knot {
     x: f32,
@@ -92,16 +92,16 @@ struct Knot {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     knots: Vec<Knot>,
-    beyond: [Beyond; 2],
+    extrapolation: [Extrapolation; 2],
 }
 
 impl Curve {
-    /// A curve through keys, which have ascending x; `beyond` says how it goes on before and after them.
+    /// A curve through keys, which have ascending x; `beyond` gives the extrapolation before and after them.
     ///
     /// # Errors
     ///
     /// See [`CurveError`]: no key, numbers that are not finite, keys out of order.
-    pub fn new(keys: &[CurveKey], beyond: [Beyond; 2]) -> Result<Self, CurveError> {
+    pub fn new(keys: &[CurveKey], extrapolation: [Extrapolation; 2]) -> Result<Self, CurveError> {
         if keys.is_empty() {
             return Err(CurveError::Empty);
         }
@@ -128,11 +128,11 @@ impl Curve {
                 interpolation: key.interpolation,
             }
         });
-        Ok(Self { knots: knots.collect(), beyond })
+        Ok(Self { knots: knots.collect(), extrapolation })
     }
 
-    /// The driven value at `x`; at NaN that of the first key. Always finite for keys of reasonable size: where numbers
-    /// overflow, the value of the nearest key before.
+    /// The driven value at `x`; at NaN that of the first key. The value is always finite for keys of reasonable size:
+    /// where numbers overflow, it is the value of the nearest key before.
     #[inline]
     pub fn evaluate(&self, x: f32) -> f32 {
         // Keys up to x, at least the first.
@@ -146,16 +146,16 @@ impl Curve {
         if y.is_finite() { y } else { knot.y }
     }
 
-    /// The value before the first (`side` 0) or after the last key (1).
+    /// The extrapolated value before the first (`side` 0) or after the last key (1).
     #[inline]
     fn outside(&self, side: usize, x: f32, knot: &Knot) -> f32 {
-        match self.beyond[side] {
-            Beyond::Hold => knot.y,
-            Beyond::Linear => knot.y + self.end_slope(side, knot) * (x - knot.x),
+        match self.extrapolation[side] {
+            Extrapolation::Hold => knot.y,
+            Extrapolation::Linear => knot.y + self.end_slope(side, knot) * (x - knot.x),
         }
     }
 
-    /// The slope with which a curve goes on: of its last piece where that is straight, else of the key.
+    /// The slope at the end of a curve: of its last piece where that is straight, else of the key.
     fn end_slope(&self, side: usize, knot: &Knot) -> f32 {
         let count = self.knots.len();
         if count < 2 {
@@ -195,7 +195,7 @@ fn chosen_slope(keys: &[CurveKey], i: usize) -> f32 {
     }
     let slope = |a: &CurveKey, b: &CurveKey| (b.y - a.y) / (b.x - a.x);
     let (before, after) = (slope(&keys[i - 1], &keys[i]), slope(&keys[i], &keys[i + 1]));
-    // As signs: their product may underflow.
+    // Signs are compared, because the product of the slopes may underflow.
     if before == 0.0 || after == 0.0 || (before < 0.0) != (after < 0.0) {
         return 0.0;
     }

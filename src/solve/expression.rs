@@ -2,11 +2,11 @@
 //!
 //! `clamp(curl * 90, 0, 90) + if(side > 0, 1, -1)`. There are numbers, names, `+ - * / % ^`, comparisons, `&&` and `||`
 //! (all of which give 1 or 0), parentheses and the functions of [`FUNCTIONS`]. Angles are in degrees. A sign binds
-//! weaker than a power (`-2^2` is -4), `%` has the sign of the divisor. There are no loops and no assignments, so an
-//! expression is finished in a time given by its length.
+//! weaker than a power (`-2^2` is -4), `%` has the sign of the divisor. There are no loops and no assignments, so the
+//! time of an evaluation is bounded by the expression's length.
 //!
-//! A scan of the text finds every error and its place, and hands an unambiguous form to the crate `exmex`, which keeps
-//! and evaluates it.
+//! A scan of the text finds every error and its place, and writes an unambiguous form, which the crate `exmex` compiles
+//! and evaluates.
 
 mod operators;
 mod scan;
@@ -23,32 +23,32 @@ pub const MOST_CHARACTERS: usize = 1000;
 /// The greatest depth of parentheses and function calls.
 pub const MOST_NESTED: usize = 32;
 
-/// The greatest number of numbers and names in an expression. So many are evaluated without allocating.
+/// The greatest number of numbers and names in an expression. Expressions up to it are evaluated without allocating.
 pub const MOST_OPERANDS: usize = 32;
 
-/// What is wrong with an expression, and where.
+/// Error in an expression, with its place.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("column {column}: {problem}")]
 pub struct ExpressionError {
     /// The first character in question, counted from 1.
     pub column: usize,
-    /// What is wrong.
+    /// Kind of the error.
     pub problem: ExpressionProblem,
 }
 
-/// What can be wrong with an expression.
+/// Kind of an error in an expression.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ExpressionProblem {
-    /// There is nothing.
+    /// The expression is empty.
     #[error("the expression is empty; write a number, a name or a formula")]
     Empty,
-    /// It is too long.
+    /// The expression is too long.
     #[error("the expression has more than {MOST_CHARACTERS} characters; split it into several")]
     TooLong,
-    /// It has too many numbers and names.
+    /// The expression has too many numbers and names.
     #[error("the expression has more than {MOST_OPERANDS} numbers and names; split it into several")]
     TooManyOperands,
-    /// It is nested too deeply.
+    /// The expression is nested too deeply.
     #[error("parentheses are nested more than {MOST_NESTED} deep; split the expression into several")]
     TooDeep,
     /// A character that the language does not have.
@@ -57,15 +57,15 @@ pub enum ExpressionProblem {
     /// `=` or `!` alone.
     #[error("`{found}` alone means nothing here; write {instead}")]
     Alone {
-        /// What is there.
+        /// Character found.
         found: char,
-        /// What may be meant.
+        /// Operators that may be meant.
         instead: &'static str,
     },
-    /// A number that is none, or too large.
+    /// A malformed or too large number.
     #[error("`{0}` is not a number that can be held; write it like 12.5 or 1e-3")]
     Number(String),
-    /// A name that is not known.
+    /// An unknown name.
     #[error("`{name}` is not known here{}", known(.nearest))]
     Unknown {
         /// The name.
@@ -78,12 +78,12 @@ pub enum ExpressionProblem {
     Arguments {
         /// The function.
         function: &'static str,
-        /// What it takes, in words.
+        /// Description of the arguments it takes.
         takes: &'static str,
-        /// What it has.
+        /// Number of arguments given.
         has: usize,
     },
-    /// An operator, a comma or the end where a number, a name or a parenthesis is due.
+    /// An operator, a comma or the end in place of a number, a name or a parenthesis.
     #[error("a number, a name or `(` must stand before {0}")]
     NoOperand(String),
     /// Two operands side by side.
@@ -98,10 +98,10 @@ pub enum ExpressionProblem {
     /// A comma outside of a function's arguments.
     #[error("a comma may stand only between the arguments of a function")]
     Comma,
-    /// Operators whose order is not agreed on.
+    /// Operators whose order of evaluation is ambiguous.
     #[error("`{0}` after `{0}` can be read two ways; use parentheses, or `&&` between comparisons")]
     Ambiguous(&'static str),
-    /// The evaluator does not take the expression although the scan did.
+    /// A failure of the evaluator on an expression that the scan accepted.
     #[error("the expression cannot be evaluated: {0}; write it in a simpler form")]
     Evaluator(String),
 }
@@ -111,9 +111,9 @@ fn known(nearest: &[String]) -> String {
     if list.is_empty() { "; check its spelling".to_owned() } else { format!("; is {} meant?", list.join(" or ")) }
 }
 
-/// What an expression comes to.
+/// Result of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Evaluated {
+pub struct Evaluation {
     /// The value; zero if it is not finite.
     pub value: f32,
     /// False if the value was not finite (a division by zero, the root of a negative number).
@@ -135,7 +135,7 @@ impl Expression {
     ///
     /// # Errors
     ///
-    /// See [`ExpressionProblem`]; the first in the text.
+    /// The first problem in the text; see [`ExpressionProblem`].
     pub fn new(text: &str, variables: &[&str]) -> Result<Self, ExpressionError> {
         let scanned = scan::scan(text, variables)?;
         let evaluator = |error: exmex::ExError| ExpressionError {
@@ -144,17 +144,17 @@ impl Expression {
         };
         let compiled = Box::new(FlatEx::parse_wo_compile(&scanned.canonical).map_err(evaluator)?);
         let expression = Self { text: text.to_owned(), used: scanned.used, compiled };
-        // Only here can the evaluator's own checks fail, so that later evaluations need not tell.
+        // A first evaluation runs the evaluator's own checks; later ones cannot fail.
         expression.compiled.eval(&vec![Pair::default(); expression.used.len()]).map_err(evaluator)?;
         Ok(expression)
     }
 
-    /// The text that it was made of.
+    /// Source text of the expression.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Indices of the variables that it depends on, ascending.
+    /// Indices of the variables that the expression depends on, ascending.
     pub fn used(&self) -> &[usize] {
         &self.used
     }
@@ -162,7 +162,7 @@ impl Expression {
     /// The value for these values of the variables, in the order in which they were declared; missing ones are zero.
     /// Does not allocate.
     #[inline]
-    pub fn evaluate(&self, values: &[f32]) -> Evaluated {
+    pub fn evaluate(&self, values: &[f32]) -> Evaluation {
         let mut taken = [Pair::default(); MOST_OPERANDS];
         let count = self.used.len().min(MOST_OPERANDS);
         for (taken, index) in taken.iter_mut().zip(&self.used) {
@@ -170,12 +170,12 @@ impl Expression {
         }
         let value = self.compiled.eval(&taken[..count]).map_or(f32::NAN, |pair| pair.0);
         let is_finite = value.is_finite();
-        Evaluated { value: if is_finite { value } else { 0.0 }, is_finite }
+        Evaluation { value: if is_finite { value } else { 0.0 }, is_finite }
     }
 }
 
 impl PartialEq for Expression {
-    /// Equal text over equal variables.
+    /// Expressions are equal if their text and variables are.
     fn eq(&self, other: &Self) -> bool {
         self.text == other.text && self.used == other.used
     }

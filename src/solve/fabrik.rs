@@ -1,52 +1,52 @@
-//! FABRIK: chains of any length that reach for a goal, by points only.
+//! FABRIK: chains of any length that reach for a goal, solved on joint positions only.
 //!
-//! Aristidou and Lasenby, "FABRIK: A fast, iterative solver for the inverse kinematics problem", Graphical Models 73(5),
-//! 2011: points are moved onto the goal from the end, then back onto the root, until the end is near enough.
+//! Aristidou and Lasenby, "FABRIK: A fast, iterative solver for the inverse kinematics problem", Graphical Models
+//! 73(5), 2011: points are moved onto the goal from the end, then back onto the root, until the end is near enough.
 
 use bevy::math::{Quat, Vec3};
 
 use crate::solve::rotate::{arc, direction, perpendicular_or_any};
 
-/// How hard an iterative solver tries.
+/// Settings of an iterative solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Effort {
-    /// The distance from end to goal that is good enough, in units of the rig's space.
+pub struct IterationSettings {
+    /// Distance from end to goal at which the solver stops, in units of the rig's space.
     pub tolerance: f32,
     /// The greatest number of passes.
     pub iterations: u32,
-    /// The direction towards which a chain bends that stands in line with its goal, which no pass would otherwise
-    /// bend; any length, rig space. Zero: a direction that depends on the chain only.
+    /// Direction in which a chain bends that is straight and in line with its goal, which no pass would otherwise bend;
+    /// any length, rig space. Zero: a direction that depends on the chain only.
     pub bend: Vec3,
 }
 
-impl Default for Effort {
+impl Default for IterationSettings {
     fn default() -> Self {
         Self { tolerance: 1e-4, iterations: 16, bend: Vec3::ZERO }
     }
 }
 
-/// What an iterative solver came to.
+/// Result of an iterative solver.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Outcome {
-    /// Passes that were made.
+pub struct IterationResult {
+    /// Number of passes made.
     pub iterations: u32,
-    /// The distance left from end to goal.
+    /// Remaining distance from end to goal.
     pub distance: f32,
 }
 
 /// Moves the points of a chain so that the last is on `goal`, or as near as it can be; the first stays.
 ///
-/// `lengths[i]` is the distance to keep between points `i` and `i + 1` (what lists have too much is left alone). A goal
-/// out of reach is aimed at by the straight chain. `O(points)` a pass. Points and lengths that are not finite leave
-/// the chain alone, and so does such a goal.
-pub fn fabrik(points: &mut [Vec3], lengths: &[f32], goal: Vec3, effort: &Effort) -> Outcome {
+/// `lengths[i]` is the distance to keep between points `i` and `i + 1` (extra entries of longer lists are left alone).
+/// A goal out of reach is aimed at by the straight chain. `O(points)` a pass. Points, lengths or a goal that are not
+/// finite leave the chain unchanged.
+pub fn fabrik(points: &mut [Vec3], lengths: &[f32], goal: Vec3, settings: &IterationSettings) -> IterationResult {
     let bones = lengths.len().min(points.len().saturating_sub(1));
     let lengths = &lengths[..bones];
     let finite = goal.is_finite()
         && points.iter().all(|point| point.is_finite())
         && lengths.iter().all(|length| length.is_finite() && *length >= 0.0);
     if bones == 0 || !finite {
-        return Outcome::default();
+        return IterationResult::default();
     }
     let points = &mut points[..=bones];
     let root = points[0];
@@ -57,15 +57,15 @@ pub fn fabrik(points: &mut [Vec3], lengths: &[f32], goal: Vec3, effort: &Effort)
         for i in 0..bones {
             points[i + 1] = points[i] + aim * lengths[i];
         }
-        return Outcome { iterations: 0, distance: points[bones].distance(goal) };
+        return IterationResult { iterations: 0, distance: points[bones].distance(goal) };
     }
     if in_line(points, goal) {
-        bend(points, lengths, goal, effort.bend);
+        bend(points, lengths, goal, settings.bend);
     }
     let mut iterations = 0;
-    // Where two points coincide the bone keeps the chain's way rather than a random one.
+    // Where two points coincide, the bone keeps the direction of the bone before it.
     let mut keep = direction(goal - root).unwrap_or(Vec3::X);
-    while iterations < effort.iterations && !(iterations > 0 && points[bones].distance(goal) <= effort.tolerance) {
+    while iterations < settings.iterations && !(iterations > 0 && points[bones].distance(goal) <= settings.tolerance) {
         points[bones] = goal;
         for i in (0..bones).rev() {
             keep = direction(points[i] - points[i + 1]).unwrap_or(keep);
@@ -78,10 +78,10 @@ pub fn fabrik(points: &mut [Vec3], lengths: &[f32], goal: Vec3, effort: &Effort)
         }
         iterations += 1;
     }
-    Outcome { iterations, distance: points[bones].distance(goal) }
+    IterationResult { iterations, distance: points[bones].distance(goal) }
 }
 
-/// True if no point leaves the line from the first point to `goal`.
+/// Returns `true` if all points lie on the line from the first point to `goal`.
 fn in_line(points: &[Vec3], goal: Vec3) -> bool {
     let root = points[0];
     let furthest = points
@@ -113,8 +113,8 @@ fn bend(points: &mut [Vec3], lengths: &[f32], goal: Vec3, towards: Vec3) {
 /// Turns the joints of a chain as its points moved from `before` to `after`, with the least twist between neighbours.
 ///
 /// `rotations` holds the joints' rotations in the rig's space at `before`, and then those at `after`: each joint turns
-/// with the one above it and on by the shortest way to its bone; the last joint turns with the one above it. Lists are
-/// used as far as the shortest goes. A bone without length turns with the one above.
+/// with the one above it, and then by the shortest rotation to its bone; the last joint turns with the one above it.
+/// Lists are used as far as the shortest goes. A bone without length turns with the one above.
 pub fn rotations_from_points(before: &[Vec3], after: &[Vec3], rotations: &mut [Quat]) {
     let count = before.len().min(after.len()).min(rotations.len());
     let mut turn = Quat::IDENTITY;

@@ -1,7 +1,7 @@
-//! Reverse foot: a foot that rolls over heel, ball and toe and tips over its edges, by a few numbers.
+//! Reverse foot: a foot that rolls over heel, ball and toe and tips over its edges, driven by a few numbers.
 //!
-//! A chain of pivots stands between the control and the ankle: heel, toe tip, edges, ball. Each turns all that follow;
-//! the ankle that comes out is the goal of the leg's solver, and the toes turn without the ball's lift.
+//! A chain of pivots lies between the control and the ankle: heel, toe tip, edges, ball. Each turns all pivots after
+//! it; the resulting ankle is the goal of the leg's solver, and the toes turn without the ball's lift.
 
 use bevy::math::{Quat, Vec3};
 
@@ -29,30 +29,31 @@ pub struct FootPivots {
     pub up: Vec3,
 }
 
-/// What the foot does. Angles in degrees, as people type them.
+/// Inputs of the foot. Angles are in degrees, as people type them.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct FootControls {
-    /// Negative: back over the heel. Positive: over the ball up to [`FootControls::break_angle`], then over the toe.
+    /// Roll. Negative: back over the heel. Positive: over the ball up to [`FootControls::break_angle`], then over the
+    /// toe.
     pub roll: f32,
-    /// The roll at which the foot begins to go over from ball to toe.
+    /// Roll at which the foot begins to go over from ball to toe.
     pub break_angle: f32,
-    /// The roll at which it stands on the toe alone, the foot straight. Not above the break angle: the ball stays
-    /// broken and the toe takes the rest.
+    /// Roll at which the foot stands on the toe alone, the foot straight. A value not above the break angle keeps the
+    /// ball bent, and the toe takes the rest.
     pub straight_angle: f32,
-    /// Tips over the outer (positive) or inner edge.
+    /// Tip over the outer (positive) or inner edge.
     pub bank: f32,
-    /// Turns about the heel, on the ground.
+    /// Turn about the heel, on the ground.
     pub heel_twist: f32,
-    /// Turns about the ball, on the ground.
+    /// Turn about the ball, on the ground.
     pub ball_twist: f32,
-    /// Turns about the toe tip, on the ground.
+    /// Turn about the toe tip, on the ground.
     pub toe_twist: f32,
-    /// Lifts the heel about the ball, on top of the roll.
+    /// Lift of the heel about the ball, on top of the roll.
     pub ball_lift: f32,
-    /// Lifts the foot about the toe tip, on top of the roll.
+    /// Lift of the foot about the toe tip, on top of the roll.
     pub toe_lift: f32,
-    /// Bends the toes up.
+    /// Bend of the toes, upwards.
     pub toe_bend: f32,
 }
 
@@ -73,40 +74,40 @@ impl Default for FootControls {
     }
 }
 
-/// Where the pivots stand, in the space of the control: rotations are from rest, translations the pivots' positions.
+/// Transforms of the pivots in the space of the control: rotations are from rest, translations the pivots' positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FootPose {
-    /// Turned about the heel.
+    /// The heel pivot.
     pub heel: Trs,
-    /// Then about the toe tip.
+    /// The toe tip pivot, after the heel.
     pub toe_tip: Trs,
-    /// Then about the outer edge.
+    /// The outer edge pivot, after the toe tip.
     pub outer: Trs,
-    /// Then about the inner edge.
+    /// The inner edge pivot, after the outer edge.
     pub inner: Trs,
-    /// Then about the ball, on the ground. The toes' joint goes with it, and with their bend.
+    /// The ball pivot, after the inner edge, turned on the ground. The toes' joint follows it and bends.
     pub ball: Trs,
     /// The toes: the ball with the toes' bend.
     pub toes: Trs,
-    /// The ankle, turned about the ball: the goal of the leg, and what the foot's bone turns by.
+    /// The ankle, turned about the ball: the goal of the leg, and the rotation of the foot's bone.
     pub ankle: Trs,
 }
 
-/// A rotation from rest and how it moves points.
+/// A rigid motion from rest: a rotation and a translation.
 #[derive(Clone, Copy)]
-struct Moved {
+struct RigidMotion {
     rotation: Quat,
     translation: Vec3,
 }
 
-impl Moved {
+impl RigidMotion {
     const NOT: Self = Self { rotation: Quat::IDENTITY, translation: Vec3::ZERO };
 
     fn apply(&self, point: Vec3) -> Vec3 {
         self.rotation * point + self.translation
     }
 
-    /// A turn about a point at rest, before this.
+    /// This motion after a turn about a point at rest.
     fn about(&self, pivot: Vec3, turn: Quat) -> Self {
         let rotation = (self.rotation * turn).normalize();
         Self { rotation, translation: self.apply(pivot) - rotation * pivot }
@@ -136,7 +137,7 @@ impl FootPivots {
         let [heel, ball, toe] = controls.split();
         let (inner, outer) = if direction(width).is_some() { (self.inner, self.outer) } else { (self.ball, self.ball) };
 
-        let on_heel = Moved::NOT.about(self.heel, turn(up, controls.heel_twist) * turn(side, heel));
+        let on_heel = RigidMotion::NOT.about(self.heel, turn(up, controls.heel_twist) * turn(side, heel));
         let toe_lift = if controls.toe_lift.is_finite() { controls.toe_lift } else { 0.0 };
         let on_toe = on_heel.about(self.toe, turn(up, controls.toe_twist) * turn(side, toe + toe_lift));
         let on_outer = on_toe.about(outer, turn(tilt, controls.bank.max(0.0)));
@@ -161,7 +162,7 @@ impl FootControls {
     /// The parts of the roll at heel, ball and toe, in degrees; continuous in the roll.
     pub fn split(&self) -> [f32; 3] {
         let roll = self.roll;
-        // Also for NaN.
+        // The negation covers NaN, too.
         if !(roll.is_finite() && roll > 0.0) {
             return [if roll.is_finite() { roll } else { 0.0 }, 0.0, 0.0];
         }
@@ -173,7 +174,7 @@ impl FootControls {
         if !(span > 0.0 && span.is_finite()) {
             return [0.0, bend, roll - bend];
         }
-        // From the break on the ball straightens while the toe takes over.
+        // From the break angle on, the ball straightens while the toe takes over.
         let share = ((roll - bend) / span).min(1.0);
         [0.0, bend * (1.0 - share), roll - bend * (1.0 - share)]
     }

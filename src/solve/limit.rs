@@ -1,4 +1,4 @@
-//! Limits: what translations, rotations and scales may be.
+//! Limits of translations, rotations and scales.
 
 use std::f32::consts::{PI, TAU};
 
@@ -9,7 +9,7 @@ use crate::solve::{
     twist::{swing_twist, twist_angle},
 };
 
-/// Bounds for each axis; an infinite bound is none. Where the least exceeds the greatest, the least counts.
+/// Bounds for each axis; an infinite bound does not limit. Where the minimum exceeds the maximum, the minimum counts.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Bounds {
     /// The least values.
@@ -25,17 +25,17 @@ impl Default for Bounds {
 }
 
 impl Bounds {
-    /// No bound at all.
+    /// Bounds that limit nothing.
     pub const NONE: Self = Self { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
 
-    /// Bounds from what each axis has.
+    /// Bounds from optional values per axis.
     pub fn new(min: [Option<f32>; 3], max: [Option<f32>; 3]) -> Self {
         let or = |value: [Option<f32>; 3], none: f32| Vec3::from(value.map(|v| v.unwrap_or(none)));
         Self { min: or(min, f32::NEG_INFINITY), max: or(max, f32::INFINITY) }
     }
 
-    /// The nearest translation or scale within the bounds. A value that is not a number counts as zero, such a bound as
-    /// none.
+    /// The nearest translation or scale within the bounds. A value that is not a number counts as zero; a bound that is
+    /// not a number does not limit.
     #[inline]
     pub fn clamp(&self, value: Vec3) -> Vec3 {
         let value = Vec3::select(value.is_nan_mask(), Vec3::ZERO, value);
@@ -48,9 +48,9 @@ impl Bounds {
 
     /// The rotation with its Euler angles within the bounds (in radians).
     ///
-    /// Of the two triples of angles that make a rotation, and of angles that differ by a turn, those are taken that are
-    /// furthest within the bounds, so a knee may bend by 150° about any axis of the order. A rotation within its bounds
-    /// comes back as it is.
+    /// Of the two triples of angles that make a rotation, and of angles that differ by a turn, the solver takes those
+    /// that lie furthest within the bounds, so a knee may bend by 150° about any axis of the order. A rotation within
+    /// its bounds is returned unchanged.
     pub fn clamp_rotation(&self, rotation: Quat, order: EulerOrder) -> Quat {
         let rotation = unit(rotation);
         let angles = order.angles(rotation);
@@ -62,7 +62,7 @@ impl Bounds {
         if outside <= 0.0 || !clamped.is_finite() { rotation } else { clamped }
     }
 
-    /// Angles shifted by whole turns to where they break the bounds least, and by how much they do in all.
+    /// Angles shifted by whole turns to where they exceed the bounds least, and the sum of these excesses.
     fn nearest(&self, angles: Vec3) -> (Vec3, f32) {
         let mut nearest = angles;
         let mut sum = 0.0;
@@ -81,15 +81,15 @@ impl Bounds {
 
 #[inline]
 fn clamp(value: f32, min: f32, max: f32) -> f32 {
-    // Written out for NaN, and because the standard one panics where bounds cross.
+    // Comparisons instead of `clamp`: they handle NaN, and `clamp` panics where bounds cross.
     let value = if value > max { max } else { value };
     if value < min { min } else { value }
 }
 
-/// How far a joint may turn from its rest rotation.
+/// Range of a joint's rotation from its rest rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub enum JointLimit {
-    /// As far as it likes.
+    /// No limit.
     #[default]
     Free,
     /// Swing within a cone about an axis, and twist about that axis within bounds, as for hips and shoulders.

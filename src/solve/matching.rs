@@ -1,9 +1,9 @@
-//! Throwing a switch without a jump: from a pose and a switch to the edits that keep everything where it is.
+//! Switch matching: edits that throw a switch of a posed rig without a visible jump.
 //!
-//! A limb between forward and inverse kinematics keeps its joints: the controls of the side that takes over are put
-//! where they hold the joints as they are. A control between spaces keeps its place: its offset makes up for the space.
-//! Everything is tried out on a copy of the instance, so whatever else the rig does to the controls (parents, other
-//! constraints, softness) is taken into account, and what is left of a jump is measured.
+//! A limb between forward and inverse kinematics keeps its joints: the controls of the new side are posed so that they
+//! hold the joints in place. A control between spaces keeps its place: its offset makes up for the change of space. All
+//! edits are tried on a copy of the instance, so that everything else that moves the controls (parents, other
+//! constraints, softness) is taken into account, and the remaining jump is measured.
 
 mod limb;
 
@@ -13,37 +13,42 @@ use crate::{
     solve::program::{RigState, StateError},
 };
 
-/// Why a switch cannot be thrown.
+/// Error of matching a switch.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MatchError {
     /// The switch names a node that is not built.
     #[error("node {0}, which the switch matches, is not in the built rig; build the rig again")]
     NoNode(Uid),
-    /// The instance cannot be posed so.
+    /// The instance refuses the pose.
     #[error(transparent)]
     State(#[from] StateError),
 }
 
-/// What throws a switch.
+/// Edits that throw a switch, and the remaining jump.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Thrown {
+pub struct MatchedSwitch {
     /// The edits, as one step: poses of controls, and the value of the attribute.
     pub edits: Vec<RigEdit>,
-    /// How far what should have stayed has moved, at most, in the rig's units. Above about 1e-4 of a limb's length
-    /// something keeps the controls from where they should be, such as limits.
+    /// Largest distance that a matched node moved, in the rig's units. A value above about 1e-4 of a limb's length
+    /// means that something, such as a limit, keeps the controls from their matched poses.
     pub distance: f32,
-    /// How far it has turned, at most, in degrees.
+    /// Largest angle that a matched node turned by, in degrees.
     pub angle: f32,
 }
 
-/// The edits that set the attribute of a switch to `value` while what it matches stays where `state` has it.
+/// The edits that set the attribute of a switch to `value` while the matched nodes stay where `state` has them.
 ///
 /// `state` is an instance of the rig in its current pose, compiled so that all controls can be posed; it is not
-/// changed. Takes some tens of evaluations of what depends on the controls.
+/// changed. Costs some tens of evaluations of the operations that depend on the controls.
 ///
 /// # Errors
-/// If the program does not have what the switch names.
-pub fn throw(rig: &BuiltRig, state: &RigState, switch: &SwitchData, value: f32) -> Result<Thrown, MatchError> {
+/// [`MatchError`] if the program lacks a node or an attribute of the switch.
+pub fn match_switch(
+    rig: &BuiltRig,
+    state: &RigState,
+    switch: &SwitchData,
+    value: f32,
+) -> Result<MatchedSwitch, MatchError> {
     let mut state = state.clone();
     state.evaluate(0.0);
     let before = state.attribute(switch.control, &switch.attribute).unwrap_or_default();
@@ -62,7 +67,7 @@ pub fn throw(rig: &BuiltRig, state: &RigState, switch: &SwitchData, value: f32) 
         }
         Matching::Space { control } => attempt.place(*control, &wanted[0], None)?,
     }
-    let mut thrown = Thrown::default();
+    let mut thrown = MatchedSwitch::default();
     for (node, wanted) in kept.iter().zip(&wanted) {
         let now = attempt.global(*node)?;
         thrown.distance = thrown.distance.max(now.translation.distance(wanted.translation));
@@ -75,17 +80,18 @@ pub fn throw(rig: &BuiltRig, state: &RigState, switch: &SwitchData, value: f32) 
     Ok(thrown)
 }
 
-/// Degrees. The dot product of two quaternions has no digits left for small angles.
+/// Angle between two rotations in degrees. It is computed from the vector part: the dot product of two quaternions has
+/// no digits left for small angles.
 fn angle_between(a: &Trs, b: &Trs) -> f32 {
     let between = a.rotation.conjugate() * b.rotation;
     2.0 * bevy::math::ops::atan2(between.xyz().length(), between.w.abs()).to_degrees()
 }
 
-/// An instance on which poses are tried out.
+/// A copy of an instance on which poses are tried.
 struct Attempt<'a> {
     rig: &'a BuiltRig,
     state: RigState,
-    /// What was changed, each node once, in the order in which it was first.
+    /// Offsets of the changed nodes, each node once, in the order of their first change.
     offsets: Vec<(Uid, PoseOffset)>,
 }
 
@@ -108,10 +114,10 @@ impl Attempt<'_> {
         Ok(())
     }
 
-    /// Poses a node so that it stands at `wanted` in the rig's space; its scale stays. With `rotate_only`, so does its
-    /// position, unless it would be off by more than that distance.
+    /// Poses a node so that its rig transform is `wanted`; its scale stays. With `rotate_only`, its position stays,
+    /// too, unless it would be off by more than that distance.
     fn place(&mut self, node: Uid, wanted: &Trs, rotate_only: Option<f32>) -> Result<(), MatchError> {
-        // What drives the node besides its pose is made up for in a second round.
+        // Constraints and other drivers of the node are compensated in further rounds.
         for round in 0..3 {
             let now = self.global(node)?;
             let near = now.translation.distance(wanted.translation) <= 1e-6 * wanted.translation.length().max(1e-3);
@@ -119,7 +125,7 @@ impl Attempt<'_> {
                 break;
             }
             let offset = self.offset(node);
-            // Where the node stands without its pose, in the rig's space: now = unposed * offset.
+            // Rig transform of the node without its pose: now = unposed * offset.
             let turned = (now.rotation * offset.rotation.conjugate()).normalize();
             let divided = |a: f32, b: f32| if b == 0.0 { a } else { a / b };
             let scale =
@@ -138,7 +144,7 @@ impl Attempt<'_> {
         Ok(())
     }
 
-    /// The node itself or the nearest one above that people move; the node itself if there is none.
+    /// The node itself or the nearest posable node above it; the node itself if there is none.
     fn handle(&self, node: Uid) -> Uid {
         let index = self.rig.nodes.iter().position(|known| known.uid == node);
         let mut at = index;
@@ -151,7 +157,7 @@ impl Attempt<'_> {
         node
     }
 
-    /// Moves what people move so that `node`, which it carries, stands at `wanted`.
+    /// Poses the nearest posable node so that `node`, which it carries, has the rig transform `wanted`.
     fn place_carried(&mut self, node: Uid, wanted: &Trs) -> Result<(), MatchError> {
         let handle = self.handle(node);
         if handle == node {
@@ -164,7 +170,7 @@ impl Attempt<'_> {
         self.place(handle, &Trs { translation, rotation, scale }, None)
     }
 
-    /// Where nodes stand as built, in the rig's space.
+    /// Rig transform of a node as built.
     fn built(&self, node: Uid) -> Option<Trs> {
         let mut at = self.rig.nodes.iter().position(|known| known.uid == node)?;
         let mut global = self.rig.nodes[at].base;

@@ -1,17 +1,20 @@
 //! A built rig as one flat program that instances share.
 //!
 //! [`RigProgram::compile`] turns the nodes and constraints of a [`BuiltRig`] into a list of small operations, sorted so
-//! that each comes after what it reads: no maps, no names, no allocation while it runs. What differs between instances
-//! is in [`RigState`]. Transforms are multiplied as Bevy multiplies two `Transform`s: no shear.
+//! that each comes after the operations it reads from: no maps, no names, no allocation while it runs. The values that
+//! differ between instances are in [`RigState`]. Transforms are multiplied as Bevy multiplies two `Transform`s: no
+//! shear.
 //!
 //! A node's local transform is its base with driven channels and its pose offset on top; constraints then change it in
-//! list order, each taking what the ones before left. What a constraint reads of *other* nodes is where they end up in
-//! the same frame. Where it needs only the origin of a node, it does not wait for what only turns or scales that node.
+//! list order, each starting from the result of those before. A constraint reads the final transforms of *other* nodes
+//! in the same frame. If it needs only the origin of a node, it does not wait for constraints that only turn or scale
+//! that node.
 
 mod cache;
 mod chains;
 mod constraints;
 mod error;
+mod freedom;
 mod graph;
 mod hash;
 mod lower;
@@ -36,6 +39,7 @@ pub use hash::ContentHash;
 pub use state::{LANES, Memory, RigState};
 
 use self::{
+    freedom::Freedom,
     graph::{Driven, Graph, Step},
     op::{N, Op, Operand, Pose, Tables, X},
     run::{Alone, Machine, Scratch},
@@ -46,31 +50,31 @@ use crate::{
     rig::{AttributeKind, BuiltRig, NodeType, Uid},
 };
 
-/// What a program is compiled for.
+/// Options of [`RigProgram::compile`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CompileOptions {
-    /// Which nodes it can be asked for.
+    /// Nodes whose transforms the program gives.
     pub keep: Keep,
-    /// Nodes outside the rig that constraints name, such as a steering wheel; they are set each frame.
-    pub inputs: Vec<Outside>,
+    /// Nodes outside the rig that constraints refer to, such as a steering wheel; their transforms are set each frame.
+    pub inputs: Vec<ExternalNode>,
 }
 
-/// Which nodes a program can be asked for; whatever only others need is left out.
+/// Nodes that stay available in a program. The compiler drops operations that none of them depends on.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Keep {
-    /// All, and all can be posed: for editing.
+    /// All nodes, all of them posable: for editing.
     #[default]
     All,
-    /// Joints, and what is listed, which alone can be posed and have attributes: for games.
+    /// Joints and the listed nodes; only the listed nodes can be posed and have attributes. For games.
     DeformAndExposed(Vec<Exposed>),
 }
 
 /// A node that a game wants to pose or to read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Exposed {
-    /// The node with that uid.
+    /// The node with this uid.
     Uid(Uid),
-    /// All nodes with that label.
+    /// All nodes with this label.
     Label(String),
     /// All controls.
     Controls,
@@ -88,36 +92,38 @@ impl fmt::Display for Exposed {
 
 /// A node outside the rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outside {
-    /// The uid by which constraints name it.
+pub struct ExternalNode {
+    /// Uid by which constraints refer to the node.
     pub uid: Uid,
-    /// Where it is in the rig's space until it is set.
+    /// Transform in the rig's space until it is set.
     pub rest: Trs,
 }
 
 /// A node of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProgramNode {
-    /// Identity.
+    /// Uid of the node.
     pub uid: Uid,
-    /// The name people see.
+    /// Name for people.
     pub label: Option<Arc<str>>,
-    /// What it is.
+    /// Kind of the node.
     pub kind: NodeType,
-    /// Slot of the parent, if the program keeps that.
+    /// Slot of the parent, if the program keeps the parent.
     pub parent: Option<usize>,
-    /// Where it stands relative to its parent before any pose.
+    /// Transform relative to the parent without any pose.
     pub base: Trs,
-    /// True if a constraint drives it.
+    /// Marks a node that a constraint drives.
     pub is_driven: bool,
-    /// Slot of its pose offset.
+    /// Slot of the pose offset.
     pose: Pose,
-    /// Register of its local transform after all constraints, if those give it.
+    /// Bounds of its pose offset, if it has any.
+    freedom: Option<Freedom>,
+    /// Register of the local transform after all constraints, if there is one.
     local: Option<X>,
 }
 
 impl ProgramNode {
-    /// True if it can be posed.
+    /// Returns `true` if the node can be posed.
     pub fn is_posable(&self) -> bool {
         self.pose != Pose::NONE
     }
@@ -130,19 +136,19 @@ pub struct ProgramAttribute {
     pub node: usize,
     /// The name.
     pub name: Arc<str>,
-    /// Numbers or choices.
+    /// Kind of the attribute: number or choice.
     pub kind: AttributeKind,
     /// The value until another is set.
     pub default: f32,
-    /// True if it can be set; false if a constraint gives its value.
+    /// Marks an attribute that can be set; a constraint gives the value of any other.
     pub is_settable: bool,
 }
 
-/// A compiled rig: see the [module](self). Nodes, attributes, inputs and morph targets have *slots*, their places in
-/// the lists that it gives out.
+/// A compiled rig: see the [module](self). Nodes, attributes, inputs and morph targets have *slots*: their indices in
+/// the lists of the program.
 #[derive(Debug)]
 pub struct RigProgram {
-    /// Differs between any two programs of a process.
+    /// Number of the program, unique within the process.
     serial: u64,
     hash: ContentHash,
     nodes: Vec<ProgramNode>,
@@ -153,14 +159,15 @@ pub struct RigProgram {
     inputs: Vec<Uid>,
     poses: usize,
     ops: Vec<Op>,
-    /// How many of the first operations depend on attributes only: what people set once rather than animate.
+    /// Number of operations at the start that depend on attributes only: values that people set once rather than
+    /// animate.
     settings: usize,
     tables: Tables,
     /// Registers before the first run. Transforms: the rig's space, nodes by slot, inputs, others; numbers: attributes,
     /// morph targets, others.
     x: Vec<Trs>,
     n: Vec<f32>,
-    /// Operations that read each pose, attribute and input, and what each operation writes.
+    /// Operations that read each pose, attribute and input, and registers that each operation writes.
     pose_readers: Lists,
     attribute_readers: Lists,
     input_readers: Lists,
@@ -169,7 +176,7 @@ pub struct RigProgram {
     spring_ops: Vec<u32>,
 }
 
-/// Lists of small numbers in one piece.
+/// Lists of small numbers in one allocation.
 #[derive(Debug, Default)]
 struct Lists {
     starts: Vec<u32>,
@@ -205,7 +212,7 @@ impl RigProgram {
     ///
     /// # Errors
     ///
-    /// See [`ProgramError`]: what is named but not there, chains that are none, cycles.
+    /// See [`ProgramError`]: references to missing nodes, joints that form no chain, cycles.
     pub fn compile(rig: &BuiltRig, options: &CompileOptions) -> Result<Self, ProgramError> {
         let hash = ContentHash::of(rig, options);
         let mut graph = Graph::new(rig, &options.keep, &options.inputs)?;
@@ -258,6 +265,7 @@ impl RigProgram {
                 base: rig.nodes[*node].base,
                 is_driven: driven[*node] != Driven::Not,
                 pose: numbering.pose(graph.pose(*node)),
+                freedom: rig.nodes[*node].control.as_ref().and_then(|control| Freedom::of(control)),
                 local: if let Driven::Local(local) = driven[*node] { Some(numbering.x(local)) } else { None },
             })
             .collect();
@@ -300,7 +308,7 @@ impl RigProgram {
         }
     }
 
-    /// Notes which operations read what.
+    /// Collects the operations that read each pose, attribute, input and register.
     fn connect(&mut self) {
         let mut x_readers: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         let mut n_readers: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -334,37 +342,37 @@ impl RigProgram {
         }));
     }
 
-    /// The hash of what it was compiled from: equal for equal content, on every machine.
+    /// The hash of the rig and options that the program was compiled from: equal for equal content, on every machine.
     pub fn hash(&self) -> ContentHash {
         self.hash
     }
 
-    /// Its nodes by slot; parents before children.
+    /// Nodes by slot; parents before children.
     pub fn nodes(&self) -> &[ProgramNode] {
         &self.nodes
     }
 
-    /// Its attributes by slot.
+    /// Attributes by slot.
     pub fn attributes(&self) -> &[ProgramAttribute] {
         &self.attributes
     }
 
-    /// Its morph targets by slot.
+    /// Names of the morph targets by slot.
     pub fn morphs(&self) -> &[Arc<str>] {
         &self.morphs
     }
 
-    /// Its inputs by slot.
+    /// Uids of the inputs by slot.
     pub fn inputs(&self) -> &[Uid] {
         &self.inputs
     }
 
-    /// Number of operations of a whole evaluation.
+    /// Number of operations of a full evaluation.
     pub fn operations(&self) -> usize {
         self.ops.len()
     }
 
-    /// True if it moves by itself as time passes.
+    /// Returns `true` if the rig moves by itself as time passes.
     pub fn has_springs(&self) -> bool {
         !self.spring_ops.is_empty()
     }
@@ -375,7 +383,7 @@ impl RigProgram {
         Some(self.by_uid[at].1 as usize)
     }
 
-    /// Slot of the first node with that label.
+    /// Slot of the first node with the label.
     pub fn find_label(&self, label: &str) -> Option<usize> {
         self.nodes.iter().position(|node| node.label.as_deref() == Some(label))
     }
@@ -416,7 +424,7 @@ fn skip_empty(graph: &mut Graph<'_>) {
     }
 }
 
-/// Runs what depends on no input, once for all.
+/// Runs the operations that depend on no input, once for all instances.
 fn run_fixed(graph: &mut Graph<'_>, fixed: &[Step]) {
     let (x, n) = (&mut graph.x, &mut graph.n);
     let mut machine = Machine {

@@ -1,4 +1,4 @@
-//! Rotations as the solvers need them: safe on any input, and the same bits wherever they run.
+//! Rotations for the solvers: safe on any input, with the same bits on every machine.
 //!
 //! Trigonometry goes through [`bevy::math::ops`], so that it can be made equal on every platform in one place.
 
@@ -35,7 +35,7 @@ pub fn perpendicular(v: Vec3, axis: Vec3) -> Option<Vec3> {
     if square > 0.01 {
         return Some(part);
     }
-    // Once more: what the first subtraction left of a nearly parallel vector is not yet perpendicular.
+    // A second projection: the rest of a nearly parallel vector after the first subtraction is not yet perpendicular.
     direction(part - axis * part.dot(axis))
 }
 
@@ -56,8 +56,8 @@ pub fn about(axis: Vec3, angle: f32) -> Quat {
 
 /// The shortest rotation that takes the unit vector `from` to the unit vector `to`.
 ///
-/// For opposite vectors it is half a turn about `hint`, as far as that is perpendicular, else about an axis that
-/// depends on `from` only.
+/// For opposite vectors the result is half a turn about the part of `hint` that is perpendicular to `from`, else about
+/// an axis that depends on `from` only.
 #[inline]
 pub fn arc(from: Vec3, to: Vec3, hint: Vec3) -> Quat {
     let dot = from.dot(to);
@@ -65,7 +65,7 @@ pub fn arc(from: Vec3, to: Vec3, hint: Vec3) -> Quat {
         let axis = from.cross(to);
         return Quat::from_xyzw(axis.x, axis.y, axis.z, 1.0 + dot).normalize();
     }
-    // Near half a turn that form loses its digits: half a turn, then the small rest.
+    // Near half a turn the formula above loses its digits: half a turn, then the small rest.
     let axis = from.cross(to);
     let axis = if axis.length_squared() > 1e-12 { axis } else { hint };
     let axis = perpendicular_or_any(from, &[axis]);
@@ -88,7 +88,7 @@ pub fn between_frames(from: [Vec3; 2], to: [Vec3; 2]) -> Quat {
     Quat::from_mat3(&(to * from.transpose())).normalize()
 }
 
-/// A unit quaternion from any: what is zero or not finite becomes the identity.
+/// A unit quaternion; a quaternion that is zero or not finite becomes the identity.
 #[inline]
 pub fn unit(q: Quat) -> Quat {
     let length = q.length_squared();
@@ -106,7 +106,7 @@ pub fn scaled_axis(q: Quat) -> Vec3 {
     q.xyz() * (2.0 * ops::atan2(sin, q.w) / sin)
 }
 
-/// The rotation about the direction of `axis` by its length in radians: undoes [`scaled_axis`].
+/// The rotation about the direction of `axis` by its length in radians: the inverse of [`scaled_axis`].
 #[inline]
 pub fn from_scaled_axis(axis: Vec3) -> Quat {
     let angle = axis.length();
@@ -180,7 +180,7 @@ impl EulerOrder {
         let at = |row: usize, column: usize| columns[column][row];
         let sin = (sign * at(i, k)).clamp(-1.0, 1.0);
         let mut angles = Vec3::ZERO;
-        // The cosine from both of its entries: the arc sine alone is blunt near a quarter turn.
+        // The cosine comes from two entries of the matrix: the arc sine alone is inaccurate near a quarter turn.
         let cos = (at(i, i) * at(i, i) + at(i, j) * at(i, j)).sqrt();
         angles[j] = ops::atan2(sin, cos);
         if cos > 1e-5 {
@@ -192,7 +192,7 @@ impl EulerOrder {
         angles
     }
 
-    /// The other angles of the same rotation: the middle one past a quarter turn.
+    /// The other triple of angles of the same rotation, with the middle one past a quarter turn.
     pub(super) fn other(self, angles: Vec3) -> Vec3 {
         let ([i, j, k], _) = self.axes();
         let mut other = angles;

@@ -9,7 +9,7 @@ use wide::f32x4;
 
 use crate::solve::rotate::{about, arc, between_frames, direction, perpendicular_or_any};
 
-/// How a curve follows its control points. Both begin at the first and end at the last.
+/// Shape of a curve near its control points. Both begin at the first and end at the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum SplineKind {
     /// Catmull-Rom: passes through all control points; its direction is continuous.
@@ -19,17 +19,18 @@ pub enum SplineKind {
     Near,
 }
 
-/// A curve over control points, any number of them: none is the origin, one is that point, two a straight line.
+/// A curve over any number of control points: none gives the origin, one that point, two a straight line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spline<'a> {
-    /// How it follows them.
+    /// Kind of the curve.
     pub kind: SplineKind,
     /// The control points.
     pub points: &'a [Vec3],
 }
 
 impl Spline<'_> {
-    /// Four weights (of the value, or of the derivative by the segment's parameter) at `t` in a segment.
+    /// Weights of the four control points (for the value, or for the derivative by the segment's parameter) at `t` in a
+    /// segment.
     #[inline]
     fn weights(&self, t: f32, derivative: bool) -> [f32; 4] {
         let (s, tt) = (1.0 - t, t * t);
@@ -50,7 +51,7 @@ impl Spline<'_> {
         }
     }
 
-    /// The four control points that make a segment. Beyond the ends the neighbour is mirrored: the curve ends on its last
+    /// The four control points of a segment. Beyond the ends the neighbour is mirrored: the curve ends on its last
     /// point, without curvature.
     #[inline]
     fn neighbours(&self, segment: usize) -> [Vec3; 4] {
@@ -89,13 +90,13 @@ impl Spline<'_> {
         self.sum(t, false)
     }
 
-    /// The derivative by `t` there; zero for a curve of less than two points.
+    /// The derivative by `t`; zero for a curve of fewer than two points.
     #[inline]
     pub fn derivative(&self, t: f32) -> Vec3 {
         self.sum(t, true)
     }
 
-    /// The direction at `t`; where the curve stands still, that from first to last point, else X.
+    /// The unit direction at `t`; where the derivative is zero, the direction from first to last point, else X.
     pub fn tangent(&self, t: f32) -> Vec3 {
         let ends = self.points.first().zip(self.points.last()).map_or(Vec3::ZERO, |(first, last)| *last - *first);
         direction(self.derivative(t)).or_else(|| direction(ends)).unwrap_or(Vec3::X)
@@ -110,15 +111,15 @@ fn weighted(points: &[Vec3; 4], weights: &[f32; 4]) -> Vec3 {
 /// Entries of a table of lengths.
 const STEPS: usize = 64;
 
-/// The length of a curve up to 65 evenly spaced parameters. Made once for each set of control points: 192 lengths of
-/// derivatives.
+/// The length of a curve up to each of 65 evenly spaced parameters. Each change of the control points costs a new
+/// table: 192 lengths of derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArcTable {
     lengths: [f32; STEPS + 1],
 }
 
 impl ArcTable {
-    /// Measures a curve, by three points of Gauss and Legendre a step.
+    /// Measures a curve, by Gauss-Legendre quadrature with three points a step.
     pub fn new(spline: &Spline) -> Self {
         let mut lengths = [0.0; STEPS + 1];
         if spline.points.len() < 2 {
@@ -148,7 +149,7 @@ impl ArcTable {
                 });
                 means = ((before + after) * 5.0 + middle * 8.0).to_array();
             } else {
-                // Steps on both sides of a control point.
+                // The step is split at the control point inside it.
                 for (mean, middle) in means.iter_mut().zip(middles) {
                     let [before, middle, after] = [middle - off, middle, middle + off].map(|t| {
                         let at = segment_at(t);
@@ -190,8 +191,7 @@ impl ArcTable {
         (step as f32 + share) / STEPS as f32
     }
 
-    /// The point at a length along the curve; before its start and past its end, on the straight lines that go on
-    /// from there.
+    /// The point at a length along the curve; before its start and past its end, on straight lines along the tangents.
     #[inline]
     pub fn point(&self, spline: &Spline, length: f32) -> Vec3 {
         let point = spline.point(self.parameter(length));
@@ -200,18 +200,18 @@ impl ArcTable {
     }
 }
 
-/// How a chain lies along a curve.
+/// Settings of a chain along a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SplineIk {
-    /// 0: bones keep their lengths, 1: they share the curve's length as they share the chain's.
+    /// Stretch. 0: bones keep their lengths. 1: bones divide the curve's length in the ratio of their own lengths.
     pub stretch: f32,
     /// Length along the curve at which the first joint sits, in units of the rig's space.
     pub start: f32,
-    /// The direction to which the first joint's up axis turns; any length, rig space. Zero: any.
+    /// Direction to which the first joint's up axis turns; any length, rig space. Zero: any.
     pub up: Vec3,
     /// Twist about the bone at the first joint, in radians.
     pub twist_start: f32,
-    /// Twist at the last joint; joints between share by length.
+    /// Twist at the last joint, in radians; joints in between twist in proportion to their distance along the chain.
     pub twist_end: f32,
     /// The axis of the joints that lies along their bone, in their own space.
     pub axis: Vec3,
@@ -233,7 +233,7 @@ impl Default for SplineIk {
     }
 }
 
-/// Passes that a joint takes to find its place on the curve.
+/// Passes to place a joint on the curve.
 const PASSES: usize = 12;
 
 impl SplineIk {
@@ -258,7 +258,7 @@ impl SplineIk {
         let total: f32 = (0..count - 1).map(length).sum();
         let start = if self.start.is_finite() { self.start } else { 0.0 };
         let stretch = if self.stretch > 0.0 { self.stretch.min(1.0) } else { 0.0 };
-        // Kept lengths and shared curve are two chains; the pose lies between.
+        // Kept lengths and a divided curve give two chains; the pose lies between.
         let share = if total > 0.0 { (table.length() - start).max(0.0) / total } else { 0.0 };
         let (mut kept, mut at) = (table.point(spline, start), start);
         let mut along = 0.0;
@@ -305,10 +305,10 @@ impl SplineIk {
     }
 }
 
-/// The next joint of a chain that keeps its lengths: the first point on the curve that is `length` away from `from`,
-/// which lies at `at` along it; and how far along that is.
+/// The next joint of a chain that keeps its lengths: the first point on the curve at the distance `length` from `from`,
+/// which lies at `at` along it. Returns the point and its length along the curve.
 fn next(spline: &Spline, table: &ArcTable, from: Vec3, at: f32, length: f32) -> (Vec3, f32) {
-    // A chord is never longer than its arc, so what is missing can be added without overshooting.
+    // A chord is never longer than its arc, so the missing distance can be added without overshooting.
     let mut to = at + length;
     let mut point = table.point(spline, to);
     for _ in 0..PASSES {

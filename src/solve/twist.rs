@@ -9,7 +9,7 @@ use crate::solve::rotate::{about, direction, unit};
 /// Splits a rotation into `(swing, twist)` with `rotation = swing * twist`: the twist is about `axis` (any length), the
 /// swing about an axis perpendicular to it.
 ///
-/// A swing of half a turn leaves the twist open; it is then the identity. So it is for an axis without length.
+/// For a swing of half a turn or an axis without length the twist is undetermined; it is then the identity.
 #[inline]
 pub fn swing_twist(rotation: Quat, axis: Vec3) -> (Quat, Quat) {
     let rotation = unit(rotation);
@@ -40,7 +40,7 @@ pub fn twist_angle(rotation: Quat, axis: Vec3) -> f32 {
     angle.clamp(-PI, PI)
 }
 
-/// The angle that equals `angle` but for whole turns and is nearest to `previous`, in radians. So an angle that is read
+/// The angle nearest to `previous` that differs from `angle` by whole turns, in radians. An angle that is unwrapped
 /// each frame counts turns, as long as it moves by less than half a turn a frame.
 #[inline]
 pub fn unwrap_angle(angle: f32, previous: f32) -> f32 {
@@ -57,8 +57,8 @@ pub fn twist_share(rotation: Quat, axis: Vec3, t: f32) -> Quat {
     direction(axis).filter(|_| angle.is_finite()).map_or(Quat::IDENTITY, |axis| about(axis, angle))
 }
 
-/// Shares a twist of `angle` radians among a chain of twist joints: the local twist that each adds to the one above
-/// it, when joint `i` of `count` shall be twisted by `(i + 1) / count` of the angle. About `axis` (any length).
+/// Divides a twist of `angle` radians among a chain of twist joints: the local twist about `axis` (any length) that
+/// each joint adds to the one above, so that joint `i` of `count` is twisted by `(i + 1) / count` of the angle.
 #[inline]
 pub fn twist_step(axis: Vec3, angle: f32, count: usize) -> Quat {
     let step = angle / count.max(1) as f32;

@@ -4,7 +4,7 @@
 //! root to goal comes from Heron's formula, which keeps its digits where the limb is almost straight or folded. Soft
 //! reach is the exponential slow-down of Andy Nicholas (<http://www.softimageblog.com/archives/108>, "The IK softness
 //! problem"). The solved rotations are the posed ones turned by the rotation that takes the bone and the bend plane to
-//! where they belong, so joints may have any axes.
+//! their solved directions, so joints may have any axes.
 
 use bevy::math::{Quat, Vec3, ops};
 
@@ -13,7 +13,7 @@ use crate::solve::rotate::{arc, between_frames, direction, perpendicular, perpen
 /// Sine of the bend under which a limb counts as straight.
 const STRAIGHT: f32 = 1e-4;
 
-/// A limb of two bones as it is posed, and what it shall do. All in the rig's space.
+/// A limb of two bones in its current pose, with its goal. All in the rig's space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoBone {
     /// Position of the root joint (shoulder, hip). It stays.
@@ -26,17 +26,17 @@ pub struct TwoBone {
     pub root_rotation: Quat,
     /// Rotation of the middle joint, a unit quaternion.
     pub mid_rotation: Quat,
-    /// Where the end joint shall be.
+    /// Goal of the end joint.
     pub goal: Vec3,
     /// The point towards which the limb bends. Without one (or with one in line with root and goal) the posed bend
     /// plane follows the goal by the shortest rotation.
     pub pole: Option<Vec3>,
-    /// The direction towards which a limb bends that is posed straight; any length. Zero: a direction that depends on
-    /// the limb's direction only.
+    /// Direction in which a limb bends that is posed straight; any length. Zero: a direction that depends on the limb's
+    /// direction only.
     pub preferred: Vec3,
     /// The share of the limb's length over which the end slows down before full stretch, 0 to 1. 0: none.
     pub soft: f32,
-    /// How far the bones lengthen towards a goal that they do not reach, 0 (not) to 1 (until they reach it).
+    /// Share by which the bones lengthen towards a goal out of reach, 0 (not) to 1 (until they reach it).
     pub stretch: f32,
     /// The greatest factor by which bones lengthen; under 1 counts as 1, infinity as no limit.
     pub max_stretch: f32,
@@ -63,8 +63,8 @@ impl TwoBone {
     /// Without softness the end is on every goal between the difference and the sum of the bones' lengths, to 1e-5 of
     /// the limb's length; on others it is as near as it can be. With softness (and without stretch) it lags behind a
     /// goal further than `1 - soft` of the limb's length; its place, the bend and their first derivative by the goal's
-    /// distance are continuous. The solution is finite whatever comes in: a limb without length, or with input that is
-    /// not finite, stays as posed; a goal on the root is met along the posed direction of the limb.
+    /// distance are continuous. The solution is finite for any input: a limb without length, or with input that is not
+    /// finite, stays as posed; a goal on the root is met along the posed direction of the limb.
     #[inline]
     pub fn solve(&self) -> TwoBoneSolution {
         let (upper, lower) = (self.mid - self.root, self.end - self.mid);
@@ -87,7 +87,7 @@ impl TwoBone {
         let bend_axis = if across.length_squared() > STRAIGHT * STRAIGHT {
             across.normalize()
         } else {
-            // The wanted bend, turned into an axis.
+            // The axis of the preferred bend.
             u.cross(perpendicular_or_any(u, &[self.preferred]))
         };
 
@@ -106,7 +106,7 @@ impl TwoBone {
         let double = 2.0 * reach;
         let along_upper = (reach * reach + squares) / double;
         let along_lower = (reach * reach - squares) / double;
-        // Two roots: the product of all four factors would leave the range of numbers.
+        // Two roots, because the product of all four factors could overflow.
         let outer = ((length - reach) * (length + reach)).max(0.0).sqrt();
         let inner = ((reach - shortest) * (reach + shortest)).max(0.0).sqrt();
         let height = outer * (inner / double);
@@ -123,13 +123,13 @@ impl TwoBone {
         }
     }
 
-    /// The distance from root to end before bones lengthen, and the factor by which they do.
+    /// The distance from root to end before bones lengthen, and the factor by which they lengthen.
     #[inline]
     fn reach(&self, distance: f32, upper: f32, lower: f32) -> (f32, f32) {
         let length = upper + lower;
         let shortest = (upper - lower).abs().max(1e-7 * length);
         let soft = length * self.soft.clamp(0.0, 1.0);
-        // NaN counts as none.
+        // NaN counts as zero.
         let soft = if soft > 0.0 { soft.min(length - shortest) } else { 0.0 };
         let hard = length - soft;
         let reach = if distance <= hard || soft <= 1e-6 * length {
@@ -142,7 +142,7 @@ impl TwoBone {
         (reach, (1.0 + wanted).min(self.max_stretch.max(1.0)))
     }
 
-    /// The limb as it was posed; without a joint that is not finite.
+    /// The limb in its given pose; joints that are not finite are at the origin.
     #[cold]
     fn unsolved(&self) -> TwoBoneSolution {
         let finite = |point: Vec3| if point.is_finite() { point } else { Vec3::ZERO };

@@ -11,7 +11,7 @@ use crate::{
     solve::rotate::{slerp, unit},
 };
 
-/// A weight as it is used.
+/// A weight, or zero if it is negative or not finite.
 #[inline]
 fn usable(weight: f32) -> f32 {
     if weight > 0.0 && weight < f32::INFINITY { weight } else { 0.0 }
@@ -36,8 +36,8 @@ pub fn blend_points(targets: impl IntoIterator<Item = (Vec3, f32)>) -> Option<Ve
 ///
 /// The normalised sum of the quaternions, each with the sign that is nearer to the first target (whatever its weight),
 /// so the mean moves continuously with weights and with targets within half a turn of the first. It does not depend on
-/// the order of targets that lie within a quarter turn of one another. For two targets it follows the shortest way.
-/// Where the sum vanishes, the first target is the mean.
+/// the order of targets that lie within a quarter turn of one another. For two targets it follows the shortest way. The
+/// first target is the mean if the sum vanishes.
 #[inline]
 pub fn blend_rotations(targets: impl IntoIterator<Item = (Quat, f32)>) -> Option<Quat> {
     let (mut sum, mut total) = (Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), 0.0);
@@ -102,16 +102,16 @@ pub fn multiply(parent: &Trs, child: &Trs) -> Trs {
     }
 }
 
-/// `transform` relative to `parent`: what [`multiply`] takes back to it, whatever the scales. Where an axis of `parent`
-/// is scaled to zero, the translation is zero and the factor one.
+/// `transform` relative to `parent`, so that [`multiply`] gives it back for any scales that are not zero. Where an axis
+/// of `parent` is scaled to zero, the translation is zero and the factor one.
 ///
-/// As the offset that a constraint keeps: `relative(target, driven)` when it is built, and each frame
-/// `multiply(target, offset)`.
+/// A constraint keeps its offset so: `relative(target, driven)` when it is built, and `multiply(target, offset)` each
+/// frame.
 #[inline]
 pub fn relative(parent: &Trs, transform: &Trs) -> Trs {
     let back = parent.rotation.conjugate();
     let moved = back * (transform.translation - parent.translation);
-    // Most parents are as large as they were: dividing by one changes no bit.
+    // Most parents have a scale of one: dividing by it changes no bit.
     if parent.scale == Vec3::ONE {
         let rotation = (back * transform.rotation).normalize();
         return Trs { translation: moved, rotation, scale: transform.scale };
@@ -123,21 +123,21 @@ pub fn relative(parent: &Trs, transform: &Trs) -> Trs {
     }
 }
 
-/// The transform that `transform` takes to the identity: `multiply(transform, inverse(transform))` is the identity.
+/// The inverse from the right: `multiply(transform, inverse(transform))` is the identity.
 ///
-/// Without shear there is none that undoes a rotated and unevenly scaled transform from the left; use [`relative`].
+/// Without shear a rotated and unevenly scaled transform has no inverse from the left; use [`relative`].
 #[inline]
 pub fn inverse(transform: &Trs) -> Trs {
     relative(transform, &Trs::IDENTITY)
 }
 
-/// A point given in the space of `transform`, in the space around it.
+/// Maps a point from the space of `transform` to its parent space.
 #[inline]
 pub fn transform_point(transform: &Trs, point: Vec3) -> Vec3 {
     transform.translation + transform.rotation * (transform.scale * point)
 }
 
-/// Division axis by axis, with a value for what a divisor of zero hides.
+/// Division axis by axis, with the value `otherwise` for a divisor of zero.
 #[inline]
 fn divide(value: Vec3, by: Vec3, otherwise: Vec3) -> Vec3 {
     Vec3::select(by.cmpeq(Vec3::ZERO), otherwise, value / by)

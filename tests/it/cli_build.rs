@@ -1,17 +1,14 @@
 //! Building rigs on the command line: the real binary, real files, exit codes.
 
-use std::{
-    collections::BTreeSet,
-    fs,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::{collections::BTreeSet, fs, path::Path, process::Command};
 
 use rigsmith::{
     files::{RealDisk, load_model, load_template},
     rig::template,
 };
 use serde_json::Value;
+
+use crate::exports::exports;
 
 /// What the binary said.
 pub struct Answer {
@@ -33,17 +30,6 @@ pub fn rigsmith(folder: &Path, args: &[&str]) -> Answer {
     let answer = Answer { code: output.status.code().unwrap(), out: text(output.stdout), err: text(output.stderr) };
     assert!(!answer.err.contains("panicked"), "{args:?} panicked: {}", answer.err);
     answer
-}
-
-/// Where exports go that a validator shall see.
-fn exports() -> (PathBuf, Option<tempfile::TempDir>) {
-    match std::env::var_os("RIGSMITH_EXPORTS") {
-        Some(folder) => (folder.into(), None),
-        None => {
-            let folder = tempfile::tempdir().unwrap();
-            (folder.path().into(), Some(folder))
-        }
-    }
 }
 
 /// A root, an arm of two joints in a group, a control, joints between, a feature with two switches, and an attribute

@@ -2,7 +2,6 @@
 
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use rigsmith::{
-    build::CommandState,
     plugins::{
         commands::{
             BuildDone, BuildFailure, BuildRequest, BuildStep, BuiltEntities, CommandReport, CommandTag, CreatedBy,
@@ -11,11 +10,12 @@ use rigsmith::{
         document::{Change, JointEntities},
     },
     prelude::*,
-    rig::{JointData, RestTransform, RigEdit, Tag, TagKind},
+    processor::CommandState,
+    rig::{JointData, RestTransform, RigEdit, TagData, TagKind},
     test_app::test_app,
 };
 
-use crate::build::{Mark, Nudge};
+use crate::processor::{Mark, Nudge};
 
 struct Bench {
     app: App,
@@ -26,7 +26,7 @@ impl Bench {
     fn new() -> Self {
         let mut app = test_app();
         app.register_rig_module::<Mark>().register_rig_module::<Nudge>();
-        let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(1000), "rig"), ..default() }).id();
+        let rig = app.world_mut().spawn(Rig::new(Uid(1000), "rig")).id();
         let mut bench = Self { app, rig };
         for number in 1..=3 {
             let joint = JointData {
@@ -58,7 +58,7 @@ impl Bench {
 
     fn tag(&mut self, joint: u64, uid: u64, module: &str, params: &str, feature: Option<u64>) {
         let kind = TagKind::Command { module: module.into(), params: params.into(), feature: feature.map(Uid) };
-        let tag = Tag { uid: Uid(uid), enabled: true, comment: String::new(), kind };
+        let tag = TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind };
         self.edit(RigEdit::AddTag { joint: Uid(joint), tag: Box::new(tag), index: usize::MAX });
     }
 
@@ -79,7 +79,7 @@ impl Bench {
 fn tags_are_entities_below_their_joint_in_order() {
     let mut bench = Bench::new();
     let kind = TagKind::Feature { kind: "generic".into(), name: "marks".into(), switch: String::new() };
-    let tag = Tag { uid: Uid(50), enabled: true, comment: "why".into(), kind };
+    let tag = TagData { uid: Uid(50), enabled: true, comment: "why".into(), kind };
     bench.edit(RigEdit::AddTag { joint: Uid(1), tag: Box::new(tag), index: 0 });
     bench.tag(1, 51, "mark", "()", Some(50));
     bench.tag(1, 52, "mark", "(up: 1.0)", None);
@@ -161,7 +161,7 @@ fn states_errors_and_times_are_on_the_tags() {
 
     // Mended by an edit: built at once.
     let kind = TagKind::Command { module: "mark".into(), params: "(up: 9.0)".into(), feature: None };
-    let tag = Tag { uid: Uid(52), enabled: true, comment: String::new(), kind };
+    let tag = TagData { uid: Uid(52), enabled: true, comment: String::new(), kind };
     bench.edit(RigEdit::SetTag(Uid(2), Box::new(tag)));
     assert_eq!(states(&bench), [Some(Done); 3]);
     assert!(bench.get::<BuildFailure>(bench.rig).is_none());

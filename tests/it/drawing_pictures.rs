@@ -10,15 +10,12 @@ use std::{
 use bevy::{
     asset::RenderAssetUsages,
     camera::RenderTarget,
-    log::LogPlugin,
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
     render::{
-        RenderPlugin,
         render_resource::TextureFormat,
         view::screenshot::{Screenshot, ScreenshotCaptured},
     },
-    window::ExitCondition,
 };
 use rigsmith::{
     mesh::obj::{ObjSettings, read_model},
@@ -28,8 +25,11 @@ use rigsmith::{
         viewport::{RigViewport, Sight},
     },
     prelude::*,
+    render::bevy_plugins,
     rig::{operations::MirrorPlane, template::read_template},
 };
+
+use crate::prerequisites::skip;
 
 /// Size of the pictures: small, unless somebody wants to look at them.
 fn size() -> UVec2 {
@@ -52,21 +52,13 @@ struct Studio {
 impl Studio {
     fn build() -> Self {
         let mut app = App::new();
-        let window = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
-        let plugins = DefaultPlugins
-            .set(window)
-            .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
-            .disable::<LogPlugin>()
-            .disable::<bevy::render::pipelined_rendering::PipelinedRenderingPlugin>();
-        #[cfg(feature = "editor")]
-        let plugins = plugins.disable::<bevy::winit::WinitPlugin>();
-        app.add_plugins((plugins, RigPlugins, DrawingPlugin)).init_resource::<Taken>();
+        app.add_plugins((bevy_plugins(), RigPlugins, DrawingPlugin)).init_resource::<Taken>();
         app.insert_resource(ClearColor(BACKGROUND));
         app.finish();
         app.cleanup();
         let world = app.world_mut();
         let template = read_template(include_bytes!("../../assets/templates/biped.rig.ron")).unwrap();
-        let rig = world.spawn(RigBundle { rig: template.rig, ..default() }).id();
+        let rig = world.spawn(template.rig).id();
         let target = Image::new_target_texture(size().x, size().y, TextureFormat::Rgba8UnormSrgb, None);
         let target = world.resource_mut::<Assets<Image>>().add(target);
         let camera = (
@@ -170,10 +162,16 @@ fn studio() -> Option<Studio> {
             std::panic::resume_unwind(reason)
         }
         Err(_) => {
-            println!("skipped: there is no graphics card, not even a software one");
+            skip("there is no graphics card, not even a software one", "RIGSMITH_REQUIRE_GPU");
             None
         }
     }
+}
+
+/// Pixels in which two pictures differ.
+fn changed(a: &Image, b: &Image) -> usize {
+    let [a, b] = [a, b].map(|image| image.data.as_ref().unwrap().chunks(4));
+    a.zip(b).filter(|(a, b)| a != b).count()
 }
 
 fn at(image: &Image, pixel: Vec2) -> [u8; 4] {
@@ -222,11 +220,21 @@ fn states_ghosts_and_labels_are_seen_on_a_gpu() {
         let place = studio.sight().project(studio.position(label)).unwrap();
         assert_ne!(at(&plain, place), at(&states, place), "{what}");
     }
-    studio.set(|settings| (settings.axes, settings.labels) = (true, LabelChoice::All));
-    studio.take("near_labels");
-    studio.look(Vec3::new(0.0, 1.0, 3.6), Vec3::new(0.0, 0.92, 0.0), None);
-    studio.take("front_labels");
+    studio.set(|settings| settings.axes = true);
+    let axes = studio.take("near_axes");
+    assert!(changed(&states, &axes) > 50, "axes change {} pixels", changed(&states, &axes));
+    studio.set(|settings| settings.labels = LabelChoice::All);
+    let labels = studio.take("near_labels");
+    let near = changed(&axes, &labels);
+    assert!(near > 300, "labels change {near} pixels");
     studio.set(|settings| (settings.axes, settings.labels) = (false, LabelChoice::None));
+    studio.look(Vec3::new(0.0, 1.0, 3.6), Vec3::new(0.0, 0.92, 0.0), None);
+    let plain = studio.take("front_plain");
+    studio.set(|settings| settings.labels = LabelChoice::All);
+    let labels = studio.take("front_labels");
+    let front = changed(&plain, &labels);
+    assert!(front > 300, "labels change {front} pixels from the front");
+    studio.set(|settings| settings.labels = LabelChoice::None);
     let (from, to) = (studio.position("chest"), Vec3::new(0.32, 1.5, 0.05));
     let mirrored = |place: Vec3| Vec3::new(-place.x, place.y, place.z);
     let step = |part: f32| from.lerp(to, part);
@@ -259,7 +267,16 @@ fn states_ghosts_and_labels_are_seen_on_a_gpu() {
         hand.iter().map(|uid| studio.app.world().get::<Rig>(rig).unwrap().position(*uid)).collect();
     let far = positions.into_iter().max_by(|a, b| a.x.total_cmp(&b.x)).unwrap();
     studio.look(far + Vec3::new(0.25, 0.25, 0.45), far - Vec3::X * 0.06, None);
-    studio.take("hand");
-    studio.look(Vec3::new(6.0, 5.0, 9.0), Vec3::ZERO, None);
-    studio.take("far");
+    let [hand, far] = [("hand", None), ("far", Some(Vec3::new(6.0, 5.0, 9.0)))].map(|(name, eye)| {
+        if let Some(eye) = eye {
+            studio.look(eye, Vec3::ZERO, None);
+        }
+        let rigged = studio.take(name);
+        studio.set(|settings| settings.rig = false);
+        let bare = studio.take(&format!("{name}_bare"));
+        studio.set(|settings| settings.rig = true);
+        changed(&rigged, &bare)
+    });
+    assert!(hand > 1000, "the rig covers {hand} pixels of a hand");
+    assert!(far > 100 && far < hand, "the rig covers {far} pixels from afar");
 }

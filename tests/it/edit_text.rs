@@ -37,7 +37,8 @@ fn weights_come_back_bit_by_bit() {
     weights.push([(0, 0.1), (1, 0.9)]);
     weights.push([]);
     weights.push([(1, f32::MIN_POSITIVE), (0, 1.0 - f32::EPSILON)]);
-    let skin = SkinData { joints: vec![Uid(1), Uid(u64::MAX)], weights, at_rest: true };
+    let subjects = [(Uid(u64::MAX), Uid(1))].into();
+    let skin = SkinData { joints: vec![Uid(1), Uid(u64::MAX)], weights, at_rest: true, subjects };
     for edit in [RigEdit::SetSkin(Uid(7), Some(Arc::new(skin))), RigEdit::SetSkin(Uid(7), None)] {
         assert_eq!(again(&RigEdit::Batch(vec![edit.clone()])), RigEdit::Batch(vec![edit]));
     }

@@ -9,7 +9,7 @@ use rigsmith::{
     plugins::{document::Selection, history::RigHistory},
     rig::{
         EditError, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigAbout, RigEdit, SkinData,
-        StoredPose, Tag, TagKind, Uid, UidSource,
+        StoredPose, TagData, TagKind, Uid, UidSource,
         operations::{Axis, MirrorPlane, Operation, OperationError, Outcome},
     },
 };
@@ -118,7 +118,7 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
         }),
         18 => edit(RigEdit::AddTag {
             joint: x,
-            tag: Box::new(Tag {
+            tag: Box::new(TagData {
                 uid,
                 enabled: odd,
                 comment: text.clone(),
@@ -132,7 +132,7 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
         },
         20 => match rig.joint(x).and_then(|joint| joint.data.tags.last()) {
             Some(tag) => {
-                edit(RigEdit::SetTag(x, Box::new(Tag { enabled: !tag.enabled, comment: text, ..tag.clone() })))
+                edit(RigEdit::SetTag(x, Box::new(TagData { enabled: !tag.enabled, comment: text, ..tag.clone() })))
             }
             None => edit(RigEdit::SetTag(x, Box::new(command(uid, "()", None)))),
         },
@@ -179,9 +179,9 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
     }
 }
 
-pub fn command(uid: Uid, params: &str, feature: Option<Uid>) -> Tag {
+pub fn command(uid: Uid, params: &str, feature: Option<Uid>) -> TagData {
     let kind = TagKind::Command { module: "a \"module\"".into(), params: params.into(), feature };
-    Tag { uid, enabled: uid.0.is_multiple_of(2), comment: String::new(), kind }
+    TagData { uid, enabled: uid.0.is_multiple_of(2), comment: String::new(), kind }
 }
 
 /// A rig after random steps; those that are refused are passed over.
@@ -510,7 +510,10 @@ fn what_could_not_be_saved_is_refused() {
     let painted = |uid, color| GroupData { uid, name: "p".into(), color, enabled: true };
     let weights = |starts: &[u32], values: &[f32]| {
         let weights = Weights { starts: starts.to_vec(), joints: vec![0; values.len()], values: values.to_vec() };
-        RigEdit::SetSkin(Uid(9), Some(Arc::new(SkinData { joints: vec![joints[0]], weights, at_rest: true })))
+        RigEdit::SetSkin(
+            Uid(9),
+            Some(Arc::new(SkinData { joints: vec![joints[0]], weights, at_rest: true, ..Default::default() })),
+        )
     };
     let table = [
         (RigEdit::SetRest(joints[0], nowhere), EditError::BadTransform(joints[0])),

@@ -2,25 +2,24 @@
 //!
 //! The files go to the folder in `RIGSMITH_EXPORTS` if it is set; the CI runs the validator on what is there.
 
-use std::{collections::BTreeMap, fs, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use rigsmith::{
     algo::weights::WeightSettings,
-    files::{RealDisk, load_model, store_model},
+    files::{RealDisk, load_model, load_template, store_model},
     headless::Workbench,
     mesh::{gltf::GltfWriteSettings, model::Model},
     rig::{RigEdit, UidSource, character::import_rig_text, operations::Operation, text},
 };
 
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: RIGSMITH_DATA is not set");
-    }
-    folder
-}
+use crate::prerequisites::test_data;
 
-fn exports() -> (PathBuf, Option<tempfile::TempDir>) {
+/// Folder of exports that a validator shall see.
+pub fn exports() -> (PathBuf, Option<tempfile::TempDir>) {
     match std::env::var_os("RIGSMITH_EXPORTS") {
         Some(folder) => (folder.into(), None),
         None => {
@@ -51,7 +50,7 @@ fn skinned(model: &Model) -> bool {
 
 #[test]
 fn bodies_skinned_to_game_engine() {
-    let Some(data) = data() else { return };
+    let Some(data) = test_data() else { return };
     let (folder, _guard) = exports();
     for name in ["baby", "female_young", "male_muscular_action"] {
         let body = data.join("bodies").join(name);
@@ -80,8 +79,27 @@ fn bodies_skinned_to_game_engine() {
 }
 
 #[test]
+fn the_bundled_character_is_exported() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
+    let (folder, _guard) = exports();
+    let rig = load_template(&RealDisk, &root.join("templates/biped.rig.ron")).unwrap().rig;
+    let joints = rig.len();
+    let mut bench = Workbench::with_rig(1, rig);
+    bench.open(load_model(&RealDisk, &root.join("models/biped.obj")).unwrap(), true).unwrap();
+    bench.skin(WeightSettings::default(), Vec::new(), &mut |_| ()).unwrap();
+    let path = folder.join("bundled_biped.glb");
+    let all = GltfWriteSettings { all_joints: true, ..Default::default() };
+    store_model(&RealDisk, &path, &bench.character(), &all).unwrap();
+    let back = load_model(&RealDisk, &path).unwrap();
+    assert!(skinned(&back));
+    assert_eq!(back.nodes.iter().filter(|node| node.joint).count(), joints);
+    let weights = back.weights.as_ref().unwrap();
+    assert!((0..weights.len()).all(|point| (1..=4).contains(&weights.of(point).len())));
+}
+
+#[test]
 fn characters_pass_through_the_workbench() {
-    let Some(data) = data() else { return };
+    let Some(data) = test_data() else { return };
     let (folder, _guard) = exports();
     let files = [
         "creatures/bird-eagle.glb",
@@ -119,8 +137,8 @@ fn characters_pass_through_the_workbench() {
         }
         let triangles = |model: &Model| model.parts.iter().map(|part| part.triangles.len()).sum::<usize>();
         assert_eq!(triangles(&back), triangles(&model), "{file}: triangles");
-        assert_eq!(back.looks.materials.len(), model.looks.materials.len(), "{file}: materials");
-        assert_eq!(back.looks.images.len(), model.looks.images.len(), "{file}: images");
+        assert_eq!(back.material_set.materials.len(), model.material_set.materials.len(), "{file}: materials");
+        assert_eq!(back.material_set.images.len(), model.material_set.images.len(), "{file}: images");
         let morphs = |model: &Model| model.objects.iter().map(|o| o.morph_names.len()).sum::<usize>();
         assert_eq!(morphs(&back), morphs(&model), "{file}: morph targets");
         // Skinned anew, at rest: the clips stay, and no vertex is left without weights.

@@ -22,11 +22,11 @@ use rigsmith::{
     rig::{NodeKind, Rig, Uid, operations::Operation},
 };
 
-use crate::heads;
+use crate::{bench::wait, heads, prerequisites::test_data};
 
 /// A file of the test data; `None`, with a word, where there is none.
 fn data(name: &str) -> Option<Model> {
-    Some(heads::model(&heads::data(name)?.join(name)))
+    Some(heads::model(&test_data()?.join(name)))
 }
 
 fn bundled(name: &str) -> Model {
@@ -90,7 +90,7 @@ fn the_bundled_head_gets_a_face() {
             if module == "control" && params.contains("limits"))
     });
     assert_eq!(controls.count(), report.bones.len());
-    let built = rigsmith::build::Builder::build(rig, &Arc::new(rigsmith::modules::all())).unwrap();
+    let built = rigsmith::processor::Builder::build(rig, &Arc::new(rigsmith::modules::all())).unwrap();
     assert!(built.nodes.len() >= rig.len() + report.bones.len(), "each bone has its control");
 
     // One step, and exactly back.
@@ -317,19 +317,9 @@ fn placing_can_be_cancelled() {
     let app = bench.app_mut();
     app.world_mut().write_message(FaceRequest { mesh, settings: settings(60), fit: None });
     app.update();
-    if let Some(job) = app.world().get::<FaceJob>(mesh) {
-        job.cancel();
-    }
-    let mut answer = None;
-    for _ in 0..2000 {
-        app.update();
-        answer = app.world_mut().resource_mut::<Messages<FacePlaced>>().drain().last();
-        if answer.is_some() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    let result = answer.expect("an answer comes").result;
+    app.world().get::<FaceJob>(mesh).expect("the job is under way").cancel();
+    wait(app, "an answer", App::update, |app| !app.world().resource::<Messages<FacePlaced>>().is_empty());
+    let result = app.world_mut().resource_mut::<Messages<FacePlaced>>().drain().last().unwrap().result;
     assert_eq!(result.unwrap_err(), FaceError::Cancelled.to_string());
     assert_eq!(*bench.rig(), before);
 }

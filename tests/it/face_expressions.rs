@@ -11,13 +11,16 @@ use rigsmith::{
         },
         grouping::group_head,
         head_bones::head_bones,
-        landmarks::Landmarks,
-        shells::find_shells,
+        landmarks::{Landmarks, find_landmarks},
+        shells::{ShellKind, Shells, find_shells},
     },
     mesh::model::Weights,
 };
 
-use crate::heads::{self, HEADS};
+use crate::{
+    heads::{self, HEADS},
+    prerequisites::test_data,
+};
 
 /// A head with bones at its true landmarks.
 struct Head {
@@ -30,12 +33,38 @@ struct Head {
     weights: Weights,
 }
 
+/// A head of the test data; `None` where there is none.
+#[track_caller]
 fn head(name: &str, density: usize) -> Option<Head> {
-    let folder = heads::data("expressions")?;
-    let (points, triangles) = heads::mesh(&folder.join(format!("heads/{name}.obj")));
+    let folder = test_data()?;
+    let mesh = heads::mesh(&folder.join(format!("heads/{name}.obj")));
     let marks = heads::truth(&folder);
-    let landmarks = heads::true_landmarks(&points, &marks);
-    let shells = find_shells(&points, &triangles);
+    let landmarks = heads::true_landmarks(&mesh.0, &marks);
+    let shells = find_shells(&mesh.0, &mesh.1);
+    Some(rigged(mesh, shells, landmarks, marks, density))
+}
+
+/// The bundled head, with bones at the landmarks that are found on it.
+fn bundled(density: usize) -> Head {
+    let mesh = heads::bundled();
+    let shells = find_shells(&mesh.0, &mesh.1);
+    let landmarks = find_landmarks(&mesh.0, &mesh.1, &shells).unwrap();
+    let nearest = |mark: &Vec3| {
+        let skin = (0..mesh.0.len()).filter(|point| shells.kind(*point) == ShellKind::Skin);
+        let distance = |point: &usize| mesh.0[*point].distance_squared(*mark);
+        skin.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+    };
+    let marks = landmarks.points.iter().map(nearest).collect();
+    rigged(mesh, shells, landmarks, marks, density)
+}
+
+fn rigged(
+    (points, triangles): heads::Mesh,
+    shells: Shells,
+    landmarks: Landmarks,
+    marks: Vec<usize>,
+    density: usize,
+) -> Head {
     let groups = group_head(&points, &triangles, &shells, &landmarks, None, &|_| true).unwrap();
     let analysis = FaceAnalysis {
         axes: HeadAxes { up: Vec3::Y, forward: Vec3::Z },
@@ -53,7 +82,7 @@ fn head(name: &str, density: usize) -> Option<Head> {
     let face = analysis.rig(&[], &settings, ExpressionSet::bundled(), &|_, _| true).unwrap();
     let AutoFace { bones, weights, .. } = face;
     let FaceAnalysis { points, triangles, landmarks, groups, .. } = analysis;
-    Some(Head { points, triangles, landmarks, marks, mask: groups.mask, bones, weights })
+    Head { points, triangles, landmarks, marks, mask: groups.mask, bones, weights }
 }
 
 impl Head {
@@ -112,11 +141,21 @@ impl Head {
     }
 }
 
+#[track_caller]
 fn check_head(name: &str, density: usize) {
-    let Some(head) = head(name, density) else { return };
+    if let Some(head) = head(name, density) {
+        check_six(&head, name, density);
+    }
+}
+
+/// Each of the six expressions reaches what it must, folds nothing and keeps lips and lids apart.
+fn check_six(head: &Head, name: &str, density: usize) {
     for expression in ExpressionSet::bundled().six() {
         let moved = head.moved(&expression.name, 1.0);
-        for (what, reached, least) in head.reached(&expression.name, &moved) {
+        // Lips that are closed in the mesh cannot part.
+        let can_part = |what: &str| head.landmarks.mouth_open || !what.starts_with("62-66");
+        let reached = head.reached(&expression.name, &moved);
+        for (what, reached, least) in reached.into_iter().filter(|(what, ..)| can_part(what)) {
             assert!(reached >= least, "{name}, {density} bones, {}: {what} {reached:.4} < {least}", expression.name);
         }
         assert_eq!(head.folds(&moved), 0, "{name}, {density} bones, {}: triangles fold", expression.name);
@@ -127,6 +166,11 @@ fn check_head(name: &str, density: usize) {
             assert!(gap(&moved) >= least, "{name}, {density} bones, {}: {above} below {below}", expression.name);
         }
     }
+}
+
+#[test]
+fn the_bundled_head_shows_the_six() {
+    check_six(&bundled(40), "the bundled head", 40);
 }
 
 #[test]
@@ -146,13 +190,14 @@ fn many_bones_show_the_six() {
 
 #[test]
 fn strength_nothing_is_rest_and_one_side_leaves_the_other() {
-    let Some(head) = head(HEADS[0], 40) else { return };
-    let still = head.moved("happiness", 0.0);
-    assert!(still.iter().zip(&head.points).all(|(a, b)| a.distance(*b) < 1e-5));
-    let moved = head.moved("lip_corner_pull_l", 1.0);
-    let way = |mark: usize| moved[head.marks[mark]].distance(head.points[head.marks[mark]]);
-    assert!(way(54) > 0.03 * head.landmarks.eye_distance(), "{}", way(54));
-    assert!(way(48) < 0.15 * way(54), "{} {}", way(48), way(54));
+    for head in [bundled(40)].into_iter().chain(head(HEADS[0], 40)) {
+        let still = head.moved("happiness", 0.0);
+        assert!(still.iter().zip(&head.points).all(|(a, b)| a.distance(*b) < 1e-5));
+        let moved = head.moved("lip_corner_pull_l", 1.0);
+        let way = |mark: usize| moved[head.marks[mark]].distance(head.points[head.marks[mark]]);
+        assert!(way(54) > 0.03 * head.landmarks.eye_distance(), "{}", way(54));
+        assert!(way(48) < 0.15 * way(54), "{} {}", way(48), way(54));
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@ use rigsmith::{
     mesh::model::Weights,
 };
 
-use crate::heads;
+use crate::{heads, prerequisites::test_data};
 
 /// A flat sheet of `side` by `side` points, one unit wide.
 fn sheet(side: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
@@ -228,7 +228,7 @@ fn bad_input_is_an_error() {
 
 #[test]
 fn true_shapes_of_a_head() {
-    let Some(folder) = heads::data("fitting a head") else { return };
+    let Some(folder) = test_data() else { return };
     let model = heads::model(&folder.join("heads/ict_neutral.obj"));
     let shapes = load_shapes(&RealDisk, &folder.join("heads/ict_expressions.json"), &model).unwrap().displacements;
     assert_eq!(shapes.len(), 57);

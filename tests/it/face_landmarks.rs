@@ -9,7 +9,10 @@ use rigsmith::algo::face::{
     shells::{ShellKind, Shells, find_shells},
 };
 
-use crate::heads::{HEADS, Mesh, data, mesh, truth};
+use crate::{
+    heads::{HEADS, Mesh, bundled, bundled_and, mesh, truth},
+    prerequisites::test_data,
+};
 
 fn find((points, triangles): &Mesh) -> Landmarks {
     find_landmarks(points, triangles, &find_shells(points, triangles)).unwrap()
@@ -60,7 +63,7 @@ fn check_sensible(found: &Landmarks) {
 
 #[test]
 fn near_the_truth() {
-    let Some(folder) = data("near_the_truth") else { return };
+    let Some(folder) = test_data() else { return };
     let truth = truth(&folder);
     for name in HEADS {
         let mesh = mesh(&folder.join(format!("heads/{name}.obj")));
@@ -78,8 +81,15 @@ fn near_the_truth() {
 }
 
 #[test]
+fn the_bundled_head_has_a_face() {
+    let found = find(&bundled());
+    check_sensible(&found);
+    assert!(found.symmetric && found.confidence > 0.5, "{}", found.confidence);
+}
+
+#[test]
 fn stretched_heads() {
-    let Some(folder) = data("stretched_heads") else { return };
+    let Some(folder) = test_data() else { return };
     let truth = truth(&folder);
     let (points, triangles) = mesh(&folder.join("heads/ict_identity_1.obj"));
     let pitch = |degrees: f32| Quat::from_rotation_x(degrees.to_radians());
@@ -99,7 +109,7 @@ fn stretched_heads() {
 
 #[test]
 fn looking_aside() {
-    let Some(folder) = data("looking_aside") else { return };
+    let Some(folder) = test_data() else { return };
     let truth = truth(&folder);
     let (points, triangles) = mesh(&folder.join("heads/ict_identity_2.obj"));
     for (axis, degrees) in [(Vec3::Y, 8.0f32), (Vec3::Y, -24.0), (Vec3::Z, 12.0)] {
@@ -113,50 +123,54 @@ fn looking_aside() {
 
 #[test]
 fn any_unit_and_place() {
-    let Some(folder) = data("any_unit_and_place") else { return };
-    let (points, triangles) = mesh(&folder.join("heads/ict_identity_1.obj"));
-    let first = find(&(points.clone(), triangles.clone()));
-    for (scale, shift) in [(0.01, Vec3::ZERO), (100.0, Vec3::ZERO), (1.0, vec3(30.0, -50.0, 20.0))] {
-        let moved: Vec<Vec3> = points.iter().map(|&point| point * scale + shift).collect();
-        let found = find(&(moved, triangles.clone()));
-        let back = found.points.map(|point| (point - shift) / scale);
-        let apart = apart(&first.points, &back);
-        assert!(apart < 1.5, "times {scale} plus {shift}: off by {apart} %");
+    for (name, (points, triangles)) in bundled_and("ict_identity_1") {
+        let first = find(&(points.clone(), triangles.clone()));
+        let eyes = first.eye_distance();
+        for (scale, shift) in [(0.01, Vec3::ZERO), (100.0, Vec3::ZERO), (1.0, vec3(4.5, -7.5, 3.0) * eyes)] {
+            let moved: Vec<Vec3> = points.iter().map(|&point| point * scale + shift).collect();
+            let found = find(&(moved, triangles.clone()));
+            let back = found.points.map(|point| (point - shift) / scale);
+            let apart = apart(&first.points, &back);
+            assert!(apart < 1.5, "{name} times {scale} plus {shift}: off by {apart} %");
+        }
     }
 }
 
 #[test]
 fn any_topology() {
-    let Some(folder) = data("any_topology") else { return };
-    let mesh = mesh(&folder.join("heads/ict_neutral.obj"));
-    let first = find(&mesh);
-    let finer = find(&subdivided(&mesh));
-    assert!(apart(&first.points, &finer.points) < 1.0, "subdivided: {} %", apart(&first.points, &finer.points));
-    let count = mesh.0.len() as u32;
-    let backward: Vec<Vec3> = mesh.0.iter().rev().copied().collect();
-    let triangles: Vec<[u32; 3]> =
-        mesh.1.iter().rev().map(|corners| corners.map(|corner| count - 1 - corner)).collect();
-    let turned = find(&(backward, triangles));
-    assert!(apart(&first.points, &turned.points) < 0.5, "reordered: {} %", apart(&first.points, &turned.points));
-    let inside_out: Vec<[u32; 3]> = mesh.1.iter().map(|&[a, b, c]| [a, c, b]).collect();
-    let turned = find(&(mesh.0.clone(), inside_out));
-    assert!(
-        apart(&first.points, &turned.points) < 0.5,
-        "wound the other way: {} %",
-        apart(&first.points, &turned.points)
-    );
+    for (name, mesh) in bundled_and("ict_neutral") {
+        let first = find(&mesh);
+        let count = mesh.0.len() as u32;
+        let backward: Vec<Vec3> = mesh.0.iter().rev().copied().collect();
+        let triangles: Vec<[u32; 3]> =
+            mesh.1.iter().rev().map(|corners| corners.map(|corner| count - 1 - corner)).collect();
+        let inside_out: Vec<[u32; 3]> = mesh.1.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        for (change, other, most) in [
+            ("subdivided", subdivided(&mesh), 1.0),
+            ("reordered", (backward, triangles), 0.5),
+            ("wound the other way", (mesh.0.clone(), inside_out), 0.5),
+        ] {
+            let apart = apart(&first.points, &find(&other).points);
+            assert!(apart < most, "{name} {change}: {apart} %");
+        }
+    }
 }
 
 #[test]
 fn same_on_both_sides() {
-    let Some(folder) = data("same_on_both_sides") else { return };
-    let (points, triangles) = mesh(&folder.join("heads/ict_neutral.obj"));
-    let found = find(&(points.clone(), triangles.clone()));
-    assert!(found.symmetric);
-    for index in 0..68 {
-        let (a, b) = (found.points[index], found.points[mirrored(index)]);
-        assert_eq!((2.0 * found.middle - a.x, a.y, a.z), (b.x, b.y, b.z), "landmark {index}");
+    for (name, mesh) in bundled_and("ict_neutral") {
+        let found = find(&mesh);
+        assert!(found.symmetric, "{name}");
+        for index in 0..68 {
+            let (a, b) = (found.points[index], found.points[mirrored(index)]);
+            assert_eq!((2.0 * found.middle - a.x, a.y, a.z), (b.x, b.y, b.z), "{name}: landmark {index}");
+        }
     }
+}
+
+#[test]
+fn a_mirrored_head_has_mirrored_landmarks() {
+    let Some(folder) = test_data() else { return };
     let (points, triangles) = mesh(&folder.join("heads/ict_identity_2.obj"));
     let found = find(&(points.clone(), triangles.clone()));
     let flipped: Vec<Vec3> = points.iter().map(|point| vec3(-point.x, point.y, point.z)).collect();
@@ -171,7 +185,7 @@ fn same_on_both_sides() {
 
 #[test]
 fn scan() {
-    let Some(folder) = data("scan") else { return };
+    let Some(folder) = test_data() else { return };
     let found = find(&mesh(&folder.join("heads/lee_perry_smith.obj")));
     check_sensible(&found);
     assert!(!found.symmetric && found.confidence > 0.5);
@@ -179,7 +193,7 @@ fn scan() {
 
 #[test]
 fn cow() {
-    let Some(folder) = data("cow") else { return };
+    let Some(folder) = test_data() else { return };
     let (points, triangles) = mesh(&folder.join("creatures/spot.obj"));
     // Its front is the other way.
     let turned: Vec<Vec3> = points.iter().map(|point| vec3(-point.x, point.y, -point.z)).collect();

@@ -8,9 +8,11 @@ use std::{
 };
 
 use rigsmith::files::{
-    Fault, FaultPlan, FaultyDisk, RealDisk, SaveError, is_temp_name, remove_stale_temps, save_atomic,
+    Disk, Fault, FaultPlan, FaultyDisk, RealDisk, SaveError, is_temp_name, remove_stale_temps, save_atomic,
 };
 use tempfile::TempDir;
+
+use crate::bench::HANG;
 
 const OLD: &[u8] = b"the old content, which must not be lost";
 
@@ -60,7 +62,8 @@ fn saving_over_a_file_leaves_the_old_or_the_finished_one_whatever_fails() {
                 Err(SaveError::Unconfirmed { .. }) => assert!(now.as_deref() == Some(&finished()), "{context}"),
                 Err(_) => assert!(now.as_deref() == existed.then_some(OLD), "{context}"),
             }
-            assert_eq!(result.is_ok(), !disk.has_failed() || plan.fault == Fault::Short, "{context}");
+            assert!(result.is_ok() || disk.has_failed(), "{context}");
+            assert!(result.is_ok() || plan.fault != Fault::Short, "{context}");
             let names = fs::read_dir(folder.path()).unwrap().count();
             assert!(names - temps(folder.path()) <= 1, "{context}");
             if !plan.lasting && !plan.fault.is_crash() {
@@ -78,13 +81,13 @@ fn child_that_saves_until_killed() {
     let Some(path) = std::env::var_os(SAVE_LOOP).map(PathBuf::from) else {
         return;
     };
-    println!("saving");
     let started = Instant::now();
     for round in 0u64.. {
         // In case the parent is gone.
-        if started.elapsed() > Duration::from_secs(20) {
+        if started.elapsed() > HANG {
             return;
         }
+        println!("saving {round}.");
         let bytes: Vec<u8> = round.to_le_bytes().repeat(32 * 1024);
         save_atomic(&RealDisk, &path, &bytes).unwrap();
     }
@@ -108,12 +111,12 @@ fn killed_while_saving_the_file_is_whole() {
             .unwrap();
         let mut started = std::io::BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();
-        while !line.contains("saving") {
+        while !line.contains(&format!("saving {}.", round % 4)) {
             line.clear();
             assert!(std::io::BufRead::read_line(&mut started, &mut line).unwrap() > 0, "the child saves");
         }
         // Spread over the few milliseconds that one save takes.
-        std::thread::sleep(Duration::from_micros(round * 7919 % 23_000));
+        std::thread::sleep(Duration::from_micros(round * 7919 % 6_000));
         child.kill().unwrap();
         child.wait().unwrap();
         let bytes = fs::read(&path).unwrap();
@@ -124,8 +127,8 @@ fn killed_while_saving_the_file_is_whole() {
     }
     assert!(seen.len() > 1, "at least one child replaced the file");
     println!("{left} of 30 kills left a temporary file");
-    remove_stale_temps(&RealDisk, folder.path(), Duration::ZERO).unwrap();
-    assert_eq!(temps(folder.path()), 0);
+    save_atomic(&RealDisk, &path, b"the next one").unwrap();
+    assert_eq!(temps(folder.path()), 0, "the next save clears up");
 }
 
 #[test]
@@ -281,8 +284,18 @@ fn temporary_names_are_told_from_others() {
     save_atomic(&FaultyDisk::new(RealDisk, Some(plan)), &folder.path().join("rig"), &finished()).unwrap_err();
     assert_eq!(temps(folder.path()), 1, "a crash leaves one behind, and its name is recognised");
     fs::write(folder.path().join("mine.tmp"), b"").unwrap();
-    assert_eq!(remove_stale_temps(&RealDisk, folder.path(), Duration::from_secs(3600)).unwrap(), 0);
-    assert_eq!(remove_stale_temps(&RealDisk, folder.path(), Duration::ZERO).unwrap(), 1);
+    assert_eq!(remove_stale_temps(&RealDisk, folder.path()).unwrap(), 1);
+    assert_eq!(temps(folder.path()), 0);
+    let at = |name: &str| folder.path().join(name);
+    let (anchor, member) = (at(".rigsmith-0123456700000000.tmp"), at(".rigsmith-0123456700000001.tmp"));
+    let mut living = RealDisk.create(&anchor).unwrap();
+    living.lock().unwrap();
+    fs::write(&member, b"half").unwrap();
+    assert_eq!(remove_stale_temps(&RealDisk, folder.path()).unwrap(), 0, "the save is still under way");
+    drop(living);
+    fs::write(at(".rigsmith-fedcba9800000001.tmp"), b"without its anchor").unwrap();
+    assert_eq!(remove_stale_temps(&RealDisk, folder.path()).unwrap(), 3);
+    assert!(!anchor.exists() && !member.exists());
     assert!(folder.path().join("mine.tmp").exists());
     for name in [".rigsmith-.tmp", ".rigsmith-0123456789abcdeg.tmp", "rigsmith-0123456789abcdef.tmp", "a.tmp", ""] {
         assert!(!is_temp_name(name.as_ref()), "{name}");
@@ -294,7 +307,6 @@ fn temporary_names_are_told_from_others() {
 fn saves_from_many_threads_do_not_meet() {
     let folder = fresh();
     let path = folder.path().join("rig");
-    let started = Instant::now();
     std::thread::scope(|scope| {
         for thread in 0..8u8 {
             let path = &path;
@@ -306,6 +318,6 @@ fn saves_from_many_threads_do_not_meet() {
         }
     });
     let bytes = fs::read(&path).unwrap();
-    assert!(bytes.len() == 10_000 && bytes.iter().all(|&b| b == bytes[0]), "{:?}", started.elapsed());
+    assert!(bytes.len() == 10_000 && bytes.iter().all(|&b| b == bytes[0]));
     assert_eq!(temps(folder.path()), 0);
 }

@@ -1,132 +1,376 @@
-//! Saving files that belong together: all of them or none, each of them whole.
+//! Saving files that belong together: whatever fails, the old ones or the finished ones are there, and nothing else changes.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     ffi::OsString,
     fs, io,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
-use rigsmith::files::{
-    Disk, DiskFile, Entry, Fault, FaultPlan, FaultyDisk, RealDisk, SaveError, is_temp_name, save_all_atomic,
+use glam::Vec3;
+use rigsmith::{
+    files::{
+        Disk, DiskFile, Entry, Fault, FaultPlan, FaultyDisk, FileSet, MeshShape, MeshToSave, ProjectToSave, RealDisk,
+        SaveError, StoreError, is_temp_name, load_model, load_project, remove_stale_temps, save_set, store_model,
+        store_project,
+    },
+    mesh::{
+        gltf::GltfWriteSettings,
+        model::{Model, Weights},
+        obj::{ObjSettings, read_model},
+    },
+    rig::{JointData, Rig, RigEdit, SkinData, Uid},
 };
 use tempfile::TempDir;
 
-fn fresh() -> TempDir {
-    tempfile::tempdir().unwrap()
+/// A set of each kind that Rigsmith saves, in versions that can be told apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    Gltf,
+    Obj,
+    Project,
 }
 
-fn temps(folder: &Path) -> usize {
+/// The texture of a version; two versions share one.
+fn texture(version: u32) -> Vec<u8> {
+    let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+    bytes.extend((version / 2).to_le_bytes().repeat(500));
+    bytes
+}
+
+/// A textured triangle whose first point tells the version.
+fn triangle(version: u32) -> Model {
+    let obj = format!("mtllib a.mtl\nv {version} 0 0\nv 1 5 0\nv 0 1 9\nvt 0 0\nusemtl wood\nf 1/1 2/1 3/1\n");
+    let mtl = format!("newmtl wood\nKd 0.5 0.5 0.{version}\nmap_Kd wood.png\n");
+    let mut sidecar = |name: &str| Some(if name == "a.mtl" { mtl.clone().into() } else { texture(version) });
+    read_model(obj.as_bytes(), "scene", &ObjSettings::default(), &mut sidecar).unwrap()
+}
+
+/// The version of a triangle, if it is that of its texture.
+fn version_of(model: &Model) -> Result<u32, String> {
+    let version = model.points.iter().map(|point| point.x as u32).max().unwrap_or_default();
+    match &model.material_set.images[..] {
+        [image] if image.bytes == texture(version) => Ok(version),
+        images => Err(format!("version {version} with {} images; {:?}", images.len(), model.notes)),
+    }
+}
+
+fn share(version: u32) -> f32 {
+    0.25 + version as f32 / 4096.0
+}
+
+fn project(mesh: &Path, version: u32) -> ProjectToSave {
+    let (mut rig, uid) = (Rig::new(Uid(1), "rig"), Uid(0x50));
+    for number in 0..2 {
+        let mut joint = JointData { uid: Uid(10 + number), ..Default::default() };
+        joint.rest.translation = Vec3::Y * number as f32;
+        rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent: None, index: usize::MAX }).unwrap();
+    }
+    let model = load_model(&RealDisk, mesh).unwrap();
+    let mut weights = Weights::default();
+    model.points.iter().for_each(|_| weights.push([(0, share(version)), (1, 1.0 - share(version))]));
+    let skin = SkinData { joints: vec![Uid(10), Uid(11)], weights, at_rest: true, ..Default::default() };
+    rig.apply(&RigEdit::SetSkin(uid, Some(Arc::new(skin)))).unwrap();
+    let shape = MeshShape::Open { triangles: model.point_triangles().into(), rest: Arc::new(model.at_rest()) };
+    let mesh = MeshToSave { uid, rig: rig.uid(), path: mesh.into(), nodes: Arc::default(), shape };
+    ProjectToSave { name: version.to_string(), rigs: vec![rig], meshes: vec![mesh], ..Default::default() }
+}
+
+impl Kind {
+    pub const ALL: [Self; 3] = [Self::Gltf, Self::Obj, Self::Project];
+
+    pub fn main(self, folder: &Path) -> PathBuf {
+        folder.join(match self {
+            Self::Gltf => "scene.gltf",
+            Self::Obj => "scene.obj",
+            Self::Project => "scene.rigsmith.ron",
+        })
+    }
+
+    pub fn save(self, disk: &dyn Disk, folder: &Path, version: u32) -> Result<(), StoreError> {
+        let path = self.main(folder);
+        match self {
+            Self::Project => store_project(disk, &path, &project(&folder.join("mesh.obj"), version)).map(drop),
+            _ => store_model(disk, &path, &triangle(version), &GltfWriteSettings::default()).map(drop),
+        }
+    }
+
+    /// The version in a folder, if it is whole.
+    pub fn load(self, folder: &Path) -> Result<u32, String> {
+        let path = self.main(folder);
+        if self != Self::Project {
+            return version_of(&load_model(&RealDisk, &path).map_err(|error| error.to_string())?);
+        }
+        let project = load_project(&RealDisk, &path).map_err(|error| error.to_string())?;
+        let version: u32 = project.name.parse().map_err(|_| project.name.clone())?;
+        let weights = project.rigs[0].skins().next().and_then(|(_, skin)| skin.weights.of(0).next());
+        match (project.notes.is_empty(), weights) {
+            (true, Some((0, weight))) if weight == share(version) => Ok(version),
+            _ => Err(format!("version {version}, weights {weights:?}; {:?}", project.notes)),
+        }
+    }
+}
+
+/// A folder with files of somebody else under every name that comes to mind.
+pub fn furnished() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for name in FOREIGN {
+        fs::write(folder.path().join(name), name.repeat(10)).unwrap();
+    }
+    fs::write(folder.path().join("mesh.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    folder
+}
+
+const FOREIGN: [&str; 7] = [
+    "wood.png",
+    "wood.0123456789abcdef.png",
+    "scene.bin",
+    "scene.mtl",
+    "scene.0000000000000050.skin",
+    "notes.txt",
+    "scene.0123456789abcdef.bin",
+];
+
+/// The names in a folder, after checking that what is somebody else's is as it was.
+pub fn names(folder: &Path) -> BTreeSet<String> {
+    for name in FOREIGN {
+        assert_eq!(fs::read_to_string(folder.join(name)).ok(), Some(name.repeat(10)), "{name} was touched");
+    }
+    fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+/// The names in a folder where nothing but this version was ever saved.
+pub fn expected(kind: Kind, version: u32) -> BTreeSet<String> {
+    let folder = furnished();
+    kind.save(&RealDisk, folder.path(), version).unwrap();
+    names(folder.path())
+}
+
+pub fn temps(folder: &Path) -> usize {
     fs::read_dir(folder).unwrap().filter(|entry| is_temp_name(&entry.as_ref().unwrap().file_name())).count()
 }
 
-/// Everything below a folder, temporary files excepted.
-fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.is_file() && !is_temp_name(path.file_name().unwrap()))
-        .map(|path| (path.clone(), fs::read(path).unwrap()))
-        .collect()
+/// Every operation fails in every manner that makes a difference; the tests of single files tell errors apart.
+fn plans(operations: usize) -> impl Iterator<Item = FaultPlan> {
+    let manners = [
+        (Fault::Io, false),
+        (Fault::NoSpace, true),
+        (Fault::Short, false),
+        (Fault::Crash, true),
+        (Fault::PowerLoss, true),
+    ];
+    (0..operations).flat_map(move |at| manners.map(|(fault, lasting)| FaultPlan { at, fault, lasting }))
 }
 
-fn plans(operations: usize) -> impl Iterator<Item = FaultPlan> {
-    (0..operations).flat_map(|at| {
-        Fault::ALL.into_iter().flat_map(move |fault| [false, true].map(|lasting| FaultPlan { at, fault, lasting }))
-    })
+fn copy(from: &Path) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for name in names(from) {
+        fs::copy(from.join(&name), folder.path().join(&name)).unwrap();
+    }
+    folder
+}
+
+/// Fails every operation of a save in every manner.
+fn check_every_operation(kind: Kind, existed: bool) {
+    let before = furnished();
+    if existed {
+        kind.save(&RealDisk, before.path(), 1).unwrap();
+    }
+    let dry = copy(before.path());
+    let counted = FaultyDisk::new(RealDisk, None);
+    kind.save(&counted, dry.path(), 2).unwrap();
+    let (done, after) = (names(dry.path()), expected(kind, 3));
+    assert_eq!(done, expected(kind, 2));
+    for plan in plans(counted.operations() + 1) {
+        let folder = copy(before.path());
+        let disk = FaultyDisk::new(RealDisk, Some(plan));
+        let result = kind.save(&disk, folder.path(), 2);
+        let context = format!("{kind:?}, existed {existed}, {plan:?}, {result:?}, {:?}", disk.log());
+        let is_new = matches!(&result, Ok(()) | Err(StoreError::Save(SaveError::Unconfirmed { .. })));
+        match (is_new, existed) {
+            (false, false) => assert!(!kind.main(folder.path()).exists(), "{context}"),
+            (is_new, _) => assert_eq!(kind.load(folder.path()), Ok(if is_new { 2 } else { 1 }), "{context}"),
+        }
+        names(folder.path());
+        if is_new && !disk.has_failed() {
+            assert_eq!(names(folder.path()), done, "{context}");
+        }
+        drop(disk);
+        // The next save clears away what is left.
+        kind.save(&RealDisk, folder.path(), 3).unwrap_or_else(|error| panic!("{context}: {error}"));
+        assert_eq!(kind.load(folder.path()), Ok(3), "{context}");
+        assert_eq!(names(folder.path()), after, "{context}");
+    }
 }
 
 #[test]
-fn saving_a_set_leaves_whole_files_and_puts_them_back_when_one_fails() {
-    let set = |folder: &Path, byte: u8| -> Vec<(PathBuf, Vec<u8>)> {
-        ["a.bin", "b.png", "c.gltf"].map(|name| (folder.join(name), vec![byte; 5000])).to_vec()
-    };
-    let dry = fresh();
-    let counted = FaultyDisk::new(RealDisk, None);
-    save_all_atomic(&RealDisk, &set(dry.path(), 1)).unwrap();
-    save_all_atomic(&counted, &set(dry.path(), 2)).unwrap();
-    assert_eq!(temps(dry.path()), 0);
-    for existed in [true, false] {
-        for plan in plans(counted.operations() + 1) {
-            let folder = fresh();
-            if existed {
-                save_all_atomic(&RealDisk, &set(folder.path(), 1)).unwrap();
-            }
-            let disk = FaultyDisk::new(RealDisk, Some(plan));
-            let result = save_all_atomic(&disk, &set(folder.path(), 2));
-            let context = format!("existed {existed}, {plan:?}, {result:?}, {:?}", disk.log());
-            let now = contents(folder.path());
-            for content in now.values() {
-                assert!(content.len() == 5000 && content.iter().all(|&b| b == content[0]), "{context}");
-            }
-            let values: Vec<u8> = now.values().map(|content| content[0]).collect();
-            let old: &[u8] = if existed { &[1, 1, 1] } else { &[] };
-            match &result {
-                Ok(()) | Err(SaveError::Unconfirmed { .. }) => assert_eq!(values, [2, 2, 2], "{context}"),
-                Err(SaveError::Mixed { .. }) => assert!(plan.lasting || plan.fault.is_crash(), "{context}"),
-                Err(_) => assert_eq!(values, old, "{context}"),
-            }
-            if !plan.lasting && !plan.fault.is_crash() {
-                assert_eq!(temps(folder.path()), 0, "{context}");
-            }
+fn a_gltf_is_saved_whole_or_not_at_all() {
+    check_every_operation(Kind::Gltf, true);
+    check_every_operation(Kind::Gltf, false);
+}
+
+#[test]
+fn an_obj_is_saved_whole_or_not_at_all() {
+    check_every_operation(Kind::Obj, true);
+    check_every_operation(Kind::Obj, false);
+}
+
+#[test]
+fn a_project_is_saved_whole_or_not_at_all() {
+    check_every_operation(Kind::Project, true);
+    check_every_operation(Kind::Project, false);
+}
+
+#[test]
+fn companions_are_found_by_content_and_cleared_with_their_main_file() {
+    for kind in Kind::ALL {
+        let folder = furnished();
+        let before = names(folder.path());
+        for version in [1, 1, 2, 3, 2, 1] {
+            kind.save(&RealDisk, folder.path(), version).unwrap();
+            assert_eq!(kind.load(folder.path()), Ok(version));
+            let now = names(folder.path());
+            assert_eq!(now, expected(kind, version), "nothing of the versions before is left");
+            let added: Vec<&str> = now.difference(&before).map(String::as_str).collect();
+            let stems: BTreeSet<&str> = added.iter().map(|name| name.split('.').next().unwrap()).collect();
+            assert_eq!(added.len(), if kind == Kind::Project { 2 } else { 3 }, "{added:?}");
+            assert!(stems.iter().all(|stem| ["scene", "wood"].contains(stem)), "readable names: {added:?}");
         }
     }
 }
 
 #[test]
-fn the_main_file_of_a_set_comes_last() {
-    let folder = fresh();
-    let files = [(folder.path().join("images/skin.png"), vec![1]), (folder.path().join("model.gltf"), vec![2])];
-    let counted = FaultyDisk::new(RealDisk, None);
-    save_all_atomic(&counted, &files).unwrap();
-    let renames: Vec<usize> =
-        counted.log().iter().enumerate().filter(|(_, name)| **name == "rename").map(|(i, _)| i).collect();
-    let last_sync = counted.log().iter().rposition(|name| *name == "sync").unwrap();
-    assert_eq!(renames.len(), 2);
-    assert!(last_sync < renames[0], "all are synced before the first takes its place");
-
-    let other = fresh();
-    let files = files.map(|(path, bytes)| (other.path().join(path.strip_prefix(folder.path()).unwrap()), bytes));
-    let plan = FaultPlan { at: renames[1], fault: Fault::Crash, lasting: true };
-    save_all_atomic(&FaultyDisk::new(RealDisk, Some(plan)), &files).unwrap_err();
-    assert!(files[0].0.exists() && !files[1].0.exists());
-}
-
-#[test]
-fn a_set_may_not_name_a_file_twice() {
-    let folder = fresh();
-    let path = folder.path().join("a.bin");
-    let error = save_all_atomic(&RealDisk, &[(path.clone(), vec![1]), (path.clone(), vec![2])]).unwrap_err();
-    assert!(matches!(error, SaveError::SameTarget { .. }), "{error}");
-    assert!(!path.exists());
-    save_all_atomic(&RealDisk, &[]).unwrap();
-}
-
-#[test]
-fn the_files_of_a_set_stay_below_the_main_file() {
-    let outer = tempfile::tempdir().unwrap();
-    let main = outer.path().join("out/model.gltf");
-    let set = |name: &str| [(main.with_file_name(name), vec![1]), (main.clone(), vec![2])];
-    let error = save_all_atomic(&RealDisk, &set("images/skin.png")).unwrap_err();
-    assert!(matches!(error, SaveError::NoFolder { .. }), "{error}");
-    assert_eq!(fs::read_dir(outer.path()).unwrap().count(), 0, "only folders below the main file's are created");
-    fs::create_dir(outer.path().join("out")).unwrap();
-    let absolute = outer.path().join("secret").display().to_string();
-    for name in ["../secret", "images/../../secret", &absolute] {
-        let error = save_all_atomic(&RealDisk, &set(name)).unwrap_err();
-        assert!(matches!(error, SaveError::Outside { .. }), "{name}: {error}");
-    }
-    assert!(!main.exists() && !outer.path().join("secret").exists());
-    for name in ["skin.png", "images/deep/skin.png", "./skin.png"] {
-        save_all_atomic(&RealDisk, &set(name)).unwrap();
-        assert_eq!(fs::read(main.with_file_name(name)).unwrap(), [1]);
+fn what_is_there_already_is_not_written_again() {
+    for kind in Kind::ALL {
+        let folder = furnished();
+        let count = |version: u32, operation: &str| {
+            let disk = FaultyDisk::new(RealDisk, None);
+            kind.save(&disk, folder.path(), version).unwrap();
+            disk.log().iter().filter(|name| **name == operation).count()
+        };
+        assert!(count(2, "hard_link") > 0);
+        assert_eq!((count(2, "hard_link"), count(2, "create")), (0, 1), "{kind:?}: only the main file");
     }
 }
 
-/// A disk without hard links, as exFAT is.
-struct WithoutHardLinks;
+#[test]
+fn a_copy_of_the_main_file_keeps_its_companions() {
+    for kind in Kind::ALL {
+        let folder = furnished();
+        kind.save(&RealDisk, folder.path(), 1).unwrap();
+        let backup = folder.path().join("backup of scene.txt");
+        fs::copy(kind.main(folder.path()), &backup).unwrap();
+        kind.save(&RealDisk, folder.path(), 2).unwrap();
+        kind.save(&RealDisk, folder.path(), 4).unwrap();
+        fs::rename(&backup, kind.main(folder.path())).unwrap();
+        assert_eq!(kind.load(folder.path()), Ok(1), "{kind:?}");
+    }
+}
 
-impl Disk for WithoutHardLinks {
+#[test]
+fn models_share_a_texture_until_the_last_one_drops_it() {
+    let folder = furnished();
+    for (kind, version) in [(Kind::Gltf, 2), (Kind::Obj, 3), (Kind::Gltf, 4)] {
+        kind.save(&RealDisk, folder.path(), version).unwrap();
+    }
+    assert_eq!((Kind::Obj.load(folder.path()), Kind::Gltf.load(folder.path())), (Ok(3), Ok(4)));
+    Kind::Obj.save(&RealDisk, folder.path(), 5).unwrap();
+    assert_eq!((Kind::Obj.load(folder.path()), Kind::Gltf.load(folder.path())), (Ok(5), Ok(4)));
+    let textures = names(folder.path()).into_iter().filter(|name| name.ends_with(".png")).count();
+    assert_eq!(textures, 2 + 1, "two of somebody else and a shared one");
+}
+
+#[test]
+fn a_name_that_is_taken_is_left_alone() {
+    for kind in Kind::ALL {
+        let fresh = expected(kind, 1);
+        let before = names(furnished().path());
+        let folder = furnished();
+        for name in fresh.difference(&before).filter(|name| **name != *kind.main(Path::new("")).to_str().unwrap()) {
+            fs::write(folder.path().join(name), "mine").unwrap();
+        }
+        let taken = names(folder.path());
+        kind.save(&RealDisk, folder.path(), 1).unwrap();
+        assert_eq!(kind.load(folder.path()), Ok(1));
+        kind.save(&RealDisk, folder.path(), 4).unwrap();
+        for name in taken.difference(&before) {
+            assert_eq!(fs::read_to_string(folder.path().join(name)).unwrap(), "mine", "{name}");
+        }
+    }
+    // It may even appear in the midst of a save.
+    let folder = tempfile::tempdir().unwrap();
+    let mut set = FileSet::new(&folder.path().join("a.gltf"));
+    let name = set.add(&RealDisk, "a.bin", vec![1, 2, 3]);
+    set.finish(b"{}".to_vec());
+    fs::write(folder.path().join(&name), "mine").unwrap();
+    let error = save_set(&RealDisk, &set).unwrap_err();
+    assert!(matches!(&error, SaveError::Occupied { path } if path.ends_with(&name)), "{error}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no main file, and nothing left over");
+    assert_eq!(fs::read_to_string(folder.path().join(&name)).unwrap(), "mine");
+}
+
+#[test]
+fn a_link_stays_a_link_and_companions_lie_beside_it() {
+    #[cfg(unix)]
+    {
+        let (folder, other) = (furnished(), tempfile::tempdir().unwrap());
+        let main = Kind::Gltf.main(folder.path());
+        std::os::unix::fs::symlink(other.path().join("real.gltf"), &main).unwrap();
+        for version in [1, 2] {
+            Kind::Gltf.save(&RealDisk, folder.path(), version).unwrap();
+            assert_eq!(Kind::Gltf.load(folder.path()), Ok(version));
+        }
+        assert!(main.is_symlink());
+        assert_eq!(names(folder.path()), expected(Kind::Gltf, 2));
+        assert_eq!(fs::read_dir(other.path()).unwrap().count(), 1);
+    }
+}
+
+#[test]
+fn companions_are_as_private_as_their_main_file() {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = furnished();
+        Kind::Gltf.save(&RealDisk, folder.path(), 1).unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        fs::set_permissions(Kind::Gltf.main(folder.path()), fs::Permissions::from_mode(0o600)).unwrap();
+        Kind::Gltf.save(&RealDisk, folder.path(), 2).unwrap();
+        let before = names(furnished().path());
+        for name in names(folder.path()).difference(&before) {
+            assert_eq!(mode(&folder.path().join(name)), 0o600, "{name}");
+        }
+    }
+}
+
+/// A disk that carries out nothing as the real one does unless it is passed on here.
+struct Passing {
+    hard_links: bool,
+    /// True if what is read back has changed on the way.
+    decays: bool,
+}
+
+struct DecayingFile(Box<dyn DiskFile>);
+
+impl DiskFile for DecayingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut bytes = bytes.to_vec();
+        bytes.iter_mut().skip(17).take(1).for_each(|byte| *byte ^= 1);
+        self.0.write(&bytes)
+    }
+    fn keep_permissions(&mut self, of: &Path) -> io::Result<()> {
+        self.0.keep_permissions(of)
+    }
+    fn sync(&mut self) -> io::Result<()> {
+        self.0.sync()
+    }
+    fn reads_back(&mut self, bytes: &[u8]) -> io::Result<bool> {
+        self.0.reads_back(bytes)
+    }
+}
+
+impl Disk for Passing {
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
         RealDisk.entry(path, follow)
     }
@@ -140,13 +384,14 @@ impl Disk for WithoutHardLinks {
         RealDisk.list(folder, limit)
     }
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        RealDisk.create(path)
+        let file = RealDisk.create(path)?;
+        Ok(if self.decays { Box::new(DecayingFile(file)) } else { file })
     }
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         RealDisk.rename(from, to)
     }
-    fn hard_link(&self, _: &Path, _: &Path) -> io::Result<()> {
-        Err(io::ErrorKind::Unsupported.into())
+    fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()> {
+        if self.hard_links { RealDisk.hard_link(existing, path) } else { Err(io::ErrorKind::Unsupported.into()) }
     }
     fn sync_folder(&self, folder: &Path) -> io::Result<()> {
         RealDisk.sync_folder(folder)
@@ -163,15 +408,88 @@ impl Disk for WithoutHardLinks {
 }
 
 #[test]
-fn a_set_is_put_back_where_there_are_no_hard_links() {
-    let folder = fresh();
-    let set = |byte: u8| ["a", "b"].map(|name| (folder.path().join(name), vec![byte; 100]));
-    save_all_atomic(&WithoutHardLinks, &set(1)).unwrap();
-    let counted = FaultyDisk::new(WithoutHardLinks, None);
-    save_all_atomic(&counted, &set(2)).unwrap();
-    let last = counted.log().iter().rposition(|name| *name == "rename").unwrap();
-    let disk = FaultyDisk::new(WithoutHardLinks, Some(FaultPlan { at: last, fault: Fault::Io, lasting: false }));
-    save_all_atomic(&disk, &set(3)).unwrap_err();
-    assert!(contents(folder.path()).values().all(|content| *content == [2; 100]));
-    assert_eq!(temps(folder.path()), 0);
+fn a_set_is_saved_where_there_are_neither_hard_links_nor_locks() {
+    for kind in Kind::ALL {
+        let folder = furnished();
+        for version in [1, 2, 5] {
+            kind.save(&Passing { hard_links: false, decays: false }, folder.path(), version).unwrap();
+            assert_eq!(kind.load(folder.path()), Ok(version));
+            assert_eq!(names(folder.path()), expected(kind, version));
+        }
+        // A temporary file of today may be that of a living process.
+        let temp = folder.path().join(".rigsmith-0123456700000000.tmp");
+        fs::write(&temp, "half").unwrap();
+        let disk = Passing { hard_links: false, decays: false };
+        assert_eq!(remove_stale_temps(&disk, folder.path()).unwrap(), 0);
+        let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(4000);
+        fs::File::options().write(true).open(&temp).unwrap().set_modified(long_ago).unwrap();
+        assert_eq!(remove_stale_temps(&disk, folder.path()).unwrap(), 1);
+    }
+}
+
+#[test]
+fn a_disk_that_returns_other_bytes_replaces_nothing() {
+    for kind in Kind::ALL {
+        let folder = furnished();
+        kind.save(&RealDisk, folder.path(), 1).unwrap();
+        let before = names(folder.path());
+        let error = kind.save(&Passing { hard_links: true, decays: true }, folder.path(), 2).unwrap_err().to_string();
+        assert!(error.contains("other bytes") && error.contains("unchanged"), "{error}");
+        assert_eq!((kind.load(folder.path()), names(folder.path())), (Ok(1), before));
+    }
+}
+
+#[test]
+fn a_model_that_a_format_holds_nothing_of_is_refused() {
+    let folder = furnished();
+    let empty = Model::default();
+    for (name, remedy) in [("scene.obj", "no mesh"), ("scene.gltf", "neither"), ("scene.glb", "neither")] {
+        let path = folder.path().join(name);
+        fs::write(&path, "work of days").unwrap();
+        let error = store_model(&RealDisk, &path, &empty, &GltfWriteSettings::default()).unwrap_err();
+        assert!(matches!(error, StoreError::Nothing { .. }) && error.to_string().contains(remedy), "{error}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "work of days");
+    }
+}
+
+#[test]
+fn what_cannot_be_read_again_is_not_written() {
+    let folder = furnished();
+    Kind::Obj.save(&RealDisk, folder.path(), 1).unwrap();
+    let before = names(folder.path());
+    let mut broken = triangle(2);
+    broken.points[1].y = f32::NAN;
+    let path = Kind::Obj.main(folder.path());
+    let error = store_model(&RealDisk, &path, &broken, &GltfWriteSettings::default()).unwrap_err();
+    assert!(matches!(error, StoreError::Unreadable { .. }), "{error}");
+    assert_eq!((Kind::Obj.load(folder.path()), names(folder.path())), (Ok(1), before));
+}
+
+#[test]
+fn saves_at_the_same_time_leave_one_of_them_whole() {
+    for kind in Kind::ALL {
+        let folder = furnished();
+        let done: BTreeMap<u32, ()> = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..4u32)
+                .map(|thread| {
+                    let folder = folder.path();
+                    scope.spawn(move || {
+                        for round in 0..6 {
+                            // A set that another thread changes in between is refused, never mixed.
+                            match kind.save(&RealDisk, folder, (thread + round) % 5 + 1) {
+                                Ok(()) => {}
+                                Err(StoreError::Save(SaveError::Occupied { .. })) => {}
+                                Err(error) => panic!("{error}"),
+                            }
+                        }
+                    })
+                })
+                .collect();
+            threads.into_iter().enumerate().map(|(at, thread)| (at as u32, thread.join().unwrap())).collect()
+        });
+        assert_eq!(done.len(), 4);
+        let version = kind.load(folder.path()).unwrap();
+        assert_eq!(names(folder.path()), expected(kind, version), "{kind:?}");
+        assert_eq!(temps(folder.path()), 0);
+    }
 }

@@ -4,6 +4,7 @@
 use super::{
     gltf::{compose, data},
     mutate::run_fuzz,
+    prerequisites::data_folder,
 };
 use glam::Vec3;
 use rigsmith::mesh::{
@@ -44,7 +45,7 @@ fn check_promises(model: &Model) {
         let count = part.vertices.len();
         let fits = |length: usize| length == 0 || length == count;
         let object = &model.objects[part.object];
-        assert!(part.material.is_none_or(|material| material < model.looks.materials.len()));
+        assert!(part.material.is_none_or(|material| material < model.material_set.materials.len()));
         assert!(part.vertices.iter().all(|point| (*point as usize) < points));
         assert!(!part.triangles.is_empty() && part.triangles.iter().flatten().all(|vertex| (*vertex as usize) < count));
         assert!(part.normals.len() == count && part.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-3));
@@ -136,7 +137,7 @@ fn fuzz_gltf() {
     let mut bins: Vec<Vec<u8>> = files.iter().map(|file| file.bin.clone()).collect();
     let mut seeds: Vec<Vec<u8>> = files.iter().enumerate().map(|(i, file)| file.gltf(&format!("{i}.bin"))).collect();
     seeds.extend(files.iter().map(|file| file.glb()));
-    for path in data::skinned_files().into_iter().flatten() {
+    for path in data_folder().into_iter().flat_map(data::skinned_files) {
         let bytes = std::fs::read(&path).unwrap();
         if bytes.len() > 80_000 {
             continue;

@@ -44,7 +44,8 @@ fn check(bytes: &[u8]) {
     let back = replay(base, recovered.changes(), 0);
     assert!(back.applied <= recovered.changes().len());
     assert_eq!(back.refused.is_none(), back.applied == recovered.changes().len());
-    let _ = recovered.basis(|_| None);
+    let restored = recovered.restore(recovered.basis(|_| None), None);
+    assert!(restored.replayed.applied + restored.skipped.len() <= recovered.changes().len());
 }
 
 #[test]

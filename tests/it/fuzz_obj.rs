@@ -1,19 +1,13 @@
-//! Random changes to OBJ files: reading them never panics or hangs, and what loads holds together.
-//!
-//! Runs for about two seconds, or for `RIGSMITH_FUZZ_SECONDS`. Files in `tests/fuzz_findings/obj` are replayed first; a
-//! file that fails is left in the folder for temporary files and named.
+//! Fuzzing of the OBJ reader: reading changed files never panics or hangs, and what loads holds together.
 
-use std::{
-    fs,
-    panic::{AssertUnwindSafe, catch_unwind},
-    path::{Path, PathBuf},
-    time::{Duration, Instant},
-};
+use std::{cell::Cell, fs, path::PathBuf};
 
 use rigsmith::mesh::{
     model::Model,
     obj::{ObjArrays, ObjError, ObjSettings, read_mtl, read_obj, to_model, write_obj},
 };
+
+use crate::{mutate::run_fuzz, prerequisites::data_folder};
 
 const SEEDS: &[&str] = &[
     "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/1/1 4/2/1\n",
@@ -24,101 +18,30 @@ const SEEDS: &[&str] = &[
     "newmtl m\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 2 -o 3 a b.png -bm 2\nnorm -bm 1 n.png\nKe 1 2 3\nPr 1\nPm 0\n",
 ];
 
-const TOKENS: &[&str] = &[
-    "\n",
-    "\r",
-    "\r\n",
-    "\\\n",
-    " ",
-    "\t",
-    "#",
-    "/",
-    "//",
-    "-",
-    "0",
-    "-1",
-    "1",
-    "99999999",
-    "4294967295",
-    "4294967296",
-    "-2147483649",
-    "1e38",
-    "1e39",
-    "-1e-45",
-    "nan",
-    "inf",
-    ".",
-    "1.#IND",
-    "16777217",
-    "v ",
-    "vt ",
-    "vn ",
-    "f ",
-    "o ",
-    "g ",
-    "s off",
-    "s 1",
-    "usemtl ",
-    "mtllib ",
-    "f 1 2 3 4 5\n",
-    "v 1e30 -1e30 0\n",
-    "f -1 -2 -3\n",
-    "\0",
-    "\u{feff}",
-    "\u{ff}",
+/// Pieces of OBJ and MTL that stumble readers.
+const WORDS: &[&[u8]] = &[
+    b"\\\n",
+    b"//",
+    b"1.#IND",
+    b"v ",
+    b"vt ",
+    b"vn ",
+    b"f ",
+    b"o ",
+    b"g ",
+    b"s off",
+    b"s 1",
+    b"usemtl ",
+    b"mtllib ",
+    b"newmtl ",
+    b"map_Kd ",
+    b"f 1 2 3 4 5\n",
+    b"v 1e30 -1e30 0\n",
+    b"f -1 -2 -3\n",
 ];
 
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        ((self.0 >> 33) as usize) % limit.max(1)
-    }
-
-    /// A changed copy of one of the seeds.
-    fn mutate(&mut self, seeds: &[Vec<u8>]) -> Vec<u8> {
-        let mut text = seeds[self.below(seeds.len())].clone();
-        for _ in 0..1 + self.below(6) {
-            let at = self.below(text.len() + 1);
-            let to = (at + self.below(40)).min(text.len());
-            match self.below(7) {
-                0 => text.truncate(at),
-                1 if at < text.len() => text[at] ^= 1 << self.below(8),
-                2 => {
-                    let token = TOKENS[self.below(TOKENS.len())];
-                    text.splice(at..at, token.bytes());
-                }
-                3 => {
-                    text.drain(at..to);
-                }
-                4 => {
-                    let again: Vec<u8> = text[at..to].to_vec();
-                    for _ in 0..1 + self.below(20) {
-                        text.splice(at..at, again.iter().copied());
-                    }
-                }
-                5 => {
-                    let other = &seeds[self.below(seeds.len())];
-                    let start = self.below(other.len() + 1);
-                    let end = (start + self.below(200)).min(other.len());
-                    text.splice(at..at, other[start..end].iter().copied());
-                }
-                _ => {
-                    let token = TOKENS[self.below(TOKENS.len())];
-                    text.splice(at..to, token.bytes());
-                }
-            }
-            text.truncate(1 << 16);
-        }
-        text
-    }
-}
-
-/// Reads `bytes` in every way and checks what comes of it.
-fn check(bytes: &[u8]) {
+/// Reads `bytes` in every way and checks what comes of it. Returns whether they were read.
+fn check(bytes: &[u8]) -> bool {
     let mut whole = ObjArrays::default();
     let result = read_obj(bytes, &mut whole, &ObjSettings::default());
     for (threads, block_bytes) in [(1, 16), (2, 50)] {
@@ -127,6 +50,7 @@ fn check(bytes: &[u8]) {
         assert_eq!(again.as_ref().map_err(ObjError::to_string), result.as_ref().map_err(ObjError::to_string));
         assert!(blocks == whole, "blocks of {block_bytes} bytes change the arrays");
     }
+    let is_read = result.is_ok();
     match result {
         Err(ObjError::Line { line, .. }) => {
             let ends = bytes.iter().filter(|byte| matches!(byte, b'\n' | b'\r')).count();
@@ -141,6 +65,7 @@ fn check(bytes: &[u8]) {
         }
     }
     read_mtl(bytes);
+    is_read
 }
 
 fn check_model(arrays: &ObjArrays, model: &Model) {
@@ -150,7 +75,7 @@ fn check_model(arrays: &ObjArrays, model: &Model) {
     for part in &model.parts {
         let count = part.vertices.len();
         assert!(part.object < model.objects.len());
-        assert!(part.material.is_none_or(|material| material < model.looks.materials.len()));
+        assert!(part.material.is_none_or(|material| material < model.material_set.materials.len()));
         assert!(part.vertices.iter().all(|point| (*point as usize) < model.points.len()));
         assert!(part.triangles.iter().flatten().all(|vertex| (*vertex as usize) < count));
         assert!(part.faces.corners.iter().all(|vertex| (*vertex as usize) < count));
@@ -165,9 +90,9 @@ fn check_model(arrays: &ObjArrays, model: &Model) {
 
 /// What is written reads as the same geometry.
 fn check_written(model: &Model) {
-    let written = write_obj(model, "fuzz.mtl");
+    let written = write_obj(model, "fuzz", &mut |plain, _| plain.to_owned());
     let mut arrays = ObjArrays::default();
-    read_obj(&written.obj[..], &mut arrays, &ObjSettings::default()).unwrap();
+    read_obj(&written[..], &mut arrays, &ObjSettings::default()).unwrap();
     let again = to_model(&arrays, "fuzz", &mut |_| None).unwrap();
     assert_eq!(again.points, model.points);
     assert_eq!(again.parts.len(), model.parts.len());
@@ -179,49 +104,20 @@ fn check_written(model: &Model) {
     }
 }
 
-/// Checks `bytes`; keeps them and says where if that fails or takes long.
-fn guarded(name: &str, bytes: &[u8]) {
-    let start = Instant::now();
-    let result = catch_unwind(AssertUnwindSafe(|| check(bytes)));
-    let took = start.elapsed();
-    if result.is_err() || took > Duration::from_secs(2) {
-        let path = std::env::temp_dir().join("rigsmith-fuzz-obj.obj");
-        fs::write(&path, bytes).unwrap();
-        panic!("{name} failed after {took:?}; the file is {}", path.display());
-    }
-}
-
 #[test]
 fn changed_files_never_panic() {
-    let findings = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz_findings/obj");
-    for (path, bytes) in files_in(&findings) {
-        guarded(&path.display().to_string(), &bytes);
-    }
     let mut seeds: Vec<Vec<u8>> = SEEDS.iter().map(|seed| seed.as_bytes().to_vec()).collect();
-    if let Some(data) = std::env::var_os("RIGSMITH_DATA") {
-        let torture = Path::new(&data).join("obj_torture");
+    if let Some(data) = data_folder() {
         for folder in ["tinyobjloader", "tobj", "assimp_invalid"] {
-            let files = files_in(&torture.join(folder));
-            seeds.extend(files.into_iter().map(|(_, bytes)| bytes).filter(|bytes| bytes.len() < 4096));
+            let mut paths: Vec<PathBuf> = (fs::read_dir(data.join("obj_torture").join(folder)).unwrap())
+                .map(|entry| entry.unwrap().path())
+                .filter(|path| path.is_file())
+                .collect();
+            paths.sort();
+            seeds.extend(paths.iter().map(|path| fs::read(path).unwrap()).filter(|bytes| bytes.len() < 4096));
         }
     }
-    let seconds = std::env::var("RIGSMITH_FUZZ_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(2.0);
-    // A long run starts elsewhere each time it is asked for a different length.
-    let mut random = Random(0x9e37_79b9_7f4a_7c15 ^ f64::to_bits(seconds));
-    let start = Instant::now();
-    let mut rounds = 0_u64;
-    while start.elapsed().as_secs_f64() < seconds {
-        let bytes = random.mutate(&seeds);
-        guarded("a changed file", &bytes);
-        rounds += 1;
-    }
-    println!("{rounds} files");
-    assert!(rounds > 0);
-}
-
-fn files_in(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
-    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file()).collect();
-    paths.sort();
-    paths.into_iter().map(|path| (fs::read(&path).unwrap(), path)).map(|(bytes, path)| (path, bytes)).collect()
+    let read = Cell::new(0);
+    run_fuzz("obj", &seeds, WORDS, |bytes| read.set(read.get() + usize::from(check(bytes))));
+    assert!(read.get() > 100, "only {} mutants are read", read.get());
 }

@@ -9,7 +9,7 @@ use rigsmith::{
         actions::{Action, ActionRequest},
         camera::ViewportSight,
         mode::Mode,
-        pointer::{Held, PointerAct, ViewportPointer},
+        pointer::{ModifierKeys, PointerAct, ViewportPointer},
         settings::{EditorSettings, GizmoSpace},
         tools::{
             ToolsPlugin,
@@ -30,6 +30,7 @@ use rigsmith::{
         operations::MirrorPlane,
         step::{Committed, StepSink},
     },
+    test_app::strict_app,
 };
 
 const SIZE: Vec2 = Vec2::new(1000.0, 800.0);
@@ -73,10 +74,9 @@ impl Bench {
     fn new(sight: Sight, place: Transform) -> Self {
         let mut app = headless_app(1);
         app.add_plugins(ToolsPlugin);
-        app.finish();
-        app.cleanup();
+        let mut app = strict_app(app);
         let sink = Sink::default();
-        let bundle = RigBundle { rig: Rig::new(Uid(1), "rig"), transform: place, ..default() };
+        let bundle = (Rig::new(Uid(1), "rig"), place);
         let rig = app.world_mut().spawn((bundle, RigJournal::new(sink.clone()))).id();
         app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
         app.update();
@@ -139,13 +139,13 @@ impl Bench {
         places.find(|at| handle_at(&shapes, *at) == Some(handle)).unwrap_or_else(|| panic!("{handle:?} is hidden"))
     }
 
-    fn pointer(&mut self, at: Vec2, act: PointerAct, held: Held) {
+    fn pointer(&mut self, at: Vec2, act: PointerAct, held: ModifierKeys) {
         self.app.world_mut().write_message(ViewportPointer { at, act, held });
         self.app.update();
     }
 
     /// A press, two moves; the button stays down.
-    fn drag(&mut self, from: Vec2, by: Vec2, held: Held) {
+    fn drag(&mut self, from: Vec2, by: Vec2, held: ModifierKeys) {
         self.pointer(from, PointerAct::Moved, held);
         self.pointer(from, PointerAct::Pressed, held);
         for share in [0.4, 1.0] {
@@ -154,7 +154,7 @@ impl Bench {
     }
 
     fn release(&mut self, at: Vec2) {
-        self.pointer(at, PointerAct::Released { dragged: true, count: 1 }, Held::default());
+        self.pointer(at, PointerAct::Released { dragged: true, count: 1 }, ModifierKeys::default());
     }
 
     fn action(&mut self, action: Action) {
@@ -280,7 +280,7 @@ fn drags_move_joints_in_every_space_and_are_one_step() {
                     let from = bench.grip(Handle::MoveAxis(axis));
                     let start = sight.project(before.position(middle)).unwrap();
                     let by = (from - start).normalize() * 70.0;
-                    bench.drag(from, by, Held::default());
+                    bench.drag(from, by, ModifierKeys::default());
                     assert_eq!((bench.steps(), bench.journaled()), (steps, steps), "a preview is no step");
                     assert_ne!(bench.rig().position(middle), before.position(middle), "a drag is seen at once");
                     bench.release(from + by);
@@ -313,7 +313,7 @@ fn the_middle_takes_the_joint_along_with_the_pointer() {
         let before = bench.rig().clone();
         let from = bench.grip(Handle::MoveView);
         let start = sight.project(before.position(middle)).unwrap();
-        bench.drag(from, Vec2::new(90.0, -60.0), Held::default());
+        bench.drag(from, Vec2::new(90.0, -60.0), ModifierKeys::default());
         bench.release(from + Vec2::new(90.0, -60.0));
         let now = sight.project(bench.rig().position(middle)).unwrap();
         assert!(now.distance(start + Vec2::new(90.0, -60.0)) < 1.0);
@@ -340,18 +340,18 @@ fn escape_and_other_edits_take_a_drag_back_to_the_bit() {
         let before = bench.rig().clone();
         let (steps, journaled) = (bench.steps(), bench.journaled());
         let from = bench.grip(handle);
-        bench.drag(from, Vec2::new(31.0, 47.0), Held::default());
+        bench.drag(from, Vec2::new(31.0, 47.0), ModifierKeys::default());
         assert_ne!(*bench.rig(), before, "{mode:?} shows nothing");
         bench.action(Action::Cancel);
         assert_eq!(*bench.rig(), before, "{mode:?} is not taken back");
-        bench.pointer(from, PointerAct::Dragged, Held::default());
+        bench.pointer(from, PointerAct::Dragged, ModifierKeys::default());
         bench.release(from);
         assert_eq!(*bench.rig(), before, "{mode:?} goes on after Escape");
         assert_eq!((bench.steps(), bench.journaled()), (steps, journaled));
 
-        bench.drag(from, Vec2::new(31.0, 47.0), Held::default());
+        bench.drag(from, Vec2::new(31.0, 47.0), ModifierKeys::default());
         bench.edit(Operation::Lock(vec![root], true));
-        bench.pointer(from, PointerAct::Dragged, Held::default());
+        bench.pointer(from, PointerAct::Dragged, ModifierKeys::default());
         bench.release(from + 50.0);
         bench.app.world_mut().write_message(EditRequest { rig: bench.rig, change: Change::Undo });
         bench.app.update();
@@ -377,7 +377,7 @@ fn the_other_side_follows() {
         bench.mode(mode);
         let before = bench.rig().clone();
         let from = bench.grip(handle);
-        bench.drag(from, Vec2::new(50.0, 20.0), Held::default());
+        bench.drag(from, Vec2::new(50.0, 20.0), ModifierKeys::default());
         bench.release(from + Vec2::new(50.0, 20.0));
         assert_ne!(*bench.rig(), before, "{mode:?}");
         for (here, there) in [(left, right), (hand, right_hand)] {
@@ -400,7 +400,7 @@ fn poses_leave_the_rest_pose_alone_and_follow_the_pointer() {
         let from = bench.grip(Handle::ViewRing);
         let centre = sight.project(before.position(middle)).unwrap();
         let turned = centre + Vec2::from_angle(0.5).rotate(from - centre);
-        bench.drag(from, turned - from, Held::default());
+        bench.drag(from, turned - from, ModifierKeys::default());
         bench.release(turned);
         let rig = bench.rig();
         for joint in [root, middle, tip] {
@@ -417,7 +417,7 @@ fn poses_leave_the_rest_pose_alone_and_follow_the_pointer() {
         bench.mode(Mode::Pose);
         let from = bench.grip(Handle::MoveView);
         let start = sight.project(bench.rig().posed_global(root).translation).unwrap();
-        bench.drag(from, Vec2::new(40.0, 25.0), Held::default());
+        bench.drag(from, Vec2::new(40.0, 25.0), ModifierKeys::default());
         bench.release(from + Vec2::new(40.0, 25.0));
         let now = sight.project(bench.rig().posed_global(root).translation).unwrap();
         assert!(now.distance(start + Vec2::new(40.0, 25.0)) < 1.0);
@@ -455,7 +455,7 @@ fn control_snaps_and_clicks_on_handles_pick_what_is_there() {
     bench.select(&[joint]);
     bench.mode(Mode::Move);
     let from = bench.grip(Handle::MoveAxis(1));
-    let control = Held { control: true, ..default() };
+    let control = ModifierKeys { control: true, ..default() };
     bench.drag(from, Vec2::new(0.0, -33.0), control);
     bench.pointer(from - Vec2::new(0.0, 33.0), PointerAct::Released { dragged: true, count: 1 }, control);
     // The skeleton is one unit high.
@@ -469,8 +469,8 @@ fn control_snaps_and_clicks_on_handles_pick_what_is_there() {
     bench.mode(Mode::Move);
     let (steps, at) = (bench.steps(), sight.project(under).unwrap());
     assert!(handle_at(&bench.shapes(), at).is_some());
-    bench.pointer(at, PointerAct::Pressed, Held::default());
-    bench.pointer(at, PointerAct::Released { dragged: false, count: 1 }, Held::default());
+    bench.pointer(at, PointerAct::Pressed, ModifierKeys::default());
+    bench.pointer(at, PointerAct::Released { dragged: false, count: 1 }, ModifierKeys::default());
     bench.app.update();
     assert_eq!(bench.app.world().get::<Selection>(bench.rig).unwrap().0, [top]);
     assert_eq!(bench.steps(), steps, "a click is no drag");

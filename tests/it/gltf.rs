@@ -83,16 +83,16 @@ fn geometry() {
 }
 
 #[test]
-fn looks() {
+fn materials() {
     let file = character();
-    let looks = file.read().unwrap().looks;
-    assert_eq!(&looks.materials, file.json["materials"].as_array().unwrap());
-    assert_eq!(&looks.textures, file.json["textures"].as_array().unwrap());
-    assert_eq!(&looks.samplers, file.json["samplers"].as_array().unwrap());
-    assert_eq!((looks.images[0].name.as_str(), looks.images[0].mime.as_str()), ("skin", "image/png"));
-    assert_eq!(looks.images[0].bytes, PNG);
-    assert_eq!(Value::from(looks.images[0].rest.clone()), json!({"extras": 1}));
-    assert_eq!(looks.extensions_used, ["KHR_materials_ior"]);
+    let material_set = file.read().unwrap().material_set;
+    assert_eq!(&material_set.materials, file.json["materials"].as_array().unwrap());
+    assert_eq!(&material_set.textures, file.json["textures"].as_array().unwrap());
+    assert_eq!(&material_set.samplers, file.json["samplers"].as_array().unwrap());
+    assert_eq!((material_set.images[0].name.as_str(), material_set.images[0].mime.as_str()), ("skin", "image/png"));
+    assert_eq!(material_set.images[0].bytes, PNG);
+    assert_eq!(Value::from(material_set.images[0].rest.clone()), json!({"extras": 1}));
+    assert_eq!(material_set.extensions_used, ["KHR_materials_ior"]);
 }
 
 #[test]
@@ -357,14 +357,14 @@ fn outside_buffers_and_images() {
     };
     let model = read_gltf(&bytes, "test.gltf", &mut load).unwrap();
     assert_eq!(asked, ["a b.bin", "textures/my skin\u{e9}.png"]);
-    assert_eq!(model.looks.images[0].bytes, PNG);
+    assert_eq!(model.material_set.images[0].bytes, PNG);
 
     // A missing image is a pity, a missing buffer an error.
     let mut load = |uri: &str| if uri.ends_with(".bin") { Ok(file.bin.clone()) } else { Err("not found".into()) };
     let model = read_gltf(&bytes, "test.gltf", &mut load).unwrap();
     assert!(has_note(&model, "(not found)"), "{:?}", model.notes);
     let again = compose::read(&write_glb(&model, &GltfWriteSettings::default()).unwrap()).unwrap();
-    assert_eq!((again.looks.images.len(), again.looks.textures[0].clone()), (0, json!({"sampler": 0})));
+    assert_eq!((again.material_set.images.len(), again.material_set.textures[0].clone()), (0, json!({"sampler": 0})));
     let error = read_gltf(&bytes, "test.gltf", &mut |_| Err("not found".into())).unwrap_err().to_string();
     assert_eq!(error, "test.gltf: /buffers/0/uri: \"./a b.bin\": not found");
 }
@@ -399,23 +399,33 @@ fn extremes() {
 fn several_files() {
     let settings = GltfWriteSettings::default();
     let model = character().read().unwrap();
-    let files = write_gltf(&model, &settings, "my character").unwrap();
-    assert_eq!(files.bin_name, "my character.bin");
-    assert_eq!(files.images, [("skin.png".to_owned(), PNG.to_vec())]);
+    let mut files = Vec::new();
+    let mut companion = |plain: &str, bytes| {
+        files.push((plain.to_owned(), bytes));
+        format!("1 {plain}")
+    };
+    let json = write_gltf(&model, &settings, "my character", &mut companion).unwrap();
+    assert_eq!(files[0], ("skin.png".to_owned(), PNG.to_vec()));
+    assert_eq!((files.len(), files[1].0.as_str()), (2, "my character.bin"));
     let mut load = |uri: &str| match uri {
-        "my character.bin" => Ok(files.bin.clone()),
-        "skin.png" => Ok(PNG.to_vec()),
+        "1 my character.bin" => Ok(files[1].1.clone()),
+        "1 skin.png" => Ok(PNG.to_vec()),
         _ => Err(format!("asked for {uri}")),
     };
-    let again = read_gltf(&files.json, "test.glb", &mut load).unwrap();
+    let again = read_gltf(&json, "test.glb", &mut load).unwrap();
     assert_eq!(again, compose::read(&write_glb(&model, &settings).unwrap()).unwrap());
 
     // Images that cannot have their own name as a file get one.
     let mut model = model;
-    let image = model.looks.images[0].clone();
+    let image = model.material_set.images[0].clone();
     let names = ["skin", "SKIN.png", "../skin", "", "hat.tga", "m_image3"];
-    model.looks.images = names.map(|name| Image { name: name.into(), ..image.clone() }).to_vec();
-    let files = write_gltf(&model, &settings, "m").unwrap();
-    let found: Vec<_> = files.images.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(found, ["skin.png", "m_image1.png", "m_image2.png", "m_image3.png", "hat.png", "m_image5.png"]);
+    model.material_set.images = names.map(|name| Image { name: name.into(), ..image.clone() }).to_vec();
+    let mut found = Vec::new();
+    let mut companion = |plain: &str, _| {
+        found.push(plain.to_owned());
+        plain.to_owned()
+    };
+    write_gltf(&model, &settings, "m", &mut companion).unwrap();
+    let images = ["skin.png", "m_image1.png", "m_image2.png", "m_image3.png", "hat.png", "m_image5.png"];
+    assert_eq!(found, [&images[..], &["m.bin"]].concat());
 }

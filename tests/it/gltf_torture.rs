@@ -9,13 +9,12 @@ use rigsmith::mesh::{
 };
 use serde_json::{Value, json};
 
+use crate::prerequisites::test_data;
+
 fn files(folder: &str) -> Vec<PathBuf> {
-    let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
-        println!("skipped: RIGSMITH_DATA is not set");
-        return Vec::new();
-    };
+    let Some(data) = test_data() else { return Vec::new() };
     let mut found = Vec::new();
-    collect(&Path::new(&data).join("gltf_torture").join(folder), &mut found);
+    collect(&data.join("gltf_torture").join(folder), &mut found);
     found.sort();
     assert!(found.len() > 10, "{found:?}");
     found
@@ -174,6 +173,7 @@ fn validator_files() {
     }
     let total = good + harmless + refused;
     println!("{total} files: {good} valid files load, {harmless} others load, {refused} are refused");
+    assert!(total == 0 || good >= 20 && refused >= 40, "{good} valid files load, {refused} are refused");
 }
 
 #[test]

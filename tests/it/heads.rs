@@ -1,6 +1,6 @@
-//! Real heads and their landmarks, for the tests of faces.
+//! Heads for the tests of faces: the bundled one, and real ones with their landmarks.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::Vec3;
 use rigsmith::{
@@ -9,19 +9,25 @@ use rigsmith::{
     mesh::model::Model,
 };
 
+use crate::prerequisites::test_data;
+
 /// Points and triangles.
 pub type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
 
 /// The heads whose landmarks are known.
 pub const HEADS: [&str; 3] = ["ict_neutral", "ict_identity_1", "ict_identity_2"];
 
-/// The folder of real meshes; `None`, with a line that says so, where there is none.
-pub fn data(what: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: {what} needs real meshes, set RIGSMITH_DATA");
-    }
-    folder
+/// The bundled head, which is on every machine.
+pub fn bundled() -> Mesh {
+    mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj"))
+}
+
+/// The bundled head and, where test data is, one of [`HEADS`], each with its name.
+#[track_caller]
+pub fn bundled_and(name: &str) -> Vec<(String, Mesh)> {
+    let bundled = ("the bundled head".to_owned(), bundled());
+    let real = test_data().map(|folder| (name.to_owned(), mesh(&folder.join(format!("heads/{name}.obj")))));
+    [bundled].into_iter().chain(real).collect()
 }
 
 /// A model of any format.

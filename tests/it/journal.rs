@@ -1,13 +1,10 @@
 //! The journal: what was committed comes back, whatever happened to the file, and nothing else does.
 
+mod damage;
+mod evidence;
 mod trouble;
 
-use std::{
-    fs,
-    path::Path,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{fs, path::Path, sync::Arc, time::Duration};
 
 use bevy::prelude::*;
 use proptest::prelude::*;
@@ -15,8 +12,8 @@ use rigsmith::{
     files::{
         Disk, RealDisk,
         journal::{
-            Basis, Ending, Journal, JournalError, JournalPlaces, JournalStart, Origin, Recovered, SaveMark, file_hash,
-            journal_beside, pending_journal, pending_journals, recover,
+            Basis, Condition, Ending, Journal, JournalError, JournalPlaces, JournalStart, Origin, Recovered, Resumed,
+            SaveMark, file_hash, journal_beside, pending_journal, pending_journals, recover,
         },
         save_atomic,
     },
@@ -34,7 +31,7 @@ use tempfile::TempDir;
 
 use crate::edits::{operation, random_rig, steps};
 
-const LONG: Duration = Duration::from_secs(20);
+const LONG: Duration = crate::bench::HANG;
 
 /// A rig that is edited with its history and journal, without an app.
 pub struct Desk {
@@ -162,6 +159,7 @@ fn skin(points: u32, seed: u32) -> Arc<SkinData> {
         joints: (0..4).map(|joint| Uid(100 + joint)).collect(),
         weights,
         at_rest: seed.is_multiple_of(2),
+        subjects: (0..seed % 3).map(|joint| (Uid(103 - u64::from(joint)), Uid(100))).collect(),
     })
 }
 
@@ -209,7 +207,7 @@ fn every_kind_of_record_comes_back() {
     desk.edit(RigEdit::SetSkin(Uid(10), Some(skin(5, 1))));
     assert!(desk.bytes().len() - large < 400, "the weights were written again");
 
-    let mut history = RigHistory::restored(&back.timeline);
+    let mut history = RigHistory::restored(&back.stacks);
     let (names, head) = desk.history.steps();
     assert_eq!(history.steps(), (names[..names.len() - 1].to_vec(), head - 1));
     let (mut rig, mut selection) = (back.rig.clone(), Selection(back.selection.unwrap()));
@@ -217,52 +215,6 @@ fn every_kind_of_record_comes_back() {
     assert_eq!(&rig, recovered.base().unwrap());
     while history.redo(&mut rig, &mut selection).is_some_and(|redone| redone.is_ok()) {}
     assert_eq!(rig, back.rig);
-}
-
-#[test]
-fn every_cut_and_every_flipped_byte_leaves_what_came_before() {
-    let folder = fresh();
-    let (_desk, bytes) = one_of_each(folder.path());
-    let whole = recover(&bytes).unwrap();
-    let check = |damaged: &[u8], at: usize, what: &str| match recover(damaged) {
-        Err(JournalError::NotAJournal) => assert!(at < 8, "{what} at {at}"),
-        Err(JournalError::Newer { .. }) => assert!((8..12).contains(&at), "{what} at {at}"),
-        Err(JournalError::NoHeader(_)) => {}
-        Ok(found) => {
-            let count = found.changes().len();
-            assert!(found.changes() == &whole.changes()[..count], "{what} at {at}");
-            match found.ending {
-                // Cut exactly between two records.
-                Ending::Open => assert!(what == "cut", "{what} at {at}"),
-                Ending::Torn { at: from, lost, .. } => {
-                    assert!(from <= at && from + lost == damaged.len(), "{what} at {at}");
-                }
-                Ending::Closed => panic!("{what} at {at}"),
-            }
-            replayed(&found);
-        }
-    };
-    let mut open = 0;
-    for at in 0..bytes.len() {
-        check(&bytes[..at], at, "cut");
-        open += usize::from(recover(&bytes[..at]).is_ok_and(|found| found.ending == Ending::Open));
-        for bit in [0, 3, 7] {
-            let mut flipped = bytes.clone();
-            flipped[at] ^= 1 << bit;
-            check(&flipped, at, "flip");
-            assert_ne!(recover(&flipped).as_ref(), Ok(&whole), "bit {bit} of byte {at} counts for nothing");
-        }
-        // Zeros that were there already change nothing.
-        if let Some(first) = (at..bytes.len()).find(|&i| bytes[i] != 0) {
-            let mut zeros = bytes.clone();
-            zeros[at..].fill(0);
-            check(&zeros, first, "zeros");
-        }
-    }
-    assert!(open >= 12, "{open} cuts between records");
-    let mut longer = bytes.clone();
-    longer.extend(&bytes);
-    assert_eq!(recover(&longer).unwrap().changes(), whole.changes());
 }
 
 proptest! {
@@ -294,7 +246,7 @@ proptest! {
         if let Some(selection) = &back.selection {
             prop_assert_eq!(selection, &desk.selection.0);
         }
-        let history = RigHistory::restored(&back.timeline);
+        let history = RigHistory::restored(&back.stacks);
         prop_assert_eq!(history.steps(), desk.history.steps());
     }
 }
@@ -419,8 +371,8 @@ fn only_work_that_nobody_has_any_more_is_offered() {
     let pending = pending_journal(&RealDisk, &path).unwrap();
     assert_eq!((pending.changes, pending.ending, &pending.origin), (1, Ending::Open, &Origin::Empty));
     assert!(pending.modified.is_some() && pending.started > 1_600_000_000);
+    assert_eq!(pending.condition, Condition::Whole);
     // Neither of these is a journal.
-    fs::write(state.join("rigsmith-0000000000000000.journal"), b"RIGJRNL\0").unwrap();
     fs::write(state.join("notes.journal"), fs::read(&path).unwrap()).unwrap();
     fs::create_dir(state.join("x.rigsmith.journal")).unwrap();
     assert_eq!(offered(), 1);
@@ -469,12 +421,18 @@ fn recovered_work_is_safe_from_the_next_crash() {
             let recovered = recover(&fs::read(&path).unwrap()).unwrap();
             let back = replayed(&recovered);
             assert_eq!(back.rig, rig, "{beside} {round}");
-            let journal = Journal::resume(Arc::new(RealDisk), places.clone(), &recovered, back.applied, &path);
+            let basis = recovered.basis(hash_at);
+            let held = |path| read_template(&fs::read(path).unwrap()).unwrap().rig;
+            let held = if basis == Basis::Journal { None } else { recovered.project().map(held) };
+            let restored = recovered.restore(basis, held);
+            let Resumed { journal, kept } =
+                Journal::resume(Arc::new(RealDisk), places.clone(), &recovered, &restored, &path);
+            assert_eq!(kept, None, "{beside} {round}");
             assert_eq!(journal.position(), recovered.changes().len() as u64, "{beside} {round}");
             let mut desk = Desk {
                 rig: back.rig.clone(),
                 selection: default(),
-                history: RigHistory::restored(&back.timeline),
+                history: RigHistory::restored(&back.stacks),
                 journal,
                 uids: UidSource::seeded(100 + round),
             };
@@ -507,7 +465,13 @@ fn what_could_not_be_replayed_is_kept() {
     let path = desk.journal.path().unwrap();
     drop(desk);
     let recovered = recover(&bytes).unwrap();
-    let journal = Journal::resume(Arc::new(RealDisk), start(folder.path()).places, &recovered, 1, &path);
+    // The rig has the second joint already.
+    let mut other = recovered.base().unwrap().clone();
+    other.apply(&recovered.changes()[1].step().forward[0]).unwrap();
+    let restored = recovered.restore(Basis::Changed, Some(other));
+    assert_eq!((restored.replayed.applied, restored.replayed.refused.is_some()), (1, true));
+    let Resumed { journal, .. } =
+        Journal::resume(Arc::new(RealDisk), start(folder.path()).places, &recovered, &restored, &path);
     journal.flush(LONG).unwrap();
     assert_eq!(journal.position(), 1);
     assert_eq!(recover(&fs::read(&path).unwrap()).unwrap().changes().len(), 1);
@@ -529,37 +493,27 @@ fn a_journal_of_the_first_format_still_opens() {
 }
 
 #[test]
-fn weights_of_a_large_mesh_neither_hold_up_the_caller_nor_the_recovery() {
+fn weights_of_a_large_mesh_are_handed_over_whole_and_written_once() {
     let folder = fresh();
     let mut desk = Desk::apart(folder.path());
     desk.place(0);
     let large = skin(500_000, 1);
-    let started = Instant::now();
-    let mut handed = Duration::MAX;
-    // The least of a few: the machine may be busy with something else.
     for _ in 0..3 {
         let skin = Arc::new(large.as_ref().clone());
-        let operation = Operation::Edits(vec![RigEdit::SetSkin(Uid(8), Some(skin))]);
+        let operation = Operation::Edits(vec![RigEdit::SetSkin(Uid(8), Some(skin.clone()))]);
         let recorded = desk.history.edit(&mut desk.rig, &mut desk.selection, &mut desk.uids, None, &operation).unwrap();
-        let before = Instant::now();
         desk.journal.record(Committed::Done(recorded.step.unwrap()));
-        handed = handed.min(before.elapsed());
+        assert!(Arc::ptr_eq(desk.rig.skin(Uid(8)).unwrap(), &skin), "what the caller has is shared, not copied");
     }
     desk.place(1);
     let bytes = desk.bytes();
-    let written = started.elapsed();
-    let started = Instant::now();
     let back = replayed(&recover(&bytes).unwrap());
-    let read = started.elapsed();
     assert!(back.rig == desk.rig && back.rig.skin(Uid(8)) == Some(&large));
-    println!("{} bytes: handed over in {handed:?}, on the disk in {written:?}, back in {read:?}", bytes.len());
-    assert!(handed < Duration::from_millis(4), "{handed:?}");
-    assert!(read < Duration::from_secs(2), "{read:?}");
     assert!(bytes.len() < 500_000 * 14, "{}", bytes.len());
 }
 
 #[test]
-fn a_long_day_is_back_in_two_seconds() {
+fn a_long_day_is_back_after_one_replay_of_its_changes() {
     let folder = fresh();
     let mut desk = Desk::apart(folder.path());
     for number in 0..200 {
@@ -571,10 +525,9 @@ fn a_long_day_is_back_in_two_seconds() {
         desk.operate(&Operation::Move { to, with_children: true });
     }
     let bytes = desk.bytes();
-    let started = Instant::now();
-    let back = replayed(&recover(&bytes).unwrap());
-    let took = started.elapsed();
-    assert_eq!(back.rig, desk.rig);
-    println!("20,200 changes, {} bytes, back in {took:?}", bytes.len());
-    assert!(took < Duration::from_secs(2), "{took:?}");
+    let recovered = recover(&bytes).unwrap();
+    assert_eq!(recovered.changes().len(), 20_200);
+    let back = replayed(&recovered);
+    assert_eq!((back.applied, &back.rig), (20_200, &desk.rig));
+    assert!(bytes.len() < 20_200 * 700, "{} bytes", bytes.len());
 }

@@ -1,19 +1,24 @@
 //! All integration tests in one binary: one module a feature, through the public API.
+//!
+//! Tests of real meshes need `RIGSMITH_DATA`, pictures and the window a graphics adapter; see `prerequisites`. Tests count
+//! work and measure no time: the benches do.
 
-mod build;
+mod bench;
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(feature = "cli")]
 mod cli_build;
 #[cfg(feature = "cli")]
 mod cli_face;
+#[cfg(feature = "cli")]
+mod cli_outputs;
 mod commands;
 mod custom_module;
 #[cfg(feature = "draw")]
 mod display;
 #[cfg(feature = "draw")]
 mod drawing;
-#[cfg(feature = "draw")]
+#[cfg(feature = "render")]
 mod drawing_pictures;
 mod edit_text;
 #[cfg(feature = "editor")]
@@ -27,6 +32,7 @@ mod face_fit;
 mod face_grouping;
 mod face_landmarks;
 mod files;
+mod files_kill;
 mod files_read;
 mod files_set;
 mod fill;
@@ -36,6 +42,7 @@ mod fuzz_journal;
 mod fuzz_obj;
 mod fuzz_project;
 mod fuzz_rig_text;
+mod fuzz_skin;
 mod fuzz_template;
 mod gestures;
 #[cfg(feature = "editor")]
@@ -43,6 +50,7 @@ mod gizmo;
 mod gltf;
 mod gltf_torture;
 mod heads;
+mod influences;
 mod journal;
 mod journal_kill;
 mod kmeans;
@@ -64,12 +72,15 @@ mod picking;
 mod placement;
 mod plugins;
 mod pose;
+mod prerequisites;
+mod processor;
 mod project;
 mod references;
 #[cfg(feature = "render")]
 mod render;
 mod rig_text;
 mod runtime;
+mod skin_built;
 mod skin_file;
 mod solvers;
 mod stroke;
@@ -85,3 +96,4 @@ mod voxels;
 mod weights;
 #[cfg(all(feature = "editor", feature = "cli"))]
 mod window;
+mod world;

@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use bevy::math::{Quat, Vec3};
 use rigsmith::{
-    build::{Builder, ModuleInfo},
     mesh::model::Trs,
     modules,
+    processor::{
+        Builder, ModuleInfo,
+        form::{read_form, read_module_form},
+    },
     rig::{
         AimUp, BuiltNode, BuiltRig, Constraint, GroupData, JointData, NodeType, RestTransform, Rig, RigEdit, Scalar,
-        Tag, TagKind, Uid,
-        form::{read_form, read_module_form},
-        shapes,
+        TagData, TagKind, Uid, shapes,
     },
     solve::aim::{Aim, Up},
 };
@@ -49,7 +50,7 @@ fn arm() -> Rig {
 
 fn tag(rig: &mut Rig, joint: Uid, uid: u64, module: &str, params: &str) {
     let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
-    let tag = Tag { uid: Uid(uid), enabled: true, comment: String::new(), kind };
+    let tag = TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind };
     apply(rig, RigEdit::AddTag { joint, tag: Box::new(tag), index: usize::MAX });
 }
 

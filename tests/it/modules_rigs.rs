@@ -4,16 +4,16 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use bevy::{math::Quat, prelude::Vec3, reflect::Reflect};
 use rigsmith::{
-    build::{BuildScope, Builder, Creation, ModuleError, Modules, RigModule},
     mesh::model::Trs,
+    processor::{BuildScope, Builder, Creation, ModuleError, Modules, RigModule, form::read_module_form},
     rig::{
-        BuiltRig, ControlData, JointData, Limits, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Tag, TagKind, Uid,
-        form::read_module_form,
+        BuiltRig, ControlData, JointData, Limits, NodeType, PoseOffset, RestTransform, Rig, RigEdit, TagData, TagKind,
+        Uid,
         reference::{NodeRef, NodeRefs},
         step::edits_from_empty,
     },
     solve::{
-        matching::{Thrown, throw},
+        matching::{MatchedSwitch, match_switch},
         program::{CompileOptions, RigProgram, RigState},
     },
 };
@@ -93,7 +93,7 @@ impl Bench {
         let uid = self.next;
         self.next += 1;
         let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
-        let tag = Tag { uid: Uid(uid), enabled: true, comment: String::new(), kind };
+        let tag = TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind };
         self.rig.apply(&RigEdit::AddTag { joint: Uid(joint), tag: Box::new(tag), index: usize::MAX }).unwrap();
         uid
     }
@@ -167,8 +167,8 @@ impl Play {
     }
 
     /// Throws the first switch.
-    fn throw(&mut self, value: f32) -> Thrown {
-        let thrown = throw(&self.built, &self.state, &self.built.switches[0], value).unwrap();
+    fn match_switch(&mut self, value: f32) -> MatchedSwitch {
+        let thrown = match_switch(&self.built, &self.state, &self.built.switches[0], value).unwrap();
         for edit in &thrown.edits {
             match edit {
                 RigEdit::SetOffset(node, offset) => self.state.set_offset(*node, offset.unwrap_or_default()).unwrap(),
@@ -472,7 +472,7 @@ fn a_limb_is_switched_without_a_jump() {
         let mut play = bench.play();
         let [upper, lower, hand, goal, pole] = tags.map(|tag| play.knob(tag));
         let joints = |play: &mut Play| [2, 3, 4].map(|joint| play.joint(joint));
-        let check = |before: [Trs; 3], after: [Trs; 3], thrown: &Thrown, what: &str| {
+        let check = |before: [Trs; 3], after: [Trs; 3], thrown: &MatchedSwitch, what: &str| {
             for (a, b) in before.iter().zip(&after) {
                 let (moved, turned) = (a.translation.distance(b.translation), degrees(a.rotation, b.rotation));
                 assert!(moved < 0.6e-4 && turned < 0.1, "{extra}, {what}: {moved} {turned}\n{before:?}\n{after:?}");
@@ -485,11 +485,11 @@ fn a_limb_is_switched_without_a_jump() {
                 play.pose(control, [0.0; 3], turn);
             }
             let before = joints(&mut play);
-            let thrown = play.throw(1.0);
+            let thrown = play.match_switch(1.0);
             let after = joints(&mut play);
             check(before, after, &thrown, &format!("to inverse {number}"));
             // Somewhere on the way.
-            let thrown = play.throw(0.4);
+            let thrown = play.match_switch(0.4);
             let between = joints(&mut play);
             check(after, between, &thrown, &format!("between {number}"));
         }
@@ -498,7 +498,7 @@ fn a_limb_is_switched_without_a_jump() {
             play.pose(goal, moved, Quat::from_rotation_y(turned));
             play.pose(pole, [0.1, 0.5 * turned, 0.0], Quat::IDENTITY);
             let before = joints(&mut play);
-            let thrown = play.throw(0.0);
+            let thrown = play.match_switch(0.0);
             let after = joints(&mut play);
             check(before, after, &thrown, &format!("to forward {number}"));
         }
@@ -515,7 +515,7 @@ fn what_is_left_of_a_jump_is_told() {
     play.pose(upper, [0.0; 3], Quat::from_rotation_z(0.4));
     play.pose(lower, [0.0; 3], Quat::from_rotation_y(0.9));
     let before = [2, 3, 4].map(|joint| play.joint(joint));
-    let thrown = play.throw(1.0);
+    let thrown = play.match_switch(1.0);
     let after = [2, 3, 4].map(|joint| play.joint(joint));
     near(before[2].translation, after[2].translation, "the end");
     let moved = before[1].translation.distance(after[1].translation);
@@ -553,7 +553,7 @@ fn a_control_changes_spaces_without_a_jump() {
     play.pose(hand, [0.05, 0.0, 0.1], Quat::from_rotation_z(0.2));
     for space in [0.0, 2.0, 1.0, 0.0, 0.5] {
         let before = play.at(hand);
-        let thrown = play.throw(space);
+        let thrown = play.match_switch(space);
         let after = play.at(hand);
         near(before.translation, after.translation, "thrown");
         assert!(degrees(before.rotation, after.rotation) < 0.1);

@@ -1,7 +1,7 @@
 //! Reading and writing OBJ files.
 
 use std::{
-    collections::HashMap,
+    collections::{BTreeMap, HashMap},
     io::{self, Read},
 };
 
@@ -292,7 +292,7 @@ fn objects_and_parts() {
     assert_eq!(names, ["a", "b"]);
     let parts: Vec<_> = by_group.parts.iter().map(|part| (part.object, part.material)).collect();
     assert_eq!(parts, [(0, None), (1, Some(0)), (0, Some(0))]);
-    assert_eq!(by_group.looks.materials[0]["name"], "m");
+    assert_eq!(by_group.material_set.materials[0]["name"], "m");
 
     let by_object = model(&format!("{TRIANGLE}g g\nf 1 2 3\no a\ng h\nf 1 2 3\no b\nf 1 2 3\n"));
     let names: Vec<&str> = by_object.objects.iter().map(|object| object.name.as_str()).collect();
@@ -423,12 +423,14 @@ pub const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Geometry as written and read again is the same to the bit.
 fn check_round_trip(name: &str, model: &Model) {
-    let written = write_obj(model, "test.mtl");
-    let mut sidecar = |path: &str| {
-        let image = written.images.iter().find(|(name, _)| name == path).map(|(_, bytes)| bytes.clone());
-        if path == "test.mtl" { written.mtl.clone() } else { image }
+    let mut files = BTreeMap::new();
+    let mut companion = |plain: &str, bytes| {
+        files.insert(plain.to_owned(), bytes);
+        plain.to_owned()
     };
-    let again = read_model(&written.obj[..], &model.name, &ObjSettings::default(), &mut sidecar).unwrap();
+    let written = write_obj(model, "test", &mut companion);
+    let mut sidecar = |path: &str| files.get(path).cloned();
+    let again = read_model(&written[..], &model.name, &ObjSettings::default(), &mut sidecar).unwrap();
     assert_eq!(again.points, model.points, "{name}");
     assert_eq!(again.parts.len(), model.parts.len(), "{name}");
     for (part, wanted) in again.parts.iter().zip(&model.parts) {
@@ -436,7 +438,7 @@ fn check_round_trip(name: &str, model: &Model) {
     }
     let names = |model: &Model| model.objects.iter().map(|object| object.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&again), names(model), "{name}");
-    assert_eq!(again.looks, model.looks, "{name}");
+    assert_eq!(again.material_set, model.material_set, "{name}");
 }
 
 #[test]
@@ -449,7 +451,7 @@ fn reading_what_was_written_gives_the_same() {
     let mtl = "newmtl m\nKd 0.1 0.2 0.3\nd 0.5\nKe 1 2 3\nPr 0.25\nPm 0.75\nmap_Kd -s 2 4 t/a b.png\nmap_Bump -bm 2 n.png\n\
         newmtl n\nmap_Kd -clamp on t/a b.png\nmap_Pr q.png\nmap_Pm q.png\nPr 0.5\nmap_d t/a b.png\n";
     let model = model_with(obj, &[("l.mtl", mtl.as_bytes()), ("t/a b.png", PNG), ("n.png", PNG), ("q.png", PNG)]);
-    assert_eq!((model.parts.len(), model.looks.images.len()), (3, 3));
+    assert_eq!((model.parts.len(), model.material_set.images.len()), (3, 3));
     check_round_trip("looks", &model);
 }
 

@@ -14,7 +14,7 @@ fn materials_become_those_of_gltf() {
         &obj,
         &[("sub/looks.mtl", mtl.as_bytes()), ("sub/skin color.png", PNG), ("nrm.jpg", b"\xff\xd8\xff\xe0")],
     );
-    let [skin, glass, lost] = &model.looks.materials[..] else { panic!("{:?}", model.looks.materials) };
+    let [skin, glass, lost] = &model.material_set.materials[..] else { panic!("{:?}", model.material_set.materials) };
     assert_eq!(skin["name"], "skin");
     let surface = &skin["pbrMetallicRoughness"];
     assert_eq!(surface["baseColorFactor"], serde_json::json!([1.0, 1.0, 1.0, 1.0]));
@@ -23,15 +23,15 @@ fn materials_become_those_of_gltf() {
     let transform = &surface["baseColorTexture"]["extensions"]["KHR_texture_transform"];
     assert_eq!(*transform, serde_json::json!({ "offset": [0.5, -1.0], "scale": [2.0, 2.0] }));
     assert_eq!(skin["normalTexture"]["scale"], 0.5);
-    assert_eq!(model.looks.images.len(), 2);
-    assert_eq!(model.looks.images[0].mime, "image/png");
-    assert_eq!(model.looks.images[1].mime, "image/jpeg");
+    assert_eq!(model.material_set.images.len(), 2);
+    assert_eq!(model.material_set.images[0].mime, "image/png");
+    assert_eq!(model.material_set.images[1].mime, "image/jpeg");
     assert_eq!(glass["alphaMode"], "BLEND");
     assert_eq!(glass["pbrMetallicRoughness"]["baseColorFactor"], serde_json::json!([0.1, 0.2, 0.3, 0.25]));
     assert_eq!(glass["pbrMetallicRoughness"]["roughnessFactor"], 0.0);
     assert_eq!(glass["emissiveFactor"], serde_json::json!([0.0, 0.5, 1.0]));
     assert_eq!(glass["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"], 4.0);
-    assert_eq!(model.looks.extensions_used, ["KHR_texture_transform", "KHR_materials_emissive_strength"]);
+    assert_eq!(model.material_set.extensions_used, ["KHR_texture_transform", "KHR_materials_emissive_strength"]);
     assert_eq!(lost["name"], "lost");
     assert!(model.notes.iter().any(|note| note.contains("`lost`")), "{:?}", model.notes);
 }
@@ -50,7 +50,7 @@ fn missing_files_are_notes() {
         }
     };
     let model = read_model(obj.as_bytes(), "test", &ObjSettings::default(), &mut sidecar).unwrap();
-    assert_eq!(model.looks.materials[0]["pbrMetallicRoughness"]["baseColorFactor"][0], 0.5);
+    assert_eq!(model.material_set.materials[0]["pbrMetallicRoughness"]["baseColorFactor"][0], 0.5);
     for wanted in ["`no`", "`such.mtl`", "outside the model's folder", "neither PNG nor JPEG"] {
         assert!(model.notes.iter().any(|note| note.contains(wanted)), "{wanted}: {:?}", model.notes);
     }

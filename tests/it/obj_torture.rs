@@ -10,14 +10,7 @@ use rigsmith::mesh::{
     obj::{ObjError, ObjSettings, read_model, write_obj},
 };
 
-/// The folder of test data, or a note that there is none.
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("RIGSMITH_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: RIGSMITH_DATA is not set");
-    }
-    folder
-}
+use crate::prerequisites::test_data;
 
 fn read(path: &Path) -> Result<Model, ObjError> {
     let folder = path.parent().unwrap();
@@ -56,7 +49,7 @@ const BROKEN: &[(&str, u64)] = &[
 
 #[test]
 fn every_file_loads_or_names_its_fault() {
-    let Some(data) = data() else { return };
+    let Some(data) = test_data() else { return };
     let folder = data.join("obj_torture");
     let mut loaded = 0;
     for path in files(&folder) {
@@ -85,16 +78,21 @@ fn check_model(name: &str, model: &Model) {
         assert!(part.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-5), "{name}");
         assert!(!part.triangles.is_empty(), "{name}");
     }
-    let written = write_obj(model, "again.mtl");
-    let mut sidecar = |path: &str| (path == "again.mtl").then(|| written.mtl.clone()).flatten();
-    let again = read_model(&written.obj[..], name, &ObjSettings::default(), &mut sidecar).unwrap();
+    let mut library = None;
+    let mut companion = |plain: &str, bytes| {
+        library = Some(bytes).filter(|_| plain == "again.mtl").or(library.take());
+        plain.to_owned()
+    };
+    let written = write_obj(model, "again", &mut companion);
+    let mut sidecar = |path: &str| library.clone().filter(|_| path == "again.mtl");
+    let again = read_model(&written[..], name, &ObjSettings::default(), &mut sidecar).unwrap();
     assert_eq!(again.points, model.points, "{name}");
     assert!(again.parts == model.parts, "{name} changed on writing");
 }
 
 #[test]
 fn files_say_what_they_should() {
-    let Some(data) = data() else { return };
+    let Some(data) = test_data() else { return };
     // File, points, triangles, objects, materials.
     for (name, points, triangles, objects, materials) in [
         ("tinyobjloader/cube.obj", 8, 12, 6, 3),
@@ -110,14 +108,14 @@ fn files_say_what_they_should() {
     ] {
         let model = read(&data.join("obj_torture").join(name)).unwrap();
         let count: usize = model.parts.iter().map(|part| part.triangles.len()).sum();
-        let found = (model.points.len(), count, model.objects.len(), model.looks.materials.len());
+        let found = (model.points.len(), count, model.objects.len(), model.material_set.materials.len());
         assert_eq!(found, (points, triangles, objects, materials), "{name}");
     }
 }
 
 #[test]
 fn materials_are_found_where_they_are() {
-    let Some(data) = data() else { return };
+    let Some(data) = test_data() else { return };
     for (name, material, color) in [
         ("tinyobjloader/mtl filename with whitespace issue46.obj", "green", [0.0, 1.0, 0.0]),
         ("tinyobjloader/issue-246-usemtl-whitespace.obj", "1", [1.0, 1.0, 1.0]),
@@ -125,7 +123,7 @@ fn materials_are_found_where_they_are() {
         ("tinyobjloader/mtllib-multiple-files-issue-112.obj", "default", [0.0, 0.0, 0.0]),
     ] {
         let model = read(&data.join("obj_torture").join(name)).unwrap();
-        let found = &model.looks.materials[0];
+        let found = &model.material_set.materials[0];
         assert_eq!(found["name"], material, "{name}");
         for (at, wanted) in color.iter().enumerate() {
             assert_eq!(found["pbrMetallicRoughness"]["baseColorFactor"][at], *wanted, "{name}");
@@ -135,7 +133,7 @@ fn materials_are_found_where_they_are() {
 
 #[test]
 fn bodies_and_heads_load_whole() {
-    let Some(data) = data() else { return };
+    let Some(data) = test_data() else { return };
     for (name, points, objects) in [
         ("bodies/male_young/body.obj", 13_380, 1),
         ("bodies/female_young/full.obj", 0, 6),

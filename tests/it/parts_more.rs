@@ -10,9 +10,9 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use bevy::math::{Affine3, Quat, Vec3};
 use rigsmith::{
-    build::{Builder, Modules},
     files::{RealDisk, load_template},
     mesh::model::Trs,
+    processor::{Builder, Modules},
     rig::{
         BuiltRig, JointData, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource,
         feature::{combined_features, set_feature},

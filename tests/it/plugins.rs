@@ -1,60 +1,29 @@
 //! The plugins in an app: joint entities follow the rig, surfaces follow the pose, work in the background can be stopped.
 
-use std::time::{Duration, Instant};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use bevy::prelude::*;
+use bevy::{ecs::schedule::ScheduleLabel, prelude::*};
 use rigsmith::{
     algo::weights::WeightSettings,
+    headless::headless_app,
     mesh::{model::Weights, ray::Ray},
     plugins::{
-        document::{InGroup, JointEntities, NodeLabel},
+        document::{GroupEntities, NodeLabel},
+        landing::ResultHeld,
+        schema::InGroup,
         skinning::SkinningJob,
     },
     prelude::*,
     rig::{RestTransform, SkinData},
-    test_app::test_app,
+    test_app::strict_app,
 };
 
-use crate::gestures::boxes;
+use crate::{bench::RigBench, gestures::boxes};
 
-struct Bench {
-    app: App,
-    rig: Entity,
-}
-
-impl Bench {
-    fn new() -> Self {
-        let mut app = test_app();
-        let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(1), "rig"), ..default() }).id();
-        Self { app, rig }
-    }
-
-    fn edit(&mut self, operation: Operation) {
-        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
-        self.app.update();
-    }
-
-    fn change(&mut self, change: Change) {
-        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
-        self.app.update();
-    }
-
-    fn chain(&mut self, places: &[[f32; 3]]) -> Vec<Uid> {
-        let positions = places.iter().map(|place| Vec3::from(*place)).collect();
-        self.edit(Operation::Chain { positions, parent: None });
-        self.rig().walk().map(|joint| joint.data.uid).collect()
-    }
-
-    fn rig(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
-    }
-
-    fn entity(&self, joint: Uid) -> Option<Entity> {
-        self.app.world().get::<JointEntities>(self.rig).unwrap().get(joint)
-    }
-
-    fn get<C: Component>(&self, joint: Uid) -> Option<&C> {
-        self.app.world().get::<C>(self.entity(joint)?)
+impl RigBench {
+    /// A component of a joint's entity.
+    fn of_joint<C: Component>(&self, joint: Uid) -> Option<&C> {
+        self.get(self.find(joint)?)
     }
 
     /// Opens a mesh and waits for its surface.
@@ -65,69 +34,53 @@ impl Bench {
         mesh
     }
 
-    fn surface(&self) -> Option<&RigSurface> {
-        self.app.world().get::<RigSurface>(self.rig)
-    }
-
-    fn wait(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
-        let started = Instant::now();
-        while !done(self) {
-            assert!(started.elapsed() < Duration::from_secs(20), "{what} does not come");
-            self.app.update();
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-
     /// Distances along a ray from (x, y, 10) to the front.
     fn hits(&self, x: f32, y: f32) -> Vec<f32> {
         let ray = Ray { origin: Vec3::new(x, y, 10.0), direction: Vec3::NEG_Z };
         self.surface().unwrap().hits(&ray).iter().map(|hit| hit.distance).collect()
     }
-
-    fn messages<M: Message>(&mut self) -> Vec<M> {
-        self.app.world_mut().resource_mut::<Messages<M>>().drain().collect()
-    }
 }
 
 #[test]
 fn joint_entities_follow_the_rig() {
-    let mut bench = Bench::new();
+    let mut bench = RigBench::new();
     let joints = bench.chain(&[[0.0, 1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 2.0, 0.0]]);
-    let entities: Vec<Entity> = joints.iter().map(|joint| bench.entity(*joint).unwrap()).collect();
-    assert_eq!(bench.get::<ChildOf>(joints[0]).unwrap().parent(), bench.rig);
-    assert_eq!(bench.get::<ChildOf>(joints[2]).unwrap().parent(), entities[1]);
-    assert_eq!(bench.get::<Uid>(joints[1]), Some(&joints[1]));
-    assert_eq!(bench.get::<JointOf>(joints[1]).unwrap().0, bench.rig);
-    assert_eq!(bench.get::<GlobalTransform>(joints[2]).unwrap().translation(), Vec3::new(1.0, 2.0, 0.0));
+    let entities: Vec<Entity> = joints.iter().map(|joint| bench.find(*joint).unwrap()).collect();
+    assert_eq!(bench.of_joint::<ChildOf>(joints[0]).unwrap().parent(), bench.rig);
+    assert_eq!(bench.of_joint::<ChildOf>(joints[2]).unwrap().parent(), entities[1]);
+    assert_eq!(bench.of_joint::<Uid>(joints[1]), Some(&joints[1]));
+    assert_eq!(bench.of_joint::<NodeOf>(joints[1]).unwrap().0, bench.rig);
+    assert_eq!(bench.of_joint::<GlobalTransform>(joints[2]).unwrap().translation(), Vec3::new(1.0, 2.0, 0.0));
 
     bench.edit(Operation::Labels(vec![(joints[1], "arm_l".into())]));
-    assert_eq!(bench.get::<NodeLabel>(joints[1]), Some(&NodeLabel("arm_l".into())));
-    assert_eq!(bench.get::<Name>(joints[1]).map(Name::as_str), Some("arm_l"));
+    assert_eq!(bench.of_joint::<NodeLabel>(joints[1]), Some(&NodeLabel("arm_l".into())));
+    assert_eq!(bench.of_joint::<Name>(joints[1]).map(Name::as_str), Some("arm_l"));
     bench.edit(Operation::Group { joints: vec![joints[1]], name: "g".into(), color: None });
-    assert_eq!(bench.get::<InGroup>(joints[1]), Some(&InGroup(bench.rig().groups()[0].uid)));
+    let group = bench.app.world().get::<GroupEntities>(bench.rig).unwrap().get(bench.rig().groups()[0].uid).unwrap();
+    assert_eq!(bench.of_joint::<InGroup>(joints[1]), Some(&InGroup(group)));
     bench.change(Change::Undo);
     bench.change(Change::Undo);
-    assert!(bench.get::<NodeLabel>(joints[1]).is_none() && bench.get::<Name>(joints[1]).is_none());
-    assert!(bench.get::<InGroup>(joints[1]).is_none());
+    assert!(bench.of_joint::<NodeLabel>(joints[1]).is_none() && bench.of_joint::<Name>(joints[1]).is_none());
+    assert!(bench.of_joint::<InGroup>(joints[1]).is_none());
 
     bench.edit(Operation::Reparent { joints: vec![joints[2]], parent: Some(joints[0]) });
-    assert_eq!(bench.get::<ChildOf>(joints[2]).unwrap().parent(), entities[0]);
-    assert_eq!(bench.get::<Transform>(joints[2]).unwrap().translation, Vec3::new(1.0, 1.0, 0.0));
+    assert_eq!(bench.of_joint::<ChildOf>(joints[2]).unwrap().parent(), entities[0]);
+    assert_eq!(bench.of_joint::<Transform>(joints[2]).unwrap().translation, Vec3::new(1.0, 1.0, 0.0));
 
     bench.edit(Operation::Delete { joints: vec![joints[0]], keep_children: true });
     assert!(bench.app.world().get_entity(entities[0]).is_err(), "its entity is gone");
-    assert_eq!(bench.entity(joints[0]), None);
+    assert_eq!(bench.find(joints[0]), None);
     for joint in &joints[1..] {
         assert_eq!(
-            bench.get::<ChildOf>(*joint).unwrap().parent(),
+            bench.of_joint::<ChildOf>(*joint).unwrap().parent(),
             bench.rig,
             "kept, though its parent's entity is gone"
         );
     }
-    assert_eq!([1, 2].map(|i| bench.entity(joints[i]).unwrap()), [entities[1], entities[2]], "the same entities");
+    assert_eq!([1, 2].map(|i| bench.find(joints[i]).unwrap()), [entities[1], entities[2]], "the same entities");
     bench.change(Change::Undo);
-    let root = bench.entity(joints[0]).unwrap();
-    assert_eq!(bench.get::<ChildOf>(joints[1]).unwrap().parent(), root);
+    let root = bench.find(joints[0]).unwrap();
+    assert_eq!(bench.of_joint::<ChildOf>(joints[1]).unwrap().parent(), root);
     let all = bench.app.world_mut().query::<&Joint>().iter(bench.app.world()).count();
     assert_eq!(all, 3);
     bench.edit(Operation::Delete { joints: vec![joints[0]], keep_children: false });
@@ -137,26 +90,26 @@ fn joint_entities_follow_the_rig() {
 
 #[test]
 fn a_pose_stays_on_top_of_the_rest_pose() {
-    let mut bench = Bench::new();
+    let mut bench = RigBench::new();
     let joints = bench.chain(&[[0.0, 1.0, 0.0], [0.0, 2.0, 0.0]]);
-    let entity = bench.entity(joints[1]).unwrap();
+    let entity = bench.find(joints[1]).unwrap();
     let turn = Quat::from_rotation_z(0.5);
     bench.app.world_mut().get_mut::<Transform>(entity).unwrap().rotation = turn;
     bench.edit(Operation::Move {
         to: vec![(joints[1], Vec3::new(0.5, 2.0, 0.0)), (joints[0], Vec3::Y)],
         with_children: true,
     });
-    let pose = *bench.get::<Transform>(joints[1]).unwrap();
+    let pose = *bench.of_joint::<Transform>(joints[1]).unwrap();
     assert!(pose.translation.distance(Vec3::new(0.5, 1.0, 0.0)) < 1e-6, "{pose:?}");
     assert!(pose.rotation.angle_between(turn) < 1e-3, "{pose:?}");
-    assert_eq!(bench.get::<RestTransform>(joints[1]).unwrap().rotation, Quat::IDENTITY);
+    assert_eq!(bench.of_joint::<RestTransform>(joints[1]).unwrap().rotation, Quat::IDENTITY);
     bench.edit(Operation::Labels(vec![(joints[0], "x".into())]));
-    assert_eq!(*bench.get::<Transform>(joints[1]).unwrap(), pose, "what does not move leaves the pose alone");
+    assert_eq!(*bench.of_joint::<Transform>(joints[1]).unwrap(), pose, "what does not move leaves the pose alone");
 }
 
 #[test]
 fn refusals_and_edits_are_told() {
-    let mut bench = Bench::new();
+    let mut bench = RigBench::new();
     let stranger = bench.app.world_mut().spawn_empty().id();
     bench.app.world_mut().write_message(EditRequest::operation(stranger, Operation::Lock(Vec::new(), true)));
     bench.app.update();
@@ -176,8 +129,8 @@ fn refusals_and_edits_are_told() {
 
 #[test]
 fn several_rigs_do_not_meet() {
-    let mut bench = Bench::new();
-    let other = bench.app.world_mut().spawn(RigBundle::default()).id();
+    let mut bench = RigBench::new();
+    let other = bench.app.world_mut().spawn(Rig::default()).id();
     bench.chain(&[[0.0; 3], [1.0; 3]]);
     assert!(bench.app.world().get::<Rig>(other).unwrap().is_empty());
     bench.app.world_mut().entity_mut(other).despawn();
@@ -190,7 +143,7 @@ fn several_rigs_do_not_meet() {
 
 #[test]
 fn the_surface_follows_the_pose() {
-    let mut bench = Bench::new();
+    let mut bench = RigBench::new();
     let joints = bench.chain(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
     // Two boxes, one above the other: each held by one joint.
     bench.open(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]], [[-0.2, 1.0, -0.2], [0.2, 2.0, 0.2]]]);
@@ -198,11 +151,11 @@ fn the_surface_follows_the_pose() {
     for point in 0..16 {
         weights.push([(u32::from(point >= 8), 1.0)]);
     }
-    let skin = SkinData { joints: joints.clone(), weights, at_rest: true };
+    let skin = SkinData { joints: joints.clone(), weights, at_rest: true, ..Default::default() };
     bench.edit(Operation::Edits(vec![RigEdit::SetSkin(Uid(99), Some(skin.into()))]));
     assert_eq!((bench.hits(0.0, 1.5).len(), bench.hits(0.7, 1.0).len()), (2, 0));
-    let pose = |bench: &mut Bench, rotation: Quat| {
-        let entity = bench.entity(joints[1]).unwrap();
+    let pose = |bench: &mut RigBench, rotation: Quat| {
+        let entity = bench.find(joints[1]).unwrap();
         bench.app.world_mut().get_mut::<Transform>(entity).unwrap().rotation = rotation;
         bench.app.update();
     };
@@ -233,7 +186,7 @@ fn the_surface_follows_the_pose() {
 
 #[test]
 fn a_rig_that_stands_elsewhere_has_the_same_surface() {
-    let mut bench = Bench::new();
+    let mut bench = RigBench::new();
     bench.chain(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
     bench.open(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]);
     *bench.app.world_mut().get_mut::<Transform>(bench.rig).unwrap() =
@@ -245,15 +198,12 @@ fn a_rig_that_stands_elsewhere_has_the_same_surface() {
 
 #[test]
 fn skinning_runs_in_the_background_and_can_be_stopped() {
-    let mut bench = Bench::new();
+    let mut bench = RigBench::new();
     let joints = bench.chain(&[[0.0, 0.1, 0.0], [0.0, 0.9, 0.0]]);
     let mesh = bench.open(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]);
     let request = || BindRequest { mesh, settings: WeightSettings::default(), rigid: Vec::new() };
     bench.app.world_mut().write_message(request());
     bench.app.update();
-    if let Some(job) = bench.app.world().get::<SkinningJob>(mesh) {
-        assert!((0.0..=1.0).contains(&job.progress()));
-    }
     bench.wait("the weights", |bench| bench.rig().skin(Uid(99)).is_some());
     let skin = bench.rig().skin(Uid(99)).unwrap();
     assert_eq!((skin.weights.len(), &skin.joints), (8, &joints));
@@ -273,6 +223,7 @@ fn skinning_runs_in_the_background_and_can_be_stopped() {
     bench.app.world_mut().write_message(BindRequest { mesh: large, ..request() });
     bench.app.update();
     let job = bench.app.world().get::<SkinningJob>(large).expect("the job is under way");
+    assert!((0.0..=1.0).contains(&job.progress()));
     job.cancel();
     bench.messages::<Bound>();
     bench.wait("the end of the job", |bench| bench.app.world().get::<SkinningJob>(large).is_none());
@@ -284,4 +235,90 @@ fn skinning_runs_in_the_background_and_can_be_stopped() {
     bench.app.world_mut().write_message(BindRequest { mesh: stranger, ..request() });
     bench.app.update();
     assert!(bench.messages::<Bound>()[0].result.as_ref().is_err_and(|error| error.contains("no rig")));
+}
+
+#[derive(Resource, Default)]
+struct Number(u32);
+
+fn double(mut number: ResMut<Number>) {
+    number.0 *= 2;
+}
+
+fn increase(mut number: ResMut<Number>) {
+    number.0 += 1;
+}
+
+#[test]
+fn ambiguous_systems_are_refused_in_every_schedule() {
+    let schedules = [
+        PreStartup.intern(),
+        Startup.intern(),
+        PreUpdate.intern(),
+        Update.intern(),
+        PostUpdate.intern(),
+        Last.intern(),
+    ];
+    for schedule in schedules {
+        let mut app = headless_app(1);
+        app.init_resource::<Number>().add_systems(schedule, (double, increase));
+        let mut app = strict_app(app);
+        let outcome = catch_unwind(AssertUnwindSafe(|| app.update()));
+        let message = *outcome.expect_err("ambiguous systems run").downcast::<String>().unwrap();
+        assert!(message.contains("double") && message.contains("increase"), "{schedule:?}: {message}");
+        let mut app = headless_app(1);
+        app.init_resource::<Number>().add_systems(schedule, (double, increase).chain());
+        strict_app(app).update();
+    }
+}
+
+/// Undoing while weights are computed must lose neither the undone steps nor put weights onto a rig without joints.
+#[test]
+fn a_late_result_never_cuts_off_undone_steps() {
+    let mut bench = RigBench::new();
+    bench.chain(&[[0.0, 0.1, 0.0], [0.0, 0.9, 0.0]]);
+    bench.edit(Operation::Place { position: Vec3::new(0.1, 0.5, 0.0), parent: None });
+    let boxes: Vec<[[f32; 3]; 2]> = (0..5000)
+        .map(|i| {
+            let low = [(i % 20) as f32 * 0.02 - 0.2, (i / 400) as f32 * 0.08, (i / 20 % 20) as f32 * 0.02 - 0.2];
+            [low, low.map(|at| at + 0.018)]
+        })
+        .collect();
+    let mesh = bench.open(&boxes);
+    let whole = bench.rig().clone();
+    let start = |bench: &mut RigBench| {
+        bench.messages::<Bound>();
+        bench.messages::<ResultHeld>();
+        bench.app.world_mut().write_message(BindRequest {
+            mesh,
+            settings: WeightSettings::default(),
+            rigid: Vec::new(),
+        });
+        bench.app.update();
+        assert!(bench.app.world().get::<SkinningJob>(mesh).is_some(), "so many points are not skinned in a frame");
+        for _ in 0..2 {
+            bench.app.world_mut().write_message(EditRequest { rig: bench.rig, change: Change::Undo });
+        }
+        bench.app.update();
+        assert!(bench.rig().is_empty());
+    };
+
+    // Held while the steps can be redone, and bound to the very state it was computed for.
+    start(&mut bench);
+    let held = |bench: &RigBench| !bench.app.world().resource::<Messages<ResultHeld>>().is_empty();
+    bench.wait("the word that the result waits", held);
+    assert!(bench.messages::<Bound>().is_empty() && bench.rig().skin(Uid(99)).is_none());
+    bench.change(Change::Redo);
+    bench.change(Change::Redo);
+    assert_eq!(*bench.rig(), whole, "nothing was lost");
+    bench.wait("the weights", |bench| bench.rig().skin(Uid(99)).is_some());
+    bench.change(Change::Undo);
+    assert_eq!(*bench.rig(), whole);
+
+    // Dropped once the person has gone another way.
+    start(&mut bench);
+    bench.edit(Operation::Place { position: Vec3::new(0.0, 0.5, 0.0), parent: None });
+    bench.wait("the end of the job", |bench| bench.app.world().get::<SkinningJob>(mesh).is_none());
+    let bound = bench.messages::<Bound>();
+    assert!(bound.len() == 1 && bound[0].result.is_err(), "{bound:?}");
+    assert!(bench.rig().skin(Uid(99)).is_none());
 }

@@ -4,17 +4,15 @@ use bevy::{math::Affine3, prelude::*};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 use rigsmith::{
     headless::Workbench,
-    plugins::document::JointEntities,
-    prelude::{Change, EditRequest, RigBundle},
+    prelude::Change,
     rig::{
         EditError, PoseOffset, RestTransform, Rig, RigEdit, StoredPose, Uid,
         operations::{Axis, MirrorPlane, Operation, OperationError},
         template::write_template,
     },
-    test_app::test_app,
 };
 
-use crate::edits::Bench;
+use crate::{bench::RigBench, edits::Bench};
 
 fn turn(x: f32, y: f32, z: f32) -> PoseOffset {
     PoseOffset::from_rotation(Quat::from_euler(EulerRot::XYZ, x, y, z))
@@ -288,39 +286,16 @@ fn a_deleted_joint_takes_its_part_of_the_pose_along_and_brings_it_back() {
     assert_eq!(bench.rig, before);
 }
 
-/// A rig in an app.
-struct InApp {
-    app: App,
-    rig: Entity,
-}
-
-impl InApp {
-    fn new(rig: Rig) -> Self {
-        let mut app = test_app();
-        let rig = app.world_mut().spawn(RigBundle { rig, ..default() }).id();
-        app.update();
-        Self { app, rig }
-    }
-
-    fn change(&mut self, change: Change) {
-        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
-        self.app.update();
-    }
-
-    fn edit(&mut self, operation: Operation) {
-        self.change(Change::Do(operation));
-    }
-
-    fn rig(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
-    }
-
-    fn entity(&self, joint: Uid) -> Entity {
-        self.app.world().get::<JointEntities>(self.rig).unwrap().get(joint).unwrap()
+impl RigBench {
+    /// A rig whose entities are there.
+    fn in_app(rig: Rig) -> Self {
+        let mut bench = Self::of(rig);
+        bench.app.update();
+        bench
     }
 
     fn transform(&self, joint: Uid) -> Transform {
-        *self.app.world().get::<Transform>(self.entity(joint)).unwrap()
+        *self.get::<Transform>(self.joint(joint)).unwrap()
     }
 
     #[track_caller]
@@ -335,7 +310,7 @@ impl InApp {
 fn entities_stand_as_the_document_poses_them() {
     let (mut bench, hips, left, right) = two_arms();
     bench.run(Operation::Pose(vec![(left[0], turn(0.0, 0.0, 1.0))]));
-    let mut app = InApp::new(bench.rig.clone());
+    let mut app = RigBench::in_app(bench.rig.clone());
     app.assert_as_documented();
     assert_ne!(app.transform(right[0]).rotation, app.rig().joint(right[0]).unwrap().data.rest.rotation);
 
@@ -362,15 +337,15 @@ fn entities_stand_as_the_document_poses_them() {
 #[test]
 fn who_else_writes_a_pose_keeps_it_until_the_document_poses_that_joint() {
     let (bench, hips, left, _) = two_arms();
-    let mut app = InApp::new(bench.rig.clone());
+    let mut app = RigBench::in_app(bench.rig.clone());
     app.edit(Operation::Pose(vec![(hips, turn(0.3, 0.0, 0.0))]));
     let animated = turn(0.0, 0.7, 0.0);
     for joint in [hips, left[1]] {
         let pose = animated.on(&app.rig().joint(joint).unwrap().data.rest);
-        let entity = app.entity(joint);
+        let entity = app.joint(joint);
         *app.app.world_mut().get_mut::<Transform>(entity).unwrap() = pose;
     }
-    let is_animated = |app: &InApp, joint: Uid| {
+    let is_animated = |app: &RigBench, joint: Uid| {
         let expected = animated.on(&app.rig().joint(joint).unwrap().data.rest);
         let found = app.transform(joint);
         found.translation.distance(expected.translation) < 1e-5

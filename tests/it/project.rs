@@ -260,6 +260,15 @@ impl Folder {
         self.0.path().join("work/hero.rigsmith.ron")
     }
 
+    /// The only file with weights.
+    fn skin(&self) -> std::path::PathBuf {
+        let files = fs::read_dir(self.0.path().join("work")).unwrap().map(|entry| entry.unwrap().path());
+        let mut skins = files.filter(|path| path.extension().is_some_and(|ending| ending == "skin"));
+        let skin = skins.next().expect("a file with weights");
+        assert_eq!(skins.next(), None);
+        skin
+    }
+
     fn text(&self) -> String {
         fs::read_to_string(self.project()).unwrap()
     }
@@ -283,8 +292,8 @@ fn to_save(loaded: LoadedProject) -> ProjectToSave {
         uid: mesh.uid,
         rig: mesh.rig,
         path: mesh.path,
-        nodes: mesh.nodes.into(),
-        shape: match mesh.state {
+        nodes: mesh.nodes,
+        shape: match mesh.shape {
             MeshState::Open { model, .. } => open_shape(&model),
             MeshState::Missing { shape, .. } => shape,
         },
@@ -301,10 +310,13 @@ fn cube(mesh: &Path) -> ProjectToSave {
     let mut weights = Weights::default();
     for point in 0..8 {
         let up = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0][point];
-        let both = [(0, 0.7 - 0.4 * up), (1, 0.3 + 0.4 * up)];
-        weights.push(both);
+        let all = [(0, 0.7 - 0.4 * up), (1, 0.2 + 0.4 * up), (2, 0.1)];
+        weights.push(all);
     }
-    let skin = SkinData { joints: joints.clone(), weights, at_rest: true };
+    // The last one is a joint that a command created for the second.
+    let created = Uid(0xC0_FFEE);
+    let subjects = [(created, joints[1])].into();
+    let skin = SkinData { joints: vec![joints[0], joints[1], created], weights, at_rest: true, subjects };
     let uid = Uid(0x50);
     bench.run(Operation::Edits(vec![RigEdit::SetSkin(uid, Some(Arc::new(skin)))]));
     bench.run(Operation::Pose(vec![(joints[1], PoseOffset::from_rotation(Quat::from_rotation_x(0.5)))]));
@@ -339,14 +351,15 @@ fn what_is_saved_is_opened_and_saving_that_changes_nothing() {
         names.sort();
         names
     };
-    assert_eq!(names, ["hero.0000000000000050.skin", "hero.rigsmith.ron"]);
+    assert_eq!(names.len(), 2);
+    assert!(names[0].starts_with("hero.") && names[0].ends_with(".skin") && names[1] == "hero.rigsmith.ron");
     assert!(folder.text().contains("path: \"../meshes/cube.obj\""), "{}", folder.text());
     let text = folder.text();
     let loaded = folder.load();
     assert_eq!(loaded.notes, Vec::<String>::new());
     assert_eq!(loaded.rigs, project.rigs);
     assert_eq!((&loaded.name, &loaded.view, &loaded.journal), (&project.name, &project.view, &project.journal));
-    assert!(matches!(&loaded.meshes[0].state, MeshState::Open { changed: false, .. }));
+    assert!(matches!(&loaded.meshes[0].shape, MeshState::Open { changed: false, .. }));
     folder.save(&to_save(loaded));
     assert_eq!(folder.text(), text);
 
@@ -370,7 +383,7 @@ fn weights_follow_a_mesh_that_has_changed() {
     let changed = CUBE.replacen("f 3 4 8 7\n", "v 0.5 1 0.5\nf 3 4 9\nf 4 8 9\nf 8 7 9\nf 7 3 9\n", 1);
     fs::write(folder.mesh(), changed).unwrap();
     let loaded = folder.load();
-    assert!(matches!(&loaded.meshes[0].state, MeshState::Open { changed: true, .. }));
+    assert!(matches!(&loaded.meshes[0].shape, MeshState::Open { changed: true, .. }));
     assert!(loaded.notes.iter().any(|note| note.contains("has changed")), "{:?}", loaded.notes);
     assert!(loaded.notes.iter().any(|note| note.contains("transferred") && note.contains("8")), "{:?}", loaded.notes);
     let skin = loaded.rigs[0].skin(Uid(0x50)).unwrap();
@@ -390,17 +403,17 @@ fn a_missing_mesh_loses_nothing() {
     let project = cube(&folder.mesh());
     folder.save(&project);
     let text = folder.text();
-    let skin = fs::read(folder.0.path().join("work/hero.0000000000000050.skin")).unwrap();
+    let skin = fs::read(folder.skin()).unwrap();
     let away = folder.0.path().join("meshes/elsewhere.obj");
     fs::rename(folder.mesh(), &away).unwrap();
     let loaded = folder.load();
     assert_eq!(loaded.rigs, project.rigs, "weights and poses included");
     let note = loaded.notes.join("\n");
     assert!(note.contains("cube.obj") && note.contains("put it back"), "{note}");
-    assert!(matches!(&loaded.meshes[0].state, MeshState::Missing { error: LoadError::Read(_), .. }));
+    assert!(matches!(&loaded.meshes[0].shape, MeshState::Missing { error: LoadError::Read(_), .. }));
     folder.save(&to_save(loaded));
     assert_eq!(folder.text(), text);
-    assert_eq!(fs::read(folder.0.path().join("work/hero.0000000000000050.skin")).unwrap(), skin);
+    assert_eq!(fs::read(folder.skin()).unwrap(), skin);
     fs::rename(&away, folder.mesh()).unwrap();
     assert_eq!(folder.load().notes, Vec::<String>::new());
 }
@@ -409,18 +422,15 @@ fn a_missing_mesh_loses_nothing() {
 fn broken_weights_are_told_and_the_rest_opens() {
     let folder = Folder::new();
     let project = cube(&folder.mesh());
-    let skin = folder.0.path().join("work/hero.0000000000000050.skin");
-    let text = {
-        folder.save(&project);
-        folder.text()
-    };
+    folder.save(&project);
+    let (skin, text) = (folder.skin(), folder.text());
+    let name = skin.file_stem().unwrap().to_str().unwrap();
     let whole = fs::read(&skin).unwrap();
     let missing = || fs::remove_file(&skin).unwrap();
     let cut = || fs::write(&skin, &whole[..whole.len() / 2]).unwrap();
-    let outside = || {
-        fs::write(folder.project(), text.replacen("hero.0000000000000050", "../work/hero.0000000000000050", 1)).unwrap()
-    };
+    let outside = || fs::write(folder.project(), text.replacen(name, &format!("../work/{name}"), 1)).unwrap();
     for (break_it, about) in [(&missing as &dyn Fn(), "no file"), (&cut, "skin"), (&outside, "below the project")] {
+        let _ = fs::remove_file(&skin);
         folder.save(&project);
         break_it();
         let loaded = folder.load();
@@ -428,12 +438,13 @@ fn broken_weights_are_told_and_the_rest_opens() {
         assert!(loaded.notes[0].contains(about), "{:?}", loaded.notes);
         assert!(loaded.rigs[0].skins().next().is_none());
         assert_eq!(loaded.rigs[0].stored_poses(), project.rigs[0].stored_poses());
-        assert!(matches!(&loaded.meshes[0].state, MeshState::Open { changed: false, .. }));
+        assert!(matches!(&loaded.meshes[0].shape, MeshState::Open { changed: false, .. }));
     }
     // Weights of another save: still those of this mesh.
+    fs::remove_file(&skin).unwrap();
     folder.save(&project);
     let hash = text.split(".skin\", hash: \"").nth(1).unwrap()[..16].to_owned();
-    fs::write(folder.project(), text.replace(&hash, "0000000000000000")).unwrap();
+    fs::write(folder.project(), text.replace(&format!("hash: \"{hash}\""), "hash: \"0000000000000000\"")).unwrap();
     let loaded = folder.load();
     assert!(loaded.notes.len() == 1 && loaded.notes[0].contains("another time"), "{:?}", loaded.notes);
     assert_eq!(loaded.rigs, project.rigs);
@@ -485,6 +496,7 @@ fn a_character_with_a_skeleton_of_its_own_goes_through_a_project() {
     let model = load_model(&RealDisk, &folder.mesh()).unwrap();
     let parts = Character {
         rig: &posed.rigs[0],
+        built: None,
         file: &model,
         rest: &model,
         nodes: &[],

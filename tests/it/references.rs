@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use proptest::prelude::*;
 use rigsmith::rig::{
-    GroupData, JointData, NodeRef, NodeRefs, NodeType, Rig, RigEdit, Tag, TagKind, Uid,
+    GroupData, JointData, NodeRef, NodeRefs, NodeType, Rig, RigEdit, TagData, TagKind, Uid,
     reference::{
         GroupScope, NameKind, NameScope, Names, NodeTypes, Pick, PickAt, PickError, RigNames, RigScope, Source, Top,
         bind_names, label_text, map_references, nearest_to_gone, references_in, refresh_names, written_as,
@@ -21,9 +21,9 @@ const CONTROL: Uid = Uid(0xc0);
 const OTHER_CONTROL: Uid = Uid(0xc1);
 const HANDLE: Uid = Uid(0xc2);
 
-fn command(uid: Uid, module: &str, params: &str) -> Tag {
+fn command(uid: Uid, module: &str, params: &str) -> TagData {
     let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
-    Tag { uid, enabled: true, comment: String::new(), kind }
+    TagData { uid, enabled: true, comment: String::new(), kind }
 }
 
 fn rig() -> Rig {

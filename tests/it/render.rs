@@ -21,17 +21,18 @@ use rigsmith::{
     rig::{PoseOffset, Rig, operations::Operation},
 };
 
+use crate::prerequisites::skip;
+
 /// One renderer at a time: several on one software adapter take their time from each other.
 static TURN: Mutex<()> = Mutex::new(());
 
 /// True if pictures can be taken; says why not, and fails where they must be.
+#[track_caller]
 fn can_draw() -> bool {
     if adapter().is_some() {
         return true;
     }
-    let required = std::env::var("RIGSMITH_REQUIRE_GPU").is_ok_and(|value| value == "1");
-    assert!(!required, "RIGSMITH_REQUIRE_GPU=1, but there is no graphics adapter");
-    println!("skipped: there is no graphics adapter, not even a software one");
+    skip("there is no graphics adapter, not even a software one", "RIGSMITH_REQUIRE_GPU");
     false
 }
 
@@ -149,4 +150,27 @@ fn impossible_sizes_are_refused() {
         let error = take_picture(Rig::default(), Vec::new(), &settings).unwrap_err().to_string();
         assert!(error.contains("choose"), "{error}");
     }
+}
+
+/// Without a display nothing asks for one, on whichever way to a graphics card.
+#[cfg(feature = "cli")]
+#[test]
+fn the_command_draws_quietly_without_a_display_on_a_gpu() {
+    if !can_draw() {
+        return;
+    }
+    let _turn = TURN.lock();
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/hand.obj");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_rigsmith"))
+        .current_dir(folder.path())
+        .args(["render", mesh, "--output", "hand.png", "--size", "64x48"])
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("XDG_RUNTIME_DIR")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && folder.path().join("hand.png").exists(), "{said}");
+    assert!(!said.contains("XDG_RUNTIME_DIR") && !said.contains("error"), "{said}");
 }

@@ -367,12 +367,9 @@ fn odd_rigs_and_strokes_are_survived() {
 
 #[test]
 fn elbows_of_real_bodies() {
-    let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
-        println!("skipped: RIGSMITH_DATA is not set");
-        return;
-    };
+    let Some(data) = crate::prerequisites::test_data() else { return };
     for body in ["female_young", "male_young"] {
-        let folder = std::path::Path::new(&data).join("bodies").join(body);
+        let folder = data.join("bodies").join(body);
         let text = std::fs::read_to_string(folder.join("body.obj")).expect("the body");
         let (mut points, mut triangles) = (Vec::new(), Vec::new());
         for line in text.lines() {

@@ -177,7 +177,7 @@ fn brute_force_gives_the_same_bits() {
     {
         let surface = Surface::build(&points, &triangles);
         let (low, high) = surface.bounds().unwrap();
-        let mut random = Random(seed as u64);
+        let (mut random, mut spans, mut crossed) = (Random(seed as u64), Random(77), [0, 0]);
         let pending = PendingSurface::new(points.clone().into(), triangles.clone().into());
         let mut found = 0;
         for i in 0..1000 {
@@ -192,6 +192,10 @@ fn brute_force_gives_the_same_bits() {
             let mut brute = Vec::new();
             hits_brute(&points, &triangles, &ray, &mut brute);
             assert_eq!(hits_of(&surface, &ray), brute);
+            let [from, to] = [spans.unit(), spans.unit()].map(|share| share * 2.0 * away);
+            let is_between = brute.iter().any(|hit| (from.min(to)..from.max(to)).contains(&hit.distance));
+            assert_eq!(surface.crosses(&ray, from.min(to), from.max(to)), is_between, "{ray:?} from {from} to {to}");
+            crossed[usize::from(is_between)] += 1;
             assert_eq!(
                 (pending.near_far(&ray), pending.closest(&ray)),
                 (surface.near_far(&ray), surface.closest(&ray))
@@ -199,6 +203,7 @@ fn brute_force_gives_the_same_bits() {
             found += brute.len();
         }
         assert!(found > 800, "{found}");
+        assert!(crossed.iter().all(|count| *count > 50), "{crossed:?}");
         assert!(pending.ready().is_none());
         assert_eq!(pending.build().triangle_count(), surface.triangle_count());
         assert!(pending.into_surface().is_some());

@@ -4,11 +4,11 @@ use std::{path::Path, sync::Arc};
 
 use bevy::prelude::*;
 use proptest::prelude::*;
-use rigsmith::plugins::document::{EditRequest, Edited, RigBundle};
+use rigsmith::plugins::document::{EditRequest, Edited};
+use rigsmith::processor::form::{FormElement, read_form};
 use rigsmith::rig::{
-    EditError, GroupData, JointData, Rig, RigEdit, Tag, TagKind, Uid, UidSource,
+    EditError, GroupData, JointData, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
     feature::{FeatureKey, FeatureKind, FeatureKinds, FeatureState, combined_features, features_named, is_active},
-    form::{FormElement, read_form},
     operations::{
         Operation, OperationError, Outcome, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
     },
@@ -29,15 +29,15 @@ const GRIP_L: Uid = Uid(0x22);
 const IK_R: Uid = Uid(0x23);
 const SPACE_R: Uid = Uid(0x24);
 
-fn tag(uid: Uid, kind: TagKind) -> Tag {
-    Tag { uid, enabled: true, comment: String::new(), kind }
+fn tag(uid: Uid, kind: TagKind) -> TagData {
+    TagData { uid, enabled: true, comment: String::new(), kind }
 }
 
-fn command(uid: Uid, module: &str, params: &str, feature: Option<Uid>) -> Tag {
+fn command(uid: Uid, module: &str, params: &str, feature: Option<Uid>) -> TagData {
     tag(uid, TagKind::Command { module: module.into(), params: params.into(), feature })
 }
 
-fn feature(uid: Uid, kind: &str, name: &str, switch: &str) -> Tag {
+fn feature(uid: Uid, kind: &str, name: &str, switch: &str) -> TagData {
     tag(uid, TagKind::Feature { kind: kind.into(), name: name.into(), switch: switch.into() })
 }
 
@@ -45,7 +45,7 @@ fn add(rig: &mut Rig, joint: JointData, parent: Option<Uid>) {
     rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent, index: 9 }).unwrap();
 }
 
-fn joint(uid: Uid, label: &str, group: Option<Uid>, mirror: Option<Uid>, tags: Vec<Tag>) -> JointData {
+fn joint(uid: Uid, label: &str, group: Option<Uid>, mirror: Option<Uid>, tags: Vec<TagData>) -> JointData {
     JointData { uid, label: Some(label.into()), group, mirror, tags, ..Default::default() }
 }
 
@@ -112,7 +112,7 @@ impl Desk {
         self.rig.joint(joint).unwrap().data.tags.iter().map(|tag| tag.uid).collect()
     }
 
-    fn tag(&self, tag: Uid) -> &Tag {
+    fn tag(&self, tag: Uid) -> &TagData {
         self.rig.find_tag(tag).unwrap().1
     }
 
@@ -224,7 +224,7 @@ fn a_command_is_active_if_all_that_governs_it_is_on() {
 /// Features of two groups: `IK` on the left with two switches, on the right without; one unnamed.
 fn features() -> Desk {
     let mut desk = Desk::new();
-    let put = |desk: &mut Desk, joint, tag: Tag| {
+    let put = |desk: &mut Desk, joint, tag: TagData| {
         desk.rig.apply(&RigEdit::AddTag { joint, tag: Box::new(tag), index: 9 }).unwrap();
     };
     put(&mut desk, HAND_L, feature(Uid(0x30), "ik", "IK arm", "soft"));
@@ -634,7 +634,7 @@ fn random_operations_do_something() {
 #[test]
 fn notes_reach_those_who_asked_and_kinds_are_a_resource() {
     let mut app = rigsmith::test_app::test_app();
-    let rig = app.world_mut().spawn(RigBundle { rig: body(), ..Default::default() }).id();
+    let rig = app.world_mut().spawn(body()).id();
     app.world_mut().resource_mut::<FeatureKinds>().register(FeatureKind::new("wing", "Wing", "Feathers."));
     let clipboard = Arc::new(copy(&body(), TagScope::Joints(vec![ARM_L, HAND_L]), false));
     let to = PasteTo::Joints(vec![HIPS]);

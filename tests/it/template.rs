@@ -324,7 +324,12 @@ fn parameters_keep_their_text_but_not_what_is_around_it() {
 #[test]
 fn weights_are_not_part_of_a_template() {
     let mut rig = frozen();
-    let skin = rigsmith::rig::SkinData { joints: vec![Uid(1)], weights: Weights::default(), at_rest: true };
+    let skin = rigsmith::rig::SkinData {
+        joints: vec![Uid(1)],
+        weights: Weights::default(),
+        at_rest: true,
+        ..Default::default()
+    };
     rig.apply(&RigEdit::SetSkin(Uid(5), Some(skin.into()))).unwrap();
     assert_eq!(write_template(&rig), FROZEN);
 }

@@ -25,6 +25,8 @@ use rigsmith::{
     },
 };
 
+use crate::{bench::wait, prerequisites::test_data};
+
 /// A part of a body that has joints of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Limb {
@@ -127,16 +129,14 @@ fn bundled() -> Body {
 
 /// Every body of the test data, by name.
 fn bodies() -> Vec<Body> {
-    let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
-        println!("skipped: RIGSMITH_DATA is not set");
-        return Vec::new();
-    };
-    let mut folders: Vec<PathBuf> = std::fs::read_dir(Path::new(&data).join("bodies"))
+    let Some(data) = test_data() else { return Vec::new() };
+    let mut folders: Vec<PathBuf> = std::fs::read_dir(data.join("bodies"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.join("joints.json").exists())
         .collect();
     folders.sort();
+    assert!(folders.len() >= 7, "{folders:?}");
     let read = |folder: &PathBuf| {
         let text = std::fs::read_to_string(folder.join("joints.json")).unwrap();
         let all: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -229,14 +229,9 @@ impl Bench {
         let rig = bench.rig_entity();
         let plane = MirrorPlane::sagittal(high.y - low.y);
         bench.app_mut().world_mut().get_mut::<Symmetry>(rig).unwrap().0 = Some(plane);
-        for _ in 0..2000 {
-            bench.app_mut().update();
-            let surface = bench.app_mut().world().get::<rigsmith::prelude::RigSurface>(rig);
-            if surface.is_some_and(|surface| surface.ready().is_some()) {
-                break;
-            }
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        }
+        wait(bench.app_mut(), "the surface", App::update, |app| {
+            app.world().get::<rigsmith::prelude::RigSurface>(rig).is_some_and(|surface| surface.ready().is_some())
+        });
         Self { bench, surface, bounds: [low, high] }
     }
 

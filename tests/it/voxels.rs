@@ -311,12 +311,10 @@ fn the_same_for_any_number_of_threads() {
 
 #[test]
 fn bodies_are_bound_well_even_with_a_third_of_faces_missing() {
-    let Ok(data) = std::env::var("RIGSMITH_DATA") else {
-        println!("skipped: RIGSMITH_DATA is not set");
-        return;
-    };
+    let Some(data) = crate::prerequisites::test_data() else { return };
+    let bodies = data.join("bodies");
     let json = |path: &str| -> serde_json::Value {
-        serde_json::from_str(&std::fs::read_to_string(format!("{data}/bodies/{path}")).unwrap()).unwrap()
+        serde_json::from_str(&std::fs::read_to_string(bodies.join(path)).unwrap()).unwrap()
     };
     let vector = |v: &serde_json::Value| Vec3::from_array([0, 1, 2].map(|i| v[i].as_f64().unwrap() as f32));
     // Bone heat of Blender has 0.233 and 0.159 on this body.
@@ -325,7 +323,7 @@ fn bodies_are_bound_well_even_with_a_third_of_faces_missing() {
         let joints = json("male_young/joints.json");
         let mut points = Vec::new();
         let mut quads: Vec<Vec<u32>> = Vec::new();
-        for line in std::fs::read_to_string(format!("{data}/bodies/male_young/body.obj")).unwrap().lines() {
+        for line in std::fs::read_to_string(bodies.join("male_young/body.obj")).unwrap().lines() {
             let mut words = line.split_whitespace();
             match words.next() {
                 Some("v") => points.push(Vec3::from_array([0; 3].map(|_: i32| words.next().unwrap().parse().unwrap()))),
@@ -355,7 +353,7 @@ fn bodies_are_bound_well_even_with_a_third_of_faces_missing() {
             })
             .cloned()
             .collect();
-        for (name, quads, most) in [("whole", quads, most), ("torn", torn, most * 1.05)] {
+        for (name, quads, most) in [("whole", quads, most), ("torn", torn, most * 1.04)] {
             let triangles: Vec<[u32; 3]> =
                 quads.iter().flat_map(|f| (2..f.len()).map(|i| [f[0], f[i - 1], f[i]])).collect();
             let weights =

@@ -3,12 +3,12 @@
 use glam::Vec3;
 use proptest::prelude::*;
 use rigsmith::{
-    algo::weights::{Locks, Method, WeightError, WeightJoint, WeightReport, WeightSettings, skin_weights},
+    algo::weights::{Locks, Method, TwistBone, WeightError, WeightJoint, WeightReport, WeightSettings, skin_weights},
     mesh::model::Weights,
 };
 
 fn joint(head: [f32; 3], parent: Option<usize>) -> WeightJoint {
-    WeightJoint { head: head.into(), parent, tail: None, deforms: true }
+    WeightJoint { head: head.into(), parent, tail: None, deforms: true, twist: None }
 }
 
 /// A tube along x from 0 to 4 with four sides and a cap at either end.
@@ -208,6 +208,70 @@ fn joints_that_do_not_deform_pass_their_flesh_up() {
     check_sound(&weights, points.len(), &joints, 8);
 }
 
+/// The tube's joints, and a twist joint at each of some shares of the first bone.
+fn twisted(shares: &[f32]) -> Vec<WeightJoint> {
+    let mut joints = tube_joints();
+    let (start, end) = (joints[0].head, joints[1].head);
+    for share in shares {
+        let twist = Some(TwistBone { joint: 0, end });
+        joints.push(WeightJoint { head: start.lerp(end, *share), parent: Some(0), tail: None, deforms: true, twist });
+    }
+    joints
+}
+
+#[test]
+fn twist_joints_share_their_bone_linearly_and_nothing_else() {
+    let (points, triangles) = tube();
+    let (plain, _) = bind(&points, &triangles, &tube_joints());
+    // Without a twist joint at its start the bone's own joint stands there, else at its end.
+    let tables: [(&[f32], &[(f32, u32)]); 3] = [
+        (&[0.25, 0.5, 0.75], &[(0.0, 0), (0.25, 3), (0.5, 4), (0.75, 5), (1.0, 5)]),
+        (&[0.0, 0.25, 0.5, 0.75], &[(0.0, 3), (0.25, 4), (0.5, 5), (0.75, 6), (1.0, 0)]),
+        (&[0.5], &[(0.0, 0), (0.5, 3), (1.0, 3)]),
+    ];
+    for (shares, stations) in tables {
+        let joints = twisted(shares);
+        let (weights, _) = bind(&points, &triangles, &joints);
+        check_sound(&weights, points.len(), &joints, 8);
+        for (point, place) in points.iter().enumerate() {
+            let held: f32 =
+                (0..joints.len() as u32).filter(|j| *j != 1 && *j != 2).map(|j| weight(&weights, point, j)).sum();
+            assert!((held - weight(&plain, point, 0)).abs() < 0.01, "{shares:?}: other bones hold what they held");
+            let at = ((place.x - 0.1) / 1.9).clamp(0.0, 1.0);
+            let next = stations.iter().position(|station| station.0 >= at).unwrap().max(1);
+            let ((from, before), (to, after)) = (stations[next - 1], stations[next]);
+            let share = (at - from) / (to - from);
+            let wanted = |joint: u32| {
+                let of = |station: u32, share: f32| if station == joint { share } else { 0.0 };
+                held * (of(before, 1.0 - share) + of(after, share))
+            };
+            for joint in [0, 3, 4, 5, 6].into_iter().filter(|joint| (*joint as usize) < joints.len()) {
+                let (is, wanted) = (weight(&weights, point, joint), wanted(joint));
+                assert!((is - wanted).abs() < 0.01, "{shares:?}: joint {joint} has {is} at {at}, not {wanted}");
+            }
+        }
+    }
+}
+
+#[test]
+fn locked_twist_joints_leave_the_bone_to_the_others() {
+    let (points, triangles) = tube();
+    let joints = twisted(&[0.5]);
+    let mut present = Weights::default();
+    (0..points.len()).for_each(|_| present.push([(1, 1.0)]));
+    for locked in [0, 3] {
+        let mut flags = [false; 4];
+        flags[locked] = true;
+        let locks = Locks { weights: &present, joints: &flags };
+        let (weights, _) =
+            skin_weights(&points, &triangles, &joints, &[], Some(locks), &WeightSettings::default(), &|_| true)
+                .unwrap();
+        check_sound(&weights, points.len(), &joints, 8);
+        assert!((0..points.len()).all(|p| weight(&weights, p, locked as u32) == 0.0));
+        assert!(weight(&weights, 0, 3 - locked as u32) > 0.9);
+    }
+}
+
 #[test]
 fn one_joint_takes_all() {
     let (points, triangles) = tube();
@@ -279,6 +343,10 @@ fn bad_input_is_named() {
         let joints = parents.map(|parent| joint([0.0; 3], parent));
         assert!(matches!(bind(&points, &triangles, &joints), Err(WeightError::Parent { .. })), "{parents:?}");
     }
+    let twist = |joint: usize, end| WeightJoint { twist: Some(TwistBone { joint, end }), ..joints[2] };
+    for broken in [twist(9, Vec3::X), twist(2, Vec3::X), twist(0, Vec3::NAN)] {
+        assert_eq!(bind(&points, &triangles, &[joints[0], joints[1], broken]), Err(WeightError::Twist { joint: 2 }));
+    }
     let rigid = skin_weights(&points, &triangles, &joints, &[(0..9999, 0)], None, &settings, &|_| true);
     assert_eq!(rigid.map(|_| ()), Err(WeightError::Rigid { part: 0 }));
     let locks = Locks { weights: &Weights::default(), joints: &[true] };
@@ -314,6 +382,21 @@ fn odd_input_gives_weights() {
     }
     let far: Vec<WeightJoint> = joints.iter().map(|&j| WeightJoint { head: j.head + Vec3::splat(1e30), ..j }).collect();
     check_sound(&bind(&points, &triangles, &far).0, points.len(), &far, 8);
+}
+
+#[test]
+fn many_triangles_at_one_place_fit_the_stack_of_a_thread() {
+    let fan: Vec<Vec3> =
+        (0..25_002).map(|i| if i == 0 { Vec3::ZERO } else { Vec3::new(1.0, i as f32 * 4e-5, 0.0) }).collect();
+    let blades: Vec<[u32; 3]> = (1..25_001).map(|i| [0, i, i + 1]).collect();
+    let joints = [joint([0.0, 0.0, 0.0], None), joint([0.5, 0.2, 0.0], Some(0)), joint([1.0, 0.5, 0.0], Some(1))];
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).stack_size(1 << 20).build().unwrap();
+    pool.install(|| {
+        let (weights, _) = bind(&fan, &blades, &joints);
+        check_sound(&weights, fan.len(), &joints, 8);
+        let (weights, _) = bind(&[Vec3::ZERO, Vec3::X, Vec3::Y], &[[0, 1, 2]; 22_000], &joints);
+        check_sound(&weights, 3, &joints, 8);
+    });
 }
 
 #[test]
@@ -363,19 +446,20 @@ fn threads_do_not_change_a_bit() {
 
 #[test]
 fn bodies_are_bound_better_than_by_plain_bone_heat() {
-    let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
-        println!("skipped: RIGSMITH_DATA is not set");
-        return;
-    };
-    let bodies = std::path::Path::new(&data).join("bodies");
+    let Some(data) = crate::prerequisites::test_data() else { return };
+    let bodies = data.join("bodies");
     let json = |path: &std::path::Path| -> serde_json::Value {
         serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
     };
-    for (body, rig, limit) in [
-        ("male_young", "game_engine", 0.95 * 0.233),
-        ("male_young", "mixamo", 1.05 * 0.159),
-        ("baby", "game_engine", 0.196),
+    // Errors as measured; a tenth more is the most. Blender's bone heat has 0.233 and 0.159 on the first body.
+    for (body, rig, measured) in [
+        ("male_young", "game_engine", 0.137),
+        ("male_young", "mixamo", 0.135),
+        ("female_young", "game_engine", 0.143),
+        ("baby", "game_engine", 0.128),
+        ("baby", "mixamo", 0.171),
     ] {
+        let limit = 1.1 * measured;
         let text = std::fs::read_to_string(bodies.join(body).join("body.obj")).unwrap();
         let mut points = Vec::new();
         let mut triangles = Vec::new();
@@ -414,6 +498,7 @@ fn bodies_are_bound_better_than_by_plain_bone_heat() {
             error += difference.iter().map(|d| d.abs()).sum::<f64>() / 2.0;
         }
         error /= points.len() as f64;
+        println!("{body} with {rig}: error {error:.4}");
         assert!(error <= limit, "{body} with {rig}: error {error:.4}, limit {limit:.4}");
     }
 }
@@ -426,7 +511,7 @@ proptest! {
     fn junk_is_weighted_soundly(
         points in prop::collection::vec(prop::array::uniform3(-4i8..5), 0..60),
         corners in prop::collection::vec(prop::array::uniform3(0usize..1000), 0..120),
-        heads in prop::collection::vec((prop::array::uniform3(-5i8..6), 0usize..100, prop::bool::weighted(0.8), prop::bool::weighted(0.2)), 1..12),
+        heads in prop::collection::vec((prop::array::uniform3(-5i8..6), 0usize..100, prop::bool::weighted(0.8), prop::bool::weighted(0.2), prop::bool::weighted(0.3)), 1..12),
         method in prop::sample::select(vec![Method::Auto, Method::Heat, Method::Voxel]),
         most in 1usize..6,
         exponent in -6i32..7,
@@ -439,11 +524,12 @@ proptest! {
         let joints: Vec<WeightJoint> = heads
             .iter()
             .enumerate()
-            .map(|(i, (head, parent, deforms, tail))| WeightJoint {
+            .map(|(i, (head, parent, deforms, tail, twist))| WeightJoint {
                 head: place(head),
                 parent: (i > 0 && parent % 7 != 0).then(|| parent % i),
                 tail: tail.then(|| place(head) + Vec3::X * scale),
                 deforms: *deforms,
+                twist: (i > 0 && *twist).then(|| TwistBone { joint: 0, end: place(head) + Vec3::Y * scale }),
             })
             .collect();
         let settings = WeightSettings { max_influences: most, method, voxel_resolution: 16, ..WeightSettings::default() };

@@ -12,6 +12,8 @@ use std::{
 
 use rigsmith::{editor::report::WindowReport, files::FileKind, render::adapter};
 
+use crate::prerequisites::{data_folder, skip};
+
 /// A display of its own, gone with the test.
 struct Display {
     server: Child,
@@ -232,8 +234,7 @@ fn missing() -> Option<&'static str> {
 
 /// A mesh and the places of joints that strokes are drawn along: pelvis, head, shoulder, elbow, hand, hip, knee, ankle.
 fn subject(folder: &Path) -> (PathBuf, [[f32; 3]; 8]) {
-    let data = std::env::var_os("RIGSMITH_DATA").map(|data| Path::new(&data).join("bodies/female_young"));
-    if let Some(body) = data.filter(|body| body.join("joints.json").exists()) {
+    if let Some(body) = data_folder().map(|data| data.join("bodies/female_young")) {
         let text = std::fs::read_to_string(body.join("joints.json")).unwrap();
         let all: serde_json::Value = serde_json::from_str(&text).unwrap();
         let at = |name: &str| [0, 1, 2].map(|i| all["game_engine"][name]["head"][i].as_f64().unwrap() as f32);
@@ -242,7 +243,6 @@ fn subject(folder: &Path) -> (PathBuf, [[f32; 3]; 8]) {
         std::fs::copy(body.join("body.obj"), &copy).unwrap();
         return (copy, names.map(at));
     }
-    println!("RIGSMITH_DATA is not set: the bundled character stands in for the body");
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models");
     let text = std::fs::read_to_string(root.join("biped.rig")).unwrap();
     let at = |name: &str| {
@@ -270,9 +270,7 @@ fn pixel(report: &WindowReport, place: [f32; 3]) -> [f32; 2] {
 #[test]
 fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
     if let Some(reason) = missing() {
-        let required = std::env::var("RIGSMITH_REQUIRE_GPU").is_ok_and(|value| value == "1");
-        assert!(!required, "RIGSMITH_REQUIRE_GPU=1, but {reason}");
-        println!("skipped: {reason}");
+        skip(reason, "RIGSMITH_REQUIRE_GPU");
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -1,8 +1,8 @@
-//! A face from a mesh alone: the whole way from points to bones and weights.
+//! Automatic face rigging: bones and weights from a mesh alone.
 //!
-//! [`FaceAnalysis`] is what depends on the mesh only (which way it looks, where the head is, landmarks, groups, head
-//! and neck bones); [`FaceAnalysis::rig`] is what depends on the density as well (facial bones and weights). Keep the
-//! analysis, and another density costs only the second half.
+//! [`FaceAnalysis`] holds the results that depend on the mesh only (axes, head part, landmarks, groups, head and neck
+//! bones); [`FaceAnalysis::rig`] computes those that depend on the density as well (facial bones and weights). With a
+//! kept analysis another density costs only the second half.
 
 mod refit;
 
@@ -11,7 +11,7 @@ use glam::{Quat, Vec3};
 use super::{
     axes::{AxesError, HeadAxes, guess_axes},
     bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, place_bones},
-    expression::{ExpressionSet, FittedFace, count_folds, mend_folds},
+    expression::{ExpressionSet, FittedFace, count_folds, repair_folds},
     grouping::{GroupingError, HeadGroups, group_head},
     head_bones::{HeadBones, HeadBonesError, head_bones},
     head_part::{HeadPartError, head_part},
@@ -21,28 +21,28 @@ use super::{
 };
 use crate::{algo::fit::FitError, mesh::model::Weights};
 
-pub use refit::Refitted;
+pub use refit::FaceFit;
 
-/// How a face is rigged.
+/// Settings of automatic face rigging.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AutoSettings {
-    /// Bones of the skin: the density.
+    /// Number of bones on the skin: the density.
     pub bones: usize,
-    /// What the first centroids are drawn with.
+    /// Seed of the first centroids.
     pub seed: u64,
-    /// How many sets of first centroids are tried; the one with the least square error is kept.
+    /// Number of random starts of the clustering; the one with the least square error is kept.
     pub starts: usize,
-    /// True for pairs of bones on both sides.
+    /// Places bones in mirrored pairs if `true`.
     pub symmetric: bool,
-    /// True for bones of jaw and eyes besides, where the mesh has them.
+    /// Adds bones of jaw and eyes, where the mesh has them, if `true`.
     pub extras: bool,
-    /// Up in the mesh's space; guessed if `None`.
+    /// Up direction in the mesh's space; guessed if `None`.
     pub up: Option<Vec3>,
-    /// Where the face looks in the mesh's space; guessed if `None`.
+    /// View direction of the face in the mesh's space; guessed if `None`.
     pub forward: Option<Vec3>,
-    /// True to take the whole mesh for a head, even if it looks like a body.
+    /// Takes the whole mesh for a head if `true`, even if it looks like a body.
     pub whole: bool,
-    /// Into how many groups the depths are cut before front groups are joined; found from the mesh if `None`.
+    /// Number of groups at which the depths are cut before front groups are joined; found from the mesh if `None`.
     pub groups: Option<usize>,
 }
 
@@ -63,35 +63,35 @@ impl Default for AutoSettings {
 }
 
 impl AutoSettings {
-    /// True if an analysis for `other` serves these settings, too.
+    /// Returns `true` if an analysis for `other` serves these settings, too.
     pub fn same_head(&self, other: &Self) -> bool {
         (self.up, self.forward, self.whole, self.groups) == (other.up, other.forward, other.whole, other.groups)
     }
 }
 
-/// The steps, in their order.
+/// Steps of face rigging, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaceStep {
-    /// Finding which way the head looks, and the head of a body.
+    /// Search for the head's axes, and for the head of a body.
     Axes,
-    /// Finding landmarks.
+    /// Search for landmarks.
     Landmarks,
-    /// Grouping in depth, and the middle in height.
+    /// Grouping in depth, and of the middle group in height.
     Grouping,
-    /// Head and neck bones.
+    /// Placement of head and neck bones.
     HeadBones,
-    /// Facial bones.
+    /// Placement of facial bones.
     Bones,
-    /// Weights.
+    /// Computation of weights.
     Weights,
-    /// Trying the six expressions, and smoothing weights where they fold skin.
+    /// Test of the six expressions; weights are smoothed where they fold skin.
     Expressions,
-    /// Moving bones to fit shapes.
+    /// Fit of the bones to shapes.
     Fit,
 }
 
 impl FaceStep {
-    /// A word for people and programs.
+    /// Name of the step for people and programs.
     pub fn name(self) -> &'static str {
         match self {
             Self::Axes => "axes",
@@ -105,7 +105,7 @@ impl FaceStep {
         }
     }
 
-    /// Where the step begins and ends on the way from 0 to 1.
+    /// Start and end of the step in the whole progress from 0 to 1.
     fn share(self) -> (f32, f32) {
         match self {
             Self::Axes => (0.0, 0.1),
@@ -120,95 +120,96 @@ impl FaceStep {
     }
 }
 
-/// Told which step runs and how much of everything is done, 0 to 1; stops the work with `false`.
+/// Progress callback, called with the current step and the finished share, 0 to 1; it cancels the work by returning
+/// `false`.
 pub type FaceProgress<'a> = &'a (dyn Fn(FaceStep, f32) -> bool + Sync);
 
-/// Why there is no face.
+/// Error of face rigging.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaceError {
-    /// Nothing to work on.
+    /// No points or triangles.
     #[error("the mesh has no points or no triangles: open a head")]
     Empty,
-    /// A point that is not a number.
+    /// Index of a point that is not finite.
     #[error("point {0} of the mesh is not finite: repair the mesh")]
     NotFinite(usize),
-    /// A corner that does not exist.
+    /// Index of a triangle with a corner that does not exist.
     #[error("triangle {0} has a corner past the last point: the mesh is damaged")]
     Triangle(usize),
-    /// No bones were asked for.
+    /// A request for zero bones.
     #[error("0 bones make no face: ask for at least 1")]
     NoBones,
-    /// It was cancelled.
+    /// Cancelled by the progress callback.
     #[error("placing the face was cancelled")]
     Cancelled,
-    /// Which way the head looks.
+    /// Error of the search for axes.
     #[error(transparent)]
     Axes(AxesError),
-    /// Where the head is.
+    /// Error of the search for the head part.
     #[error(transparent)]
     Part(HeadPartError),
-    /// Landmarks.
+    /// Error of the search for landmarks.
     #[error(transparent)]
     Landmarks(LandmarkError),
-    /// Grouping.
+    /// Error of the grouping.
     #[error(transparent)]
     Grouping(GroupingError),
-    /// Head and neck.
+    /// Error of placing head and neck bones.
     #[error(transparent)]
     HeadBones(HeadBonesError),
-    /// Facial bones.
+    /// Error of placing facial bones.
     #[error(transparent)]
     Bones(FaceBonesError),
-    /// Weights.
+    /// Error of computing weights.
     #[error(transparent)]
     Weights(FaceWeightsError),
-    /// Shapes that cannot be fitted.
+    /// Error of fitting shapes.
     #[error(transparent)]
     Fit(FitError),
 }
 
-/// What a mesh says about its face, whatever the density.
+/// Results of a mesh's analysis that do not depend on the density of bones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaceAnalysis {
-    /// Which way the head looks, in the mesh's space.
+    /// Axes of the head in the mesh's space.
     pub axes: HeadAxes,
-    /// False if that is a weak guess that a person should confirm.
+    /// Certainty of the axes: `false` for a weak guess that a person should confirm.
     pub certain: bool,
-    /// The mesh's points that the head consists of, where the mesh is more than a head.
+    /// Indices of the mesh's points that belong to the head; `None` if the whole mesh is a head.
     pub part: Option<Vec<u32>>,
-    /// Points of the whole mesh.
+    /// Number of points of the whole mesh.
     pub mesh_points: usize,
     /// Points of the head in head space.
     pub points: Vec<Vec3>,
-    /// Triangles over them.
+    /// Triangles over `points`.
     pub triangles: Vec<[u32; 3]>,
-    /// Skin, eyes and the rest.
+    /// Connected parts of the head: skin, eyes and the rest.
     pub shells: Shells,
-    /// Where features are.
+    /// Landmarks of the face, in head space.
     pub landmarks: Landmarks,
-    /// Face, middle and back.
+    /// Groups of the points: face, middle and back.
     pub groups: HeadGroups,
-    /// Head and neck.
+    /// Head and neck bones, in head space.
     pub head_bones: HeadBones,
 }
 
 /// Facial bones and the weights of all points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AutoFace {
-    /// The bones.
+    /// Facial bones, in head space.
     pub bones: Vec<FaceBone>,
     /// Weights of the points of the *analysis* over neck (0), head (1) and the bones (from 2).
     pub weights: Weights,
     /// Sum of squared distances of the mask's points to their bone, in the mesh's unit squared.
     pub square_error: f64,
-    /// Rounds until no point changed its group.
+    /// Rounds of the clustering until no point changed its group.
     pub rounds: usize,
-    /// Triangles that the six expressions fold over; usually none.
+    /// Number of triangles that the six expressions fold over; usually none.
     pub folds: usize,
 }
 
 impl FaceAnalysis {
-    /// Looks at a mesh.
+    /// Analyses a mesh.
     ///
     /// `points` and `triangles` are in the mesh's space and any unit. Tens of milliseconds for 11,000 points.
     ///
@@ -261,8 +262,8 @@ impl FaceAnalysis {
 
     /// Places facial bones and binds the head to them.
     ///
-    /// `fixed` bones (head space) stay where they are and count among [`AutoSettings::bones`]. Where the six expressions
-    /// would fold skin over, other seeds are tried and the one that folds least is kept.
+    /// `fixed` bones (head space) stay where they are and count among [`AutoSettings::bones`]. If the six expressions
+    /// fold skin over, other seeds are tried, and the result with the fewest folds is kept.
     ///
     /// # Errors
     /// [`FaceError`]: no bones, more than the mask has points, or cancelled.
@@ -330,20 +331,20 @@ impl FaceAnalysis {
         };
         begin(progress, FaceStep::Expressions)?;
         let mask = &groups.mask;
-        let left = mend_folds(expressions, points, triangles, mask, &mut face.weights, &face.bones, landmarks);
+        let left = repair_folds(expressions, points, triangles, mask, &mut face.weights, &face.bones, landmarks);
         if left > 0 {
-            // What the weights still fold the solver may yet avoid.
+            // The expression solver may still avoid folds that the weights allow.
             face.folds = count_folds(expressions, points, triangles, mask, &face.weights, &face.bones, landmarks);
         }
         Ok(face)
     }
 
-    /// The head with given bones and weights, ready to show expressions.
+    /// The head with the given bones and weights, prepared for expressions.
     pub fn fitted<'a>(&'a self, bones: &'a [FaceBone], weights: &'a Weights) -> FittedFace<'a> {
         FittedFace::new(&self.points, &self.triangles, &self.groups.mask, weights, bones, &self.landmarks)
     }
 
-    /// A rotation from head space to the mesh's space.
+    /// Rotation from head space to the mesh's space.
     pub fn to_mesh(&self) -> Quat {
         self.axes.rotation().inverse()
     }
@@ -360,7 +361,7 @@ impl FaceAnalysis {
         of(&mut grown.into_iter().map(|corner| to_mesh * corner))
     }
 
-    /// The number in the mesh of a point of the analysis.
+    /// Index in the mesh of a point of the analysis.
     pub fn mesh_point(&self, point: usize) -> usize {
         match &self.part {
             Some(part) => part.get(point).map_or(point, |point| *point as usize),
@@ -369,7 +370,7 @@ impl FaceAnalysis {
     }
 }
 
-/// Seeds that are tried where expressions fold skin over.
+/// Number of seeds tried where expressions fold skin over.
 const SEEDS: u64 = 4;
 
 fn check(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), FaceError> {
@@ -387,7 +388,7 @@ fn begin(progress: FaceProgress, step: FaceStep) -> Result<(), FaceError> {
     if progress(step, step.share().0) { Ok(()) } else { Err(FaceError::Cancelled) }
 }
 
-/// The progress of one step as a part of the whole.
+/// Progress of one step, mapped to its part of the whole.
 fn within(progress: FaceProgress<'_>, step: FaceStep) -> impl Fn(f32) -> bool + Sync + '_ {
     move |part| {
         let (from, to) = step.share();
@@ -395,7 +396,7 @@ fn within(progress: FaceProgress<'_>, step: FaceStep) -> impl Fn(f32) -> bool + 
     }
 }
 
-/// The error, or that the work was cancelled if that is why there is one.
+/// Maps an error of a step that was cancelled to [`FaceError::Cancelled`].
 fn cancelled(progress: FaceProgress, error: FaceError) -> FaceError {
     let stopped = !progress(FaceStep::Weights, FaceStep::Weights.share().0);
     if stopped { FaceError::Cancelled } else { error }
@@ -405,7 +406,7 @@ fn turned(points: &[Vec3], turn: Quat) -> Vec<Vec3> {
     if turn == Quat::IDENTITY { points.to_vec() } else { points.iter().map(|point| turn * *point).collect() }
 }
 
-/// The points of the part: those of triangles whose corners all are.
+/// Indices of the part's points that belong to triangles with all corners in the part.
 fn kept(part: &[bool], triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut used = vec![false; part.len()];
     for triangle in triangles {

@@ -1,8 +1,8 @@
-//! Axes: which way a head looks and where its crown is.
+//! Axes: the view direction of a head and the direction of its crown.
 //!
-//! Width is the direction across the plane that mirrors the head best. What is up and what is forward is then one of
-//! four, and the shape has to say: faces are rough, with eyes, nose and mouth, where the back of a head and its crown are
-//! smooth; the neck is where an open mesh ends; and eyeballs lie in front.
+//! Width is the direction across the plane that mirrors the head best. Up and forward are then one of four pairs of
+//! directions, chosen by the shape: faces are rough, with eyes, nose and mouth, where the back of a head and its crown
+//! are smooth; an open mesh ends at the neck; and eyeballs lie in front.
 
 use glam::{Mat3, Quat, Vec3};
 use thiserror::Error;
@@ -15,12 +15,12 @@ use super::{
 
 mod mirror;
 
-/// How a head stands in the space of its mesh: unit vectors at right angles.
+/// Orientation of a head in the space of its mesh: unit vectors at right angles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadAxes {
     /// Towards the crown.
     pub up: Vec3,
-    /// Where the face looks.
+    /// View direction of the face.
     pub forward: Vec3,
 }
 
@@ -35,43 +35,44 @@ impl HeadAxes {
     }
 }
 
-/// Axes, and whether the shape says so clearly.
+/// Guessed axes, and whether the shape supports them clearly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxesGuess {
     /// The axes.
     pub axes: HeadAxes,
-    /// False if a person should confirm them.
+    /// Certainty: `false` if a person should confirm the axes.
     pub certain: bool,
 }
 
-/// Why there are no axes.
+/// Error of guessing axes.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum AxesError {
-    /// Nothing to look at.
+    /// No points or triangles.
     #[error("the mesh has no points or no triangles; pick a mesh with a surface")]
     Empty,
-    /// A coordinate is infinite or not a number.
+    /// A coordinate that is not finite.
     #[error("point {point} has a coordinate that is not a finite number; remove it or repair the mesh")]
     NotFinite {
-        /// Its index.
+        /// Index of the point.
         point: usize,
     },
-    /// A given direction is none.
+    /// A given direction without length.
     #[error("the given direction of up or forward has no length; name an axis such as +y")]
     NoDirection,
-    /// Up and forward given along one line.
+    /// Up and forward directions along one line.
     #[error("up and forward are along one line; they have to be at right angles, such as +y and +z")]
     Parallel,
 }
 
-/// Guesses how a head stands among the 24 ways along the axes of its space, and honours what is given.
+/// Guesses the orientation of a head among the 24 orientations along the axes of its space, and respects given
+/// directions.
 ///
 /// `points` are in the mesh's space and any unit. A given `up` is kept; a given `forward` is made to be at right angles
-/// to `up`, or kept where only it is given. Where the shape says nothing, +y is up and +z forward, and the guess is not
+/// to `up`, or kept where only it is given. For a shape without features, +y is up and +z forward, and the guess is not
 /// certain.
 ///
 /// # Errors
-/// [`AxesError`]: nothing to look at, coordinates that are not finite, directions without length or along one line.
+/// [`AxesError`]: no points or triangles, coordinates that are not finite, directions without length or along one line.
 /// Linear time, a few milliseconds for 10,000 points.
 pub fn guess_axes(
     points: &[Vec3],
@@ -97,28 +98,28 @@ pub fn guess_axes(
         }
         return Ok(AxesGuess { axes: HeadAxes { up, forward: forward.normalize() }, certain: true });
     }
-    // In the frame of what is given: its direction becomes an axis.
+    // The search runs in a frame in which a given direction is an axis.
     let frame = match (up, forward) {
         (Some(up), _) => Quat::from_rotation_arc(up, Vec3::Y),
         (_, Some(forward)) => Quat::from_rotation_arc(forward, Vec3::Z),
         _ => Quat::IDENTITY,
     };
     let turned: Vec<Vec3> = points.iter().map(|point| frame * *point).collect();
-    let signs = Signs::new(&turned, triangles);
+    let evidence = Evidence::new(&turned, triangles);
     let possible = ways().filter(|(u, f)| up.is_none_or(|_| *u == Vec3::Y) && forward.is_none_or(|_| *f == Vec3::Z));
-    let mut scored: Vec<(f32, Vec3, Vec3)> = possible.map(|(u, f)| (signs.score(u, f), u, f)).collect();
-    // The usual way comes first and wins ties, since sorting keeps the order of equals.
+    let mut scored: Vec<(f32, Vec3, Vec3)> = possible.map(|(u, f)| (evidence.score(u, f), u, f)).collect();
+    // The usual orientation comes first and wins ties, since sorting is stable.
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let (best, u, f) = scored.first().copied().unwrap_or((0.0, Vec3::Y, Vec3::Z));
     let margin = best - scored.get(1).map_or(f32::MIN, |next| next.0);
-    let certain = signs.symmetric && margin >= CLEAR;
-    // A weak lead says nothing against what nearly all files do, and little against how beasts carry their heads.
+    let certain = evidence.symmetric && margin >= CLEAR;
+    // A weak lead is not enough against the usual orientation of files, nor against the carriage of a quadruped's head.
     let (u, f) = if certain {
         (u, f)
     } else if forward.is_none()
-        && let Some(looks) = beast(&turned, triangles, &signs)
+        && let Some(forward) = quadruped_forward(&turned, triangles, &evidence)
     {
-        (Vec3::Y, looks)
+        (Vec3::Y, forward)
     } else {
         scored.iter().map(|way| (way.1, way.2)).fold((u, f), usual)
     };
@@ -127,55 +128,55 @@ pub fn guess_axes(
     Ok(AxesGuess { axes, certain })
 }
 
-/// The usual way, if it is among those possible.
+/// The usual orientation, if it is among those possible.
 fn usual(best: (Vec3, Vec3), way: (Vec3, Vec3)) -> (Vec3, Vec3) {
     if way == (Vec3::Y, Vec3::Z) { way } else { best }
 }
 
-/// Where a beast on four legs looks, if it is one with +y up.
-fn beast(points: &[Vec3], triangles: &[[u32; 3]], signs: &Signs) -> Option<Vec3> {
-    // Along x only where that is clearly not its width.
-    let along = if signs.skew.x > 2.0 * signs.skew.z + 0.05 { Vec3::X } else { Vec3::Z };
+/// View direction of a quadruped with +y up; `None` if the mesh is not one.
+fn quadruped_forward(points: &[Vec3], triangles: &[[u32; 3]], evidence: &Evidence) -> Option<Vec3> {
+    // The length runs along x only if x is clearly not the width.
+    let along = if evidence.skew.x > 2.0 * evidence.skew.z + 0.05 { Vec3::X } else { Vec3::Z };
     let turned: Vec<Vec3> = match along == Vec3::X {
         true => points.iter().map(|point| Vec3::new(-point.z, point.y, point.x)).collect(),
         false => points.to_vec(),
     };
     let higher = snout::carriage(&Body::new(&turned, triangles))?;
-    let says = higher + ROUGH * signs.rough.dot(along);
+    let says = higher + ROUGH * evidence.rough.dot(along);
     Some(if says < -FACES { -along } else { along })
 }
 
-/// How much a beast's detail says beside how it carries its head.
+/// Factor of the roughness beside the carriage of a quadruped's head.
 const ROUGH: f32 = 1.0;
-/// A beast looks the unusual way only if this much says so.
+/// Least score for the unusual view direction of a quadruped.
 const FACES: f32 = 0.05;
 
-/// A lead in score from which a guess is certain.
+/// Lead in score from which a guess is certain.
 const CLEAR: f32 = 0.25;
 
-/// The 24 ways to stand, the usual one first.
+/// The 24 orientations as up and forward, the usual one first.
 fn ways() -> impl Iterator<Item = (Vec3, Vec3)> {
     const AXES: [Vec3; 6] = [Vec3::Y, Vec3::Z, Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z, Vec3::NEG_X];
     const FORWARD: [Vec3; 6] = [Vec3::Z, Vec3::Y, Vec3::X, Vec3::NEG_Z, Vec3::NEG_Y, Vec3::NEG_X];
     AXES.into_iter().flat_map(|up| FORWARD.into_iter().filter(move |f| f.dot(up) == 0.0).map(move |f| (up, f)))
 }
 
-/// What the shape says of directions.
-struct Signs {
-    /// How much each axis is unlike width: 0 for a perfect mirror, 1 for none.
+/// Evidence of the shape for directions.
+struct Evidence {
+    /// Asymmetry along each axis: 0 for a perfect mirror, 1 for none.
     skew: Vec3,
     symmetric: bool,
-    /// From the open end to the middle; towards the crown. Length up to 1.
+    /// Direction from the open end to the middle, which points to the crown. Length up to 1.
     crown: Vec3,
-    /// From the middle to where the surface is rough.
+    /// Direction from the middle to the rough part of the surface.
     rough: Vec3,
-    /// From the middle to the eyes.
+    /// Direction from the middle to the eyes.
     eyes: Option<Vec3>,
     /// Third moment along each axis by extent: noses and snouts reach far.
     reach: Vec3,
 }
 
-impl Signs {
+impl Evidence {
     fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let (low, high) = points.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
         let half = ((high - low) * 0.5).max(Vec3::splat(f32::MIN_POSITIVE));
@@ -193,7 +194,7 @@ impl Signs {
         }
         let center = surface / area.max(f32::MIN_POSITIVE);
         let skew = mirror::skew(points, triangles, (low + high) * 0.5, size);
-        // Modellers and scanners put small triangles where the detail is.
+        // Modellers and scanners put small triangles at details.
         let dense = cloud.iter().copied().sum::<Vec3>() / cloud.len().max(1) as f32;
         let reach =
             Vec3::from_array([0, 1, 2].map(|axis| ((low[axis] + high[axis]) * 0.5 - center[axis]) / half[axis]));
@@ -221,7 +222,7 @@ impl Signs {
         Self { skew, symmetric, crown, rough: (dense - center) / size, eyes, reach }
     }
 
-    /// How well a way to stand agrees with the shape; higher is better.
+    /// Score of an orientation; higher is better.
     fn score(&self, up: Vec3, forward: Vec3) -> f32 {
         let width = up.cross(forward).abs();
         let mut score = -4.0 * self.skew.dot(width);

@@ -1,9 +1,9 @@
 //! Facial bones: one at each centroid of the facial mask, found by k-means.
 //!
-//! Lids, lips and brows are clustered on their own, so that no bone takes in both lips or both lids and each has bones
-//! even where there are few; the rest of the mask is one part. Bones come in mirrored pairs unless asked otherwise: the
-//! samples of both sides are folded onto one and its centroids mirrored, with a strip along the middle plane for bones on
-//! the plane. Jaw and eyes get bones of their own on top.
+//! Lids, lips and brows are clustered on their own, so that no bone covers both lips or both lids and each part has
+//! bones even at a low density; the rest of the mask is one part. Bones come in mirrored pairs unless asked otherwise:
+//! the samples of both sides are folded onto one and its centroids mirrored, with a strip along the middle plane for
+//! bones on the plane. Jaw and eyes get bones of their own on top.
 
 mod extras;
 pub(crate) mod map;
@@ -55,7 +55,7 @@ pub enum Region {
     Eye,
 }
 
-/// What a facial bone is for.
+/// Function of a facial bone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaceBoneKind {
     /// Moves a patch of skin.
@@ -69,43 +69,43 @@ pub enum FaceBoneKind {
 /// One facial bone, a child of the head bone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaceBone {
-    /// Where it is, in head space.
+    /// Position in head space.
     pub position: Vec3,
-    /// What it is for.
+    /// Function of the bone.
     pub kind: FaceBoneKind,
-    /// The region it lies in.
+    /// Region of the bone.
     pub region: Region,
-    /// The side it lies on.
+    /// Side of the bone.
     pub side: Side,
     /// A name such as `brow_01_l`, unique among the bones.
     pub label: String,
-    /// Its mirror image among the bones.
+    /// Index of the mirrored bone.
     pub pair: Option<usize>,
-    /// Which of the given fixed places it stands at.
+    /// Index of the given fixed place of the bone.
     pub fixed: Option<usize>,
 }
 
-/// A bone that a person put somewhere: it stays there.
+/// A bone at a place that a person chose; it stays there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedBone {
-    /// Where it is, in head space.
+    /// Position in head space.
     pub position: Vec3,
-    /// What it is for.
+    /// Function of the bone.
     pub kind: FaceBoneKind,
 }
 
-/// How bones are placed.
+/// Settings of the placement of bones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaceBonesSettings {
     /// The number of bones on the skin, fixed ones included; jaw and eyes come on top.
     pub bones: usize,
     /// Seed of the clustering.
     pub seed: u64,
-    /// How often the clustering starts anew; the least error is kept.
+    /// Number of random starts of the clustering; the least error is kept.
     pub starts: usize,
-    /// Bones in mirrored pairs.
+    /// Places bones in mirrored pairs if `true`.
     pub symmetric: bool,
-    /// Bones for jaw and eyes where the mesh has them.
+    /// Adds bones for jaw and eyes where the mesh has them if `true`.
     pub extras: bool,
 }
 
@@ -122,53 +122,53 @@ pub struct FaceBones {
     pub bones: Vec<FaceBone>,
     /// Sum over the vertices of the mask of the squared distance to the nearest bone.
     pub square_error: f64,
-    /// The most rounds that a part of the clustering took.
+    /// Largest number of rounds of a part's clustering.
     pub rounds: usize,
 }
 
-/// Why there are no bones.
+/// Error of placing bones.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaceBonesError {
-    /// Zero bones were asked for.
+    /// A request for zero bones.
     #[error("no facial bones were asked for: ask for one at least")]
     NoBones,
-    /// Fewer vertices than bones.
+    /// A mask with fewer vertices than bones.
     #[error("{bones} facial bones do not fit on a facial mask of {vertices} vertices: ask for fewer")]
     TooManyBones {
-        /// Bones asked for.
+        /// Number of bones requested.
         bones: usize,
-        /// Vertices of the mask.
+        /// Number of vertices of the mask.
         vertices: usize,
     },
-    /// Nothing to place bones on.
+    /// A mask without vertices.
     #[error("the facial mask is empty: check which way the head looks (up and forward)")]
     EmptyMask,
-    /// More fixed bones than bones.
+    /// More fixed bones than bones in all.
     #[error("{fixed} bones are fixed but only {bones} were asked for: ask for more or free some")]
     TooManyFixed {
-        /// Fixed places.
+        /// Number of fixed places.
         fixed: usize,
-        /// Bones asked for.
+        /// Number of bones requested.
         bones: usize,
     },
-    /// A point or fixed place that is not a number.
+    /// A point or fixed place that is not finite.
     #[error("{what} {index} is not finite: repair it first")]
     NotFinite {
-        /// "point" or "fixed bone".
+        /// Kind of the point: "point" or "fixed bone".
         what: &'static str,
-        /// Index of the first such.
+        /// Index of the first such point.
         index: usize,
     },
-    /// A triangle corner that does not exist.
+    /// A triangle with a corner that does not exist.
     #[error("triangle {triangle} has a corner past the last point: the mesh is damaged")]
     Triangle {
         /// Index of the first such triangle.
         triangle: usize,
     },
-    /// The progress callback said stop.
+    /// Cancelled by the progress callback.
     #[error("placing facial bones was cancelled")]
     Cancelled,
-    /// The clustering failed.
+    /// Error of the clustering.
     #[error("the facial mask could not be clustered: {0}")]
     Cluster(KMeansError),
 }
@@ -187,13 +187,14 @@ impl From<KMeansError> for FaceBonesError {
 /// `points` are in head space, `shells`, `groups` and `landmarks` belong to them. `fixed` are places of bones that stay
 /// where they are and count among the bones; the rest is clustered around them. The answer has exactly
 /// [`FaceBonesSettings::bones`] bones on the skin, each on the surface, then a jaw bone if the mouth can open and eye
-/// bones where there are eyeballs. The same input and seed give the same bits. `progress` hears a share from 0 to 1 and
-/// answers whether to go on.
+/// bones where there are eyeballs. The same input and seed give the same bits. `progress` is called with a share from 0
+/// to 1 and returns whether to go on.
 ///
-/// Where the landmarks are not to be trusted (creatures), the mask is clustered as one and every bone is a `cheek`.
+/// If the landmarks are too uncertain (creatures), the mask is clustered as one part and every bone is a `cheek`.
 ///
 /// # Errors
-/// See [`FaceBonesError`]; no input panics. Cost: linear in the triangles, and k-means on about a hundred samples a bone.
+/// See [`FaceBonesError`]; no input panics. Cost: linear in the triangles, and k-means on about a hundred samples a
+/// bone.
 pub fn place_bones(
     points: &[Vec3],
     triangles: &[[u32; 3]],
@@ -270,14 +271,14 @@ fn check(
     Ok(())
 }
 
-/// A stand-in for the eyes' distance: two fifths of the mesh's largest extent.
+/// Substitute for the distance of the eyes: two fifths of the mesh's largest extent.
 pub(crate) fn extent(points: &[Vec3]) -> f32 {
     let low = points.iter().fold(Vec3::INFINITY, |a, &b| a.min(b));
     let high = points.iter().fold(Vec3::NEG_INFINITY, |a, &b| a.max(b));
     0.4 * (high - low).max_element()
 }
 
-/// Which of [`PARTS`] a part of the face is clustered in.
+/// Index in [`PARTS`] of the group in which a part of the face is clustered.
 fn group_of(part: Part) -> usize {
     match part {
         Part::UpperLip => 1,
@@ -290,7 +291,7 @@ fn group_of(part: Part) -> usize {
     }
 }
 
-/// The part of a seat: that in which it was clustered, or where it lies if that is the rest.
+/// The part of a seat: the part that it was clustered in, or, for a seat of the rest, the part at its place.
 fn part_of(seat: &Seat, map: &FaceMap) -> Part {
     match seat.part {
         1 => Part::UpperLip,
@@ -301,7 +302,7 @@ fn part_of(seat: &Seat, map: &FaceMap) -> Part {
         6 => Part::LowerLid,
         _ => {
             let part = map.part(seat.place);
-            // A centroid of the rest that lies over a hole in it is named for what is around.
+            // A centroid of the rest that lies over a hole in it is named after the surrounding skin.
             match part {
                 Part::UpperLid | Part::LowerLid | Part::UpperLip | Part::Corner => Part::Cheek,
                 Part::LowerLip => Part::Jaw,
@@ -319,13 +320,13 @@ fn spread(spreader: &mut Spreader, patches: &[[Patch; 2]], fixed: &[Fixed]) -> R
     let mut symmetric = settings.symmetric;
     let mut least: Vec<usize> = (0..PARTS.len()).map(|part| spreader.needed(&of(part))).collect();
     if !symmetric || least.iter().sum::<usize>() > settings.bones {
-        // Partners of so many fixed bones do not fit.
+        // The partners of so many fixed bones do not fit.
         symmetric = false;
         least = (0..PARTS.len()).map(|part| of(part).len()).collect();
     }
     let empty: Vec<bool> = patches.iter().map(|p| p.iter().all(Patch::is_empty)).collect();
     let mut quotas = spread::quotas(settings.bones, &least, &empty, symmetric);
-    // What found no room anywhere goes to the largest part of the middle.
+    // Bones without room anywhere go to the largest part in the middle.
     let missing = settings.bones - quotas.iter().sum::<usize>().min(settings.bones);
     if missing > 0
         && let Some(part) = (0..PARTS.len()).find(|&p| !empty[p])
@@ -370,7 +371,7 @@ fn drop_onto_skin(
         .collect();
     let drop = |seat: &Seat| {
         let mut best = (f32::INFINITY, seat.place);
-        // Its own part first: the other lip may be nearer than its own.
+        // The seat's own part comes first: the other lip may be nearer.
         for own in [true, false] {
             for (_, c) in skin.iter().filter(|(part, _)| !own || *part == seat.part) {
                 let sphere = ((c[0] + c[1] + c[2]) / 3.0).distance_squared(seat.place);
@@ -424,12 +425,12 @@ fn nearest_on_triangle(c: &[Vec3; 3], p: Vec3) -> Vec3 {
         .unwrap_or(p)
 }
 
-/// The region of the face that a place on the skin lies in.
+/// Region of the face at a place on the skin.
 pub fn region_of(position: Vec3, landmarks: &Landmarks) -> Region {
     name::region(FaceMap::new(landmarks, landmarks.symmetric, 1.0).part(position)).0
 }
 
-/// The side of the face that a place lies on: the middle is a strip of a hundredth of the eyes' distance either way.
+/// Side of the face at a place; the middle is a strip of a hundredth of the eyes' distance either way.
 pub fn side_of(position: Vec3, landmarks: &Landmarks) -> Side {
     let map = FaceMap::new(landmarks, true, 0.0);
     match position.x - map.middle {
@@ -439,7 +440,7 @@ pub fn side_of(position: Vec3, landmarks: &Landmarks) -> Side {
     }
 }
 
-/// The label of a bone: `brow_01_l`; `jaw` and `eye_l` for those of jaw and eyes.
+/// Label of a bone: `brow_01_l`; `jaw` and `eye_l` for jaw and eyes.
 pub fn label(region: Region, side: Side, number: usize, kind: FaceBoneKind) -> String {
     match kind {
         FaceBoneKind::Skin => format!("{}_{number:02}_{}", region.word(), side.letter()),

@@ -1,15 +1,15 @@
-//! Depth map: what a head looks like straight from the front, as a picture of depths.
+//! Depth map: the front view of a head as a picture of depths.
 //!
-//! An orthographic view down the z axis, rasterised on square pixels: at each pixel's centre the largest z of the
-//! triangles over it and which triangle that is. Landmarks are read from it, since rows, columns and smoothing are
+//! An orthographic view down the z axis, rasterised on square pixels: each pixel holds the largest z of the triangles
+//! over its centre, and the index of that triangle. Landmarks are read from it, since rows, columns and smoothing are
 //! simple on a picture whatever the mesh's topology.
 
 use glam::{Vec2, Vec3};
 
-/// No triangle covers this pixel.
+/// Marks a pixel without a triangle.
 pub const NO_TRIANGLE: u32 = u32::MAX;
 
-/// Where a depth map looks: a rectangle of the x-y plane cut into square pixels.
+/// Frame of a depth map: a rectangle of the x-y plane cut into square pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthFrame {
     /// The centre of the first pixel (smallest x, smallest y), in head space.
@@ -39,7 +39,7 @@ impl DepthFrame {
         self.origin + Vec2::new(column as f32, row as f32) * self.pixel
     }
 
-    /// Where a place lies, in pixels from the first pixel's centre.
+    /// Coordinates of a place, in pixels from the first pixel's centre.
     pub fn pixels(&self, place: Vec2) -> Vec2 {
         (place - self.origin) / self.pixel
     }
@@ -48,16 +48,16 @@ impl DepthFrame {
 /// Depths seen from the front.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMap {
-    /// Where it looks.
+    /// Frame of the map.
     pub frame: DepthFrame,
-    /// The largest z at each pixel, rows from the lowest y up; negative infinity where there is nothing.
+    /// The largest z at each pixel, rows from the lowest y up; negative infinity without a triangle.
     pub depth: Vec<f32>,
     /// The triangle seen at each pixel or [`NO_TRIANGLE`].
     pub triangle: Vec<u32>,
 }
 
 impl DepthMap {
-    /// Draws those of `triangles` for which `keep` says so (it is given their index).
+    /// Draws the triangles whose index `keep` accepts.
     ///
     /// Points in head space; triangles with an index out of range or a corner that is not finite are left out. Where
     /// two triangles are equally near, the one earlier in the list is kept. Time goes with the number of triangles plus
@@ -89,7 +89,8 @@ impl DepthMap {
         if high.x < 0.0 || high.y < 0.0 || low.x > limit.x || low.y > limit.y {
             return;
         }
-        // Whole numbers by truncation: all are positive after clamping. Most triangles of a fine mesh cover no centre.
+        // Truncation rounds down, because all coordinates are positive after clamping. Most triangles of a fine mesh
+        // cover no centre.
         let (low, high) = (low.max(Vec2::ZERO), high.min(limit));
         let up = |x: f32| x as usize + usize::from(x > (x as usize) as f32);
         let (columns, rows) = (up(low.x)..high.x as usize + 1, up(low.y)..high.y as usize + 1);
@@ -98,9 +99,9 @@ impl DepthMap {
             return;
         }
         let inverse = 1.0 / area;
-        // A little over the edge, so that no ray slips between two neighbours.
+        // A little slack over the edge, so that no ray slips between two neighbours.
         let slack = -1e-5;
-        // The weights are linear in x, so each row needs them once.
+        // The weights are linear in x, so each row computes them once.
         let step_b = (pc.y - pa.y) * inverse;
         let step_c = -(pb.y - pa.y) * inverse;
         for row in rows {
@@ -124,7 +125,7 @@ impl DepthMap {
         }
     }
 
-    /// The depth at a pixel, if something is seen there.
+    /// The depth at a pixel, if a triangle covers it.
     pub fn at(&self, column: usize, row: usize) -> Option<f32> {
         if column >= self.frame.width || row >= self.frame.height {
             return None;
@@ -132,13 +133,13 @@ impl DepthMap {
         self.depth.get(row * self.frame.width + column).copied().filter(|depth| depth.is_finite())
     }
 
-    /// The depth at a place, between the four pixels around it; of those where something is seen.
+    /// The depth at a place, interpolated between the covered ones of the four pixels around it.
     pub fn sample(&self, place: Vec2) -> Option<f32> {
         let at = self.frame.pixels(place);
         if !(at.x > -1.0 && at.y > -1.0 && at.x < self.frame.width as f32 && at.y < self.frame.height as f32) {
             return None;
         }
-        // One more and one less, so that truncation rounds down.
+        // Adding and subtracting one makes truncation round down.
         let (column, row) = ((at.x + 1.0) as i64 - 1, (at.y + 1.0) as i64 - 1);
         let part = at - Vec2::new(column as f32, row as f32);
         let (mut sum, mut weight) = (0.0, 0.0);
@@ -160,7 +161,7 @@ impl DepthMap {
         (weight > 1e-3).then(|| sum / weight)
     }
 
-    /// True if something is seen at the pixel nearest to a place.
+    /// Returns `true` if a triangle covers the pixel nearest to a place.
     pub fn covered(&self, place: Vec2) -> bool {
         let at = self.frame.pixels(place).round();
         at.x >= 0.0 && at.y >= 0.0 && self.at(at.x as usize, at.y as usize).is_some()

@@ -1,17 +1,17 @@
-//! Expressions: what moves in a face, as fields in normalised face coordinates, and what that means for bones.
+//! Expressions: displacement fields in normalised face coordinates, and the poses of bones that follow them.
 //!
-//! A [`Unit`] is about what one facial muscle does (the action units of the Facial Action Coding System): a few
-//! landmarks of the skin, and where each goes. It is written once, in shares of the eye distance, for the character's
+//! A [`Unit`] stands for about one facial muscle (an action unit of the Facial Action Coding System): a few landmarks
+//! of the skin, and the displacement of each. It is written once, in shares of the eye distance, for the character's
 //! left, and fits any head that has [`Landmarks`] and any number of bones. An [`Expression`] names units and strengths.
 //!
-//! [`pose_sampled`] takes the field where the bones are. Few bones cannot follow it everywhere, and each drags its whole
+//! [`pose_sampled`] samples the field at the bones. Few bones cannot follow it everywhere, and each drags its whole
 //! patch of skin along, so [`pose`] and [`FittedFace`] solve for the bone movements whose *skinned surface* follows the
-//! field best, above all at the landmarks. That is what makes a face look the same with ten bones or eighty.
+//! field best, above all at the landmarks. So a face looks the same with ten bones or eighty.
 
+mod bone_fit;
 mod field;
-mod fitted;
-mod gates;
-mod mend;
+mod fold_repair;
+mod openings;
 mod set;
 mod text;
 
@@ -26,29 +26,29 @@ use super::{
 use crate::mesh::{model::Weights, skinning::skin_points};
 
 pub use self::{
-    fitted::FittedFace,
-    mend::{count_folds, mend_folds},
+    bone_fit::FittedFace,
+    fold_repair::{count_folds, repair_folds},
     set::{ExpressionSet, UnitSet},
     text::{Expression, ExpressionError, Gaze, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
 };
 
-/// The furthest that a bone is moved, in eye distances.
+/// Largest distance that a bone is moved, in eye distances.
 const FURTHEST: f32 = 0.6;
 
 /// A bone's offset from rest in head space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BonePose {
-    /// How far the bone moves, in units of the mesh.
+    /// Movement of the bone, in units of the mesh.
     pub translation: Vec3,
-    /// How it turns, about its own (moved) position.
+    /// Rotation of the bone about its own (moved) position.
     pub rotation: Quat,
 }
 
 impl BonePose {
-    /// At rest.
+    /// The pose at rest.
     pub const REST: Self = Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
 
-    /// What takes points of the rest pose to the posed ones, for a bone that rests at `position`.
+    /// Matrix that takes points of the rest pose to the posed ones, for a bone that rests at `position`.
     pub fn affine(&self, position: Vec3) -> Affine3A {
         let matrix = glam::Mat3A::from_quat(self.rotation);
         Affine3A {
@@ -58,7 +58,7 @@ impl BonePose {
     }
 }
 
-/// How strongly each unit acts on each side: what any blend of expressions comes down to.
+/// Strength of each unit on each side: any blend of expressions reduces to a mix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mix {
     /// Left and right strength of each unit, in the order of the [`UnitSet`], each from 0 to the unit's limit.
@@ -66,15 +66,15 @@ pub struct Mix {
 }
 
 impl Mix {
-    /// Nothing moves.
+    /// The mix without movement.
     pub fn rest(units: &UnitSet) -> Self {
         Self { strengths: vec![[0.0; 2]; units.units().len()] }
     }
 
     /// A blend of expressions: strengths of the same unit add up, to the unit's limit at most.
     ///
-    /// Strengths of expressions are cut to 0..=1, those that are not numbers count as 0. Units that `units` does not have
-    /// are left out (an [`ExpressionSet`] never has such).
+    /// Strengths of expressions are cut to 0..=1, NaN counts as 0. Units that are not in `units` are left out (an
+    /// [`ExpressionSet`] has no such expressions).
     pub fn of(expressions: &[(&Expression, f32)], units: &UnitSet) -> Self {
         let mut mix = Self::rest(units);
         for (expression, strength) in expressions {
@@ -85,7 +85,7 @@ impl Mix {
         mix
     }
 
-    /// Adds one unit on one side or both; false if there is no such unit.
+    /// Adds one unit on one side or both; returns `false` if there is no such unit.
     pub fn add(&mut self, unit: &str, side: Sides, strength: f32, units: &UnitSet) -> bool {
         let Some(index) = units.index(unit) else { return false };
         let (Some(strengths), Some(unit)) = (self.strengths.get_mut(index), units.units().get(index)) else {
@@ -99,21 +99,21 @@ impl Mix {
         true
     }
 
-    /// True if nothing moves.
+    /// Returns `true` if nothing moves.
     pub fn is_rest(&self) -> bool {
         self.strengths.iter().all(|strengths| strengths == &[0.0; 2])
     }
 }
 
-/// A number in 0..=`most`; 0 for what is none.
+/// `value` clamped to 0..=`most`; 0 for NaN.
 fn between(value: f32, most: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(0.0, most) }
 }
 
-/// How bones move for a blend of expressions (strengths 0..=1), so that the skin follows it best.
+/// Poses of bones for a blend of expressions (strengths 0..=1) whose skin follows the blend best.
 ///
 /// All in head space: rest positions of `bones`, `points` and `landmarks`, and the poses. `weights` as [`apply`] takes
-/// them. This is [`FittedFace`] without triangles, hence without a check that none turns over: a few milliseconds for
+/// them. This is [`FittedFace`] without triangles, hence without a check for flipped triangles: a few milliseconds for
 /// 11,000 points and 40 bones. Keep a [`FittedFace`] to pose the same head often.
 pub fn pose(
     set: &ExpressionSet,
@@ -126,17 +126,17 @@ pub fn pose(
     FittedFace::new(points, &[], &[], weights, bones, landmarks).pose(&Mix::of(wanted, set.unit_set()), set.unit_set())
 }
 
-/// How bones move for a mix of units, without regard to weights: the field, sampled where the bones are.
+/// Poses of bones for a mix of units, without regard to weights: the field, sampled at the bones.
 ///
-/// Skin bones move, the jaw bone turns about where it is, eye bones turn. Skin bones follow the whole field, as if the
-/// jaw bone held no skin. Everything at rest if the landmarks are degenerate. Cost: bones times moves.
+/// Skin bones move, the jaw bone turns about its position, eye bones turn. Skin bones follow the whole field, as if the
+/// jaw bone held no skin. All bones rest if the landmarks are degenerate. Cost: bones times moves.
 pub fn pose_sampled(mix: &Mix, units: &UnitSet, bones: &[FaceBone], landmarks: &Landmarks) -> Vec<BonePose> {
     let Some(field) = Field::new(mix, units, bones, landmarks) else { return vec![BonePose::REST; bones.len()] };
     bones
         .iter()
         .map(|bone| match bone.kind {
             FaceBoneKind::Skin => BonePose {
-                translation: limited(field.at(bone.position, gates::Known::default()), landmarks),
+                translation: limited(field.at(bone.position, openings::OpeningSide::default()), landmarks),
                 rotation: Quat::IDENTITY,
             },
             _ => field.turn(bone),
@@ -144,15 +144,15 @@ pub fn pose_sampled(mix: &Mix, units: &UnitSet, bones: &[FaceBone], landmarks: &
         .collect()
 }
 
-/// A movement no longer than bones may make.
+/// A movement clamped to the longest that a bone may make; zero if it is not finite.
 fn limited(movement: Vec3, landmarks: &Landmarks) -> Vec3 {
     if movement.is_finite() { movement.clamp_length_max(FURTHEST * landmarks.eye_distance()) } else { Vec3::ZERO }
 }
 
 /// The points of a head in an expression, by linear blend skinning.
 ///
-/// `points` in head space; `weights` as [`face_weights`](super::weights) makes them: joint 0 the neck and 1 the head,
-/// which stay where they are, 2 + i `bones[i]`. Bones without a pose stay at rest. A point without weights stays.
+/// `points` in head space; `weights` as [`face_weights`](super::weights) makes them: joint 0 is the neck and 1 the
+/// head, which stay at rest, 2 + i is `bones[i]`. Bones without a pose stay at rest. A point without weights stays.
 pub fn apply(points: &[Vec3], weights: &Weights, bones: &[FaceBone], poses: &[BonePose]) -> Vec<Vec3> {
     let mut matrices = vec![Affine3A::IDENTITY; 2];
     matrices.extend(

@@ -1,9 +1,10 @@
 //! Grouping: face, middle and back of a head by average linkage in depth.
 //!
 //! After "automatic placement of bones on face models", section 3.1: the vertices are merged by their depth until three
-//! groups remain, and the middle one again by height into an upper and a lower part. A plain cut at three depends on how
-//! the modeller spread the vertices and may leave the sides of the jaw out of the face. So where the front group misses
-//! landmarks, the same merge history is cut deeper and groups are joined from the front, until it does not.
+//! groups remain, and the middle one again by height into an upper and a lower part. A plain cut at three depends on
+//! how the modeller spread the vertices and may leave the sides of the jaw out of the face. So if the front group
+//! misses landmarks, the same merge history is cut deeper and groups are joined from the front, until the joined group
+//! holds all landmarks.
 
 use glam::{Vec2, Vec3};
 use thiserror::Error;
@@ -34,11 +35,11 @@ pub enum HeadGroup {
 pub struct HeadGroups {
     /// The merge history of the depths.
     pub depth: Dendrogram,
-    /// The number of groups where it was cut before front groups were joined.
+    /// Number of groups at the cut, before front groups were joined.
     pub groups: usize,
     /// The group of each point.
     pub of: Vec<HeadGroup>,
-    /// True for points of the facial mask: skin of the face group without the neck.
+    /// Marks points of the facial mask: skin of the face group without the neck.
     pub mask: Vec<bool>,
     /// Mean of the upper half of the middle group.
     pub upper_mean: Vec3,
@@ -48,25 +49,25 @@ pub struct HeadGroups {
     pub chin: f32,
 }
 
-/// Why a head cannot be grouped.
+/// Error of grouping a head.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum GroupingError {
-    /// Nothing to group.
+    /// No points or triangles.
     #[error("the head has no points or no triangles to group; pick a mesh with a surface")]
     Empty,
-    /// A coordinate is infinite or not a number.
+    /// A coordinate that is not finite.
     #[error("point {point} has a coordinate that is not a finite number; remove it or repair the mesh")]
     NotFinite {
-        /// Its index.
+        /// Index of the point.
         point: usize,
     },
-    /// All points at one depth, or at two.
+    /// Points at one or two depths only.
     #[error("the head is flat: {depths} different depth(s) make no face, middle and back; check which way it looks")]
     Flat {
-        /// How many depths there are.
+        /// Number of different depths.
         depths: usize,
     },
-    /// No skin in front.
+    /// No skin in the front group.
     #[error("no skin lies at the landmarks of the face; check which way the head looks")]
     NoMask,
     /// The linkage failed.
@@ -74,28 +75,28 @@ pub enum GroupingError {
     Linkage(LinkageError),
 }
 
-/// How far behind the last landmark the face may begin, as a share of the distance of the eyes: landmarks that were
+/// Allowed distance of the face's border behind the last landmark, as a share of the distance of the eyes: landmarks
 /// found on a mesh are not exact.
 const SLACK: f32 = 0.08;
-/// How far behind the last landmark the face may begin before a deeper cut is sought, likewise.
+/// Distance of the face's border behind the last landmark from which a deeper cut is sought, as the same share.
 const FARTHEST: f32 = 0.4;
-/// The most groups tried for the sake of landmarks.
+/// Largest number of groups tried to include the landmarks.
 const MOST_GROUPS: usize = 256;
-/// The most groups tried for the middle's upper and lower part.
+/// Largest number of groups tried for the middle's upper and lower part.
 const MOST_HEIGHTS: usize = 12;
 
 /// Groups a head in depth, and its middle in height.
 ///
-/// `points` are in head space (+x the character's left, +y up, +z forward), in any unit, and so are `landmarks`. The mask
-/// holds every skin point of the face group that does not lie below the jaw. `wanted` is the number of groups (2 or more)
-/// at which a person cut the history; of these, too, the front ones that hold landmarks are joined. `progress` hears how much is done and stops
-/// with `false`.
+/// `points` are in head space (+x the character's left, +y up, +z forward), in any unit, and so are `landmarks`. The
+/// mask holds every skin point of the face group that does not lie below the jaw. `wanted` is the number of groups (2
+/// or more) at which a person cut the history; the front groups that hold landmarks are joined in this case, too.
+/// `progress` is called with the finished share and cancels by returning `false`.
 ///
 /// # Errors
-/// [`GroupingError`]: no points or triangles, coordinates that are not finite, fewer than three depths, no skin in front,
-/// or cancelled ([`LinkageError`]).
+/// [`GroupingError`]: no points or triangles, coordinates that are not finite, fewer than three depths, no skin in
+/// front, or cancelled ([`LinkageError`]).
 ///
-/// Costs one linkage of the depths, n log n, and little besides.
+/// Costs one linkage of the depths, n log n; the rest is cheap.
 pub fn group_head(
     points: &[Vec3],
     triangles: &[[u32; 3]],
@@ -141,10 +142,11 @@ pub fn group_head(
     Ok(HeadGroups { depth, groups: cut.groups, of, mask, upper_mean, lower_mean, chin })
 }
 
-/// Where the history of numbers is split, last merge first: cutting at k groups means the first k - 1 of these, and each
-/// group begins at one of them.
+/// Borders of the merge history, last merge first: a cut into k groups uses the first k - 1 borders, and each group
+/// begins at one of them.
 ///
-/// On a line groups are intervals, so a merge joins one interval to the next, and the border is where the upper begins.
+/// On a line groups are intervals, so a merge joins one interval to the next, and the border is the lower end of the
+/// upper one.
 fn borders(values: &[f32], history: &Dendrogram) -> Vec<f32> {
     let mut lowest = values.to_vec();
     let mut borders = Vec::with_capacity(history.merges.len());
@@ -152,7 +154,7 @@ fn borders(values: &[f32], history: &Dendrogram) -> Vec<f32> {
         let first = lowest.get(merge.first as usize).copied().unwrap_or(f32::MAX);
         let second = lowest.get(merge.second as usize).copied().unwrap_or(f32::MAX);
         lowest.push(first.min(second));
-        // Points at one depth are not a border.
+        // A merge of points at one depth is not a border.
         if merge.height > 0.0 && first != second {
             borders.push(first.max(second));
         }
@@ -161,25 +163,25 @@ fn borders(values: &[f32], history: &Dendrogram) -> Vec<f32> {
     borders
 }
 
-/// Where groups begin in depth.
+/// Borders of the groups in depth.
 struct Cut {
     groups: usize,
     face: f32,
     middle: f32,
 }
 
-/// The least number of groups of which those in front, joined, hold all landmarks without reaching far behind them.
+/// The cut with the fewest groups whose joined front groups hold all landmarks without reaching far behind them.
 ///
-/// Where a number is `wanted`, that many groups, joined from the front just as far as landmarks reach.
+/// With a `wanted` number, a cut into that many groups, joined from the front just as far as landmarks reach.
 fn cut(borders: &[f32], rear: f32, eyes: f32, wanted: Option<usize>) -> Cut {
     let (nearest, farthest) = (rear - SLACK * eyes, rear - FARTHEST * eyes);
-    // A border behind the face's has to exist, or there is no back.
+    // A border behind the face's must exist, or there is no back.
     let behind = |taken: &[f32], face: f32| taken.iter().copied().find(|border| *border < face);
     if let Some(wanted) = wanted {
         let groups = wanted.clamp(2, borders.len() + 1);
         let taken = &borders[..groups - 1];
         let holding = taken.iter().copied().filter(|border| *border <= nearest).fold(f32::MIN, f32::max);
-        // Landmarks may reach behind every border: then all but the hindmost group are the face.
+        // Landmarks may reach behind every border: then all groups but the hindmost are the face.
         let hindmost = taken.iter().copied().fold(f32::MAX, f32::min);
         let face = if holding > f32::MIN { holding } else { hindmost };
         let middle = taken.iter().copied().filter(|border| *border < face).fold(f32::MIN, f32::max);
@@ -199,7 +201,7 @@ fn cut(borders: &[f32], rear: f32, eyes: f32, wanted: Option<usize>) -> Cut {
     }
     match closest {
         Some((_, cut)) => cut,
-        // Landmarks reach to the very back: all but the last two groups are the face.
+        // Landmarks reach to the very back: all groups but the last two are the face.
         None => {
             let (a, b) = (borders[0], borders[1]);
             Cut { groups: 3, face: a.max(b), middle: a.min(b) }
@@ -246,12 +248,13 @@ fn heights(
     };
     let parts = |border: f32| Some([mean(&|y| y >= border)?, mean(&|y| y < border)?]);
     let all = mean(&|_| true).unwrap_or_default();
-    // Flat in height: both parts are the whole.
+    // A group that is flat in height: both parts are the whole.
     let Some(plain) = borders.first().and_then(|border| parts(*border)) else { return Ok([all, all]) };
     if plain[1].y < chin {
         return Ok(plain);
     }
-    // The lower part is no neck. Where there is one, the split nearest its narrowest section is.
+    // The lower part includes more than the neck. If there is a neck, the split nearest to its narrowest section is
+    // taken.
     let bottom = points.iter().map(|point| point.y).fold(f32::MAX, f32::min);
     let neck = sections::neck(points, &skin, sections::border::largest(points, &skin).as_ref(), bottom, chin);
     let Some(narrow) = sections::narrowest(&neck).map(|index| neck[index].at) else { return Ok(plain) };

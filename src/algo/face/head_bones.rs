@@ -2,8 +2,8 @@
 //!
 //! After "automatic placement of bones on face models", section 3.1: the head bone passes the mean of the upper part in
 //! the direction of up, the neck bone the mean of the lower part in the direction of the neck, and the two are joined.
-//! Seen from the side these two lines meet; where they do is the joint. A straight neck that never meets the head's line,
-//! or far from the skull's base, takes the skull's base instead.
+//! Seen from the side these two lines meet in the joint. For a straight neck that meets the head's line far from the
+//! skull's base or not at all, the joint is the skull's base.
 
 use glam::{Vec2, Vec3};
 use thiserror::Error;
@@ -17,54 +17,54 @@ use super::{
 /// A bone from its joint to its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {
-    /// Where it turns.
+    /// Position of the joint, about which the bone turns.
     pub head: Vec3,
-    /// Where it ends.
+    /// Position of the bone's end.
     pub tail: Vec3,
 }
 
 /// The two bones that carry a face, joined: the neck's tail is the head's head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadBones {
-    /// From the root of the neck to the base of the skull.
+    /// Bone from the root of the neck to the base of the skull.
     pub neck: Bone,
-    /// From the base of the skull to the crown.
+    /// Bone from the base of the skull to the crown.
     pub head: Bone,
 }
 
-/// Why a head has no place for its bones.
+/// Error of placing head and neck bones.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum HeadBonesError {
-    /// Nothing there.
+    /// No points or triangles.
     #[error("the head has no points or no triangles to put bones into; pick a mesh with a surface")]
     Empty,
-    /// A coordinate is infinite or not a number.
+    /// A coordinate that is not finite.
     #[error("point {point} has a coordinate that is not a finite number; remove it or repair the mesh")]
     NotFinite {
-        /// Its index.
+        /// Index of the point.
         point: usize,
     },
-    /// No height.
+    /// A mesh without height.
     #[error("the head is flat: a head bone needs height; check which way is up")]
     Flat,
 }
 
-/// A section belongs to the neck up to this much wider than its narrowest.
+/// Largest width of a neck's section, relative to its narrowest one.
 const NECK_WIDENS: f32 = 1.25;
-/// Where the skull's base is between chin and crown, at the highest: about the upper lip.
+/// Largest height of the skull's base between chin and crown: about the upper lip.
 const SKULL_BASE: f32 = 0.35;
-/// The shortest neck bone, as a share of the height from chin to crown.
+/// Length of the shortest neck bone, as a share of the height from chin to crown.
 const SHORTEST: f32 = 0.2;
-/// How far inside an end a bone begins, as a share of the way.
+/// Inset of a bone's start from the end of the mesh, as a share of the way.
 const EDGE: f32 = 0.06;
-/// How far from the middle of the neck its bone may be, as a share of the extent.
+/// Largest distance of the neck bone from the middle of the neck, as a share of the extent.
 const INWARD: f32 = 0.25;
 
 /// Places head and neck bones.
 ///
 /// All in head space (+x the character's left, +y up, +z forward) and one unit. The head bone is upright, above the
-/// groups' upper mean. A neck that leaves the head backwards, as with most beasts, is followed between its open end and
-/// the skull; a head without neck gets a short neck bone just below the skull's base.
+/// groups' upper mean. A neck that leaves the head backwards, as with most quadrupeds, is followed between its open end
+/// and the skull; a head without neck gets a short neck bone just below the skull's base.
 ///
 /// # Errors
 /// [`HeadBonesError`]: no points or triangles, coordinates that are not finite, no height. Linear time.
@@ -94,7 +94,7 @@ pub fn head_bones(
     Ok(if landmarks.symmetric { centered(bones, landmarks.middle) } else { bones })
 }
 
-/// What both ways of placing look at.
+/// Shape of the head, shared by both ways of placing.
 struct Shape<'a> {
     points: &'a [Vec3],
     triangles: &'a [[u32; 3]],
@@ -103,7 +103,8 @@ struct Shape<'a> {
     chin: f32,
 }
 
-/// True if a neck leaves the head backwards rather than downwards: by where its end is, and how the end is cut.
+/// Returns `true` if a neck leaves the head backwards rather than downwards: by the position of its end and the
+/// direction of the cut.
 fn leaves_backwards(end: &border::End, center: Vec3) -> bool {
     let down = -(end.center - center).normalize_or_zero().y;
     let cut = end.high - end.low;
@@ -123,14 +124,14 @@ fn upright(shape: &Shape, end: Option<&border::End>, groups: &HeadGroups) -> Hea
         Vec::new()
     };
     let Some(neck) = NeckLine::new(&sections) else {
-        // No neck: a short one at the bottom of the head.
+        // Without a neck: a short bone at the bottom of the head.
         let (bottom, top) = column(shape, upper).unwrap_or((shape.low.y, crown));
         let root = upper.with_y(bottom + EDGE * (top - bottom));
         let joint = (chin + skull) * 0.5;
         let shortest = root.y + SHORTEST * (crown - root.y);
         return joined(root, upper.with_y(joint.max(shortest).min((root.y + crown) * 0.5)), crown);
     };
-    // The neck's line passes the lower mean where that lies in the neck; a mean among the shoulders does not.
+    // The neck's line passes the lower mean if that lies in the neck; a mean among the shoulders does not count.
     let place = neck.at(groups.lower_mean.y);
     let off = (groups.lower_mean - place).with_x(0.0);
     let inside = groups.lower_mean.y >= neck.bottom && groups.lower_mean.y <= chin && off.length() <= 0.25 * neck.width;
@@ -145,7 +146,7 @@ fn upright(shape: &Shape, end: Option<&border::End>, groups: &HeadGroups) -> Hea
     let shortest = SHORTEST * (crown - chin);
     if joint.y - root.y < shortest {
         joint.y = joint.y.max((root.y + shortest).min(skull));
-        // A neck cut close below the chin: towards its end.
+        // A neck cut close below the chin: the bone is lengthened towards its end.
         let missing = shortest - (joint.y - root.y);
         if let Some(end) = end.filter(|end| missing > 0.0 && end.center.y < root.y) {
             root = root.lerp(end.center, (missing / (root.y - end.center.y)).min(1.0 - EDGE));
@@ -154,7 +155,7 @@ fn upright(shape: &Shape, end: Option<&border::End>, groups: &HeadGroups) -> Hea
     joined(inward(shape, root), joint, crown)
 }
 
-/// The neck of a beast: behind the head, from its open end to the skull.
+/// The neck of a quadruped: behind the head, from its open end to the skull.
 fn slanted(shape: &Shape, end: Vec3, center: Vec3, groups: &HeadGroups) -> HeadBones {
     let upper = groups.upper_mean;
     let axis = (center - end).normalize_or_zero();
@@ -162,9 +163,9 @@ fn slanted(shape: &Shape, end: Vec3, center: Vec3, groups: &HeadGroups) -> HeadB
     let sections = sections::sections(shape.points, shape.triangles, axis, [from + 0.04 * (to - from), to], 32);
     let (bottom, top) = column(shape, upper).unwrap_or((shape.low.y, shape.high.y));
     let height = top - bottom;
-    // The cut is ragged, so that the middle of its border says more than the first sections.
+    // The cut is ragged, so the middle of its border is more exact than the first sections.
     let root = end + axis * EDGE * (to - from);
-    // Where the middle of the neck passes below the head's line; as high as the skull's base at the most.
+    // Passage of the neck's middle below the head's line; not above the skull's base.
     let passing = sections
         .iter()
         .min_by(|a, b| (a.centroid.z - upper.z).abs().total_cmp(&(b.centroid.z - upper.z).abs()))
@@ -191,7 +192,7 @@ fn joined(root: Vec3, joint: Vec3, crown: f32) -> HeadBones {
     HeadBones { neck: Bone { head: root, tail: joint }, head: Bone { head: joint, tail: joint.with_y(crown) } }
 }
 
-/// Onto the plane of symmetry.
+/// The bones moved onto the plane of symmetry.
 fn centered(bones: HeadBones, middle: f32) -> HeadBones {
     let onto = |bone: Bone| Bone { head: bone.head.with_x(middle), tail: bone.tail.with_x(middle) };
     HeadBones { neck: onto(bones.neck), head: onto(bones.head) }
@@ -202,7 +203,7 @@ fn crown(shape: &Shape, above: Vec3) -> f32 {
     column(shape, above).map_or(shape.high.y, |(_, top)| top).max(above.y)
 }
 
-/// Where the vertical line through a place enters and leaves the mesh.
+/// Heights at which the vertical line through a place enters and leaves the mesh.
 fn column(shape: &Shape, through: Vec3) -> Option<(f32, f32)> {
     let at = Vec2::new(through.x, through.z);
     let (mut bottom, mut top) = (f32::MAX, f32::MIN);
@@ -211,7 +212,7 @@ fn column(shape: &Shape, through: Vec3) -> Option<(f32, f32)> {
         let [p, q, r] = [a, b, c].map(|corner| Vec2::new(corner.x, corner.z) - at);
         let area = (q - p).perp_dot(r - p);
         let weights = Vec3::new(q.perp_dot(r), r.perp_dot(p), p.perp_dot(q)) / area;
-        // A little more than the triangle, or a line along an edge slips through.
+        // The triangle is enlarged a little, so that no line along an edge slips through.
         if area != 0.0 && weights.min_element() >= -1e-4 {
             let height = weights.dot(Vec3::new(a.y, b.y, c.y));
             bottom = bottom.min(height);
@@ -220,7 +221,7 @@ fn column(shape: &Shape, through: Vec3) -> Option<(f32, f32)> {
     }
     match top > bottom {
         true => Some((bottom, top)),
-        // It leaves through the open end.
+        // The line leaves through the open end.
         false => (top > through.y).then_some((shape.low.y, top)),
     }
 }
@@ -229,7 +230,7 @@ fn column(shape: &Shape, through: Vec3) -> Option<(f32, f32)> {
 struct NeckLine {
     /// Mean of the centroids.
     middle: Vec3,
-    /// How much x and z change with y.
+    /// Change of x and z with y.
     slope: Vec2,
     /// Height of the neck's root.
     bottom: f32,
@@ -238,7 +239,7 @@ struct NeckLine {
 }
 
 impl NeckLine {
-    /// Through the centroids of the sections about the narrowest.
+    /// Fits the line to the centroids of the sections near the narrowest.
     fn new(sections: &[Section]) -> Option<Self> {
         let narrow = sections::narrowest(sections)?;
         let width = sections[narrow].size();
@@ -255,12 +256,12 @@ impl NeckLine {
             zy += off.z * off.y;
             yy += off.y * off.y;
         }
-        // More than 25 degrees from up is the slope of chin and shoulders, not of a neck.
+        // A slope of more than 25 degrees belongs to chin and shoulders, not to a neck.
         let slope = if yy > 0.0 && neck.len() >= 3 { Vec2::new(xy, zy) / yy } else { Vec2::ZERO };
         Some(Self { middle, slope: slope.clamp_length_max(0.45), bottom: neck[0].at, width })
     }
 
-    /// Where the line is at a height.
+    /// Point of the line at a height.
     fn at(&self, height: f32) -> Vec3 {
         let up = height - self.middle.y;
         Vec3::new(self.middle.x + self.slope.x * up, height, self.middle.z + self.slope.y * up)

@@ -1,8 +1,8 @@
-//! Head part: the head of a whole body or beast.
+//! Head part: the head of a whole body, human or animal.
 //!
-//! A body stands on legs: near the ground its surface is two parts or more. From the head's extremity (the top of a
-//! biped, the snout of a beast) planes or spheres walk into the body; where their sections are narrowest behind the head
-//! is the neck, and where they widen from there to the body it is cut.
+//! A body stands on legs: near the ground its surface has two parts or more. Planes or spheres walk from the head's
+//! extremity (the top of a biped, the snout of a quadruped) into the body; their narrowest section behind the head is
+//! the neck, and the cut lies between it and the body, where they widen.
 
 use glam::Vec3;
 use thiserror::Error;
@@ -15,37 +15,37 @@ pub(super) mod snout;
 /// The head of a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadPart {
-    /// True if the mesh is more than a head.
+    /// Marks a mesh that is more than a head.
     pub is_part: bool,
-    /// True for points of the head with its neck; all points if the mesh is a head itself.
+    /// Marks points of the head with its neck; all points if the mesh is a head itself.
     pub points: Vec<bool>,
-    /// What the mesh is taken for, a sentence for the user.
+    /// Interpretation of the mesh, as a sentence for the user.
     pub reason: String,
-    /// Where the neck is cut, a point and a unit normal towards the head, if it is.
+    /// Cut through the neck, a point and a unit normal towards the head, if there is one.
     pub cut: Option<(Vec3, Vec3)>,
 }
 
-/// Why there is no head.
+/// Error of the search for a head.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum HeadPartError {
-    /// Nothing to look at.
+    /// No points or triangles.
     #[error("the mesh has no points or no triangles to find a head in; pick a mesh with a surface")]
     Empty,
-    /// A coordinate is infinite or not a number.
+    /// A coordinate that is not finite.
     #[error("point {point} has a coordinate that is not a finite number; remove it or repair the mesh")]
     NotFinite {
-        /// Its index.
+        /// Index of the point.
         point: usize,
     },
 }
 
-/// Planes from the head's extremity through the body.
+/// Number of planes from the head's extremity through the body.
 const PLANES: usize = 64;
-/// A biped is so much higher than deep.
+/// Least ratio of height to depth of a biped.
 const BIPED: f32 = 1.8;
-/// The neck ends where a section is this much wider than its narrowest.
+/// Widening of a section, relative to the narrowest one, at which the neck ends.
 const WIDENS: f32 = 1.3;
-/// A body that lifts a leg is so much higher than its head.
+/// Least ratio of the height of a body to that of its head if it lifts a leg.
 const LIFTED: f32 = 3.0;
 
 /// Finds the head of a mesh: all of it, or the head part of a body.
@@ -53,7 +53,7 @@ const LIFTED: f32 = 3.0;
 /// `points` are in head space (+y up, +z forward), in any unit.
 ///
 /// # Errors
-/// [`HeadPartError`]: nothing to look at, or coordinates that are not finite. Near linear time.
+/// [`HeadPartError`]: no points or triangles, or coordinates that are not finite. Near linear time.
 pub fn head_part(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<HeadPart, HeadPartError> {
     if points.is_empty() || triangles.is_empty() {
         return Err(HeadPartError::Empty);
@@ -86,20 +86,19 @@ pub fn head_part(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<HeadPart, He
     })
 }
 
-/// Where a head is cut from its body.
+/// Cut of a head from its body.
 pub(super) struct Cut {
-    /// How far each place is from the head's extremity.
+    /// Distance of each place from the head's extremity.
     away: Vec<f32>,
-    /// Up to where it is the head.
+    /// Distance up to which places belong to the head.
     reach: f32,
-    /// The place at the extremity.
+    /// Index of the place at the extremity.
     tip: usize,
     /// A point and a normal towards the head.
     plane: (Vec3, Vec3),
 }
 
-/// The cut of a body that stands upright, horizontal and below the topmost part, and the head's height above the
-/// narrowest place.
+/// The cut of an upright body, horizontal and below the topmost part, and the head's height above the narrowest place.
 fn crown_cut(body: &Body) -> Option<(Cut, f32)> {
     let planes = sections(&body.places, &body.joined, Vec3::NEG_Y, [-body.high.y, -body.low.y], PLANES);
     let sizes: Vec<f32> = planes.iter().map(Section::size).collect();
@@ -116,7 +115,7 @@ fn crown_cut(body: &Body) -> Option<(Cut, f32)> {
     Some((cut, body.high.y - narrow))
 }
 
-/// A mesh with points of one position made one.
+/// A mesh whose points of one position are welded.
 pub(super) struct Body {
     welded: Vec<u32>,
     pub(super) places: Vec<Vec3>,
@@ -150,13 +149,14 @@ impl Body {
         self.size().y > BIPED * self.size().z
     }
 
-    /// True if it stands on two legs or more, or stands on one and lifts another, being much higher than its `head`.
+    /// Returns `true` if the body stands on two legs or more, or stands on one, lifts another, and is much higher than
+    /// its `head`.
     pub(super) fn stands(&self, head: Option<f32>) -> bool {
         let two = |shares: [f32; 2]| shares.into_iter().all(|share| self.legs(share) >= 2);
         two([0.06, 0.12]) || (head.is_some_and(|head| self.size().y > LIFTED * head) && two([0.2, 0.3]))
     }
 
-    /// How many parts of the surface there are below a share of the height, dust aside.
+    /// Number of parts of the surface below a share of the height, without tiny ones.
     fn legs(&self, share: f32) -> usize {
         let height = self.low.y + share * self.size().y;
         let below: Vec<[u32; 3]> = self
@@ -181,7 +181,7 @@ impl Body {
         areas
     }
 
-    /// The places of the head: what hangs together with its tip before the cut, and what is loose among it.
+    /// Marks the places of the head: those connected with its tip before the cut, and loose parts among them.
     fn within(&self, cut: &Cut) -> Vec<bool> {
         let near = |place: usize| cut.away[place] <= cut.reach;
         let above: Vec<[u32; 3]> = self
@@ -198,7 +198,7 @@ impl Body {
                 inside = (inside.0.min(*place), inside.1.max(*place));
             }
         }
-        // Eyes and teeth are loose, and lie within the head's box; hands held high do not.
+        // Eyes and teeth are loose, and lie within the head's box; raised hands do not.
         let boxed = |place: Vec3| place.cmpge(inside.0).all() && place.cmple(inside.1).all();
         (0..self.places.len())
             .map(|place| island_of[place] == head || (near(place) && boxed(self.places[place])))
@@ -206,13 +206,13 @@ impl Body {
     }
 }
 
-/// Where the neck is narrowest and where to cut it, given sizes of sections from the head into the body, of which the
-/// first `last` may be the neck: past the narrowest behind the head, where they widen. Sections of the head are at least a
-/// share `head` of the largest of those.
+/// Indices of the narrowest section of the neck and of the cut, given sizes of sections from the head into the body, of
+/// which the first `last` may be the neck. The cut lies past the narrowest section behind the head, where sections
+/// widen. Sections of the head are at least a share `head` of the largest of them.
 fn neck(sizes: &[f32], last: usize, head: f32, widens: f32) -> Option<(usize, usize)> {
     let last = last.min(sizes.len().checked_sub(1)?);
     let least = head * sizes[..=last].iter().copied().fold(0.0, f32::max);
-    // The narrowest place that has something wider on either side, by the most; a waist farther off counts less.
+    // The narrowest place with the largest ratio to wider places on either side; a waist farther off counts less.
     let mut best: Option<(f32, usize)> = None;
     let mut before = 0.0_f32;
     for index in 1..last {
@@ -224,7 +224,7 @@ fn neck(sizes: &[f32], last: usize, head: f32, widens: f32) -> Option<(usize, us
             best = Some((worth, index));
         }
     }
-    // Without a waist: half of how far the head may reach.
+    // Without a waist: half of the largest reach of the head.
     let Some((_, narrow)) = best else { return Some((last / 2, last / 2)) };
     let wide = (narrow..=last).find(|index| sizes[*index] > widens * sizes[narrow]).unwrap_or(last);
     Some((narrow, wide.saturating_sub(1).max(narrow)))

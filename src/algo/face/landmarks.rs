@@ -1,10 +1,10 @@
 //! Landmarks: the 68 points of the Multi-PIE scheme, found on a head mesh.
 //!
-//! From the shape alone, whatever the topology, in three steps. A coarse depth map and the mean relief of a face tell
-//! where the face is and how large (`search`). On a fine depth map, features are measured: the eye openings
-//! (`eyes`), nose, lips and chin along the profile (`profile`), and the ends of the lips (`mouth`). The mean
-//! face is bent through them (`assemble`) and laid onto the skin (`surface`). What cannot be measured, as brows
-//! without hair or the eyes of a creature, stays where the mean face has it.
+//! The search uses the shape alone, whatever the topology, in three steps. A coarse depth map and the mean relief of a
+//! face give the position and size of the face (`search`). Features are measured on a fine depth map: the eye openings
+//! (`eyes`), nose, lips and chin along the profile (`profile`), and the ends of the lips (`mouth`). The mean face is
+//! bent through them (`assemble`) and laid onto the skin (`surface`). Features that cannot be measured, such as brows
+//! without hair or the eyes of a creature, keep their place on the mean face.
 
 mod assemble;
 mod eyes;
@@ -19,7 +19,7 @@ mod turn;
 use bevy::math::ops;
 use glam::{Quat, Vec3, vec2, vec3};
 
-use self::{assemble::Measured, relief::Relief, search::EyeHint};
+use self::{assemble::Measurements, relief::Relief, search::EyeHint};
 use super::{
     depth_map::{DepthFrame, DepthMap, NO_TRIANGLE},
     shells::{ShellKind, Shells},
@@ -28,15 +28,15 @@ use super::{
 /// The 68 landmarks of a face, in head space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Landmarks {
-    /// In Multi-PIE order, on the skin.
+    /// Positions in Multi-PIE order, on the skin.
     pub points: [Vec3; 68],
-    /// Where the plane of symmetry meets the x axis.
+    /// Position of the plane of symmetry on the x axis.
     pub middle: f32,
-    /// True if the head is the same on both sides.
+    /// Marks a head that is the same on both sides.
     pub symmetric: bool,
-    /// How sure the search is, 0 to 1.
+    /// Confidence of the search, 0 to 1.
     pub confidence: f32,
-    /// True if the lips are apart in the mesh (a border or a slit between them), so that the mouth can open.
+    /// Marks a mesh whose lips are apart (a border or a slit between them), so that the mouth can open.
     pub mouth_open: bool,
 }
 
@@ -58,27 +58,27 @@ impl Landmarks {
     }
 }
 
-/// Why no landmarks could be found.
+/// Error of the search for landmarks.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LandmarkError {
-    /// Nothing to look at.
+    /// No points or triangles.
     #[error("the mesh has no skin triangles to find a face on: give a head mesh")]
     Empty,
-    /// A coordinate is not a number.
+    /// A coordinate that is not finite.
     #[error("point {point} is not finite: repair the mesh")]
     NotFinite {
-        /// Which one.
+        /// Index of the point.
         point: usize,
     },
     /// No depth, no width or no height.
     #[error("the mesh is flat, a head has depth: check the axes and the mesh")]
     Flat,
-    /// Nothing like a front was seen.
+    /// No part of the mesh that looks like a front.
     #[error("no face was found looking along -z: check which axis is forward, and that the mesh is a head")]
     NoFront,
 }
 
-/// The number of the landmark at the same place on the other side.
+/// Index of the mirrored landmark.
 pub const fn mirrored(index: usize) -> usize {
     match index {
         0..=16 => 16 - index,
@@ -97,16 +97,16 @@ pub const fn mirrored(index: usize) -> usize {
 /// Finds the landmarks of a head.
 ///
 /// `points` in head space (x to the character's left, y up, z to the front) in any unit and at any place; `shells`
-/// tells skin and eyeballs apart. A head that looks up to 30 degrees aside or is tilted is looked at again from its own front; one that
-/// nods by more than 10 degrees or has its mouth wide open is found with growing error. Whatever has a front gets an answer: on what is no human face, a low
-/// [`confidence`](Landmarks::confidence).
+/// tells skin and eyeballs apart. A head that is turned aside by up to 30 degrees or tilted is searched again from its
+/// own front; on a head that nods by more than 10 degrees or has its mouth wide open errors grow. Every mesh with a
+/// front gets landmarks; on anything but a human face their [`confidence`](Landmarks::confidence) is low.
 ///
 /// Takes about 5 ms at 11,000 points and 15 ms at 45,000 for a head that is exactly symmetric, twice that for another,
 /// and up to six times that where no face is clear at first.
 ///
 /// # Errors
-/// [`LandmarkError`] for a point that is not finite, no skin, skin without depth, and where nothing can be
-/// laid onto the front.
+/// [`LandmarkError`] for a point that is not finite, no skin, skin without depth, and where nothing can be laid onto
+/// the front.
 pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) -> Result<Landmarks, LandmarkError> {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for (index, point) in points.iter().enumerate() {
@@ -135,7 +135,7 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     let mut best = look(points, triangles, shells, None).map(|(found, normal)| (found, normal, Quat::IDENTITY));
     let sure = |found: &Result<Sighting, LandmarkError>| found.as_ref().map_or(-1.0, |found| found.0.confidence);
     if sure(&best) < 0.5 {
-        // It may look aside. What is hardly a face from anywhere is taken as it stands.
+        // The face may be turned aside. A mesh that is hardly a face from any side is taken in its given orientation.
         for degrees in [-14.0f32, 14.0, -28.0, 28.0] {
             let half = degrees.to_radians() / 2.0;
             let next = attempt(Quat::from_xyzw(0.0, ops::sin(half), 0.0, ops::cos(half)));
@@ -145,7 +145,7 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
         }
     }
     let (mut found, mut normal, mut rotation) = best?;
-    // A face that looks aside is looked at again from its own front, as long as that is no less clear.
+    // A face that is turned aside is searched again from its own front, as long as the result is no less clear.
     for _ in 0..2 {
         if normal.x > LEAST_TURN {
             break;
@@ -163,17 +163,17 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     Ok(found)
 }
 
-/// Landmarks in a turned space, the normal of the plane of symmetry there, and how the space was turned.
+/// Landmarks in a turned space, the normal of the plane of symmetry there, and the rotation into the space.
 type Sighting = (Landmarks, Vec3, Quat);
 
-/// The cosine of how far a face may be turned without being looked at again: 2 degrees.
+/// Cosine of the largest turn of a face that is not searched again: 2 degrees.
 const LEAST_TURN: f32 = 0.9994;
 
-/// The confidence of landmarks where nothing looks like a face.
+/// Confidence of landmarks where nothing looks like a face.
 const GUESSED: f32 = 0.05;
 
-/// Finds the landmarks of a face that looks along z, and the normal of its plane of symmetry. `exact` is where that
-/// plane is if the points mirror onto each other.
+/// Finds the landmarks of a face that looks along z, and the normal of its plane of symmetry. `exact` is the position
+/// of that plane if the points mirror onto each other.
 fn look(
     points: &[Vec3],
     triangles: &[[u32; 3]],
@@ -204,7 +204,7 @@ fn look(
         poses.max_by(|a, b| a.worth.total_cmp(&b.worth))
     };
     let seen = find(hint).or_else(|| find(None));
-    // Where nothing looks like a face, the mean face of a person as large as the front.
+    // If nothing looks like a face, the mean face of a person in the size of the front is used.
     let guessed = seen.is_none();
     let mut pose = seen.unwrap_or_else(|| search::guess(exact.unwrap_or((low.x + high.x) / 2.0), low, high));
     let (fine, _) = front(relief::close_up(&pose), points, triangles, |t| kind(t) != ShellKind::Inside);
@@ -241,7 +241,8 @@ fn look(
     Ok((Landmarks { points: found, middle, symmetric: exact.is_some(), confidence, mouth_open }, normal))
 }
 
-/// Where eyeballs that are loose parts say the face is: their centres lie 0.7 outer corner distances apart.
+/// Position and size of the face from eyeballs that are loose parts: their centres lie 0.7 outer corner distances
+/// apart.
 fn eye_hint(points: &[Vec3], shells: &Shells) -> Option<EyeHint> {
     let center = |wanted: ShellKind| {
         let own = points.iter().enumerate().filter(|&(index, _)| shells.kind(index) == wanted);
@@ -253,10 +254,10 @@ fn eye_hint(points: &[Vec3], shells: &Shells) -> Option<EyeHint> {
     Some(EyeHint { center: (left + right) / 2.0, size: (left.x - right.x).abs() / 0.7 })
 }
 
-/// Lays the normalised places onto the skin: those that the front view shows by their depth there, the rest at the
+/// Lays the normalised places onto the skin: places visible in the front view by their depth there, the others at the
 /// closest place of the skin.
 fn lay(
-    measured: &Measured,
+    measured: &Measurements,
     skin: &DepthMap,
     points: &[Vec3],
     triangles: &[[u32; 3]],
@@ -265,7 +266,7 @@ fn lay(
 ) -> [Vec3; 68] {
     let relief = Relief { map: skin, center: measured.center, size: measured.size };
     let places = &measured.places;
-    // Where the mean face's depths begin on this head: the median over places the front view shows well.
+    // Offset of the mean face's depths on this head: the median over places that the front view shows well.
     let mut offsets: Vec<f32> = [19, 21, 22, 24, 27, 31, 33, 35, 51, 57]
         .iter()
         .filter_map(|&i: &usize| places.get(i).and_then(|p| relief.at(p.x, p.y).map(|depth| depth - p.z)))
@@ -277,7 +278,7 @@ fn lay(
         let place = places[index];
         let seen = match index {
             0..=6 | 10..=16 => None,
-            // Off the rim, where skin is sure to be.
+            // Away from the rim, where there certainly is skin.
             37 | 38 | 43 | 44 => relief.at(place.x, place.y + 0.012),
             40 | 41 | 46 | 47 => relief.at(place.x, place.y - 0.012),
             61..=63 => relief.at(place.x, place.y + 0.004).map(|depth| depth - 0.03),
@@ -297,7 +298,7 @@ fn lay(
     for (index, point) in snapped.into_iter().zip(closest) {
         laid[index] = point;
     }
-    // Between closed lips the closest skin can be the other lip's: then what is seen from the front has to do.
+    // Between closed lips the closest skin can be the other lip's: then the visible depth is used.
     for (upper, lower) in [(61, 67), (62, 66), (63, 65)] {
         if laid[upper].y < laid[lower].y {
             for index in [upper, lower] {
@@ -320,8 +321,8 @@ fn lay(
     laid
 }
 
-/// True if there is a cavity close behind the lips, or nothing between them.
-fn opens(measured: &Measured, points: &[Vec3], triangles: &[[u32; 3]], skin: impl Fn(usize) -> bool) -> bool {
+/// Returns `true` if there is a cavity close behind the lips, or no skin between them.
+fn opens(measured: &Measurements, points: &[Vec3], triangles: &[[u32; 3]], skin: impl Fn(usize) -> bool) -> bool {
     let line = (measured.profile.upper_edge + measured.profile.lower_edge) / 2.0;
     let looks = [(0.02, 0.05), (-0.04, 0.05), (0.02, -0.05), (-0.04, -0.05), (0.05, 0.03)];
     let behind = looks.iter().filter(|&&(u, v)| {
@@ -334,7 +335,8 @@ fn opens(measured: &Measured, points: &[Vec3], triangles: &[[u32; 3]], skin: imp
     behind.count() >= 2 || measured.profile.upper_edge - measured.profile.lower_edge > 0.015
 }
 
-/// The map of what faces the viewer, the far wall seen through a hole left out, and what is covered with it.
+/// Depth map of the triangles that face the viewer, without the far wall seen through a hole, and the mask of covered
+/// pixels.
 fn front(
     frame: DepthFrame,
     points: &[Vec3],
@@ -351,7 +353,7 @@ fn front(
             if (*b - *a).truncate().perp_dot((*c - *a).truncate()) >= 0.0 { 1 } else { -1 }
         })
         .collect();
-    // A mesh that is wound the other way round faces us with its back throughout.
+    // A mesh with reversed winding shows its back faces throughout.
     let most = if facing.iter().map(|&side| i64::from(side)).sum::<i64>() >= 0 { 1 } else { -1 };
     let solid = map.triangle.iter().map(|&triangle| triangle != NO_TRIANGLE).collect();
     for ((depth, triangle), side) in map.depth.iter_mut().zip(&mut map.triangle).zip(facing) {

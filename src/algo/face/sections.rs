@@ -1,6 +1,7 @@
-//! Sections: what planes across a mesh cut out of it.
+//! Sections: intersections of a mesh with planes across an axis.
 //!
-//! The neck is found where the sections of a head are narrowest, and its direction is the line through their centroids.
+//! The neck is the part where the sections of a head are narrowest, and its direction is the line through their
+//! centroids.
 
 use glam::{Vec2, Vec3};
 
@@ -8,10 +9,10 @@ pub mod border;
 
 use self::border::End;
 
-/// What one plane cuts out of a mesh.
+/// Intersection of a mesh with one plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Section {
-    /// Where the plane is along the axis.
+    /// Position of the plane along the axis.
     pub at: f32,
     /// Mean of the outline, weighted by its length; on the plane.
     pub centroid: Vec3,
@@ -22,7 +23,8 @@ pub struct Section {
 }
 
 impl Section {
-    /// The larger extent. A slanted cut through shoulders leaves shallow arcs, which are no neck for being shallow.
+    /// The larger extent. A slanted cut through shoulders leaves shallow arcs, which would pass for a neck by their
+    /// smaller extent.
     pub fn size(&self) -> f32 {
         self.extent.max_element()
     }
@@ -37,8 +39,8 @@ pub fn across(axis: Vec3) -> (Vec3, Vec3) {
 
 /// Cuts `triangles` by `count` planes across `axis` (unit), the first at `low`, the last at `high` (as `p · axis`).
 ///
-/// Triangles with corners past the end of `points` are ignored. Planes that meet nothing are left out. Linear in the
-/// triangles and in what they cut.
+/// Triangles with corners past the end of `points` are ignored. Planes without an intersection are left out. Cost:
+/// linear in the triangles and in the planes that they cross.
 pub fn sections(
     points: &[Vec3],
     triangles: &[[u32; 3]],
@@ -70,7 +72,7 @@ pub fn sections(
                 (heights[1], heights[2]),
                 (heights[2], heights[0]),
             ]) {
-                // Half open, so that a corner on the plane counts once.
+                // Half open intervals: a corner on the plane counts once.
                 if (hp < at) != (hq < at) {
                     ends[found] = p.lerp(q, (at - hp) / (hq - hp));
                     found += 1;
@@ -107,7 +109,7 @@ pub fn narrowest(sections: &[Section]) -> Option<usize> {
 /// The neck of an upright head: horizontal sections from its open `end`, or the `bottom` of a closed mesh, to the
 /// underside of the chin.
 ///
-/// Where the end is not level, planes below its highest point cut an open outline, so that the neck begins there.
+/// If the end is not level, planes below its highest point cut an open outline, so the neck begins at that point.
 pub fn neck(points: &[Vec3], triangles: &[[u32; 3]], end: Option<&End>, bottom: f32, chin: f32) -> Vec<Section> {
     let bottom = end.map(|end| end.high.y).filter(|top| *top < chin - 0.1 * (chin - bottom)).unwrap_or(bottom);
     // The very edge is ragged.

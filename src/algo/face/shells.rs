@@ -1,17 +1,17 @@
-//! Shells: the loose parts of a head mesh, skin, eyes and what lies inside.
+//! Shells: the loose parts of a head mesh: skin, eyes and inner parts.
 //!
 //! A head often comes with eyeballs, teeth and lashes as loose parts, and a scan with its skin in several pieces. Size
-//! alone cannot tell them apart, so every part is looked at from six sides: skin is big and seen, eyes are a pair of
-//! equal balls, and the rest lies inside.
+//! alone cannot tell them apart, so the visibility of every part is measured from six sides: skin is large and visible,
+//! eyes are a pair of equal balls, and the rest lies inside.
 
 use glam::Vec3;
 
 use crate::mesh::adjacency;
 
 mod eyes;
-mod seen;
+mod visibility;
 
-/// What a shell is.
+/// Kind of a shell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ShellKind {
     /// The outer surface.
@@ -20,7 +20,7 @@ pub enum ShellKind {
     LeftEye,
     /// The eyeball on the character's right.
     RightEye,
-    /// Teeth, tongue, lashes and all else.
+    /// Teeth, tongue, lashes and everything else.
     Inside,
 }
 
@@ -29,24 +29,24 @@ pub enum ShellKind {
 pub struct Shells {
     /// The shell of each point.
     pub shell_of: Vec<u32>,
-    /// What each shell is.
+    /// Kind of each shell.
     pub kinds: Vec<ShellKind>,
 }
 
 impl Shells {
-    /// What the shell of a point is.
+    /// Kind of a point's shell.
     pub fn kind(&self, point: usize) -> ShellKind {
         self.shell_of.get(point).and_then(|&shell| self.kinds.get(shell as usize)).copied().unwrap_or(ShellKind::Inside)
     }
 }
 
-/// Area of a skin shell, at the least, as a share of the largest shell's.
+/// Least area of a skin shell, as a share of the largest shell's.
 const SKIN_AREA: f32 = 0.03;
-/// How much of a skin shell is seen from six sides. A flat patch of skin shows one half of itself; teeth behind open
+/// Least visible share of a skin shell from six sides. A flat patch of skin shows one half of itself; teeth behind open
 /// lips show a sixth.
 const SKIN_SEEN: f32 = 0.3;
 
-/// What is known of one shell.
+/// Measurements of one shell.
 #[derive(Debug, Clone, Copy)]
 struct Island {
     low: Vec3,
@@ -54,12 +54,12 @@ struct Island {
     area: f32,
 }
 
-/// Finds the loose parts of a mesh and what each is.
+/// Finds the loose parts of a mesh and the kind of each.
 ///
-/// `points` are in head space (+x the character's left, +y up, +z forward), in any unit. Points of equal position hang
-/// together, so that seams of texture do not cut the skin. Every large part that is seen from outside is
-/// [`ShellKind::Skin`], and so are the walls of mouth and eye sockets that hang on it; two balls of one size are the
-/// eyes. Points without triangles are [`ShellKind::Inside`]. Triangles with corners past the end are ignored.
+/// `points` are in head space (+x the character's left, +y up, +z forward), in any unit. Points of equal position are
+/// connected, so that texture seams do not cut the skin. Every large part that is visible from outside is
+/// [`ShellKind::Skin`], with the walls of mouth and eye sockets connected to it; two balls of one size are the eyes.
+/// Points without triangles are [`ShellKind::Inside`]. Triangles with corners past the end are ignored.
 ///
 /// Shells are numbered by their first points. Linear time; a millisecond for 10,000 points.
 pub fn find_shells(points: &[Vec3], triangles: &[[u32; 3]]) -> Shells {
@@ -94,7 +94,8 @@ fn kinds(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands: &[I
         return kinds;
     }
     let solid = islands.iter().filter(|island| island.area > 0.0).count();
-    let seen = if solid > 1 { seen::shares(points, triangles, shell_of, islands) } else { vec![1.0; islands.len()] };
+    let seen =
+        if solid > 1 { visibility::shares(points, triangles, shell_of, islands) } else { vec![1.0; islands.len()] };
     for (kind, (island, seen)) in kinds.iter_mut().zip(islands.iter().zip(&seen)) {
         if island.area >= SKIN_AREA * largest && *seen >= SKIN_SEEN {
             *kind = ShellKind::Skin;
@@ -103,7 +104,7 @@ fn kinds(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands: &[I
     if solid > 1 {
         eyes::find(points, shell_of, islands, &mut kinds);
     }
-    // Something has to be the skin, even of a shape that hides itself.
+    // One shell has to be the skin, even of a shape that hides itself.
     if !kinds.contains(&ShellKind::Skin)
         && let Some(first) = islands.iter().position(|island| island.area == largest)
     {

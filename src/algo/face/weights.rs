@@ -1,10 +1,10 @@
 //! Weights of a face: skin bones, jaw and eyes, head and neck.
 //!
 //! Each point of the facial mask begins with its nearest bone, and heat spreads these patches along the surface until
-//! neighbours overlap (two implicit steps, as wide as the bones are apart). Lips and lids are told apart along the
-//! surface, so that no bone of one moves the other. What heat brings in from outside the mask belongs to the head bone.
+//! neighbours overlap (two implicit steps, as wide as the bones are apart). Upper and lower lips and lids are separated
+//! along the surface, so that no bone of one moves the other. Heat from outside the mask belongs to the head bone.
 
-mod inside;
+mod interior;
 mod sides;
 mod skin;
 
@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     algo::weights::laplacian::Graph,
-    mesh::{adjacency::weld, model::Weights},
+    mesh::{adjacency::weld, influences::keep_strongest, model::Weights},
 };
 
 /// Joint of the neck bone.
@@ -28,52 +28,52 @@ pub const HEAD: u32 = 1;
 /// Joint of the first facial bone.
 pub const FIRST: u32 = 2;
 
-/// The most influences of a point.
+/// Largest number of influences of a point.
 const INFLUENCES: usize = 8;
 /// Weights below this are dropped.
 const PRUNE: f32 = 0.002;
 
-/// Why there are no weights.
+/// Error of computing the weights of a face.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaceWeightsError {
-    /// A point that is not a number.
+    /// A point that is not finite.
     #[error("point {point} of the mesh is not finite: repair the mesh before binding")]
     Point {
         /// Index of the first such point.
         point: usize,
     },
-    /// A bone that is not a number.
+    /// A bone that is not finite.
     #[error("facial bone {bone} is not at a finite place: move it before binding")]
     Bone {
         /// Index of the first such bone.
         bone: usize,
     },
-    /// A triangle corner that does not exist.
+    /// A triangle with a corner that does not exist.
     #[error("triangle {triangle} has a corner past the last point: the mesh is damaged")]
     Triangle {
         /// Index of the first such triangle.
         triangle: usize,
     },
-    /// The progress callback said stop.
+    /// Cancelled by the progress callback.
     #[error("computing facial weights was cancelled")]
     Cancelled,
 }
 
-/// What the parts of the binding share: the welded mesh and the face on it.
+/// Data shared by the parts of the binding: the welded mesh and the map of the face on it.
 pub(crate) struct Face<'a> {
-    /// Places of the welded vertices.
+    /// Positions of the welded vertices.
     pub places: Vec<Vec3>,
     /// The welded surface.
     pub graph: Graph,
-    /// True for skin.
+    /// Marks vertices of the skin.
     pub skin: Vec<bool>,
-    /// True for visible vertices of the mask.
+    /// Marks visible vertices of the mask.
     pub mask: Vec<bool>,
     pub map: FaceMap,
     pub bones: &'a [FaceBone],
     /// The joint that lower teeth and chin follow.
     pub jaw: Option<u32>,
-    /// Where the jaw turns.
+    /// Position of the jaw's axis.
     pub pivot: Vec3,
     /// Height of the underside of the chin.
     pub chin: f32,
@@ -85,14 +85,14 @@ pub(crate) struct Face<'a> {
 
 /// Weights of all points of a head.
 ///
-/// `points` are in head space; `shells`, `groups`, `landmarks` and `bones` belong to them. Joints of the answer: 0 is
-/// the neck, 1 the head, 2 + i is `bones[i]`. Every point has one to eight influences, strongest first, that sum to one;
-/// points at equal places have equal weights. The same input gives the same bits with any number of threads. `progress`
-/// hears a share from 0 to 1 and answers whether to go on.
+/// `points` are in head space; `shells`, `groups`, `landmarks` and `bones` belong to them. Joints of the result: 0 is
+/// the neck, 1 the head, 2 + i is `bones[i]`. Every point has one to eight influences, strongest first, that sum to
+/// one; points at equal places have equal weights. The same input gives the same bits with any number of threads.
+/// `progress` is called with a share from 0 to 1 and returns whether to go on.
 ///
 /// # Errors
-/// Input that is not finite or refers to points that do not exist, and [`FaceWeightsError::Cancelled`]; no input panics.
-/// Cost: one sparse factorisation over the mask and two solves a bone.
+/// Input that is not finite or refers to points that do not exist, and [`FaceWeightsError::Cancelled`]; no input
+/// panics. Cost: one sparse factorisation over the mask and two solves a bone.
 pub fn face_weights(
     points: &[Vec3],
     triangles: &[[u32; 3]],
@@ -155,7 +155,7 @@ pub fn face_weights(
     };
     let sides = sides::Sides::new(&face);
     let mut rows = skin::rows(&face, &sides, progress)?;
-    inside::rows(&face, &sides, &shell, &kinds, &mut rows);
+    interior::rows(&face, &sides, &shell, &kinds, &mut rows);
     rows.iter_mut().for_each(finish);
     if !progress(1.0) {
         return Err(FaceWeightsError::Cancelled);
@@ -170,25 +170,16 @@ pub fn face_weights(
 /// The influences of one vertex.
 pub(crate) type Row = Vec<(u32, f32)>;
 
-/// Keeps the strongest influences, strongest first, and makes them sum to one.
+/// Keeps the strongest influences of a vertex; one without any belongs to the head.
 fn finish(row: &mut Row) {
-    row.retain(|e| e.1.is_finite() && e.1 > 0.0);
-    row.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    row.truncate(INFLUENCES);
-    let total: f32 = row.iter().map(|e| e.1).sum();
-    row.retain(|e| e.1 >= PRUNE * total);
-    let total: f64 = row.iter().map(|e| f64::from(e.1)).sum();
-    if row.is_empty() || total <= 0.0 {
-        *row = vec![(HEAD, 1.0)];
-        return;
-    }
-    for e in row.iter_mut() {
-        e.1 = (f64::from(e.1) / total) as f32;
+    keep_strongest(row, INFLUENCES, PRUNE);
+    if row.is_empty() {
+        row.push((HEAD, 1.0));
     }
 }
 
 impl Face<'_> {
-    /// How much of what the head holds belongs to the neck, 0 to 1.
+    /// Share of the neck in the head's weight, 0 to 1.
     ///
     /// On a face the border rises from below the chin to the base of the skull; elsewhere it is half way between the
     /// means of the middle group.
@@ -204,7 +195,7 @@ impl Face<'_> {
         if share.is_finite() { smooth(0.3, 0.8, share) } else { 0.0 }
     }
 
-    /// How far a place lies below the plane through the jaw's axis and the line between the lips.
+    /// Distance of a place below the plane through the jaw's axis and the line between the lips.
     pub fn below_lips(&self, p: Vec3) -> f32 {
         let half = &self.map.halves[0];
         let line = half.lip_line();

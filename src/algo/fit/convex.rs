@@ -1,21 +1,21 @@
-//! Convex weights of one point: the least squares problem that every point solves for itself.
+//! Convex weights of one point: the least squares problem that is solved for every point.
 //!
 //! Minimise `½ wᵀ G w - cᵀ w` with `w ≥ 0`, `Σ w = 1` and few entries: an active set method (Lawson and Hanson 1974,
 //! chapter 23) with the sum as an equality, and exchanges once the set is full.
 
-/// Below this a weight counts as zero.
+/// Largest weight that counts as zero.
 const NOTHING: f64 = 1e-7;
-/// Exchanges a call tries once the set is full.
+/// Number of exchanges in a call once the set is full.
 const EXCHANGES: usize = 4;
 
-/// A solver with its buffers; one a thread, used for point after point.
+/// A solver with its buffers; each thread uses one for point after point.
 #[derive(Default)]
 pub(super) struct Convex {
     /// The matrix `G`, rows of `n`.
     pub gram: Vec<f64>,
     /// The vector `c`; its length is `n`.
     pub target: Vec<f64>,
-    /// In: where to begin (sums to one, or all zero). Out: the answer.
+    /// Input: first weights (sum one, or all zero). Output: the solved weights.
     pub weights: Vec<f64>,
     set: Vec<usize>,
     factor: Vec<f64>,
@@ -24,7 +24,7 @@ pub(super) struct Convex {
 }
 
 impl Convex {
-    /// Makes room for `n` unknowns; all values are zero then.
+    /// Makes room for `n` unknowns and sets all values to zero.
     pub fn reset(&mut self, n: usize) {
         for (buffer, size) in [(&mut self.gram, n * n), (&mut self.target, n), (&mut self.weights, n)] {
             buffer.clear();
@@ -107,7 +107,8 @@ impl Convex {
         }
     }
 
-    /// The best weights on the set, which loses what would become negative. Returns the multiplier of the sum.
+    /// Finds the best weights on the set; weights that would become negative leave it. Returns the multiplier of the
+    /// sum.
     fn settle(&mut self) -> Option<f64> {
         loop {
             let slope = self.equality()?;
@@ -141,7 +142,7 @@ impl Convex {
         }
     }
 
-    /// Solves on the set without signs, into `answer`; `None` where the matrix is not positive.
+    /// Solves on the set without signs, into `answer`; returns `None` if the matrix is not positive definite.
     fn equality(&mut self) -> Option<f64> {
         let (n, m) = (self.target.len(), self.set.len());
         self.factor.clear();

@@ -1,11 +1,11 @@
 //! Rigid transforms of all bones, given the weights.
 //!
-//! Everything that the transforms depend on is a sum over points of weight times weight times position times
-//! position (one 4×4 block for each pair of bones that share points), or of weight times position times displacement.
-//! With these sums at hand, the cost of a round no longer depends on the number of points. Bones move in two ways:
-//! one after the other to the best transform for what the others leave (Le and Deng 2012, "Smooth skinning
-//! decomposition with rigid bones", section 4.2), and all at once by Gauss-Newton steps, whose equations conjugate
-//! gradients solve; the former never fails, the latter gets along where bones overlap widely.
+//! Everything that the transforms depend on is a sum over points of weight times weight times position times position
+//! (one 4×4 block for each pair of bones that share points), or of weight times position times displacement. With these
+//! sums at hand, the cost of a round no longer depends on the number of points. Bones move in two ways: one after the
+//! other to the best transform for the residual of the others (Le and Deng 2012, "Smooth skinning decomposition with
+//! rigid bones", section 4.2), and all at once by Gauss-Newton steps, whose equations are solved by conjugate
+//! gradients; the former never fails, the latter converges where bones overlap widely.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ pub(super) struct Rigid {
 impl Rigid {
     pub const IDENTITY: Self = Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
 
-    /// What it adds to a point, as a linear map of `(x, y, z, 1)`: the images of the four unit vectors.
+    /// Displacement of a point as a linear map of `(x, y, z, 1)`: the images of the four unit vectors.
     pub fn map(&self) -> Map {
         let [x, y, z] = [self.rotation.x_axis, self.rotation.y_axis, self.rotation.z_axis];
         [x - DVec3::X, y - DVec3::Y, z - DVec3::Z, self.translation]
@@ -57,12 +57,13 @@ pub(super) type Influences = [Vec<(u32, f64)>];
 
 /// The sums over points that the transforms depend on.
 pub(super) struct Moments {
-    /// For each bone the bones that share points with it, itself first, and their blocks.
+    /// Bones that share points with each bone, itself first, and their blocks.
     pairs: Vec<Vec<(u32, Square)>>,
-    /// For each bone and shape: weight times position times displacement.
+    /// Sums of weight times position times displacement, for each bone and shape.
     targets: Vec<Vec<Map>>,
-    /// For each bone where its points are on average (by squared weight), and how they spread (squared, by axis).
+    /// Mean position of each bone's points (by squared weight).
     centers: Vec<DVec3>,
+    /// Spread of each bone's points about it (squared, by axis).
     spread: Vec<DMat3>,
     /// Squared displacements of each shape.
     energy: Vec<f64>,
@@ -70,7 +71,7 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Sums over all moving points. `stiffness` is the share of its own mass with which a bone is held at rest.
+    /// Sums over all moving points. `stiffness` holds a bone at rest, as a share of its own mass.
     pub fn new(problem: &Problem, influences: &Influences, bones: usize, stiffness: f64) -> Self {
         let mut members = vec![Vec::new(); bones];
         for (point, row) in influences.iter().enumerate() {
@@ -96,13 +97,13 @@ impl Moments {
         Self { pairs, targets, centers, spread, energy, shapes }
     }
 
-    /// How much weight a bone has, and where its points are on average.
+    /// Weight of a bone, and the mean position of its points.
     pub fn center(&self, bone: usize) -> (f64, DVec3) {
         (self.pairs[bone][0].1[9], self.centers[bone])
     }
 
     /// Improves the transforms of all bones (`moves[bone][shape]`): `sweeps` times one after the other, then `steps`
-    /// times all at once. Returns the sum of squared distances that is left.
+    /// times all at once. Returns the remaining sum of squared distances.
     pub fn improve(&self, moves: &mut [Vec<Rigid>], sweeps: usize, steps: usize) -> f64 {
         let bones = moves.len();
         let solved: Vec<(Vec<Rigid>, f64)> = (0..self.shapes)
@@ -130,7 +131,7 @@ impl Moments {
         total
     }
 
-    /// The sum of squared distances of one shape, and what holding bones at rest costs.
+    /// The sum of squared distances of one shape, plus the cost of holding bones at rest.
     fn cost(&self, shape: usize, maps: &[Map]) -> f64 {
         let mut sum = self.energy[shape];
         for (bone, map) in maps.iter().enumerate() {
@@ -141,7 +142,7 @@ impl Moments {
         sum
     }
 
-    /// One row of blocks times a vector.
+    /// Product of one row of blocks and a vector.
     fn apply(&self, bone: usize, maps: &[Map]) -> Map {
         let mut sum = [DVec3::ZERO; 4];
         for (other, block) in &self.pairs[bone] {
@@ -151,7 +152,7 @@ impl Moments {
         sum
     }
 
-    /// Gives each bone in turn its best transform for what the others leave.
+    /// Gives each bone in turn its best transform for the residual of the others.
     fn sweep(&self, shape: usize, rigid: &mut [Rigid], maps: &mut [Map]) {
         for bone in 0..rigid.len() {
             let mass = self.pairs[bone][0].1[9];
@@ -164,7 +165,7 @@ impl Moments {
                 let part = times(block, &maps[*other as usize]);
                 (0..4).for_each(|a| left[a] -= part[a]);
             }
-            // From displacements to places.
+            // Displacements become positions.
             let rest = times(own, &[DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO]);
             (0..4).for_each(|a| left[a] += rest[a]);
             let center = self.centers[bone];
@@ -176,11 +177,11 @@ impl Moments {
         }
     }
 
-    /// One Gauss-Newton step of all bones of a shape; false if it does not help (any more).
+    /// Takes one Gauss-Newton step of all bones of a shape; returns `false` if it does not improve the cost.
     fn step(&self, shape: usize, rigid: &mut [Rigid], maps: &mut [Map]) -> bool {
         let bones = rigid.len();
         let pivots: Vec<DVec3> = (0..bones).map(|bone| rigid[bone].rotation * self.centers[bone]).collect();
-        // A turn about the bone's moved centre and a shift, as a map, and the transpose of that.
+        // A turn about the bone's moved centre and a shift, as a map, and the transpose of that map.
         let lift = |bone: usize, [omega, tau]: [DVec3; 2]| -> Map {
             let r = &rigid[bone].rotation;
             [omega.cross(r.x_axis), omega.cross(r.y_axis), omega.cross(r.z_axis), tau - omega.cross(pivots[bone])]
@@ -281,7 +282,7 @@ fn covariance(own: &Square) -> DMat3 {
     )
 }
 
-/// The blocks of one bone, its own first and with what holds it at rest.
+/// The blocks of one bone, its own first, with its stiffness.
 fn blocks(
     problem: &Problem,
     influences: &Influences,
@@ -303,7 +304,7 @@ fn blocks(
     let (c, spread) = (center(&own), covariance(&own));
     let held = own[9] * stiffness;
     if held > 0.0 {
-        // As much again as the bone's own points, but as far out on all axes, so that no turn is free.
+        // The stiffness is that of the bone's own points, spread equally on all axes, so that no rotation is free.
         let wide = (spread.x_axis.x + spread.y_axis.y + spread.z_axis.z) / own[9] + 1e-12;
         let products = square(c);
         own.iter_mut().zip(products).for_each(|(sum, p)| *sum += held * p);
@@ -313,7 +314,7 @@ fn blocks(
     std::iter::once((bone as u32, own)).chain(others).collect()
 }
 
-/// Weight times position times displacement of one bone, for each shape.
+/// Sums of weight times position times displacement of one bone, for each shape.
 fn targets(problem: &Problem, members: &[(u32, f64)]) -> Vec<Map> {
     let width = problem.width;
     let mut sums = vec![0.0f64; 4 * width];

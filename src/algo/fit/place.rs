@@ -1,4 +1,4 @@
-//! Where bones are, and the way back to the caller's space.
+//! Positions of bones, and the conversion of results to the caller's space.
 
 use glam::{DMat3, DQuat, DVec3, Vec3};
 
@@ -7,14 +7,13 @@ use super::{
     moves::{Influences, Rigid},
     problem::Problem,
 };
-use crate::mesh::model::Weights;
+use crate::mesh::{influences::keep_strongest, model::Weights};
 
-/// How strongly a bone's position is drawn to the middle of what it moves, against turning about a point that stands
-/// still.
+/// Pull of a bone's position towards the middle of its points, against the fixed point of its rotations.
 const PULL: f64 = 0.05;
 
 impl Problem {
-    /// A position of the caller's, here.
+    /// Converts a position from the caller's space to the fit's.
     pub fn inward(&self, point: Vec3) -> DVec3 {
         (point.as_dvec3() - self.center) / self.scale
     }
@@ -46,22 +45,20 @@ pub(super) fn finish(
     (positions, weights)
 }
 
-/// One point's influences over joints, the head's share included, strongest first.
+/// Influences of one point over joints, with the head's share, strongest first.
 fn finished(row: &[(u32, f64)], most: usize) -> Vec<(u32, f32)> {
     let head = 1.0 - row.iter().map(|e| e.1).sum::<f64>();
-    let mut all: Vec<(u32, f64)> =
-        std::iter::once((0, head)).chain(row.iter().map(|e| (e.0 + 1, e.1))).filter(|e| e.1 > PRUNE).collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    all.truncate(most);
-    let sum: f64 = all.iter().map(|e| e.1).sum();
+    let all = std::iter::once((0, head)).chain(row.iter().map(|e| (e.0 + 1, e.1)));
+    let mut all: Vec<(u32, f32)> = all.filter(|e| e.1 > PRUNE).map(|e| (e.0, e.1 as f32)).collect();
+    keep_strongest(&mut all, most, 0.0);
     if all.is_empty() {
-        return vec![(0, 1.0)];
+        all.push((0, 1.0));
     }
-    all.iter().map(|&(joint, weight)| (joint, (weight / sum) as f32)).collect()
+    all
 }
 
-/// For each bone the place that it shifts least in all shapes, as far as that is clear from how it turns, else the
-/// middle of what it moves.
+/// Position of each bone: the place that the bone shifts least in all shapes, as far as its rotations determine it,
+/// else the middle of its points.
 fn positions(problem: &Problem, influences: &Influences, moves: &[Vec<Rigid>]) -> Vec<DVec3> {
     let mut sums = vec![(0.0f64, DVec3::ZERO, 0.0f64); moves.len()];
     for (row, p) in influences.iter().zip(&problem.points) {
@@ -92,13 +89,13 @@ fn positions(problem: &Problem, influences: &Influences, moves: &[Vec<Rigid>]) -
                 return middle;
             }
             let offset = (matrix + DMat3::from_diagonal(DVec3::splat(trace * PULL))).inverse() * target;
-            // Never further out than its own points are.
+            // The position stays within the spread of the bone's own points.
             middle + offset.clamp_length_max((2.0 * spread).sqrt())
         })
         .collect()
 }
 
-/// Movements about the bones' positions, for each shape each bone.
+/// Movements about the bones' positions: for each shape, those of all bones.
 pub(super) fn outward(problem: &Problem, positions: &[Vec3], moves: &[Vec<Rigid>]) -> Vec<Vec<BoneMove>> {
     let one = |position: &Vec3, rigid: &Rigid| {
         let at = problem.inward(*position);

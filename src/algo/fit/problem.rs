@@ -5,14 +5,14 @@ use glam::{DVec3, Vec3};
 use super::FitError;
 use crate::mesh::adjacency::weld;
 
-/// Numbers that are worked on together.
+/// Number of values processed together.
 pub(super) const LANES: usize = 8;
-/// A point counts as moving if some shape moves it further than this share of the furthest movement.
+/// Least movement of a moving point in some shape, as a share of the largest movement.
 const STILL: f32 = 1e-4;
 
-/// The points that move, about the origin and about one unit in size.
+/// The moving points, centred at the origin and scaled to about one unit.
 pub(super) struct Problem {
-    /// Index of each moving point among all of them.
+    /// Index of each moving point in the whole mesh.
     pub origin: Vec<u32>,
     /// Rest positions.
     pub points: Vec<DVec3>,
@@ -27,15 +27,15 @@ pub(super) struct Problem {
     pub moved: Vec<f32>,
     /// Squared length of each row of `moved`.
     pub energy: Vec<f64>,
-    /// What a unit here is in the caller's space, and where the origin is there.
+    /// Size of a unit in the caller's space, and position of the origin there.
     pub scale: f64,
     pub center: DVec3,
-    /// The number of all points.
+    /// Number of all points.
     pub all: usize,
 }
 
 impl Problem {
-    /// Checks the input; see [`FitError`].
+    /// Checks the input and selects the moving points; see [`FitError`].
     pub fn new(rest: &[Vec3], triangles: &[[u32; 3]], shapes: &[impl AsRef<[Vec3]>]) -> Result<Self, FitError> {
         let furthest = check(rest, triangles, shapes)?;
         let still = furthest * STILL;
@@ -74,7 +74,7 @@ impl Problem {
     }
 }
 
-/// Returns the furthest movement along an axis.
+/// Checks the input and returns the largest movement along an axis.
 fn check(rest: &[Vec3], triangles: &[[u32; 3]], shapes: &[impl AsRef<[Vec3]>]) -> Result<f32, FitError> {
     if let Some(point) = rest.iter().position(|p| !p.is_finite()) {
         return Err(FitError::Point { point });
@@ -96,7 +96,7 @@ fn check(rest: &[Vec3], triangles: &[[u32; 3]], shapes: &[impl AsRef<[Vec3]>]) -
         }
         furthest = shape.iter().fold(furthest, |furthest, d| furthest.max(d.abs().max_element()));
     }
-    // A thousandth of what single precision can tell apart at the mesh's own place and size is no movement.
+    // A movement below a thousandth of single precision at the mesh's own position and size counts as none.
     let size = rest.iter().fold(0.0f32, |size, p| size.max(p.abs().max_element()));
     if furthest <= size * 1e-10 { Err(FitError::NothingMoves) } else { Ok(furthest) }
 }
@@ -104,7 +104,7 @@ fn check(rest: &[Vec3], triangles: &[[u32; 3]], shapes: &[impl AsRef<[Vec3]>]) -
 /// Neighbours of the moving points, as starts and indices among the moving points; points at one place share theirs.
 fn surface(rest: &[Vec3], triangles: &[[u32; 3]], origin: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let (place, places) = weld(rest);
-    // Any one of the points at a place stands for all of them: they move together, or not at all.
+    // Any point at a place represents all of them: they move together, or not at all.
     let mut stands = vec![u32::MAX; places];
     for (index, &p) in origin.iter().enumerate().rev() {
         stands[place[p as usize] as usize] = index as u32;

@@ -2,11 +2,11 @@
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
-/// The rotation `R` that maximises `Σ R[k][a] m[a][k]`, that is which turns points onto targets best, where `m` is
-/// the sum of point times transposed target. `near` is where the search begins.
+/// The rotation `R` that maximises `Σ R[k][a] m[a][k]`, that is, turns points onto targets best, where `m` is the sum
+/// of point times transposed target. `near` is the start of the search.
 ///
-/// Newton's method on rotations; where it does not settle at a maximum, the quaternion of the largest eigenvalue (Horn
-/// 1987, "Closed-form solution of absolute orientation using unit quaternions"). Without any information: `near`.
+/// Newton's method on rotations; if it does not converge to a maximum, the quaternion of the largest eigenvalue (Horn
+/// 1987, "Closed-form solution of absolute orientation using unit quaternions"). For a zero matrix: `near`.
 pub(super) fn best_rotation(m: [DVec3; 3], near: DMat3) -> DMat3 {
     let scale = m.iter().map(|row| row.length()).sum::<f64>();
     if !(scale > 0.0 && scale.is_finite()) {
@@ -14,7 +14,7 @@ pub(super) fn best_rotation(m: [DVec3; 3], near: DMat3) -> DMat3 {
     }
     let mut rotation = near;
     for _ in 0..4 {
-        // t[a] is where axis a was turned, m[a] where it should go.
+        // t[a] is the turned axis a, m[a] its target.
         let turned = [rotation.x_axis, rotation.y_axis, rotation.z_axis];
         let mut gradient = DVec3::ZERO;
         let mut sum = DMat3::ZERO;
@@ -40,7 +40,7 @@ pub(super) fn best_rotation(m: [DVec3; 3], near: DMat3) -> DMat3 {
     horn(m, near)
 }
 
-/// A small turn by `axis` (its length is about the angle): exactly a rotation, without trigonometry.
+/// A small turn about `axis`, whose length is approximately the angle: exactly a rotation, without trigonometry.
 pub(super) fn turn(axis: DVec3) -> DMat3 {
     DMat3::from_quat(DQuat::from_xyzw(axis.x * 0.5, axis.y * 0.5, axis.z * 0.5, 1.0).normalize())
 }

@@ -1,6 +1,6 @@
 //! Weights of all points, given the transforms.
 //!
-//! What a bone adds to a point is linear in the point's position, so the matrix of a point's least squares problem is a
+//! The displacement by a bone is linear in the point's position, so the matrix of a point's least squares problem is a
 //! quadratic function of its position, whose coefficients (ten a pair of bones) are found once. Only the right-hand
 //! side reads the displacements.
 
@@ -12,16 +12,16 @@ use super::{
     problem::{LANES, Problem},
 };
 
-/// Points that one task works on.
+/// Number of points of one task.
 const CHUNK: usize = 128;
 
-/// All bones' movements, prepared for questions about single points.
+/// Movements of all bones, prepared for queries at single points.
 pub(super) struct Columns {
     bones: usize,
     width: usize,
-    /// For each bone four rows of `width`: what it adds to x, y, z and 1, in all shapes.
+    /// Four rows of `width` for each bone: its displacement of x, y, z and 1, in all shapes.
     rows: Vec<f32>,
-    /// For each pair of bones (first ≤ second) the coefficients of the product of their columns.
+    /// Coefficients of the product of two bones' columns, for each pair (first ≤ second).
     products: Vec<Square>,
 }
 
@@ -80,7 +80,7 @@ impl Columns {
         x * at[6] + y * at[7] + z * at[8] + one
     }
 
-    /// The squared distance that is left if one bone alone moves the point.
+    /// The remaining squared distance if one bone alone moves the point.
     pub fn alone(&self, bone: usize, at: &Square, moved: &[f32], energy: f64) -> f64 {
         energy - 2.0 * self.target(bone, at, moved) + self.product(bone, bone, at)
     }
@@ -90,24 +90,24 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// How weights are found.
-pub(super) struct Sharing<'a> {
+/// Settings of the computation of weights.
+pub(super) struct ShareSettings<'a> {
     /// The largest number of bones a point, the head included.
     pub most: usize,
     /// Pull towards the mean of the neighbours, as a share of the mean energy of a point.
     pub smoothing: f64,
-    /// For each point the bones it may follow, sorted.
+    /// Candidate bones of each point, sorted.
     pub candidates: &'a (dyn Fn(usize, &mut Vec<u32>) + Sync),
 }
 
 /// Finds the weights of all points anew, beginning with those in `influences`.
 ///
-/// Returns each point's influences, sorted by bone (what they leave is the head's), and its squared distance.
+/// Returns each point's influences, sorted by bone (the remainder to one is the head's), and its squared distance.
 pub(super) fn share(
     problem: &Problem,
     columns: &Columns,
     influences: &[Vec<(u32, f64)>],
-    sharing: &Sharing,
+    sharing: &ShareSettings,
 ) -> (Vec<Vec<(u32, f64)>>, Vec<f64>) {
     let count = problem.points.len();
     let mean = problem.energy.iter().sum::<f64>() / count.max(1) as f64;
@@ -155,7 +155,7 @@ fn one(
     targets: &mut Vec<f64>,
 ) -> (Vec<(u32, f64)>, f64) {
     debug_assert!(bones.iter().all(|&b| (b as usize) < columns.bones));
-    // The head comes first; it adds nothing.
+    // The head comes first; it moves nothing.
     let n = bones.len() + 1;
     convex.reset(n);
     let at = square(problem.points[point]);

@@ -1,8 +1,8 @@
-//! Where a fit begins: points grouped by how they move.
+//! Start of a fit: groups of points with similar movement.
 //!
-//! One group at first; then the groups that their own rigid movement explains worst are split, and points go to the
-//! group whose movement suits them best, until there are enough (after Le and Deng 2014, "Robust and accurate skeletal
-//! rigging from mesh sequences", section 4).
+//! The fit begins with one group; then the groups that their own rigid movement explains worst are split, and points go
+//! to the group whose movement fits them best, until there are enough (after Le and Deng 2014, "Robust and accurate
+//! skeletal rigging from mesh sequences", section 4).
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use super::{
     share::Columns,
 };
 
-/// The label of points that the head moves.
+/// Label of points that the head moves.
 pub(super) const HEAD: u32 = u32::MAX;
 
 /// Movements of `bones` groups of points; `given` are places whose nearest points form the first groups.
@@ -30,7 +30,7 @@ pub(super) fn groups(problem: &Problem, bones: usize, given: &[DVec3], stiffness
         let first = count;
         count = more;
         for bone in first..count {
-            // A group that has just split off begins with where its points went.
+            // A group that has just been split off begins with the mean movement of its points.
             moves.push(average(problem, &labels, bone as u32));
         }
         for _ in 0..3 {
@@ -61,7 +61,7 @@ fn nearest(problem: &Problem, given: &[DVec3]) -> Vec<u32> {
     problem.points.iter().map(near).collect()
 }
 
-/// Each point's best group by movement; the head where nothing is better than standing still.
+/// Best group of each point by movement; the head where no group is better than rest.
 fn assign(problem: &Problem, moves: &[Vec<Rigid>]) -> Vec<u32> {
     let columns = Columns::new(problem, moves);
     (0..problem.points.len())
@@ -80,7 +80,7 @@ fn assign(problem: &Problem, moves: &[Vec<Rigid>]) -> Vec<u32> {
         .collect()
 }
 
-/// Fits the groups' movements and returns what each point's own group leaves, squared.
+/// Fits the groups' movements and returns the squared residual of each point in its own group.
 fn fit_labels(problem: &Problem, labels: &[u32], moves: &mut [Vec<Rigid>], stiffness: f64) -> Vec<f64> {
     let influences: Vec<Vec<(u32, f64)>> =
         labels.iter().map(|&l| if l == HEAD { Vec::new() } else { vec![(l, 1.0)] }).collect();
@@ -100,10 +100,11 @@ fn fit_labels(problem: &Problem, labels: &[u32], moves: &mut [Vec<Rigid>], stiff
         .collect()
 }
 
-/// Splits the groups that leave most, the worst first, until there are `wanted`; returns how many there are.
+/// Splits the groups with the largest residual, the worst first, until there are `wanted`; returns the number of
+/// groups.
 fn split(problem: &Problem, labels: &mut [u32], left: &[f64], count: usize, wanted: usize) -> usize {
     let mut sums = vec![(0.0f64, 0usize); count + 1];
-    // For each group the point that it explains worst.
+    // The point of each group with the largest residual.
     let mut worst = vec![(0.0f64, usize::MAX); count + 1];
     for (point, &label) in labels.iter().enumerate() {
         let group = (label as usize).min(count);
@@ -117,7 +118,7 @@ fn split(problem: &Problem, labels: &mut [u32], left: &[f64], count: usize, want
     let total: f64 = sums.iter().map(|s| s.0).sum();
     let mut next = count;
     for group in order {
-        // Groups that are far below the mean can wait for a later turn, unless there are not enough others.
+        // Groups far below the mean wait for a later turn, unless there are not enough others.
         if next == wanted || next > count && sums[group].0 * (4 * count) as f64 <= total {
             break;
         }
@@ -136,7 +137,7 @@ fn split(problem: &Problem, labels: &mut [u32], left: &[f64], count: usize, want
     next
 }
 
-/// The mean displacement of a group, as shifts.
+/// Movements that shift by the mean displacement of a group.
 fn average(problem: &Problem, labels: &[u32], label: u32) -> Vec<Rigid> {
     let mut sums = vec![DVec3::ZERO; problem.shapes];
     let mut count = 0.0;

@@ -1,21 +1,21 @@
-//! Where centroids go roughly, found on few means of neighbours that stand for many points.
+//! Coarse grouping: approximate centroids, found on few means of neighbours that stand for many points.
 
 use super::{
     KMeansError,
-    lloyd::{self, Pace, State},
+    lloyd::{self, Schedule, State},
     rearrange, seeds,
     space::{Place, Space},
 };
 
-/// The most rounds before and between jumps.
+/// Largest number of rounds before and between jumps.
 const ROUNDS: usize = 40;
-/// How often centroids may jump once they have come to rest, and how many at once.
+/// Number of attempts at jumps once centroids have converged.
 const TRIES: usize = 8;
 const AT_ONCE: usize = 4;
-/// Then a jump is worth it if it promises to gain so many times what it costs.
+/// Least ratio of the expected gain to the cost of a jump after convergence.
 const WORTH: f64 = 1.5;
 
-/// Centroids that are worth beginning with; none if there are too few places.
+/// First centroids for the fine grouping; `None` without enough means.
 pub(super) fn place<const BOUNDS: bool>(
     coarse: &Space,
     groups: usize,
@@ -23,10 +23,10 @@ pub(super) fn place<const BOUNDS: bool>(
     report: &dyn Fn(usize) -> Result<(), KMeansError>,
 ) -> Result<Option<Vec<Place>>, KMeansError> {
     let Ok(seeds) = seeds::choose(coarse, groups, random) else { return Ok(None) };
-    // How far a start has come is told by its rounds on all points.
+    // The progress of a start is measured by its rounds on all points.
     let report = |_: usize| report(0);
     let run = |centroids: Vec<Place>, jumps: &'static [usize]| -> Result<State, KMeansError> {
-        lloyd::run::<BOUNDS>(coarse, centroids, &Pace { rounds: ROUNDS, jumps, stride: lloyd::LONG }, &report)
+        lloyd::run::<BOUNDS>(coarse, centroids, &Schedule { rounds: ROUNDS, jumps, stride: lloyd::LONG }, &report)
     };
     let mut best = run(seeds, lloyd::JUMPS)?;
     let mut at_once = AT_ONCE;
@@ -41,7 +41,7 @@ pub(super) fn place<const BOUNDS: bool>(
             best = next;
             continue;
         }
-        // Fewer at once may still help.
+        // Fewer jumps at once may still help.
         at_once /= 2;
         if at_once == 0 {
             break;

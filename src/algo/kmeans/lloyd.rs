@@ -1,4 +1,4 @@
-//! Rounds: points to their nearest centroid, centroids to their points' mean.
+//! Lloyd's rounds: points to their nearest centroid, centroids to their points' mean.
 
 use rayon::prelude::*;
 use wide::{CmpLe, CmpLt, f32x8};
@@ -9,40 +9,40 @@ use super::{
     space::{BLOCK, Place, Space, Sum},
 };
 
-/// What a start came to.
+/// Result of a start.
 pub(super) struct State {
     pub(super) centroids: Vec<Place>,
-    /// In the order of the space's points.
+    /// Group of each point, in the order of the space's points.
     pub(super) labels: Vec<u32>,
     pub(super) square_error: f64,
     pub(super) rounds: usize,
 }
 
-/// Bounds are wider than they are computed by this, in units: all places are within one, so this is far more than what
-/// roots, sums and differences in single precision are rounded by.
+/// Slack of bounds, in units: all places are within one, so this is far more than the rounding of roots, sums and
+/// differences in single precision.
 const SLACK: f32 = 4e-6;
-/// A block before its first round.
+/// State of a block before its first round.
 const NEVER: f64 = f64::NEG_INFINITY;
-/// Rounds after which centroids jump, where nothing better is known.
+/// Rounds after which centroids jump, by default.
 pub(super) const JUMPS: &[usize] = &[5, 10, 16, 24];
 pub(super) const NO_JUMPS: &[usize] = &[];
-/// A stride that saves about half of the rounds.
+/// Length of strides that saves about half of the rounds.
 pub(super) const LONG: f32 = 1.8;
-/// Strides are as long as that while at least one point in so many changes its group.
+/// Strides stay long while at least one point in this many changes its group.
 const RESTLESS: usize = 2048;
-/// Candidates hold until centroids have gone this part of how far the furthest of them may be.
+/// Candidates hold until centroids have moved this share of the largest candidate distance.
 const AHEAD: f32 = 0.05;
-/// Blocks are handed out in runs of so many.
+/// Number of blocks in a task.
 const RUN: usize = 16;
 
-/// How rounds go.
-pub(super) struct Pace {
-    /// The most there may be.
+/// Schedule of the rounds.
+pub(super) struct Schedule {
+    /// Largest number of rounds.
     pub(super) rounds: usize,
-    /// After these, centroids that are of little use jump to where they are of more.
+    /// Rounds after which centroids of little use jump to better places.
     pub(super) jumps: &'static [usize],
-    /// How far centroids go, in parts of the way to their points' mean, while many points change their group. Up to twice the
-    /// way the error does not rise; once few points change, it is the whole way.
+    /// Stride of centroids, relative to the way to their points' mean, while many points change their group. Up to a
+    /// stride of two the error does not rise; once few points change, the stride is one.
     pub(super) stride: f32,
 }
 
@@ -58,49 +58,49 @@ struct Centroids {
     places: Vec<Place>,
 }
 
-/// How far centroids have gone since the bounds began: each one, in all and in the last round.
-struct Gone {
+/// Distances that centroids have moved since the bounds began: each one, in all and in the last round.
+struct Travel {
     each: Vec<f32>,
-    /// In the last round.
+    /// Distance of each centroid in the last round.
     last: Vec<f32>,
     furthest: f32,
-    /// The sum of each round's furthest.
+    /// Sum over the rounds of the largest distance in each.
     most: f64,
 }
 
-/// A block's points: where they belong and what is known about them.
+/// The points of a block: their groups and bounds.
 struct Bounds<'a> {
     labels: &'a mut [u32],
-    /// The largest distance to the own centroid, less the way it had gone.
+    /// Upper bound of the distance to the own centroid, less the distance that it had moved.
     own: &'a mut [f32],
-    /// The least distance to any other centroid, and the sum of the furthest ways on top.
+    /// Lower bound of the distance to any other centroid, plus the sum of the largest distances moved.
     others: &'a mut [f32],
-    /// What is known about all of them.
+    /// Bounds of the whole block.
     block: &'a mut Block,
 }
 
-/// What is known about a block.
+/// Bounds of a block.
 #[derive(Clone)]
 struct Block {
-    /// The sum of each round's furthest way of a candidate.
+    /// Sum over the rounds of the largest distance that a candidate moved.
     most: f64,
-    /// Nothing changes here until that sum is this.
+    /// Value of `most` up to which no point of the block changes its group.
     holds: f64,
-    /// The centroids that can be nearest or second nearest to any of its points, in order.
+    /// The centroids that can be nearest or second nearest to any point of the block, in order.
     candidates: Vec<u32>,
-    /// They are all until the sum of the furthest ways of any centroid is this.
+    /// Sum of the largest distances of any centroid up to which `candidates` is complete.
     complete: f64,
 }
 
-/// A point that went from one group to another; [`NOWHERE`] before the first round.
+/// Move of a point from one group to another; [`NOWHERE`] before the first round.
 type Change = (u32, u32, u32);
 const NOWHERE: u32 = u32::MAX;
 
-/// Runs until no point changes its group, or for as many rounds as there may be.
+/// Runs rounds until no point changes its group, or up to the largest number of rounds.
 pub(super) fn run<const BOUNDS: bool>(
     space: &Space,
     seeds: Vec<Place>,
-    pace: &Pace,
+    schedule: &Schedule,
     report: &dyn Fn(usize) -> Result<(), KMeansError>,
 ) -> Result<State, KMeansError> {
     let count = space.points.len();
@@ -111,7 +111,7 @@ pub(super) fn run<const BOUNDS: bool>(
     let mut others = vec![0.0; count];
     let mut known = vec![Block { most: 0.0, holds: NEVER, candidates: Vec::new(), complete: NEVER }; space.boxes.len()];
     let mut sums = vec![Sum::default(); groups];
-    let mut gone = Gone::new(groups);
+    let mut travel = Travel::new(groups);
     let mut rounds = 0;
     loop {
         let blocks = space
@@ -129,8 +129,8 @@ pub(super) fn run<const BOUNDS: bool>(
                 |(mut changes, mut room): (Vec<Change>, Vec<Eight>),
                  (at, ((((points, labels), own), others), block))| {
                     let mut bounds = Bounds { labels, own, others, block };
-                    if !BOUNDS || bounds.block.follow(&space.boxes[at], &centroids, &gone) {
-                        bounds.settle::<BOUNDS>(at * BLOCK, points, &centroids, &gone, &mut changes, &mut room);
+                    if !BOUNDS || bounds.block.follow(&space.boxes[at], &centroids, &travel) {
+                        bounds.settle::<BOUNDS>(at * BLOCK, points, &centroids, &travel, &mut changes, &mut room);
                     }
                     (changes, room)
                 },
@@ -147,17 +147,17 @@ pub(super) fn run<const BOUNDS: bool>(
             }
             sums[to as usize].add(place, 1);
         }
-        if changes.is_empty() || rounds >= pace.rounds {
+        if changes.is_empty() || rounds >= schedule.rounds {
             break;
         }
         rounds += 1;
         report(rounds)?;
         let fixed = space.fixed.len();
-        let swap = pace.jumps.contains(&rounds) && rearrange::worth(groups - fixed, count);
+        let swap = schedule.jumps.contains(&rounds) && rearrange::worth(groups - fixed, count);
         let mut moved: Vec<Place> = centroids.places.clone();
         let mut empty = Vec::new();
         let is_restless = rounds > 1 && changes.len() * RESTLESS > count;
-        let stride = if is_restless { pace.stride } else { 1.0 };
+        let stride = if is_restless { schedule.stride } else { 1.0 };
         for (group, sum) in sums.iter().enumerate().skip(fixed) {
             if sum.count > 0 {
                 let (mean, from) = (sum.mean(), moved[group]);
@@ -176,11 +176,11 @@ pub(super) fn run<const BOUNDS: bool>(
         if swap {
             rearrange::rearrange(space, &labels, &mut moved, rearrange::CLEARLY, usize::MAX);
         }
-        gone.go(&centroids.places, &moved);
-        // The sums of ways lose digits as they grow, which the slack no longer covers: begin the bounds anew. After a
-        // centroid has jumped no bound is worth anything.
-        if swap || gone.most > 4.0 {
-            gone = Gone::new(groups);
+        travel.go(&centroids.places, &moved);
+        // The sums of distances lose digits as they grow, which the slack would no longer cover: bounds begin anew.
+        // After a jump of a centroid no bound holds.
+        if swap || travel.most > 4.0 {
+            travel = Travel::new(groups);
             others.fill(f32::NEG_INFINITY);
             for block in &mut known {
                 (block.most, block.holds, block.complete) = (0.0, NEVER, NEVER);
@@ -200,7 +200,7 @@ pub(super) fn run<const BOUNDS: bool>(
     Ok(State { centroids: centroids.places, labels, square_error: blocks.iter().sum(), rounds })
 }
 
-/// Puts each group without points at a point that is furthest from its centroid (of equal ones the first).
+/// Puts each group without points at the point that is furthest from its centroid (the first of equal ones).
 fn refill(space: &Space, centroids: &Centroids, labels: &[u32], sums: &[Sum], empty: &[usize], moved: &mut [Place]) {
     let mut far: Vec<(f32, u32)> = space
         .points
@@ -227,13 +227,13 @@ fn exact_square(a: Place, b: Place) -> f64 {
 }
 
 impl Bounds<'_> {
-    /// Finds the nearest centroid of each point for which the bounds leave a doubt.
+    /// Finds the nearest centroid of each point whose bounds do not decide it.
     fn settle<const BOUNDS: bool>(
         &mut self,
         start: usize,
         points: &[Place],
         centroids: &Centroids,
-        gone: &Gone,
+        travel: &Travel,
         changes: &mut Vec<Change>,
         near: &mut Vec<Eight>,
     ) {
@@ -244,7 +244,7 @@ impl Bounds<'_> {
             let label = self.labels[at];
             if BOUNDS && label != NOWHERE {
                 let least = self.others[at] - most - SLACK;
-                let way = gone.each[label as usize];
+                let way = travel.each[label as usize];
                 let margin = least - (self.own[at] + way);
                 if margin > 0.0 {
                     room = room.min(margin);
@@ -267,7 +267,7 @@ impl Bounds<'_> {
                 nearest(&centroids.eights, *point)
             };
             let (distance, other) = (square.sqrt() + SLACK, second.sqrt());
-            self.own[at] = distance - gone.each[nearest as usize];
+            self.own[at] = distance - travel.each[nearest as usize];
             self.others[at] = other + most;
             room = room.min(other - SLACK - distance);
             if nearest != label {
@@ -275,12 +275,12 @@ impl Bounds<'_> {
                 self.labels[at] = nearest;
             }
         }
-        // Both bounds come nearer by no more than the furthest way.
+        // Both bounds approach each other by no more than the largest distance moved.
         self.block.holds = self.block.most + f64::from((room - SLACK).max(0.0)) * 0.5;
     }
 }
 
-impl Gone {
+impl Travel {
     fn new(groups: usize) -> Self {
         Self { each: vec![0.0; groups], last: vec![0.0; groups], furthest: 0.0, most: 0.0 }
     }
@@ -303,12 +303,12 @@ impl Centroids {
     }
 }
 
-/// The nearest centroid (of equally near ones the first), its squared distance, and that of the second nearest.
+/// The nearest centroid (the first of equally near ones), its squared distance, and that of the second nearest.
 fn nearest(eights: &[Eight], point: Place) -> (u32, f32, f32) {
     let [x, y, z] = point.map(f32x8::splat);
     let mut least = f32x8::splat(f32::INFINITY);
     let mut second = least;
-    // Exact in single precision up to 2^24 eights.
+    // Indices are exact in single precision up to 2^24 groups of eight.
     let mut which = f32x8::ZERO;
     for (at, eight) in eights.iter().enumerate() {
         let (dx, dy, dz) = (eight.x - x, eight.y - y, eight.z - z);
@@ -335,15 +335,15 @@ fn nearest(eights: &[Eight], point: Place) -> (u32, f32, f32) {
 }
 
 impl Block {
-    /// Follows the last round; whether a point may have changed its group.
-    fn follow(&mut self, around: &(Place, Place), centroids: &Centroids, gone: &Gone) -> bool {
-        let step = if gone.most < self.complete {
-            self.candidates.iter().fold(0.0_f32, |most, &group| most.max(gone.last[group as usize]))
+    /// Updates the block after the last round; returns whether a point may have changed its group.
+    fn follow(&mut self, around: &(Place, Place), centroids: &Centroids, travel: &Travel) -> bool {
+        let step = if travel.most < self.complete {
+            self.candidates.iter().fold(0.0_f32, |most, &group| most.max(travel.last[group as usize]))
         } else {
-            // Enough for some rounds like the last.
-            let ahead = self.choose(around, gone.furthest * 4.0, centroids);
-            self.complete = gone.most + f64::from(ahead);
-            gone.furthest
+            // Enough for some rounds like the last one.
+            let ahead = self.choose(around, travel.furthest * 4.0, centroids);
+            self.complete = travel.most + f64::from(ahead);
+            travel.furthest
         };
         self.most += f64::from(step);
         self.most >= self.holds
@@ -357,8 +357,9 @@ impl Block {
         );
     }
 
-    /// No point of the box is further from its two nearest than the second least of the furthest distances to the box.
-    /// Holds until centroids have gone `ahead`, or further if that costs few candidates: how far is returned.
+    /// Chooses the candidates of a box: no point of the box is further from its two nearest centroids than the second
+    /// least of the furthest distances to the box. They hold until centroids have moved by `ahead`, or further if that
+    /// costs few candidates; returns this distance.
     fn choose(&mut self, (low, high): &(Place, Place), ahead: f32, centroids: &Centroids) -> f32 {
         let (low, high) = (low.map(f32x8::splat), high.map(f32x8::splat));
         let mut least = f32x8::splat(f32::INFINITY);

@@ -1,29 +1,30 @@
-//! Centroids that jump: the way out of seeds that stand too close here and too far apart there.
+//! Jumps of centroids: a remedy for seeds that are too close in one place and too far apart in another.
 
 use super::{
     seeds::square_distance,
     space::{Place, Space},
 };
 
-/// A jump is clearly worth it if it promises to gain so many times what it costs.
+/// Least ratio of the expected gain to the cost of a jump during the rounds.
 pub(super) const CLEARLY: f64 = 2.5;
 
-/// What a group's points are like.
+/// Moments of a group's points.
 #[derive(Clone, Copy, Default)]
 struct Spread {
     count: f64,
     sum: [f64; 3],
-    /// xx, yy, zz, xy, xz, yz.
+    /// Sums of xx, yy, zz, xy, xz, yz.
     squares: [f64; 6],
 }
 
-/// Whether there are groups enough that could jump, and points enough in each to tell.
+/// Returns `true` if there are enough groups that could jump, and enough points in each to judge.
 pub(super) fn worth(free: usize, points: usize) -> bool {
     free >= 4 && points / free >= 8
 }
 
-/// Moves the centroids of groups whose points would hardly be worse off in the nearest other group to groups that gain most
-/// when they are cut in two, at most `most` of them, each if it promises to gain `worth` times what it costs. Fixed ones stay.
+/// Moves the centroids of groups whose points have the nearest other group almost as near to groups with the largest
+/// gain from a split, at most `most` of them, each if its expected gain is `worth` times its cost. Fixed centroids
+/// stay.
 pub(super) fn rearrange(space: &Space, labels: &[u32], centroids: &mut [Place], worth: f64, most: usize) {
     let mut jumps = 0;
     let fixed = space.fixed.len();
@@ -31,8 +32,8 @@ pub(super) fn rearrange(space: &Space, labels: &[u32], centroids: &mut [Place], 
     for (point, &label) in space.points.iter().zip(labels) {
         spreads[label as usize].add(*point);
     }
-    // Where groups lie as well as they can, all have the same square error: one more or less then gains or costs about as much
-    // as one group's error, once the neighbours have closed up.
+    // At the optimum all groups have the same square error: one group more or less then gains or costs about as much as
+    // one group's error, once the neighbours have adjusted.
     let mut losses: Vec<(f64, usize, usize)> = (fixed..centroids.len())
         .filter_map(|group| {
             let other = (0..centroids.len()).filter(|&other| other != group).min_by(|&a, &b| {
@@ -43,7 +44,7 @@ pub(super) fn rearrange(space: &Space, labels: &[u32], centroids: &mut [Place], 
         })
         .collect();
     losses.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    // The halves lie where they would if the points were spread evenly along the longest axis.
+    // The halves are placed as if the points were spread evenly along the longest axis.
     let mut gains: Vec<(f64, usize, Place)> = (fixed..centroids.len())
         .map(|group| {
             let (axis, variance) = spreads[group].longest();
@@ -102,7 +103,7 @@ impl Spread {
         let own = self.squares.map(|sum| sum * share);
         let c = [own[0] - x * x, own[1] - y * y, own[2] - z * z, own[3] - x * y, own[4] - x * z, own[5] - y * z];
         let rows = [[c[0], c[3], c[4]], [c[3], c[1], c[5]], [c[4], c[5], c[2]]];
-        // The power method from the longest row; a few steps are near enough.
+        // The power method from the longest row; a few steps are accurate enough.
         let length = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
         let mut axis = rows.into_iter().max_by(|a, b| length(*a).total_cmp(&length(*b))).unwrap_or_default();
         let mut variance = 0.0;

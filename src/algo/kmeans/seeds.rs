@@ -2,10 +2,10 @@
 
 use super::space::{BLOCK, Place, Space};
 
-/// Of so many draws the one that lowers the error most becomes the seed.
+/// Number of draws for a seed; the draw that lowers the error most is taken.
 const DRAWS: usize = 12;
 
-/// Numbers that look random: SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
+/// Pseudorandom numbers: SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
 pub(super) struct Random(u64);
 
 impl Random {
@@ -23,28 +23,28 @@ impl Random {
         bits ^ bits >> 31
     }
 
-    /// At least 0, less than 1.
+    /// A number from 0 (included) to 1 (excluded).
     fn part(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
 
-/// How far points are from the seeds so far.
-struct Far {
+/// Distances of points from the seeds so far.
+struct SeedDistances {
     /// The squared distance of each point to the nearest seed.
     square: Vec<f32>,
-    /// Their sum and their largest, for each block.
+    /// Sum and largest of the squared distances in each block.
     blocks: Vec<(f64, f32)>,
 }
 
-/// Chooses the first centroids, fixed ones first; or says how many different places there are, if they are too few.
+/// Chooses the first centroids, fixed ones first; fails with the number of different places if they are too few.
 pub(super) fn choose(space: &Space, groups: usize, mut random: Random) -> Result<Vec<Place>, usize> {
     let count = space.points.len();
     let blocks = space.boxes.iter().enumerate().map(|(block, _)| {
         let size = BLOCK.min(count - block * BLOCK);
         (size as f64 * f64::from(f32::MAX), f32::MAX)
     });
-    let mut far = Far { square: vec![f32::MAX; count], blocks: blocks.collect() };
+    let mut far = SeedDistances { square: vec![f32::MAX; count], blocks: blocks.collect() };
     let mut seeds = space.fixed.clone();
     for seed in &seeds {
         far.take(space, *seed);
@@ -75,7 +75,7 @@ pub(super) fn choose(space: &Space, groups: usize, mut random: Random) -> Result
     Ok(seeds)
 }
 
-/// Fills up with places that are no seeds yet, where all squared distances are (or are rounded to) zero.
+/// Fills up with places that are not seeds yet, where all squared distances are (or are rounded to) zero.
 fn finish(space: &Space, groups: usize, mut seeds: Vec<Place>) -> Result<Vec<Place>, usize> {
     let bits = |place: &Place| place.map(|value| (value + 0.0).to_bits());
     let mut places: Vec<[u32; 3]> = space.points.iter().map(bits).collect();
@@ -91,7 +91,7 @@ fn finish(space: &Space, groups: usize, mut seeds: Vec<Place>) -> Result<Vec<Pla
     Ok(seeds)
 }
 
-impl Far {
+impl SeedDistances {
     /// The point at which the sum of squared distances reaches `sum`.
     fn draw(&self, mut sum: f64) -> usize {
         let mut last = 0;
@@ -119,7 +119,7 @@ impl Far {
         chosen
     }
 
-    /// By how much a seed would lower the sum.
+    /// Decrease of the sum of squared distances by a seed.
     fn gain(&self, space: &Space, seed: Place) -> f64 {
         let mut gain = 0.0;
         for (block, &(_, largest)) in self.blocks.iter().enumerate() {

@@ -1,20 +1,21 @@
-//! Points as k-means works on them: in an order where neighbours are near, about their middle, one unit large.
+//! Points in the space of k-means: ordered so that neighbours are near, centred, and scaled to one unit.
 
 use glam::{DVec3, Vec3};
 
 use super::{KMeans, lloyd::State};
 use crate::algo::linkage::kd::{self, Site};
 
-/// More points than this might overflow a sum in whole numbers.
+/// Largest number of points whose integer sums cannot overflow.
 pub(super) const MAX_POINTS: usize = 1 << 28;
-/// Points are kept in blocks of this size.
+/// Number of points in a block.
 pub(super) const BLOCK: usize = 32;
-/// So many neighbours become one; in the order of points they are a box of their own.
+/// Number of neighbours merged into one coarse point; in the order of points they form a box.
 const COARSE: usize = 8;
-/// Fewer points than this do not need it, and fewer means to a group than this are too few.
+/// Least number of points for a coarse grouping.
 const MANY: usize = 1 << 15;
+/// Least number of coarse points per group.
 const EACH: usize = 16;
-/// Whole numbers are parts of this of a unit.
+/// Number of integer parts of a unit.
 const PARTS: f64 = (1_u64 << 34) as f64;
 
 /// A place, in units.
@@ -22,7 +23,7 @@ pub(super) type Place = [f32; 3];
 
 pub(super) struct Space {
     pub(super) points: Vec<Place>,
-    /// Where each of them was in the input.
+    /// Index of each point in the input.
     pub(super) index: Vec<u32>,
     pub(super) fixed: Vec<Place>,
     /// The box of each block of points.
@@ -56,7 +57,7 @@ impl Space {
         Self { points, index, fixed: fixed.iter().map(local).collect(), boxes, middle, unit }
     }
 
-    /// Means of neighbours that can stand for them; none where points are few.
+    /// Means of neighbours that stand for the points; `None` for few points.
     pub(super) fn coarse(&self, groups: usize) -> Option<Self> {
         let count = self.points.len();
         if count < MANY || count / COARSE < groups * EACH {
@@ -101,7 +102,7 @@ fn boxes(points: &[Place]) -> Vec<(Place, Place)> {
     points.chunks(BLOCK).map(around).collect()
 }
 
-/// A sum of places that is exact in any order.
+/// A sum of places in integers, exact in any order.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sum {
     parts: [i64; 3],

@@ -12,7 +12,7 @@ pub(super) struct Leaf {
     pub(super) variance: f32x8,
 }
 
-/// Eight boxes. A lane without a box is inside out at infinity.
+/// Eight boxes. A lane without a box has inverted bounds at infinity.
 #[derive(Clone, Copy)]
 struct Node {
     low: [f32x8; 3],
@@ -37,7 +37,7 @@ pub(super) struct Boxes {
 }
 
 impl Boxes {
-    /// Builds it over means and variances, which stand in an order where neighbours are near.
+    /// Builds the hierarchy over means and variances, ordered so that neighbours are near.
     pub(super) fn build(&mut self, means: impl ExactSizeIterator<Item = ([f32; 3], f32)>) {
         self.leaves.clear();
         self.leaves.resize(means.len().div_ceil(8), EMPTY_LEAF);
@@ -64,7 +64,7 @@ impl Boxes {
         &self.leaves[leaf]
     }
 
-    /// Takes a mean out. Boxes stay as they are.
+    /// Removes a mean. Boxes are not shrunk.
     pub(super) fn remove(&mut self, slot: usize) {
         self.leaves[slot / 8].put(slot % 8, [f32::INFINITY; 3], 0.0);
     }
@@ -79,8 +79,8 @@ impl Boxes {
         }
     }
 
-    /// Calls `visit` with each leaf that comes within a squared distance of `place`; it returns that distance, which may
-    /// fall on the way. `stack` is room to work in.
+    /// Calls `visit` with each leaf within a squared distance of `place`; it returns that distance, which may fall on
+    /// the way. `stack` is a buffer.
     pub(super) fn near(
         &self,
         place: [f32; 3],

@@ -4,25 +4,25 @@ use rayon::prelude::*;
 
 use super::{LinkageError, engine::Cluster, history::History, moments::Tree, pair::Points};
 
-/// How many clusters the matrix is filled for.
+/// Number of clusters from which the matrix is filled.
 pub(super) fn clusters(points: usize) -> usize {
     LAST.min(points)
 }
 
-/// What is left of a cluster.
+/// Row of a cluster in the matrix.
 #[derive(Clone, Copy)]
 struct Row {
     node: u32,
     size: u32,
-    /// Its nearest row, or [`NONE`].
+    /// Nearest row, or [`NONE`].
     nearest: u32,
     distance: f64,
 }
 
-/// So many clusters have few enough distances for a matrix, and are small enough for sums before.
+/// Number of clusters with few enough distances for a matrix, and small enough for sums before.
 const LAST: usize = 384;
 const NONE: u32 = u32::MAX;
-/// Fewer distances than this are compared on one thread.
+/// Largest number of distances that are compared on one thread.
 const ALONE: usize = 1 << 15;
 
 struct Matrix {
@@ -49,7 +49,7 @@ pub(super) fn finish(
     Ok(())
 }
 
-/// Cuts each cluster into blocks, and puts the points in their order.
+/// Cuts each cluster into blocks, and sorts the points by block.
 fn plant(clusters: &[Cluster], points: &Points) -> (Vec<Tree>, Points) {
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     let mut parts: Vec<&mut [u32]> = Vec::with_capacity(clusters.len());
@@ -76,7 +76,7 @@ impl Matrix {
             .collect();
         let mut cells = vec![f64::INFINITY; stride * stride];
         let (trees, points) = plant(clusters, points);
-        // Rows get longer, so a run of rows is taken from either end.
+        // Rows get longer, so each task takes rows from both ends.
         cells.par_chunks_mut(stride).enumerate().with_max_len(4).for_each(|(at, row)| {
             for (to, cell) in row[..at].iter_mut().enumerate() {
                 let count = f64::from(clusters[to].span.size) * f64::from(clusters[at].span.size);
@@ -139,7 +139,7 @@ impl Matrix {
         for &(a, b) in &pairs {
             self.merge(a as usize, b as usize, history);
         }
-        // Rows that had a merged one as nearest are searched again.
+        // Rows whose nearest row was merged are searched again.
         let mut merged = vec![false; self.rows.len()];
         for &(a, b) in &pairs {
             merged[a as usize] = true;
@@ -172,7 +172,7 @@ impl Matrix {
         self.rows[b] = Row { node, size: 0, nearest: NONE, distance: f64::INFINITY };
     }
 
-    /// Takes dead rows and columns out.
+    /// Removes dead rows and columns.
     fn close_gaps(&mut self, work: &mut [u32]) {
         let kept: Vec<usize> = (0..self.rows.len()).filter(|&at| self.rows[at].size > 0).collect();
         let mut moved = vec![NONE; self.rows.len()];

@@ -13,26 +13,26 @@ use super::{
     search::{Room, Scene},
 };
 
-/// A cluster. Its slot in the list changes from time to time, its node does not.
+/// A cluster. Its slot in the list may change, its node does not.
 #[derive(Clone, Copy)]
 pub(super) struct Cluster {
     pub(super) mean: [f64; 3],
     /// Mean squared distance of its points from their mean.
     pub(super) variance: f64,
     pub(super) span: Span,
-    /// Its number in the history.
+    /// Number of the cluster in the history.
     pub(super) node: u32,
-    /// The slot of its nearest cluster, or [`NONE`].
+    /// Slot of the nearest cluster, or [`NONE`].
     nearest: u32,
     distance: f64,
 }
 
 const NONE: u32 = u32::MAX;
-/// A node that is no more.
+/// Marks a cluster that was merged into another.
 const DEAD: u32 = u32::MAX;
-/// Fewer searches than this are done on one thread.
+/// Largest number of searches on one thread.
 const ALONE: usize = 64;
-/// Searches are handed out in runs of so many.
+/// Number of searches in a task.
 const RUN: usize = 128;
 
 impl Cluster {
@@ -53,12 +53,12 @@ struct Engine {
     points: Points,
     boxes: Boxes,
     history: History,
-    /// For each slot the first slot that has it as nearest, and for each slot the next with the same nearest.
+    /// Linked lists by slot: the first slot that has it as nearest, and the next slot with the same nearest.
     asked_by: Vec<u32>,
     next_asker: Vec<u32>,
-    /// Clusters left.
+    /// Number of clusters left.
     alive: usize,
-    /// The same when the boxes were built.
+    /// Number of clusters when the boxes were built.
     built_with: usize,
     middle: [f64; 3],
     slack: f32,
@@ -94,20 +94,20 @@ pub(super) fn run<const SQUARE: bool>(points: &[Vec3], progress: Progress) -> Re
 
 /// A place with all points that lie there.
 struct Place {
-    /// One of them.
+    /// Index of one of the points.
     first: u32,
     node: u32,
     size: u32,
 }
 
-/// Merges points that coincide, which are each other's nearest in any case: searches would meet all of them as ties.
+/// Merges points that coincide; they are each other's nearest in any case, and searches would meet all of them as ties.
 fn merge_equal(points: &[Vec3], history: &mut History) -> Vec<Place> {
     let bits = |at: u32| (points[at as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
     let mut order: Vec<(u64, u32)> = (0..points.len() as u32).map(|at| (mix(bits(at)), at)).collect();
     order.par_sort_unstable();
     let mut places: Vec<Place> = Vec::with_capacity(points.len());
     for run in order.chunk_by(|a, b| a.0 == b.0) {
-        // Places that only share their key are told apart.
+        // Places that only share their key are separated.
         let start = places.len();
         for &(_, at) in run {
             match places[start..].iter_mut().find(|place| bits(place.first) == bits(at)) {
@@ -129,10 +129,10 @@ fn mix([x, y, z]: [u32; 3]) -> u64 {
     key ^ key >> 32
 }
 
-/// Where points are and how large: inside, they span one unit, so that no square is too large or too small.
+/// Position and scale of the points: inside, they span one unit, so that no square overflows or underflows.
 struct Frame {
     middle: [f64; 3],
-    /// A power of two, so that nothing is rounded.
+    /// Scale, a power of two, so that nothing is rounded.
     unit: f64,
 }
 
@@ -208,7 +208,7 @@ impl Engine {
         self.boxes.build(self.clusters.iter().map(|cluster| (local(cluster, middle), cluster.variance as f32)));
     }
 
-    /// One round. `work` holds the slots whose nearest cluster is not known, in order, before and after.
+    /// Runs one round. `work` holds the slots whose nearest cluster is not known, in order, before and after.
     fn round<const SQUARE: bool>(&mut self, work: &mut Vec<u32>) {
         let scene = Scene { clusters: &self.clusters, boxes: &self.boxes, points: &self.points, slack: self.slack };
         let found: Vec<Option<(u32, f64)>> = if work.len() <= ALONE {
@@ -227,7 +227,7 @@ impl Engine {
                 self.asked_by[nearest as usize] = slot;
             }
         }
-        // A pair of which both were searched is met twice: the second time it has merged already.
+        // A pair whose clusters were both searched appears twice: the second time it has merged already.
         let searched = std::mem::take(work);
         for &slot in &searched {
             let cluster = &self.clusters[slot as usize];
@@ -244,7 +244,8 @@ impl Engine {
         work.dedup();
     }
 
-    /// Merges the nearest pair of all. Rounding may leave a ring of ties in which no two are each other's nearest.
+    /// Merges the nearest pair of all. Rounding may leave a ring of ties in which no two clusters are each other's
+    /// nearest.
     fn merge_least(&mut self, work: &mut Vec<u32>) {
         let known =
             self.clusters.iter().enumerate().filter(|(_, cluster)| cluster.is_alive() && cluster.nearest != NONE);
@@ -255,7 +256,8 @@ impl Engine {
         }
     }
 
-    /// Merges `second` into `first`, and puts both it and those that had one of them as nearest on `work`.
+    /// Merges `second` into `first`, and adds the merged cluster and all clusters that had one of them as nearest to
+    /// `work`.
     fn merge(&mut self, first: u32, second: u32, work: &mut Vec<u32>) {
         let (i, j) = (first as usize, second as usize);
         let (a, b) = (self.clusters[i], self.clusters[j]);
@@ -299,7 +301,7 @@ impl Engine {
         }
     }
 
-    /// Closes the gaps that merges left, puts each cluster's points together and builds the boxes anew.
+    /// Closes the gaps that merges left, stores each cluster's points contiguously and rebuilds the boxes.
     fn rebuild(&mut self, work: &mut [u32]) {
         let mut moved = vec![NONE; self.clusters.len()];
         let mut points = Points::with_capacity(self.points.x.capacity());
@@ -329,7 +331,7 @@ impl Engine {
     }
 }
 
-/// A cluster's mean from the middle, in single precision.
+/// A cluster's mean relative to `middle`, in single precision.
 fn local(cluster: &Cluster, middle: [f64; 3]) -> [f32; 3] {
     let mean = cluster.mean;
     [(mean[0] - middle[0]) as f32, (mean[1] - middle[1]) as f32, (mean[2] - middle[2]) as f32]

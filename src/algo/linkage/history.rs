@@ -1,10 +1,10 @@
-//! Merges as they are found, and put in the order of their heights.
+//! Merge history: merges as they are found, then sorted by height.
 
 use rayon::prelude::*;
 
 use super::{Dendrogram, Merge};
 
-/// Merges in the order they were found. Node numbers count points first, then merges in this order.
+/// Merges in the order in which they were found. Node numbers count points first, then merges in this order.
 pub(super) struct History {
     points: usize,
     joins: Vec<Join>,
@@ -25,14 +25,14 @@ impl History {
 
     /// Notes a merge and returns the node it makes.
     ///
-    /// Rounding must not put a whole below its parts, so the height is at least theirs.
+    /// The height is at least that of both parts, whatever the rounding.
     pub(super) fn join(&mut self, first: u32, second: u32, height: f64, size: u32) -> u32 {
         let height = (height as f32).min(f32::MAX).max(self.height(first)).max(self.height(second));
         self.joins.push(Join { first, second, size, height });
         (self.points + self.joins.len() - 1) as u32
     }
 
-    /// How many merges there are.
+    /// Number of merges.
     pub(super) fn len(&self) -> usize {
         self.joins.len()
     }
@@ -44,12 +44,13 @@ impl History {
         }
     }
 
-    /// The same merges by height, numbered anew.
+    /// The merges sorted by height and renumbered.
     ///
-    /// Heights are multiplied by `unit`. Parts were found before their wholes and are never higher, so a stable order keeps them before.
+    /// Heights are multiplied by `unit`. Parts were found before their wholes and are never higher, so a stable sort
+    /// keeps them before.
     pub(super) fn finish(self, unit: f64) -> Dendrogram {
         let points = self.points;
-        // Heights are not negative, so their bits are in order, too.
+        // Heights are not negative, so the order of their bits is that of the numbers.
         let mut order: Vec<u64> = self
             .joins
             .iter()

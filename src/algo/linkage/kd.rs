@@ -2,19 +2,19 @@
 
 use rayon::join;
 
-/// A place and whose it is.
+/// A place and its owner.
 #[derive(Clone, Copy)]
 pub(crate) struct Site {
     pub(crate) at: [f32; 3],
     pub(crate) index: u32,
 }
 
-/// How many sites a leaf has, whose order does not matter.
+/// Number of sites in a leaf, whose order does not matter.
 const LEAF: usize = 8;
-/// Fewer sites than this are not worth a second thread.
+/// Largest number of sites sorted on one thread.
 const ALONE: usize = 2048;
 
-/// Orders sites so that each aligned block of 8, 16, 32... is a box of its own, split across its longest side.
+/// Orders sites so that each aligned block of 8, 16, 32... is compact: it comes from splits across the longest side.
 pub(crate) fn order(sites: &mut [Site]) {
     if sites.len() <= LEAF {
         return;

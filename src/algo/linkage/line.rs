@@ -9,9 +9,9 @@ use super::{Dendrogram, LinkageError, Progress, history::History};
 struct Interval {
     /// Sum of its values.
     sum: f64,
-    /// How many they are.
+    /// Number of values.
     size: u32,
-    /// Its node in the history.
+    /// Node of the interval in the history.
     node: u32,
 }
 
@@ -21,14 +21,14 @@ impl Interval {
     }
 }
 
-/// How many merges between two calls of the progress function.
+/// Number of merges between two calls of the progress callback.
 const REPORT: usize = 1 << 14;
 
 /// Clusters finite values.
 ///
-/// A chain along the line: the gaps between the intervals on the left stack fall towards its top. While the gap ahead is
-/// smaller still, the chain goes on; else the two topmost are each other's nearest, merge, and wait on the right to be met
-/// again, since their gap to the left has grown. Each merge adds one step, so the time is linear.
+/// The gaps between the intervals on the left stack fall towards its top. While the gap ahead is smaller still, the
+/// chain goes on; else the two topmost intervals are each other's nearest and merge. The merged interval waits on the
+/// right, since its gap to the left has grown. Each merge adds one step, so the time is linear.
 pub(super) fn run(values: &[f32], progress: Progress) -> Result<Dendrogram, LinkageError> {
     let mut sorted: Vec<u64> =
         values.iter().enumerate().map(|(at, &value)| u64::from(ordered(value)) << 32 | at as u64).collect();
@@ -46,7 +46,7 @@ pub(super) fn run(values: &[f32], progress: Progress) -> Result<Dendrogram, Link
             (Some((top, _)), Some(next)) => (next.mean() - top.mean()).max(0.0),
             _ => f64::INFINITY,
         };
-        // Of equal gaps the left one is taken.
+        // The left of two equal gaps is taken.
         if let Some(&(top, gap)) = left.last()
             && gap <= ahead
             && gap < f64::INFINITY
@@ -74,7 +74,7 @@ pub(super) fn run(values: &[f32], progress: Progress) -> Result<Dendrogram, Link
     Ok(history.finish(1.0))
 }
 
-/// Bits in the order of the numbers; both zeros are one.
+/// Bits in the order of the numbers; both zeros are equal.
 fn ordered(value: f32) -> u32 {
     let bits = (value + 0.0).to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }

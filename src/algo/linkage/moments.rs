@@ -1,29 +1,29 @@
 //! Mean distances of clusters that are far from each other, by their moments.
 //!
-//! With Δ between the means of two clusters and x the difference of two points' places from these means, the distance is
-//! |Δ + x|, a series in t = |x| / |Δ| whose terms are (up to sign) Gegenbauer polynomials of the angle: with p the part of x
-//! along Δ and s = x², both in units of Δ,
+//! With Δ between the means of two clusters and x the difference of two points' places from these means, the distance
+//! is |Δ + x|, a series in t = |x| / |Δ| whose terms are (up to sign) Gegenbauer polynomials of the angle: with p the
+//! part of x along Δ and s = x², both in units of Δ,
 //!
 //! |Δ + x| / |Δ| = 1 + p + (s - p²)/2 + (p³ - ps)/2 + (-s² + 6p²s - 5p⁴)/8 + ...
 //!
-//! Its mean over all pairs needs the clusters' moments only. The n-th term is at most 2/(2n - 1) tⁿ, since it is a difference
-//! of two Legendre polynomials over 2n - 1. So what is left out after the fourth is at most 2/9 E(t⁴) r/(1 - r), where r is
-//! the largest t. Clusters for which that is too much are halved; small ones are summed.
+//! Its mean over all pairs needs the clusters' moments only. The n-th term is at most 2/(2n - 1) tⁿ, since it is a
+//! difference of two Legendre polynomials over 2n - 1. So the error of omitting all terms after the fourth is at most
+//! 2/9 E(t⁴) r/(1 - r), where r is the largest t. Clusters with a larger error are halved; small ones are summed.
 
 use super::pair::{Points, Span};
 
-/// The part of a distance that leaving out higher moments may cost, at most; a fiftieth of it is usual.
+/// Largest relative error of a distance by omitted moments; a fiftieth of it is usual.
 const LEFT_OUT: f64 = 2e-5;
-/// Blocks of points of at most this size are not halved.
+/// Largest block that is not halved.
 const LEAF: u32 = 12;
-/// Pairs of blocks with at most so many pairs of points are summed at once.
+/// Largest number of pairs of points that are summed directly.
 const FEW: u32 = 32;
 
 /// A block of points and its central moments.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Block {
     mean: [f64; 3],
-    /// The furthest point from the mean.
+    /// Distance of the furthest point from the mean.
     radius: f64,
     /// E(x²).
     square: f64,
@@ -35,16 +35,16 @@ pub(super) struct Block {
     third_trace: [f64; 3],
     /// xxx, yyy, zzz, xxy, xxz, yyx, yyz, zzx, zzy, xyz.
     third: [f64; 10],
-    /// As `second`, each times the length squared.
+    /// The moments of `second`, each times the length squared.
     fourth_trace: [f64; 6],
     /// xxxx, yyyy, zzzz, xxxy, xxxz, yyyx, yyyz, zzzx, zzzy, xxyy, xxzz, yyzz, xxyz, yyxz, zzxy.
     fourths: [f64; 15],
     span: Span,
-    /// The first of its two halves, or 0.
+    /// Index of the first of its two halves, or 0.
     halves: u32,
 }
 
-/// Blocks of one cluster, halves of each other; the first is the whole.
+/// Blocks of one cluster, each split into halves; the first is the whole.
 pub(super) struct Tree {
     blocks: Vec<Block>,
 }
@@ -119,7 +119,7 @@ fn longest(points: &Points, part: &[u32]) -> usize {
     }
 }
 
-/// The mean distance, if the clusters are so far that what is left out does not matter.
+/// The mean distance, if the clusters are so far apart that the omitted terms do not matter.
 fn far(a: &Block, b: &Block) -> Option<f64> {
     let delta = [b.mean[0] - a.mean[0], b.mean[1] - a.mean[1], b.mean[2] - a.mean[2]];
     let square = dot(delta, delta);
@@ -129,7 +129,7 @@ fn far(a: &Block, b: &Block) -> Option<f64> {
         return None;
     }
     let inverse = 1.0 / square;
-    // E|x|⁴ of the difference: each one's own, and what the two make together.
+    // E|x|⁴ of the difference: the parts' own moments, and their mixed terms.
     let (c, k) = (&a.second, &b.second);
     let crossed = c[0] * k[0] + c[1] * k[1] + c[2] * k[2] + 2.0 * (c[3] * k[3] + c[4] * k[4] + c[5] * k[5]);
     let fourth = a.fourth + b.fourth + 2.0 * a.square * b.square + 4.0 * crossed;
@@ -147,7 +147,7 @@ fn far(a: &Block, b: &Block) -> Option<f64> {
     let (pa, pb) = (dot(u, ca), dot(u, cb));
     let p2 = (pa + pb) * inverse;
     let s = (a.square + b.square) * inverse;
-    // Odd moments of b - a: those of a change their sign.
+    // Odd moments of b - a: the moments of a change their sign.
     let t = |at: usize| b.third[at] - a.third[at];
     let p3 = t(0) * xx * x
         + t(1) * yy * y

@@ -2,7 +2,7 @@
 
 use wide::f32x4;
 
-/// Points as three lists.
+/// Points as three lists of coordinates.
 #[derive(Clone, Default)]
 pub(super) struct Points {
     pub(super) x: Vec<f32>,
@@ -10,18 +10,18 @@ pub(super) struct Points {
     pub(super) z: Vec<f32>,
 }
 
-/// Where a cluster's points are.
+/// Range of a cluster's points.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Span {
     pub(super) start: u32,
     pub(super) size: u32,
 }
 
-/// How far from the truth [`Points::sum`] may be, in parts of it: differences, squares, sums and the root are rounded once
-/// each (about 3 units in all), and a lane sums at most nine in single precision.
+/// Largest relative error of [`Points::sum`]: differences, squares, sums and the root are rounded once each (about 3
+/// units in all), and a lane sums at most nine in single precision.
 pub(super) const ROUNDING: f64 = 8e-7;
 
-/// So many fours are summed in single precision before they are added in double precision.
+/// Number of groups of four that are summed in single precision before they are added in double precision.
 const BLOCK: usize = 8;
 
 impl Points {
@@ -73,9 +73,10 @@ impl Points {
         sum
     }
 
-    /// The sum of distances over all pairs to [`ROUNDING`]. The order of the two matters for the last bits.
+    /// The sum of distances over all pairs, with the relative error [`ROUNDING`]. The order of the two matters for the
+    /// last bits.
     pub(super) fn sum(&self, a: Span, b: Span) -> f64 {
-        // The longer one is taken in fours.
+        // The longer one is processed in fours.
         let (a, b) = if a.size > b.size { (b, a) } else { (a, b) };
         if b.size < 4 {
             return self.exact_sum(a, b);

@@ -1,4 +1,4 @@
-//! The nearest cluster of a cluster.
+//! Search for the nearest cluster of a cluster.
 
 use wide::{CmpLe, f32x8};
 
@@ -8,13 +8,13 @@ use super::{
     pair::{Points, ROUNDING},
 };
 
-/// What clusters are searched in.
+/// Data that searches run on.
 #[derive(Clone, Copy)]
 pub(super) struct Scene<'a> {
     pub(super) clusters: &'a [Cluster],
     pub(super) boxes: &'a Boxes,
     pub(super) points: &'a Points,
-    /// How far a mean in single precision may be from the true one.
+    /// Largest error of a mean in single precision.
     pub(super) slack: f32,
 }
 
@@ -24,22 +24,22 @@ struct Candidate {
     slot: u32,
     /// Squared distance of the means.
     square: f32,
-    /// The mean distance, once it is known.
+    /// The mean distance, once it is computed.
     distance: f64,
 }
 
-/// Room that searches on one thread use again.
+/// Buffers reused by the searches of a thread.
 #[derive(Default)]
 pub(super) struct Room {
     stack: Vec<(u32, u32, f32)>,
     candidates: Vec<Candidate>,
 }
 
-/// Each bound on a distance is widened by this part of it, more than it is rounded by.
+/// Factor that widens each bound on a distance, more than its rounding error.
 const WIDER: f32 = 1.0 + 4e-6;
 
 impl Scene<'_> {
-    /// The nearest cluster of the one in `slot` and its distance, or none if it is alone.
+    /// The nearest cluster of the one in `slot` and its distance, or `None` if it is alone.
     ///
     /// With `SQUARE` the distance is the mean squared one.
     pub(super) fn nearest<const SQUARE: bool>(&self, slot: u32, room: &mut Room) -> Option<(u32, f64)> {
@@ -96,7 +96,7 @@ impl Scene<'_> {
         }
         let this = &self.clusters[own];
         let mut best = f64::INFINITY;
-        // Sums are uncertain by this part; squares are computed without.
+        // Sums have this relative uncertainty; squares are exact enough.
         let band = if SQUARE { 1.0 } else { 1.0 + 2.5 * ROUNDING };
         let mut reach = f32::INFINITY;
         for candidate in candidates.iter_mut() {
@@ -123,7 +123,7 @@ impl Scene<'_> {
             if !SQUARE && close > 1 {
                 distance = self.exact_distance(own, candidate.slot as usize);
             }
-            // Ties go to the pair whose younger cluster is older.
+            // Of tied pairs the one whose younger cluster is older wins.
             let better = chosen.is_none_or(|(slot, least)| {
                 distance < least || (distance == least && self.age(own, candidate.slot) < self.age(own, slot))
             });
@@ -139,7 +139,7 @@ impl Scene<'_> {
         (a.max(b), a.min(b))
     }
 
-    /// The same bits whichever of the two is first.
+    /// The mean distance, with the same bits in either order.
     fn mean_distance(&self, a: usize, b: usize) -> f64 {
         let (a, b) = (&self.clusters[a.min(b)], &self.clusters[a.max(b)]);
         self.points.sum(a.span, b.span) / (f64::from(a.span.size) * f64::from(b.span.size))

@@ -1,9 +1,9 @@
-//! The line of the limb's section centroids under a stroke.
+//! Centre line of a limb: the centroids of its sections under a stroke.
 //!
-//! Stations along the stroke feel out the limb's section square to its axis in space, which need not run in the view plane.
-//! Two passes: a coarse one finds the axis roughly and where the limb ends in something bigger (the shoulder in the chest, the
-//! hip in the pelvis), the second measures it square to that. Where sections are no longer the limb's own, the line
-//! goes on straight: the upper arm's axis into the shoulder.
+//! Stations along the stroke measure the limb's section at right angles to its axis in space, which need not lie in the
+//! view plane. There are two passes: a coarse one finds the approximate axis and the places where the limb joins a
+//! larger part (the shoulder in the chest, the hip in the pelvis), the second measures sections at right angles to that
+//! axis. Where sections are not the limb's own, the line is extrapolated: the upper arm's axis into the shoulder.
 
 use glam::Vec3;
 
@@ -16,27 +16,28 @@ use crate::mesh::{
     surface::Surface,
 };
 
-/// Every so many samples of the track, the coarse pass and the fine pass take a section.
+/// Strides of the coarse pass and the fine pass through the samples of the track.
 const COARSE: usize = 4;
 const FINE: usize = 2;
-/// A fan reaches so many radii: sections of hands, feet and flat limbs fit in.
+/// Reach of a fan in radii: sections of hands, feet and flat limbs fit in.
 const REACH: f32 = 2.2;
 
-/// So much more open than the median section is not the limb any more.
+/// Openness above the median section's from which a section is not the limb's own.
 const OPENER: f32 = 0.1;
 
-/// How many radii before such a border sections lean that way already.
+/// Distance in radii before the border to a larger part at which sections already lean towards it.
 const TRIM: f32 = 0.25;
-/// Something bigger is the limb going on if the stroke stays this near to its middle, for this long, in its radii.
+/// Limits, in radii, of the stroke's distance from a larger part's middle and of its length there, from which that part
+/// is the limb.
 const BESIDE: f32 = 0.4;
 const LASTING: f32 = 1.5;
-/// Over how many radii the direction is taken in which the line goes on.
+/// Length in radii over which the direction of the extrapolated line is measured.
 const STRAIGHT: f32 = 3.0;
 
-/// How far beside the stroke, in radii, a joint may be put where the limb has no section of its own.
+/// Largest distance of a joint from the stroke, in radii, where the limb has no section of its own.
 const TREMBLE: f32 = 0.35;
 
-/// One place along the centre line.
+/// A place along the centre line.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Station {
     /// Arc length along the stroke.
@@ -45,23 +46,23 @@ pub(super) struct Station {
     pub(super) radius: f32,
     /// Unit direction of the limb.
     pub(super) tangent: Vec3,
-    /// Whether the section here is the limb's own; otherwise centre and radius are carried on from those that are.
+    /// Marks a section of the limb itself; other centres and radii are extrapolated from those.
     pub(super) own: bool,
-    /// From the stroke to the line, across the view.
+    /// Vector from the stroke to the line, across the view.
     aside: Vec3,
 }
 
 /// A centre line.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
-    /// By rising arc length, at least two.
+    /// Stations by rising arc length, at least two.
     pub(super) stations: Vec<Station>,
     /// The median radius.
     pub(super) radius: f32,
 }
 
 impl Axis {
-    /// `None` if the stroke has no length inside the volume, or the volume no inside.
+    /// Finds the centre line; `None` if the stroke has no length inside the volume, or the volume no inside.
     pub(super) fn find(surface: &Surface, fan: &Fan, track: &Track) -> Option<Self> {
         let coarse = every(&track.samples, COARSE);
         let half = median(coarse.iter().map(|s| 0.5 * (s.span.far - s.span.near))).filter(|&half| half > 0.0)?;
@@ -86,7 +87,7 @@ impl Axis {
         Self::assemble(&fine, &sections, &normals, rough.radius)
     }
 
-    /// Joins sections to a line: finds those that are the limb's own, carries the line on over the others.
+    /// Joins sections to a line: finds the limb's own sections and extrapolates over the others.
     fn assemble(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3], radius: f32) -> Option<Self> {
         let own = own(samples, sections, normals)?;
         let measured = |i: usize| sections[i].filter(|_| own[i]);
@@ -97,7 +98,7 @@ impl Axis {
         let smoothed = smooth(&centres, 0.4 * radius);
         let line = match directed(&smoothed, radius) {
             Some(line) => line,
-            // One own section only: the direction of the stroke in space is all there is.
+            // With a single own section the direction of the stroke in space is used.
             None => {
                 let across = (samples[samples.len() - 1].middle - samples[0].middle).try_normalize()?;
                 smoothed.iter().map(|&centre| (centre, across)).collect()
@@ -114,7 +115,8 @@ impl Axis {
                     let end = next.saturating_sub(1);
                     let (from, tangent) = end_line(&line, radii[end], next == 0);
                     let on_line = under(from, tangent, &sample.ray);
-                    // Far beyond the limb or beside the stroke its line says nothing any more; the volume's middle does.
+                    // Far beyond the limb or beside the stroke the extrapolated line is unreliable; the volume's middle
+                    // is used.
                     let far = on_line.distance(from) / radii[end];
                     let beside = across(on_line, &sample.ray).length() / radii[end];
                     let trust = (0.5 * (5.0 - far)).min(2.0 - beside).clamp(0.0, 1.0);
@@ -131,7 +133,7 @@ impl Axis {
         (stations.len() > 1).then_some(Self { stations, radius })
     }
 
-    /// The line under `ray`, which stands at the arc length `at` of the stroke.
+    /// The station under `ray`, which is at the arc length `at` of the stroke.
     pub(super) fn station(&self, at: f32, ray: &Ray) -> Station {
         let next = self.stations.partition_point(|s| s.at < at).clamp(1, self.stations.len() - 1);
         let (a, b) = (self.stations[next - 1], self.stations[next]);
@@ -144,7 +146,7 @@ impl Axis {
         Station { at, centre: centre + slid.clamp_length_max(radius), radius, tangent, ..nearer }
     }
 
-    /// How far the stroke runs beside the line, on average; what a hand trembles does not count.
+    /// Mean distance of the stroke from the line; the trembling of a hand is averaged out.
     pub(super) fn aside(&self) -> f32 {
         let pieces: Vec<f32> = self
             .stations
@@ -154,7 +156,7 @@ impl Axis {
         pieces.iter().sum::<f32>() / pieces.len() as f32
     }
 
-    /// The centroid of the limb's section under `ray`, which stands at the arc length `at` of the stroke, and its radius.
+    /// The centroid of the limb's section under `ray`, which is at the arc length `at` of the stroke, and its radius.
     pub(super) fn recentre(
         &self,
         surface: &Surface,
@@ -165,7 +167,8 @@ impl Axis {
     ) -> (Vec3, f32) {
         let station = self.station(at, ray);
         if !station.own {
-            // Nothing was measured here: the line may correct a trembling hand, not lead away from the stroke.
+            // No section was measured here: the line may correct a trembling hand, but must not lead away from the
+            // stroke.
             let aside = across(station.centre, ray);
             let too_far = aside - aside.clamp_length_max(TREMBLE * station.radius);
             return (station.centre - too_far, station.radius);
@@ -175,11 +178,11 @@ impl Axis {
     }
 }
 
-/// Which sections are the limb's own.
+/// Marks the limb's own sections.
 ///
-/// Starts at the section of median size and walks both ways. Not the limb's is a section that is open although those of
-/// the limb are closed, whose centre jumps aside, or that grows and at the same time leaves the line of those a radius back.
-/// `None` if there is no section at all.
+/// The walk starts at the section of median size and goes both ways. A section is not the limb's own if it is open
+/// although the limb's sections are closed, if its centre jumps aside, or if it grows and at the same time leaves the
+/// line of the sections a radius back. `None` if there is no section at all.
 fn own(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3]) -> Option<Vec<bool>> {
     let mut by_size: Vec<(f32, usize)> =
         sections.iter().enumerate().filter_map(|(i, s)| s.map(|s| (s.radius, i))).collect();
@@ -203,14 +206,15 @@ fn own(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3]) -> Op
             let (back, normal) = back.copied().unwrap_or(line[0]);
             let way = section.centroid - back.centroid;
             let aside = (way.reject_from_normalized(normal).length() - 0.1 * way.length()) / back.radius;
-            // A pinch in the limb is no measure for what comes after it.
+            // A constriction of the limb is no measure for later sections.
             let growth = section.radius / back.radius.max(0.8 * line[0].0.radius);
             if section.open > open || jump > 0.6 {
                 other.clear();
                 continue;
             }
             if growth > 1.8 || (growth > 1.2 && aside > 0.1) {
-                // Something bigger. If the stroke goes on along its middle, that is the limb now: a thigh after the knee.
+                // A larger part begins. If the stroke goes on along its middle, that part is the limb now: a thigh
+                // after the knee.
                 let beside = across(section.centroid, &samples[i].ray).length();
                 if beside > BESIDE * section.radius {
                     other.clear();
@@ -228,7 +232,7 @@ fn own(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3]) -> Op
                 line.extend(sections[i].map(|s| (s, normals[i])));
             }
         }
-        // Just before the limb ends in something bigger its sections already lean that way.
+        // Just before the limb joins a larger part its sections already lean towards it.
         let Some(border) = way.iter().position(|&i| !own[i]) else { continue };
         for &i in way[..border].iter().rev() {
             let (Some(here), Some(section)) = (sections[i], sections[way[border.saturating_sub(1)]]) else { continue };
@@ -241,7 +245,8 @@ fn own(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3]) -> Op
     Some(own)
 }
 
-/// The point and direction from which the line goes on straight beyond its start or end: the mean over two radii.
+/// Point and direction from which the line is extrapolated beyond its start or end: the mean direction over
+/// [`STRAIGHT`] radii.
 fn end_line(line: &[(Vec3, Vec3)], radius: f32, at_start: bool) -> (Vec3, Vec3) {
     let end = if at_start { 0 } else { line.len() - 1 };
     let (from, tangent) = line[end];
@@ -255,13 +260,13 @@ fn end_line(line: &[(Vec3, Vec3)], radius: f32, at_start: bool) -> (Vec3, Vec3) 
     (from, sum.try_normalize().unwrap_or(tangent))
 }
 
-/// From a ray to a point, square to the ray.
+/// Vector from a ray to a point, at right angles to the ray.
 fn across(point: Vec3, ray: &Ray) -> Vec3 {
     (point - ray.origin).reject_from_normalized(ray.direction)
 }
 
-/// The point of the line from `from` along the unit vector `direction` that comes closest to `ray`; `from` itself where the
-/// line runs nearly along the ray.
+/// The point of the line from `from` along the unit vector `direction` that comes closest to `ray`; `from` itself if
+/// the line is nearly parallel to the ray.
 fn under(from: Vec3, direction: Vec3, ray: &Ray) -> Vec3 {
     let along = direction.dot(ray.direction);
     let steep = 1.0 - along * along;
@@ -272,7 +277,7 @@ fn under(from: Vec3, direction: Vec3, ray: &Ray) -> Vec3 {
     from + direction * ((direction.dot(to) - along * ray.direction.dot(to)) / steep)
 }
 
-/// Every `step`-th sample and the last.
+/// Samples at every `step`-th index, and the last.
 fn every(samples: &[Sample], step: usize) -> Vec<Sample> {
     let mut some: Vec<Sample> = samples.iter().copied().step_by(step).collect();
     if !(samples.len() - 1).is_multiple_of(step) {
@@ -281,14 +286,14 @@ fn every(samples: &[Sample], step: usize) -> Vec<Sample> {
     some
 }
 
-/// Mean of each point and its neighbours, which weigh less the more reaches away they are along the line.
+/// Mean of each point and its neighbours, with weights that fall with the distance along the line in units of `reach`.
 fn smooth(points: &[Vec3], reach: f32) -> Vec<Vec3> {
     let mut along = vec![0.0; points.len()];
     for i in 1..points.len() {
         along[i] = along[i - 1] + points[i].distance(points[i - 1]);
     }
     let mean = |i: usize| {
-        // Equally far to both sides, so that the mean does not shorten the line at its ends.
+        // The window is equal on both sides, so that the mean does not shorten the line at its ends.
         let room = (along[i] - along[0]).min(along[points.len() - 1] - along[i]);
         let mut sum = points[i];
         let mut total = 1.0;
@@ -304,8 +309,8 @@ fn smooth(points: &[Vec3], reach: f32) -> Vec<Vec3> {
     (0..points.len()).map(mean).collect()
 }
 
-/// Each point with the direction of the secant that reaches at least `reach` to both sides, where the line is long
-/// enough. `None` if all points are one.
+/// Points with the direction of the secant that reaches at least `reach` to both sides, where the line is long enough.
+/// `None` if all points are equal.
 fn directed(points: &[Vec3], reach: f32) -> Option<Vec<(Vec3, Vec3)>> {
     let last = points.len().checked_sub(1)?;
     let overall = (points[last] - points[0]).try_normalize()?;
@@ -318,7 +323,7 @@ fn directed(points: &[Vec3], reach: f32) -> Option<Vec<(Vec3, Vec3)>> {
     Some((0..=last).map(direction).collect())
 }
 
-/// The median; `None` of nothing.
+/// The median; `None` of an empty list.
 fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
     let mut values: Vec<f32> = values.collect();
     values.sort_by(f32::total_cmp);

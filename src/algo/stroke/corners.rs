@@ -1,15 +1,15 @@
-//! Where a wanted number of joints goes: the polyline through so many points of the limb's centre line that fits it best.
+//! Places of a given number of joints: the polyline with this many corners that fits the limb's centre line best.
 //!
-//! The centre line and not the stroke is fitted, because it is known in depth, where the bend of an elbow may lie, and is
-//! steadier than a hand. Where the line does not bend, nothing says where a joint goes; pieces of even length are the
-//! mild preference that decides then.
+//! The centre line is fitted instead of the stroke, because it has depth, where the bend of an elbow may lie, and is
+//! steadier than a hand. Where the line is straight, it does not determine the joints; a weak preference for pieces of
+//! even length does.
 
 use glam::Vec3;
 
 use super::{axis::Axis, track::Track};
 
-/// How strongly even pieces are preferred: what pieces twice too long or nil would cost, in squared deviations of one
-/// radius of the limb.
+/// Weight of the preference for even pieces: the cost of pieces twice too long or of length zero, in squared deviations
+/// of one radius of the limb.
 const EVENNESS: f32 = 1.0;
 
 /// Arc lengths of exactly `count` joints, ends included, rising.
@@ -25,8 +25,8 @@ pub(super) fn choose(track: &Track, axis: Option<&Axis>, count: usize) -> Vec<f3
     chosen.into_iter().map(|i| axis.stations[i].at).collect()
 }
 
-/// Indices of `count` points, the first and last among them, whose polyline has the least mean squared distance from all
-/// points, in squared radii, plus the price of uneven pieces. O(points³ + count · points²).
+/// Indices of `count` points, the first and last among them, whose polyline has the least mean squared distance from
+/// all points, in squared radii, plus the cost of uneven pieces. O(points³ + count · points²).
 fn fit(points: &[Vec3], radius: f32, count: usize) -> Vec<usize> {
     let n = points.len();
     let mut along = vec![0.0; n];
@@ -56,7 +56,7 @@ fn fit(points: &[Vec3], radius: f32, count: usize) -> Vec<usize> {
             prices[i * n + j] = price(i, j);
         }
     }
-    // best[k][j]: the least price of k pieces from the first point to point j.
+    // best[k][j]: the least cost of k pieces from the first point to point j.
     let mut best = vec![f32::INFINITY; count * n];
     let mut from = vec![0; count * n];
     best[0] = 0.0;

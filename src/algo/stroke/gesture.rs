@@ -1,33 +1,34 @@
-//! What a stroke over a rig means: a chain, a joint inserted into a bone, or joints to delete.
+//! Interpretation of strokes over a rig: a chain, a joint inserted into a bone, or joints to delete.
 //!
-//! All is judged on the view plane, where the user draws. A chain is what a stroke means unless it is clearly something else:
+//! Strokes are judged on the view plane, on which the user draws. A stroke is a chain unless it is clearly something
+//! else:
 //!
 //! - **Erase**: a scribble. It swings to and fro at least four times, each time over most of its width, is no thin line
-//!   (its width is at least three tenths of its length; or it runs to and fro along its length), and there is a joint under it. To draw a
-//!   chain over joints, draw it in one direction.
-//! - **Insert**: a short straight tick across one bone. It crosses exactly one bone, steeply (45° or more) and away from
-//!   its joints, is no longer than that bone, and begins and ends beside the rig. To draw a chain across a bone, draw it
-//!   longer than the bone, or begin it on a joint.
+//!   (its width is at least three tenths of its length; or it runs to and fro along its length), and there is a joint
+//!   under it. To draw a chain over joints, draw it in one direction.
+//! - **Insert**: a short straight tick across one bone. It crosses exactly one bone, steeply (45° or more) and away
+//!   from its joints, is no longer than that bone, and begins and ends beside the rig. To draw a chain across a bone,
+//!   draw it longer than the bone, or begin it on a joint.
 //!
-//! Whoever wants neither can let every stroke be a chain: take [`StrokeKind::Chain`] with [`joint_at`] for its ends.
+//! An app without the other two takes every stroke for a chain: [`StrokeKind::Chain`] with [`joint_at`] for its ends.
 
 use glam::Vec2;
 
-/// What a stroke means.
+/// Interpretation of a stroke.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StrokeKind {
     /// A chain of joints.
     Chain {
         /// The joint that the stroke starts on: the chain continues from it.
         start: Option<usize>,
-        /// The joint that the stroke ends on, if it is another.
+        /// The joint that the stroke ends on, if it differs from the start.
         end: Option<usize>,
     },
     /// A joint to be inserted into a bone.
     Insert {
         /// The bone's lower joint; the bone runs from its parent to it.
         bone: usize,
-        /// Where along the bone on the view plane, 0 at the parent and 1 at the joint.
+        /// Place along the bone on the view plane, 0 at the parent and 1 at the joint.
         t: f32,
     },
     /// Joints to be deleted.
@@ -37,10 +38,11 @@ pub enum StrokeKind {
     },
 }
 
-/// Decides what `stroke` means.
+/// Classifies `stroke`.
 ///
-/// `joints` are places on the view plane, each with its parent's index (one out of range counts as none; a place that is not
-/// finite is never met). `tolerance` is how near counts as on a joint, in model units. O(points · (log points + bones)).
+/// `joints` are places on the view plane, each with its parent's index (an index out of range counts as none; a place
+/// that is not finite is never hit). `tolerance` is the distance up to which a point is on a joint, in model units.
+/// O(points · (log points + bones)).
 pub fn classify(stroke: &[Vec2], joints: &[(Vec2, Option<usize>)], tolerance: f32) -> StrokeKind {
     let tolerance = if tolerance > 0.0 { tolerance } else { 0.0 };
     let points: Vec<Vec2> = stroke.iter().copied().filter(|p| p.is_finite()).collect();
@@ -65,7 +67,8 @@ pub fn classify(stroke: &[Vec2], joints: &[(Vec2, Option<usize>)], tolerance: f3
     StrokeKind::Chain { start, end }
 }
 
-/// The joint nearest to `point` on the view plane within `tolerance`; the lower index of two equally near.
+/// The joint nearest to `point` on the view plane within `tolerance`; of two equally near, the one with the lower
+/// index.
 pub fn joint_at(point: Vec2, joints: &[(Vec2, Option<usize>)], tolerance: f32) -> Option<usize> {
     let mut best = None;
     let mut nearest = tolerance;
@@ -78,11 +81,11 @@ pub fn joint_at(point: Vec2, joints: &[(Vec2, Option<usize>)], tolerance: f32) -
     best
 }
 
-/// How often a scribble turns back at least.
+/// Least number of turns of a scribble.
 const TURNS: usize = 4;
-/// A scribble's width at least, in parts of its length. An unsteady hand's line stays below.
+/// Least width of a scribble, as a share of its length. The line of an unsteady hand stays below.
 const WIDTH: f32 = 0.3;
-/// What part of the extent a swing covers at least to count.
+/// Least length of a counted swing, as a share of the extent.
 const SWING: f32 = 0.4;
 
 fn is_scribble(points: &[Vec2], tolerance: f32) -> bool {
@@ -99,11 +102,11 @@ fn is_scribble(points: &[Vec2], tolerance: f32) -> bool {
     swings(long, length) || (width >= WIDTH * length && swings(wide, width))
 }
 
-/// How often the coordinate along `axis` turns back by at least `swing`.
+/// Number of turns of the coordinate along `axis` by at least `swing`.
 fn turns(points: &[Vec2], axis: Vec2, swing: f32) -> usize {
     let mut count = 0;
     let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-    // 0 until the first swing, then the sign of the last one.
+    // Direction of the last swing: its sign, or 0 before the first.
     let mut direction = 0;
     for point in points {
         let x = point.dot(axis);
@@ -132,7 +135,7 @@ fn main_axes(points: &[Vec2]) -> [Vec2; 2] {
     }
     let half = 0.5 * (xx - yy);
     let root = (half * half + xy * xy).sqrt();
-    // Of the two equal forms of the eigenvector, the one that does not cancel.
+    // The form of the eigenvector without cancellation is used.
     let long = if half >= 0.0 { glam::DVec2::new(half + root, xy) } else { glam::DVec2::new(xy, root - half) };
     let long = long.try_normalize().unwrap_or(glam::DVec2::X).as_vec2();
     [long, long.perp()]
@@ -171,7 +174,7 @@ fn contains(hull: &[Vec2], point: Vec2) -> bool {
         })
 }
 
-/// A short straight stroke across one bone, and where it crosses it.
+/// A short straight stroke across one bone: the bone and the place of the crossing.
 fn tick(points: &[Vec2], joints: &[(Vec2, Option<usize>)], tolerance: f32) -> Option<(usize, f32)> {
     let (first, last) = (*points.first()?, *points.last()?);
     let chord = last - first;
@@ -209,12 +212,12 @@ fn tick(points: &[Vec2], joints: &[(Vec2, Option<usize>)], tolerance: f32) -> Op
         .then_some((bone, t))
 }
 
-/// True unless the point lies on the line itself.
+/// Returns `true` unless the point lies on the line itself.
 fn beside(point: Vec2, head: Vec2, along: Vec2) -> bool {
     (point - head).perp_dot(along) != 0.0
 }
 
-/// Where the segments `a`-`b` and `c`-`d` cross, as parameters of both.
+/// Crossing of the segments `a`-`b` and `c`-`d`, as parameters of both.
 fn crossing(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> Option<(f32, f32)> {
     let (ab, cd, ac) = (b - a, d - c, c - a);
     let det = ab.perp_dot(cd);

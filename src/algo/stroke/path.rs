@@ -12,11 +12,11 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// Drops what is not finite and what repeats the point before.
+    /// Drops points that are not finite and points that repeat the one before.
     pub(super) fn new(points: &[Vec2]) -> Result<Self, StrokeError> {
         let mut clean: Vec<Vec2> = points.iter().copied().filter(|p| p.is_finite()).collect();
         clean.dedup();
-        // Measured in double precision, so that half a million tiny steps still add up.
+        // Lengths are summed in double precision, so that half a million tiny steps still add up.
         let mut length = 0.0f64;
         let lengths: Vec<f32> = (0..clean.len())
             .map(|i| {

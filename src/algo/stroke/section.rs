@@ -1,4 +1,4 @@
-//! The cross-section of a limb, felt out with a fan of rays from inside.
+//! Cross-section of a limb, measured with a fan of rays from inside.
 
 use bevy::math::ops;
 use glam::{Vec2, Vec3};
@@ -8,7 +8,7 @@ use crate::mesh::{
     surface::Surface,
 };
 
-/// Directions around a circle, reused by every section.
+/// Directions around a circle, shared by all sections.
 #[derive(Debug, Clone)]
 pub(super) struct Fan {
     fine: Vec<Vec2>,
@@ -16,7 +16,7 @@ pub(super) struct Fan {
 
 const FINE: usize = 48;
 
-/// More of the circle than this without a wall near: not a section of a limb.
+/// Largest share of the circle without a near wall: a more open section is not a limb's.
 const OPEN: f32 = 0.4;
 
 /// A cross-section.
@@ -25,7 +25,7 @@ pub(super) struct Section {
     pub(super) centroid: Vec3,
     /// Radius of the circle with the same area.
     pub(super) radius: f32,
-    /// The part of the rays that met no wall within the limit, 0 to 1.
+    /// Share of the rays that hit no wall within the limit, 0 to 1.
     pub(super) open: f32,
 }
 
@@ -36,9 +36,9 @@ impl Fan {
         Self { fine }
     }
 
-    /// The section through `from` square to `normal`: the polygon of the ends of every `stride`-th ray. A ray that meets no
-    /// wall within `limit` (a hole, or the way into the torso) takes its length from its neighbours. `None` if too
-    /// many do, or the polygon has no area.
+    /// The section through `from` at right angles to `normal`: the polygon of the ends of every `stride`-th ray. A ray
+    /// that hits no wall within `limit` (a hole, or the way into the torso) takes its length from its neighbours.
+    /// `None` if there are too many such rays, or the polygon has no area.
     pub(super) fn section(
         &self,
         surface: &Surface,
@@ -80,7 +80,7 @@ impl Fan {
     }
 }
 
-/// Fills the gaps of a circle in proportion between their ends.
+/// Fills the gaps of a circle by interpolating between their ends.
 fn close(reach: &mut [Option<f32>]) {
     let n = reach.len();
     let Some(first) = reach.iter().position(|r| r.is_some()) else { return };

@@ -1,4 +1,4 @@
-//! Where a stroke bends: the subdivision of Pencil Rigger's section 5.3.
+//! Subdivision of a stroke at its bends, after Pencil Rigger, section 5.3.
 
 use glam::Vec2;
 
@@ -14,7 +14,7 @@ pub(super) fn by_threshold(path: &Path, threshold: f32) -> Vec<f32> {
     let mut joint = vec![false; path.points.len()];
     joint[0] = true;
     joint[last] = true;
-    // A stack of its own: a spiral of a million points must not exhaust the thread's.
+    // An explicit stack: a spiral of a million points must not exhaust the thread's.
     let mut pieces = vec![(0, last)];
     while let Some((from, to)) = pieces.pop() {
         let mut cuts = [None; 2];
@@ -43,7 +43,7 @@ pub(super) fn by_threshold(path: &Path, threshold: f32) -> Vec<f32> {
     joint.iter().zip(&path.lengths).filter_map(|(&is_joint, &length)| is_joint.then_some(length)).collect()
 }
 
-/// Distance of a point from a segment, and on which side of its line it lies (points beyond an end in line with it: 0).
+/// Distance of a point from a segment, and the side of its line (points beyond an end in line with it: 0).
 fn from_segment(point: Vec2, a: Vec2, b: Vec2) -> (f32, usize) {
     let along = b - a;
     let t = ((point - a).dot(along) / along.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);

@@ -1,4 +1,4 @@
-//! Following a stroke through the mesh: which of the volumes under it it runs in.
+//! Tracking of a stroke through the mesh: the volume that it runs in.
 
 use glam::{Vec2, Vec3};
 
@@ -11,10 +11,10 @@ use crate::{
     },
 };
 
-/// How many rays follow a stroke, whatever its length.
+/// Number of rays that follow a stroke, whatever its length.
 pub(super) const SAMPLES: usize = 96;
 
-/// A stretch of a ray, as distances from its origin.
+/// An interval of a ray, as distances from its origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
     pub(super) near: f32,
@@ -35,7 +35,7 @@ impl Span {
     }
 }
 
-/// One ray under the stroke that meets the volume.
+/// A ray under the stroke that crosses the volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sample {
     /// Arc length along the stroke.
@@ -45,25 +45,25 @@ pub(super) struct Sample {
     pub(super) ray: Ray,
     /// Entry and exit of the volume.
     pub(super) span: Span,
-    /// Midway between.
+    /// Point midway between entry and exit.
     pub(super) middle: Vec3,
 }
 
-/// The stroke's way through one volume.
+/// The course of a stroke through one volume.
 #[derive(Debug, Clone)]
 pub(super) struct Track {
-    /// Only where the ray meets the volume; by rising arc length; not empty.
+    /// Samples whose ray crosses the volume, by rising arc length; not empty.
     pub(super) samples: Vec<Sample>,
     pub(super) volume_at_start: u32,
     pub(super) volumes_at_start: u32,
-    /// Whether other volumes could have been followed.
+    /// Marks a stroke that could have followed other volumes.
     pub(super) ambiguous: bool,
     volume: Option<u32>,
 }
 
 impl Track {
-    /// `None` if no ray meets the surface. `first` is the number of the volume, from zero, in which the stroke starts; by
-    /// itself it is chosen as everywhere, by `volume`.
+    /// Follows a stroke; `None` if no ray hits the surface. `first` is the number of the volume, from zero, in which
+    /// the stroke starts; without it the volume is chosen by `volume`, as everywhere.
     pub(super) fn follow(
         surface: &Surface,
         plane: &ViewPlane,
@@ -113,7 +113,7 @@ impl Track {
     }
 }
 
-/// The volumes of a ray. A sheet without thickness counts only where there is nothing else; several of them make one span.
+/// The volumes of a ray. Sheets without thickness count only if there is no volume; several of them make one span.
 fn spans(hits: &[Hit]) -> Vec<Span> {
     let all: Vec<Span> = volumes(hits).into_iter().map(|v| Span { near: v.near, far: v.far }).collect();
     let solid: Vec<Span> = all.iter().copied().filter(|s| s.far > s.near).collect();
@@ -124,8 +124,8 @@ fn spans(hits: &[Hit]) -> Vec<Span> {
     }
 }
 
-/// Which of several volumes a stroke is in when nothing before tells: the one asked for, or the one that holds the
-/// midpoint of the closest and furthest hit, or, where that midpoint lies outside of everything, the nearest.
+/// Index of the volume of a stroke at its start: the requested one, or the one that holds the midpoint of the closest
+/// and furthest hit, or, if that midpoint lies outside of all volumes, the nearest.
 fn start(spans: &[Span], volume: Option<u32>) -> usize {
     if let Some(n) = volume {
         return n.saturating_sub(1) as usize % spans.len();
@@ -134,9 +134,9 @@ fn start(spans: &[Span], volume: Option<u32>) -> usize {
     spans.iter().position(|s| s.near <= middle && middle <= s.far).unwrap_or(0)
 }
 
-/// The volume that goes on from the span `before`; `None` if none does.
+/// The volume that continues the span `before`; `None` without one.
 ///
-/// Where one volume becomes several, the hips two legs, the choice is made among these as at the start.
+/// If one volume divides into several, as the hips into two legs, one of these is chosen as at the start.
 fn continuing(spans: &[Span], before: Span, volume: Option<u32>) -> Option<Span> {
     let within: Vec<Span> = spans.iter().copied().filter(|s| s.overlap(before) > 0.6 * (s.far - s.near)).collect();
     if within.len() > 1 {

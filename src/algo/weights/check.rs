@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::{Locks, WeightError, WeightJoint};
+use super::{Locks, TwistBone, WeightError, WeightJoint};
 
 /// The first thing that is wrong.
 pub(crate) fn input(
@@ -25,6 +25,11 @@ pub(crate) fn input(
     }
     if let Some(joint) = joints.iter().position(|j| !j.head.is_finite() || j.tail.is_some_and(|t| !t.is_finite())) {
         return Err(WeightError::Joint { joint });
+    }
+    let is_broken =
+        |twist: &TwistBone| !twist.end.is_finite() || joints.get(twist.joint).is_none_or(|j| j.twist.is_some());
+    if let Some(joint) = joints.iter().position(|j| j.twist.as_ref().is_some_and(is_broken)) {
+        return Err(WeightError::Twist { joint });
     }
     if let Some(triangle) = triangles.iter().position(|t| t.iter().any(|&p| p as usize >= points.len())) {
         return Err(WeightError::Triangle { triangle });

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{Locks, WeightJoint, WeightSettings};
-use crate::mesh::model::Weights;
+use crate::mesh::{influences::keep_strongest, model::Weights};
 
 /// What the caller fixed, and how many influences a point may have.
 pub(crate) struct Shaping<'a> {
@@ -62,7 +62,7 @@ impl<'a> Shaping<'a> {
                 row.push((self.rigid[point], 1.0));
             } else {
                 row.extend(computed(point));
-                shape(&mut row, self.most, self.least);
+                keep_strongest(&mut row, self.most, self.least);
                 if let Some(locks) = &self.locks {
                     self.keep_locked(locks, point, &mut row);
                 }
@@ -100,22 +100,7 @@ impl<'a> Shaping<'a> {
         } else {
             row.clear();
             row.extend(locked);
-            shape(row, self.most, 0.0);
+            keep_strongest(row, self.most, 0.0);
         }
-    }
-}
-
-/// Sorts strongest first, keeps the strongest few that matter, and makes them sum to one.
-pub(crate) fn shape(row: &mut Vec<(u32, f32)>, most: usize, least: f32) {
-    row.retain(|e| e.1.is_finite() && e.1 > 0.0);
-    row.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    row.truncate(most);
-    let sum: f32 = row.iter().map(|e| e.1).sum();
-    // The strongest stays whatever the threshold.
-    let mut first = true;
-    row.retain(|e| std::mem::take(&mut first) || e.1 >= least * sum);
-    let sum: f32 = row.iter().map(|e| e.1).sum();
-    for entry in row.iter_mut() {
-        entry.1 /= sum;
     }
 }

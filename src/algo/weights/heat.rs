@@ -7,11 +7,10 @@ use rayon::prelude::*;
 
 use super::{
     claim::Claim,
-    finish::shape,
     laplacian::Graph,
     ldl::{LANES, Ldl, Symmetric},
 };
-use crate::mesh::model::Weights;
+use crate::mesh::{influences::keep_strongest, model::Weights};
 
 /// More joints than this are not solved for one by one.
 const MANY_JOINTS: usize = 1024;
@@ -77,7 +76,7 @@ pub(crate) fn solve(graph: &Graph, claims: &[Claim], wanted: &[bool], smoothing:
     }
     let mut weights = Weights { starts: vec![0], ..Weights::default() };
     for mut row in rows {
-        shape(&mut row, KEPT, 0.0);
+        keep_strongest(&mut row, KEPT, 0.0);
         weights.push(row);
     }
     weights
@@ -146,7 +145,7 @@ pub(crate) fn step<'a>(
                 add(&mut row, weights.of(v), total);
                 let warmth = graph.areas[v] * claim.heat / smoothing;
                 add(&mut row, claim.shares.iter().copied().filter(|s| s.1 > 0.0), warmth);
-                shape(&mut row, KEPT, 1e-3);
+                keep_strongest(&mut row, KEPT, 1e-3);
                 part.push(row.iter().copied());
             }
             part

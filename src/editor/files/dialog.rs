@@ -1,4 +1,4 @@
-//! What the editor asks about files, one question at a time, and the answers.
+//! Questions about files, one at a time, and their answers.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use super::{Then, template::Fit};
 use crate::files::journal::PendingJournal;
 
-/// The question that is asked now, if any.
+/// The current question, if any.
 #[derive(Resource, Default)]
 pub struct Dialog {
     question: Option<Question>,
@@ -20,12 +20,12 @@ impl Dialog {
         self.question.as_ref()
     }
 
-    /// Counts the questions, to tell one from the next.
+    /// Number of questions asked so far, which identifies the current one.
     pub(super) fn number(&self) -> u64 {
         self.number
     }
 
-    /// Asks, instead of what was asked before.
+    /// Asks a question in place of the current one.
     pub fn ask(&mut self, question: Question) {
         self.question = Some(question);
         self.number += 1;
@@ -43,36 +43,36 @@ pub enum Question {
     Unsaved {
         /// The document's name.
         name: String,
-        /// What would lose them.
+        /// Action that would lose the changes.
         then: Then,
     },
-    /// Which file to open.
+    /// Choice of a file to open.
     Open,
-    /// Where to write.
+    /// Choice of a path to write to.
     Path {
-        /// What is written.
+        /// Content to write.
         purpose: Purpose,
-        /// What stands in the field at first.
+        /// Initial text of the field.
         suggestion: PathBuf,
-        /// What goes on afterwards.
+        /// Action that follows.
         then: Option<Then>,
     },
-    /// There is a file of that name.
+    /// A file of that name exists.
     Replace {
-        /// What is written.
+        /// Content to write.
         purpose: Purpose,
         /// The file.
         path: PathBuf,
-        /// What goes on afterwards.
+        /// Action that follows.
         then: Option<Then>,
     },
-    /// A template is of another size than the mesh.
+    /// A template has another size than the mesh.
     Fit(Fit),
-    /// Work that a crash left.
+    /// Work left by a crash.
     Recover(Vec<PendingJournal>),
 }
 
-/// What is written.
+/// Content to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
     /// The project.
@@ -81,27 +81,27 @@ pub enum Purpose {
     Export,
 }
 
-/// Answers the question that is asked now.
+/// Answer to the current question.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct DialogAnswer(pub Answer);
 
-/// An answer; one that does not fit the question is as good as [`Answer::Cancel`].
+/// Answer to a question; an answer of another question counts as [`Answer::Cancel`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Answer {
-    /// Saves, or replaces the file that is there.
+    /// Saves, or replaces the existing file.
     Save,
-    /// Goes on without saving.
+    /// Proceeds without saving.
     Discard,
-    /// Leaves everything as it is.
+    /// Cancels without a change.
     Cancel,
-    /// This file.
+    /// Takes this file.
     Path(PathBuf),
     /// Scales the template to the mesh.
     Fit,
-    /// Takes the template in its own size.
+    /// Keeps the template's own size.
     AsItIs,
     /// Recovers the work in this journal.
     Recover(PathBuf),
-    /// Throws the work in this journal away.
+    /// Deletes the work in this journal.
     Forget(PathBuf),
 }

@@ -1,4 +1,4 @@
-//! The questions about files as they are drawn. Keys work in all of them: Enter takes the marked answer, Escape none.
+//! Dialogs of the questions about files. Keys work in all of them: Enter takes the marked answer, Escape cancels.
 
 use std::{
     path::{Path, PathBuf},
@@ -19,22 +19,25 @@ use crate::{
         panel::{EditorOverlay, Requests},
         recovery, style,
     },
-    files::{FileKind, journal::PendingJournal},
+    files::{
+        FileKind,
+        journal::{Condition, PendingJournal},
+    },
 };
 
-/// Draws the question that is asked.
+/// View of the current question.
 #[derive(Default)]
 pub(super) struct DialogView {
-    /// The question that the rest belongs to.
+    /// Number of the question that the state belongs to.
     number: u64,
     text: String,
-    /// Frames since the question was asked; widgets get the keyboard in the first ones.
+    /// Frames since the question was asked; widgets get the keyboard focus in the first ones.
     age: u32,
     chosen: usize,
     browser: Option<FileDialog>,
 }
 
-/// Everything that can be opened, by name and kinds.
+/// Kinds of files that can be opened, by name.
 const OPENED: &[(&str, &[FileKind])] = &[
     (
         "Meshes, templates, projects",
@@ -68,7 +71,7 @@ impl EditorOverlay for DialogView {
     }
 }
 
-/// Where people look for files first: where the last one was.
+/// Initial folder of file choices: that of the last opened file.
 fn folder(world: &World) -> Option<PathBuf> {
     let settings = world.get_resource::<crate::editor::settings::EditorSettings>()?;
     settings.recent.first()?.parent().filter(|folder| folder.is_dir()).map(Path::to_path_buf)
@@ -132,7 +135,7 @@ impl DialogView {
         shown.inner.or(escaped.then_some(Answer::Cancel))
     }
 
-    /// Buttons at the right; the first one stands outermost and takes Enter.
+    /// Draws buttons aligned to the right; the first one is outermost and takes Enter.
     fn buttons(&self, ui: &mut egui::Ui, answers: &[(&str, Answer)]) -> Option<Answer> {
         let mut taken = None;
         ui.add_space(4.0);
@@ -206,7 +209,7 @@ impl DialogView {
         let accept = Answer::Path(path);
         let has_name = !self.text.trim().is_empty();
         let answers = [(verb, accept.clone()), ("Cancel", Answer::Cancel)];
-        // The field has the keyboard here, not the first button.
+        // The text field has the keyboard focus here, not the first button.
         let view = Self { age: u32::MAX, ..Self::default() };
         let clicked = view.buttons(ui, &answers);
         match clicked.or(entered.then_some(accept)) {
@@ -229,26 +232,34 @@ impl DialogView {
 
     fn recover(&mut self, ui: &mut egui::Ui, list: &[PendingJournal]) -> Option<Answer> {
         ui.heading("There is unsaved work from before");
-        ui.label("Rigsmith ended without closing its document. Recover it with all its steps?");
+        ui.label("Rigsmith ended without closing its document. Recover it with its steps?");
         egui::ScrollArea::vertical().max_height(220.0).show(ui, |ui| {
             for (number, pending) in list.iter().enumerate() {
-                let changes =
-                    if pending.changes == 1 { "1 edit".to_owned() } else { format!("{} edits", pending.changes) };
-                let mut text = format!("{}: {changes}, {}", recovery::describe(pending), when(pending.modified));
+                let mut text = format!("{}, {}", recovery::describe(pending), when(pending.modified));
                 if pending.project_changed {
                     text.push_str("; its project was changed since");
                 }
                 ui.radio_value(&mut self.chosen, number, text).on_hover_text(pending.path.display().to_string());
             }
         });
-        let path = list.get(self.chosen).or(list.first()).map(|pending| pending.path.clone())?;
-        let answers =
-            [("Recover", Answer::Recover(path.clone())), ("Later", Answer::Cancel), ("Discard", Answer::Forget(path))];
+        let pending = list.get(self.chosen).or(list.first())?;
+        if pending.condition != Condition::Whole {
+            ui.label("What is damaged stays on the disk until you delete it.");
+        }
+        let path = pending.path.clone();
+        let mut answers = vec![
+            ("Recover", Answer::Recover(path.clone())),
+            ("Later", Answer::Cancel),
+            ("Delete", Answer::Forget(path)),
+        ];
+        if !recovery::can_recover(pending) {
+            answers.remove(0);
+        }
         self.buttons(ui, &answers)
     }
 }
 
-/// Marks the name without folder and ending, which is what people want to change.
+/// Selects the name without folder and extension, the part that people usually change.
 fn select_stem(ctx: &egui::Context, id: egui::Id, text: &str) {
     let name_at = text.rfind(['/', '\\']).map_or(0, |at| at + 1);
     let stem = crate::files::stem(Path::new(&text[name_at..]));
@@ -266,7 +277,7 @@ fn frame(ctx: &egui::Context) -> egui::Frame {
     egui::Frame::popup(&ctx.global_style()).inner_margin(16)
 }
 
-/// How long ago something was, in words.
+/// Age of a time, in words.
 fn when(time: Option<SystemTime>) -> String {
     let Some(seconds) = time.and_then(|time| time.elapsed().ok()).map(|age| age.as_secs()) else {
         return "at an unknown time".to_owned();

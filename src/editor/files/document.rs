@@ -1,4 +1,4 @@
-//! The open document: what it is called, where it is saved, what of it is saved, and its journal.
+//! The open document: its name, its file, its saved state and its journal.
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
@@ -18,18 +18,18 @@ use crate::{
     rig::{Uid, step::Step},
 };
 
-/// On the rig that is edited: where it comes from and where it goes.
+/// Component of the edited rig with its file and journal.
 #[derive(Component)]
 pub struct OpenDocument {
-    /// What the title says.
+    /// Name in the window's title.
     pub name: String,
     /// The project file; `None` before the first save.
     pub project: Option<PathBuf>,
     pub(super) saved: SavedAt,
     pub(super) journal: Journal,
-    /// Meshes of the project that were not found, to be saved again as they were.
+    /// Meshes of the project that were not found; they are saved again unchanged.
     pub(super) missing: Vec<MeshToSave>,
-    /// True once it is known where the journal lies, and that was told if it is not where it should be.
+    /// Marks that the place of the journal is known, and that a notice was sent if it is not the usual one.
     pub(super) is_placed: bool,
 }
 
@@ -40,30 +40,30 @@ impl OpenDocument {
     }
 }
 
-/// Which state of the document is in a file.
+/// State of the document that is in a file.
 #[derive(Debug, Clone)]
 pub(super) enum SavedAt {
-    /// The one after this step; before the first for `None`.
+    /// The state after this step; before the first for `None`.
     Step(Option<Arc<Step>>),
-    /// None.
+    /// No file holds any state.
     Nowhere,
 }
 
-/// Where an open mesh comes from.
+/// Source of an open mesh.
 #[derive(Component, Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MeshSource {
-    /// It comes with the program.
+    /// The bundled mesh.
     Bundled,
-    /// A file.
+    /// A mesh file.
     File(PathBuf),
 }
 
-/// The folder for journals of what is in no project yet.
+/// Folder for journals of documents without a project.
 #[derive(Resource, Debug, Clone)]
 pub struct StateFolder(pub Option<PathBuf>);
 
 impl Default for StateFolder {
-    /// `RIGSMITH_STATE`, or the user's folder for such data.
+    /// `RIGSMITH_STATE`, or the user's folder for application state.
     fn default() -> Self {
         let chosen = std::env::var_os("RIGSMITH_STATE").filter(|folder| !folder.is_empty()).map(PathBuf::from);
         Self(chosen.or_else(|| {
@@ -72,17 +72,17 @@ impl Default for StateFolder {
     }
 }
 
-/// Where journals of a document may lie.
+/// Places for the journal of a document.
 pub(in crate::editor) fn places(world: &World, project: Option<PathBuf>) -> JournalPlaces {
     JournalPlaces { project, state: world.get_resource::<StateFolder>().and_then(|folder| folder.0.clone()) }
 }
 
-/// The step that the document stands after.
+/// The last step in effect.
 pub(super) fn last_step(world: &World, rig: Entity) -> Option<Arc<Step>> {
     world.get::<RigHistory>(rig)?.last().cloned()
 }
 
-/// True if two steps are the same one.
+/// Returns `true` if two steps are identical.
 pub(super) fn is_same(a: &Option<Arc<Step>>, b: &Option<Arc<Step>>) -> bool {
     match (a, b) {
         (None, None) => true,
@@ -91,7 +91,7 @@ pub(super) fn is_same(a: &Option<Arc<Step>>, b: &Option<Arc<Step>>) -> bool {
     }
 }
 
-/// True if the document is not as some file has it.
+/// Returns `true` if no file holds the document's state.
 pub(in crate::editor) fn is_unsaved(world: &World, rig: Entity) -> bool {
     match world.get::<OpenDocument>(rig).map(|document| &document.saved) {
         Some(SavedAt::Step(saved)) => {
@@ -107,7 +107,7 @@ pub(in crate::editor) fn is_unsaved(world: &World, rig: Entity) -> bool {
     }
 }
 
-/// The meshes that the rig moves, in the order of their uids.
+/// Meshes of the rig, in the order of their uids.
 pub(super) fn meshes(world: &World, rig: Entity) -> Vec<(Entity, &RigMesh, Option<&MeshSource>)> {
     let entities: Vec<Entity> = world.get::<RigMeshes>(rig).map(|meshes| meshes.iter().collect()).unwrap_or_default();
     let mut meshes: Vec<_> = entities
@@ -118,7 +118,7 @@ pub(super) fn meshes(world: &World, rig: Entity) -> Vec<(Entity, &RigMesh, Optio
     meshes
 }
 
-/// What the journal keeps besides the rig: which meshes are open.
+/// Context stored in the journal besides the rig: the open meshes.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(in crate::editor) struct Context {
@@ -140,7 +140,7 @@ impl Context {
     }
 }
 
-/// Tells once if the journal lies somewhere else than it should.
+/// Sends a notice once if the journal is not at its usual place.
 pub(super) fn watch_places(world: &mut World) {
     let Some(rig) = active(world) else { return };
     let Some(document) = world.get::<OpenDocument>(rig).filter(|document| !document.is_placed) else { return };
@@ -161,7 +161,8 @@ pub(super) fn watch_places(world: &mut World) {
     }
 }
 
-/// Ends the journal of the open document: nothing of it is to be recovered. With `wait`, does so before it returns.
+/// Ends the journal of the open document, so that nothing of it is recovered later. With `wait`, it ends before the
+/// function returns.
 pub(super) fn close_journal(world: &World, wait: bool) {
     let Some(document) = active(world).and_then(|rig| world.get::<OpenDocument>(rig)) else { return };
     let journal = document.journal.clone();
@@ -170,7 +171,7 @@ pub(super) fn close_journal(world: &World, wait: bool) {
             warn!("the journal could not be removed: {reason}");
         }
     } else {
-        // The last handle waits for the disk: not in a frame.
+        // Dropping the last handle waits for the disk, which must not happen in a frame.
         let close = async move {
             if let Err(reason) = journal.close(Duration::from_secs(10)) {
                 warn!("the journal could not be removed: {reason}");
@@ -180,7 +181,7 @@ pub(super) fn close_journal(world: &World, wait: bool) {
     }
 }
 
-/// The disk, for journals.
+/// The disk on which journals are written.
 pub(in crate::editor) fn disk() -> Arc<dyn crate::files::Disk> {
     Arc::new(RealDisk)
 }

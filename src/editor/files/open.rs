@@ -1,4 +1,4 @@
-//! Opening, in the background; what is open stays until the whole of it is there.
+//! Opening in the background; the open document stays until the next one is complete.
 
 use std::{path::Path, sync::Arc};
 
@@ -22,9 +22,10 @@ use crate::{
         settings::EditorSettings,
     },
     files::{
-        Disk, FileKind, MeshState, MeshToSave, RealDisk,
+        Disk, FileKind, LoadedMesh, MeshState, MeshToSave, RealDisk,
         journal::{
-            Journal, JournalStart, Origin, PendingJournal, Recovered, file_hash, journal_beside, pending_journal,
+            Journal, JournalStart, Origin, PendingJournal, Recovered, Restored, Resumed, file_hash, journal_beside,
+            pending_journal,
         },
         load_model, load_project, load_rig_text, load_template, read_capped, stem,
     },
@@ -33,54 +34,55 @@ use crate::{
         obj::{ObjSettings, read_model},
     },
     plugins::{
-        document::RigBundle,
+        history::RigHistory,
         journal::replayed_bundle,
+        selection::Selection,
         surface::{RigMesh, SkinOf},
     },
     rig::{
         Rig, RigEdit, UidSource,
         character::{import_rig_text, import_skeleton},
         project::ProjectView,
-        step::{Replayed, Step},
+        step::Step,
     },
 };
 
-/// The bytes of the character that comes with Rigsmith.
+/// Bytes of the bundled character.
 pub(super) const BUNDLED: &[u8] = include_bytes!("../../../assets/models/biped.obj");
-/// Bytes of a file that are hashed, at most.
+/// Largest number of bytes of a file that are hashed.
 const MAX_HASHED: u64 = 1 << 30;
 
-/// What is being opened.
+/// Document that is being opened.
 #[derive(Resource, Default)]
 pub struct Loading {
     job: Option<Job>,
-    /// What is there and waits for an answer about changes that were made while it loaded.
+    /// Loaded document that waits for an answer about changes that were made while it loaded.
     held: Option<(String, Box<Opened>)>,
 }
 
 struct Job {
     name: String,
     task: Task<Result<Landing, String>>,
-    /// The step that the open document stood after when nobody minded losing it.
+    /// Last step of the open document when its loss was accepted.
     confirmed: Option<Arc<Step>>,
 }
 
 impl Loading {
-    /// The name of what is being opened.
+    /// Name of the document that is being opened.
     pub fn what(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
     }
 }
 
-/// What a file turned out to be.
+/// Result of opening a file.
 pub(in crate::editor) enum Landing {
-    /// Something to take the document's place.
+    /// A document that replaces the open one.
     Document(Box<Opened>),
-    /// A rig: for the mesh that is open, or a document of its own.
+    /// A rig: for the open mesh, or a document of its own.
     Template(Box<Opened>),
 }
 
-/// What was opened.
+/// A loaded document.
 pub(in crate::editor) struct Opened {
     pub name: String,
     pub rig: Rig,
@@ -90,16 +92,18 @@ pub(in crate::editor) struct Opened {
     pub project: Option<std::path::PathBuf>,
     pub origin: Origin,
     pub notes: Vec<String>,
-    /// What a crash left, to go on with.
+    /// Facts that people should look after.
+    pub warnings: Vec<String>,
+    /// Recovered work after a crash.
     pub work: Option<Box<Work>>,
-    /// What a crash left beside the project.
+    /// Journal left by a crash beside the project.
     pub pending: Option<PendingJournal>,
 }
 
-/// Work that was recovered.
+/// Recovered work.
 pub(in crate::editor) struct Work {
     pub recovered: Recovered,
-    pub replayed: Replayed,
+    pub restored: Restored,
     pub journal: std::path::PathBuf,
 }
 
@@ -114,6 +118,7 @@ impl Opened {
             project: None,
             origin: Origin::Empty,
             notes: Vec::new(),
+            warnings: Vec::new(),
             work: None,
             pending: None,
         }
@@ -134,7 +139,7 @@ impl Opened {
     }
 }
 
-/// Says why a file cannot be opened, if its name tells that already.
+/// Returns an error if a file's name already shows that it cannot be opened.
 pub(super) fn recognise(path: &Path) -> Result<(), String> {
     match FileKind::of(path) {
         Some(
@@ -154,12 +159,12 @@ pub(super) fn recognise(path: &Path) -> Result<(), String> {
     }
 }
 
-/// True for files that hold a rig without a mesh.
+/// Returns `true` for files that hold a rig without a mesh.
 pub(super) fn is_rig_file(path: &Path) -> bool {
     matches!(FileKind::of(path), Some(FileKind::Template | FileKind::RigText))
 }
 
-/// Opens in the background; what was being opened before is forgotten.
+/// Starts opening in the background; a previous attempt is dropped.
 pub(super) fn start(world: &mut World, request: OpenRequest) {
     let mut uids = UidSource::seeded(world.resource_mut::<UidSource>().next_uid().0);
     let (name, task) = match request {
@@ -176,7 +181,7 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
     begin(world, name, task);
 }
 
-/// Waits for `task` to land.
+/// Registers `task` as the document that is being opened.
 pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<Landing, String>>) {
     let confirmed = active(world).and_then(|rig| last_step(world, rig));
     let mut loading = world.resource_mut::<Loading>();
@@ -184,7 +189,7 @@ pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Resul
     loading.held = None;
 }
 
-/// Runs work that takes long.
+/// Runs long work on a background thread.
 pub(in crate::editor) fn spawn<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Task<T> {
     AsyncComputeTaskPool::get().spawn(async move { work() })
 }
@@ -193,7 +198,7 @@ pub(in crate::editor) fn document(opened: Opened) -> Landing {
     Landing::Document(Box::new(opened))
 }
 
-/// Reads the character that comes with Rigsmith.
+/// Reads the bundled character.
 pub(in crate::editor) fn bundled_model() -> Result<Model, String> {
     read_model(BUNDLED, "biped", &ObjSettings::default(), &mut |_| None).map_err(|error| error.to_string())
 }
@@ -203,7 +208,7 @@ fn bundled(uids: &mut UidSource) -> Result<Landing, String> {
     Ok(document(Opened::model(bundled_model()?, MeshSource::Bundled, origin, uids)))
 }
 
-/// The hash of a file's bytes; 0 if it cannot be read.
+/// Hash of a file's bytes; `None` if it cannot be read.
 pub(in crate::editor) fn hash_of(path: &Path) -> Option<u64> {
     read_capped(&RealDisk, path, MAX_HASHED).ok().map(|bytes| file_hash(&bytes))
 }
@@ -239,7 +244,7 @@ fn file(path: &Path, uids: &mut UidSource) -> Result<Landing, String> {
     }
 }
 
-/// Opens a project; of several rigs the first.
+/// Opens a project; if it has several rigs, the first.
 pub(in crate::editor) fn project(path: &Path) -> Result<Opened, String> {
     let hash = hash_of(path).unwrap_or_default();
     let loaded = load_project(&RealDisk, path).map_err(|error| error.to_string())?;
@@ -253,18 +258,12 @@ pub(in crate::editor) fn project(path: &Path) -> Result<Opened, String> {
         ));
     }
     let mut opened = Opened::named(stem(path), rig);
-    for mesh in loaded.meshes {
-        match mesh.state {
+    for LoadedMesh { uid, rig, path, nodes, shape } in loaded.meshes {
+        match shape {
             MeshState::Open { model, .. } => {
-                opened.meshes.push((RigMesh::new(mesh.uid, *model, mesh.nodes), MeshSource::File(mesh.path)));
+                opened.meshes.push((RigMesh::new(uid, *model, nodes.to_vec()), MeshSource::File(path)));
             }
-            MeshState::Missing { shape, .. } => opened.missing.push(MeshToSave {
-                uid: mesh.uid,
-                rig: mesh.rig,
-                path: mesh.path,
-                nodes: mesh.nodes.into(),
-                shape,
-            }),
+            MeshState::Missing { shape, .. } => opened.missing.push(MeshToSave { uid, rig, path, nodes, shape }),
         }
     }
     opened.notes.append(&mut notes);
@@ -275,10 +274,10 @@ pub(in crate::editor) fn project(path: &Path) -> Result<Opened, String> {
     Ok(opened)
 }
 
-/// Lands what is done.
+/// Takes over finished documents.
 pub(super) fn poll(world: &mut World) {
     if world.resource::<Recovery>().is_looking() {
-        // A journal that begins while others are looked through could be taken for one of them.
+        // A journal that begins during the search could be taken for one left by a crash.
         return;
     }
     let mut loading = world.resource_mut::<Loading>();
@@ -308,22 +307,23 @@ pub(super) fn poll(world: &mut World) {
     }
 }
 
-/// Lands what was held back; what is open may be lost.
+/// Takes over the held document; the open one may be lost.
 pub(super) fn land_held(world: &mut World) {
     if let Some((name, opened)) = world.resource_mut::<Loading>().held.take() {
         land(world, &name, *opened);
     }
 }
 
-/// Forgets what was held back.
+/// Drops the held document.
 pub(super) fn drop_held(world: &mut World) {
     world.resource_mut::<Loading>().held = None;
 }
 
 fn land(world: &mut World, name: &str, opened: Opened) {
-    let Opened { name: title, rig, meshes, missing, view: kept, project, origin, notes, work, pending } = opened;
+    let Opened { name: title, rig, meshes, missing, view: kept, project, origin, notes, mut warnings, work, pending } =
+        opened;
     if let Some(old) = world.get_resource::<ActiveRig>().map(|rig| rig.0) {
-        // The next journal may lie in the same place.
+        // The next journal may be at the same place.
         let same = project.is_some() && world.get::<OpenDocument>(old).is_some_and(|old| old.project == project);
         close_journal(world, same);
         world.despawn(old);
@@ -338,19 +338,21 @@ fn land(world: &mut World, name: &str, opened: Opened) {
             .map(|(mesh, source)| ContextMesh { uid: mesh.uid, source: source.clone(), nodes: mesh.nodes.to_vec() })
             .collect(),
     };
-    // What a crash left beside the project stays there until somebody says what becomes of it.
+    // A journal left by a crash beside the project stays there until a person decides about it.
     let places = places(world, project.clone().filter(|_| pending.is_none()));
     let is_recovered = work.is_some();
     let (bundle, journal) = match work {
         Some(work) => {
-            let journal = Journal::resume(disk(), places, &work.recovered, work.replayed.applied, &work.journal);
+            let Resumed { journal, kept } =
+                Journal::resume(disk(), places, &work.recovered, &work.restored, &work.journal);
+            warnings.extend(kept.map(|kept| format!("the former journal is kept as `{}`", kept.display())));
             journal.context(context.text());
-            (replayed_bundle(&work.replayed), journal)
+            (replayed_bundle(&work.restored.replayed), journal)
         }
         None => {
             let base = project.is_none().then(|| rig.clone());
             let start = JournalStart { places, origin, rig: base, context: context.text() };
-            (RigBundle { rig, ..default() }, Journal::start(disk(), start))
+            ((rig, Selection::default(), RigHistory::default()), Journal::start(disk(), start))
         }
     };
     let sink = watched(journal.clone());
@@ -367,6 +369,9 @@ fn land(world: &mut World, name: &str, opened: Opened) {
         true => Notice::done(format!("Recovered {title}; save it to keep it")),
         false => Notice::done(format!("Opened {name}")),
     });
+    for warning in warnings {
+        world.write_message(Notice::warning(warning));
+    }
     for note in notes {
         let is_serious = note.starts_with("a mesh of the project is not there") || note.starts_with("the weights");
         world.write_message(if is_serious { Notice::warning(note) } else { Notice::info(note).quiet() });

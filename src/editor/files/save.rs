@@ -25,19 +25,19 @@ use crate::{
     files::{
         Disk, FileKind, MeshShape, MeshToSave, ProjectToSave, RealDisk,
         journal::{Journal, SaveMark},
-        project_files, read_capped, save_all_atomic, save_atomic, stem, store_model, store_rig, store_skin,
+        project_files, read_capped, save_atomic, save_set, stem, store_model, store_rig, store_skin,
     },
     mesh::{gltf::GltfWriteSettings, model::Model},
-    plugins::{history::RigHistory, surface::RigMesh},
+    plugins::{commands::Built, history::RigHistory, surface::RigMesh},
     rig::{
-        Rig,
+        BuiltRig, Rig,
         character::{Character, character},
         skin::{SkinFile, SkinJoint},
         step::Step,
     },
 };
 
-/// What is being saved.
+/// Document that is being saved.
 #[derive(Resource, Default)]
 pub struct Saving {
     job: Option<Job>,
@@ -45,12 +45,12 @@ pub struct Saving {
 }
 
 impl Saving {
-    /// The name of what is being saved.
+    /// Name of the file that is being saved.
     pub fn what(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
     }
 
-    /// Goes on with `then` when everything is saved; false if nothing is being saved.
+    /// Schedules `then` after the current saving; returns `false` if nothing is being saved.
     pub(super) fn wait_for(&mut self, then: Then) -> bool {
         let Some(job) = &mut self.job else { return false };
         match self.waiting.back_mut() {
@@ -64,19 +64,19 @@ impl Saving {
 struct Job {
     name: String,
     rig: Entity,
-    /// The step that the snapshot was taken after.
+    /// Last step in the snapshot.
     step: Option<Arc<Step>>,
-    task: Task<Result<Stored, String>>,
+    task: Task<Result<SavedContent, String>>,
     then: Option<Then>,
 }
 
-/// What was written.
-enum Stored {
+/// Content that was written.
+enum SavedContent {
     Project { mark: SaveMark, notes: Vec<String>, bundled: Option<PathBuf> },
     Export { notes: Vec<String> },
 }
 
-/// What stands in the field for a path at first.
+/// Initial path in the dialog.
 pub(super) fn suggestion(world: &World, rig: Entity, purpose: Purpose) -> PathBuf {
     let Some(document) = world.get::<OpenDocument>(rig) else { return PathBuf::new() };
     let beside = meshes(world, rig).into_iter().find_map(|(_, _, source)| match source {
@@ -92,7 +92,7 @@ pub(super) fn suggestion(world: &World, rig: Entity, purpose: Purpose) -> PathBu
     }
 }
 
-/// A path as somebody typed it, made whole: absolute, and with an ending.
+/// A typed path, completed to an absolute path with an extension.
 pub(super) fn completed(path: &Path, purpose: Purpose) -> PathBuf {
     let home = std::env::var_os("HOME").map(PathBuf::from);
     let path = match (path.strip_prefix("~"), home) {
@@ -114,7 +114,7 @@ pub(super) fn completed(path: &Path, purpose: Purpose) -> PathBuf {
     path
 }
 
-/// Saves or exports.
+/// Saves the project or exports the character.
 pub(super) fn to(world: &mut World, purpose: Purpose, path: PathBuf, then: Option<Then>) {
     match purpose {
         Purpose::Save => project(world, path, then),
@@ -122,13 +122,13 @@ pub(super) fn to(world: &mut World, purpose: Purpose, path: PathBuf, then: Optio
     }
 }
 
-/// The rig without what a drag under way has not made sure of.
+/// The rig without the preview of a current drag.
 fn settled(world: &World, rig: Entity) -> Option<Rig> {
     let data = world.get::<Rig>(rig)?;
     Some(world.get::<RigHistory>(rig).map_or_else(|| data.clone(), |history| history.settled(data).into_owned()))
 }
 
-/// The document as it is now.
+/// Snapshot of the document; returns `true` with it if its mesh is the bundled one.
 pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(ProjectToSave, bool)> {
     let view = view::now(world);
     let document = world.get::<OpenDocument>(rig)?;
@@ -138,7 +138,7 @@ pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(Pro
     for (_, mesh, source) in meshes(world, rig) {
         let path = match source {
             Some(MeshSource::File(path)) => path.clone(),
-            // Where it will be is known when there is a folder for it.
+            // The path is set once the project has a folder for it.
             _ => {
                 is_bundled = true;
                 PathBuf::new()
@@ -174,7 +174,7 @@ fn store(
     path: PathBuf,
     journal: &Journal,
     position: u64,
-) -> Result<Stored, String> {
+) -> Result<SavedContent, String> {
     let bundled = if is_bundled { Some(place_bundled(&path)?) } else { None };
     if let Some(bundled) = &bundled {
         for mesh in project.meshes.iter_mut().filter(|mesh| mesh.path.as_os_str().is_empty()) {
@@ -186,11 +186,11 @@ fn store(
     if let Err(reason) = journal.saving(mark.clone(), Duration::from_secs(2)) {
         debug!("the save is not noted in the journal: {reason}");
     }
-    save_all_atomic(&RealDisk, &files.files).map_err(|error| error.to_string())?;
-    Ok(Stored::Project { mark, notes: files.notes, bundled })
+    save_set(&RealDisk, &files.set).map_err(|error| error.to_string())?;
+    Ok(SavedContent::Project { mark, notes: files.notes, bundled })
 }
 
-/// Puts the character that comes with Rigsmith beside a project, so that the project has a mesh to name.
+/// Copies the bundled character beside a project, so that the project can refer to its mesh.
 pub(in crate::editor) fn place_bundled(project: &Path) -> Result<PathBuf, String> {
     let names = ["biped.obj".to_owned(), format!("{}.biped.obj", stem(project))];
     let limit = BUNDLED.len() as u64 + 1;
@@ -209,7 +209,7 @@ pub(in crate::editor) fn place_bundled(project: &Path) -> Result<PathBuf, String
     Err(format!("there is another {} in that folder already; choose another name or folder", names.join(" and ")))
 }
 
-/// Exports what the ending of the path asks for.
+/// Exports the format given by the path's extension.
 fn export(world: &mut World, path: PathBuf) {
     if world.resource::<Saving>().job.is_some() {
         world.resource_mut::<Saving>().waiting.push_back((Purpose::Export, path, None));
@@ -221,29 +221,31 @@ fn export(world: &mut World, path: PathBuf) {
     let more = open.len().saturating_sub(1);
     let mesh = open.into_iter().next().map(|(_, mesh, _)| mesh.clone());
     let (step, name) = (last_step(world, rig), file_name(&path));
+    let built = world.get::<Built>(rig).map(|built| built.0.clone());
     let task = spawn(move || {
-        let mut notes = export_to(&path, &data, mesh.as_ref())?;
+        let mut notes = export_to(&path, &data, built.as_deref(), mesh.as_ref())?;
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
         }
-        Ok(Stored::Export { notes })
+        Ok(SavedContent::Export { notes })
     });
     world.resource_mut::<Saving>().job = Some(Job { name, rig, step, task, then: None });
 }
 
-fn export_to(path: &Path, rig: &Rig, mesh: Option<&RigMesh>) -> Result<Vec<String>, String> {
+fn export_to(path: &Path, rig: &Rig, built: Option<&BuiltRig>, mesh: Option<&RigMesh>) -> Result<Vec<String>, String> {
     match FileKind::of(path) {
         Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
             let empty = Model { name: rig.about().name.clone(), ..default() };
             let skin = mesh.and_then(|mesh| rig.skin(mesh.uid));
             let model = character(&Character {
                 rig,
+                built,
                 file: mesh.map_or(&empty, |mesh| &mesh.file),
                 rest: mesh.map_or(&empty, |mesh| &mesh.rest),
                 nodes: mesh.map_or(&[], |mesh| &mesh.nodes),
                 skin: skin.map(Arc::as_ref),
             });
-            // Without weights no joint deforms, and none of them would be written.
+            // Without weights no joint deforms, and none would be written.
             let settings = GltfWriteSettings { all_joints: skin.is_none(), ..default() };
             store_model(&RealDisk, path, &model, &settings).map_err(|error| error.to_string())
         }
@@ -253,11 +255,8 @@ fn export_to(path: &Path, rig: &Rig, mesh: Option<&RigMesh>) -> Result<Vec<Strin
         Some(FileKind::Skin) => {
             let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
             let (mesh, skin) = both.ok_or("there are no weights to export; skin the mesh first")?;
-            let joints = skin.joints.iter().map(|uid| {
-                let label = rig.joint(*uid).and_then(|joint| joint.data.label.clone()).unwrap_or_default();
-                SkinJoint { uid: uid.0, label }
-            });
-            let file = SkinFile::new(joints.collect(), skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true);
+            let joints = SkinJoint::list(rig, skin);
+            let file = SkinFile::new(joints, skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true);
             let file = file.map_err(|error| error.to_string())?;
             store_skin(&RealDisk, path, &file).map_err(|error| error.to_string())?;
             Ok(Vec::new())
@@ -268,7 +267,7 @@ fn export_to(path: &Path, rig: &Rig, mesh: Option<&RigMesh>) -> Result<Vec<Strin
     }
 }
 
-/// Tells what became of what was being saved, and goes on.
+/// Reports the result of saving, and proceeds.
 pub(super) fn poll(world: &mut World) {
     let mut saving = world.resource_mut::<Saving>();
     let Some(job) = &mut saving.bypass_change_detection().job else { return };
@@ -277,12 +276,12 @@ pub(super) fn poll(world: &mut World) {
     let next = saving.waiting.pop_front();
     let is_done = result.is_ok();
     match result {
-        Ok(Stored::Project { mark, notes, bundled }) => {
+        Ok(SavedContent::Project { mark, notes, bundled }) => {
             saved(world, rig, step, mark, bundled);
             world.write_message(Notice::done(format!("Saved {name}")));
             tell(world, notes);
         }
-        Ok(Stored::Export { notes }) => {
+        Ok(SavedContent::Export { notes }) => {
             world.write_message(Notice::done(format!("Exported {name}")));
             tell(world, notes);
         }
@@ -294,7 +293,7 @@ pub(super) fn poll(world: &mut World) {
         to(world, purpose, path, then);
     }
     if let Some(then) = then.filter(|_| is_done) {
-        // Somebody may have gone on while it was being saved.
+        // Changes may have been made while it was being saved.
         after_asking(world, then);
     }
 }
@@ -305,7 +304,7 @@ fn tell(world: &mut World, notes: Vec<String>) {
     }
 }
 
-/// The project is in its file: the journal starts again from there.
+/// The project is saved: the journal starts again from this state.
 fn saved(world: &mut World, rig: Entity, step: Option<Arc<Step>>, mark: SaveMark, bundled: Option<PathBuf>) {
     let open: Vec<Entity> = meshes(world, rig).into_iter().map(|(entity, ..)| entity).collect();
     if let Some(path) = bundled {

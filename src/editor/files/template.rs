@@ -1,4 +1,4 @@
-//! A template on the mesh that is open: one step that undo takes back.
+//! Templates put onto the open mesh, as one step that undo takes back.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::{
     rig::{PoseOffset, Rig, RigEdit, operations::Operation, step::edits_from_empty},
 };
 
-/// How much larger or smaller than the mesh a template may be before somebody is asked.
+/// Largest ratio of sizes of a template and the mesh without a question.
 const ALLOWED: f32 = 1.6;
 
 /// A template, and a mesh of another size.
@@ -24,9 +24,9 @@ const ALLOWED: f32 = 1.6;
 pub struct Fit {
     /// The template's name.
     pub name: String,
-    /// The height of its joints, in its own units.
+    /// Height of the template's joints, in its own units.
     pub rig_height: f32,
-    /// The height of the mesh at rest.
+    /// Height of the mesh at rest.
     pub mesh_height: f32,
     pub(super) rig: Arc<Rig>,
 }
@@ -38,12 +38,12 @@ impl Fit {
     }
 }
 
-/// True if a mesh is open.
+/// Returns `true` if a mesh is open.
 pub(super) fn has_mesh(world: &World) -> bool {
     active(world).is_some_and(|rig| !meshes(world, rig).is_empty())
 }
 
-/// Puts a template onto the mesh, or asks what to do about their sizes.
+/// Puts a template onto the mesh, or asks about their sizes.
 pub(super) fn consider(world: &mut World, opened: Opened) {
     let Some(active) = active(world) else { return };
     for note in &opened.notes {
@@ -67,7 +67,7 @@ pub(super) fn consider(world: &mut World, opened: Opened) {
     }
 }
 
-/// A height in three figures.
+/// Height with three digits.
 pub(super) fn number(height: f32) -> String {
     match height {
         large if large >= 100.0 => format!("{large:.0}"),
@@ -81,7 +81,7 @@ fn height(points: impl Iterator<Item = Vec3>) -> f32 {
     (high - low).max(0.0)
 }
 
-/// Replaces the rig that is open by the template, `scale` times as large, as one step.
+/// Replaces the open rig by the template, scaled by `scale`, as one step.
 pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
     let Some(entity) = active(world) else { return };
     let Some(rig) = world.get::<Rig>(entity) else { return };
@@ -101,7 +101,7 @@ pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
     world.write_message(Notice::done(format!("Put {} onto the mesh: {joints} joints{sized}{replaced}", fit.name)));
 }
 
-/// The edits that empty a rig.
+/// Edits that empty a rig.
 fn clearing(rig: &Rig) -> Vec<RigEdit> {
     let mut edits: Vec<RigEdit> = rig.skins().map(|(mesh, _)| RigEdit::SetSkin(mesh, None)).collect();
     edits.extend(rig.stored_poses().iter().map(|pose| RigEdit::RemoveStoredPose(pose.uid)));

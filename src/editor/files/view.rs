@@ -1,4 +1,4 @@
-//! How a document is looked at: kept in its project, and back again.
+//! View state of a document: stored in its project, and restored.
 
 use bevy::{ecs::system::SystemState, prelude::*};
 use bevy_panorbit_camera::PanOrbitCamera;
@@ -12,7 +12,7 @@ use crate::{
     rig::project::ProjectView,
 };
 
-/// How the document is looked at now.
+/// Current view state of the document.
 pub(in crate::editor) fn now(world: &mut World) -> ProjectView {
     let mut cameras = world.query::<(&PanOrbitCamera, &Projection)>();
     let camera = cameras.iter(world).next().map(|(orbit, projection)| camera::kept(orbit, projection));
@@ -37,7 +37,7 @@ pub(in crate::editor) fn now(world: &mut World) -> ProjectView {
     view
 }
 
-/// Looks at the document as it was looked at. Returns true if that says where the camera stands.
+/// Restores the view state. Returns `true` if it includes the camera.
 pub(super) fn restore(world: &mut World, view: &ProjectView) -> bool {
     let mut state: SystemState<(
         Option<ResMut<Mode>>,

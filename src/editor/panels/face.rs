@@ -1,4 +1,4 @@
-//! The face: how many bones, how the head is grouped, and what the face shows.
+//! Face panel: number of bones, grouping of the head, and expressions.
 
 mod dendrogram;
 mod expressions;
@@ -10,9 +10,9 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Button, CollapsingHeader, DragValue, ProgressBar, RichText, ScrollArea, Slider, Ui};
 
 use super::{
+    displayed_rig::{DisplayedRig, Stamp},
     fields, list,
     log::LogSystems,
-    shown::{Shown, Stamp},
 };
 use crate::{
     algo::face::{
@@ -33,7 +33,7 @@ use crate::{
     rig::Uid,
 };
 
-/// Tells what came of faces, and stops them.
+/// Plugin of the face panel: reports results of face jobs, and cancels jobs.
 pub struct FacePanelPlugin;
 
 impl Plugin for FacePanelPlugin {
@@ -48,7 +48,7 @@ impl Plugin for FacePanelPlugin {
     }
 }
 
-/// What was last placed in each mesh.
+/// Last report of each mesh.
 #[derive(Resource, Debug, Default)]
 pub struct FaceResults(Vec<(Entity, FaceReport)>);
 
@@ -59,7 +59,7 @@ impl FaceResults {
     }
 }
 
-/// Asks to stop placing a face; the rig stays as it is.
+/// Request to cancel the face job of a mesh; the rig stays unchanged.
 #[derive(Message, Debug, Clone, Copy)]
 pub struct CancelFace(pub Entity);
 
@@ -122,13 +122,13 @@ fn told(report: &FaceReport) -> String {
 #[derive(Default)]
 pub struct FacePanel {
     settings: AutoSettings,
-    shown: Option<Drawn>,
+    shown: Option<FaceData>,
     /// Strengths while a slider is dragged.
     held: Option<BTreeMap<String, f32>>,
 }
 
-/// What was made of the face in one state of the rig.
-struct Drawn {
+/// Data of the face in one state of the rig.
+struct FaceData {
     mesh: Entity,
     stamp: Stamp,
     known: FaceRig,
@@ -141,7 +141,7 @@ impl EditorPanel for FacePanel {
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
-        let Some(shown) = Shown::of(world) else {
+        let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
         let first = world.get::<RigMeshes>(shown.entity).and_then(|meshes| meshes.iter().next());
@@ -174,18 +174,18 @@ impl EditorPanel for FacePanel {
 }
 
 impl FacePanel {
-    /// Reads the rig's face again where the rig has changed.
-    fn renew(&mut self, shown: &Shown, mesh: Entity, _: &RigMesh, _: Option<&Face>) {
+    /// Reads the rig's face again if the rig has changed.
+    fn renew(&mut self, shown: &DisplayedRig, mesh: Entity, _: &RigMesh, _: Option<&Face>) {
         let stamp = shown.stamp();
         if self.shown.as_ref().is_some_and(|drawn| drawn.mesh == mesh && drawn.stamp == stamp) {
             return;
         }
         let known = FaceRig::read(&shown.rig);
         let pictures = self.shown.take().filter(|drawn| drawn.mesh == mesh).map(|drawn| drawn.pictures);
-        self.shown = Some(Drawn { mesh, stamp, known, pictures: pictures.unwrap_or_default() });
+        self.shown = Some(FaceData { mesh, stamp, known, pictures: pictures.unwrap_or_default() });
     }
 
-    /// The button; while a job runs, its progress and a button that stops it.
+    /// Draws the button; while a job runs, its progress and a button that cancels it.
     fn place(&mut self, ui: &mut Ui, world: &World, entity: Entity, requests: &mut Requests) {
         let size = egui::vec2(ui.available_width(), 34.0);
         if let Some(job) = world.get::<FaceJob>(entity) {
@@ -208,14 +208,14 @@ impl FacePanel {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
             let slider = ui.add(Slider::new(&mut self.settings.bones, 4..=150).logarithmic(true));
             let slider = slider.on_hover_text("Density: bones of the facial skin");
-            // Letting go is enough: what was placed is placed again as dense.
+            // Releasing the slider is enough: an existing face is placed again with the new density.
             if again && (slider.drag_stopped() || slider.lost_focus()) {
                 requests.send(FaceRequest { mesh: entity, settings: self.settings.clone(), fit: None });
             }
         });
     }
 
-    /// How faces are placed, folded away; among it the merge history.
+    /// Draws the settings, folded by default, with the merge history.
     fn options(&mut self, ui: &mut Ui, world: &World, entity: Entity) {
         CollapsingHeader::new("Settings").show(ui, |ui| {
             fields::labelled(ui, "Seed", |ui| {
@@ -237,7 +237,7 @@ impl FacePanel {
     }
 }
 
-/// One of the six axes, or what the mesh looks like.
+/// Choice of one of the six axes, or of a guess from the mesh.
 fn axis(ui: &mut Ui, name: &str, value: &mut Option<Vec3>) {
     let axes =
         [("X", Vec3::X), ("Y", Vec3::Y), ("Z", Vec3::Z), ("-X", Vec3::NEG_X), ("-Y", Vec3::NEG_Y), ("-Z", Vec3::NEG_Z)];
@@ -252,8 +252,8 @@ fn axis(ui: &mut Ui, name: &str, value: &mut Option<Vec3>) {
     });
 }
 
-/// How many bones each region has; a click selects them.
-fn regions(ui: &mut Ui, shown: &Shown, known: &FaceRig, face: Option<&Face>, requests: &mut Requests) {
+/// Draws the number of bones in each region; a click selects them.
+fn regions(ui: &mut Ui, shown: &DisplayedRig, known: &FaceRig, face: Option<&Face>, requests: &mut Requests) {
     let mut by_region: BTreeMap<&str, Vec<Uid>> = BTreeMap::new();
     match face {
         Some(face) => {
@@ -310,7 +310,7 @@ fn fit(ui: &mut Ui, entity: Entity, mesh: &RigMesh, settings: &AutoSettings, req
     }
 }
 
-/// The expressions that are known.
+/// The available expressions.
 fn set(world: &World) -> FaceExpressions {
     world.get_resource::<FaceExpressions>().cloned().unwrap_or_default()
 }

@@ -11,7 +11,7 @@ use bevy_egui::egui::{
 
 use super::list;
 
-/// A value of several things: that of the active one, and whether all have it.
+/// A value of several joints: that of the active one, and whether it differs among them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Shared<T> {
     pub value: T,
@@ -28,7 +28,7 @@ impl<T: PartialEq> Shared<T> {
     }
 }
 
-/// What is shown where values differ.
+/// Text for values that differ.
 pub(super) const MIXED: &str = "mixed";
 
 /// A row with a name on the left.
@@ -47,18 +47,19 @@ pub(super) fn labelled<R>(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui) -> 
     .inner
 }
 
-/// What became of a name that is typed in place.
+/// Result of editing a name in place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Renaming {
-    /// The field has the keyboard.
+    /// The field has the keyboard focus.
     Typing,
-    /// Escape.
+    /// Escape was pressed.
     Dropped,
-    /// Enter, or a click elsewhere.
+    /// Enter was pressed, or a click was elsewhere.
     Accepted,
 }
 
-/// A field in place of a name, all of which is selected at first. `focused` is true once it has had the keyboard.
+/// Draws a text field in place of a name, with the whole text selected at first. `focused` is set once it has had the
+/// keyboard focus.
 pub(super) fn rename(ui: &mut Ui, rect: Rect, id: Id, said: &str, text: &mut String, focused: &mut bool) -> Renaming {
     let field = TextEdit::singleline(text).id(id).margin(vec2(3.0, 1.0)).desired_width(rect.width());
     let response = ui.place(rect, field);
@@ -80,11 +81,11 @@ pub(super) fn rename(ui: &mut Ui, rect: Rect, id: Id, said: &str, text: &mut Str
     }
 }
 
-/// Numbers while they are dragged: the rig shows them, and takes the last one as one step.
+/// Number fields: during a drag the rig shows a preview, and the release makes one step.
 #[derive(Default)]
 pub(super) struct Numbers {
     dragged: Option<Dragged>,
-    /// The field that Escape has left: egui hands out what was typed once more in the next frame.
+    /// The field left by Escape: egui returns the typed text once more in the next frame.
     dropped: Option<Id>,
 }
 
@@ -96,31 +97,31 @@ struct Dragged {
     value: f64,
 }
 
-/// What is done to a number.
+/// Edit of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum NumberEdit {
-    /// Typed.
+    /// A typed value.
     Set(f32),
-    /// Dragged so far.
+    /// Preview of a drag.
     Preview(f32),
-    /// Let go after a drag.
+    /// Release after a drag.
     Commit,
-    /// Dragged, and not meant.
+    /// Cancelled drag.
     Cancel,
 }
 
-/// How a number is shown and dragged.
+/// Display and drag settings of a number.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Look {
-    /// Change a pixel.
+    /// Change of the value per pixel.
     pub speed: f64,
     pub decimals: usize,
     pub suffix: &'static str,
 }
 
 impl Numbers {
-    /// Three fields, X, Y and Z, beside each other or below each other where it is narrow. Returns the axis and what is
-    /// done to it.
+    /// Three fields, X, Y and Z, beside each other, or below each other in a narrow panel. Returns the axis and its
+    /// edit.
     pub fn vector(
         &mut self,
         ui: &mut Ui,
@@ -152,7 +153,7 @@ impl Numbers {
         edited
     }
 
-    /// One field. Escape drops what is typed or dragged.
+    /// Draws one field. Escape drops the typed or dragged value.
     fn field(
         &mut self,
         ui: &mut Ui,
@@ -189,7 +190,7 @@ impl Numbers {
         }
         if let Some(Dragged { from, value, .. }) = dragged.filter(|_| !response.dragged()) {
             self.dragged = None;
-            // Escape, or something else took the pointer, or it is back where it was.
+            // Escape, a lost pointer, or a return to the first value cancels the drag.
             let dropped = escaped || !response.drag_stopped() || value == from;
             return Some(if dropped { NumberEdit::Cancel } else { NumberEdit::Commit });
         }
@@ -201,7 +202,7 @@ impl Numbers {
             return None;
         }
         let number = typed.get().or(response.changed().then_some(value))? as f32;
-        // Digits that are not shown are not changed by confirming those that are.
+        // Confirming the visible digits keeps the hidden ones.
         let same = !shown.mixed && short(number.into(), look.decimals) == short(shown.value.into(), look.decimals);
         (number.is_finite() && !same).then_some(NumberEdit::Set(number))
     }
@@ -213,7 +214,7 @@ const AXES: [(&str, Color32); 3] = [
     ("Z", Color32::from_rgb(90, 150, 240)),
 ];
 
-/// A number without digits that say nothing.
+/// A number without trailing zeros.
 pub(super) fn short(number: f64, decimals: usize) -> String {
     let text = format!("{number:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

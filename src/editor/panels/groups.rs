@@ -1,12 +1,12 @@
-//! Choosing a local group, or creating one by typing its name.
+//! Choice of a local group, or creation of one by typing its name.
 
 use bevy_egui::egui::{Color32, Key, Rect, Response, Sense, TextEdit, Ui, WidgetInfo, WidgetType, vec2};
 
-use super::{list, shown::color};
+use super::{displayed_rig::color, list};
 use crate::rig::Rig;
 
-/// The rig's groups with their colours, "None", and a field for another name. Returns the name that was chosen;
-/// empty for none. `draft` is what has been typed so far.
+/// Draws the rig's groups with their colours, "None", and a field for another name. Returns the chosen name, empty for
+/// none. `draft` is the text typed so far.
 pub(super) fn choose(ui: &mut Ui, rig: &Rig, current: Option<&str>, draft: &mut String) -> Option<String> {
     let mut chosen = None;
     if entry(ui, "None", None, current == Some("")).clicked() {

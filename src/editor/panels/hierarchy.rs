@@ -1,4 +1,4 @@
-//! The tree of joints.
+//! Hierarchy panel: the tree of joints.
 //!
 //! It shows the rig's own selection and changes it with pick requests, so the viewport and the tree never differ.
 
@@ -13,8 +13,8 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, DragAndDrop, Rect, Sense, Ui};
 
 use super::{
+    displayed_rig::{DisplayedRig, Stamp},
     list::{self, List},
-    shown::{Shown, Stamp},
 };
 use crate::{
     editor::{
@@ -35,22 +35,22 @@ pub struct HierarchyPanel {
     filter: String,
     folded: HashSet<Uid>,
     tree: Tree,
-    /// True once what is folded changed.
+    /// Marks a change of the folded joints.
     stale: bool,
     selected: (Option<Stamp>, HashSet<Uid>),
-    /// The active joint that was last brought into view.
+    /// The active joint that was last scrolled into view.
     revealed: Option<Uid>,
-    /// Where a range of rows begins.
+    /// First joint of a range selection.
     anchor: Option<Uid>,
     rename: Option<Rename>,
     group: String,
-    /// The joint that the tree said the pointer is at.
+    /// The joint that the tree last reported as hovered.
     pointed: Option<Uid>,
-    /// The joint whose row the pointer is over now.
+    /// The joint of the row under the pointer.
     under: Option<Uid>,
 }
 
-/// The listed rows and what they were made from.
+/// The listed rows with the state they were made from.
 #[derive(Default)]
 struct Tree {
     made_from: Option<(Stamp, String)>,
@@ -62,11 +62,11 @@ struct Tree {
 struct Rename {
     joint: Uid,
     text: String,
-    /// True once the field has had the keyboard.
+    /// Marks that the field has had the keyboard focus.
     focused: bool,
 }
 
-/// Joints on their way to another parent.
+/// Joints dragged to another parent.
 struct Dragged(Vec<Uid>);
 
 impl EditorPanel for HierarchyPanel {
@@ -75,7 +75,7 @@ impl EditorPanel for HierarchyPanel {
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
-        let Some(shown) = Shown::of(world) else {
+        let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
         if shown.rig.is_empty() {
@@ -98,8 +98,8 @@ impl EditorPanel for HierarchyPanel {
 }
 
 impl HierarchyPanel {
-    /// The filter, and buttons that fold.
-    fn bar(&mut self, ui: &mut Ui, shown: &Shown) {
+    /// Draws the filter and the fold buttons.
+    fn bar(&mut self, ui: &mut Ui, shown: &DisplayedRig) {
         let mut fold: Option<bool> = None;
         let tip = "Joints whose label or group contains all of these words";
         list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
@@ -121,8 +121,8 @@ impl HierarchyPanel {
         }
     }
 
-    /// Lists the rows again if the rig, the filter or what is folded changed.
-    fn refresh(&mut self, shown: &Shown) {
+    /// Lists the rows again after a change of the rig, the filter or the folded joints.
+    fn refresh(&mut self, shown: &DisplayedRig) {
         let stamp = shown.stamp();
         let fresh = self.tree.made_from.as_ref().is_some_and(|(from, filter)| *from == stamp && *filter == self.filter);
         if !fresh || std::mem::take(&mut self.stale) {
@@ -137,8 +137,8 @@ impl HierarchyPanel {
         }
     }
 
-    /// Unfolds what hides a joint that became active.
-    fn reveal_active(&mut self, shown: &Shown) {
+    /// Unfolds the joints above a joint that became active.
+    fn reveal_active(&mut self, shown: &DisplayedRig) {
         let active = shown.selection.active();
         if active != self.revealed
             && let Some(active) = active
@@ -153,8 +153,8 @@ impl HierarchyPanel {
         }
     }
 
-    /// The row of the joint that became active since the last time.
-    fn newly_active(&mut self, shown: &Shown) -> Option<usize> {
+    /// Row of the joint that became active since the last call.
+    fn newly_active(&mut self, shown: &DisplayedRig) -> Option<usize> {
         let active = shown.selection.active();
         if active == self.revealed {
             return None;
@@ -167,8 +167,8 @@ impl HierarchyPanel {
         self.tree.rows.iter().position(|row| row.joint == joint)
     }
 
-    /// Draws the rows in view; true if the one that is being renamed was among them.
-    fn list(&mut self, ui: &mut Ui, shown: &Shown, reveal: Option<usize>, requests: &mut Requests) -> bool {
+    /// Draws the visible rows; returns `true` if the row being renamed was among them.
+    fn list(&mut self, ui: &mut Ui, shown: &DisplayedRig, reveal: Option<usize>, requests: &mut Requests) -> bool {
         let height = list::row_height(ui);
         let tree = std::mem::take(&mut self.tree);
         let renamed = self.rename.as_ref().map(|rename| rename.joint);
@@ -190,8 +190,8 @@ impl HierarchyPanel {
         drawn
     }
 
-    /// What happens below the last row: a click selects nothing, a drop makes roots.
-    fn ground(&mut self, ui: &Ui, view: Rect, ground: &egui::Response, shown: &Shown, requests: &mut Requests) {
+    /// Handles the area below the last row: a click clears the selection, a drop makes roots.
+    fn ground(&mut self, ui: &Ui, view: Rect, ground: &egui::Response, shown: &DisplayedRig, requests: &mut Requests) {
         if ground.clicked() {
             requests.send(PickRequest { rig: shown.entity, what: Pick::None, add: false });
         }
@@ -201,15 +201,15 @@ impl HierarchyPanel {
         }
     }
 
-    /// Takes what was typed once the field has lost the keyboard or is out of sight; Escape drops it.
-    fn end_rename(&mut self, shown: &Shown, drawn: bool, requests: &mut Requests) {
+    /// Accepts the typed text once the field has lost the focus or is out of view; Escape drops it.
+    fn end_rename(&mut self, shown: &DisplayedRig, drawn: bool, requests: &mut Requests) {
         let over = self.rename.as_ref().is_some_and(|rename| !drawn && rename.focused);
         if over {
             self.accept_rename(shown, requests);
         }
     }
 
-    fn accept_rename(&mut self, shown: &Shown, requests: &mut Requests) {
+    fn accept_rename(&mut self, shown: &DisplayedRig, requests: &mut Requests) {
         let Some(Rename { joint, text, .. }) = self.rename.take() else { return };
         let Some(known) = shown.rig.joint(joint) else { return };
         if known.data.label.as_deref().unwrap_or_default() != text.trim() {
@@ -218,15 +218,15 @@ impl HierarchyPanel {
         }
     }
 
-    fn start_rename(&mut self, joint: Uid, shown: &Shown) {
+    fn start_rename(&mut self, joint: Uid, shown: &DisplayedRig) {
         if let Some(known) = shown.rig.joint(joint) {
             let text = known.data.label.clone().unwrap_or_default();
             self.rename = Some(Rename { joint, text, focused: false });
         }
     }
 
-    /// Folds or unfolds a joint, with `deep` everything below it, too.
-    fn fold(&mut self, joint: Uid, fold: bool, deep: bool, shown: &Shown) {
+    /// Folds or unfolds a joint, with `deep` its whole hierarchy.
+    fn fold(&mut self, joint: Uid, fold: bool, deep: bool, shown: &DisplayedRig) {
         let all: Vec<Uid> = match deep {
             true => shown.rig.hierarchy(joint).map(|joint| joint.data.uid).collect(),
             false => vec![joint],
@@ -243,19 +243,19 @@ impl HierarchyPanel {
 }
 
 /// Selects joints; the last is active.
-fn select(joints: Vec<Uid>, shown: &Shown, requests: &mut Requests) {
+fn select(joints: Vec<Uid>, shown: &DisplayedRig, requests: &mut Requests) {
     requests.send(PickRequest { rig: shown.entity, what: Pick::Joints(joints), add: false });
 }
 
-/// Those of `joints` that hang below none of the others, in the order of the tree.
+/// Joints of `joints` that are below none of the others, in the order of the tree.
 fn tops(rig: &Rig, joints: &[Uid]) -> Vec<Uid> {
     let listed: HashSet<Uid> = joints.iter().copied().collect();
     let is_top = |joint: &Uid| !rig.ancestors(*joint).any(|above| listed.contains(&above.data.uid));
     rig.walk().map(|joint| joint.data.uid).filter(|joint| listed.contains(joint)).filter(is_top).collect()
 }
 
-/// Why joints cannot hang below `parent`, if they cannot.
-fn obstacle(joints: &[Uid], parent: Option<Uid>, shown: &Shown) -> Option<String> {
+/// Reason why joints cannot be moved below `parent`, if any.
+fn obstacle(joints: &[Uid], parent: Option<Uid>, shown: &DisplayedRig) -> Option<String> {
     let parent = parent?;
     if joints.contains(&parent) {
         return Some(format!("{} cannot hang below itself", shown.name(parent)));
@@ -265,10 +265,10 @@ fn obstacle(joints: &[Uid], parent: Option<Uid>, shown: &Shown) -> Option<String
     Some(format!("{joint} cannot hang below {parent}, which hangs below it"))
 }
 
-/// Hangs joints below another, or says why not. Those that hang there already stay.
-fn reparent(joints: &[Uid], parent: Option<Uid>, shown: &Shown, requests: &mut Requests) {
+/// Moves joints below another, or sends a notice with the reason. Joints already there stay.
+fn reparent(joints: &[Uid], parent: Option<Uid>, shown: &DisplayedRig, requests: &mut Requests) {
     if joints == [parent.unwrap_or_default()] {
-        // Let go where it was picked up.
+        // Dropped on the joint that was dragged.
         return;
     }
     if let Some(obstacle) = obstacle(joints, parent, shown) {
@@ -282,7 +282,7 @@ fn reparent(joints: &[Uid], parent: Option<Uid>, shown: &Shown, requests: &mut R
     }
 }
 
-/// Scrolls while joints are held near an edge of the view.
+/// Scrolls while dragged joints are near an edge of the view.
 fn autoscroll(ui: &Ui, view: Rect) {
     let Some(pointer) = ui.input(|input| input.pointer.latest_pos()) else { return };
     if !DragAndDrop::has_payload_of_type::<Dragged>(ui.ctx()) || !view.x_range().contains(pointer.x) {

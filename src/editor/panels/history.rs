@@ -1,11 +1,11 @@
-//! The steps that were done, and back to any of them.
+//! History panel: the steps, with a jump to any of them.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Button, Rect, Sense, Ui, WidgetInfo, WidgetType};
 
 use super::{
+    displayed_rig::DisplayedRig,
     list::{self, List},
-    shown::Shown,
 };
 use crate::{
     editor::panel::{EditorPanel, Requests},
@@ -21,9 +21,9 @@ pub struct HistoryPanel {
     made_from: Option<(Entity, bevy::ecs::change_detection::Tick)>,
     /// Names of the steps, oldest first.
     steps: Vec<String>,
-    /// How many of them are in effect.
+    /// Number of steps in effect.
     done: usize,
-    /// The step that was last brought into view.
+    /// The step that was last scrolled into view.
     revealed: Option<usize>,
 }
 
@@ -33,7 +33,7 @@ impl EditorPanel for HistoryPanel {
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
-        let Some(shown) = Shown::of(world) else {
+        let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
         let Some(history) = world.get_entity(shown.entity).ok().and_then(|rig| rig.get_ref::<RigHistory>()) else {
@@ -71,7 +71,7 @@ impl EditorPanel for HistoryPanel {
 }
 
 impl HistoryPanel {
-    /// Draws the state after so many steps; true if it was clicked.
+    /// Draws the state after `number` steps; returns `true` if it was clicked.
     fn step(&self, ui: &Ui, rect: Rect, number: usize) -> bool {
         let name = number.checked_sub(1).and_then(|step| self.steps.get(step)).map_or("Start", String::as_str);
         let current = number == self.done;
@@ -99,8 +99,8 @@ impl HistoryPanel {
     }
 }
 
-/// Goes from one state to another, step by step.
-fn jump(from: usize, to: usize, shown: &Shown, requests: &mut Requests) {
+/// Undoes or redoes step by step from one state to another.
+fn jump(from: usize, to: usize, shown: &DisplayedRig, requests: &mut Requests) {
     let change = if to < from { Change::Undo } else { Change::Redo };
     for _ in 0..from.abs_diff(to) {
         requests.send(EditRequest { rig: shown.entity, change: change.clone() });

@@ -1,4 +1,4 @@
-//! Lists with any number of rows, of which only those in view cost anything.
+//! Lists with any number of rows, of which only the visible ones are drawn.
 
 use std::ops::Range;
 
@@ -16,14 +16,15 @@ pub(super) struct List<'a> {
     pub id: &'a str,
     pub count: usize,
     pub height: f32,
-    /// The row to bring into view.
+    /// Row to scroll into view.
     pub reveal: Option<usize>,
-    /// True to stay at the end while rows are added there.
+    /// Keeps the list at its end while rows are added there, if `true`.
     pub follow: bool,
 }
 
 impl List<'_> {
-    /// Draws the rows in view. `draw` gets the numbers in view and the rectangle of any row.
+    /// Draws the visible rows. `draw` gets the range of visible rows and a function that gives the rectangle of any
+    /// row.
     pub fn show(self, ui: &mut Ui, draw: impl FnOnce(&mut Ui, Range<usize>, &dyn Fn(usize) -> Rect)) {
         let List { id, count, height, reveal, follow } = self;
         let area = ScrollArea::vertical()
@@ -47,7 +48,7 @@ impl List<'_> {
     }
 }
 
-/// One line of text in a rectangle, vertically centred and cut with an ellipsis; true if it was cut.
+/// Draws one line of text in a rectangle, vertically centred and cut with an ellipsis; returns `true` if it was cut.
 pub(super) fn line(ui: &Ui, rect: Rect, text: &str, color: Color32) -> bool {
     let font = TextStyle::Body.resolve(ui.style());
     let mut job = LayoutJob::simple_singleline(text.to_owned(), font, color);
@@ -59,7 +60,7 @@ pub(super) fn line(ui: &Ui, rect: Rect, text: &str, color: Color32) -> bool {
     cut
 }
 
-/// A symbol in the middle of a rectangle.
+/// Draws a symbol in the middle of a rectangle.
 pub(super) fn symbol(ui: &Ui, rect: Rect, symbol: &str, color: Color32) {
     let size = TextStyle::Body.resolve(ui.style()).size;
     ui.painter().text(rect.center(), Align2::CENTER_CENTER, symbol, FontId::proportional(size), color);
@@ -70,7 +71,7 @@ pub(super) fn row_height(ui: &Ui) -> f32 {
     (ui.text_style_height(&TextStyle::Body) + 4.0).max(18.0).round()
 }
 
-/// What is said where a panel has nothing to show.
+/// Draws the text of an empty panel.
 pub(super) fn nothing(ui: &mut Ui, text: &str) {
     ui.add_space(8.0);
     ui.vertical_centered(|ui| {
@@ -79,7 +80,7 @@ pub(super) fn nothing(ui: &mut Ui, text: &str) {
     });
 }
 
-/// A small square button with a symbol.
+/// Draws a small square button with a symbol.
 pub(super) fn symbol_button(ui: &mut Ui, text: &str, tip: &str) -> bool {
     let side = ui.spacing().interact_size.y;
     let button = Button::new(text).min_size(Vec2::splat(side));
@@ -88,7 +89,7 @@ pub(super) fn symbol_button(ui: &mut Ui, text: &str, tip: &str) -> bool {
     response.clicked()
 }
 
-/// A field that narrows a list down, and what `buttons` adds to its right, from right to left.
+/// Draws a search field with the given buttons to its right, from right to left.
 pub(super) fn search_bar(ui: &mut Ui, name: &str, tip: &str, text: &mut String, buttons: impl FnOnce(&mut Ui)) {
     let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
     ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {

@@ -1,4 +1,4 @@
-//! Everything that was told, and where it is kept.
+//! Log panel: all notices, and their storage.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -14,7 +14,7 @@ use crate::{
     plugins::document::EditRefused,
 };
 
-/// Keeps notices, and makes notices of refused edits.
+/// Plugin that stores notices, and makes notices of refused edits.
 pub struct LogPlugin;
 
 impl Plugin for LogPlugin {
@@ -28,12 +28,12 @@ impl Plugin for LogPlugin {
     }
 }
 
-/// In `Last`: notices of this frame are written into the [`LogBook`]. Who makes notices of other messages in `Last` does
-/// so before.
+/// System set in `Last` that writes this frame's notices into the [`LogBook`]. Systems that make notices of other
+/// messages in `Last` run before it.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct LogSystems;
 
-/// The notices so far, oldest first; the oldest go when there are more than [`LogBook::CAPACITY`].
+/// The notices so far, oldest first; the oldest are dropped beyond [`LogBook::CAPACITY`].
 #[derive(Resource, Debug, Default)]
 pub struct LogBook {
     entries: VecDeque<LogEntry>,
@@ -41,20 +41,20 @@ pub struct LogBook {
     next: u64,
 }
 
-/// A notice and when it was given.
+/// A notice with its time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogEntry {
-    /// Counts from 0 and never repeats.
+    /// Number of the entry, counted from 0 and never reused.
     pub number: u64,
-    /// Since the program started.
+    /// Time since the program started.
     pub at: Duration,
-    /// What was told.
+    /// The notice.
     pub notice: Notice,
-    /// How often in a row.
+    /// Number of repetitions in a row.
     pub times: u32,
 }
 
-/// Asks to forget all entries.
+/// Request to clear the log.
 #[derive(Message, Debug, Clone, Copy)]
 pub struct ClearLog;
 
@@ -72,7 +72,7 @@ impl LogBook {
         self.next
     }
 
-    /// Adds a notice. One that repeats the last is counted there and takes its place at the end.
+    /// Adds a notice. A repetition of the last one increases its count and updates its time.
     pub fn add(&mut self, notice: Notice, at: Duration) {
         let mut times = 1;
         if let Some(last) = self.entries.pop_back_if(|last| last.notice == notice) {
@@ -87,7 +87,7 @@ impl LogBook {
 }
 
 impl LogEntry {
-    /// One line for the clipboard.
+    /// The entry as one line for the clipboard.
     pub fn line(&self) -> String {
         let times = if self.times > 1 { format!(" ({} times)", self.times) } else { String::new() };
         format!("{} {}: {}{times}", clock(self.at), severity_name(self.notice.severity), self.notice.text)
@@ -100,7 +100,7 @@ fn tell_refusals(mut refused: MessageReader<EditRefused>, mut notices: MessageWr
     }
 }
 
-/// A reason as a sentence of its own.
+/// A reason as a sentence: capitalised, with a full stop.
 fn sentence(reason: &str) -> String {
     let mut letters = reason.chars();
     let first = letters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
@@ -129,12 +129,12 @@ fn keep_notices(
 #[derive(Default)]
 pub struct LogPanel {
     search: String,
-    /// The entry whose whole text is shown.
+    /// The entry whose full text is shown.
     chosen: Option<u64>,
     listed: Listed,
 }
 
-/// Numbers of the entries that the search finds, and what they were found for.
+/// Numbers of the entries that match the search, with the search they belong to.
 #[derive(Default)]
 struct Listed {
     made_from: Option<(u64, usize, String)>,
@@ -149,12 +149,12 @@ impl EditorPanel for LogPanel {
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
         let Some(book) = world.get_resource::<LogBook>() else { return };
         if self.refresh(book) {
-            // The list stays at its end one frame after it has grown.
+            // The list reaches its end one frame after it has grown.
             ui.ctx().request_repaint();
         }
         self.bar(ui, book, requests);
         if book.entries.is_empty() {
-            return list::nothing(ui, "Nothing has been told yet.");
+            return list::nothing(ui, "No notices yet.");
         }
         let chosen = self.chosen.and_then(|chosen| book.entries().find(|entry| entry.number == chosen));
         let detail = chosen.map_or(0.0, |_| (ui.available_height() * 0.35).clamp(44.0, 110.0));
@@ -173,7 +173,7 @@ impl EditorPanel for LogPanel {
 }
 
 impl LogPanel {
-    /// Searches again if the entries or the search changed; true if so.
+    /// Searches again if the entries or the search changed; returns `true` if so.
     fn refresh(&mut self, book: &LogBook) -> bool {
         let key = (book.next, book.entries.len(), self.search.clone());
         if self.listed.made_from.as_ref() == Some(&key) {
@@ -237,7 +237,7 @@ fn entry_row(ui: &mut Ui, rect: Rect, entry: &LogEntry, chosen: &mut Option<u64>
         text.min.x += 44.0;
     }
     let times = if entry.times > 1 { format!("{}× ", entry.times) } else { String::new() };
-    // Line breaks would show as boxes in a single line.
+    // Line breaks would appear as boxes in a single line.
     let line = format!("{times}{}", entry.notice.text.replace('\n', " "));
     let cut = list::line(ui, text, &line, ui.visuals().text_color());
     if response.clicked() {
@@ -248,7 +248,7 @@ fn entry_row(ui: &mut Ui, rect: Rect, entry: &LogEntry, chosen: &mut Option<u64>
     }
 }
 
-/// Minutes and seconds, and hours once there are some.
+/// Minutes and seconds, and hours once there are any.
 fn clock(at: Duration) -> String {
     let seconds = at.as_secs();
     let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
@@ -264,7 +264,7 @@ fn severity_name(severity: Severity) -> &'static str {
     }
 }
 
-/// The symbol of a severity and its colour, the same in the log and in toasts.
+/// The symbol and colour of a severity, the same in the log and in toasts.
 pub(super) fn severity_symbol(ui: &Ui, severity: Severity) -> (&'static str, Color32) {
     let visuals = ui.visuals();
     match severity {

@@ -1,12 +1,12 @@
-//! The pose and stored poses. Nothing here changes the rest pose.
+//! Poses panel: the pose and stored poses. It never changes the rest pose.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align, Button, Key, Layout, Rect, Sense, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType};
 
 use super::{
+    displayed_rig::DisplayedRig,
     fields::{self, Renaming},
     list::{self, List},
-    shown::Shown,
 };
 use crate::{
     editor::{
@@ -21,7 +21,7 @@ use crate::{
     rig::{Rig, StoredPose, Uid, operations::Operation},
 };
 
-/// Carries [`Action::ResetPose`] and [`Action::StorePose`] out.
+/// Plugin that carries out [`Action::ResetPose`] and [`Action::StorePose`].
 pub struct PosesPlugin;
 
 impl Plugin for PosesPlugin {
@@ -49,7 +49,7 @@ fn pose_actions(
     }
 }
 
-/// The first of "Pose 1", "Pose 2" and so on that no stored pose has.
+/// The first free name of "Pose 1", "Pose 2" and so on.
 fn free_name(rig: &Rig) -> String {
     let taken = |name: &String| rig.stored_poses().iter().any(|pose| pose.name == *name);
     let names = (1..).map(|number| format!("Pose {number}"));
@@ -64,7 +64,7 @@ pub struct PosesPanel {
     rename: Option<Rename>,
 }
 
-/// A stored pose's name being typed.
+/// Name of a stored pose that is being typed.
 struct Rename {
     pose: Uid,
     text: String,
@@ -77,7 +77,7 @@ impl EditorPanel for PosesPanel {
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
-        let Some(shown) = Shown::of(world) else {
+        let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
         let mut operation = current(ui, &shown);
@@ -93,8 +93,8 @@ impl EditorPanel for PosesPanel {
     }
 }
 
-/// What is posed, and back to rest.
-fn current(ui: &mut Ui, shown: &Shown) -> Option<Operation> {
+/// Draws the number of posed joints and the reset button.
+fn current(ui: &mut Ui, shown: &DisplayedRig) -> Option<Operation> {
     let posed = shown.rig.pose().len();
     let text = match posed {
         0 => "At rest".to_owned(),
@@ -120,8 +120,8 @@ fn current(ui: &mut Ui, shown: &Shown) -> Option<Operation> {
 }
 
 impl PosesPanel {
-    /// A name and a button that keeps the pose under it.
-    fn store(&mut self, ui: &mut Ui, shown: &Shown) -> Option<Operation> {
+    /// Draws a name field and a button that stores the pose under it.
+    fn store(&mut self, ui: &mut Ui, shown: &DisplayedRig) -> Option<Operation> {
         let free = free_name(&shown.rig);
         let name = self.name.trim();
         let replaces = shown.rig.stored_poses().iter().any(|pose| pose.name == name);
@@ -142,7 +142,7 @@ impl PosesPanel {
     }
 
     /// The stored poses.
-    fn stored(&mut self, ui: &mut Ui, shown: &Shown) -> Option<Operation> {
+    fn stored(&mut self, ui: &mut Ui, shown: &DisplayedRig) -> Option<Operation> {
         let poses = shown.rig.stored_poses();
         let mut operation = None;
         let mut drawn = false;
@@ -157,7 +157,7 @@ impl PosesPanel {
                 operation = asked.or(operation.take());
             }
         });
-        // What was typed is taken when the field is gone, too.
+        // The typed text is also accepted when the field disappears.
         if !drawn && self.rename.as_ref().is_some_and(|rename| rename.focused) {
             let rename = self.rename.take()?;
             operation = operation.or(shown.rig.stored_pose(rename.pose).and_then(|pose| renamed(pose, &rename.text)));
@@ -165,8 +165,8 @@ impl PosesPanel {
         operation
     }
 
-    /// One pose: apply, rename, delete.
-    fn row(&mut self, ui: &mut Ui, rect: Rect, pose: &StoredPose, shown: &Shown) -> Option<Operation> {
+    /// Draws a pose with its actions: apply, rename, delete.
+    fn row(&mut self, ui: &mut Ui, rect: Rect, pose: &StoredPose, shown: &DisplayedRig) -> Option<Operation> {
         let current = pose.offsets == *shown.rig.pose();
         let response = ui.interact(rect, ui.id().with(pose.uid), Sense::click());
         response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, current, &pose.name));
@@ -201,7 +201,7 @@ impl PosesPanel {
         self.rename = Some(Rename { pose: pose.uid, text: pose.name.clone(), focused: false });
     }
 
-    /// The field in place of a name.
+    /// Draws the text field in place of a name.
     fn rename(&mut self, ui: &mut Ui, rect: Rect, pose: &StoredPose) -> Option<Operation> {
         let rename = self.rename.as_mut()?;
         let id = ui.id().with((pose.uid, "rename"));
@@ -216,7 +216,7 @@ impl PosesPanel {
     }
 }
 
-/// Renames a pose, unless that says nothing.
+/// Operation that renames a pose, unless the text is empty or unchanged.
 fn renamed(pose: &StoredPose, text: &str) -> Option<Operation> {
     let name = text.trim();
     (!name.is_empty() && name != pose.name).then(|| Operation::RenamePose(pose.uid, name.to_owned()))

@@ -1,6 +1,7 @@
-//! The selected joints: label, group, rest pose, weights' lock. Several at once where they have a field in common.
+//! Properties panel of the selected joints: label, group, rest pose, lock of weights. Several joints share their common
+//! fields.
 //!
-//! A field that is typed or dragged is one step of the history. The rig shows a number while it is dragged.
+//! A typed or dragged value is one step of the history. The rig shows a number while it is dragged.
 
 mod values;
 
@@ -8,9 +9,9 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Checkbox, ComboBox, Key, ScrollArea, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use super::{
+    displayed_rig::{DisplayedRig, color},
     fields::{Look, MIXED, NumberEdit, Numbers, Shared, labelled, short},
     groups, list,
-    shown::{Shown, color},
 };
 use crate::{
     editor::{
@@ -33,11 +34,11 @@ pub struct PropertiesPanel {
     numbers: Numbers,
     label: Option<LabelDraft>,
     group: String,
-    /// A group's colour while it is being chosen.
+    /// Colour of a group while it is being chosen.
     color: Option<(String, [u8; 3])>,
 }
 
-/// A label being typed, and whose it is: the selection may change before it is committed.
+/// A label being typed, with its joints: the selection may change before it is committed.
 struct LabelDraft {
     joints: Vec<Uid>,
     text: String,
@@ -49,7 +50,7 @@ impl EditorPanel for PropertiesPanel {
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
-        let Some(shown) = Shown::of(world) else {
+        let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
         self.values.refresh(&shown);
@@ -73,18 +74,18 @@ impl EditorPanel for PropertiesPanel {
 }
 
 impl PropertiesPanel {
-    fn send(&self, operation: Operation, shown: &Shown, requests: &mut Requests) {
+    fn send(&self, operation: Operation, shown: &DisplayedRig, requests: &mut Requests) {
         requests.send(EditRequest::operation(shown.entity, operation));
     }
 
     /// Commits a label that was typed for joints that are no longer selected.
-    fn keep_label(&mut self, shown: &Shown, requests: &mut Requests) {
+    fn keep_label(&mut self, shown: &DisplayedRig, requests: &mut Requests) {
         if self.label.as_ref().is_some_and(|draft| draft.joints != self.values.joints) {
             self.accept_label(shown, requests);
         }
     }
 
-    fn accept_label(&mut self, shown: &Shown, requests: &mut Requests) {
+    fn accept_label(&mut self, shown: &DisplayedRig, requests: &mut Requests) {
         let Some(draft) = self.label.take() else { return };
         let labels = numbered(&draft.joints, draft.text.trim()).into_iter().filter(|(uid, label)| {
             shown.rig.joint(*uid).is_some_and(|joint| joint.data.label.as_deref().unwrap_or_default() != label)
@@ -95,7 +96,7 @@ impl PropertiesPanel {
         }
     }
 
-    fn label_field(&mut self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+    fn label_field(&mut self, ui: &mut Ui, shown: &DisplayedRig, requests: &mut Requests) {
         let several = self.values.joints.len() > 1;
         let Shared { value, mixed } = self.values.label.clone();
         let kept = self.label.as_ref().map(|draft| draft.text.clone());
@@ -123,7 +124,7 @@ impl PropertiesPanel {
         }
     }
 
-    fn group_field(&mut self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+    fn group_field(&mut self, ui: &mut Ui, shown: &DisplayedRig, requests: &mut Requests) {
         let Shared { value, mixed } = self.values.group;
         let group = value.filter(|_| !mixed).and_then(|uid| shown.rig.group(uid)).cloned();
         let text = match &group {
@@ -160,8 +161,8 @@ impl PropertiesPanel {
         }
     }
 
-    /// Kind and bones, and parent and other side, each a click away.
-    fn relations(&self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+    /// Draws kind and bone lengths, and links to the parent and the other side.
+    fn relations(&self, ui: &mut Ui, shown: &DisplayedRig, requests: &mut Requests) {
         let kind = match (self.values.kind.mixed, self.values.kind.value) {
             (true, _) => MIXED,
             (false, NodeKind::Joint) => "Joint",
@@ -189,7 +190,7 @@ impl PropertiesPanel {
         }
     }
 
-    fn lock_field(&self, ui: &mut Ui, shown: &Shown, requests: &mut Requests) {
+    fn lock_field(&self, ui: &mut Ui, shown: &DisplayedRig, requests: &mut Requests) {
         let Shared { mut value, mixed } = self.values.locked;
         let field = Checkbox::new(&mut value, "Lock weights").indeterminate(mixed);
         if ui.add(field).on_hover_text("Skinning leaves the weights of these joints as they are").clicked() {
@@ -198,8 +199,8 @@ impl PropertiesPanel {
         }
     }
 
-    /// The rest pose; in Pose mode what the pose puts on top of it.
-    fn transform(&mut self, ui: &mut Ui, world: &World, shown: &Shown, requests: &mut Requests) {
+    /// Draws the rest pose, or in Pose mode the pose on top of it.
+    fn transform(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
         let posing = world.get_resource::<Mode>() == Some(&Mode::Pose);
         let length = Look { speed: self.values.speed(), decimals: 4, suffix: "" };
         let degrees = Look { speed: 0.5, decimals: 2, suffix: "°" };

@@ -1,4 +1,4 @@
-//! One button that gives every mesh its weights, and what came of it.
+//! Skinning panel: a button that computes weights for every mesh, and a report of the results.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{
@@ -6,9 +6,9 @@ use bevy_egui::egui::{
 };
 
 use super::{
+    displayed_rig::{DisplayedRig, joint_name},
     fields, list,
     log::LogSystems,
-    shown::{Shown, joint_name},
 };
 use crate::{
     algo::weights::{Method, WeightReport, WeightSettings},
@@ -20,13 +20,14 @@ use crate::{
     },
     plugins::{
         RigSystems,
+        landing::ResultHeld,
         skinning::{BindRequest, Bound, SkinningJob},
         surface::{RigMesh, RigMeshes},
     },
     rig::{NodeKind, Rig, SkinData, Uid},
 };
 
-/// Carries [`Action::Skin`] out and tells what came of it.
+/// Plugin that carries out [`Action::Skin`] and reports the results.
 pub struct SkinningPanelPlugin;
 
 impl Plugin for SkinningPanelPlugin {
@@ -37,16 +38,17 @@ impl Plugin for SkinningPanelPlugin {
             .add_message::<CancelSkinning>()
             .add_message::<Notice>()
             .add_message::<Bound>()
+            .add_message::<ResultHeld>()
             .add_systems(Update, (skin, cancel).chain().after(RigSystems::Build).before(RigSystems::Bind))
-            .add_systems(Last, tell_results.before(LogSystems));
+            .add_systems(Last, (tell_results, tell_held).chain().before(LogSystems));
     }
 }
 
-/// How [`Action::Skin`] computes weights.
+/// Settings of the weights that [`Action::Skin`] computes.
 #[derive(Resource, Debug, Clone, PartialEq, Default)]
 pub struct SkinningSettings(pub WeightSettings);
 
-/// What came of the last computation of each mesh.
+/// Result of the last computation of each mesh.
 #[derive(Resource, Debug, Default)]
 pub struct SkinningResults(Vec<(Entity, Result<WeightReport, String>)>);
 
@@ -57,11 +59,11 @@ impl SkinningResults {
     }
 }
 
-/// Asks to stop all computations for the active rig; the weights stay as they are.
+/// Request to cancel all computations for the active rig; the weights stay unchanged.
 #[derive(Message, Debug, Clone, Copy)]
 pub struct CancelSkinning;
 
-/// Asks for weights of every mesh, or says why that cannot be.
+/// Requests weights for every mesh, or sends a notice with the obstacle.
 fn skin(
     mut actions: MessageReader<ActionRequest>,
     active: Option<Res<ActiveRig>>,
@@ -90,7 +92,7 @@ fn skin(
     }
 }
 
-/// Why there is nothing to skin, if there is nothing.
+/// Reason why there is nothing to skin, if so.
 fn obstacle(rig: &Rig, meshes: usize) -> Option<&'static str> {
     if meshes == 0 {
         Some("There is no mesh to skin: open one first.")
@@ -137,6 +139,15 @@ fn tell_results(
     }
 }
 
+/// Says that a finished result waits, so that no undone step is lost to it.
+fn tell_held(mut held: MessageReader<ResultHeld>, mut notices: MessageWriter<Notice>) {
+    for ResultHeld { reason, .. } in held.read() {
+        let mut letters = reason.chars();
+        let first = letters.next().map(char::to_uppercase).into_iter().flatten();
+        notices.write(Notice::warning(format!("{}{}.", first.collect::<String>(), letters.as_str())));
+    }
+}
+
 fn is_cancelled(reason: &str) -> bool {
     reason == crate::algo::weights::WeightError::Cancelled.to_string()
 }
@@ -145,13 +156,13 @@ fn mesh_name(mesh: &RigMesh) -> &str {
     if mesh.file.name.is_empty() { "The mesh" } else { &mesh.file.name }
 }
 
-/// Points that nothing holds.
+/// Number of points without weights.
 fn unweighted(report: &WeightReport) -> usize {
     let held = report.by_surface + report.by_voxels + report.by_fill + report.by_nearest + report.given;
     report.points.saturating_sub(held)
 }
 
-/// "100 % of 13380 points have weights", or how many have none.
+/// "100 % of 13380 points have weights", or the number of points without any.
 fn covered(points: usize, without: usize) -> String {
     if without == 0 {
         format!("100 % of {points} points have weights")
@@ -163,7 +174,7 @@ fn covered(points: usize, without: usize) -> String {
 /// The panel.
 #[derive(Default)]
 pub struct SkinningPanel {
-    /// Points without weights, by the weights they were counted in.
+    /// Number of points without weights, for each counted set of weights.
     counted: Vec<(Uid, std::sync::Weak<SkinData>, usize)>,
 }
 
@@ -173,7 +184,7 @@ impl EditorPanel for SkinningPanel {
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
-        let Some(shown) = Shown::of(world) else {
+        let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
         let meshes = world.get::<RigMeshes>(shown.entity);
@@ -191,8 +202,8 @@ impl EditorPanel for SkinningPanel {
     }
 }
 
-/// The button; while a job runs, its progress and a button that stops it.
-fn skin_button(ui: &mut Ui, shown: &Shown, meshes: usize, running: &[&SkinningJob], requests: &mut Requests) {
+/// Draws the button; while a job runs, its progress and a button that cancels it.
+fn skin_button(ui: &mut Ui, shown: &DisplayedRig, meshes: usize, running: &[&SkinningJob], requests: &mut Requests) {
     let size = egui::vec2(ui.available_width(), 34.0);
     if running.is_empty() {
         let obstacle = obstacle(&shown.rig, meshes);
@@ -215,7 +226,7 @@ fn skin_button(ui: &mut Ui, shown: &Shown, meshes: usize, running: &[&SkinningJo
     ui.ctx().request_repaint_after_secs(0.1);
 }
 
-/// How weights are computed, folded away.
+/// Draws the settings of the computation, folded by default.
 fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
     let current = world.get_resource::<SkinningSettings>().cloned().unwrap_or_default();
     let mut next = current.clone();
@@ -255,8 +266,8 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
 }
 
 impl SkinningPanel {
-    /// Coverage of one mesh, and how its points got their weights.
-    fn mesh(&mut self, ui: &mut Ui, world: &World, entity: Entity, shown: &Shown) {
+    /// Draws the coverage of one mesh, and the sources of its points' weights.
+    fn mesh(&mut self, ui: &mut Ui, world: &World, entity: Entity, shown: &DisplayedRig) {
         let Some(mesh) = world.get::<RigMesh>(entity) else { return };
         ui.separator();
         ui.strong(mesh_name(mesh));
@@ -307,7 +318,7 @@ impl SkinningPanel {
     }
 }
 
-/// How points got their weights, where that is worth a look.
+/// Sources of the points' weights that deserve a look.
 fn notes(report: &WeightReport) -> Vec<String> {
     let share = |count: usize| 100.0 * count as f64 / report.points.max(1) as f64;
     let kinds = [
@@ -324,7 +335,7 @@ fn notes(report: &WeightReport) -> Vec<String> {
         .collect()
 }
 
-/// Joints that were added since, and move nothing yet.
+/// Note about joints added after skinning, which have no weights yet.
 fn unbound(rig: &Rig, skin: &SkinData) -> Option<String> {
     let bound: std::collections::HashSet<Uid> = skin.joints.iter().copied().collect();
     let mut missing = rig.walk().filter(|joint| joint.data.kind == NodeKind::Joint && !bound.contains(&joint.data.uid));

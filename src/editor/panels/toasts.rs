@@ -1,7 +1,7 @@
-//! Toasts: what was told just now, in the viewport's lower right corner.
+//! Toasts: recent notices, in the viewport's lower right corner.
 //!
 //! They are areas of their own, so a click on one never reaches the viewport below it, and they cost a frame only when
-//! one of them has to go: the window sleeps until then.
+//! one of them expires: the window sleeps until then.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use crate::editor::{
     pointer::ViewportArea,
 };
 
-/// Wakes the window when a toast has to go.
+/// Plugin that wakes the window when a toast expires.
 pub struct ToastsPlugin;
 
 impl Plugin for ToastsPlugin {
@@ -29,18 +29,18 @@ impl Plugin for ToastsPlugin {
     }
 }
 
-/// How long after the program's start the next toast goes, in seconds; `None` while none goes by itself.
+/// Time at which the next toast expires, in seconds since the program's start; `None` while none expires.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
 struct NextToast(Option<f64>);
 
-/// Shortens the window's sleep while there are toasts, and puts it back.
+/// Shortens the window's sleep while there are toasts, and restores it.
 fn wake_for_toasts(
     next: Res<NextToast>,
     time: Res<Time<Real>>,
     settings: Option<ResMut<WinitSettings>>,
     mut usual: Local<Option<(UpdateMode, UpdateMode)>>,
 ) {
-    // Another wait is another frame at once: it is set when a toast comes or goes, not in every frame.
+    // Setting a wait triggers a frame: it is set when a toast appears or expires, not in every frame.
     if !next.is_changed() {
         return;
     }
@@ -70,7 +70,7 @@ fn wake_for_toasts(
 /// The overlay.
 #[derive(Default)]
 pub struct Toasts {
-    /// The number of the first log entry that has not been seen.
+    /// Number of the first unseen log entry.
     next: u64,
     shown: Vec<Toast>,
 }
@@ -80,7 +80,7 @@ struct Toast {
     number: u64,
     notice: Notice,
     times: u32,
-    /// When it goes, in egui's time; `None` if it stays until it is closed.
+    /// Expiry in egui's time; `None` if the toast stays until it is closed.
     until: Option<f64>,
 }
 
@@ -88,26 +88,26 @@ impl Toasts {
     /// The largest number of toasts at a time.
     pub const MOST: usize = 4;
 
-    /// Takes the entries that were added since the last time.
+    /// Takes over the entries that were added since the last call.
     fn follow(&mut self, book: &LogBook, now: f64) {
         let unseen: Vec<_> = book.entries().rev().take_while(|entry| entry.number >= self.next).collect();
         for entry in unseen.into_iter().rev().filter(|entry| !entry.notice.quiet) {
             let until = lifetime(&entry.notice).map(|time| now + time.as_secs_f64());
-            // The same again renews the toast.
+            // A repeated notice renews its toast.
             self.shown.retain(|toast| toast.notice != entry.notice);
             let (number, notice, times) = (entry.number, entry.notice.clone(), entry.times);
             self.shown.push(Toast { number, notice, times, until });
         }
         self.next = book.next_number();
         while self.shown.len() > Self::MOST {
-            // What goes by itself goes first; errors that nobody closed are still in the log.
+            // A toast that expires is dropped first; unclosed errors are still in the log.
             let first = self.shown.iter().position(|toast| toast.until.is_some()).unwrap_or(0);
             self.shown.remove(first);
         }
     }
 }
 
-/// How long a toast stays; long enough to be read.
+/// Lifetime of a toast, long enough to read it; `None` for errors.
 fn lifetime(notice: &Notice) -> Option<Duration> {
     let reading = Duration::from_millis(45) * notice.text.chars().count().min(200) as u32;
     match notice.severity {
@@ -143,7 +143,7 @@ impl EditorOverlay for Toasts {
             }
             let rect: Rect = shown.response.rect;
             if let Some(until) = &mut toast.until {
-                // What is being read stays.
+                // A toast under the pointer stays.
                 let read = ctx.input(|input| input.pointer.hover_pos()).is_some_and(|pointer| rect.contains(pointer));
                 if read && *until < now + 1.0 {
                     *until = now + 2.0;
@@ -169,7 +169,7 @@ fn viewport(world: &World) -> Option<Rect> {
     (rect.width() > 60.0 && rect.height() > 60.0).then_some(rect)
 }
 
-/// Draws a toast; true if it was closed.
+/// Draws a toast; returns `true` if it was closed.
 fn draw(ui: &mut Ui, toast: &Toast, width: f32) -> bool {
     let (symbol, color) = severity_symbol(ui, toast.notice.severity);
     let visuals = ui.visuals();

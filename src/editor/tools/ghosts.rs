@@ -1,4 +1,4 @@
-//! What tools are about to make, for [drawing](crate::plugins::drawing).
+//! Ghosts: the planned results of tools, for [drawing](crate::plugins::drawing).
 
 use bevy::prelude::*;
 
@@ -20,14 +20,14 @@ use crate::{
     },
 };
 
-/// Hands what tools are about to make to the drawing.
+/// Plugin that hands the planned results of tools to the drawing.
 pub struct GhostsPlugin;
 
 impl Plugin for GhostsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Ghosts>().add_systems(
             PostUpdate,
-            haunt
+            update_ghosts
                 .run_if(resource_changed::<PlaceTool>.or_else(resource_changed::<StrokeTool>))
                 .in_set(ToolSystems::Show)
                 .after(super::stroke::show),
@@ -35,7 +35,7 @@ impl Plugin for GhostsPlugin {
     }
 }
 
-fn haunt(place: Res<PlaceTool>, stroke: Res<StrokeTool>, scene: Scene, mut ghosts: ResMut<Ghosts>) {
+fn update_ghosts(place: Res<PlaceTool>, stroke: Res<StrokeTool>, scene: Scene, mut ghosts: ResMut<Ghosts>) {
     let mut next = Ghosts::default();
     if let Some(rig) = scene.rig() {
         match &stroke.state {
@@ -66,7 +66,7 @@ fn line(request: &StrokeRequest) -> Vec<Vec3> {
     request.points.iter().map(|point| request.plane.lift(*point)).collect()
 }
 
-/// The joints of a chain, each with its parent, on both sides.
+/// Ghost joints of a chain, each with its parent, on both sides.
 fn chain(positions: &[Vec3], parent: Option<Uid>, rig: &EditedRig, posed: &[(Uid, Vec3)]) -> Vec<GhostJoint> {
     let place_of = |joint: Uid| posed.iter().find(|(uid, _)| *uid == joint).map(|(_, place)| *place);
     let other_parent = rig.other_side(parent);

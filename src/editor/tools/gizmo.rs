@@ -1,7 +1,7 @@
-//! Gizmos as values: where their handles are on the screen, which one a pixel is on, and what dragging it means.
+//! Gizmos as values: positions of their handles on the screen, hit tests, and the effect of a drag.
 //!
-//! A gizmo stands at a place of the rig's space and keeps its size on the screen. Its handles are lines in pixels; the
-//! same lines are hit and painted. Nothing here knows joints: a drag gives a movement, a turn or factors.
+//! A gizmo has a position in the rig's space and keeps its size on the screen. Its handles are lines in pixels; the
+//! same lines are tested and painted. Gizmos do not know joints: a drag gives a movement, a rotation or factors.
 
 pub mod drag;
 
@@ -13,46 +13,46 @@ use crate::plugins::viewport::Sight;
 
 /// Length of arrows, in pixels.
 pub const LENGTH: f32 = 90.0;
-/// Length of arrows that stand inside rings, in pixels.
+/// Length of arrows inside rings, in pixels.
 const SHORT: f32 = 58.0;
 /// Radius of the rings about the axes, in pixels.
 pub const RING: f32 = 74.0;
 /// Radius of the ring about the view, in pixels.
 pub const VIEW_RING: f32 = 92.0;
-/// How near the pointer must come to a line, in pixels.
+/// Largest distance of the pointer from a line that it hits, in pixels.
 pub const REACH: f32 = 6.0;
 /// Radius of the handle in the middle, in pixels.
 const CENTRE: f32 = 8.0;
-/// Pixels between the middle and where arrows begin.
+/// Distance from the middle to the start of arrows, in pixels.
 const GAP: f32 = 14.0;
-/// The squares of two axes: from here to there along both, in pixels.
+/// Extent of the squares between two axes: start and end along both, in pixels.
 const SQUARE: [f32; 2] = [26.0, 44.0];
 /// Half a side of the boxes at the ends of scale handles, in pixels.
 const BOX: f32 = 5.0;
 /// Segments of a ring.
 const SEGMENTS: usize = 72;
-/// Arrows that appear shorter than this share of their length point at the viewer and are left out.
+/// Least visible share of an arrow's length; shorter arrows point at the viewer and are left out.
 const LEAST_SHARE: f32 = 0.18;
-/// Squares seen at a lower sine than this are left out.
+/// Least sine of the angle at which squares are seen; flatter ones are left out.
 const LEAST_SLANT: f32 = 0.2;
 
-/// Where a gizmo stands, in the rig's space.
+/// Position and axes of a gizmo, in the rig's space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GizmoFrame {
-    /// Its middle.
+    /// Position of the middle.
     pub origin: Vec3,
-    /// Its axes: unit length, perpendicular, right-handed.
+    /// Axes of unit length, perpendicular, right-handed.
     pub axes: [Vec3; 3],
 }
 
-/// What a gizmo can do.
+/// Parts of a gizmo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GizmoParts {
-    /// It has arrows, squares and a middle that move.
+    /// Arrows, squares and a middle that move.
     pub moves: bool,
-    /// It has rings that turn.
+    /// Rings that turn.
     pub turns: bool,
-    /// It has boxes and a middle that scale.
+    /// Boxes and a middle that scale.
     pub scales: bool,
 }
 
@@ -61,9 +61,9 @@ pub struct GizmoParts {
 pub enum Handle {
     /// Moves along an axis.
     MoveAxis(usize),
-    /// Moves in the plane square to an axis.
+    /// Moves in the plane perpendicular to an axis.
     MovePlane(usize),
-    /// Moves in the plane of the view: what it moves keeps its depth.
+    /// Moves in the plane of the view, at constant depth.
     MoveView,
     /// Turns about an axis.
     Ring(usize),
@@ -71,12 +71,12 @@ pub enum Handle {
     ViewRing,
     /// Scales along an axis.
     ScaleAxis(usize),
-    /// Scales evenly.
+    /// Scales uniformly.
     ScaleAll,
 }
 
 impl Handle {
-    /// The axis that it is about.
+    /// Index of the handle's axis.
     pub fn axis(self) -> Option<usize> {
         match self {
             Self::MoveAxis(axis) | Self::MovePlane(axis) | Self::Ring(axis) | Self::ScaleAxis(axis) => Some(axis),
@@ -84,7 +84,7 @@ impl Handle {
         }
     }
 
-    /// Which of two handles under the same pixel is meant: the lower number.
+    /// Rank among handles under the same pixel: the lowest number wins.
     fn rank(self) -> u8 {
         match self {
             Self::MoveView | Self::ScaleAll => 0,
@@ -98,36 +98,36 @@ impl Handle {
 /// A handle on the screen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandleShape {
-    /// Which.
+    /// The handle.
     pub handle: Handle,
-    /// Its lines.
+    /// Lines of the handle.
     pub lines: Vec<HandleLine>,
-    /// How near the pointer must come, in pixels.
+    /// Largest distance of the pointer that hits, in pixels.
     pub reach: f32,
 }
 
 /// A line of a handle, in pixels of the viewport.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandleLine {
-    /// Its points.
+    /// Points of the line.
     pub points: Vec<Vec2>,
-    /// How it is painted.
+    /// Paint of the line.
     pub paint: LinePaint,
 }
 
-/// How a line is painted, and whether it can be hit.
+/// Paint of a line, which also decides whether it can be hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinePaint {
-    /// As a line.
+    /// A line.
     Line,
-    /// As a thin line behind the middle, which nobody can hit.
+    /// A thin line behind the middle, which cannot be hit.
     Far,
-    /// As the outline of an area.
+    /// The outline of an area.
     Area,
 }
 
 impl GizmoFrame {
-    /// The handles as a view sees them, those to paint first before the others; none if the middle is behind the camera.
+    /// The handles in a view, in the order of painting; none if the middle is behind the camera.
     pub fn shapes(&self, parts: GizmoParts, sight: &Sight) -> Vec<HandleShape> {
         let mut shapes = Vec::new();
         let unit = sight.pixel_at(self.origin);
@@ -161,7 +161,7 @@ impl GizmoFrame {
         shapes
     }
 
-    /// A ring, in pieces before and behind the middle.
+    /// The lines of a ring, split into pieces before and behind the middle.
     fn ring(&self, axis: usize, unit: f32, sight: &Sight) -> Vec<HandleLine> {
         let (across, up) = (self.axes[(axis + 1) % 3], self.axes[(axis + 2) % 3]);
         let towards = sight.towards(self.origin);
@@ -203,7 +203,7 @@ impl GizmoFrame {
     }
 }
 
-/// The handle that a pixel is on.
+/// The handle under a pixel.
 pub fn handle_at(shapes: &[HandleShape], at: Vec2) -> Option<Handle> {
     let near = shapes.iter().filter_map(|shape| {
         let lines = shape.lines.iter().filter(|line| line.paint != LinePaint::Far);
@@ -215,7 +215,7 @@ pub fn handle_at(shapes: &[HandleShape], at: Vec2) -> Option<Handle> {
 }
 
 impl HandleLine {
-    /// How far a pixel is from it; 0 inside an area.
+    /// Distance of a pixel from the line; 0 inside an area.
     fn distance(&self, at: Vec2) -> f32 {
         let is_area = self.paint == LinePaint::Area;
         let ends = self.points.iter().zip(self.points.iter().cycle().skip(1));

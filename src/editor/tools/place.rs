@@ -1,4 +1,4 @@
-//! Placing: a ghost shows where the joint would go, a click puts it exactly there.
+//! Place tool: a ghost shows the position of the joint, and a click places it exactly there.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -9,7 +9,7 @@ use super::{
     select,
 };
 use crate::{
-    algo::placement::{PlaceSettings, Placement, place_hits},
+    algo::placement::{PlaceSettings, Placement},
     editor::{
         actions::{Action, ActionRequest},
         camera::ViewportSight,
@@ -21,13 +21,13 @@ use crate::{
     mesh::ray::Ray,
     plugins::{
         picking::{HoverRequest, Pick, PickRequest},
-        placement::PlaceRequest,
+        placement::{PlaceRequest, PlacedJoint, joint_at},
         viewport::Sight,
     },
     rig::{Uid, operations::settle},
 };
 
-/// Adds placing joints with the pointer.
+/// Plugin of the place tool.
 pub struct PlacePlugin;
 
 impl Plugin for PlacePlugin {
@@ -39,34 +39,35 @@ impl Plugin for PlacePlugin {
     }
 }
 
-/// What placing is about.
+/// State of the place tool.
 #[derive(Resource, Debug, Clone, PartialEq, Default)]
 pub struct PlaceTool {
-    /// Depth and volume of the next joint. The volume is kept until Tab has gone through all; the depth only for one joint.
+    /// Depth and volume of the next joint. The volume is kept until Tab has cycled through all; the depth is for one
+    /// joint only.
     pub settings: PlaceSettings,
-    /// What a click would place now.
+    /// The joint that a click would place.
     pub ghost: Option<PlaceGhost>,
     pointer: Option<Vec2>,
     press: Option<Press>,
-    /// True while Control is held: a click selects.
+    /// Marks that Control is held: a click selects.
     picks: bool,
-    /// What the last hover request was about.
+    /// Marks that the last hover request was sent by this tool.
     hovers: bool,
 }
 
 impl PlaceTool {
-    /// True while the next joint has a depth to choose.
+    /// Returns `true` while the next joint has a depth to choose.
     pub fn has_depth(&self) -> bool {
         self.ghost.is_some_and(|ghost| matches!(ghost.placement, Placement::Between { .. }))
     }
 }
 
-/// The button is down.
+/// A press of the button.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Press {
     at: Vec2,
     depth: f32,
-    /// True if it selects.
+    /// Marks a press that selects.
     picks: bool,
 }
 
@@ -75,46 +76,46 @@ struct Press {
 pub struct PlaceGhost {
     /// The ray under the pointer.
     pub ray: Ray,
-    /// What it meets.
+    /// Placement of the joint by the ray.
     pub placement: Placement,
-    /// Where the joint would go: on the mirror plane, if near it.
+    /// Position of the joint: on the mirror plane, if near it.
     pub position: Vec3,
-    /// Where its other side would go.
+    /// Position of its mirrored joint.
     pub mirrored: Option<Vec3>,
-    /// The joint it would hang on.
+    /// Parent of the joint.
     pub parent: Option<Uid>,
-    /// Where that is.
+    /// Position of the parent.
     pub parent_place: Option<Vec3>,
-    /// Where the parent of the other side is.
+    /// Position of the mirrored joint's parent.
     pub mirrored_parent: Option<Vec3>,
 }
 
-/// Why a click places nothing.
+/// Reason why a click places nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PlaceObstacle {
-    /// There is no rig.
+    /// No rig.
     #[error("no rig is open; open a mesh first (Ctrl+O)")]
     NoRig,
-    /// There is no mesh.
+    /// No mesh.
     #[error("the rig has no mesh to place joints in; open one first (Ctrl+O)")]
     NoMesh,
-    /// The surface is being built.
+    /// A surface that is still being built.
     #[error("the mesh is still being prepared; a click waits for it")]
     Preparing,
-    /// The ray meets nothing.
+    /// A ray that misses the mesh.
     #[error("the pointer is beside the mesh; move it over the mesh")]
     Beside,
 }
 
-/// Notches of the wheel from the near to the far end of the span.
+/// Number of notches of the wheel from the near to the far end of the span.
 const NOTCHES: f32 = 20.0;
-/// Pixels that a drag takes from the near to the far end, at least and at most.
+/// Least and largest length of a drag from the near to the far end, in pixels.
 const DRAG_SPAN: [f32; 2] = [80.0, 400.0];
 
-/// What a click at a pixel would place.
+/// The joint that a click at a pixel would place.
 ///
 /// # Errors
-/// Says why it would place nothing.
+/// The reason why it would place nothing.
 pub fn ghost_at(
     scene: &Scene,
     rig: &EditedRig,
@@ -122,18 +123,14 @@ pub fn ghost_at(
     at: Vec2,
     settings: PlaceSettings,
 ) -> Result<PlaceGhost, PlaceObstacle> {
-    let surface = rig.surface.as_ref().and_then(|surface| surface.ready());
+    let surface = rig.surface.as_deref().filter(|surface| surface.ready().is_some());
     let surface = surface.ok_or(if rig.has_mesh { PlaceObstacle::Preparing } else { PlaceObstacle::NoMesh })?;
     let ray = sight.ray(at);
-    let mut hits = Vec::new();
-    surface.hits(&ray, &mut hits);
-    let placement = place_hits(&ray, &hits, settings);
-    let place = placement.position().ok_or(PlaceObstacle::Beside)?;
-    let parent = rig.selection.active();
+    let PlacedJoint { placement, parent, rest } = joint_at(&rig.rig, &rig.selection, Some(surface), &ray, settings);
+    let rests = rest.ok_or(PlaceObstacle::Beside)?;
     let posed = scene.posed(rig);
     let place_of = |joint: Uid| posed.iter().find(|(uid, _)| *uid == joint).map(|(_, place)| *place);
     let other = rig.other_side(parent);
-    let rests = rig.rig.rest_from_pose(parent).transform_point3(place);
     let (position, mirrored) = settle(&[rests], rig.symmetry.0.as_ref()).first().copied().unwrap_or((rests, None));
     let position = rig.posed_below(parent, position);
     let mirrored = mirrored.map(|mirrored| rig.posed_below(other, mirrored));
@@ -179,7 +176,7 @@ pub(super) fn place(
             continue;
         }
         let before = tool.picks;
-        // A press decides for the whole drag.
+        // The press decides for the whole drag.
         tool.picks = tool.press.map_or(pointer.held.control, |press| press.picks);
         tool.pointer = Some(pointer.at);
         match pointer.act {
@@ -204,7 +201,7 @@ pub(super) fn place(
                     picks.write(PickRequest { rig: rig.entity, what, add: pointer.held.shift });
                     continue;
                 }
-                // The second click of a double click would put a joint into the one that the first has put there.
+                // The second click of a double click would put a joint into the one that the first has placed.
                 if count > 1 && !dragged {
                     continue;
                 }
@@ -227,7 +224,7 @@ pub(super) fn place(
             tool.set_changed();
         }
     }
-    // With Control a click selects; what it would select is shown as anywhere else.
+    // With Control a click selects; its joint is highlighted as in other modes.
     let hovering = tool.picks && is_on;
     if let Some((rig, sight)) = &found
         && (hovering || tool.hovers)
@@ -247,7 +244,7 @@ pub(super) fn place(
     }
 }
 
-/// From the whole span to the near volume, to the next, to the whole span.
+/// Cycles from the whole span to the near volume, to the next ones, and back.
 fn next_volume(tool: &mut PlaceTool) {
     let count = match tool.ghost.map(|ghost| ghost.placement) {
         Some(Placement::Between { volumes, .. }) => volumes,
@@ -260,14 +257,14 @@ fn next_volume(tool: &mut PlaceTool) {
     };
 }
 
-/// How many pixels a drag takes from the near to the far end: as many as the span is long.
+/// Length of a drag from the near to the far end in pixels: the length of the span on the screen, within [`DRAG_SPAN`].
 fn drag_span(tool: &PlaceTool, sight: &Sight) -> Option<f32> {
     let Placement::Between { near, far, .. } = tool.ghost?.placement else { return None };
     let pixel = sight.pixel_at(near.midpoint(far));
     (pixel > 0.0).then(|| (near.distance(far) / pixel).clamp(DRAG_SPAN[0], DRAG_SPAN[1]))
 }
 
-/// Keeps the ghost and the status line true.
+/// Updates the ghost and the status line.
 pub(super) fn show(
     mut tool: ResMut<PlaceTool>,
     mode: Res<Mode>,
@@ -286,7 +283,7 @@ pub(super) fn show(
     if !(tool.is_changed() || mode.is_changed() || scene.is_changed()) {
         return;
     }
-    // The mode may have come by a key, under a pointer that rests.
+    // The mode may have been changed by a key, under a resting pointer.
     let pointer = tool.pointer.or(area.pointer);
     let at = tool.press.map(|press| press.at).or(pointer).filter(|_| !tool.picks);
     let found = match (scene.rig(), scene.sight(), at) {
@@ -311,7 +308,7 @@ pub(super) fn show(
     status.set_if_neq(StatusLine { hint, obstacle, banner });
 }
 
-/// What a click would do, in a sentence or two.
+/// Description of the effect of a click, in a sentence or two.
 fn describe(ghost: &PlaceGhost, rig: &EditedRig, settings: PlaceSettings) -> String {
     let below = ghost.parent.map_or("as a root".to_owned(), |parent| format!("below {}", rig.name(parent)));
     let both = if ghost.mirrored.is_some() { " on both sides" } else { "" };
@@ -330,7 +327,7 @@ fn describe(ghost: &PlaceGhost, rig: &EditedRig, settings: PlaceSettings) -> Str
     }
 }
 
-/// Writes depth and volume beside the ghost where they are not as usual.
+/// Painter of depth and volume beside the ghost, if they are not the defaults.
 struct DepthPainter;
 
 impl ViewportPainter for DepthPainter {

@@ -1,4 +1,4 @@
-//! Posing with gizmos: what a turn or a movement in the rig's space is as offsets from rest.
+//! Posing with gizmos: conversion of rotations and movements in the rig's space to offsets from rest.
 
 use bevy::{
     math::{Affine3, Quat, Vec3},
@@ -8,23 +8,23 @@ use bevy::{
 use super::gizmo::Delta;
 use crate::rig::{PoseOffset, RestTransform, Rig, Uid};
 
-/// A joint as it was posed when a drag began.
+/// A joint in its pose at the start of a drag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosedJoint {
     /// The joint.
     pub joint: Uid,
     rest: RestTransform,
     offset: PoseOffset,
-    /// From the parent's space to the rig's, as posed.
+    /// Posed transform from the parent's space to the rig's.
     parent: Affine3,
-    /// Its own axes in the rig's space, as posed.
+    /// Posed axes of the joint in the rig's space.
     axes: [Vec3; 3],
-    /// True if a joint above it is dragged, too, and takes it along.
+    /// Marks a joint below another dragged one, which moves it along.
     carried: bool,
 }
 
 impl PosedJoint {
-    /// Joints as they are posed now. Joints that are not in the rig are left out.
+    /// Collects the current poses of joints. Joints that are not in the rig are left out.
     pub fn gather(rig: &Rig, joints: &[Uid]) -> Vec<Self> {
         let posed = |&joint: &Uid| {
             let found = rig.joint(joint)?;
@@ -40,8 +40,8 @@ impl PosedJoint {
         joints.iter().filter_map(posed).collect()
     }
 
-    /// The offset that a drag gives it. Every joint turns about itself, about its own axis number `own` if there is one;
-    /// what hangs below a dragged joint is moved by it already.
+    /// The joint's offset after a drag. Every joint turns about itself, about its own axis number `own` if given;
+    /// joints below a dragged one are moved by it already.
     pub fn dragged(&self, delta: &Delta, own: Option<usize>) -> PoseOffset {
         match delta {
             Delta::Turn { axis, angle } => {
@@ -60,7 +60,7 @@ impl PosedJoint {
 
     fn turned(&self, axis: Vec3, angle: f32) -> Quat {
         let linear = self.parent.matrix3;
-        // A parent turned inside out turns the other way round.
+        // A mirrored parent reverses the rotation.
         let angle = if linear.determinant() < 0.0 { -angle } else { angle };
         let Some(axis) = (linear.inverse() * axis).try_normalize() else { return self.offset.rotation };
         let local = (self.rest.rotation * self.offset.rotation).normalize();

@@ -1,4 +1,4 @@
-//! The rig that is edited, as tools see it.
+//! The edited rig, as tools read it.
 
 use bevy::{ecs::system::SystemParam, math::Affine3, prelude::*};
 
@@ -13,7 +13,7 @@ use crate::{
     rig::{Rig, Uid},
 };
 
-/// Reads the active rig and the view of it.
+/// Access to the active rig and its view.
 #[derive(SystemParam)]
 pub struct Scene<'w, 's> {
     active: Option<Res<'w, ActiveRig>>,
@@ -34,43 +34,43 @@ type RigQuery = (
 
 /// The active rig.
 pub struct EditedRig<'a> {
-    /// Its entity.
+    /// Entity of the rig.
     pub entity: Entity,
     /// The document.
     pub rig: Ref<'a, Rig>,
-    /// What is selected.
+    /// Selection of the rig.
     pub selection: Ref<'a, Selection>,
     /// Live mirroring.
     pub symmetry: Ref<'a, Symmetry>,
-    /// Entities of its joints.
+    /// Entities of the joints.
     pub entities: &'a JointEntities,
-    /// Where it stands.
+    /// World transform of the rig.
     pub place: &'a GlobalTransform,
-    /// Its posed surface, if there is one yet.
+    /// Posed surface, if there is one yet.
     pub surface: Option<Ref<'a, RigSurface>>,
-    /// True if it has a mesh, even if its surface is still being built.
+    /// Marks a rig with a mesh, even if its surface is still being built.
     pub has_mesh: bool,
 }
 
 impl Scene<'_, '_> {
-    /// What the viewport sees.
+    /// View of the viewport.
     pub fn sight(&self) -> Option<Sight> {
         self.sight.0
     }
 
-    /// The active rig, if it is there.
+    /// The active rig, if it exists.
     pub fn rig(&self) -> Option<EditedRig<'_>> {
         let entity = self.active.as_ref()?.0;
         let (rig, selection, symmetry, entities, place, surface, has_mesh) = self.rigs.get(entity).ok()?;
         Some(EditedRig { entity, rig, selection, symmetry, entities, place, surface, has_mesh })
     }
 
-    /// Places of a rig's joints as posed, in the rig's space.
+    /// Posed positions of a rig's joints, in the rig's space.
     pub fn posed(&self, rig: &EditedRig) -> Vec<(Uid, Vec3)> {
         posed_joints(&rig.rig, rig.entities, rig.place, &self.joints)
     }
 
-    /// True if what a tool shows may look different now: another rig, view, selection or surface.
+    /// Returns `true` if the display of a tool may have to change: another rig, view, selection or surface.
     pub fn is_changed(&self) -> bool {
         let other = self.sight.is_changed() || self.active.as_ref().is_some_and(|active| active.is_changed());
         other
@@ -89,18 +89,18 @@ impl EditedRig<'_> {
         joint_name(&self.rig, joint)
     }
 
-    /// The joint on the other side; the joint itself in the middle.
+    /// The joint on the other side; a central joint itself.
     pub fn other_side(&self, joint: Option<Uid>) -> Option<Uid> {
         joint.map(|joint| self.rig.joint(joint).and_then(|joint| joint.data.mirror).unwrap_or(joint))
     }
 
-    /// Where the pose of `parent` brings a place that rests below it, in the rig's space.
+    /// Posed position of a point that rests below `parent`, in the rig's space.
     pub fn posed_below(&self, parent: Option<Uid>, rests: Vec3) -> Vec3 {
         let to_rest = self.rig.rest_from_pose(parent);
         if to_rest == Affine3::IDENTITY { rests } else { to_rest.inverse().transform_point3(rests) }
     }
 
-    /// How large the character is, in the rig's units: the longest side of its surface, or of its skeleton.
+    /// Size of the character in the rig's units: the longest side of its surface, or of its skeleton.
     pub fn size(&self) -> f32 {
         let [low, high] = self.bounds();
         (high - low).max_element()

@@ -1,6 +1,6 @@
-//! Selecting: a click picks a joint, a drag a box of them, a double click all that hangs below.
+//! Select tool: a click picks a joint, a drag the joints in a box, a double click the hierarchy.
 //!
-//! What a click would pick is shown before the click: the engine answers both questions with the same code.
+//! The joint that a click would pick is highlighted before the click, by the same code.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -15,7 +15,7 @@ use crate::{
         mode::Mode,
         notice::StatusLine,
         panel::{PanelApp, ViewportPainter},
-        pointer::{Held, PointerAct, ViewportArea},
+        pointer::{ModifierKeys, PointerAct, ViewportArea},
     },
     plugins::{
         document::Hovered,
@@ -25,7 +25,7 @@ use crate::{
     rig::Uid,
 };
 
-/// Adds selecting with the pointer.
+/// Plugin of the select tool.
 pub struct SelectPlugin;
 
 impl Plugin for SelectPlugin {
@@ -37,23 +37,23 @@ impl Plugin for SelectPlugin {
     }
 }
 
-/// What selecting is about.
+/// State of the select tool.
 #[derive(Resource, Debug, Clone, PartialEq, Default)]
 pub struct SelectTool {
     /// Opposite corners of the box that is being dragged, in pixels of the viewport.
     pub band: Option<[Vec2; 2]>,
     press: Option<Vec2>,
     pointer: Option<Vec2>,
-    /// What the last hover request was about.
+    /// Rig, view and position of the last hover request.
     asked: Option<(Entity, Sight, Vec2)>,
 }
 
-/// How near a click must come to be at the same spot, in pixels.
+/// Largest distance of clicks at the same spot, in pixels.
 pub const REACH: f32 = 8.0;
-/// How far beside the mesh a click still means a joint, in pixels.
+/// Largest distance of a click beside the mesh from the joint it picks, in pixels.
 const BESIDE: f32 = 24.0;
 
-/// What a click picks; `None` for one beside everything.
+/// The pick of a click; `None` for a click beside the mesh and all joints.
 pub fn click(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Pick> {
     is_over(scene, rig, sight, at).then(|| Pick::Click {
         plane: sight.plane,
@@ -62,7 +62,7 @@ pub fn click(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<
     })
 }
 
-/// Whether a pixel lies over the mesh or near a joint.
+/// Returns `true` if a pixel is over the mesh or near a joint.
 fn is_over(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> bool {
     let near = |place: Vec3| sight.project(place).is_some_and(|pixel| pixel.distance(at) <= BESIDE);
     let met = rig
@@ -86,7 +86,7 @@ pub(super) fn select(
         pointers.clear();
         return;
     };
-    // Only the box is to be seen; where the pointer is changes nothing.
+    // Only the box is shown; the pointer's position does not count as a change.
     let band = shown.band;
     let tool = shown.bypass_change_detection();
     for ToolPointer { tool: who, pointer } in pointers.read() {
@@ -111,12 +111,12 @@ pub(super) fn select(
             PointerAct::Moved | PointerAct::Wheel(_) => {}
         }
     }
-    // The mode may have come by a key, under a pointer that rests.
+    // The mode may have been changed by a key, under a resting pointer.
     let resting = area.pointer.filter(|_| Tool::of(*mode) == Tool::Select && !gizmo.0);
     let at = tool.pointer.or(resting).filter(|_| tool.press.is_none());
     let asked = at.map(|at| (rig.entity, sight, at));
     if asked != tool.asked {
-        // Nothing is asked for again and again where the pointer is not this tool's: another may have asked.
+        // No request is repeated while another tool has the pointer: that tool may have sent one.
         tool.asked = asked;
         let what = at.and_then(|at| match click(&scene, &rig, &sight, at) {
             Some(Pick::Click { plane, point, reach }) => Some((plane, point, reach)),
@@ -134,7 +134,7 @@ fn clicked(
     rig: &EditedRig,
     sight: &Sight,
     at: Vec2,
-    held: Held,
+    held: ModifierKeys,
     count: u8,
     hovered: Option<&Hovered>,
 ) -> PickRequest {
@@ -143,7 +143,7 @@ fn clicked(
     if count > 1
         && let Some(active) = rig.selection.active()
     {
-        // All that hangs below, the joint itself last: it stays the active one.
+        // The whole hierarchy, the joint itself last: it stays the active one.
         let mut below: Vec<Uid> = rig.rig.hierarchy(active).map(|joint| joint.data.uid).collect();
         below.reverse();
         return request(Pick::Joints(below), held.shift || held.control);
@@ -163,7 +163,7 @@ fn clicked(
     }
 }
 
-fn boxed(scene: &Scene, rig: &EditedRig, sight: &Sight, band: [Vec2; 2], held: Held) -> PickRequest {
+fn boxed(scene: &Scene, rig: &EditedRig, sight: &Sight, band: [Vec2; 2], held: ModifierKeys) -> PickRequest {
     let corners = band.map(|corner| sight.point(corner));
     if !held.control {
         return PickRequest { rig: rig.entity, what: Pick::Box { plane: sight.plane, corners }, add: held.shift };
@@ -175,7 +175,7 @@ fn boxed(scene: &Scene, rig: &EditedRig, sight: &Sight, band: [Vec2; 2], held: H
     PickRequest { rig: rig.entity, what: Pick::Joints(rest), add: false }
 }
 
-/// Says what a click would do.
+/// Sets the status line to the effect of a click.
 pub(super) fn say(
     mode: Res<Mode>,
     tool: Res<SelectTool>,
@@ -215,7 +215,7 @@ pub(super) fn say(
     status.set_if_neq(StatusLine { hint, obstacle: None, banner: status.banner.clone() });
 }
 
-/// Paints the box that is being dragged.
+/// Painter of the box that is being dragged.
 struct BandPainter;
 
 impl ViewportPainter for BandPainter {

@@ -1,11 +1,11 @@
-//! Drawing: a line that follows the pointer, and a preview of the chain it becomes until that is taken or dropped.
+//! Stroke tool: a line that follows the pointer, and a preview of its chain until that is accepted or dropped.
 //!
-//! Following the stroke through the mesh takes a task; choosing joints from what it found takes microseconds, so the
-//! number of joints changes under the wheel while the person watches. What is taken is what was shown: both come from
+//! A background task follows the stroke through the mesh; choosing joints from its samples takes microseconds, so the
+//! number of joints changes under the wheel at once. The accepted chain is the previewed one: both come from
 //! [`plan_stroke`].
 
 mod bar;
-mod words;
+mod hints;
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-use words::{answer, describe};
+use hints::{answer, describe};
 
 use super::{
     Tool, ToolPointer, ToolSystems,
@@ -48,7 +48,7 @@ use crate::{
     },
 };
 
-/// Adds drawing with the pointer.
+/// Plugin of the stroke tool.
 pub struct StrokeToolPlugin;
 
 impl Plugin for StrokeToolPlugin {
@@ -62,12 +62,12 @@ impl Plugin for StrokeToolPlugin {
     }
 }
 
-/// What drawing is about.
+/// State of the stroke tool.
 #[derive(Resource, Debug)]
 pub struct StrokeTool {
-    /// What is being drawn or previewed.
+    /// Stroke that is being drawn or previewed.
     pub state: StrokeState,
-    /// How far a stroke may stray from its bones, in parts of the character's size: where the next preview begins.
+    /// Largest distance of a stroke from its bones, as a share of the character's size, for the next preview.
     pub threshold: f32,
 }
 
@@ -78,61 +78,61 @@ impl Default for StrokeTool {
 }
 
 impl StrokeTool {
-    /// True while a stroke is being followed in the background.
+    /// Returns `true` while a stroke is being followed in the background.
     pub fn is_busy(&self) -> bool {
         matches!(&self.state, StrokeState::Preview(preview) if preview.is_followed() || preview.plan.is_none())
     }
 }
 
-/// Where a stroke is on its way.
+/// Stage of a stroke.
 #[derive(Debug, Default)]
 pub enum StrokeState {
-    /// There is none.
+    /// No stroke.
     #[default]
     Idle,
-    /// The button is down.
+    /// A stroke under the pressed button.
     Drawing(Box<StrokeRequest>),
-    /// It waits to be taken or dropped.
+    /// A finished stroke that waits to be accepted or dropped.
     Preview(Box<StrokePreview>),
 }
 
-/// A surface to draw on, and across what it is mirrored.
+/// A surface to draw on, with the mirror plane.
 #[derive(Debug, Clone)]
-struct On {
+struct DrawingSurface {
     surface: Arc<Surface>,
     symmetry: Option<MirrorPlane>,
 }
 
-/// A stroke that waits to be taken or dropped.
+/// A finished stroke that waits to be accepted or dropped.
 #[derive(Debug)]
 pub struct StrokePreview {
-    /// What taking it would ask for, except for the chain that is known already.
+    /// Request of accepting the stroke, without a chain that is already computed.
     pub request: StrokeRequest,
-    /// What would come of it; `None` while the stroke is being followed.
+    /// Result of accepting the stroke; `None` while it is being followed.
     pub plan: Option<StrokePlan>,
     followed: Option<FollowedStroke>,
     task: Option<Task<Result<FollowedStroke, StrokeError>>>,
-    /// The surface that the stroke was or is being followed through.
-    on: Option<On>,
-    /// Parts of a notch that the wheel has turned: trackpads turn by little.
+    /// The surface through which the stroke was or is being followed.
+    on: Option<DrawingSurface>,
+    /// Fraction of a notch that the wheel has turned: trackpads turn in small steps.
     turned: f32,
 }
 
 impl StrokePreview {
-    /// True while the stroke is being followed through the mesh.
+    /// Returns `true` while the stroke is being followed through the mesh.
     pub fn is_followed(&self) -> bool {
         self.task.is_some() || self.on.is_none()
     }
 
-    /// What taking it would do to the rig, as far as that is known.
+    /// Operation of accepting the stroke, as far as it is known.
     pub fn operation(&self) -> Option<&Operation> {
         match self.plan.as_ref()? {
-            StrokePlan::Ready { operation, .. } => operation.as_ref(),
+            StrokePlan::Ready { operation, .. } => operation.as_deref(),
             StrokePlan::NeedsChain => None,
         }
     }
 
-    /// The chain that it would become, with the joint it starts on, as far as that is known.
+    /// Chain of the stroke, with the joint it starts on, as far as it is known.
     pub fn chain(&self) -> Option<&StrokeChain> {
         match self.plan.as_ref()? {
             StrokePlan::Ready { result: StrokeResult::Chain { chain, .. }, .. } => Some(chain),
@@ -141,19 +141,19 @@ impl StrokePreview {
     }
 }
 
-/// Changes the preview of a stroke.
+/// Change of a stroke's preview.
 #[derive(Message, Debug, Clone, Copy, PartialEq)]
 pub enum StrokeTune {
-    /// Which joints it becomes.
+    /// Choice of the joints.
     Choice(ChainChoice),
-    /// The volume it runs in, counted from one; `None` for the one it would take by itself.
+    /// Volume of the stroke, counted from one; `None` for the automatic one.
     Volume(Option<u32>),
 }
 
-/// How near a stroke must come to a joint to mean it, in pixels.
+/// Largest distance from a joint at which a stroke starts or ends on it, in pixels.
 const REACH: f32 = 10.0;
 
-/// The request that a stroke begins with.
+/// The request at the start of a stroke.
 fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequest {
     StrokeRequest {
         rig: rig.entity,
@@ -168,8 +168,8 @@ fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequ
     }
 }
 
-/// What is being drawn is the last step to whoever draws it: undo drops that and leaves the step before alone. Runs after
-/// keys are read and before anything is carried out.
+/// Turns an undo during drawing into a cancel: the drawing is dropped and the last step stays. Runs after keys are read
+/// and before actions are carried out.
 fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<ActionRequest>) {
     if matches!(tool.state, StrokeState::Idle) {
         return;
@@ -179,14 +179,14 @@ fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<Actio
     }
 }
 
-/// Where the button went down, and the view at that moment: it holds for the whole line.
+/// Position of the press, and the view at that moment, which holds for the whole line.
 #[derive(Debug, Clone, Copy)]
 struct Press {
     sight: Sight,
     at: Vec2,
 }
 
-/// What strokes become.
+/// Output of the stroke tool.
 #[derive(SystemParam)]
 struct Outcomes<'w> {
     strokes: MessageWriter<'w, StrokeRequest>,
@@ -208,7 +208,7 @@ fn draw(
 ) {
     for ActionRequest(action) in actions.read() {
         match action {
-            // What saves, computes or leaves must not leave a drawing behind.
+            // Actions that save, compute or leave must not leave a drawing behind.
             Action::Accept
             | Action::Save
             | Action::SaveAs
@@ -241,7 +241,7 @@ fn draw(
             (Tool::Stroke, PointerAct::Dragged) => {
                 let Some(Press { sight, at }) = &*press else { continue };
                 if !matches!(tool.state, StrokeState::Drawing(_)) {
-                    // Whoever draws on has what is there already.
+                    // Starting the next line accepts the preview.
                     take(&mut tool, &mut out.strokes);
                     tool.state = StrokeState::Drawing(Box::new(begin(rig, sight, *at, tool.threshold)));
                 }
@@ -281,7 +281,7 @@ fn draw(
     }
     let on = found.as_ref().and_then(|(rig, _)| {
         let surface = rig.surface.as_ref()?.shared()?;
-        Some(On { surface, symmetry: rig.symmetry.0 })
+        Some(DrawingSurface { surface, symmetry: rig.symmetry.0 })
     });
     follow(&mut tool, on, &mut out.notices);
 }
@@ -294,18 +294,18 @@ fn joint_under(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Optio
     joint_at(sight.point(at), &flat, REACH * sight.pixel).map(|number| posed[number].0)
 }
 
-/// Takes what is previewed, as it is shown.
+/// Accepts the preview as it is shown.
 fn take(tool: &mut ResMut<StrokeTool>, strokes: &mut MessageWriter<StrokeRequest>) {
     if !matches!(tool.state, StrokeState::Preview(_)) {
         return;
     }
     let StrokeState::Preview(preview) = std::mem::take(&mut tool.state) else { return };
-    // Where the stroke is still being followed, the engine waits for the same.
+    // If the stroke is still being followed, the engine waits for the same result.
     let chain = preview.chain().filter(|_| !preview.is_followed()).cloned();
     strokes.write(StrokeRequest { chain, ..preview.request });
 }
 
-/// Ends the line: a chain is previewed, everything else is done at once.
+/// Ends the line: a chain is previewed, other strokes are carried out at once.
 fn release(tool: &mut ResMut<StrokeTool>, scene: &Scene, rig: &EditedRig, strokes: &mut MessageWriter<StrokeRequest>) {
     let StrokeState::Drawing(request) = std::mem::take(&mut tool.state) else { return };
     match stroke_kind(&request, &rig.rig, &scene.posed(rig)) {
@@ -334,7 +334,7 @@ fn tune(tool: &mut ResMut<StrokeTool>, change: StrokeTune, rig: Option<EditedRig
     }
 }
 
-/// One joint more or less a notch.
+/// Changes the number of joints by one per notch.
 fn wheel(tool: &mut ResMut<StrokeTool>, notches: f32) {
     let StrokeState::Preview(preview) = &mut tool.state else { return };
     let count = match preview.request.choice {
@@ -351,7 +351,7 @@ fn wheel(tool: &mut ResMut<StrokeTool>, notches: f32) {
     preview.request.choice = ChainChoice::Joints(count as usize);
 }
 
-/// The volume after the one that the stroke runs in; after the last, the one it takes by itself.
+/// Takes the volume after the current one; after the last, the automatic one.
 fn next_volume(tool: &mut ResMut<StrokeTool>) {
     if !matches!(tool.state, StrokeState::Preview(_)) {
         return;
@@ -368,7 +368,7 @@ fn next_volume(tool: &mut ResMut<StrokeTool>) {
     preview.on = None;
 }
 
-/// The volume taken where the stroke starts, and how many there are; `None` for a single one.
+/// The volume at the start of the stroke, and the number of volumes; `None` for a single one.
 fn volumes(chain: &StrokeChain) -> Option<(u32, u32)> {
     chain.notes.iter().find_map(|note| match note {
         StrokeNote::VolumeChosen { volume, of } => Some((*volume, *of)),
@@ -376,11 +376,11 @@ fn volumes(chain: &StrokeChain) -> Option<(u32, u32)> {
     })
 }
 
-/// Follows the previewed stroke through the surface in a task, again when the surface changes.
-fn follow(tool: &mut ResMut<StrokeTool>, on: Option<On>, notices: &mut MessageWriter<Notice>) {
+/// Follows the previewed stroke through the surface in a task, again after a change of the surface.
+fn follow(tool: &mut ResMut<StrokeTool>, on: Option<DrawingSurface>, notices: &mut MessageWriter<Notice>) {
     let StrokeState::Preview(preview) = &mut tool.bypass_change_detection().state else { return };
     let Some(on) = on else { return };
-    let is_same = |was: &On| Arc::ptr_eq(&was.surface, &on.surface) && was.symmetry == on.symmetry;
+    let is_same = |was: &DrawingSurface| Arc::ptr_eq(&was.surface, &on.surface) && was.symmetry == on.symmetry;
     if !preview.on.as_ref().is_some_and(is_same) {
         let (plane, points, settings) =
             (preview.request.plane, preview.request.points.clone(), preview.request.settings);
@@ -400,7 +400,7 @@ fn follow(tool: &mut ResMut<StrokeTool>, on: Option<On>, notices: &mut MessageWr
     tool.set_changed();
 }
 
-/// Plans what is previewed on the rig as it stands, and says so.
+/// Plans the preview on the current rig, and updates the status line.
 pub(super) fn show(
     mut tool: ResMut<StrokeTool>,
     mode: Res<Mode>,

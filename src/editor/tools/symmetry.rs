@@ -13,7 +13,7 @@ use crate::{
     rig::{Rig, operations::MirrorPlane},
 };
 
-/// Switches live mirroring. Its plane is drawn for as long as a rig's [`Symmetry`] holds one.
+/// Plugin that switches live mirroring. Its plane is drawn while a rig's [`Symmetry`] holds one.
 pub struct SymmetryPlugin;
 
 impl Plugin for SymmetryPlugin {
@@ -44,7 +44,7 @@ fn switch(
     }
 }
 
-/// How tall the character is, by which the plane's tolerance is measured.
+/// Height of the character, from which the plane's tolerance follows.
 fn height(rig: &Rig, surface: Option<&RigSurface>) -> f32 {
     if let Some(surface) = surface {
         let [low, high] = surface.bounds();

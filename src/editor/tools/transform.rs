@@ -1,15 +1,15 @@
 //! Moving, turning and scaling joints with the handles of a gizmo: the rest pose, or the pose.
 //!
-//! A drag only previews; the release makes it one step of the history, Escape takes it back to the bit. A press on a
+//! A drag only previews; the release makes one step of the history, Escape restores the rig to the bit. A press on a
 //! handle that does not become a drag is a click like any other: a handle never hides the next joint.
 
-mod aim;
 mod paint;
 mod show;
+mod target;
 
 use bevy::{prelude::*, window::RequestRedraw};
 
-pub use aim::Aim;
+pub use target::GizmoTarget;
 
 use super::{
     GizmoHover, PointerOwner, Tool, ToolPointer, ToolSystems,
@@ -24,7 +24,7 @@ use crate::{
         mode::Mode,
         notice::StatusLine,
         panel::PanelApp,
-        pointer::{Held, PointerAct, ViewportPointer},
+        pointer::{ModifierKeys, PointerAct, ViewportPointer},
         settings::{EditorSettings, GizmoSpace},
     },
     plugins::{
@@ -37,7 +37,7 @@ use crate::{
     },
 };
 
-/// Adds gizmos for the modes Move, Rotate, Scale and Pose.
+/// Plugin of gizmos for the modes Move, Rotate, Scale and Pose.
 pub struct TransformPlugin;
 
 impl Plugin for TransformPlugin {
@@ -50,23 +50,27 @@ impl Plugin for TransformPlugin {
             .add_systems(Update, drag.in_set(ToolSystems::Tools).before(select::select))
             .add_systems(
                 PostUpdate,
-                (show::show_rest, show::show).chain().in_set(ToolSystems::Show).after(super::stroke::show),
+                (show::show_rest, show::show)
+                    .chain()
+                    .in_set(ToolSystems::Show)
+                    .after(super::stroke::show)
+                    .before(super::weights::show_weights),
             )
             .add_painter(paint::GizmoPainter);
     }
 }
 
-/// What the gizmo is about.
+/// State of the gizmo.
 #[derive(Resource, Debug, Clone, PartialEq, Default)]
 pub struct GizmoTool {
-    /// Its handles on the screen, those painted first before the others.
+    /// Handles on the screen, in the order of painting.
     pub shapes: Vec<HandleShape>,
     /// The handle under the pointer.
     pub hovered: Option<Handle>,
     pointer: Option<Vec2>,
     drag: Option<Drag>,
-    /// True while the banner is about a drag.
-    told: bool,
+    /// Marks that the banner describes a drag.
+    has_banner: bool,
 }
 
 impl GizmoTool {
@@ -76,47 +80,47 @@ impl GizmoTool {
     }
 }
 
-/// True to have arrows beside the rings in Pose mode for every joint, not only for roots.
+/// Shows arrows beside the rings in Pose mode for every joint if `true`, not only for roots.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PoseMoves(pub bool);
 
-/// A press on a handle, and what became of it.
+/// A press on a handle, and its drag.
 #[derive(Debug, Clone, PartialEq)]
 struct Drag {
     rig: Entity,
     gizmo: GizmoDrag,
-    /// The joint's own axis that every joint turns about, for local rings in Pose mode.
+    /// Index of the joint's own axis that every joint turns about, for local rings in Pose mode.
     own: Option<usize>,
     name: String,
     from: Start,
-    /// The step of movements while Control is held: of the model as it was at the press, which a drag may make higher.
+    /// Step of movements while Control is held: of the model's size at the press, which a drag may change.
     step: f32,
 }
 
 impl Drag {
-    fn snap(&self, held: Held) -> Option<f32> {
+    fn snap(&self, held: ModifierKeys) -> Option<f32> {
         held.control.then_some(self.step)
     }
 }
 
-/// The dragged joints at the press.
+/// The dragged joints in their state at the press.
 #[derive(Debug, Clone, PartialEq)]
 enum Start {
-    /// At rest, with their places.
+    /// Joints at rest, with their positions.
     Rest(Vec<(Uid, Vec3)>),
-    /// As posed.
+    /// Joints in their pose.
     Pose(Vec<PosedJoint>),
 }
 
 /// Step of movements while snapping, as a share of the model's height.
 const MOVE_STEP: f32 = 0.01;
 
-/// True for the modes that edit the rest pose with a gizmo.
+/// Returns `true` for the modes that edit the rest pose with a gizmo.
 pub fn edits_rest(mode: Mode) -> bool {
     matches!(mode, Mode::Move | Mode::Rotate | Mode::Scale)
 }
 
-/// Keeps [`GizmoHover`] true for the presses of this frame.
+/// Updates [`GizmoHover`] for the presses of this frame.
 fn hover(
     mut pointers: MessageReader<ViewportPointer>,
     mode: Res<Mode>,
@@ -144,7 +148,7 @@ fn hover(
     if tool.drag.is_some() || owner.0.is_some() && press.is_none() {
         return;
     }
-    let aim = Aim::new(*mode, settings.gizmo_space, moves.0, &scene);
+    let aim = GizmoTarget::new(*mode, settings.gizmo_space, moves.0, &scene);
     let shapes = aim.zip(scene.sight()).map(|(aim, sight)| aim.frame.shapes(aim.parts, &sight));
     let handle = shapes.zip(press.or(last)).and_then(|(shapes, at)| handle_at(&shapes, at));
     if tool.hovered != handle {
@@ -165,7 +169,7 @@ fn drag(
     mut picks: MessageWriter<PickRequest>,
 ) {
     let rig = scene.rig();
-    // What changed the rig meanwhile has taken the preview back; the drag began with another rig.
+    // Another change of the rig has undone the preview; the drag began with a different rig.
     let overtaken: Vec<Entity> = edited.read().filter(|edit| edit.committed.is_some()).map(|edit| edit.rig).collect();
     let cancelled = actions.read().filter(|action| action.0 == Action::Cancel).count() > 0;
     if let Some(drag) = &tool.drag
@@ -208,16 +212,16 @@ fn drag(
         edits.write(EditRequest { rig: drag.rig, change });
     }
     let banner = tool.drag.as_ref().filter(|drag| !drag.gizmo.delta().is_none()).map(Drag::banner);
-    if (tool.told || banner.is_some()) && status.banner != banner {
-        tool.told = banner.is_some();
+    if (tool.has_banner || banner.is_some()) && status.banner != banner {
+        tool.has_banner = banner.is_some();
         status.banner = banner;
     }
 }
 
-/// A press on a handle.
+/// Starts a drag with a press on a handle.
 fn press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) -> Option<Drag> {
     let (rig, sight) = (scene.rig()?, scene.sight()?);
-    let aim = Aim::new(mode, space, moves, scene)?;
+    let aim = GizmoTarget::new(mode, space, moves, scene)?;
     let handle = handle_at(&aim.frame.shapes(aim.parts, &sight), at)?;
     let name = match aim.joints.as_slice() {
         [only] => rig.name(*only),
@@ -246,8 +250,8 @@ fn step(rig: &EditedRig) -> f32 {
     height * MOVE_STEP
 }
 
-/// What a click on a handle picks: a joint that is right there.
-fn clicked(scene: &Scene, rig: &EditedRig, at: Vec2, held: Held) -> Option<PickRequest> {
+/// The pick of a click on a handle: a joint at that pixel.
+fn clicked(scene: &Scene, rig: &EditedRig, at: Vec2, held: ModifierKeys) -> Option<PickRequest> {
     let sight = scene.sight()?;
     let near = scene.posed(rig).into_iter().filter_map(|(joint, place)| {
         let distance = sight.project(place)?.distance(at);
@@ -264,7 +268,7 @@ fn clicked(scene: &Scene, rig: &EditedRig, at: Vec2, held: Held) -> Option<PickR
 }
 
 impl Drag {
-    /// The preview of what it has come to.
+    /// The preview of the drag's result.
     fn preview(&self, with_children: bool) -> Change {
         let delta = self.gizmo.delta();
         if delta.is_none() {
@@ -278,7 +282,7 @@ impl Drag {
         })
     }
 
-    /// What moves and how far, in a few words.
+    /// Description of the movement, in a few words.
     fn banner(&self) -> String {
         let name = &self.name;
         match self.gizmo.delta() {
@@ -311,7 +315,7 @@ fn rest_operation(places: &[(Uid, Vec3)], gizmo: &GizmoDrag, delta: &Delta, with
     }
 }
 
-/// The selected joints that a gizmo moves: with live mirroring only one side, the active joint's; the other follows.
+/// The selected joints that a gizmo moves: with live mirroring only the active joint's side; the other side follows.
 fn one_side(rig: &EditedRig, plane: Option<&MirrorPlane>) -> Vec<Uid> {
     let selected: Vec<Uid> = rig.selection.0.iter().copied().filter(|joint| rig.rig.joint(*joint).is_some()).collect();
     let (Some(plane), Some(active)) = (plane, rig.selection.active()) else { return selected };

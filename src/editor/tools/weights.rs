@@ -1,4 +1,4 @@
-//! Weights: shows what the active joint moves for as long as the mode is on.
+//! Weights mode: shows the points that the active joint moves.
 
 use bevy::prelude::*;
 
@@ -12,7 +12,7 @@ use crate::{
     rig::Uid,
 };
 
-/// Shows weights in their mode.
+/// Plugin that shows weights in their mode.
 pub struct WeightsPlugin;
 
 impl Plugin for WeightsPlugin {
@@ -23,13 +23,13 @@ impl Plugin for WeightsPlugin {
     }
 }
 
-/// What the display showed before the mode was entered.
+/// Display settings before the mode was entered.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
 pub struct WeightsTool {
     before: Option<WeightColors>,
 }
 
-fn show_weights(
+pub(super) fn show_weights(
     mut tool: ResMut<WeightsTool>,
     mode: Res<Mode>,
     scene: Scene,
@@ -58,7 +58,7 @@ fn show_weights(
     status.set_if_neq(StatusLine { hint, obstacle, banner });
 }
 
-/// What the active joint moves, and why it moves nothing.
+/// Description of the active joint's weights, and the reason if it has none.
 fn describe(rig: &EditedRig) -> (String, Option<String>) {
     if rig.rig.skins().next().is_none() {
         let why = "the mesh has no weights yet; compute them first (B)".to_owned();
@@ -76,7 +76,7 @@ fn describe(rig: &EditedRig) -> (String, Option<String>) {
     (format!("{hint} Click another joint to see what it moves."), None)
 }
 
-/// How many points of all bound meshes a joint has a part in, and how many there are.
+/// Number of points of all bound meshes with an influence of a joint, and number of all points.
 pub fn points_moved(rig: &EditedRig, joint: Uid) -> (usize, usize) {
     let mut moved = 0;
     let mut of = 0;

@@ -20,6 +20,8 @@ pub enum SaveStep {
     Write,
     /// Waiting until the content has reached the device.
     Sync,
+    /// Comparing what the disk returns with what was written.
+    Verify,
     /// Putting the finished file in place.
     Replace,
 }
@@ -32,12 +34,13 @@ impl std::fmt::Display for SaveStep {
             Self::Permissions => "keeping its permissions",
             Self::Write => "writing",
             Self::Sync => "waiting for the disk",
+            Self::Verify => "reading back what was written",
             Self::Replace => "putting the finished file in place",
         })
     }
 }
 
-/// Why a file was not saved. But for [`SaveError::Unconfirmed`] and [`SaveError::Mixed`], what was there before is unchanged.
+/// Why a file was not saved. But for [`SaveError::Unconfirmed`], what was there before is unchanged.
 #[derive(Debug, Error)]
 pub enum SaveError {
     /// The path ends in no file name.
@@ -78,18 +81,10 @@ pub enum SaveError {
         /// The path as given.
         path: PathBuf,
     },
-    /// A file that belongs to another is named outside that one's folder.
-    #[error("cannot save `{}`: it is outside the folder `{}` of the file it belongs to; give it a plain file name", path.display(), folder.display())]
-    Outside {
-        /// The path as given.
-        path: PathBuf,
-        /// The folder of the main file.
-        folder: PathBuf,
-    },
-    /// Two files of one call aim at the same place.
-    #[error("cannot save `{}` twice in one go: give the files different names", path.display())]
-    SameTarget {
-        /// The path that occurs twice.
+    /// Something appeared under the name of a companion while the set was being saved.
+    #[error("cannot save `{}`: another program has just put a file there; save again", path.display())]
+    Occupied {
+        /// The companion.
         path: PathBuf,
     },
     /// The disk, the quota or the largest file size is exhausted.
@@ -128,14 +123,6 @@ pub enum SaveError {
         /// The path as given.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
-    },
-    /// Some files of a set were replaced and could not be put back; each file is whole.
-    #[error("`{}` and what belongs to it were replaced only in part ({source}); each file is whole; save the set again", path.display())]
-    Mixed {
-        /// The main file.
-        path: PathBuf,
-        /// What stopped it.
         source: io::Error,
     },
 }

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Content, Origin, SaveMark,
-    frame::{Kind, put_frame, put_prelude},
+    frame::{RecordKind, put_frame, put_prelude},
     text::{SkinsOut, rig_text, step_text, value_text},
 };
-use crate::rig::step::{Committed, Timeline};
+use crate::rig::step::{Committed, UndoStacks};
 
 /// The header's payload.
 #[derive(Serialize, Deserialize)]
@@ -24,14 +24,14 @@ pub(super) struct Encoder {
     session: u64,
     number: u64,
     /// As a reader will have it, so that steps it knows need not be written again.
-    timeline: Timeline,
+    stacks: UndoStacks,
     skins: SkinsOut,
 }
 
 impl Encoder {
     /// The bytes of a whole file, and what appends to it.
     pub(super) fn begin(session: u64, content: &Content) -> Result<(Self, Vec<u8>), String> {
-        let mut encoder = Self { session, number: 0, timeline: Timeline::default(), skins: SkinsOut::default() };
+        let mut encoder = Self { session, number: 0, stacks: UndoStacks::default(), skins: SkinsOut::default() };
         let mut out = Vec::new();
         put_prelude(&mut out, session);
         let header = Header {
@@ -41,11 +41,13 @@ impl Encoder {
             origin: content.origin.clone(),
             first: content.first,
         };
-        encoder.put(&mut out, Kind::Header, value_text(&header)?.as_bytes())?;
+        encoder.put(&mut out, RecordKind::Header, value_text(&header)?.as_bytes())?;
         encoder.context(&mut out, &content.context)?;
         if let Some(rig) = &content.base {
             let text = rig_text(rig, &mut encoder.skins)?;
-            encoder.put_with_skins(&mut out, Kind::Base, &text)?;
+            encoder.put_with_skins(&mut out, RecordKind::Base, &text)?;
+            // All else stands on it and nothing else tells it. Readers take either copy.
+            encoder.put(&mut out, RecordKind::Base, text.as_bytes())?;
         }
         for committed in &content.changes {
             encoder.change(&mut out, committed)?;
@@ -59,39 +61,39 @@ impl Encoder {
     /// Appends a change. On failure `out` is as before, and this change and all later ones cannot be in this file.
     pub(super) fn change(&mut self, out: &mut Vec<u8>, committed: &Committed) -> Result<(), String> {
         let (kind, whole) = match committed {
-            Committed::Done(_) => (Kind::Done, true),
-            Committed::Undone(step) if self.timeline.undoes(step) => (Kind::Undone, false),
-            Committed::Undone(_) => (Kind::UndoneOlder, true),
-            Committed::Redone(step) if self.timeline.redoes(step) => (Kind::Redone, false),
-            Committed::Redone(_) => (Kind::RedoneOlder, true),
+            Committed::Done(_) => (RecordKind::Done, true),
+            Committed::Undone(step) if self.stacks.undoes(step) => (RecordKind::Undone, false),
+            Committed::Undone(_) => (RecordKind::UndoneOlder, true),
+            Committed::Redone(step) if self.stacks.redoes(step) => (RecordKind::Redone, false),
+            Committed::Redone(_) => (RecordKind::RedoneOlder, true),
         };
         let text = if whole { step_text(committed.step(), &mut self.skins)? } else { String::new() };
         self.put_with_skins(out, kind, &text)?;
-        self.timeline.follow(committed);
+        self.stacks.follow(committed);
         Ok(())
     }
 
     /// Appends a note that the project is about to be saved.
     pub(super) fn mark(&mut self, out: &mut Vec<u8>, mark: &SaveMark) -> Result<(), String> {
-        self.put(out, Kind::Mark, value_text(mark)?.as_bytes())
+        self.put(out, RecordKind::Mark, value_text(mark)?.as_bytes())
     }
 
     /// Appends the caller's text.
     pub(super) fn context(&mut self, out: &mut Vec<u8>, context: &str) -> Result<(), String> {
-        self.put(out, Kind::Context, context.as_bytes())
+        self.put(out, RecordKind::Context, context.as_bytes())
     }
 
     /// Appends the word that nothing is to be recovered.
     pub(super) fn end(&mut self, out: &mut Vec<u8>) -> Result<(), String> {
-        self.put(out, Kind::End, &[])
+        self.put(out, RecordKind::End, &[])
     }
 
-    fn put_with_skins(&mut self, out: &mut Vec<u8>, kind: Kind, text: &str) -> Result<(), String> {
+    fn put_with_skins(&mut self, out: &mut Vec<u8>, kind: RecordKind, text: &str) -> Result<(), String> {
         let (start, number) = (out.len(), self.number);
         let mut put = || {
             for (hash, bytes) in self.skins.take_fresh() {
                 let payload = [&hash.to_le_bytes()[..], &bytes].concat();
-                self.put(out, Kind::Skin, &payload)?;
+                self.put(out, RecordKind::Skin, &payload)?;
             }
             self.put(out, kind, text.as_bytes())
         };
@@ -103,7 +105,7 @@ impl Encoder {
         result
     }
 
-    fn put(&mut self, out: &mut Vec<u8>, kind: Kind, payload: &[u8]) -> Result<(), String> {
+    fn put(&mut self, out: &mut Vec<u8>, kind: RecordKind, payload: &[u8]) -> Result<(), String> {
         if !put_frame(out, self.session, self.number, kind, payload) {
             return Err(format!("{} MiB are more than a record holds", payload.len() >> 20));
         }

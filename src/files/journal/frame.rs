@@ -1,24 +1,27 @@
 //! Frames: how records lie in the file, and how a reader notices that one is torn or damaged.
 
+use super::Damage;
 use crate::rig::skin::content_hash;
 
 /// First bytes of every journal.
 pub(super) const MAGIC: [u8; 8] = *b"RIGJRNL\0";
 /// The format this version writes, and the highest it reads.
+///
+/// A later format has to mix its number into the checksums, so that they tell the format where the prelude is damaged.
 pub const JOURNAL_FORMAT: u32 = 1;
 /// Bytes before the first frame: magic, format, session.
 pub(super) const PRELUDE: usize = 8 + 4 + 8;
 /// Bytes of a frame before its payload: length of the payload, kind, number.
-const HEAD: usize = 4 + 1 + 8;
+pub(super) const HEAD: usize = 4 + 1 + 8;
 /// Bytes of the checksum after the payload.
-const TAIL: usize = 8;
+pub(super) const TAIL: usize = 8;
 /// Bytes of the payload of one record, at most.
 pub const MAX_RECORD: usize = 1 << 30;
 
-/// What a frame holds.
+/// Kind of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub(super) enum Kind {
+pub enum RecordKind {
     /// Where the work started.
     Header = 1,
     /// The rig it started with.
@@ -43,8 +46,9 @@ pub(super) enum Kind {
     End = 11,
 }
 
-impl Kind {
-    const ALL: [Self; 11] = [
+impl RecordKind {
+    /// All kinds, by number.
+    pub(super) const ALL: [Self; 11] = [
         Self::Header,
         Self::Base,
         Self::Done,
@@ -58,8 +62,14 @@ impl Kind {
         Self::End,
     ];
 
-    fn of(number: u8) -> Option<Self> {
+    /// The kind with this number.
+    pub(super) fn of(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| *kind as u8 == number)
+    }
+
+    /// True for the kinds that are counted as changes of the rig.
+    pub fn is_change(self) -> bool {
+        matches!(self, Self::Done | Self::Undone | Self::Redone | Self::UndoneOlder | Self::RedoneOlder)
     }
 }
 
@@ -72,7 +82,7 @@ pub(super) fn put_prelude(out: &mut Vec<u8>, session: u64) {
 
 /// Appends a frame; false if the payload is too long for one.
 #[must_use]
-pub(super) fn put_frame(out: &mut Vec<u8>, session: u64, number: u64, kind: Kind, payload: &[u8]) -> bool {
+pub(super) fn put_frame(out: &mut Vec<u8>, session: u64, number: u64, kind: RecordKind, payload: &[u8]) -> bool {
     if payload.len() > MAX_RECORD {
         return false;
     }
@@ -87,61 +97,58 @@ pub(super) fn put_frame(out: &mut Vec<u8>, session: u64, number: u64, kind: Kind
     true
 }
 
-/// What the frames of a journal end with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Torn {
-    /// Where the first frame that cannot be used begins.
-    pub at: usize,
-    /// What is wrong with it.
-    pub why: &'static str,
+/// Beginning of a frame, as its bytes have it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Head {
+    pub length: usize,
+    pub kind: u8,
+    pub number: u64,
 }
 
-/// Reads frames one after the other, up to the first that is not as it was written.
-pub(super) struct Frames<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    session: u64,
-    number: u64,
-}
-
-impl<'a> Frames<'a> {
-    /// Frames of a file whose prelude has been checked.
-    pub(super) fn new(bytes: &'a [u8], session: u64) -> Self {
-        Self { bytes, at: PRELUDE, session, number: 0 }
-    }
-
-    /// Where the next frame begins.
-    pub(super) fn offset(&self) -> usize {
-        self.at
-    }
-
-    /// The next frame; `None` at the end of the file.
-    pub(super) fn next(&mut self) -> Option<Result<(Kind, &'a [u8]), Torn>> {
-        let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
-        Some(self.read(rest).map_err(|why| Torn { at: self.at, why }))
-    }
-
-    fn read(&mut self, rest: &'a [u8]) -> Result<(Kind, &'a [u8]), &'static str> {
-        const CUT: &str = "the record is cut off";
-        let (length, after) = rest.split_first_chunk::<4>().ok_or(CUT)?;
-        let (kind, after) = after.split_first().ok_or(CUT)?;
-        let (number, after) = after.split_first_chunk::<8>().ok_or(CUT)?;
+impl Head {
+    /// The head at `at`; `None` if the file ends within it.
+    pub(super) fn at(bytes: &[u8], at: usize) -> Option<Self> {
+        let (length, rest) = bytes.get(at..)?.split_first_chunk::<4>()?;
+        let (kind, rest) = rest.split_first()?;
+        let number = rest.first_chunk::<8>()?;
         let length = u32::from_le_bytes(*length) as usize;
-        if length > MAX_RECORD {
-            return Err("the record's length is damaged");
-        }
-        let payload = after.get(..length).ok_or(CUT)?;
-        let checksum = after.get(length..).and_then(|tail| tail.first_chunk::<TAIL>()).ok_or(CUT)?;
-        let whole = rest.get(..HEAD + length).ok_or(CUT)?;
-        if u64::from_le_bytes(*checksum) != content_hash(whole) ^ self.session {
-            return Err("the record is damaged: its checksum does not fit");
-        }
-        if u64::from_le_bytes(*number) != self.number {
-            return Err("a record is missing before this one");
-        }
-        let kind = Kind::of(*kind).ok_or("the record is of a kind that this version does not know")?;
-        self.number += 1;
-        self.at += HEAD + length + TAIL;
-        Ok((kind, payload))
+        Some(Self { length, kind: *kind, number: u64::from_le_bytes(*number) })
     }
+
+    /// End of a frame that begins at `at` with this head; `None` where no file is that long.
+    pub(super) fn end(&self, at: usize) -> Option<usize> {
+        at.checked_add(HEAD)?.checked_add(self.length)?.checked_add(TAIL)
+    }
+}
+
+/// A frame whose checksum fits.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame<'a> {
+    pub at: usize,
+    pub number: u64,
+    /// `None` for a kind that this version does not know.
+    pub kind: Option<RecordKind>,
+    pub payload: &'a [u8],
+}
+
+impl Frame<'_> {
+    /// Where the next frame begins.
+    pub(super) fn end(&self) -> usize {
+        self.at + HEAD + self.payload.len() + TAIL
+    }
+}
+
+/// Reads the frame at `at`.
+pub(super) fn read_frame(bytes: &[u8], at: usize, session: u64) -> Result<Frame<'_>, Damage> {
+    let head = Head::at(bytes, at).ok_or(Damage::Cut)?;
+    if head.length > MAX_RECORD {
+        return Err(Damage::Length);
+    }
+    let end = head.end(at).filter(|end| *end <= bytes.len()).ok_or(Damage::Cut)?;
+    let (whole, checksum) = bytes.get(at..end).and_then(|frame| frame.split_last_chunk::<TAIL>()).ok_or(Damage::Cut)?;
+    if u64::from_le_bytes(*checksum) != content_hash(whole) ^ session {
+        return Err(Damage::Checksum);
+    }
+    let payload = whole.get(HEAD..).ok_or(Damage::Cut)?;
+    Ok(Frame { at, number: head.number, kind: RecordKind::of(head.kind), payload })
 }

@@ -3,25 +3,27 @@
 use std::sync::Arc;
 
 use super::{
-    Content, Origin, SaveMark,
+    Content, Damage, Gap, Origin, RecordCount, RecordKind, SaveMark,
     encode::Header,
-    frame::{Frames, JOURNAL_FORMAT, Kind, MAGIC, PRELUDE},
-    text::{SkinsIn, read_rig, read_step, read_value},
+    lossy_timeline::LossyTimeline,
+    scan::{Item, Scan},
+    tally::Tally,
+    text::{SkinsIn, StepIn, read_rig, read_step, read_value},
 };
 use crate::rig::{
     Rig,
     skin::read_skin_data,
-    step::{Committed, Replayed, Timeline, replay},
+    step::{Committed, Step},
 };
 
 /// Bytes of a journal that are read.
 pub const MAX_JOURNAL: u64 = 8 << 30;
 
-/// Why bytes are not a journal at all.
+/// Reason why nothing of a journal can be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum JournalError {
-    /// The file does not begin like a journal.
-    #[error("this is not a journal: it does not begin with RIGJRNL")]
+    /// The file does not begin like a journal, and has no records of one.
+    #[error("this is not a journal: it does not begin with RIGJRNL, and holds no records")]
     NotAJournal,
     /// Written by a later version.
     #[error("the journal has format {found}, this version reads up to {known}: update to recover the work in it")]
@@ -31,39 +33,40 @@ pub enum JournalError {
         /// The highest format known.
         known: u32,
     },
-    /// The first record is gone, so that nobody knows what the changes belong to.
-    #[error("the journal is damaged at its very beginning: {0}; open the last saved file")]
-    NoHeader(&'static str),
+    /// No record is sound.
+    #[error("the journal is damaged, and none of its records can be read; open the last saved file")]
+    NothingSound,
+    /// The file cannot be read.
+    #[error("the journal cannot be read: {0}")]
+    Read(String),
 }
 
-/// How a journal ends.
+/// Ending of a journal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
     /// With a whole record: the process ended, or is still at work.
     Open,
     /// With the word that nothing is to be recovered.
     Closed,
-    /// With something that is no record; what came before it is sound.
-    Torn {
-        /// Where, in bytes from the start of the file.
-        at: usize,
-        /// Bytes from there to the end.
-        lost: usize,
-        /// What is wrong there.
-        why: &'static str,
-    },
+    /// With something that is no record: the last of the [gaps](Recovered::gaps).
+    Torn,
 }
 
-/// What a journal holds.
+/// Content of a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recovered {
     /// The session that wrote it.
     pub session: u64,
-    /// The process that wrote it.
+    /// The process that wrote it; 0 if that is lost.
     pub process: u32,
-    /// How it ends.
+    /// Ending of the file.
     pub ending: Ending,
     pub(super) content: Content,
+    pub(super) gaps: Vec<Gap>,
+    count: RecordCount,
+    tally: Tally,
+    /// Steps with edits in one direction only, because those in the other one name weights that are lost.
+    pub(super) one_way: Vec<Arc<Step>>,
 }
 
 /// What to replay a journal on.
@@ -82,6 +85,21 @@ pub enum Basis {
 }
 
 impl Recovered {
+    /// Places where records cannot be used, in the order of the file.
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
+    }
+
+    /// True if the file is not as it was written, even if nothing is lost.
+    pub fn is_damaged(&self) -> bool {
+        !self.gaps.is_empty()
+    }
+
+    /// Number of records that are there and that are lost.
+    pub fn records(&self) -> RecordCount {
+        self.count
+    }
+
     /// What the work started from.
     pub fn origin(&self) -> &Origin {
         &self.content.origin
@@ -92,7 +110,7 @@ impl Recovered {
         self.content.started
     }
 
-    /// The rig that the work started with; `None` if that is what the project file holds.
+    /// The rig that the work started with; `None` if that is what the project file holds, or if it is lost.
     pub fn base(&self) -> Option<&Rig> {
         self.content.base.as_deref()
     }
@@ -121,10 +139,19 @@ impl Recovered {
         self.content.marks.last().map(|mark| mark.path.as_path()).or(opened)
     }
 
+    /// Takes the project that the journal lies beside for what the work started from, where the journal does not tell that
+    /// any more. What is replayed on it is a guess: [`Basis::Changed`].
+    pub fn assume_project(&mut self, project: &std::path::Path) {
+        if self.content.origin == Origin::Unknown && self.content.base.is_none() {
+            self.content.origin = Origin::Project { path: project.to_owned(), hash: 0 };
+        }
+    }
+
     /// What to replay on. `hash` gives the hash of the file at a path as it is now, or `None` if it cannot be read.
     pub fn basis(&self, mut hash: impl FnMut(&std::path::Path) -> Option<u64>) -> Basis {
-        if let Some(mark) = self.saved(&mut hash) {
-            return Basis::Project { contained: self.contained(mark) };
+        if let Some((index, mark)) = self.saved(&mut hash) {
+            let contained = self.tally.contained(index, mark, self.content.first);
+            return Basis::Project { contained };
         }
         match &self.content.origin {
             _ if self.content.base.is_some() => Basis::Journal,
@@ -134,179 +161,160 @@ impl Recovered {
         }
     }
 
-    /// The latest save whose content is in the project file now.
-    pub(super) fn saved(&self, hash: &mut impl FnMut(&std::path::Path) -> Option<u64>) -> Option<&SaveMark> {
-        self.content.marks.iter().rev().find(|mark| hash(&mark.path) == Some(mark.hash))
-    }
-
-    fn contained(&self, mark: &SaveMark) -> usize {
-        let contained = mark.position.saturating_sub(self.content.first);
-        usize::try_from(contained).unwrap_or(usize::MAX).min(self.content.changes.len())
-    }
-
-    /// Makes the rig as it was: on the journal's own rig (an empty one if it has none) for [`Basis::Journal`], else on
-    /// `project`, the rig that the project file holds now.
-    pub fn replay(&self, basis: Basis, project: Option<Rig>) -> Replayed {
-        match basis {
-            Basis::Journal => replay(self.base().cloned().unwrap_or_default(), self.changes(), 0),
-            Basis::Project { contained } => replay(project.unwrap_or_default(), self.changes(), contained),
-            Basis::Changed => replay(project.unwrap_or_default(), self.changes(), 0),
-        }
-    }
-
-    /// Reads frame after frame until one is torn, damaged or makes no sense.
-    fn take(&mut self, frames: &mut Frames, total: usize) {
-        let mut timeline = Timeline::default();
-        let mut skins = SkinsIn::new();
-        loop {
-            let at = frames.offset();
-            let torn = |at: usize, why| Ending::Torn { at, lost: total.saturating_sub(at), why };
-            let (kind, payload) = match frames.next() {
-                None => return,
-                Some(Err(error)) => {
-                    self.ending = torn(error.at, error.why);
-                    return;
-                }
-                Some(Ok(frame)) => frame,
-            };
-            match self.take_frame(kind, payload, &mut timeline, &mut skins) {
-                Some(true) => {}
-                Some(false) => {
-                    self.ending = Ending::Closed;
-                    return;
-                }
-                None => {
-                    self.ending = torn(at, "the record's content makes no sense");
-                    return;
-                }
-            }
-        }
-    }
-
-    /// Takes one record; false at the end of the journal, `None` if it makes no sense here.
-    fn take_frame(&mut self, kind: Kind, payload: &[u8], timeline: &mut Timeline, skins: &mut SkinsIn) -> Option<bool> {
-        let content = &mut self.content;
-        let step = |skins: &SkinsIn| read_step(payload, skins).map(Arc::new);
-        let committed = match kind {
-            Kind::Done => Committed::Done(step(skins)?),
-            Kind::UndoneOlder => Committed::Undone(step(skins)?),
-            Kind::RedoneOlder => Committed::Redone(step(skins)?),
-            Kind::Undone => Committed::Undone(timeline.done.last()?.clone()),
-            Kind::Redone => Committed::Redone(timeline.undone.last()?.clone()),
-            Kind::Skin => {
-                let (hash, bytes) = payload.split_first_chunk::<8>()?;
-                skins.insert(u64::from_le_bytes(*hash), Arc::new(read_skin_data(bytes)?));
-                return Some(true);
-            }
-            Kind::Mark => {
-                content.marks.push(read_value(payload)?);
-                return Some(true);
-            }
-            Kind::Context => {
-                content.context = std::str::from_utf8(payload).ok()?.to_owned();
-                return Some(true);
-            }
-            Kind::Base if content.changes.is_empty() => {
-                content.base = Some(Arc::new(read_rig(payload, skins)?));
-                return Some(true);
-            }
-            Kind::Header | Kind::Base => return None,
-            Kind::End => return Some(false),
-        };
-        timeline.follow(&committed);
-        content.changes.push(committed);
-        Some(true)
+    /// The latest save whose content is in the project file now, and its index.
+    pub(super) fn saved(&self, hash: &mut impl FnMut(&std::path::Path) -> Option<u64>) -> Option<(usize, &SaveMark)> {
+        self.content.marks.iter().enumerate().rev().find(|(_, mark)| hash(&mark.path) == Some(mark.hash))
     }
 }
 
-/// Reads a journal as far as it is sound. Memory stays within a small multiple of the file's length.
+/// Reads every record of a journal that is sound, whatever lies between them. Memory stays within a small multiple of the
+/// file's length.
 ///
 /// # Errors
-/// [`JournalError`] if not even its beginning can be read. Everything after that is no error: see [`Recovered::ending`].
+/// [`JournalError`] if there is no sound record. Damage is no error: see [`Recovered::gaps`].
 pub fn recover(bytes: &[u8]) -> Result<Recovered, JournalError> {
-    let (session, mut frames, header) = begin(bytes)?;
-    let content = Content {
-        generation: header.generation,
-        started: header.started,
-        origin: header.origin,
-        first: header.first,
-        ..Content::default()
+    let scan = Scan::new(bytes)?;
+    let content = Content { origin: Origin::Unknown, ..Content::default() };
+    let mut reader = Reader {
+        recovered: Recovered {
+            session: scan.session(),
+            process: 0,
+            ending: Ending::Open,
+            content,
+            gaps: Vec::new(),
+            count: RecordCount::default(),
+            tally: Tally::default(),
+            one_way: Vec::new(),
+        },
+        stacks: LossyTimeline::default(),
+        skins: SkinsIn::new(),
     };
-    let mut recovered = Recovered { session, process: header.process, ending: Ending::Open, content };
-    recovered.take(&mut frames, bytes.len());
-    Ok(recovered)
+    for item in scan {
+        reader.take(item);
+    }
+    if reader.recovered.gaps.is_empty() && reader.recovered.content.origin == Origin::Unknown {
+        reader.lose(Gap::NO_HEADER);
+    }
+    match reader.recovered.count.sound {
+        0 => Err(JournalError::NothingSound),
+        _ => Ok(reader.recovered),
+    }
 }
 
-fn begin(bytes: &[u8]) -> Result<(u64, Frames<'_>, Header), JournalError> {
-    if bytes.get(..MAGIC.len()) != Some(&MAGIC) {
-        return Err(JournalError::NotAJournal);
-    }
-    let number = |at: usize| bytes.get(at..)?.first_chunk::<4>().copied().map(u32::from_le_bytes);
-    let format = number(MAGIC.len()).ok_or(JournalError::NoHeader("it is cut off"))?;
-    if format > JOURNAL_FORMAT {
-        return Err(JournalError::Newer { found: format, known: JOURNAL_FORMAT });
-    }
-    let session = bytes.get(PRELUDE - 8..).and_then(|rest| rest.first_chunk::<8>());
-    let session = session.copied().map(u64::from_le_bytes).ok_or(JournalError::NoHeader("it is cut off"))?;
-    if format == 0 {
-        return Err(JournalError::NoHeader("its format is 0"));
-    }
-    let mut frames = Frames::new(bytes, session);
-    let header = match frames.next() {
-        None => Err("it is cut off"),
-        Some(Err(torn)) => Err(torn.why),
-        Some(Ok((Kind::Header, payload))) => read_value(payload).ok_or("its first record makes no sense"),
-        Some(Ok(_)) => Err("its first record is no header"),
-    };
-    Ok((session, frames, header.map_err(JournalError::NoHeader)?))
+/// State of the reader: the result so far, and the steps and weights that the next records refer to.
+struct Reader {
+    recovered: Recovered,
+    stacks: LossyTimeline,
+    skins: SkinsIn,
 }
 
-/// A journal's frames counted without reading what is in them: enough to list it.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Summary {
-    pub session: u64,
-    pub generation: u64,
-    pub started: u64,
-    pub origin: Origin,
-    pub has_base: bool,
-    pub first: u64,
-    pub changes: usize,
-    pub marks: Vec<SaveMark>,
-    pub ending: Ending,
-}
-
-/// Counts what a journal holds.
-pub(super) fn summarise(bytes: &[u8]) -> Result<Summary, JournalError> {
-    let (session, mut frames, header) = begin(bytes)?;
-    let mut summary = Summary {
-        session,
-        generation: header.generation,
-        started: header.started,
-        origin: header.origin,
-        has_base: false,
-        first: header.first,
-        changes: 0,
-        marks: Vec::new(),
-        ending: Ending::Open,
-    };
-    while let Some(frame) = frames.next() {
-        match frame {
-            Err(torn) => {
-                let lost = bytes.len().saturating_sub(torn.at);
-                summary.ending = Ending::Torn { at: torn.at, lost, why: torn.why };
-                break;
+impl Reader {
+    fn take(&mut self, item: Item<'_>) {
+        let recovered = &mut self.recovered;
+        let (at, kind, payload) = match item {
+            Item::Gap(gap) => {
+                if gap.records != Some(0) {
+                    recovered.ending = Ending::Torn;
+                }
+                recovered.count.lose(&gap);
+                self.stacks.lose(&gap);
+                self.lose(gap);
+                return;
             }
-            Ok((Kind::End, _)) => {
-                summary.ending = Ending::Closed;
-                break;
-            }
-            Ok((Kind::Mark, payload)) => summary.marks.extend(read_value::<SaveMark>(payload)),
-            Ok((Kind::Base, _)) => summary.has_base = true,
-            Ok((Kind::Header | Kind::Skin | Kind::Context, _)) => {}
-            Ok((Kind::Done | Kind::Undone | Kind::Redone | Kind::UndoneOlder | Kind::RedoneOlder, _)) => {
-                summary.changes += 1;
-            }
+            Item::Record(at, kind, payload) => (at, kind, payload),
+        };
+        recovered.count.sound += 1;
+        recovered.ending = if kind == RecordKind::End { Ending::Closed } else { Ending::Open };
+        let place =
+            Gap { at, bytes: payload.len(), records: Some(1), kind: Some(kind), damage: Damage::Content, changes: 0 };
+        let taken =
+            if kind.is_change() { self.take_change(kind, payload, place) } else { self.take_other(kind, payload) };
+        if let Err((damage, records)) = taken {
+            self.lose(Gap { records: Some(records), damage, ..place });
         }
     }
-    Ok(summary)
+
+    fn lose(&mut self, gap: Gap) {
+        let recovered = &mut self.recovered;
+        recovered.tally.lose(&gap);
+        recovered.gaps.push(Gap { changes: recovered.content.changes.len(), ..gap });
+    }
+
+    /// Takes one change; else tells what is wrong with it, and how many records that loses.
+    fn take_change(&mut self, kind: RecordKind, payload: &[u8], place: Gap) -> Result<(), (Damage, u64)> {
+        let has_step = !matches!(kind, RecordKind::Undone | RecordKind::Redone);
+        let read = if has_step { read_step(payload, &self.skins) } else { None };
+        let damage = match (&read, has_step) {
+            (_, false) => Damage::UnknownStep,
+            (None, true) => Damage::Content,
+            (Some(_), true) => Damage::Weights,
+        };
+        let is_usable =
+            |read: &StepIn| if kind == RecordKind::UndoneOlder { read.has_backward } else { read.has_forward };
+        let read = read.filter(is_usable);
+        let is_one_way = read.as_ref().is_some_and(|read| !(read.has_forward && read.has_backward));
+        let step = read.map(|read| Arc::new(read.step));
+        if let Some(step) = step.clone().filter(|_| is_one_way) {
+            self.recovered.one_way.push(step);
+            self.lose(Gap { records: Some(0), damage, ..place });
+        }
+        let stacks = &mut self.stacks;
+        let committed = match kind {
+            RecordKind::Undone => stacks.undo().map(Committed::Undone),
+            RecordKind::Redone => stacks.redo().map(Committed::Redone),
+            RecordKind::UndoneOlder => {
+                stacks.undo_older(step.clone());
+                step.map(Committed::Undone)
+            }
+            RecordKind::RedoneOlder => {
+                stacks.redo_older(step.clone());
+                step.map(Committed::Redone)
+            }
+            _ => {
+                stacks.done(step.clone());
+                step.map(Committed::Done)
+            }
+        };
+        let committed = committed.ok_or((damage, 1))?;
+        self.recovered.tally.change();
+        self.recovered.content.changes.push(committed);
+        Ok(())
+    }
+
+    /// Takes a record that is no change; as [`Self::take_change`].
+    fn take_other(&mut self, kind: RecordKind, payload: &[u8]) -> Result<(), (Damage, u64)> {
+        let content = &mut self.recovered.content;
+        let senseless = (Damage::Content, 1);
+        match kind {
+            RecordKind::Header if content.origin == Origin::Unknown && content.changes.is_empty() => {
+                let header: Header = read_value(payload).ok_or(senseless)?;
+                (content.generation, content.started) = (header.generation, header.started);
+                (content.origin, content.first) = (header.origin, header.first);
+                self.recovered.process = header.process;
+                self.recovered.tally.begin(header.first);
+            }
+            // Written twice.
+            RecordKind::Base if content.base.is_some() => {}
+            RecordKind::Base if content.changes.is_empty() => {
+                let (rig, is_whole) = read_rig(payload, &self.skins).ok_or(senseless)?;
+                content.base = Some(Arc::new(rig));
+                if !is_whole {
+                    return Err((Damage::Weights, 0));
+                }
+            }
+            RecordKind::Skin => {
+                let (hash, bytes) = payload.split_first_chunk::<8>().ok_or(senseless)?;
+                let skin = read_skin_data(bytes).ok_or(senseless)?;
+                self.skins.insert(u64::from_le_bytes(*hash), Arc::new(skin));
+            }
+            RecordKind::Mark => {
+                content.marks.push(read_value(payload).ok_or(senseless)?);
+                self.recovered.tally.mark();
+            }
+            RecordKind::Context => content.context = std::str::from_utf8(payload).map_err(|_| senseless)?.to_owned(),
+            RecordKind::End => {}
+            _ => return Err(senseless),
+        }
+        Ok(())
+    }
 }

@@ -136,21 +136,35 @@ fn parsed<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Option<T> {
     ron::from_str(text).ok()
 }
 
-/// Reads a step; `None` if it is none, or names weights that are not there.
-pub(super) fn read_step(payload: &[u8], skins: &SkinsIn) -> Option<Step> {
-    let StepText { name, forward, backward, before, after } = parsed(payload)?;
-    let (forward, backward) = (edits(forward, skins)?, edits(backward, skins)?);
-    Some(Step { name: Cow::Owned(name), forward, backward, before, after })
+/// A step as a journal holds it.
+pub(super) struct StepIn {
+    pub step: Step,
+    /// False if the edits name weights that are not there; then the step has none.
+    pub has_forward: bool,
+    /// As `has_forward`, for the edits that take the step back.
+    pub has_backward: bool,
 }
 
-/// Reads a rig; `None` if it is none.
-pub(super) fn read_rig(payload: &[u8], skins: &SkinsIn) -> Option<Rig> {
+/// Reads a step; `None` if it is none.
+pub(super) fn read_step(payload: &[u8], skins: &SkinsIn) -> Option<StepIn> {
+    let StepText { name, forward, backward, before, after } = parsed(payload)?;
+    let (forward, backward) = (edits(forward, skins), edits(backward, skins));
+    let (has_forward, has_backward) = (forward.is_some(), backward.is_some());
+    let (forward, backward) = (forward.unwrap_or_default(), backward.unwrap_or_default());
+    Some(StepIn { step: Step { name: Cow::Owned(name), forward, backward, before, after }, has_forward, has_backward })
+}
+
+/// Reads a rig, without the weights that are not there, and whether all are; `None` if it is no rig.
+pub(super) fn read_rig(payload: &[u8], skins: &SkinsIn) -> Option<(Rig, bool)> {
     let RigText { uid, edits: list } = parsed(payload)?;
-    let mut rig = Rig::new(uid, "");
-    for edit in edits(list, skins)? {
-        rig.apply(&edit).ok()?;
+    let (mut rig, mut is_whole) = (Rig::new(uid, ""), true);
+    for text in list {
+        match edit(text, skins) {
+            Some(edit) => drop(rig.apply(&edit).ok()?),
+            None => is_whole = false,
+        }
     }
-    Some(rig)
+    Some((rig, is_whole))
 }
 
 /// Reads a value that [`value_text`] wrote.
@@ -158,13 +172,15 @@ pub(super) fn read_value<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Option<T>
     parsed(payload)
 }
 
+/// The edits; `None` if they name weights that are not there.
 fn edits(list: Vec<EditText>, skins: &SkinsIn) -> Option<Vec<RigEdit>> {
-    let edit = |text| {
-        Some(match text {
-            EditText::Edit(edit) => edit,
-            EditText::Skin(mesh, hash) => RigEdit::SetSkin(mesh, Some(skins.get(&hash)?.clone())),
-            EditText::Batch(list) => RigEdit::Batch(edits(list, skins)?),
-        })
-    };
-    list.into_iter().map(edit).collect()
+    list.into_iter().map(|text| edit(text, skins)).collect()
+}
+
+fn edit(text: EditText, skins: &SkinsIn) -> Option<RigEdit> {
+    Some(match text {
+        EditText::Edit(edit) => edit,
+        EditText::Skin(mesh, hash) => RigEdit::SetSkin(mesh, Some(skins.get(&hash)?.clone())),
+        EditText::Batch(list) => RigEdit::Batch(edits(list, skins)?),
+    })
 }

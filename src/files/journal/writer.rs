@@ -12,7 +12,13 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use super::{Content, JournalPlaces, Origin, Recovered, SaveMark, place::file_hash_at, sync::Synced, thread::Writer};
+use super::{
+    Content, JournalPlaces, Origin, Recovered, Restored, SaveMark,
+    place::{file_hash_at, set_aside},
+    restore::Contained,
+    sync::Synced,
+    thread::Writer,
+};
 use crate::{
     files::Disk,
     rig::{
@@ -42,6 +48,14 @@ pub struct JournalStart {
     pub rig: Option<Rig>,
     /// Whatever else the caller needs to go on after a crash, such as the meshes that are open; given back as it is.
     pub context: String,
+}
+
+/// A journal that goes on with recovered work.
+pub struct Resumed {
+    /// The journal.
+    pub journal: Journal,
+    /// Place where the former file is kept, because it was damaged or not all of it could be made again.
+    pub kept: Option<PathBuf>,
 }
 
 /// What the thread is asked for.
@@ -119,33 +133,37 @@ impl Journal {
         Self::begin(disk, session, start.places, content, None)
     }
 
-    /// Goes on with what was recovered from the file `old`, whose first `applied` changes are in the rig again
-    /// ([`Replayed::applied`](crate::rig::step::Replayed::applied)). Everything not saved is in the journal from the
-    /// start; when that is on the disk, `old` is removed.
+    /// Goes on with what was recovered from the file `old` and [restored](Recovered::restore). Everything not saved is in
+    /// the journal from the start; when that is on the disk, `old` is removed.
     ///
-    /// If not all changes could be replayed, `old` is kept under the ending `.kept`, where nothing looks for it again.
+    /// A damaged journal is kept under the ending `.damaged`, and one whose changes could not all be made again under the
+    /// ending `.kept`. Nothing looks for those again, and nothing removes them.
     pub fn resume(
         disk: Arc<dyn Disk>,
         places: JournalPlaces,
         recovered: &Recovered,
-        applied: usize,
+        restored: &Restored,
         old: &Path,
-    ) -> Self {
-        let mut content = recovered.content.clone();
-        let mut old = old.to_owned();
-        if applied < content.changes.len() {
-            content.changes.truncate(applied);
-            let mut kept = old.clone().into_os_string();
-            kept.push(".kept");
-            let _ = disk.rename(&old, Path::new(&kept));
-            old = PathBuf::new();
-        }
-        let saved = recovered.saved(&mut |path| file_hash_at(disk.as_ref(), path)).cloned();
-        if let Some(mark) = saved {
-            content.rebase(&mark);
+    ) -> Resumed {
+        let ending = match recovered.is_damaged() {
+            true => Some(".damaged"),
+            false => restored.replayed.refused.is_some().then_some(".kept"),
+        };
+        // What cannot be set aside stays in its place, which the next journal leaves alone.
+        let (kept, replaces) = match ending.map(|ending| set_aside(disk.as_ref(), old, ending)) {
+            None => (None, Some(old.to_owned())),
+            Some(Ok((aside, old_is_there))) => (Some(aside), old_is_there.then(|| old.to_owned())),
+            Some(Err(_)) => (Some(old.to_owned()), None),
+        };
+        let mut content = restored.content.clone();
+        let saved = recovered.saved(&mut |path| file_hash_at(disk.as_ref(), path)).map(|(_, mark)| mark.clone());
+        match (saved, restored.contained) {
+            (Some(mark), Contained::Marked) => content.rebase(&mark),
+            (Some(mark), Contained::Counted(contained)) => content.rebase_after(&mark, contained),
+            (_, Contained::Nothing) | (None, _) => {}
         }
         // Under the same session the file has the same name, and takes the place of the old one in one step.
-        Self::begin(disk, recovered.session, places, content, Some(old).filter(|old| !old.as_os_str().is_empty()))
+        Resumed { journal: Self::begin(disk, recovered.session, places, content, replaces), kept }
     }
 
     fn begin(

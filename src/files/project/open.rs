@@ -17,7 +17,7 @@ use crate::{
     rig::{
         Rig, RigEdit, SkinData, Uid,
         project::{MeshReference, Project, SkinReference},
-        skin::{SkinFile, mesh_hash},
+        skin::{SkinFile, SkinJoint, mesh_hash},
     },
 };
 
@@ -84,7 +84,7 @@ fn open_mesh(
     let path = located(project, &path);
     let data = |file: &SkinFile, weights: Weights, at_rest: bool| {
         let joints = file.joints().iter().map(|joint| Uid(joint.uid)).collect();
-        SkinData { joints, weights, at_rest }
+        SkinData { joints, weights, at_rest, subjects: SkinJoint::subjects(file.joints()) }
     };
     let (state, bound) = match load_model(disk, &path) {
         Err(error) => {
@@ -111,7 +111,7 @@ fn open_mesh(
             (MeshState::Open { model: Box::new(model), changed }, bound)
         }
     };
-    (LoadedMesh { uid, rig: rig_uid, path, nodes, state }, bound)
+    (LoadedMesh { uid, rig: rig_uid, path, nodes: nodes.into(), shape: state }, bound)
 }
 
 /// The weights for a mesh: as they are if it is the one they were made for, else transferred.

@@ -70,7 +70,7 @@ impl Component {
     }
 }
 
-/// How many elements there are, their size, and how far apart they are if the view does not say.
+/// Number of elements, their size, and their distance if the view does not give one.
 #[derive(Clone, Copy)]
 struct Layout {
     count: usize,
@@ -78,7 +78,7 @@ struct Layout {
     packed: usize,
 }
 
-/// Where elements lie: in a view, `offset` bytes from its start, `stride` apart.
+/// Location of elements: in a view, `offset` bytes from its start, `stride` apart.
 struct Place {
     view: usize,
     offset: usize,
@@ -96,9 +96,9 @@ struct Sparse {
 /// An accessor whose ranges lie inside its views.
 pub(super) struct Accessor {
     pub(super) count: usize,
-    /// `None` if the component type is none of ours.
+    /// Component type; `None` for an unknown type.
     pub(super) component: Option<Component>,
-    /// Components an element; zero if the type is none of ours.
+    /// Number of components of an element; zero for an unknown type.
     pub(super) width: usize,
     pub(super) normalized: bool,
     place: Option<Place>,
@@ -139,7 +139,7 @@ impl Accessor {
 }
 
 impl Accessor {
-    /// True if no bytes belong to the accessor, so that all its elements are zero.
+    /// Returns `true` if no bytes belong to the accessor, so that all its elements are zero.
     pub(super) fn is_empty(&self) -> bool {
         self.place.is_none() && self.sparse.is_none()
     }
@@ -192,7 +192,7 @@ fn sparse(at: &At, layout: Layout, views: &[View]) -> Result<Sparse, GltfError> 
     Ok(Sparse { count, indices, index_component, values })
 }
 
-/// The document with its buffers: where elements are read from.
+/// The document with the bytes of its buffers.
 pub(super) struct Source<'a> {
     pub(super) document: &'a Document<'a>,
     buffers: &'a [Option<Cow<'a, [u8]>>],
@@ -213,13 +213,13 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// All elements as floats, flat, `width` an element. Fails if the accessor has another width.
+    /// Reads all elements as floats, flat, `width` an element. Fails if the accessor has another width.
     pub(super) fn floats(&self, index: usize, width: usize) -> Result<Vec<f32>, GltfError> {
         let normalized = self.document.accessors[index].normalized;
         self.read(index, width, 0.0, |component, bytes| component.float(bytes, normalized))
     }
 
-    /// All elements as unsigned numbers.
+    /// Reads all elements as unsigned numbers.
     pub(super) fn uints(&self, index: usize, width: usize) -> Result<Vec<u32>, GltfError> {
         match self.document.accessors[index].component {
             Some(Component::U8 | Component::U16 | Component::U32) => {
@@ -276,7 +276,7 @@ impl<'a> Source<'a> {
         Ok(out)
     }
 
-    /// Like [`Source::floats`], with an error that names the first element that is not finite.
+    /// Reads floats as [`Source::floats`] does; an error names the first element that is not finite.
     pub(super) fn finite(&self, index: usize, width: usize) -> Result<Vec<f32>, GltfError> {
         let floats = self.floats(index, width)?;
         match floats.iter().position(|value| !value.is_finite()) {
@@ -287,7 +287,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Matrices of finite floats.
+    /// Reads matrices of finite floats.
     pub(super) fn matrices(&self, index: usize) -> Result<Vec<Mat4>, GltfError> {
         if self.document.accessors[index].component != Some(Component::F32) {
             return Err(GltfError::at(format!("/accessors/{index}/componentType"), "matrices must be floats (5126)"));

@@ -1,4 +1,4 @@
-//! Vertex attributes of a primitive: decoded once, picked, and put right where a file is careless.
+//! Vertex attributes of a primitive: decoded once, selected by index, and repaired where a file is careless.
 
 use std::{cell::RefCell, collections::BTreeMap, mem::size_of, rc::Rc};
 
@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::{GltfError, accessor::Source, budget::Notes};
 
-/// Decodes accessors, each once however many primitives share it.
+/// Decoder of accessors that decodes each once, however many primitives share it.
 pub(super) struct Decoder<'a> {
     pub(super) source: &'a Source<'a>,
     pub(super) notes: &'a Notes,
@@ -30,7 +30,7 @@ impl<'a> Decoder<'a> {
         Ok(floats)
     }
 
-    /// The elements of an accessor at `pick`, or all.
+    /// The elements of an accessor at the indices `pick`, or all.
     pub(super) fn pick<const N: usize, T>(
         &self,
         accessor: usize,
@@ -47,7 +47,7 @@ impl<'a> Decoder<'a> {
         })
     }
 
-    /// Displacements; not finite is an error.
+    /// Displacements; a value that is not finite is an error.
     pub(super) fn offsets(&self, accessor: usize, pick: Option<&[u32]>) -> Result<Vec<Vec3>, GltfError> {
         let offsets = self.pick(accessor, pick, Vec3::from_array)?;
         match offsets.iter().position(|offset| !offset.is_finite()) {
@@ -61,7 +61,8 @@ impl<'a> Decoder<'a> {
         self.pick(accessor, pick, |normal| unit(Vec3::from_array(normal)))
     }
 
-    /// Tangents of unit length with a sign; those the file has no direction for are made up, across the normal.
+    /// Tangents of unit length with a sign; a tangent without direction is replaced by one at right angles to the
+    /// normal.
     pub(super) fn tangents(
         &self,
         accessor: usize,
@@ -113,7 +114,7 @@ impl<'a> Decoder<'a> {
     }
 }
 
-/// A direction of unit length; its bits if it is that already, zero if it is none.
+/// A direction of unit length: a unit vector keeps its bits, a vector without direction becomes zero.
 pub(super) fn unit(vector: Vec3) -> Vec3 {
     let length = vector.as_dvec3().length();
     if (length - 1.0).abs() <= 1e-4 {

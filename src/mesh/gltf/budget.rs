@@ -1,12 +1,12 @@
-//! What one reading may cost, and what it has to say.
+//! The memory budget of one reading, and its notes for the user.
 
 use std::cell::{Cell, RefCell};
 
 use super::{GltfError, memory_limit};
 
-/// Counts the memory that reading a file takes, before it is taken.
+/// Counter of the memory that reading a file takes; memory is charged before it is allocated.
 ///
-/// Nothing is ever given back: that bounds the time as well, since no work here is more than linear in what it makes.
+/// Nothing is ever given back: that bounds the time as well, since all work here is linear in the memory it charges.
 pub(super) struct Budget {
     input: Cell<u64>,
     used: Cell<u64>,
@@ -17,12 +17,12 @@ impl Budget {
         Self { input: Cell::new(input), used: Cell::new(0) }
     }
 
-    /// Another file's bytes that belong to the input.
+    /// Adds another file's bytes to the input.
     pub(super) fn add_input(&self, bytes: u64) {
         self.input.set(self.input.get().saturating_add(bytes));
     }
 
-    /// Takes `count` elements of `size` bytes for the object at `place`.
+    /// Charges `count` elements of `size` bytes to the object at `place`.
     pub(super) fn take(&self, count: usize, size: usize, place: &str) -> Result<(), GltfError> {
         let used = self.used.get().saturating_add((count as u64).saturating_mul(size as u64));
         let limit = memory_limit(self.input.get());
@@ -34,11 +34,11 @@ impl Budget {
     }
 }
 
-/// Sentences for the user, each once, with how often it applied.
+/// Sentences for the user, each once, with the number of occurrences.
 #[derive(Default)]
 pub(super) struct Notes(RefCell<Vec<(String, usize)>>);
 
-/// More different sentences than anyone reads.
+/// Largest number of different sentences.
 const MAX_NOTES: usize = 100;
 
 impl Notes {
@@ -46,7 +46,7 @@ impl Notes {
         self.add_times(sentence, 1);
     }
 
-    /// Adds `times` occurrences; none if zero.
+    /// Adds `times` occurrences of a sentence; does nothing if zero.
     pub(super) fn add_times(&self, sentence: impl Into<String>, times: usize) {
         if times == 0 {
             return;

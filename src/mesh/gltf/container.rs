@@ -15,7 +15,7 @@ pub(super) struct Container<'a> {
 const JSON: u32 = 0x4E4F_534A;
 const BIN: u32 = 0x004E_4942;
 
-/// Takes the container apart; trusts no length in it.
+/// Splits the container into its chunks; every length in it is checked.
 pub(super) fn split(bytes: &[u8]) -> Result<Container<'_>, GltfError> {
     if bytes.is_empty() {
         return Err(GltfError::container(0, "the file is empty"));
@@ -79,7 +79,7 @@ fn split_glb(bytes: &[u8]) -> Result<Container<'_>, GltfError> {
     }
 }
 
-/// Parses the JSON after charging what its tree will take.
+/// Parses the JSON after charging the memory of its tree.
 pub(super) fn parse(json: &[u8], budget: &Budget) -> Result<Value, GltfError> {
     let json = json.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(json);
     budget.take(1, tree_size(json), "")?;

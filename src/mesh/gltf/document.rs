@@ -1,4 +1,4 @@
-//! The document: what the JSON says, typed, with every reference and every range of bytes checked.
+//! The document: the content of the JSON, typed, with every reference and every range of bytes checked.
 
 use std::{borrow::Cow, mem::size_of};
 
@@ -66,12 +66,12 @@ pub(super) struct Document<'a> {
     pub(super) animations: Vec<AnimationEntry<'a>>,
     /// Root nodes of the scene to load.
     pub(super) scene: Option<Vec<usize>>,
-    /// The file's own lists of extensions.
+    /// The file's `extensionsUsed` and `extensionsRequired`.
     pub(super) extensions_used: Vec<&'a str>,
     pub(super) extensions_required: Vec<&'a str>,
 }
 
-/// Extensions that are understood, carried, or do not matter for what is read here.
+/// Extensions that this reader understands, carries unread, or can ignore.
 const SUPPORTED: &[&str] = &[
     "EXT_texture_avif",
     "EXT_texture_webp",

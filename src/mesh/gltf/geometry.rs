@@ -104,7 +104,7 @@ struct ObjectReader<'a> {
     hierarchy: &'a Hierarchy,
     node: usize,
     skin: Option<usize>,
-    /// The first point, and the change of place, of vertices that several primitives share.
+    /// Index of the first point, by the attributes and the transform of vertices that several primitives share.
     points: BTreeMap<Vec<(&'a str, usize)>, u32>,
     model: &'a mut Model,
     weights: &'a mut Weights,
@@ -140,7 +140,7 @@ impl<'a> ObjectReader<'a> {
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let base = self.points(primitive, accessor, positions, &bake, shared)?;
-        // Of vertices that several primitives share, a part has only those it uses.
+        // A part has only those of the shared vertices that it uses.
         let pick = shared.then(|| compact(&mut triangles, positions.len()));
         let count = pick.as_ref().map_or(positions.len(), Vec::len);
         self.decoder.source.budget.take(count, size_of::<u32>(), &primitive.place)?;
@@ -160,7 +160,7 @@ impl<'a> ObjectReader<'a> {
         Ok(())
     }
 
-    /// Appends the primitive's vertices to the model's points, once if they are shared. Returns the first.
+    /// Appends the primitive's vertices to the model's points, once if they are shared. Returns the index of the first.
     fn points(
         &mut self,
         primitive: &Primitive<'a>,
@@ -228,7 +228,7 @@ impl<'a> ObjectReader<'a> {
             return Err(GltfError::at(format!("{}/indices", primitive.place), what));
         }
         source.budget.take(indices.len(), size_of::<[u32; 3]>(), &primitive.place)?;
-        // Strips repeat a vertex to get from one place to another; what that leaves of a triangle is no surface.
+        // Strips repeat a vertex to jump from one place to another; triangles with a repeated vertex are no surface.
         let solid = |[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
         Ok(match primitive.mode {
             5 => {
@@ -250,7 +250,7 @@ impl<'a> ObjectReader<'a> {
         })
     }
 
-    /// Everything but positions and weights.
+    /// Reads all attributes but positions and weights.
     fn attributes(
         &self,
         primitive: &Primitive,
@@ -264,7 +264,7 @@ impl<'a> ObjectReader<'a> {
         let mut own_normals = match normals {
             Some(accessor) => self.decoder.normals(accessor, pick)?,
             None => {
-                // Also for the sums of double precision that the normals are computed from.
+                // The double-precision sums for the normals are charged, too.
                 source.budget.take(count, 4 * size_of::<Vec3>(), &primitive.place)?;
                 vec![Vec3::ZERO; count]
             }
@@ -351,7 +351,7 @@ impl<'a> ObjectReader<'a> {
     }
 }
 
-/// Renumbers triangles over the vertices they use; returns those, in order.
+/// Renumbers triangles over the vertices they use; returns these vertices, in order.
 pub(super) fn compact(triangles: &mut [[u32; 3]], count: usize) -> Vec<u32> {
     let mut place = vec![u32::MAX; count];
     for vertex in triangles.iter().flatten() {

@@ -1,4 +1,4 @@
-//! The node hierarchy: checked to be a forest, ordered, placed in model space; and which of it a rig needs.
+//! The node hierarchy: checked to be a forest, ordered, placed in model space; and the selection of the nodes to keep.
 
 use std::mem::size_of;
 
@@ -14,21 +14,21 @@ use super::{
 };
 use crate::mesh::model::{Node, Trs};
 
-/// What is known of each node of the file.
+/// Properties of each node of the file.
 pub(super) struct Hierarchy {
     parents: Vec<Option<usize>>,
     /// All nodes, parents first.
     order: Vec<usize>,
-    /// True if the node is in the scene that is read.
+    /// Marks nodes of the scene that is read.
     pub(super) visible: Vec<bool>,
-    /// True if a skin lists it.
+    /// Marks nodes that a skin lists.
     joint: Vec<bool>,
     /// The nearest kept node at or above a node that a joint or clip moves.
     pub(super) carrier: Vec<Option<usize>>,
-    /// Index in the model's nodes.
+    /// Index in the model's nodes; `None` for a node that is not kept.
     pub(super) kept: Vec<Option<usize>>,
     rest: Vec<Trs>,
-    /// To model space at rest. Nodes that are not kept keep the shear that [`Trs`] cannot hold.
+    /// Transforms to model space at rest. Nodes that are not kept keep the shear that [`Trs`] cannot hold.
     pub(super) world: Vec<DAffine3>,
 }
 
@@ -83,7 +83,7 @@ impl Hierarchy {
             rest[node] = trs;
             let local = if needed[node] { matrix::affine(&trs) } else { exact };
             world[node] = parents[node].map_or(local, |parent| world[parent] * local);
-            // Also as the `f32` that others compute with.
+            // The `f32` matrix has to be finite, too: other code computes with it.
             if !world[node].as_affine3a().is_finite() {
                 return Err(GltfError::at(&*entry.at.place, "the transform in model space is not finite"));
             }
@@ -147,8 +147,8 @@ fn parents(document: &Document) -> Result<Vec<Option<usize>>, GltfError> {
     Ok(parents)
 }
 
-/// All nodes, each before its children and with all below it: first the scene's, then other roots'. A node that is
-/// below no root is in a cycle, which is an error.
+/// Orders nodes depth first, each before its children: first the scene's roots, then other roots. A node below no root
+/// is in a cycle, which is an error.
 fn depth_first(document: &Document, parents: &[Option<usize>], scene: &[usize]) -> Result<Vec<usize>, GltfError> {
     let count = document.nodes.len();
     let mut order = Vec::with_capacity(count);
@@ -174,7 +174,7 @@ fn depth_first(document: &Document, parents: &[Option<usize>], scene: &[usize]) 
     }
 }
 
-/// A node's transform as declared, and the same without losing shear.
+/// Transform of a node as declared, and as a matrix that keeps its shear.
 fn rest_transform(at: &At, notes: &Notes, needed: bool) -> Result<(Trs, DAffine3), GltfError> {
     if let Some(columns) = at.vector::<16>("matrix")? {
         let matrix = DMat4::from_cols_array(&columns);

@@ -1,4 +1,4 @@
-//! Reading fields of JSON objects with errors that say where.
+//! Access to fields of JSON objects with errors that name the place.
 
 use std::mem::size_of;
 
@@ -71,7 +71,7 @@ impl<'a> At<'a> {
         }
     }
 
-    /// The index of one of `len` things.
+    /// The index of one of `len` objects; `of` names their kind in errors.
     pub(super) fn index(&self, key: &str, len: usize, of: &str) -> Result<Option<usize>, GltfError> {
         match self.uint(key)? {
             Some(index) if index >= len => Err(self.fail(key, out_of_range(index, len, of))),
@@ -79,7 +79,7 @@ impl<'a> At<'a> {
         }
     }
 
-    /// A list of indices, each of one of `len` things.
+    /// A list of indices, each of one of `len` objects.
     pub(super) fn indices(&self, key: &str, len: usize, of: &str) -> Result<Vec<usize>, GltfError> {
         let list = self.array(key)?;
         let mut indices = Vec::with_capacity(list.len());
@@ -125,7 +125,7 @@ impl<'a> At<'a> {
         let mut numbers = Vec::with_capacity(list.len());
         for (i, value) in list.iter().enumerate() {
             match value.as_f64() {
-                // Beyond `f32` is as good as infinite.
+                // A number beyond the range of `f32` counts as infinite.
                 Some(number) if (number as f32).is_finite() => numbers.push(number),
                 _ => return Err(GltfError::at(format!("{}/{i}", self.sub(key)), "must be a finite number")),
             }
@@ -145,7 +145,7 @@ impl<'a> At<'a> {
     }
 }
 
-/// A whole number that fits, also when it is written as a float.
+/// A whole number within range, also when it is written as a float.
 pub(super) fn whole(value: &Value) -> Option<usize> {
     if let Some(number) = value.as_u64() {
         return usize::try_from(number).ok();
@@ -165,7 +165,7 @@ pub(super) fn copy(value: &Value, budget: &Budget, place: &str) -> Result<Value,
     Ok(value.clone())
 }
 
-/// What a value takes in memory; the parser allows no depth that would trouble the stack.
+/// Memory of a value in bytes; the parser's limit on depth keeps the recursion shallow.
 fn tree_bytes(value: &Value) -> usize {
     const ENTRY: usize = 64;
     let inside = match value {

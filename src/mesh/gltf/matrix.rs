@@ -1,11 +1,11 @@
-//! Rest transforms: matrices taken apart, and geometry moved to model space.
+//! Rest transforms: decomposition of matrices, and geometry moved to model space.
 
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Quat, Vec3};
 
 use crate::mesh::model::Trs;
 
-/// How far a transform may be from the identity and still count as it: what is left of a transform times its inverse
-/// when both are stored as `f32`.
+/// Largest deviation from the identity that still counts as the identity: the rounding error of a transform times its
+/// inverse when both are stored as `f32`.
 const SNAP: f64 = 1e-5;
 
 /// A transform in double precision.
@@ -23,7 +23,8 @@ pub(super) fn unit(rotation: Quat) -> Option<Quat> {
     (length > 1e-12).then(|| (rotation.as_dquat() * (1.0 / length)).as_quat())
 }
 
-/// Takes an affine matrix apart. Shear is lost, which the second value tells.
+/// Decomposes an affine matrix into translation, rotation and scale. Returns `true` if the matrix had shear, which is
+/// lost.
 pub(super) fn decompose(matrix: DMat4) -> (Trs, bool) {
     let (linear, translation) = (DMat3::from_mat4(matrix), matrix.w_axis.truncate());
     let lengths = DVec3::new(linear.x_axis.length(), linear.y_axis.length(), linear.z_axis.length());
@@ -40,7 +41,7 @@ pub(super) fn decompose(matrix: DMat4) -> (Trs, bool) {
     (trs, sheared)
 }
 
-/// True if the transform leaves points up to `extent` from the origin where they are, to within rounding.
+/// Returns `true` if the transform moves points up to `extent` from the origin by no more than rounding.
 pub(super) fn is_identity(world: &DAffine3, extent: f64) -> bool {
     let off = world.matrix3 - DMat3::IDENTITY;
     let columns = [off.x_axis, off.y_axis, off.z_axis];
@@ -48,24 +49,25 @@ pub(super) fn is_identity(world: &DAffine3, extent: f64) -> bool {
         && world.translation.abs().max_element() <= SNAP * extent
 }
 
-/// Moves geometry by a transform.
+/// Transform of geometry from node space to model space.
 pub(super) struct Bake {
     world: DAffine3,
     /// The inverse transpose up to a positive factor; it exists for singular transforms, too.
     normal: DMat3,
-    /// True if the transform mirrors, so that triangles turn the other way round.
+    /// Marks a transform that mirrors, so that triangles have to be reversed.
     pub(super) flip: bool,
-    /// True if nothing is to be done.
+    /// Marks the identity: nothing has to be done.
     pub(super) identity: bool,
 }
 
 impl Bake {
-    /// The change that leaves everything as it is.
+    /// The bake that changes nothing.
     pub(super) fn none() -> Self {
         Self { world: DAffine3::IDENTITY, normal: DMat3::IDENTITY, flip: false, identity: true }
     }
 
-    /// Moves points up to `extent` from the origin; does nothing if the transform is the identity to within rounding.
+    /// A bake for points up to `extent` from the origin; a transform that is the identity to within rounding does
+    /// nothing.
     pub(super) fn new(world: DAffine3, extent: f64) -> Self {
         if is_identity(&world, extent) {
             return Self::none();
@@ -84,17 +86,17 @@ impl Bake {
         if self.identity { point } else { self.world.transform_point3(point.as_dvec3()).as_vec3() }
     }
 
-    /// A displacement, or a tangent not yet of unit length.
+    /// Transforms a displacement, or a tangent not yet of unit length.
     pub(super) fn vector(&self, vector: Vec3) -> Vec3 {
         if self.identity { vector } else { self.world.transform_vector3(vector.as_dvec3()).as_vec3() }
     }
 
-    /// A unit normal; zero where the transform leaves none.
+    /// Transforms a unit normal; zero if the transform flattens it.
     pub(super) fn normal(&self, normal: Vec3) -> Vec3 {
         if self.identity { normal } else { (self.normal * normal.as_dvec3()).normalize_or_zero().as_vec3() }
     }
 
-    /// The displacement of a unit normal, such that normal and displacement added point the right way.
+    /// Transforms the displacement of a unit normal, such that the sum of normal and displacement keeps its direction.
     pub(super) fn normal_offset(&self, normal: Vec3, offset: Vec3) -> Vec3 {
         if self.identity {
             return offset;

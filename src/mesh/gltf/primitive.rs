@@ -1,4 +1,4 @@
-//! Meshes and primitives as declared (section 3.7): which accessors they use, checked against each other.
+//! Meshes and primitives as declared (section 3.7): their accessors, checked against each other.
 
 use serde_json::Value;
 
@@ -12,7 +12,7 @@ use super::{
 /// Attribute names and their accessors, in the file's order.
 pub(super) type Attributes<'a> = Vec<(&'a str, usize)>;
 
-/// Compressed geometry, beside which a file may or may not have plain geometry.
+/// Extension of compressed geometry; files may or may not have plain geometry beside it.
 const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// A mesh as declared.

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::mesh::model::SkinBinding;
 
-/// Sets of four influences read at most; what comes after is weaker than anything that shows.
+/// Largest number of sets of four influences read; later sets are too weak to show.
 const MAX_SETS: usize = 32;
 
 /// The bind pose of every skin.
@@ -67,7 +67,7 @@ impl Influences {
         Ok(Self { sets })
     }
 
-    /// The influences of a vertex over `joints`, settled; negative weights count as none and are counted.
+    /// The influences of a vertex over `joints`, normalised; negative weights are dropped and counted.
     pub(super) fn of(
         &self,
         vertex: usize,
@@ -97,14 +97,14 @@ impl Influences {
     }
 }
 
-/// What tells primitives with the same vertices apart: all attributes that make up points and their influences.
+/// Key of a primitive's vertices: all attributes that make up points and their influences.
 pub(super) fn vertex_key<'a>(attributes: &Attributes<'a>) -> Vec<(&'a str, usize)> {
     let of_points = |name: &str| name == "POSITION" || name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_");
     attributes.iter().copied().filter(|(name, _)| of_points(name)).collect()
 }
 
-/// Puts influences in order: one a joint, strongest first, summing to one. Weights that sum to one within a float's
-/// precision keep their bits, so that settling twice changes nothing. All zero leaves none.
+/// Normalises influences: one a joint, strongest first, summing to one. Weights that sum to one within a float's
+/// precision keep their bits, so that normalising twice changes nothing. Influences of weight zero are dropped.
 pub(super) fn settle(influences: &mut Vec<(u32, f32)>) {
     influences.retain(|(_, weight)| *weight > 0.0);
     influences.sort_by_key(|(joint, _)| *joint);
@@ -126,7 +126,7 @@ pub(super) fn settle(influences: &mut Vec<(u32, f32)>) {
         *weight = (f64::from(*weight) / total) as f32;
     }
     influences.retain(|(_, weight)| *weight > 0.0);
-    // The strongest takes what rounding left over.
+    // The strongest influence takes the rounding error.
     let rest = 1.0 - sum(influences);
     if let Some((_, weight)) = influences.first_mut() {
         *weight = (f64::from(*weight) + rest) as f32;

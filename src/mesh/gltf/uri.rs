@@ -2,7 +2,7 @@
 
 use super::GltfError;
 
-/// What a URI stands for.
+/// Content or file that a URI refers to.
 pub(super) enum Resolved {
     /// The bytes are in the URI.
     Data {
@@ -15,7 +15,7 @@ pub(super) enum Resolved {
     File(String),
 }
 
-/// An error about a URI, which is shortened in it.
+/// An error about a URI, which is quoted shortened.
 pub(super) fn fault(place: &str, uri: &str, what: impl Into<String>) -> GltfError {
     let mut short: String = uri.chars().take(80).collect();
     if short.len() < uri.len() {
@@ -24,7 +24,7 @@ pub(super) fn fault(place: &str, uri: &str, what: impl Into<String>) -> GltfErro
     GltfError::External { file: String::new(), place: place.to_owned(), uri: short, what: what.into() }
 }
 
-/// Decodes a URI and checks that it leads nowhere it should not.
+/// Decodes a URI and checks that it stays below the model's folder.
 pub(super) fn resolve(uri: &str, place: &str) -> Result<Resolved, GltfError> {
     let fail = |what: &str| fault(place, uri, what);
     if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {

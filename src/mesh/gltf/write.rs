@@ -3,65 +3,52 @@
 mod buffer;
 mod check;
 mod clips;
-mod looks;
+mod materials;
 mod meshes;
 mod skeleton;
 
 use serde_json::{Map, Value};
 
 use super::{GltfError, uri::percent_encode};
-use crate::mesh::model::Model;
+use crate::mesh::{CompanionSink, model::Model};
 use buffer::Bin;
 use skeleton::Skeleton;
 
-/// What to write, and how.
+/// Settings of [`write_glb`] and [`write_gltf`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GltfWriteSettings {
     /// Influences a vertex, 1 to 8; the strongest are kept and scaled to sum to one. Over 4, vertices get a second set
     /// (`JOINTS_1`, `WEIGHTS_1`), which not every program reads.
     pub max_influences: usize,
-    /// True to write all nodes. False: only joints with weights, nodes that carry rigid parts, and the ancestors of
-    /// both; channels of other nodes are left out, and clips that this empties.
+    /// Writes all nodes if `true`. If `false`, only joints with weights, nodes that carry rigid parts, and the
+    /// ancestors of both are written; channels of other nodes are left out, and so are clips without any channel left.
     pub all_joints: bool,
-    /// True to bind points without weights to the first root joint of their skin, as a file may have had them. False:
-    /// they are an error, because whoever skinned the mesh forgot them.
+    /// Binds points without weights to the first root joint of their skin if `true`, as a file may have had them. If
+    /// `false`, such points are an error, because they were probably forgotten in skinning.
     pub bind_unweighted: bool,
     /// The program's name, for `asset.generator`.
     pub generator: String,
 }
 
 impl Default for GltfWriteSettings {
-    /// Four influences, only joints that deform, unweighted points are an error.
+    /// Default settings: four influences, only joints that deform, an error for unweighted points.
     fn default() -> Self {
         Self { max_influences: 4, all_joints: false, bind_unweighted: false, generator: "Rigsmith".to_owned() }
     }
 }
 
-/// A glTF model as several files.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct GltfFiles {
-    /// The `.gltf` file.
-    pub json: Vec<u8>,
-    /// The name of the buffer's file, which the JSON refers to.
-    pub bin_name: String,
-    /// The buffer; empty if the JSON refers to none.
-    pub bin: Vec<u8>,
-    /// Names and contents of the image files, which the JSON refers to.
-    pub images: Vec<(String, Vec<u8>)>,
-}
-
 /// Writes a model as one GLB file.
 ///
-/// Every object with triangles becomes a mesh and a node: skinned ones and those that nothing carries at the scene's
-/// root with the identity transform, rigid parts below their node. Vertices that no triangle uses are not written.
-/// Joints of one skin below several roots get a common root node named `skeleton`, which glTF demands.
-/// Reading the result and writing it again gives the same model and the same bytes.
+/// Every object with triangles becomes a mesh and a node: skinned objects and objects without a carrying node lie at
+/// the scene's root with the identity transform, rigid parts below their node. Vertices that no triangle uses are not
+/// written. Joints of one skin below several roots get a common root node named `skeleton`, which glTF demands. Reading
+/// the result and writing it again gives the same model and the same bytes.
 ///
 /// # Errors
-/// [`GltfError::Model`] if the model's indices or lists do not fit together or something is not finite,
-/// [`GltfError::Unweighted`] as the settings say. Costs time and memory linear in the model.
+/// [`GltfError::Model`] if the model's indices or lists do not fit together or a number is not finite,
+/// [`GltfError::Unweighted`] if `bind_unweighted` is off. Costs time and memory linear in the model.
 pub fn write_glb(model: &Model, settings: &GltfWriteSettings) -> Result<Vec<u8>, GltfError> {
-    let Document { json, bin, .. } = document(model, settings, None)?;
+    let (json, bin) = document(model, settings, None)?;
     let mut json = to_bytes(&json, false)?;
     json.resize(json.len().next_multiple_of(4), b' ');
     let bin_chunk = if bin.is_empty() { 0 } else { 8 + bin.len() };
@@ -84,13 +71,17 @@ pub fn write_glb(model: &Model, settings: &GltfWriteSettings) -> Result<Vec<u8>,
     Ok(glb)
 }
 
-/// Writes a model as a `.gltf` file, a buffer named `<stem>.bin`, and the images as files beside it.
+/// Writes a model as a `.gltf` file. Its buffer, which would be called `<stem>.bin`, and the images go to `companion`.
 ///
 /// # Errors
 /// As [`write_glb`].
-pub fn write_gltf(model: &Model, settings: &GltfWriteSettings, stem: &str) -> Result<GltfFiles, GltfError> {
-    let Document { json, bin, images } = document(model, settings, Some(stem))?;
-    Ok(GltfFiles { json: to_bytes(&json, true)?, bin_name: format!("{stem}.bin"), bin, images })
+pub fn write_gltf(
+    model: &Model,
+    settings: &GltfWriteSettings,
+    stem: &str,
+    companion: &mut CompanionSink,
+) -> Result<Vec<u8>, GltfError> {
+    to_bytes(&document(model, settings, Some((stem, companion)))?.0, true)
 }
 
 fn to_bytes(root: &Map<String, Value>, pretty: bool) -> Result<Vec<u8>, GltfError> {
@@ -98,16 +89,12 @@ fn to_bytes(root: &Map<String, Value>, pretty: bool) -> Result<Vec<u8>, GltfErro
     bytes.map_err(|error| GltfError::model(error.to_string()))
 }
 
-/// A document in its parts.
-struct Document {
-    json: Map<String, Value>,
-    bin: Vec<u8>,
-    /// Image files, if images are not in the buffer.
-    images: Vec<(String, Vec<u8>)>,
-}
-
-/// The whole document; with a stem, its buffer and images are files.
-fn document(model: &Model, settings: &GltfWriteSettings, stem: Option<&str>) -> Result<Document, GltfError> {
+/// The whole document and its buffer; given a stem and somebody who takes companions, buffer and images go there.
+fn document(
+    model: &Model,
+    settings: &GltfWriteSettings,
+    mut outside: Option<(&str, &mut CompanionSink)>,
+) -> Result<(Map<String, Value>, Vec<u8>), GltfError> {
     check::check(model)?;
     let mut bin = Bin::default();
     let skeleton = Skeleton::new(model, settings)?;
@@ -116,7 +103,7 @@ fn document(model: &Model, settings: &GltfWriteSettings, stem: Option<&str>) -> 
     let meshes = meshes::write(model, &skeleton, &mut bin, &mut nodes, &mut scene_nodes)?;
     let skins = skeleton.skins(model, &mut bin);
     let animations = clips::write(model, &skeleton, &meshes.node_of_object, &mut bin);
-    let looks = looks::write(&model.looks, stem, &mut bin);
+    let written = materials::write(&model.material_set, outside.as_mut(), &mut bin);
 
     let mut asset = Map::new();
     asset.insert("version".to_owned(), "2.0".into());
@@ -126,12 +113,12 @@ fn document(model: &Model, settings: &GltfWriteSettings, stem: Option<&str>) -> 
     let mut scene = Map::new();
     insert_name(&mut scene, &model.name);
     insert_list(&mut scene, "nodes", scene_nodes);
-    let (accessors, views, bytes) = bin.finish();
+    let (accessors, views, mut bytes) = bin.finish();
     let mut root = Map::new();
     root.insert("asset".to_owned(), asset.into());
-    insert_list(&mut root, "extensionsUsed", looks.extensions_used);
-    insert_list(&mut root, "extensionsRequired", looks.extensions_required);
-    // Some readers take no scene without nodes.
+    insert_list(&mut root, "extensionsUsed", written.extensions_used);
+    insert_list(&mut root, "extensionsRequired", written.extensions_required);
+    // Some readers refuse a scene without nodes.
     if scene.contains_key("nodes") {
         root.insert("scene".to_owned(), 0.into());
         root.insert("scenes".to_owned(), vec![Value::from(scene)].into());
@@ -140,21 +127,22 @@ fn document(model: &Model, settings: &GltfWriteSettings, stem: Option<&str>) -> 
     insert_list(&mut root, "meshes", meshes.meshes);
     insert_list(&mut root, "skins", skins);
     insert_list(&mut root, "animations", animations);
-    insert_list(&mut root, "materials", looks.materials);
-    insert_list(&mut root, "textures", looks.textures);
-    insert_list(&mut root, "images", looks.images);
-    insert_list(&mut root, "samplers", looks.samplers);
+    insert_list(&mut root, "materials", written.materials);
+    insert_list(&mut root, "textures", written.textures);
+    insert_list(&mut root, "images", written.images);
+    insert_list(&mut root, "samplers", written.samplers);
     insert_list(&mut root, "accessors", accessors);
     insert_list(&mut root, "bufferViews", views);
     if !bytes.is_empty() {
         let mut buffer = Map::new();
-        if let Some(stem) = stem {
-            buffer.insert("uri".to_owned(), percent_encode(&format!("{stem}.bin")).into());
-        }
         buffer.insert("byteLength".to_owned(), bytes.len().into());
+        if let Some((stem, companion)) = outside {
+            let name = companion(&format!("{stem}.bin"), std::mem::take(&mut bytes));
+            buffer.insert("uri".to_owned(), percent_encode(&name).into());
+        }
         root.insert("buffers".to_owned(), vec![Value::from(buffer)].into());
     }
-    Ok(Document { json: root, bin: bytes, images: looks.files })
+    Ok((root, bytes))
 }
 
 /// Inserts a list unless it is empty, which glTF forbids.

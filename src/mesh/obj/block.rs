@@ -1,8 +1,8 @@
 //! One block of whole lines, parsed on its own into lists of its own.
 //!
 //! Plain lines (`v x y z`, `vt`, `vn`, `f` with positive indices) are read here without looking for their end first.
-//! Any other line goes to [`super::statement`], which is slower and knows everything. Indices that count backwards
-//! are kept relative to the start of the block, because how many vertices come before it is not known yet.
+//! Any other line goes to [`super::statement`], which is slower and handles every statement. Indices that count
+//! backwards are kept relative to the start of the block, because the number of vertices before it is not known yet.
 
 use super::{
     NONE,
@@ -10,55 +10,56 @@ use super::{
     scan::{Scan, WINDOW},
 };
 
-/// Line ends after the text, so that plain lines need no care near its end.
+/// Line ends after the text, so that plain lines need no bounds checks near its end.
 pub(super) const MARGIN: usize = WINDOW + 8;
 
-/// Text and what was read from it. Blocks are used again, so that nothing is allocated per block.
+/// Text and the values parsed from it. Blocks are reused, so that nothing is allocated per block.
 #[derive(Debug, Default)]
 pub(super) struct Block {
     /// Bytes of whole lines, up to `filled`, and at least [`MARGIN`] line ends after them.
     pub text: Vec<u8>,
     pub filled: usize,
-    /// Why the text could not be read.
+    /// Failure to read the text.
     pub failure: Option<Failure>,
     pub parsed: Parsed,
 }
 
-/// What is wrong with a block before it is parsed.
+/// Failure of a block before it is parsed.
 #[derive(Debug)]
 pub(super) enum Failure {
     Io(std::io::Error),
-    /// On the block's first line.
+    /// A problem on the block's first line.
     Line(LineProblem),
 }
 
-/// What a block says.
+/// Values parsed from a block.
 #[derive(Debug, Default)]
 pub(super) struct Parsed {
     pub positions: Vec<[f32; 3]>,
-    /// Empty, or one a position.
+    /// Colours, one a position, or empty.
     pub colors: Vec<[f32; 3]>,
     pub texcoords: Vec<[f32; 2]>,
     pub normals: Vec<[f32; 3]>,
-    /// Where each face's corners end.
+    /// End of each face's corners.
     pub face_ends: Vec<u32>,
     /// The line of each face.
     pub face_lines: Vec<u32>,
-    /// Indices of positions, texture coordinates and normals. The latter two may be shorter: the rest is [`NONE`].
+    /// Indices of positions, texture coordinates and normals. The latter two lists may be shorter: missing entries are
+    /// [`NONE`].
     pub corners: [Vec<u32>; 3],
     /// Corners whose index is relative to the block's start, as a wrapping number.
     pub relative: Vec<Relative>,
-    /// The largest index of each list that counts forwards, from 1; 0 if there is none.
+    /// The largest forward index of each list, from 1; 0 without any.
     pub largest: [u32; 3],
     pub events: Vec<Event>,
     /// Text of the events.
     pub names: Vec<u8>,
-    /// Kinds of statements that were passed over.
+    /// Counts of skipped statements by kind.
     pub skipped: [Skipped; SKIPS],
     /// Lines in the block, or before the error.
     pub lines: u32,
     pub error: Option<BlockError>,
-    /// A statement continued over several lines, put together.
+    /// Buffer for a statement continued over several lines.
     pub joined: Vec<u8>,
 }
 
@@ -66,7 +67,7 @@ pub(super) struct Parsed {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Relative {
     pub corner: u32,
-    /// 0 position, 1 texture coordinate, 2 normal.
+    /// List of the index: 0 position, 1 texture coordinate, 2 normal.
     pub list: u8,
 }
 
@@ -74,9 +75,9 @@ pub(super) struct Relative {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Event {
     pub what: EventKind,
-    /// The number of faces of the block before it.
+    /// Number of the block's faces before the statement.
     pub face: u32,
-    /// Its text in [`Parsed::names`].
+    /// Start of the statement's text in [`Parsed::names`].
     pub start: u32,
     pub end: u32,
 }
@@ -90,7 +91,7 @@ pub(super) enum EventKind {
     Smoothing(u32),
 }
 
-/// How often a kind of statement was passed over, and the first line.
+/// Number of skipped statements of one kind, and the line of the first.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Skipped {
     pub count: u64,
@@ -104,7 +105,7 @@ pub(super) const SKIP_CURVES: usize = 2;
 pub(super) const SKIP_UNKNOWN: usize = 3;
 
 impl Block {
-    /// Parses the text. An error is kept in [`Parsed::error`]; what came before it is kept too.
+    /// Parses the text. An error is kept in [`Parsed::error`], together with the values before it.
     pub fn parse(&mut self) {
         self.parsed.clear();
         if self.failure.is_some() {
@@ -129,7 +130,7 @@ impl Block {
         self.parsed.even_out();
     }
 
-    /// Bytes held, but for small lists.
+    /// Memory of the large lists in bytes.
     pub fn bytes(&self) -> usize {
         let corners = self.parsed.corners.iter().map(Vec::capacity).sum::<usize>() + self.parsed.relative.capacity();
         self.text.capacity() + 4 * corners + self.parsed.joined.capacity() + 24 * self.parsed.positions.capacity()
@@ -154,7 +155,7 @@ impl Parsed {
         self.error = None;
     }
 
-    /// Makes lists that may be shorter either empty or as long as what they belong to.
+    /// Makes each optional list either empty or as long as the list it belongs to.
     fn even_out(&mut self) {
         let corners = self.corners[0].len();
         for list in &mut self.corners[1..] {
@@ -167,8 +168,8 @@ impl Parsed {
         }
     }
 
-    /// Reads the plain line that starts at `at` and returns where the next one does; `None`, and nothing kept, if it is
-    /// not plain.
+    /// Reads the plain line that starts at `at` and returns the start of the next line; returns `None` and keeps
+    /// nothing if the line is not plain.
     #[inline(always)]
     fn plain(&mut self, text: &[u8], at: usize) -> Option<usize> {
         match *text.get(at..)?.first_chunk::<3>()? {
@@ -240,20 +241,20 @@ impl Parsed {
         self.face_lines.push(self.lines);
     }
 
-    /// How long the lists of corners are.
+    /// Lengths of the lists of corners.
     pub fn lengths(&self) -> [usize; 3] {
         self.corners.each_ref().map(Vec::len)
     }
 
-    /// Forgets a face that was begun when the lists of corners had these lengths. Lists that were empty are so again:
-    /// an empty one says that no corner has such an index.
+    /// Removes an unfinished face, given the lengths of the lists of corners before it. Lists that were empty become
+    /// empty again: an empty list means that no corner has such an index.
     pub fn drop_face(&mut self, lengths: [usize; 3]) {
         for (list, length) in self.corners.iter_mut().zip(lengths) {
             list.truncate(length);
         }
     }
 
-    /// The corners of one face, all of the same form.
+    /// Reads the corners of one face, all of the same form.
     #[inline(always)]
     fn plain_corners(&mut self, text: &[u8], at: usize, start: usize) -> Option<usize> {
         let mut scan = Scan::new(text, at, 2)?;
@@ -295,7 +296,7 @@ impl Parsed {
     }
 }
 
-/// The colour of vertices that have none in a file where others have.
+/// The colour of vertices without one in a file where others have colours.
 pub(super) const WHITE: [f32; 3] = [1.0; 3];
 
 /// Reads an index and appends it, counted from 0.

@@ -1,4 +1,4 @@
-//! Blocks put together in the order of the file.
+//! Assembly of blocks in the order of the file.
 
 use super::{
     MAX_ELEMENTS, NONE, ObjArrays, ObjRun,
@@ -6,27 +6,27 @@ use super::{
     error::{LISTS, LineProblem, ObjError},
 };
 
-/// More `mtllib` statements than this are passed over: real files have one.
+/// Largest number of `mtllib` statements kept: real files have one.
 const MOST_LIBRARIES: usize = 256;
 
-/// Appends blocks to arrays; knows what must outlive a block.
+/// Appends blocks to arrays; keeps the state that outlives a block.
 pub(super) struct Collector<'a> {
     arrays: &'a mut ObjArrays,
-    /// Lines of the blocks so far.
+    /// Number of lines of the blocks so far.
     lines: u64,
-    /// Indices that lie past the end of their lists so far, each larger than the one before it, and their lines.
+    /// Indices past the end of their lists so far, each larger than the one before it, and their lines.
     ahead: [Vec<(u32, u64)>; 3],
     skipped: [Skipped; SKIPS],
-    current: Current,
+    current: RunState,
 }
 
-/// What holds for the next face.
+/// State that holds for the next face.
 #[derive(Default)]
-struct Current {
+struct RunState {
     /// Names of object, group and material; empty for none.
     names: [String; 3],
     smoothing: Option<u32>,
-    /// The first face that this holds for.
+    /// The first face with this state.
     since: usize,
     changed: bool,
 }
@@ -34,11 +34,11 @@ struct Current {
 impl<'a> Collector<'a> {
     pub fn new(arrays: &'a mut ObjArrays) -> Self {
         arrays.clear();
-        let current = Current { changed: true, ..Default::default() };
+        let current = RunState { changed: true, ..Default::default() };
         Self { arrays, lines: 0, ahead: Default::default(), skipped: Default::default(), current }
     }
 
-    /// Appends a block; `block` must be the one after the last.
+    /// Appends a block, which must be the next in the file.
     pub fn append(&mut self, block: &mut Block) -> Result<(), ObjError> {
         match block.failure.take() {
             Some(Failure::Io(error)) => return Err(error.into()),
@@ -65,7 +65,7 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    /// The number in the file of a block's line.
+    /// Line number in the file of a block's line.
     fn line(&self, line: u32) -> u64 {
         self.lines + u64::from(line) + 1
     }
@@ -91,7 +91,7 @@ impl<'a> Collector<'a> {
 
     /// The error of an index that counts back to before the first element.
     fn before_line(&self, parsed: &Parsed, face: usize, list: usize, resolved: i64) -> ObjError {
-        // How many there were at that line is not kept; how far before the first it points is.
+        // The number of elements at that line is not kept; the distance before the first element is.
         let line = self.line(parsed.face_lines.get(face).copied().unwrap_or(parsed.lines));
         ObjError::Line {
             line,
@@ -144,7 +144,7 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    /// Starts a run for the faces since the last change, if there are any, and makes `face` the next to change at.
+    /// Ends the run of the faces since the last change, if there are any, and starts the next one at `face`.
     fn commit(&mut self, face: usize) -> Result<(), ObjError> {
         let current = &mut self.current;
         if current.changed && face > current.since {
@@ -213,7 +213,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// Remembers forward indices that nothing in the file so far answers.
+    /// Notes forward indices past the end of their lists so far.
     fn note_ahead(&mut self, parsed: &Parsed) {
         for (list, count) in self.counts().into_iter().enumerate() {
             if parsed.largest[list] as usize <= count {
@@ -235,7 +235,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// Checks what only the whole file can tell and completes the arrays.
+    /// Checks the conditions on the whole file and completes the arrays.
     pub fn finish(mut self) -> Result<(), ObjError> {
         let faces = self.arrays.face_count();
         self.commit(faces)?;
@@ -258,7 +258,8 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    /// Some exporters number normals or texture coordinates that they do not write: the corners have none then.
+    /// Clears a list of corner indices whose elements the file does not have: some exporters number normals or texture
+    /// coordinates that they do not write.
     fn drop_absent(&mut self, list: usize) {
         if let Some((_, line)) = self.ahead[list].first() {
             let what = LISTS[list];
@@ -285,14 +286,14 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Appends, growing as [`grow`] does.
+/// Appends to a list, growing it as [`grow`] does.
 fn extend<T: Copy>(list: &mut Vec<T>, more: &[T]) {
     grow(list, more.len());
     list.extend_from_slice(more);
 }
 
-/// Makes room for `more`. Long lists grow by a quarter rather than to twice their size, which bounds the memory that
-/// is never used; large allocations move by remapping pages, so this costs no copies.
+/// Makes room for `more`. Long lists grow by a quarter rather than to twice their size, which bounds unused memory;
+/// large allocations move by remapping pages, so this costs no copies.
 fn grow<T>(list: &mut Vec<T>, more: usize) {
     const SMALL: usize = 4 << 20;
     if list.capacity() - list.len() >= more {

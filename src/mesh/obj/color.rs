@@ -1,6 +1,6 @@
 //! sRGB and linear colours without transcendental functions, whose results differ between machines.
 
-/// The linear value of an sRGB component (IEC 61966-2-1), both in 0..=1 as a rule; others are continued oddly.
+/// The linear value of an sRGB component (IEC 61966-2-1). Values outside 0..=1 are extrapolated.
 pub(super) fn to_linear(value: f64) -> f64 {
     if value <= 0.04045 {
         return value / 12.92;
@@ -21,7 +21,7 @@ pub(super) fn to_srgb(value: f64) -> f64 {
     1.055 * root(square * square * value, 3).sqrt().sqrt() - 0.055
 }
 
-/// The shortest decimal whose linear value is `linear` again, for a writer; the exact one if there is none so short.
+/// The shortest decimal whose linear value is `linear` again; the exact decimal if there is none so short.
 pub(super) fn srgb_text(linear: f32) -> String {
     let value = to_srgb(f64::from(linear.max(0.0)));
     let candidates = (1..12).map(|places| format!("{value:.places$}"));
@@ -33,7 +33,7 @@ pub(super) fn srgb_text(linear: f32) -> String {
     }
 }
 
-/// A root of a positive number by Newton's iteration, which from above falls to it without fail.
+/// A root of a positive number by Newton's iteration, which converges monotonically from above.
 fn root(value: f64, degree: i32) -> f64 {
     let n = f64::from(degree);
     let mut guess = value.max(1.0);

@@ -1,25 +1,25 @@
-//! Which vertex a corner is: a list of the vertices at each point.
+//! Vertices of corners: a list of the vertices at each point.
 
 use std::hash::{DefaultHasher, Hasher};
 
 use super::NONE;
 
-/// Vertices by point and a key for everything else. Points have few vertices, and corners come in the order of a mesh,
-/// so a short list a point is much faster than a hash of all.
+/// Vertices by point and a key for all other attributes. Points have few vertices, and corners come in the order of a
+/// mesh, so a short list for each point is much faster than one hash table.
 #[derive(Debug, Default)]
 pub(super) struct CornerTable {
     heads: Vec<u32>,
     keys: Vec<u64>,
     next: Vec<u32>,
-    crowd: Crowd,
+    crowd: OverflowTable,
 }
 
-/// The longest list.
+/// Longest list of a point.
 const LONGEST: usize = 32;
 
-/// Vertices of points that have too many for a list, by hash: open addressing with linear steps.
+/// Vertices of points that have too many for a list, in a hash table: open addressing with linear steps.
 #[derive(Debug, Default)]
-struct Crowd {
+struct OverflowTable {
     /// Points and vertices.
     members: Vec<[u32; 2]>,
     /// Indices of members; [`NONE`] is free.
@@ -31,7 +31,7 @@ impl CornerTable {
         Self { heads: vec![NONE; points], ..Self::default() }
     }
 
-    /// Vertices so far.
+    /// Number of vertices so far.
     pub fn len(&self) -> usize {
         self.keys.len()
     }
@@ -40,7 +40,7 @@ impl CornerTable {
         self.keys[vertex]
     }
 
-    /// Forgets all vertices; `points` are theirs.
+    /// Removes all vertices; `points` are their points.
     pub fn clear(&mut self, points: &[u32]) {
         for point in points {
             self.heads[*point as usize] = NONE;
@@ -51,7 +51,7 @@ impl CornerTable {
         self.crowd.slots.clear();
     }
 
-    /// The vertex of this point and key, if there is one.
+    /// The vertex of this point and key, if it exists.
     pub fn find(&self, point: u32, key: u64) -> Option<u32> {
         let mut vertex = self.heads[point as usize];
         for _ in 0..LONGEST {
@@ -66,7 +66,7 @@ impl CornerTable {
         self.crowd.find(point, key, &self.keys)
     }
 
-    /// The vertex of this point and key, and whether it was there.
+    /// The vertex of this point and key, and whether it existed.
     #[inline]
     pub fn vertex(&mut self, point: u32, key: u64) -> (u32, bool) {
         let head = self.heads[point as usize];
@@ -89,7 +89,7 @@ impl CornerTable {
         (vertex, false)
     }
 
-    /// A vertex that no other corner shares.
+    /// Appends a vertex that no other corner shares.
     pub fn push(&mut self, key: u64, next: u32) -> u32 {
         self.keys.push(key);
         self.next.push(next);
@@ -97,7 +97,7 @@ impl CornerTable {
     }
 }
 
-impl Crowd {
+impl OverflowTable {
     fn find(&self, point: u32, key: u64, keys: &[u64]) -> Option<u32> {
         if self.slots.is_empty() {
             return None;
@@ -106,7 +106,7 @@ impl Crowd {
         self.members.get(member as usize).map(|[_, vertex]| *vertex)
     }
 
-    /// Adds a vertex that is not in yet.
+    /// Adds a vertex that is not in the table yet.
     fn insert(&mut self, point: u32, vertex: u32, keys: &[u64]) {
         self.members.push([point, vertex]);
         if self.members.len() * 2 > self.slots.len() {
@@ -122,7 +122,7 @@ impl Crowd {
         }
     }
 
-    /// Where the member is, or where it would go.
+    /// Slot of the member, or the free slot for it.
     fn slot(&self, point: u32, key: u64, keys: &[u64]) -> usize {
         // The standard hasher with its fixed key: the same on every run, and not easily made to collide.
         let mut hasher = DefaultHasher::new();

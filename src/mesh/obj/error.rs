@@ -1,8 +1,8 @@
-//! What can be wrong with an OBJ file, said so that its author can mend it.
+//! Errors of OBJ files, with hints for their authors.
 
 use super::MAX_ELEMENTS;
 
-/// Why an OBJ file was not read.
+/// Error of reading an OBJ file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObjError {
@@ -12,19 +12,19 @@ pub enum ObjError {
     Line {
         /// The line, from 1. For a statement continued with `\`, its first line.
         line: u64,
-        /// What is wrong there.
+        /// Problem on that line.
         problem: LineProblem,
     },
     /// The reader failed.
     #[error("reading the OBJ data failed: {0}; check the disk or the connection and try again")]
     Io(#[from] std::io::Error),
-    /// A list grew past what 32-bit indices reach.
+    /// A list grew past the range of 32-bit indices.
     #[error("the file holds more than {MAX_ELEMENTS} {what}; split it into several files")]
     TooMany {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
     },
-    /// There is neither a vertex nor a face.
+    /// The file has neither a vertex nor a face.
     #[error("no vertices and no faces found; check that this is a Wavefront OBJ file and that it is complete")]
     NoGeometry,
     /// Arrays that were changed since they were read do not fit together any more.
@@ -34,7 +34,7 @@ pub enum ObjError {
     Inconsistent,
 }
 
-/// What is wrong with a line.
+/// Problem on a line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LineProblem {
@@ -55,15 +55,15 @@ pub enum LineProblem {
     FewNumbers {
         /// `v`, `vt` or `vn`.
         keyword: &'static str,
-        /// How many are needed.
+        /// Number of values needed.
         wanted: usize,
-        /// How many are there.
+        /// Number of values found.
         found: usize,
     },
     /// A face has fewer than three corners.
     #[error("a face has {corners} corners; it needs at least three (an edge is written with `l`)")]
     FewCorners {
-        /// How many it has.
+        /// Number of corners of the face.
         corners: usize,
     },
     /// A face corner is not of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.
@@ -85,7 +85,7 @@ pub enum LineProblem {
         list: &'static str,
         /// The index.
         index: u64,
-        /// How many the file has.
+        /// Number of elements in the file.
         count: u64,
     },
     /// A negative index counts back to before the first element.
@@ -93,7 +93,7 @@ pub enum LineProblem {
     BeforeFirst {
         /// `vertex`, `texture coordinate` or `normal`.
         list: &'static str,
-        /// How far before the first one it points.
+        /// Distance before the first element.
         missing: u64,
     },
     /// The text is UTF-16.
@@ -117,7 +117,7 @@ pub(super) struct BlockError {
 /// Names of the lists that corners index, for messages.
 pub(super) const LISTS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
-/// Text for a message: no longer than a line of it, and printable.
+/// Text for a message: printable and at most one line long.
 pub(super) fn excerpt(bytes: &[u8]) -> String {
     const LONGEST: usize = 40;
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST)]);

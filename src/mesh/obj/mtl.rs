@@ -1,13 +1,13 @@
 //! Material libraries: the `.mtl` files next to an OBJ.
 //!
-//! The statements of Wavefront's appendix B2 that a glTF material has a place for, and the physically based ones that
-//! exporters added (`Pr`, `Pm`, `Ke`, `norm` and their maps). Whatever does not parse keeps its default: a material that
-//! looks a little wrong is better than a mesh that does not open.
+//! The reader takes the statements of Wavefront's appendix B2 that a glTF material has a place for, and the physically
+//! based ones that exporters added (`Pr`, `Pm`, `Ke`, `norm` and their maps). A statement that does not parse keeps its
+//! default: a material that looks a little wrong is better than a mesh that does not open.
 
 /// A material as its library describes it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ObjMaterial {
-    /// What `usemtl` refers to.
+    /// Name that `usemtl` refers to.
     pub name: String,
     /// `Kd`: base colour, taken as linear.
     pub diffuse: Option<[f32; 3]>,
@@ -33,31 +33,31 @@ pub struct ObjMaterial {
     pub metallic_map: Option<ObjTexture>,
     /// `norm`, or else `map_Bump` or `bump`, which exporters use for normal maps as well.
     pub normal_map: Option<ObjTexture>,
-    /// True if `d` was given, which `Tr` then does not change.
+    /// Marks a material with `d`, whose opacity `Tr` does not change.
     pub(super) has_dissolve: bool,
-    /// True if `norm` was given, which `bump` then does not change.
+    /// Marks a material with `norm`, whose normal map `bump` does not change.
     pub(super) has_norm: bool,
 }
 
-/// A texture file and how it is laid on.
+/// A texture file and its placement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjTexture {
     /// The path as written.
     pub path: String,
-    /// `-s`: how often it repeats along u and v.
+    /// `-s`: number of repeats along u and v.
     pub scale: [f32; 2],
     /// `-o`: shift along u and v.
     pub offset: [f32; 2],
     /// `-bm`: strength of a bump or normal map.
     pub strength: f32,
-    /// `-clamp on`: does not repeat.
+    /// `-clamp on`: the texture does not repeat.
     pub clamp: bool,
 }
 
-/// More materials than this are no library.
+/// Largest number of materials in a library.
 const MOST_MATERIALS: usize = 1 << 14;
 
-/// Reads a material library. Unknown and malformed statements are passed over, and so is what follows the 16,384th
+/// Reads a material library. Unknown and malformed statements are skipped, and so is the rest after the 16,384th
 /// material.
 pub fn read_mtl(bytes: &[u8]) -> Vec<ObjMaterial> {
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
@@ -110,7 +110,7 @@ fn number(text: &str) -> Option<f32> {
     text.split_whitespace().next()?.parse().ok().filter(|value: &f32| value.is_finite())
 }
 
-/// Three numbers, or one for all three.
+/// Three numbers, or one number for all three components.
 fn color(text: &str) -> Option<[f32; 3]> {
     let mut tokens = text.split_whitespace();
     let red = number(tokens.next()?)?;
@@ -132,12 +132,12 @@ fn texture(text: &str) -> Option<ObjTexture> {
     (!texture.path.is_empty()).then_some(texture)
 }
 
-/// True if the text starts with an option of a texture.
+/// Returns `true` if the text starts with an option of a texture.
 fn is_option(text: &str) -> bool {
     text.starts_with('-') && arguments(split_word(text).0).is_some()
 }
 
-/// How many arguments an option takes, at least and at most.
+/// Least and largest number of arguments of an option.
 fn arguments(option: &str) -> Option<(usize, usize)> {
     match option {
         "-o" | "-s" | "-t" => Some((1, 3)),
@@ -148,7 +148,7 @@ fn arguments(option: &str) -> Option<(usize, usize)> {
 }
 
 impl ObjTexture {
-    /// Takes options off the front and returns the rest.
+    /// Removes options from the front and returns the rest.
     fn options<'a>(&mut self, text: &'a str) -> &'a str {
         let mut rest = text.trim();
         loop {
@@ -158,7 +158,7 @@ impl ObjTexture {
             let mut word = "";
             for (taken, value) in values.iter_mut().enumerate().take(most) {
                 let (argument, more) = split_word(after);
-                // What may be left out is a number and not the file's name.
+                // An optional argument must be a number and must not be the file's name.
                 if taken >= least && (number(argument).is_none() || more.is_empty()) {
                     break;
                 }

@@ -28,12 +28,12 @@ impl ObjNames {
         self.ends.len()
     }
 
-    /// True if there is no name.
+    /// Returns `true` without names.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
 
-    /// The name with this number; empty for [`NONE`] and numbers never given out.
+    /// The name with this number; empty for [`NONE`] and for unknown numbers.
     pub fn get(&self, name: u32) -> &str {
         let name = name as usize;
         let Some(&end) = self.ends.get(name) else { return "" };
@@ -62,7 +62,7 @@ impl ObjNames {
         Some(self.slots[slot])
     }
 
-    /// Where this name is, or where it would go.
+    /// Slot of the name, or the free slot for it.
     fn slot(&self, name: &str) -> usize {
         // The standard hasher with its fixed key: the same on every run, and not easily made to collide.
         let mut hasher = DefaultHasher::new();

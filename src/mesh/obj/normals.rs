@@ -1,4 +1,4 @@
-//! Normals where a file has none: smooth within smoothing groups, flat where it says `s off`.
+//! Computed normals for files without them: smooth within smoothing groups, flat after `s off`.
 
 use std::collections::HashMap;
 
@@ -6,14 +6,15 @@ use glam::{DVec3, Vec3};
 
 use super::{NONE, ObjArrays, corner_table::CornerTable, triangulate::newell};
 
-/// Smooth normals at points, one for each smoothing group that meets there.
+/// Smooth normals at points, one for each smoothing group at the point.
 pub(super) struct SmoothNormals {
     /// Sums of face normals, by point if there is one group only, else by number in `table`.
     sums: Vec<Vec3>,
     table: Option<CornerTable>,
 }
 
-/// The normal with length 1, unless it has none. One that is as good as that long is kept to the bit.
+/// The normal scaled to length 1; `None` if it has no direction. A normal of unit length to within rounding keeps its
+/// bits.
 pub(super) fn unit(normal: [f32; 3]) -> Option<Vec3> {
     let long = DVec3::from(normal.map(f64::from));
     let square = long.length_squared();
@@ -23,7 +24,7 @@ pub(super) fn unit(normal: [f32; 3]) -> Option<Vec3> {
     (square > 0.0).then(|| (long / square.sqrt()).as_vec3())
 }
 
-/// The normal that the file gives a corner, if it is any good.
+/// The normal that the file gives a corner, if it has a direction.
 pub(super) fn given(arrays: &ObjArrays, corner: usize) -> Option<(u32, Vec3)> {
     let index = *arrays.corner_normals.get(corner)?;
     if index == NONE {
@@ -32,7 +33,8 @@ pub(super) fn given(arrays: &ObjArrays, corner: usize) -> Option<(u32, Vec3)> {
     Some((index, unit(arrays.normals[index as usize])?))
 }
 
-/// True if faces with this value of `s` are flat. Files without any `s` mean smooth faces, as all readers take it.
+/// Returns `true` if faces with this value of `s` are flat. Files without any `s` have smooth faces, as all readers
+/// take it.
 pub(super) fn is_flat(smoothing: u32) -> bool {
     smoothing == 0
 }
@@ -50,8 +52,8 @@ pub(super) fn face_normal(arrays: &ObjArrays, face: usize) -> DVec3 {
 
 impl SmoothNormals {
     /// Sums the normals of all smooth faces that have a corner without normal at each of their corners, weighted by the
-    /// angle there (Thürmer and Wüthrich 1998), so that how a surface is cut into faces does not matter.
-    /// `groups` are the runs' numbers of [`group_numbers`].
+    /// angle there (Thürmer and Wüthrich 1998), so that the cut of a surface into faces does not matter. `groups` are
+    /// the runs' numbers of [`group_numbers`].
     pub fn new(arrays: &ObjArrays, groups: &[u32]) -> Self {
         let smooth = |run: &usize| !is_flat(arrays.runs[*run].smoothing);
         let lacking = |face: &usize| arrays.face(*face).any(|corner| given(arrays, corner).is_none());
@@ -116,10 +118,11 @@ fn angle(a: DVec3, b: DVec3) -> f64 {
     if cosine < 0.0 { std::f64::consts::PI - angle } else { angle }
 }
 
-/// Smoothing groups that are told apart.
+/// Largest number of different smoothing groups.
 const MOST_GROUPS: usize = 4096;
 
-/// A number for the smoothing group of each run, in the order of their first use. Those after the 4096th share the last.
+/// A number for the smoothing group of each run, in the order of their first use. Groups after the 4096th share the
+/// last number.
 pub(super) fn group_numbers(arrays: &ObjArrays) -> Vec<u32> {
     let mut numbers = HashMap::new();
     let mut number = |smoothing: u32| {

@@ -11,19 +11,19 @@ const TENTHS: [f64; 19] = [
     1e-18,
 ];
 
-/// The value of the first `count` of eight bytes, which are digits; 0 for none of them.
+/// The value of the first `count` of eight bytes, which are digits; 0 for a count of 0.
 #[inline(always)]
 pub(super) fn value(bytes: [u8; 8], count: usize) -> u64 {
     let nibbles = u64::from_le_bytes(bytes) & 0x0f0f_0f0f_0f0f_0f0f;
-    // Shift what follows the digits out and leading zeros in. Then sum pairs, fours and eights.
+    // The shift removes the bytes after the digits and inserts leading zeros. Then pairs, fours and eights are summed.
     let value = nibbles.checked_shl(64 - 8 * count as u32).unwrap_or(0);
     let value = (value.wrapping_mul(2_561) >> 8) & 0x00ff_00ff_00ff_00ff;
     let value = (value.wrapping_mul(6_553_601) >> 16) & 0x0000_ffff_0000_ffff;
     value.wrapping_mul(42_949_672_960_001) >> 32
 }
 
-/// `±mantissa / 10^places` as the nearest float, or `None` where the double in between does not tell which that is. The
-/// mantissa has at most 18 digits.
+/// `±mantissa / 10^places` as the nearest float, or `None` where the double in between does not decide which float that
+/// is. The mantissa has at most 18 digits.
 #[inline(always)]
 pub(super) fn rounded(mantissa: u64, places: usize, negative: bool) -> Option<f32> {
     let double = mantissa as i64 as f64 * TENTHS[places];
@@ -35,7 +35,7 @@ pub(super) fn rounded(mantissa: u64, places: usize, negative: bool) -> Option<f3
     (!between).then(|| f32::from_bits(bits))
 }
 
-/// A whole token as a float, correctly rounded; `None` if it is no number. Infinities and NaN are numbers here.
+/// A whole token as a float, correctly rounded; `None` if it is not a number. Infinities and NaN count as numbers.
 pub(super) fn token(text: &[u8]) -> Option<f32> {
     let text = match text {
         [b'+', b'+' | b'-', ..] => return None,

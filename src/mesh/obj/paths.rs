@@ -1,9 +1,9 @@
-//! Names of files that an OBJ or MTL refers to: what they mean, and which are safe to open.
+//! Paths of files that an OBJ or MTL refers to: their meaning, and the check that they are safe to open.
 
 /// The path of a file below the folder of the model, with `/` between its parts, or `None` if it leads elsewhere.
 ///
 /// `\` separates as `/` does, `.` and inner `..` are resolved. Absolute paths, drives, URLs, paths that climb out of
-/// the folder, control characters and empty paths give `None`. Symbolic links are the caller's to judge.
+/// the folder, control characters and empty paths give `None`. The caller has to judge symbolic links.
 pub fn safe_relative_path(path: &str) -> Option<String> {
     let path = path.trim();
     if path.starts_with(['/', '\\']) || path.contains(|c: char| c == ':' || c.is_control()) {
@@ -22,7 +22,7 @@ pub fn safe_relative_path(path: &str) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join("/"))
 }
 
-/// Places to look for a file named `path` by a file in `folder` (a safe path, or empty), the likeliest first: next to
+/// Candidate paths for a file named `path` by a file in `folder` (a safe path, or empty), the likeliest first: next to
 /// the file that names it, below the model, and, since exporters write the paths of their authors' disks, by its bare
 /// name in both.
 pub(super) fn candidates(folder: &str, path: &str) -> Vec<String> {
@@ -41,13 +41,13 @@ pub(super) fn candidates(folder: &str, path: &str) -> Vec<String> {
     found
 }
 
-/// The folder part of a safe path; empty for none.
+/// Folder part of a safe path; empty for none.
 pub(super) fn folder_of(path: &str) -> &str {
     path.rsplit_once('/').map_or("", |(folder, _)| folder)
 }
 
-/// What the text after `mtllib` may name: as a whole, one file with blanks in its name; or else several files with
-/// blanks between their names, in which `\ ` stands for a blank. The first entry is the whole.
+/// File names that the text after `mtllib` may stand for: the whole text as one file name with blanks, which is the
+/// first entry; or several file names separated by blanks, in which `\ ` stands for a blank.
 pub fn library_names(statement: &str) -> Vec<String> {
     let statement = statement.trim().trim_matches('"');
     let mut names = vec![statement.to_owned()];

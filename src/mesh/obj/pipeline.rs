@@ -1,9 +1,9 @@
 //! A reader cut into blocks of whole lines, and the threads that parse them.
 //!
 //! A file that fits one block is read by the caller alone. From the second block on each thread takes the next block
-//! from the reader, parses it, and hands it in; whoever hands in the block that is due appends it and all that wait
-//! behind it, while the others go on. So the arrays are the same for any number of threads, appending costs no thread
-//! of its own, and a few blocks are all the memory needed besides the arrays.
+//! from the reader, parses it, and hands it in; the thread that hands in the next block of the file appends it and all
+//! blocks that wait behind it, while the others go on. So the arrays are the same for any number of threads, appending
+//! needs no thread of its own, and a few blocks are all the memory needed besides the arrays.
 
 use std::{
     io::{ErrorKind, Read},
@@ -21,30 +21,30 @@ use super::{
     error::{LineProblem, ObjError},
 };
 
-/// The longest line, continuations included.
+/// Longest line in bytes, continuations included.
 const LONGEST_LINE: usize = 256 << 20;
-/// Blocks that had to grow past this are not kept for the next read.
+/// Largest block in bytes that is kept for the next read.
 const KEPT_BLOCK: usize = 8 << 20;
-/// More threads than this wait for the reader and the memory.
+/// Largest number of threads: more would wait for the reader and the memory.
 const MOST_THREADS: usize = 8;
 
 /// Blocks kept between reads.
 #[derive(Debug, Default)]
-pub(super) struct Spare(Vec<Block>);
+pub(super) struct SpareBlocks(Vec<Block>);
 
-impl Clone for Spare {
+impl Clone for SpareBlocks {
     fn clone(&self) -> Self {
         Self::default()
     }
 }
 
-impl PartialEq for Spare {
+impl PartialEq for SpareBlocks {
     fn eq(&self, _: &Self) -> bool {
         true
     }
 }
 
-/// Reads everything into `arrays`.
+/// Reads the whole file into `arrays`.
 pub(super) fn read(reader: impl Read + Send, arrays: &mut ObjArrays, settings: &ObjSettings) -> Result<(), ObjError> {
     let mut spare = std::mem::take(&mut arrays.spare.0);
     let result = read_with(reader, arrays, settings, &mut spare);
@@ -107,19 +107,19 @@ fn read_with(
     }
 }
 
-/// The reader and where it is.
+/// The reader and its position.
 struct Input<R> {
     reader: R,
     /// The start of a line whose end the last block did not reach.
     carry: Vec<u8>,
-    /// Blocks taken so far.
+    /// Number of blocks taken so far.
     taken: u64,
     done: bool,
     block: usize,
 }
 
 impl<R: Read> Input<R> {
-    /// Reads the next whole lines. With the last of them, or a failure, `done` is set.
+    /// Reads the next whole lines. Sets `done` with the last of them, or at a failure.
     fn fill(&mut self, block: &mut Block) {
         block.failure = None;
         if let Err(failure) = self.try_fill(block) {
@@ -173,7 +173,8 @@ impl<R: Read> Input<R> {
     }
 }
 
-/// Just past the last line end that no `\` continues. A carriage return at the very end may be half of one.
+/// Position just past the last line end without a continuation `\`. A carriage return at the very end may be half of a
+/// line end and does not count.
 fn last_cut(text: &[u8]) -> Option<usize> {
     let mut end = text.len();
     while let Some(at) = memrchr2(b'\n', b'\r', &text[..end]) {
@@ -187,11 +188,11 @@ fn last_cut(text: &[u8]) -> Option<usize> {
     None
 }
 
-/// What the threads share.
+/// State that the threads share.
 struct Work<'a, R> {
     input: Mutex<Input<R>>,
     order: Mutex<Order>,
-    /// Locked only by the thread that set [`Order::appending`].
+    /// Collector of blocks; only the thread that set [`Order::appending`] locks it.
     collector: Mutex<Collector<'a>>,
     change: Condvar,
 }
@@ -199,7 +200,7 @@ struct Work<'a, R> {
 struct Order {
     /// The number of the block to append next.
     due: u64,
-    /// Parsed blocks that wait for others before them.
+    /// Parsed blocks that wait for blocks before them.
     waiting: Vec<(u64, Block)>,
     free: Vec<Block>,
     appending: bool,
@@ -268,7 +269,7 @@ impl<R: Read> Work<'_, R> {
     }
 }
 
-/// Locks. Nothing that a panic could leave half done is used afterwards.
+/// Locks a mutex, poisoned or not: a state that a panic left half done is not used afterwards.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

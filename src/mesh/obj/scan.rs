@@ -1,17 +1,17 @@
-//! Where digits end, for 64 bytes at once.
+//! Scanner that finds the ends of digits in 64 bytes at once.
 //!
-//! Finding the end of each number only after that of the one before makes a chain of waits as long as the line. One
-//! comparison of 64 bytes tells all ends in them; after that, the next is a bit further (Langdale and Lemire, "Parsing
-//! Gigabytes of JSON per Second", section 3.1, use such masks for the structure of JSON).
+//! Searching the end of each number only after that of the one before makes a chain of dependent steps as long as the
+//! line. One comparison of 64 bytes finds all ends in them; each next end is then a bit further in the mask (Langdale
+//! and Lemire, "Parsing Gigabytes of JSON per Second", section 3.1, use such masks for the structure of JSON).
 
 use wide::{CmpGt, i8x16};
 
 use super::number::{rounded, value};
 
-/// Bytes told at once, which a text must still hold from wherever it is scanned.
+/// Bytes compared at once; the text must hold as many from any scanned position.
 pub(super) const WINDOW: usize = 64;
 
-/// A place in a text that moves on from number to number. Reading a number passes the byte after it.
+/// A position in a text that moves on from number to number. Reading a number passes the byte after it.
 pub(super) struct Scan<'a> {
     text: &'a [u8],
     base: usize,
@@ -34,7 +34,7 @@ fn non_digits(window: &[u8; WINDOW]) -> u64 {
 }
 
 impl<'a> Scan<'a> {
-    /// Starts at `base + skip`.
+    /// Makes a scan that starts at `base + skip`.
     #[inline(always)]
     pub fn new(text: &'a [u8], base: usize, skip: usize) -> Option<Self> {
         let window = text.get(base..)?.first_chunk()?;
@@ -90,7 +90,7 @@ impl<'a> Scan<'a> {
         self.slash(at)
     }
 
-    /// Where the next line starts, if nothing but blanks comes before the end of this one.
+    /// Start of the next line, if nothing but blanks comes before the end of this one.
     #[inline(always)]
     pub fn line_end(&self, mut at: usize) -> Option<usize> {
         if *self.text.get(at)? == b'\n' {
@@ -107,7 +107,7 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Reads a whole number without sign of one to eight digits: its value and where it ends.
+    /// Reads a whole number without sign of one to eight digits: its value and its end.
     #[inline(always)]
     pub fn index(&mut self, at: usize) -> Option<(u32, usize)> {
         let end = self.stop(at)?;
@@ -119,13 +119,13 @@ impl<'a> Scan<'a> {
         Some((value(self.word(at)?, count) as u32, end))
     }
 
-    /// Reads a plain decimal like `-12.345678`: its value and where it ends. `None` for whatever is not plain; at an
-    /// exponent it stops, for the caller to stumble over.
+    /// Reads a plain decimal like `-12.345678`: its value and its end. Returns `None` for other forms; stops at an
+    /// exponent, which the caller's next step refuses.
     #[inline(always)]
     pub fn decimal(&mut self, at: usize) -> Option<(f32, usize)> {
         let negative = *self.text.get(at)? == b'-';
         self.stop(at)?;
-        // Passes the sign without a branch that could only guess it.
+        // Passes the sign without a branch, which the processor would often mispredict.
         self.stops &= self.stops.wrapping_sub(u64::from(negative));
         let start = at + usize::from(negative);
         let mut end = self.stop(start)?;
@@ -149,7 +149,7 @@ impl<'a> Scan<'a> {
         Some((rounded(mantissa, places, negative)?, end))
     }
 
-    /// Adds the digits after the point to those before it.
+    /// Appends the digits after the point to the mantissa.
     #[inline(always)]
     fn fraction(&self, mantissa: u64, first: usize, places: usize) -> Option<u64> {
         if places <= 8 {
@@ -177,7 +177,7 @@ impl<'a> Scan<'a> {
         Some((values, at))
     }
 
-    /// Goes past the blank that ended a number, and any others.
+    /// Goes past the blank that ended a number, and past further blanks.
     #[inline(always)]
     pub fn separated(&mut self, at: usize) -> Option<usize> {
         if !matches!(self.text.get(at)?, b' ' | b'\t') {
@@ -187,7 +187,7 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// Powers of ten as integers, as far as digits come in words.
+/// Powers of ten as integers, up to the eight digits of a word.
 const WHOLE_TENS: [u64; 9] = [1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Any line, whatever it says and however it is written.
+//! Parser of any statement in any form.
 
 use memchr::memchr2;
 
@@ -10,7 +10,7 @@ use super::{
 };
 
 impl Parsed {
-    /// Reads the statement that `text` starts with, over as many lines as it goes on. Returns how many bytes it took.
+    /// Reads the statement that `text` starts with, over all its continued lines. Returns the number of bytes read.
     pub fn statement(&mut self, text: &[u8]) -> Result<usize, LineProblem> {
         let (mut end, mut next) = line_bounds(text, 0);
         let mut lines = 1;
@@ -125,13 +125,13 @@ impl Parsed {
         Ok(())
     }
 
-    /// Adds one index to the corner that is being read. Index 0 of a corner comes first and makes it.
+    /// Adds one index to the current corner. The index of list 0 comes first and makes the corner.
     fn corner_index(&mut self, list: usize, field: &[u8], corner: &[u8]) -> Result<(), LineProblem> {
         let at = self.corners[0].len() - usize::from(list > 0);
         let count = [self.positions.len(), self.texcoords.len(), self.normals.len()][list];
         let value = match whole(field).ok_or_else(|| LineProblem::BadCorner { text: excerpt(corner) })? {
             0 => return Err(LineProblem::ZeroIndex { list: LISTS[list] }),
-            // Checked against what the file holds when the block takes its place in it.
+            // The block's place in the file is not known yet; the index is checked when the block is appended.
             index @ 1.. => {
                 let index = u32::try_from(index).unwrap_or(NONE);
                 self.largest[list] = self.largest[list].max(index);
@@ -139,7 +139,7 @@ impl Parsed {
             }
             back => {
                 self.relative.push(Relative { corner: at as u32, list: list as u8 });
-                // Below the lowest that any file could mean, all are the same: out of range.
+                // Below the lowest possible index all values are equal: out of range.
                 (count as i64 + back.max(i64::from(i32::MIN))) as u32
             }
         };
@@ -184,7 +184,7 @@ const CURVES: &[&[u8]] = &[
     b"end", b"con", b"bzp", b"bsp", b"cdc", b"cdp", b"res", b"call", b"csh",
 ];
 
-/// Statements about how things are shown, which no polygon depends on.
+/// Statements about display, which no polygon depends on.
 const DISPLAY: &[&[u8]] = &[
     b"bevel",
     b"c_interp",
@@ -199,7 +199,7 @@ const DISPLAY: &[&[u8]] = &[
     b"mg",
 ];
 
-/// Where the line that starts at `start` ends, and where the next one starts.
+/// End of the line that starts at `start`, and start of the next one.
 fn line_bounds(text: &[u8], start: usize) -> (usize, usize) {
     let Some(length) = memchr2(b'\n', b'\r', &text[start..]) else { return (text.len(), text.len()) };
     let end = start + length;
@@ -207,15 +207,15 @@ fn line_bounds(text: &[u8], start: usize) -> (usize, usize) {
     (end, end + 1 + usize::from(crlf))
 }
 
-/// The first token, and what follows it without blanks at either end.
+/// The first token, and the rest of the line without blanks at either end.
 fn split_token(line: &[u8]) -> (&[u8], &[u8]) {
     let line = line.trim_ascii();
     let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
     (&line[..end], line[end..].trim_ascii_start())
 }
 
-/// Reads numbers until the line or a comment ends, and returns how many; those past the end of `values` are checked
-/// and dropped.
+/// Reads numbers until the line or a comment ends, and returns their count; numbers past the end of `values` are
+/// checked and dropped.
 fn fill(values: &mut [f32], mut rest: &[u8]) -> Result<usize, LineProblem> {
     let mut found = 0;
     loop {
@@ -235,7 +235,7 @@ fn fill(values: &mut [f32], mut rest: &[u8]) -> Result<usize, LineProblem> {
     }
 }
 
-/// Up to three numbers, at least `wanted`; the others are 0.
+/// Up to three numbers, at least `wanted`; missing ones are 0.
 fn coordinates(keyword: &'static str, rest: &[u8], wanted: usize) -> Result<[f32; 3], LineProblem> {
     let mut values = [0.0; 3];
     let found = fill(&mut values, rest)?;
@@ -245,7 +245,7 @@ fn coordinates(keyword: &'static str, rest: &[u8], wanted: usize) -> Result<[f32
     Ok(values)
 }
 
-/// A whole number with or without sign. One too large for any list stays too large.
+/// A whole number with or without sign. A number too large for `i64` is clamped, which stays out of range.
 fn whole(text: &[u8]) -> Option<i64> {
     let (negative, digits) = match text {
         [b'-', digits @ ..] => (true, digits),

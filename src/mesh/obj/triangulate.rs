@@ -10,26 +10,27 @@ use glam::{DVec2, DVec3};
 
 use super::NONE;
 
-/// Room for work, used again from polygon to polygon.
+/// Buffers of the triangulation, reused from polygon to polygon.
 #[derive(Debug, Default)]
 pub(super) struct Triangulator {
     flat: Vec<DVec2>,
     previous: Vec<u32>,
     next: Vec<u32>,
-    /// True for corners that may lie in an ear: not cut off yet, and reflex or straight.
+    /// Marks corners that may lie in an ear: not cut off yet, and reflex or straight.
     inner: Vec<bool>,
     grid: Grid,
-    /// Comparisons made on all polygons so far.
+    /// Number of comparisons on all polygons so far.
     work: u64,
-    /// Polygons that were too tangled to be cut well within the limit of work.
+    /// Number of polygons that were too tangled for ear clipping within the limit of work.
     pub fans: usize,
 }
 
-/// Comparisons after which large polygons are cut into fans: about a second, and far more than real meshes need.
+/// Number of comparisons after which large polygons are cut into fans: about a second, and far more than real meshes
+/// need.
 const MOST_WORK: u64 = 1 << 26;
 
-/// A vector at right angles to a polygon, as long as twice its area (Newell's method): the normal of the plane that fits
-/// it best.
+/// A vector at right angles to a polygon, as long as twice its area (Newell's method): the normal of the best-fitting
+/// plane.
 pub(super) fn newell(corners: impl ExactSizeIterator<Item = DVec3> + Clone) -> DVec3 {
     let Some(origin) = corners.clone().next() else { return DVec3::ZERO };
     let mut sum = DVec3::ZERO;
@@ -78,7 +79,7 @@ impl Triangulator {
         }));
     }
 
-    /// True if every corner turns left, or goes straight on, and the turns add up to one round.
+    /// Returns `true` if no corner turns right and the turns add up to one round.
     fn convex(&self) -> bool {
         let count = self.flat.len();
         let edge = |corner: usize| self.flat[(corner + 1) % count] - self.flat[corner % count];
@@ -86,7 +87,7 @@ impl Triangulator {
         for corner in 0..count {
             let (here, after) = (edge(corner), edge(corner + 1));
             let turn = here.perp_dot(after);
-            // Straight corners are left to ear clipping: a fan from one would be flat.
+            // Straight corners are left to ear clipping: a fan from one has a flat triangle.
             if turn <= 0.0 {
                 return false;
             }
@@ -110,8 +111,8 @@ impl Triangulator {
         self.grid.build(&self.flat, &self.inner);
         let mut left = count;
         let mut corner = 0;
-        // Corners looked at since the last cut, and how much is forgiven: nothing; then touching and flat ears; then
-        // all, for a polygon that crosses itself.
+        // Number of corners tested since the last cut, and the tolerated defects: first none; then touching and flat
+        // ears; then all, for a polygon that crosses itself.
         let mut looked = 0;
         let mut lenience = Lenience::Strict;
         while left > 3 {
@@ -129,7 +130,7 @@ impl Triangulator {
                     self.inner[neighbour] = self.inner[neighbour] && self.turn(neighbour) <= 0.0;
                 }
                 left -= 1;
-                // Going on past the neighbour spreads the cuts around, which makes better triangles than a fan.
+                // Moving on past the neighbour spreads the cuts around, which makes better triangles than a fan.
                 corner = self.next[after as usize] as usize;
                 looked = 0;
                 lenience = Lenience::Strict;
@@ -173,8 +174,8 @@ impl Triangulator {
             let point = flat[other as usize];
             let sides = [area(a, b, point), area(b, c, point), area(c, a, point)];
             if let Some(at) = [a, b, c].iter().position(|corner| *corner == point) {
-                // The polygon touches itself at a corner of the ear (a hole joined by a slit, for example). It is in
-                // the way if it goes on into the ear from there.
+                // The polygon touches itself at a corner of the ear (a hole joined by a slit, for example). That corner
+                // blocks the ear if the polygon continues into the ear from there.
                 let [tip, to, from] = [[a, b, c], [b, c, a], [c, a, b]][at];
                 let into = |neighbour: u32| {
                     let goal = flat[neighbour as usize];
@@ -190,7 +191,7 @@ impl Triangulator {
     }
 }
 
-/// What an ear may be.
+/// Defects that an ear may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Lenience {
     Strict,
@@ -224,11 +225,11 @@ fn quad(points: &[DVec3]) -> [[u32; 3]; 2] {
     }
 }
 
-/// Points in square cells.
+/// Points sorted into square cells.
 #[derive(Debug, Default)]
 struct Grid {
     low: DVec2,
-    /// Cells a unit.
+    /// Number of cells per unit.
     scale: DVec2,
     side: usize,
     starts: Vec<u32>,
@@ -239,7 +240,7 @@ impl Grid {
     fn build(&mut self, points: &[DVec2], wanted: &[bool]) {
         let inside = || points.iter().zip(wanted).filter(|(_, wanted)| **wanted).map(|(point, _)| *point);
         let count = inside().count();
-        // One or two points a cell, in a row of cells at least.
+        // One or two points a cell, in a row of at least one cell.
         self.side = 1;
         while self.side * self.side * 4 < count && self.side < 1024 {
             self.side *= 2;
@@ -278,7 +279,7 @@ impl Grid {
         y * self.side + x
     }
 
-    /// True if `test` holds for any point in the cells that the box touches.
+    /// Returns `true` if `test` holds for any point in the cells that the box touches.
     fn any(&self, low: DVec2, high: DVec2, mut test: impl FnMut(u32) -> bool) -> bool {
         let ([left, bottom], [right, top]) = (self.coordinates(low), self.coordinates(high));
         (bottom..=top).any(|row| {

@@ -1,4 +1,4 @@
-//! Arrays into a [`Model`]: objects, parts, and vertices in place of corners.
+//! Conversion of arrays into a [`Model`]: objects, parts, and vertices in place of corners.
 
 use std::collections::HashMap;
 
@@ -8,29 +8,29 @@ use super::{
     NONE, ObjArrays,
     color::to_linear,
     corner_table::CornerTable,
-    looks::{Sidecar, looks},
+    materials::{Sidecar, material_set},
     normals::{SmoothNormals, face_normal, given, group_numbers, is_flat, position},
     triangulate::Triangulator,
 };
 use crate::mesh::model::{Faces, Model, Object, Part};
 
-/// More parts than this are no character but noise, and each costs memory.
+/// Largest number of parts: a file with more is noise and not a character, and each part costs memory.
 const MOST_PARTS: usize = 1 << 16;
 
-/// Faces with more corners are cut into plain fans, which take no memory.
+/// Largest number of corners for ear clipping; larger faces are cut into plain fans, which take no memory.
 const LARGEST_POLYGON: usize = 1 << 20;
 
-/// What becomes one [`Part`].
+/// Faces that become one [`Part`].
 struct Plan {
     object: usize,
     material: Option<usize>,
-    /// Runs with faces of it.
+    /// Runs that contain faces of the part.
     runs: Vec<usize>,
 }
 
 pub(super) fn model(arrays: &ObjArrays, name: &str, sidecar: &mut Sidecar) -> Model {
     let mut notes = arrays.notes.clone();
-    let (looks, materials) = looks(arrays, sidecar, &mut notes);
+    let (material_set, materials) = material_set(arrays, sidecar, &mut notes);
     let (objects, plans) = plan(arrays, &materials, &mut notes);
     let colors = linear_colors(arrays, &mut notes);
     let groups = group_numbers(arrays);
@@ -48,7 +48,7 @@ pub(super) fn model(arrays: &ObjArrays, name: &str, sidecar: &mut Sidecar) -> Mo
         notes.push(format!("{fans} very large or tangled polygon(s) were cut into plain fans"));
     }
     let points = arrays.positions.iter().copied().map(Vec3::from).collect();
-    Model { name: name.into(), points, objects, parts, looks, notes, ..Model::default() }
+    Model { name: name.into(), points, objects, parts, material_set, notes, ..Model::default() }
 }
 
 /// Objects and parts in the order of their first faces.
@@ -125,7 +125,7 @@ struct Welder<'a> {
     triangulator: Triangulator,
 }
 
-/// Marks the lower half of a key as a smoothing group where it else is a normal.
+/// Bit that marks the lower half of a key as a smoothing group instead of a normal.
 const MADE: u32 = 1 << 31;
 
 impl Welder<'_> {
@@ -158,7 +158,7 @@ impl Welder<'_> {
         part
     }
 
-    /// Makes or finds the vertices of one face. Made normals of one `group` are shared.
+    /// Makes or finds the vertices of one face. Computed normals of one `group` are shared.
     fn face(&mut self, face: usize, smoothing: u32, group: u32, part: &mut Part, corners: &mut Vec<u32>) {
         let arrays = self.arrays;
         let mut flat = None;
@@ -182,7 +182,7 @@ impl Welder<'_> {
                 let fallback = |flat: &mut Option<Vec3>| {
                     *flat.get_or_insert_with(|| {
                         let normal = face_normal(arrays, face);
-                        // A face without area faces up, for want of better.
+                        // A face without area faces up by convention.
                         if normal == DVec3::ZERO { Vec3::Y } else { normal.as_vec3() }
                     })
                 };
@@ -192,7 +192,7 @@ impl Welder<'_> {
         }
     }
 
-    /// Fills what the vertices' keys tell.
+    /// Fills the attributes that the vertices' keys refer to.
     fn attributes(&self, part: &mut Part) {
         let texcoord = |vertex: usize| (self.table.key(vertex) >> 32) as u32;
         let count = self.table.len();

@@ -5,29 +5,23 @@ use std::{collections::HashSet, io::Write};
 use glam::Vec4;
 
 use super::{color::srgb_text, write_mtl::materials};
-use crate::mesh::model::{Model, Part};
+use crate::mesh::{
+    CompanionSink,
+    model::{Model, Part},
+};
 
-/// An OBJ file and what belongs next to it.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct ObjFiles {
-    /// The OBJ file.
-    pub obj: Vec<u8>,
-    /// The material library it refers to, if the model has materials.
-    pub mtl: Option<Vec<u8>>,
-    /// Image files that the library refers to: safe relative paths and bytes.
-    pub images: Vec<(String, Vec<u8>)>,
-}
-
-/// Writes a model's geometry, objects and materials; `library` is the name that the material library will have.
+/// Writes a model's geometry, objects and materials. The material library, which would be called `<stem>.mtl`, and the
+/// images that it refers to go to `companion`, which returns the names that they get; they must fit on a line.
 ///
 /// Polygons are written where the model has them. Each vertex gets its own `vt` and `vn`, so that reading the file again
 /// gives the same points, vertices, faces and attributes to the bit; numbers are the shortest that do. Skins, morph
 /// targets, clips and second texture coordinate sets have no place in the format.
-pub fn write_obj(model: &Model, library: &str) -> ObjFiles {
-    let (names, mtl, images) = materials(&model.looks);
+pub fn write_obj(model: &Model, stem: &str, companion: &mut CompanionSink) -> Vec<u8> {
+    let (names, library) = materials(&model.material_set, companion);
     let mut out = Vec::new();
-    if mtl.is_some() {
-        line(&mut out, format_args!("mtllib {}", clean(library)));
+    if let Some(library) = library {
+        let library = companion(&format!("{stem}.mtl"), library);
+        line(&mut out, format_args!("mtllib {library}"));
     }
     let colors = point_colors(model);
     for (at, point) in model.points.iter().enumerate() {
@@ -59,10 +53,10 @@ pub fn write_obj(model: &Model, library: &str) -> ObjFiles {
         texcoords += part.uvs.first().map_or(0, Vec::len);
         normals += part.normals.len();
     }
-    ObjFiles { obj: out, mtl, images }
+    out
 }
 
-/// Writes to memory, which cannot fail.
+/// Writes formatted text to memory, which cannot fail.
 pub(super) fn line(out: &mut Vec<u8>, text: std::fmt::Arguments) {
     let _ = out.write_fmt(text);
     out.push(b'\n');
@@ -98,13 +92,13 @@ fn write_part(out: &mut Vec<u8>, part: &Part, texcoords: usize, normals: usize) 
     }
 }
 
-/// The coordinate that reading turns into `v`: `1 - v`, or the float next to it where that rounds elsewhere.
+/// The texture coordinate that reading turns into `v`: `1 - v`, or the float next to it where that rounds differently.
 fn turned(v: f32) -> f32 {
     let near = 1.0 - v;
     [near, near.next_up(), near.next_down()].into_iter().find(|turned| 1.0 - turned == v).unwrap_or(near)
 }
 
-/// The colour of each point, from the first vertex there; white for those without. Empty if no part has colours.
+/// The colour of each point, from the first vertex at it; white for points without one. Empty if no part has colours.
 fn point_colors(model: &Model) -> Vec<Vec4> {
     let colored = |part: &&Part| !part.colors.is_empty() && part.colors.len() == part.vertices.len();
     if !model.parts.iter().any(|part| colored(&part)) {
@@ -132,7 +126,7 @@ fn object_names(model: &Model) -> Vec<String> {
     names
 }
 
-/// Names fit for a line, each used once; `kind` and a number for those without.
+/// Distinct names fit for a line; an empty name becomes `kind` and a number.
 pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>, kind: &str) -> Vec<String> {
     let mut used = HashSet::new();
     let unique = |(at, name): (usize, &str)| {
@@ -149,7 +143,7 @@ pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>, kind: &str) -> 
     names.enumerate().map(unique).collect()
 }
 
-/// Text that stays on its line.
+/// Text with control characters replaced by blanks, so that it stays on its line.
 fn clean(text: &str) -> String {
     let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     text.trim().trim_end_matches('\\').trim_end().to_owned()

@@ -1,4 +1,4 @@
-//! glTF materials as a material library.
+//! Material libraries written from glTF materials.
 
 use serde_json::Value;
 
@@ -6,32 +6,31 @@ use super::{
     paths::safe_relative_path,
     write::{distinct, line},
 };
-use crate::mesh::model::Looks;
+use crate::mesh::{CompanionSink, model::MaterialSet};
 
-/// Paths and bytes of image files.
-type Images = Vec<(String, Vec<u8>)>;
-
-/// Names of the materials, the library, and the image files it refers to. No library for no materials.
-pub(super) fn materials(looks: &Looks) -> (Vec<String>, Option<Vec<u8>>, Images) {
-    let names =
-        distinct(looks.materials.iter().map(|material| material["name"].as_str().unwrap_or_default()), "material");
-    let files = image_names(looks);
-    let mut used = vec![false; files.len()];
+/// Names of the materials, and the library. No library for no materials. Images that it refers to go to `companion`.
+pub(super) fn materials(material_set: &MaterialSet, companion: &mut CompanionSink) -> (Vec<String>, Option<Vec<u8>>) {
+    let names = distinct(
+        material_set.materials.iter().map(|material| material["name"].as_str().unwrap_or_default()),
+        "material",
+    );
+    let plain = image_names(material_set);
+    let mut files: Vec<Option<String>> = vec![None; plain.len()];
     let mut out = Vec::new();
-    for (name, material) in names.iter().zip(&looks.materials) {
+    for (name, material) in names.iter().zip(&material_set.materials) {
         line(&mut out, format_args!("newmtl {name}"));
         write_material(&mut out, material, |texture| {
-            let texture = looks.textures.get(texture["index"].as_u64()? as usize)?;
+            let texture = material_set.textures.get(texture["index"].as_u64()? as usize)?;
             let image = texture["source"].as_u64()? as usize;
-            *used.get_mut(image)? = true;
-            let clamped = texture["sampler"].as_u64().and_then(|at| looks.samplers.get(at as usize));
+            // An image that was not found has no bytes.
+            let bytes = Some(&material_set.images.get(image)?.bytes).filter(|bytes| !bytes.is_empty())?;
+            let file = files.get_mut(image)?.get_or_insert_with(|| companion(&plain[image], bytes.clone()));
+            let clamped = texture["sampler"].as_u64().and_then(|at| material_set.samplers.get(at as usize));
             let clamped = clamped.is_some_and(|sampler| sampler["wrapS"] == 33071 && sampler["wrapT"] == 33071);
-            Some((files[image].clone(), clamped))
+            Some((file.clone(), clamped))
         });
     }
-    let images = files.into_iter().zip(&looks.images).zip(used).filter(|(_, used)| *used);
-    let images = images.map(|((file, image), _)| (file, image.bytes.clone())).collect();
-    (names, (!looks.materials.is_empty()).then_some(out), images)
+    (names, (!material_set.materials.is_empty()).then_some(out))
 }
 
 fn write_material(out: &mut Vec<u8>, material: &Value, mut file: impl FnMut(&Value) -> Option<(String, bool)>) {
@@ -86,9 +85,9 @@ fn write_material(out: &mut Vec<u8>, material: &Value, mut file: impl FnMut(&Val
 }
 
 /// A file name for each image, each used once.
-fn image_names(looks: &Looks) -> Vec<String> {
+fn image_names(material_set: &MaterialSet) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
-    for (at, image) in looks.images.iter().enumerate() {
+    for (at, image) in material_set.images.iter().enumerate() {
         let extension = if image.mime == "image/jpeg" { "jpg" } else { "png" };
         let safe = safe_relative_path(&image.name).unwrap_or_else(|| format!("texture_{at}"));
         let known =

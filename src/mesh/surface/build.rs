@@ -1,9 +1,10 @@
-//! Builds the hierarchy: top down, by binned surface area heuristic (Wald, "On fast Construction of SAH-based Bounding
-//! Volume Hierarchies", 2007), eight children at a time.
+//! Construction of the hierarchy: top down, by binned surface area heuristic (Wald, "On fast Construction of SAH-based
+//! Bounding Volume Hierarchies", 2007), eight children at a time.
 //!
 //! Clustering bottom up (PLOC) is faster on good meshes, but takes quadratic time where each box is nearest to a
-//! smaller neighbour, as in a fan of growing triangles, or where many are equal; here the depth and the time are bounded
-//! for any input. Only minima, maxima and whole numbers are combined across threads, so their number changes nothing.
+//! smaller neighbour, as in a fan of growing triangles, or where many boxes are equal. Depth and time of this
+//! construction are bounded for any input. Only minima, maxima and whole numbers are combined across threads, so the
+//! number of threads changes nothing.
 
 use std::ops::Range;
 
@@ -18,11 +19,11 @@ use super::packet::{LANES, Quad};
 const BINS: usize = 16;
 /// Bins for parts of few primitives.
 const FEW_BINS: usize = 8;
-/// What few primitives are.
+/// Largest number of primitives that get [`FEW_BINS`].
 const FEW: usize = 24;
-/// Levels after which ranges are halved instead, so that the depth stays below `tree::DEPTH`.
+/// Depth from which ranges are halved instead, so that the depth stays below `tree::DEPTH`.
 const PATIENCE: usize = 20;
-/// Triangles of the largest leaf.
+/// Largest number of triangles in a leaf.
 const MOST: usize = 2 * LANES;
 /// Primitives in a unit of parallel work.
 const CHUNK: usize = 1 << 14;
@@ -44,7 +45,7 @@ impl Primitive {
         }
     }
 
-    /// The triangles in it.
+    /// The triangles of the primitive.
     pub fn triangles(&self) -> Range<u32> {
         let low = self.high.w as u32;
         let first = (self.low.w as u32) << 16 | low >> 1;
@@ -56,7 +57,7 @@ impl Primitive {
     }
 }
 
-/// A box whose last lanes mean nothing.
+/// A box whose last lanes are unused.
 #[derive(Debug, Clone, Copy)]
 struct Box4 {
     low: Vec4,
@@ -88,11 +89,11 @@ impl Box4 {
 pub(super) struct Part {
     /// Indices of the primitives.
     pub range: Range<usize>,
-    /// If they are a leaf, how many packets it has (one or two), else zero.
+    /// Number of packets if the primitives are a leaf (one or two), else zero.
     pub packets: usize,
     triangles: usize,
     bounds: Box4,
-    /// Around twice the centres of their boxes.
+    /// Bounds of the doubled centres of the primitives' boxes.
     centers: Box4,
 }
 
@@ -129,7 +130,7 @@ impl Part {
         }
     }
 
-    /// Counts the packets it needs, if these are few enough for a leaf.
+    /// Counts the packets that the part needs, if these are few enough for a leaf.
     fn settle(mut self, primitives: &[Primitive], triangles: &[[u32; 3]]) -> Self {
         if self.triangles <= MOST {
             let packets = quads(primitives, triangles).len.div_ceil(2);
@@ -159,7 +160,7 @@ impl Quads {
     }
 }
 
-/// Pairs triangles that share an edge, as many as come along; at most [`MOST`] triangles.
+/// Pairs triangles that share an edge, in their order; takes at most [`MOST`] triangles.
 pub(super) fn quads(primitives: &[Primitive], triangles: &[[u32; 3]]) -> Quads {
     let mut quads = Quads { quads: [Quad::one(0, [0; 3]); MOST], len: 0 };
     let mut alone = [0; MOST];
@@ -205,7 +206,7 @@ struct Bin {
     triangles: usize,
 }
 
-/// Where a plane along an axis puts primitives.
+/// Mapping from a primitive's centre to its bin along an axis.
 #[derive(Debug, Clone, Copy)]
 struct Binning {
     axis: usize,
@@ -240,7 +241,7 @@ impl Binning {
     }
 }
 
-/// The primitives of all triangles that can take part, in their order, and how many triangles that is.
+/// The primitives of all usable triangles, in their order, and the number of these triangles.
 pub(super) fn primitives(points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Primitive>, usize) {
     let bounds_of = |triangle: &[u32; 3]| -> Option<Bounds> {
         let [a, b, c] = triangle.map(|corner| points.get(corner as usize).copied().filter(|&point| usable(point)));
@@ -283,7 +284,7 @@ pub(super) fn primitives(points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Primit
     (out, count)
 }
 
-/// All primitives as one part, which is not a leaf.
+/// One part of all primitives, not a leaf.
 pub(super) fn whole(primitives: &[Primitive]) -> Part {
     Part::new(0, primitives)
 }
@@ -292,12 +293,12 @@ pub(super) fn whole(primitives: &[Primitive]) -> Part {
 pub(super) fn children(primitives: &mut [Primitive], part: &Part, triangles: &[[u32; 3]], level: usize) -> Vec<Part> {
     let mut parts = Vec::with_capacity(WIDTH);
     let offset = part.range.start;
-    // Only a root may fit a leaf itself.
+    // Only the root can fit a leaf itself.
     parts.push(part.clone().settle(primitives, triangles));
-    // What is too large for a leaf, then what is too large for a packet.
+    // Parts too large for a leaf are split first, then parts too large for a packet.
     for packets in [0, 2] {
         while parts.len() < WIDTH {
-            // The largest box is the likeliest to be met.
+            // The largest box is the likeliest to be hit.
             let mut widest: Option<(usize, f32)> = None;
             for (i, part) in parts.iter().enumerate().filter(|(_, part)| part.packets == packets) {
                 let area = if level < PATIENCE { part.bounds.half_area() } else { part.triangles as f32 };

@@ -47,7 +47,7 @@ pub(super) fn at(weights: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
     a * weights.x + b * weights.y + c * weights.z
 }
 
-/// How far along `edge` the foot of `offset` lies, from 0 to 1.
+/// Position of the foot of `offset` along `edge`, from 0 to 1.
 fn fraction(offset: Vec3, edge: Vec3) -> f32 {
     let length = edge.length_squared();
     if length > 0.0 { (offset.dot(edge) / length).clamp(0.0, 1.0) } else { 0.0 }

@@ -1,4 +1,4 @@
-//! Whether and where a ray crosses a triangle, without gaps between neighbours.
+//! Crossing test of a ray and a triangle, without gaps between neighbours.
 //!
 //! After Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection" (JCGT 2013): vertices are sheared so that the
 //! ray becomes the third axis, which maps a vertex to the same two coordinates whatever triangle it is in; the sign of
@@ -10,13 +10,13 @@ use glam::Vec3;
 
 use crate::mesh::ray::{Hit, Ray};
 
-/// Coordinates past this are treated as unusable: products of two of them must stay finite.
+/// Largest usable coordinate: products of two coordinates must stay finite.
 pub(super) const LIMIT: f32 = 1e18;
 
-/// Relative size of the errors of a sheared vertex, with a margin: boxes are met with this much slack.
+/// Relative size of the errors of a sheared vertex, with a margin: boxes are tested with this much slack.
 pub(super) const SLACK: f32 = 1.0 / (1 << 19) as f32;
 
-/// True if a coordinate can take part.
+/// Returns `true` if all coordinates are numbers of usable size.
 pub(super) fn usable(point: Vec3) -> bool {
     // Written so that NaN fails.
     point.abs().max_element() <= LIMIT && !point.is_nan()
@@ -25,38 +25,38 @@ pub(super) fn usable(point: Vec3) -> bool {
 /// A ray prepared for many triangles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame {
-    /// Where the ray starts.
+    /// Start of the ray.
     pub origin: Vec3,
-    /// Where it goes; any length but zero.
+    /// Direction of the ray, of any length but zero.
     pub direction: Vec3,
     /// The axes of the sheared space; the last is the longest of the direction.
     pub axes: [usize; 3],
-    /// What to subtract of the third coordinate from the first two.
+    /// Factors of the third coordinate to subtract from the first two.
     pub shear: [f32; 2],
 }
 
-/// A crossing before neighbours that share it are counted once.
+/// A crossing before crossings at a shared edge or corner are merged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     /// Distance along the ray.
     pub distance: f64,
     /// The triangle, as the caller numbers them.
     pub triangle: u32,
-    /// Where the caller keeps its corners.
+    /// Slot of the triangle in the caller's storage.
     pub slot: u32,
-    /// True if the ray goes in.
+    /// Direction of the crossing: `true` if the ray goes in.
     pub entering: bool,
-    /// Distances less than this apart may be the same place.
+    /// Distances less than this apart may be the same crossing.
     pub tolerance: f32,
 }
 
 impl Crossing {
-    /// Sorts along the ray, ties by triangle.
+    /// Sort key: distance along the ray, then triangle.
     pub fn key(&self) -> (f64, u32) {
         (self.distance, self.triangle)
     }
 
-    /// What callers see.
+    /// The crossing as callers see it.
     pub fn hit(&self) -> Hit {
         Hit { distance: self.distance as f32, triangle: self.triangle, entering: self.entering }
     }
@@ -75,7 +75,8 @@ impl Frame {
         Some(Self { origin: ray.origin, direction: ray.direction, axes, shear })
     }
 
-    /// Where the ray crosses the triangle: distance, whether it enters, and how far its corners lie from the origin.
+    /// Crossing of the ray and the triangle: distance, whether it enters, and the largest distance of a corner from the
+    /// origin.
     pub fn cross(&self, corners: [Vec3; 3]) -> Option<(f64, bool, f32)> {
         let [x, y, z] = self.axes;
         let flat = corners.map(|corner| {
@@ -99,8 +100,8 @@ impl Frame {
     }
 }
 
-/// Twice the area between the origin and the edge `a` → `b`, and on which side of the edge the origin lies: never zero
-/// unless the ends coincide, and exactly opposite for the opposite edge.
+/// Twice the area of the triangle of the origin and the edge `a` → `b`, and the side of the edge on which the origin
+/// lies: never zero unless the ends coincide, and exactly opposite for the opposite edge.
 fn side(a: [f32; 2], b: [f32; 2]) -> (f64, i32) {
     // Products of two f32 are exact in f64, so the sign of their difference is as well.
     let area = f64::from(a[0]) * f64::from(b[1]) - f64::from(a[1]) * f64::from(b[0]);
@@ -115,7 +116,7 @@ fn side(a: [f32; 2], b: [f32; 2]) -> (f64, i32) {
     (area, side)
 }
 
-/// Sorts crossings and writes them as hits, a place that several triangles share once.
+/// Sorts crossings and writes them as hits; a crossing that several triangles share becomes one hit.
 ///
 /// Crossings at one place whose triangles share a corner cancel in pairs of opposite directions while more than one is
 /// left; a touch, which goes in and out at one place, stays as two hits in the order that continues the ones before.
@@ -157,7 +158,7 @@ pub(super) fn resolve(crossings: &mut [Crossing], corners: impl Fn(u32) -> [Vec3
     }
 }
 
-/// True if two triangles have a corner in common, by position.
+/// Returns `true` if two triangles have a corner in common, by position.
 fn touch(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
     a.iter().any(|a| b.contains(a))
 }

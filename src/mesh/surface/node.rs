@@ -1,4 +1,4 @@
-//! Eight boxes in 128 bytes: what a ray waits for is memory, so nodes are small.
+//! Nodes of the hierarchy: eight boxes in 128 bytes. Rays mostly wait for memory, so nodes are small.
 //!
 //! Bounds are kept as 16-bit steps from the node's own lower corner, after Ylitie, Karras and Laine, "Efficient
 //! Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs" (HPG 2017), always rounded outwards.
@@ -21,26 +21,26 @@ const STEPS: f32 = 65535.0;
 /// Four values for the first four children and four for the others.
 pub(super) type Eight = [f32x4; 2];
 
-/// Up to eight children: first those that are nodes, then leaves. Both kinds lie one after the other.
+/// Up to eight children: first those that are nodes, then leaves. The children of each kind are stored consecutively.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(128))]
 pub(super) struct Node {
-    /// Lower and upper bounds along each axis, in steps from `base`. A word holds those of child `i` in its lower half
-    /// and of child `i + 4` in its upper half.
+    /// Lower and upper bounds along each axis, in steps from `base`. A word holds the bound of child `i` in its lower
+    /// half and that of child `i + 4` in its upper half.
     planes: [[[u32; 4]; 3]; 2],
     /// The lower corner of everything in the node.
     base: [f32; 3],
     /// Binary exponents of the steps, as in an `f32`.
     exponents: [u8; 3],
-    /// How many children are nodes.
+    /// Number of children that are nodes.
     nodes: u8,
-    /// How many children there are.
+    /// Number of children.
     count: u8,
     /// A bit for each child that is a leaf of two packets.
     twos: u8,
-    /// The first child that is a node.
+    /// Index of the first child that is a node.
     pub first_node: u32,
-    /// The first packet of the first leaf.
+    /// Index of the first packet of the first leaf.
     pub first_packet: u32,
 }
 
@@ -48,11 +48,11 @@ pub(super) struct Node {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Child(u32);
 
-/// What a [`Child`] refers to.
+/// The node or leaf that a [`Child`] refers to.
 pub(super) enum Target {
     /// A node.
     Node(usize),
-    /// The first packet of a leaf, and whether there is a second.
+    /// Index of the first packet of a leaf, and whether there is a second.
     Leaf(usize, bool),
 }
 
@@ -83,7 +83,7 @@ impl Default for Bounds {
 }
 
 impl Bounds {
-    /// Holds nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
     #[inline(always)]
@@ -126,15 +126,15 @@ impl Boxes {
     }
 }
 
-/// A ray prepared for boxes: they are grown by what rounding can do to the triangles in them and to the boxes, so that
-/// no crossing that the triangle test sees is lost.
+/// A ray prepared for box tests. Boxes are grown by the rounding errors of their triangles and of their own bounds, so
+/// that no crossing of the triangle test is lost.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BoxRay {
     /// The origin, moved back for near planes and ahead for far ones.
     origins: [Vec3; 2],
-    /// One over the direction.
+    /// Reciprocal of the direction.
     inverse: Vec3,
-    /// Which bound is near, per axis.
+    /// Index of the near bound (0 lower, 1 upper) per axis.
     near: [usize; 3],
 }
 
@@ -153,7 +153,7 @@ impl BoxRay {
         }
     }
 
-    /// Distances at which the ray enters and leaves each box, and a bit for each that it meets within the range.
+    /// Distances at which the ray enters and leaves each box, and a bit for each box that it crosses within the range.
     #[inline(always)]
     pub fn meet(&self, node: &Node, from: f32, to: f32) -> (Eight, Eight, u32) {
         let (mut enter, mut leave) = ([f32x4::splat(from); 2], [f32x4::splat(to); 2]);
@@ -175,7 +175,8 @@ impl BoxRay {
 }
 
 impl Node {
-    /// A node without boxes: how many of its children are nodes, and how many packets each leaf has (one or two).
+    /// Makes a node without boxes from the number of children that are nodes and the number of packets of each leaf
+    /// (one or two).
     pub fn new(nodes: usize, leaves: impl Iterator<Item = usize>) -> Self {
         let mut node = Self {
             planes: [[[0; 4]; 3]; 2],
@@ -194,22 +195,22 @@ impl Node {
         node
     }
 
-    /// How many children there are.
+    /// Number of children.
     pub fn len(&self) -> usize {
         self.count as usize
     }
 
-    /// How many of them are nodes.
+    /// Number of children that are nodes.
     pub fn inner(&self) -> usize {
         self.nodes as usize
     }
 
-    /// How many packets its leaves have.
+    /// Number of packets of all leaves.
     pub fn packets(&self) -> usize {
         self.len() - self.inner() + self.twos.count_ones() as usize
     }
 
-    /// How many packets the leaf at `i` has.
+    /// Number of packets of the leaf at `i`.
     pub fn packets_of(&self, i: usize) -> usize {
         1 + usize::from(self.twos >> i & 1)
     }
@@ -255,7 +256,7 @@ impl Node {
         (squared, (1 << self.count) - 1)
     }
 
-    /// Takes the boxes of its children; returns the box around all.
+    /// Sets the boxes of the node's children; returns the box around all.
     pub fn fit(&mut self, boxes: &Boxes) -> Bounds {
         let mut whole = Bounds::EMPTY;
         for axis in 0..3 {
@@ -263,11 +264,11 @@ impl Node {
             whole.low[axis] = low.iter().copied().fold(f32::INFINITY, |a, b| if b < a { b } else { a });
             whole.high[axis] = high.iter().copied().fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
             self.base[axis] = whole.low[axis];
-            // The next power of two: one more than the exponent of a number that is not below the wanted step.
+            // The next power of two: one more than the exponent of a number that is not below the required step.
             let wanted = (whole.high[axis] - whole.low[axis]) * (1.001 / STEPS);
             self.exponents[axis] = (wanted.to_bits() >> 23) as u8 + 1;
             let (base, scale) = (f32x4::splat(self.base[axis]), f32x4::splat(1.0 / self.step(axis)));
-            // Casts round down; the one more above also covers what rounding took. Absent children stay in range too.
+            // Casts round down; the one more above also covers the rounding errors. Absent children stay in range too.
             for (planes, side, more) in [(low, 0, 0.0), (high, 1, 1.0)] {
                 let steps = |half: usize| {
                     let four: [f32; 4] = std::array::from_fn(|i| planes[4 * half + i]);
@@ -281,7 +282,7 @@ impl Node {
         whole
     }
 
-    /// Reads from both halves of the node.
+    /// Reads a word from each half of the node.
     #[inline(always)]
     pub fn touch(&self) -> u32 {
         self.planes[0][0][0] ^ self.first_packet

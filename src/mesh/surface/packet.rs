@@ -16,19 +16,19 @@ pub(super) const NONE: u32 = u32::MAX;
 pub(super) struct Quad {
     /// Points: the first triangle has the corners 0, 1, 2 and the second 0, 2, 3, each after a rotation.
     pub points: [u32; 4],
-    /// Both triangles, [`NONE`] if there is no second.
+    /// Index of each triangle; [`NONE`] for a missing second one.
     pub triangles: [u32; 2],
-    /// Which of a triangle's own corners comes first, for each.
+    /// Index of the triangle's own corner that comes first, for each triangle.
     rotations: [u8; 2],
 }
 
 impl Quad {
-    /// A triangle alone.
+    /// A quad of one triangle.
     pub fn one(index: u32, [a, b, c]: [u32; 3]) -> Self {
         Self { points: [a, b, c, c], triangles: [index, NONE], rotations: [0; 2] }
     }
 
-    /// Two triangles, if they run along a common edge in opposite directions.
+    /// A quad of two triangles, if they run along a common edge in opposite directions.
     pub fn two(indices: [u32; 2], first: [u32; 3], second: [u32; 3]) -> Option<Self> {
         for i in 0..3 {
             let [a, b, c] = [first[i], first[(i + 1) % 3], first[(i + 2) % 3]];
@@ -50,18 +50,18 @@ impl Quad {
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(128))]
 pub(super) struct Packet {
-    /// Axis, then quad, then the quad's points.
+    /// Coordinates by axis, then quad, then the quad's points.
     corners: [[f32x4; 2]; 3],
     /// The caller's index of each triangle, [`NONE`] if a lane has none.
     triangles: [u32; LANES],
-    /// Which corner of each triangle comes first.
+    /// Index of the corner of each triangle that comes first.
     rotations: [u8; LANES],
     /// A bit for each lane with a triangle.
     lanes: u32,
 }
 
 impl Packet {
-    /// Takes one or two quads; returns the packet without positions, and whose points it needs.
+    /// Makes a packet of one or two quads, without positions; returns it with the indices of its points.
     pub fn new(quads: &[Quad]) -> (Self, [u32; 8]) {
         let mut packet =
             Self { corners: [[f32x4::ZERO; 2]; 3], triangles: [NONE; LANES], rotations: [0; LANES], lanes: 0 };
@@ -79,7 +79,7 @@ impl Packet {
         (packet, points)
     }
 
-    /// Takes the positions of its points; returns the box around them.
+    /// Sets the positions of the packet's points; returns the box around them.
     #[inline(always)]
     pub fn place(&mut self, points: &[Vec3], sources: &[u32; 8]) -> Bounds {
         let at = sources.map(|point| points[point as usize].to_array());
@@ -117,7 +117,7 @@ impl Packet {
         self.lanes
     }
 
-    /// A bit for each lane whose triangle may be crossed: none is missed, and nearly all are right.
+    /// A bit for each lane whose triangle may be crossed. No crossing is missed; false candidates are rare.
     ///
     /// The same sheared coordinates as in [`Frame::cross`]. Rounding keeps order, so a strict comparison of rounded
     /// products is a strict comparison of the products themselves.
@@ -145,7 +145,7 @@ impl Packet {
         !mixed.move_mask() as u32 & self.lanes
     }
 
-    /// Reads from both halves of the packet.
+    /// Reads a word from each half of the packet.
     #[inline(always)]
     pub fn touch(&self) -> u32 {
         self.corners[0][0].as_array_ref()[0].to_bits() ^ self.lanes

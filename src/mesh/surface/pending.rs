@@ -1,4 +1,4 @@
-//! A surface that answers before its hierarchy is built.
+//! A surface that answers queries before its hierarchy is built.
 
 use std::sync::{Arc, OnceLock};
 
@@ -9,7 +9,8 @@ use super::Surface;
 use super::crossing::{Crossing, Frame, resolve, usable};
 use crate::mesh::ray::{Hit, Ray};
 
-/// Every place where `ray` crosses the triangles, by testing each of them; the same, to the bit, as [`Surface::hits`].
+/// Collects every crossing of `ray` with the triangles by testing each of them; the hits equal those of
+/// [`Surface::hits`] to the bit.
 ///
 /// Parallel over triangles: about as fast as building a hierarchy for a handful of rays.
 pub fn hits_brute(points: &[Vec3], triangles: &[[u32; 3]], ray: &Ray, out: &mut Vec<Hit>) {
@@ -50,19 +51,19 @@ pub struct PendingSurface {
 }
 
 impl PendingSurface {
-    /// Holds `points` (posed space) and `triangles` over them; does no work yet.
+    /// Holds `points` (posed space) and `triangles` over them; builds nothing yet.
     pub fn new(points: Arc<[Vec3]>, triangles: Arc<[[u32; 3]]>) -> Self {
         Self { points, triangles, ready: OnceLock::new() }
     }
 
-    /// Builds the hierarchy, unless that is done, and returns it. Others who call this meanwhile wait for it.
+    /// Builds the hierarchy, unless that is done, and returns it. Concurrent callers wait for it.
     pub fn build(&self) -> &Surface {
         self.ready.get_or_init(|| Surface::build(&self.points, &self.triangles))
     }
 
-    /// Takes a hierarchy that was made elsewhere (refitted from another pose); one that is there already stays.
+    /// Sets a hierarchy that was made elsewhere (refitted from another pose). A hierarchy that is already set stays.
     pub fn set(&self, surface: Surface) {
-        // An error means that another hierarchy over the same points is there: just as good.
+        // An error means that another hierarchy over the same points is set: just as good.
         let _ = self.ready.set(surface);
     }
 
@@ -76,7 +77,7 @@ impl PendingSurface {
         self.ready.into_inner()
     }
 
-    /// As [`Surface::hits`].
+    /// Collects all hits along `ray`, as [`Surface::hits`].
     pub fn hits(&self, ray: &Ray, out: &mut Vec<Hit>) {
         match self.ready() {
             Some(surface) => surface.hits(ray, out),
@@ -84,7 +85,7 @@ impl PendingSurface {
         }
     }
 
-    /// As [`Surface::near_far`].
+    /// The first and the last hit along `ray`, as [`Surface::near_far`].
     pub fn near_far(&self, ray: &Ray) -> Option<(Hit, Hit)> {
         match self.ready() {
             Some(surface) => surface.near_far(ray),
@@ -97,7 +98,7 @@ impl PendingSurface {
         }
     }
 
-    /// As [`Surface::closest`].
+    /// The first hit along `ray`, as [`Surface::closest`].
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         match self.ready() {
             Some(surface) => surface.closest(ray),

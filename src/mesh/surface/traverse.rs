@@ -11,10 +11,10 @@ use super::node::{BoxRay, Child, Target, WIDTH};
 use super::packet::LANES;
 use super::tree::{DEPTH, Tree};
 
-/// Room for the children that wait: seven a level.
+/// Largest number of waiting children: seven a level.
 const STACK: usize = (WIDTH - 1) * DEPTH + 1;
 
-/// Children that wait, the best on top, each with what it may hold at best (less is better).
+/// Stack of children to visit, the best on top, each with a bound of the distances in it (less is better).
 struct Waiting {
     children: [(f32, Child); STACK],
     len: usize,
@@ -31,7 +31,7 @@ impl Waiting {
         Some(self.children[self.len])
     }
 
-    /// Adds a child; those from `start` on are kept in order.
+    /// Adds a child; the entries from `start` on are kept in order.
     #[inline(always)]
     fn push(&mut self, start: usize, bound: f32, child: Child) {
         let mut at = self.len;
@@ -109,7 +109,8 @@ impl Tree {
         best
     }
 
-    /// Reads from what a child refers to, so that it is on its way from memory while others are tested.
+    /// Reads a word of the node or packet of a child, so that the processor fetches it from memory while others are
+    /// tested.
     #[inline(always)]
     fn touch(&self, child: Child) -> u32 {
         match child.target() {
@@ -118,7 +119,32 @@ impl Tree {
         }
     }
 
-    /// Every crossing, in no order.
+    /// True if a triangle is crossed at a distance between `from` and `to`.
+    pub fn crosses(&self, frame: &Frame, boxes: &BoxRay, from: f32, to: f32) -> bool {
+        let between = |crossing: &Crossing| (f64::from(from)..f64::from(to)).contains(&crossing.distance);
+        let mut waiting = Waiting::new(self);
+        while let Some((_, child)) = waiting.pop() {
+            match child.target() {
+                Target::Node(index) => {
+                    let node = &self.nodes[index];
+                    let (_, _, mask) = boxes.meet(node, from, to);
+                    for i in bits(mask) {
+                        waiting.push(waiting.len, 0.0, node.child(i));
+                    }
+                }
+                Target::Leaf(index, two) => {
+                    let mut found = false;
+                    self.test(index, two, frame, |crossing| found |= between(&crossing));
+                    if found {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Collects every crossing, in no order.
     pub fn all(&self, frame: &Frame, boxes: &BoxRay, out: &mut Vec<Crossing>) {
         let mut waiting = Waiting::new(self);
         let mut touched = 0;

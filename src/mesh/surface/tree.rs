@@ -1,4 +1,4 @@
-//! The hierarchy: laid out depth first, so that what is near in space is near in memory.
+//! The hierarchy in memory: laid out depth first, so that nodes near in space are near in memory.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use super::build::{self, Part, Primitive};
 use super::node::{Bounds, Boxes, Node, WIDTH};
 use super::packet::Packet;
 
-/// Most levels of nodes there can be: the builder halves ranges long before.
+/// Bound on the levels of nodes: the builder halves ranges long before it.
 pub(super) const DEPTH: usize = 40;
 /// A subtree with more nodes is refitted in parallel.
 const SEQUENTIAL: usize = 512;
@@ -15,9 +15,9 @@ const SEQUENTIAL: usize = 512;
 /// Nodes over packets of triangles.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tree {
-    /// The root, then its children, then what is below the first of them, and so on.
+    /// The root, then its children, then the subtree of the first of them, and so on.
     pub nodes: Vec<Node>,
-    /// In the same order.
+    /// Packets in the same order.
     pub packets: Vec<Packet>,
     /// The points of each packet.
     sources: Vec<[u32; 8]>,
@@ -25,18 +25,18 @@ pub(super) struct Tree {
     pub bounds: Bounds,
 }
 
-/// A node while the tree is built: in order of levels, and what its children are.
+/// A node during construction: drafts are in order of levels and know their children.
 struct Draft {
     node: Node,
     leaves: Vec<Part>,
-    /// Its first child among the drafts.
+    /// Index of the first child among the drafts.
     first: usize,
-    /// Nodes and packets below it.
+    /// Numbers of nodes and packets below the draft.
     below: [u32; 2],
 }
 
 impl Tree {
-    /// Builds over the triangles that can take part; returns how many these are.
+    /// Builds the hierarchy over the usable triangles; returns it and their number.
     pub fn build(points: &[Vec3], triangles: &[[u32; 3]]) -> (Self, usize) {
         let (mut primitives, count) = build::primitives(points, triangles);
         let mut tree = Self::default();
@@ -49,7 +49,7 @@ impl Tree {
         let (empty, _) = Packet::new(&[]);
         tree.packets = vec![empty; packets as usize];
         tree.sources = vec![[0; 8]; packets as usize];
-        // Each draft's leaves are packets in a row, and the rows follow each other.
+        // The packets of each draft's leaves are consecutive, and drafts follow each other.
         let (mut packets, mut sources) = (&mut tree.packets[..], &mut tree.sources[..]);
         let mut work = Vec::with_capacity(drafts.len());
         let mut by_packet: Vec<&Draft> = drafts.iter().filter(|draft| !draft.leaves.is_empty()).collect();
@@ -76,12 +76,12 @@ impl Tree {
         (tree, count)
     }
 
-    /// The points that triangles use; some several times.
+    /// Indices of the points that triangles use; some appear several times.
     pub fn points(&self) -> impl Iterator<Item = usize> {
         self.sources.iter().flatten().map(|&point| point as usize)
     }
 
-    /// Takes new positions of the same points.
+    /// Refits all boxes to new positions of the same points.
     pub fn refit(&mut self, points: &[Vec3]) {
         self.bounds = match self.nodes.split_first_mut() {
             Some((root, below)) => {
@@ -93,7 +93,7 @@ impl Tree {
     }
 }
 
-/// Splits everything level by level.
+/// Splits all primitives level by level.
 fn draft(primitives: &mut [Primitive], triangles: &[[u32; 3]]) -> Vec<Draft> {
     let mut drafts: Vec<Draft> = Vec::new();
     let mut level = vec![build::whole(primitives)];
@@ -119,7 +119,7 @@ fn draft(primitives: &mut [Primitive], triangles: &[[u32; 3]]) -> Vec<Draft> {
     drafts
 }
 
-/// Gives each node the place of its children; returns which draft comes at each place.
+/// Assigns each node the place of its children; returns the index of the draft at each place.
 fn arrange(drafts: &mut [Draft]) -> Vec<usize> {
     for i in (0..drafts.len()).rev() {
         let (first, inner) = (drafts[i].first, drafts[i].node.inner());
@@ -148,7 +148,7 @@ fn arrange(drafts: &mut [Draft]) -> Vec<usize> {
     order
 }
 
-/// Everything below a node.
+/// The nodes and packets below a node.
 struct Region<'a> {
     /// Index of the first of `nodes`.
     first: usize,
@@ -158,7 +158,7 @@ struct Region<'a> {
 }
 
 impl<'a> Region<'a> {
-    /// Refits what is below `node`, and the node itself; returns the box around it.
+    /// Refits the subtree of `node` and the node itself; returns the box around it.
     fn refit(self, node: &mut Node, points: &[Vec3]) -> Bounds {
         let mut boxes = Boxes::EMPTY;
         let inner = node.inner();

@@ -1,13 +1,13 @@
-//! From hits to volumes: the stretches of a ray that lie inside a body.
+//! Volumes: the intervals of a ray that lie inside a body.
 
 use crate::mesh::ray::Hit;
 
-/// A stretch of a ray inside the surface, as distances from the ray's origin.
+/// An interval of a ray inside the surface, as distances from the ray's origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Volume {
-    /// Where it begins.
+    /// Distance at which the interval begins.
     pub near: f32,
-    /// Where it ends; equal to `near` for a sheet whose other side is missing.
+    /// Distance at which the interval ends; equal to `near` for a sheet whose other side is missing.
     pub far: f32,
 }
 
@@ -18,17 +18,17 @@ impl Volume {
     }
 }
 
-/// Groups the hits of one ray, sorted by distance, into volumes, sorted by distance and apart from each other.
+/// Groups the hits of one ray, sorted by distance, into disjoint volumes, sorted by distance.
 ///
 /// The rule:
-/// 1. Opposite hits at the same distance are a two-sided sheet or a mere touch. They are left out, unless the ray
-///    meets nothing else; then sheets go in and out in turn.
+/// 1. Opposite hits at the same distance are a two-sided sheet or a mere touch. They are left out, unless the ray meets
+///    nothing else; then sheets go in and out in turn.
 /// 2. If as many hits enter as leave, a volume is a stretch where the winding number is not zero. So shells inside a
 ///    shell (teeth in a body), duplicates of a shell and shells that overlap make one volume; a shell turned inside out
 ///    makes the same volume as its right self; a cavity (a mouth whose walls belong to the body) separates two.
-/// 3. Otherwise some surface is open. Each exit is paired with the last entry before it that has none; what remains is
-///    paired the other way around (exit first: inside out); outermost pairs are volumes. A hit that finds no partner
-///    and lies in no volume is a sheet: a volume whose `near` and `far` are equal.
+/// 3. Otherwise some surface is open. Each exit is paired with the last entry before it that has none; the remaining
+///    hits are paired the other way around (exit first: inside out); outermost pairs are volumes. A hit that finds no
+///    partner and lies in no volume is a sheet: a volume whose `near` and `far` are equal.
 ///
 /// Linear time.
 pub fn volumes(hits: &[Hit]) -> Vec<Volume> {
@@ -37,13 +37,13 @@ pub fn volumes(hits: &[Hit]) -> Vec<Volume> {
         return sheets.chunks(2).map(|pair| Volume { near: pair[0], far: pair[pair.len() - 1] }).collect();
     }
     let winding: i64 = solid.iter().map(|&(_, entering)| if entering { 1 } else { -1 }).sum();
-    if winding == 0 { wound(&solid) } else { paired(&solid) }
+    if winding == 0 { winding_volumes(&solid) } else { paired_volumes(&solid) }
 }
 
 /// Distance, and whether the ray enters.
 type Side = (f32, bool);
 
-/// Takes out opposite hits at one distance; returns what is left and the distances of what was taken.
+/// Removes opposite hits at one distance; returns the remaining hits and the distances of the removed ones.
 fn split_sheets(hits: &[Hit]) -> (Vec<Side>, Vec<f32>) {
     let (mut solid, mut sheets) = (Vec::with_capacity(hits.len()), Vec::new());
     for same in hits.chunk_by(|a, b| b.distance - a.distance <= a.distance.abs() * 1e-6) {
@@ -59,8 +59,8 @@ fn split_sheets(hits: &[Hit]) -> (Vec<Side>, Vec<f32>) {
     (solid, sheets)
 }
 
-/// Stretches where the winding number is not zero; the sum over all hits is zero.
-fn wound(hits: &[Side]) -> Vec<Volume> {
+/// Intervals where the winding number is not zero; the sum over all hits is zero.
+fn winding_volumes(hits: &[Side]) -> Vec<Volume> {
     let mut volumes = Vec::new();
     let (mut winding, mut near) = (0, 0.0);
     for &(distance, entering) in hits {
@@ -75,8 +75,8 @@ fn wound(hits: &[Side]) -> Vec<Volume> {
     volumes
 }
 
-/// Outermost pairs, and what finds none.
-fn paired(hits: &[Side]) -> Vec<Volume> {
+/// Outermost pairs, and hits without a partner as sheets.
+fn paired_volumes(hits: &[Side]) -> Vec<Volume> {
     let mut partner: Vec<usize> = (0..hits.len()).collect();
     for opens in [true, false] {
         let mut open: Vec<usize> = Vec::new();

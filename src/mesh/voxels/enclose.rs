@@ -1,4 +1,4 @@
-//! What is inside: a flood of the outside, and votes of straight lines where holes let it in.
+//! Inside test of voxels: a flood of the outside, and votes of straight lines where holes let the flood in.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ pub(super) fn enclose(grid: &mut Voxels, surface: Vec<u64>, points: &[Vec3], tri
 
     let dims = grid.dims;
     let at = |x: usize, row: usize| row * dims[0] + x;
-    // Cells that the flood reached although most lines say inside.
+    // Cells that the flood reached although most lines vote for inside.
     let (mut leaked, mut kept) = (0usize, 0usize);
     for row in 0..dims[1] * dims[2] {
         for x in 0..dims[0] {
@@ -34,8 +34,8 @@ pub(super) fn enclose(grid: &mut Voxels, surface: Vec<u64>, points: &[Vec3], tri
     let blurred = leaky.then(|| (blur(&odd, dims), blur(&winding, dims)));
     let inside = |index: usize| match &blurred {
         None => i32::from(odd[index]) * 2 > HALF_LINES,
-        // In a leaky body a share of the lines misses a face; winding numbers average to that share of one inside and
-        // to zero outside, parities are the fallback where triangles face at random.
+        // In a leaky body a share of the lines misses a face. Inside, winding numbers average to that share of one;
+        // outside, to zero. Parities are the fallback where triangles face at random.
         Some((odd, winding)) => {
             let full = HALF_LINES * (2 * BLUR as i32 + 1).pow(3);
             i32::from(winding[index]).abs() * 20 > full * 7 || i32::from(odd[index]) * 20 > full * 11
@@ -164,8 +164,8 @@ fn spread(outside: &mut [u64], surface: &[u64], valid: &[u64]) {
     }
 }
 
-/// For each cell how many of its six half lines cross the surface an odd number of times, and six times the mean of
-/// their winding numbers. Dense, x fastest.
+/// Votes of each cell: the number of its six half lines that cross the surface an odd number of times, and six times
+/// the mean of their winding numbers. Dense, x fastest.
 fn votes(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<i8>, Vec<i8>) {
     let dims = grid.dims;
     let count = dims[0] * dims[1] * dims[2];

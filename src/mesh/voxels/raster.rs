@@ -1,4 +1,4 @@
-//! Drawing triangles into the grid: which cells they touch, and where lines along the axes cross them.
+//! Rasterisation of triangles into the grid: the cells that they touch, and their crossings with lines along the axes.
 
 use std::sync::atomic::{AtomicI8, AtomicU64, Ordering::Relaxed};
 
@@ -9,7 +9,7 @@ use super::Voxels;
 
 /// Triangles handled at a time by one thread.
 const CHUNK: usize = 2048;
-/// Lines run through cell centres moved by this much, so that they do not meet vertices of symmetric models.
+/// Offset of lines from the cell centres, so that they do not meet vertices of symmetric models.
 const OFF_CENTER: [f64; 2] = [0.013_17, 0.007_91];
 
 /// Corners in grid units, or `None` where a corner is not finite or the triangle is clear of the grid.
@@ -42,7 +42,7 @@ fn normal(corners: &[[f64; 3]; 3]) -> [f64; 3] {
     [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
 }
 
-/// An upper estimate of how many cell columns [`surface`] and [`crossings`] will visit.
+/// An upper estimate of the number of cell columns that [`surface`] and [`crossings`] will visit.
 pub(super) fn work(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
     let columns = |chunk: &[[u32; 3]]| -> f64 {
         let mut sum = 0.0;
@@ -86,7 +86,7 @@ fn touch(corners: &[[f64; 3]; 3], dims: [usize; 3], set: &impl Fn([usize; 3])) {
         return;
     }
     if range.iter().filter(|(first, end)| end - first > 1).count() <= 1 {
-        // At most a straight row of cells: every one is touched.
+        // The triangle touches at most a straight row of cells: every one is set.
         for x in range[0].0..range[0].1 {
             for y in range[1].0..range[1].1 {
                 for z in range[2].0..range[2].1 {
@@ -179,7 +179,7 @@ pub(super) fn segment(mut from: [f64; 3], mut to: [f64; 3], dims: [usize; 3], mu
         }
     }
     let length = (0..3).map(|a| (to[a] - from[a]).abs()).fold(0.0, f64::max);
-    // What lies in the grid is short; anything else was not a number.
+    // A segment inside the grid is short; a longer one had coordinates that are not numbers.
     if length.is_nan() || length > 2.0 * super::MAX_RESOLUTION as f64 {
         return;
     }
@@ -193,8 +193,8 @@ pub(super) fn segment(mut from: [f64; 3], mut to: [f64; 3], dims: [usize; 3], mu
     }
 }
 
-/// For every cell, the sum of crossings between its centre and the centre before it on the line along `axis`:
-/// +1 where the line goes in (against the triangle's normal), -1 where it comes out. Dense, x fastest.
+/// Sums of the crossings between the centre of every cell and the centre before it on the line along `axis`: +1 where
+/// the line goes in (against the triangle's normal), -1 where it comes out. Dense, x fastest.
 pub(super) fn crossings(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]], axis: usize) -> Vec<i8> {
     let dims = grid.dims;
     let sums: Vec<AtomicI8> = (0..dims[0] * dims[1] * dims[2]).map(|_| AtomicI8::new(0)).collect();
@@ -233,7 +233,8 @@ pub(super) fn crossings(grid: &Voxels, points: &[Vec3], triangles: &[[u32; 3]], 
     sums.into_iter().map(AtomicI8::into_inner).collect()
 }
 
-/// True if the point lies in the triangle seen along an axis; of two triangles that share an edge just one has it.
+/// Returns `true` if the point lies in the triangle seen along an axis; of two triangles that share an edge exactly one
+/// covers it.
 fn covers(corners: &[[f64; 3]; 3], u: usize, v: usize, pu: f64, pv: f64) -> bool {
     let mut inside = false;
     for i in 0..3 {

@@ -1,148 +1,223 @@
-//! Created nodes as entities that follow what is built.
+//! Created nodes as entities that follow the build, and the hierarchy of all nodes of a rig.
 
 use std::collections::{BTreeMap, HashSet};
 
-use bevy::{ecs::entity_disabling::Disabled, prelude::*};
-
-use super::{Built, TagEntities};
-use crate::{
-    plugins::document::{InGroup, Joint, JointEntities, NodeLabel},
-    rig::{ControlData, NodeType, PoseOffset, RestTransform, Rig, Uid},
+use bevy::{
+    ecs::{entity_disabling::Disabled, query::Allow},
+    prelude::*,
 };
 
-/// The command tag that made a node.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
-#[relationship(relationship_target = CreatedNodes)]
-pub struct CreatedBy(pub Entity);
+use super::Built;
+use crate::{
+    plugins::{
+        document::{
+            GroupEntities, JointEntities, TagEntities,
+            entities::{BuiltEntities, EntityIndex, MirroredNode, Part},
+        },
+        runtime::RigRuntime,
+        schema::{
+            Attributes, Control, CreatedBy, CreatedRole, InGroup, Joint, NodeLabel, NodeLayer, NodeOf, Null, Parked,
+        },
+    },
+    rig::{BuiltNode, NodeType, RestTransform, Rig, Uid},
+};
 
-/// The nodes that a command made.
-#[derive(Component, Debug, Default)]
-#[relationship_target(relationship = CreatedBy)]
-pub struct CreatedNodes(Vec<Entity>);
+type Followed<'a> = (
+    Entity,
+    &'a Rig,
+    Option<&'a Built>,
+    &'a mut JointEntities,
+    &'a TagEntities,
+    &'a GroupEntities,
+    &'a mut BuiltEntities,
+    Has<RigRuntime>,
+);
 
-/// What a node was made for.
-#[derive(Component, Debug, Clone, PartialEq, Eq)]
-pub struct CreatedRole {
-    /// What the module says it is for.
-    pub role: String,
-    /// The node that it was made for.
-    pub subject: Uid,
-    /// Which of several for the same purpose.
-    pub number: u32,
-}
-
-/// A node that people and animations move.
-#[derive(Component, Debug, Clone, PartialEq)]
-pub struct Control(pub ControlData);
-
-/// A node that carries others.
-#[derive(Component, Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Null;
-
-/// A node that is rolled back. It has no place in the rig until it is built again.
-#[derive(Component, Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Parked;
-
-/// The entities of the nodes that a rig's commands created, parked ones included.
-#[derive(Component, Debug, Default)]
-pub struct BuiltEntities {
-    nodes: BTreeMap<Uid, Entity>,
-    parked: HashSet<Uid>,
-}
-
-impl BuiltEntities {
-    /// The entity of a created node that is part of the rig at present.
-    pub fn get(&self, node: Uid) -> Option<Entity> {
-        self.nodes.get(&node).copied().filter(|_| !self.parked.contains(&node))
-    }
-
-    /// The entity of a created node, parked or not.
-    pub fn any(&self, node: Uid) -> Option<Entity> {
-        self.nodes.get(&node).copied()
-    }
-
-    /// All created nodes that are part of the rig at present, by uid.
-    pub fn iter(&self) -> impl Iterator<Item = (Uid, Entity)> {
-        self.nodes.iter().filter(|(uid, _)| !self.parked.contains(*uid)).map(|(uid, entity)| (*uid, *entity))
-    }
-}
-
-/// Makes the entities of created nodes equal to what is built: spawns, parks, brings back and describes them.
+/// Makes the entities of created nodes equal to the build (spawns, parks, brings back, describes them), and puts every
+/// node below its parent: below the built one, or, for joints that are not built, below the authored one.
 pub(super) fn follow_nodes(
     mut commands: Commands,
-    mut rigs: Query<
-        (Entity, &Rig, &Built, &JointEntities, Option<&TagEntities>, Option<&mut BuiltEntities>),
-        Or<(Changed<Built>, Changed<Rig>)>,
-    >,
-    mut nodes: Query<(&mut Transform, &mut RestTransform, Option<&ChildOf>)>,
+    mut rigs: Query<Followed, Or<(Changed<Built>, Changed<Rig>)>>,
+    parents: Query<&ChildOf, Allow<Disabled>>,
+    mut places: Query<(&mut Transform, &mut RestTransform), Allow<Disabled>>,
+    mut index: ResMut<EntityIndex>,
 ) {
-    for (rig_entity, rig, built, joints, tags, known) in &mut rigs {
-        let mut own = BuiltEntities::default();
-        let is_new = known.is_none();
-        let known: &mut BuiltEntities = match known {
-            Some(known) => known.into_inner(),
-            None => &mut own,
-        };
-        let alive: HashSet<Uid> =
-            built.0.nodes.iter().filter(|node| node.origin.is_some()).map(|node| node.uid).collect();
-        let leaving: Vec<(Uid, Entity)> = known.iter().filter(|(uid, _)| !alive.contains(uid)).collect();
-        for (uid, entity) in leaving {
-            known.parked.insert(uid);
-            commands
-                .entity(entity)
-                .detach_all_children()
-                .remove::<(ChildOf, Control, Null, Joint, NodeLabel, Name, InGroup, CreatedBy, CreatedRole)>()
-                .insert((Parked, Disabled));
-        }
-        for node in &built.0.nodes {
-            let Some(origin) = &node.origin else { continue };
+    for (rig_entity, rig, built, mut joints, tags, groups, mut known, is_running) in &mut rigs {
+        let built = built.map(|built| &*built.0);
+        let nodes = built.map_or(&[][..], |built| &built.nodes);
+        let joints = joints.bypass_change_detection();
+        let known = known.bypass_change_detection();
+        park(&mut commands, known, nodes);
+        let mut writer = Writer { commands: &mut commands, rig: rig_entity, tags, groups };
+        for node in nodes {
+            let parent = node.parent.map(|parent| nodes[parent].uid);
+            let parent =
+                parent.and_then(|parent| joints.get(parent).or_else(|| known.get(parent))).unwrap_or(rig_entity);
+            let Some(origin) = &node.origin else {
+                writer.place_joint(joints, node.uid, parent, &parents);
+                let before = known.joints.get(&node.uid);
+                if let Some(entity) = joints.get(node.uid)
+                    && before.is_none_or(|(of, before)| *of != entity || before != node)
+                {
+                    let before = before.filter(|(of, _)| *of == entity).map(|(_, before)| before.clone());
+                    writer.describe_any(entity, rig, node, before.as_ref());
+                    known.joints.insert(node.uid, (entity, node.clone()));
+                }
+                continue;
+            };
             let rest = RestTransform::from(node.base);
-            let pose = rig.offset(node.uid).copied().unwrap_or(PoseOffset::IDENTITY).on(&rest);
-            let back = known.parked.remove(&node.uid);
-            let entity = *known.nodes.entry(node.uid).or_insert_with(|| commands.spawn((node.uid, rest, pose)).id());
-            let parent = node.parent.map(|parent| built.0.nodes[parent].uid);
-            let parent = parent.and_then(|parent| joints.get(parent).or_else(|| known.get(parent)));
-            let parent = parent.unwrap_or(rig_entity);
-            let mut target = commands.entity(entity);
-            if back {
-                target.remove::<(Parked, Disabled)>();
+            let pose = rig.offset(node.uid).copied().unwrap_or_default().on(&rest);
+            let Some(mirrored) = known.nodes.get_mut(&node.uid) else {
+                let entity = writer.commands.spawn((node.uid, rest, pose, NodeOf(rig_entity), ChildOf(parent))).id();
+                index.insert(entity, rig_entity, node.uid, Part::Node);
+                writer.describe(entity, rig, node, None);
+                let mirrored =
+                    MirroredNode { entity, is_parked: false, node: Some(node.clone()), parent: Some(parent) };
+                known.nodes.insert(node.uid, mirrored);
+                continue;
+            };
+            let entity = mirrored.entity;
+            let is_back = std::mem::take(&mut mirrored.is_parked);
+            if is_back {
+                let placed = (rest, pose, NodeOf(rig_entity), ChildOf(parent));
+                writer.commands.entity(entity).try_remove::<(Parked, Disabled)>().try_insert(placed);
+                mirrored.node = None;
+            } else if mirrored.parent != Some(parent) || !parents.contains(entity) {
+                writer.commands.entity(entity).try_insert(ChildOf(parent));
             }
-            if let Ok((mut transform, mut base, child_of)) = nodes.get_mut(entity) {
-                if *base != rest || back {
-                    *base = rest;
-                    *transform = pose;
+            mirrored.parent = Some(parent);
+            if mirrored.node.as_ref().is_some_and(|before| before == node && before.origin.as_ref() == Some(origin)) {
+                continue;
+            }
+            if let Some(before) = mirrored.node.as_ref().filter(|before| before.base != node.base)
+                && let Ok((mut transform, mut base)) = places.get_mut(entity)
+            {
+                let _ = before;
+                base.set_if_neq(rest);
+                // A rig that runs gives the places of all its nodes itself.
+                if !is_running {
+                    transform.set_if_neq(pose);
                 }
-                if back || child_of.is_none_or(|child_of| child_of.parent() != parent) {
-                    target.insert(ChildOf(parent));
-                }
-            } else {
-                target.insert((rest, pose, ChildOf(parent)));
             }
-            let role = CreatedRole { role: origin.role.to_string(), subject: origin.subject, number: origin.number };
-            target.insert((role, Name::new(node.name.to_string())));
-            if let Some(tag) = tags.and_then(|tags| tags.get(origin.command)) {
-                target.insert(CreatedBy(tag));
+            writer.describe(entity, rig, node, mirrored.node.as_ref());
+            mirrored.node = Some(node.clone());
+        }
+        let built_uids: HashSet<Uid> = nodes.iter().map(|node| node.uid).collect();
+        for joint in rig.walk().filter(|joint| !built_uids.contains(&joint.data.uid)) {
+            let parent = joint.parent.and_then(|parent| joints.get(parent)).unwrap_or(rig_entity);
+            writer.place_joint(joints, joint.data.uid, parent, &parents);
+        }
+        known.joints.retain(|uid, _| built_uids.contains(uid));
+    }
+}
+
+/// Takes nodes that are no longer built out of the rig; they keep their entity.
+fn park(commands: &mut Commands, known: &mut BuiltEntities, nodes: &[BuiltNode]) {
+    let alive: HashSet<Uid> = nodes.iter().filter(|node| node.origin.is_some()).map(|node| node.uid).collect();
+    for (_, mirrored) in known.nodes.iter_mut().filter(|(uid, mirrored)| !mirrored.is_parked && !alive.contains(*uid)) {
+        (mirrored.is_parked, mirrored.node, mirrored.parent) = (true, None, None);
+        if let Ok(mut entity) = commands.get_entity(mirrored.entity) {
+            entity.detach_all_children();
+            entity.try_remove::<(ChildOf, NodeOf, Control, Null, Joint, NodeLabel, Name, InGroup)>();
+            entity.try_remove::<(CreatedBy, CreatedRole, NodeLayer, Attributes)>().try_insert((Parked, Disabled));
+        }
+    }
+}
+
+/// Writes the components of one rig's nodes.
+struct Writer<'a, 'w, 's> {
+    commands: &'a mut Commands<'w, 's>,
+    rig: Entity,
+    tags: &'a TagEntities,
+    groups: &'a GroupEntities,
+}
+
+impl Writer<'_, '_, '_> {
+    /// Puts a joint of the document below its parent.
+    fn place_joint(
+        &mut self,
+        joints: &mut JointEntities,
+        joint: Uid,
+        parent: Entity,
+        parents: &Query<&ChildOf, Allow<Disabled>>,
+    ) {
+        let Some(mirrored) = joints.mirrored_mut(joint) else { return };
+        debug_assert_ne!(parent, mirrored.entity, "a joint cannot hang below itself in rig {}", self.rig);
+        if mirrored.parent != Some(parent) || !parents.contains(mirrored.entity) {
+            mirrored.parent = Some(parent);
+            self.commands.entity(mirrored.entity).try_insert(ChildOf(parent));
+        }
+    }
+
+    /// Writes the components of a created node that differ from before; all if there is no before.
+    fn describe(&mut self, entity: Entity, rig: &Rig, node: &BuiltNode, before: Option<&BuiltNode>) {
+        let differs = |of: fn(&BuiltNode, &BuiltNode) -> bool| before.is_none_or(|before| !of(before, node));
+        let mut target = self.commands.entity(entity);
+        if differs(|a, b| a.origin == b.origin)
+            && let Some(origin) = &node.origin
+        {
+            target.try_insert(CreatedRole {
+                role: origin.role.to_string(),
+                subject: origin.subject,
+                number: origin.number,
+            });
+            if let Some(tag) = self.tags.get(origin.command) {
+                target.try_insert(CreatedBy(tag));
             }
+        }
+        if differs(|a, b| a.name == b.name) {
+            target.try_insert(Name::new(node.name.to_string()));
+        }
+        if differs(|a, b| a.label == b.label) {
             match &node.label {
-                Some(label) => target.insert(NodeLabel(label.to_string())),
-                None => target.remove::<NodeLabel>(),
-            };
-            match node.group {
-                Some(group) => target.insert(InGroup(group)),
-                None => target.remove::<InGroup>(),
-            };
-            match node.kind {
-                NodeType::Joint => target.insert(Joint).remove::<(Control, Null)>(),
-                NodeType::Null => target.insert(Null).remove::<(Control, Joint)>(),
-                NodeType::Control => target.remove::<(Null, Joint)>(),
-            };
-            match &node.control {
-                Some(control) => target.insert(Control((**control).clone())),
-                None => target.remove::<Control>(),
+                Some(label) => target.try_insert(NodeLabel(label.to_string())),
+                None => target.try_remove::<NodeLabel>(),
             };
         }
-        if is_new {
-            commands.entity(rig_entity).insert(own);
+        if differs(|a, b| a.group == b.group) {
+            match node.group.and_then(|group| self.groups.get(group)) {
+                Some(group) => target.try_insert(InGroup(group)),
+                None => target.try_remove::<InGroup>(),
+            };
+        }
+        if differs(|a, b| a.kind == b.kind) {
+            match node.kind {
+                NodeType::Joint => target.try_insert(Joint).try_remove::<Null>(),
+                NodeType::Null => target.try_insert(Null).try_remove::<Joint>(),
+                NodeType::Control => target.try_remove::<(Null, Joint)>(),
+            };
+        }
+        if differs(|a, b| a.control == b.control) {
+            match &node.control {
+                Some(control) => target.try_insert(Control((**control).clone())),
+                None => target.try_remove::<Control>(),
+            };
+        }
+        self.describe_any(entity, rig, node, before);
+    }
+
+    /// Writes what joints of the document get from a build, too: layer and attributes.
+    fn describe_any(&mut self, entity: Entity, rig: &Rig, node: &BuiltNode, before: Option<&BuiltNode>) {
+        let mut target = self.commands.entity(entity);
+        if before.and_then(|before| before.layer.as_ref()) != node.layer.as_ref() {
+            match &node.layer {
+                Some(layer) => target.try_insert(NodeLayer((**layer).clone())),
+                None => target.try_remove::<NodeLayer>(),
+            };
+        }
+        let had_any = before.is_some_and(|before| !before.attributes.is_empty());
+        if node.attributes.is_empty() {
+            if had_any {
+                target.try_remove::<Attributes>();
+            }
+        } else if before.is_none_or(|before| before.attributes != node.attributes) {
+            let values: BTreeMap<String, f32> = (node.attributes.iter())
+                .map(|attribute| {
+                    let value = rig.attribute_value(node.uid, &attribute.name).unwrap_or(attribute.default);
+                    (attribute.name.to_string(), attribute.clamp(value))
+                })
+                .collect();
+            target.try_insert(Attributes(values));
         }
     }
 }

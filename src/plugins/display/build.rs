@@ -1,4 +1,4 @@
-//! Bevy meshes from pieces of a model: positions, looks, weights and weight colours.
+//! Bevy meshes from pieces of a model: positions, attributes, weights and weight colours.
 
 use bevy::{
     asset::RenderAssetUsages,
@@ -10,26 +10,29 @@ use super::{
     colors::Painter,
     plan::{EdgePlan, SurfacePlan, flat_normals},
 };
-use crate::{mesh::model::Model, rig::SkinData};
+use crate::{
+    mesh::{influences::keep_strongest, model::Model},
+    rig::SkinData,
+};
 
-/// Stands in a palette for the rig itself, which holds what no joint holds.
+/// Marks the rig itself in a palette; it holds points without influences.
 pub(super) const RIG: u32 = u32::MAX;
 /// Influences that the graphics card takes for each vertex.
 const INFLUENCES: usize = 4;
 
-/// A mesh that is ready for the renderer.
+/// A Bevy mesh for the renderer.
 #[derive(Debug)]
 pub(super) struct Piece {
     /// The mesh.
     pub mesh: Mesh,
     /// Index into the model's materials.
     pub material: Option<usize>,
-    /// The joint that each joint index of the mesh means: an index into [`SkinData::joints`], or [`RIG`]. `None` if
-    /// the mesh is not skinned.
+    /// The joint for each joint index of the mesh: an index into [`SkinData::joints`], or [`RIG`]. `None` if the mesh
+    /// is not skinned.
     pub palette: Option<Vec<u32>>,
-    /// True if the vertices have colours.
+    /// Marks vertices with colours.
     pub colored: bool,
-    /// Bytes of its vertices and indices, about.
+    /// Approximate number of bytes of its vertices and indices.
     pub bytes: usize,
 }
 
@@ -74,7 +77,7 @@ pub(super) fn build_surface(
         let tangents = plan.sources(model).map(|(part, vertex)| part.tangents[vertex].to_array());
         mesh.insert_attribute(Mesh::ATTRIBUTE_TANGENT, tangents.collect::<Vec<_>>());
     } else if tangents && traits.uvs[0] {
-        // Without them a normal map is not used; the surface is then as smooth as its normals.
+        // Without tangents a normal map is not used; the surface is then as smooth as its normals.
         let _ = mesh.generate_tangents();
     }
     let palette = skin.map(|skin| insert_weights(&mut mesh, &points, skin));
@@ -93,7 +96,7 @@ pub(super) fn build_edges(model: &Model, plan: &EdgePlan, skin: Option<&SkinData
 
 fn finish(mut mesh: Mesh, material: Option<usize>, palette: Option<Vec<u32>>, colored: bool) -> Piece {
     if palette.is_some() {
-        // Bounds that follow the pose. A mesh without vertices has none, and nothing to cull.
+        // Bounds that follow the pose. A mesh without vertices has none and needs no culling.
         let _ = mesh.generate_skinned_mesh_bounds();
     }
     let bytes = mesh.get_vertex_buffer_size() + mesh.indices().map_or(0, |indices| indices.len() * 2);
@@ -113,39 +116,27 @@ fn insert_weights(mesh: &mut Mesh, points: &[u32], skin: &SkinData) -> Vec<u32> 
     };
     let mut joints: Vec<[u16; 4]> = Vec::with_capacity(points.len());
     let mut weights: Vec<[f32; 4]> = Vec::with_capacity(points.len());
+    let mut strongest = Vec::new();
     for point in points {
-        let strongest = strongest(skin, *point as usize);
-        let sum: f32 = strongest.iter().map(|(_, weight)| weight).sum();
-        if sum > 0.0 {
-            joints.push(strongest.map(|(joint, weight)| if weight > 0.0 { number(joint) } else { 0 }));
-            weights.push(strongest.map(|(_, weight)| weight / sum));
-        } else {
-            joints.push([number(RIG), 0, 0, 0]);
-            weights.push([1.0, 0.0, 0.0, 0.0]);
+        strongest.clear();
+        strongest.extend(influences(skin, *point as usize));
+        keep_strongest(&mut strongest, INFLUENCES, 0.0);
+        if strongest.is_empty() {
+            strongest.push((RIG, 1.0));
         }
+        let (mut own_joints, mut own_weights) = ([0; INFLUENCES], [0.0; INFLUENCES]);
+        for (place, (joint, weight)) in strongest.iter().enumerate() {
+            (own_joints[place], own_weights[place]) = (number(*joint), *weight);
+        }
+        joints.push(own_joints);
+        weights.push(own_weights);
     }
     mesh.insert_attribute(Mesh::ATTRIBUTE_JOINT_INDEX, VertexAttributeValues::Uint16x4(joints));
     mesh.insert_attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT, weights);
     palette
 }
 
-/// The strongest influences of a point, strongest first, padded with zero weights.
-fn strongest(skin: &SkinData, point: usize) -> [(u32, f32); INFLUENCES] {
-    let mut best = [(0, 0.0); INFLUENCES];
-    for (joint, weight) in influences(skin, point) {
-        if weight > best[INFLUENCES - 1].1 {
-            best[INFLUENCES - 1] = (joint, weight);
-            let mut place = INFLUENCES - 1;
-            while place > 0 && best[place].1 > best[place - 1].1 {
-                best.swap(place, place - 1);
-                place -= 1;
-            }
-        }
-    }
-    best
-}
-
-/// The influences of a point by joints that there are; none past the end of the weights.
+/// The influences of a point by existing joints; none past the end of the weights.
 pub(super) fn influences(skin: &SkinData, point: usize) -> impl Iterator<Item = (u32, f32)> {
     let weights = &skin.weights;
     let range = match (weights.starts.get(point), weights.starts.get(point + 1)) {
@@ -158,7 +149,7 @@ pub(super) fn influences(skin: &SkinData, point: usize) -> impl Iterator<Item = 
     known.filter(|(joint, weight)| (*joint as usize) < skin.joints.len() && *weight > 0.0 && weight.is_finite())
 }
 
-/// Pieces have so few vertices that indices take two bytes.
+/// Indices of two bytes, which are enough for a piece.
 fn indices(indices: &[u32]) -> Indices {
     Indices::U16(indices.iter().map(|index| *index as u16).collect())
 }

@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use super::{WeightColors, build::influences};
 use crate::rig::SkinData;
 
-/// Where a joint has no weight at all.
+/// Colour of points without any weight.
 const NONE: Srgba = Srgba::rgb(0.36, 0.36, 0.37);
 /// Colours at equal steps of the weight. Matplotlib's "plasma" map: its lightness rises evenly with the weight, so that
 /// it can be read without colour vision, too.
@@ -35,13 +35,14 @@ pub fn weight_color(weight: f32) -> Color {
 /// The colour of a joint in [`WeightColors::AllJoints`], by its place in [`SkinData::joints`]. Neighbours in the list
 /// differ most.
 pub fn joint_color(joint: usize) -> Color {
-    // Steps of the golden angle never come back to the same hue; lightness tells apart what colour vision may not.
+    // Steps of the golden angle never return to the same hue; lightness distinguishes colours that colour vision may
+    // not.
     let hue = (joint as f32 * 137.507_77) % 360.0;
     let lightness = [0.72, 0.52, 0.84][joint % 3];
     Oklcha::new(lightness, 0.13, hue, 1.0).into()
 }
 
-/// Knows the colour of every point of a mesh.
+/// Colours of a mesh's points by weight.
 pub(super) enum Painter {
     /// Weights of the joint with that number, if the skin has it.
     Joint(Option<u32>),
@@ -50,7 +51,7 @@ pub(super) enum Painter {
 }
 
 impl Painter {
-    /// What paints weights in a way; `None` while weights are not shown.
+    /// Makes the painter of a mode; `None` while weights are not shown.
     pub fn new(colors: WeightColors, skin: Option<&SkinData>) -> Option<Self> {
         match colors {
             WeightColors::Off => None,

@@ -1,4 +1,4 @@
-//! What is drawn follows meshes, weights, rest poses and the way they are to be shown.
+//! Updates of the picture after changes of meshes, weights, rest poses and display settings.
 
 use std::{
     collections::BTreeMap,
@@ -15,20 +15,21 @@ use bevy::{
 use super::{
     DisplayJob, DisplayNote, DisplayPiece, MeshDisplay, Shading, WeightColors,
     build::RIG,
-    layer::{Layer, LayerKey, Plans, Shown},
-    looks::{self, Materials},
+    layer::{Layer, LayerKey, Plans, ShownPiece},
+    materials::{self, Materials},
     wire::WireMaterial,
 };
 use crate::{
     mesh::model::Model,
     plugins::{
+        commands::{Built, BuiltEntities},
         document::JointEntities,
         surface::{RigMesh, SkinOf},
     },
-    rig::{Rig, Uid},
+    rig::{Rig, deform::DeformSkeleton},
 };
 
-/// The picture of a mesh.
+/// Picture of a mesh.
 #[derive(Component)]
 pub(super) struct Displayed {
     model: Arc<Model>,
@@ -37,14 +38,14 @@ pub(super) struct Displayed {
     edges: Layer,
     materials: Vec<StandardMaterial>,
     textures: Option<TextureJob>,
-    dresses: BTreeMap<Dress, Handle<StandardMaterial>>,
-    /// Pieces have come, or their materials changed, in this frame.
+    piece_materials: BTreeMap<PieceMaterial, Handle<StandardMaterial>>,
+    /// Marks that pieces have arrived, or their materials changed, in this frame.
     fresh: bool,
 }
 
-/// What a piece of the surface is drawn with.
+/// Material of a piece of the surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Dress {
+struct PieceMaterial {
     look: Look,
     xray: bool,
 }
@@ -60,7 +61,7 @@ enum Look {
 struct TextureJob {
     task: Task<()>,
     queue: Arc<Mutex<Vec<(Handle<Image>, Result<Image, String>)>>>,
-    /// Materials with their textures, to be used when all of them are there.
+    /// Materials with their textures, used once all textures are decoded.
     materials: Vec<StandardMaterial>,
     total: usize,
     landed: usize,
@@ -83,7 +84,7 @@ impl FromWorld for EdgeMaterials {
     }
 }
 
-/// Puts meshes below their rigs, where they are drawn, and takes down the picture of what is no mesh of a rig any more.
+/// Puts meshes below their rigs, where they are drawn, and removes the pictures of meshes without a rig.
 pub(super) fn place_meshes(
     mut commands: Commands,
     placed: Query<(Entity, &SkinOf, Option<&ChildOf>), (With<RigMesh>, Or<(Added<RigMesh>, Changed<SkinOf>)>)>,
@@ -103,13 +104,13 @@ pub(super) fn place_meshes(
         }
         commands.entity(mesh).try_remove::<(Displayed, DisplayJob)>();
     }
-    // Pieces that were put up in the very moment in which their mesh went.
+    // Pieces that were spawned in the same frame in which their mesh was removed.
     for piece in &orphans {
         commands.entity(piece).try_despawn();
     }
 }
 
-/// Starts to build what is to be shown and is not.
+/// Starts to build missing pieces.
 pub(super) fn start_jobs(
     mut commands: Commands,
     display: Res<MeshDisplay>,
@@ -158,7 +159,7 @@ impl Displayed {
             edges: Layer::new(DisplayPiece::Edges),
             materials: Vec::new(),
             textures: None,
-            dresses: BTreeMap::new(),
+            piece_materials: BTreeMap::new(),
             fresh: false,
         };
         displayed.change_model(model, images);
@@ -170,17 +171,18 @@ impl Displayed {
         self.plans = Plans::default();
         self.surface.forget();
         self.edges.forget();
-        self.dresses.clear();
-        let Materials { materials, textures } = looks::translate(&model.looks, &images.get_handle_provider());
+        self.piece_materials.clear();
+        let Materials { materials, textures } =
+            materials::translate(&model.material_set, &images.get_handle_provider());
         if textures.is_empty() {
             (self.materials, self.textures) = (materials, None);
             return;
         }
-        self.materials = materials.iter().map(|material| looks::without_textures(material, |_| true)).collect();
+        self.materials = materials.iter().map(|material| materials::without_textures(material, |_| true)).collect();
         let queue = Arc::new(Mutex::new(Vec::new()));
         let (model, out, total) = (model.clone(), queue.clone(), textures.len());
         let task = AsyncComputeTaskPool::get().spawn(async move {
-            for done in looks::decode_textures(&model.looks, &textures) {
+            for done in materials::decode_textures(&model.material_set, &textures) {
                 out.lock().unwrap_or_else(PoisonError::into_inner).push(done);
                 bevy::tasks::futures_lite::future::yield_now().await;
             }
@@ -196,7 +198,7 @@ impl Displayed {
     }
 }
 
-/// Puts up what is built, a bounded amount a frame.
+/// Spawns finished pieces, a bounded amount a frame.
 pub(super) fn land_jobs(
     mut commands: Commands,
     mut displays: Query<(Entity, &RigMesh, &mut Displayed, Option<&mut DisplayJob>)>,
@@ -258,56 +260,69 @@ impl Displayed {
             return;
         }
         let missing = |image: &Handle<Image>| job.missing.contains(&image.id());
-        self.materials = job.materials.iter().map(|material| looks::without_textures(material, missing)).collect();
+        self.materials = job.materials.iter().map(|material| materials::without_textures(material, missing)).collect();
         self.textures = None;
-        for (dress, handle) in &self.dresses {
-            // The handle is held, so its place is there.
-            let _ = materials.insert(handle.id(), dress.material(&self.materials));
+        for (piece_material, handle) in &self.piece_materials {
+            // The handle is alive, so its slot exists.
+            let _ = materials.insert(handle.id(), piece_material.material(&self.materials));
         }
     }
 }
 
-/// Joins pieces to the joints that hold them, and tells the renderer where the joints rest.
+/// Links pieces to their joints, and gives the renderer the rest transforms of the joints.
 pub(super) fn follow_skins(
     mut commands: Commands,
     mut displays: Query<(&mut Displayed, Ref<SkinOf>)>,
-    rigs: Query<(Entity, Ref<Rig>, Ref<JointEntities>)>,
+    rigs: Query<(Entity, Ref<Rig>, Ref<JointEntities>, Option<Ref<Built>>, Option<Ref<BuiltEntities>>)>,
     mut bind_assets: ResMut<Assets<SkinnedMeshInverseBindposes>>,
 ) {
     for (mut displayed, of) in &mut displays {
-        let Ok((entity, rig, entities)) = rigs.get(of.0) else { continue };
-        if !(displayed.fresh || of.is_changed() || rig.is_changed() || entities.is_changed()) {
+        let Ok((entity, rig, joints, built, created)) = rigs.get(of.0) else { continue };
+        let is_rebuilt = built.as_ref().is_some_and(|built| built.is_changed())
+            || created.as_ref().is_some_and(|created| created.is_changed());
+        if !(displayed.fresh || of.is_changed() || rig.is_changed() || joints.is_changed() || is_rebuilt) {
             continue;
         }
-        let mut rests: BTreeMap<Uid, (Entity, Mat4)> = BTreeMap::new();
+        let skeleton = DeformSkeleton::new(&rig, built.as_ref().map(|built| &*built.0));
+        // Whoever does not move anything is held by the rig.
+        let held = skeleton.joints().iter().map(|joint| {
+            let found = joints.get(joint.uid).or_else(|| created.as_ref()?.get(joint.uid));
+            let bind = Mat4::from(bevy::math::Affine3A::from(joint.rest).inverse());
+            found.filter(|_| bind.is_finite()).map_or((entity, Mat4::IDENTITY), |joint| (joint, bind))
+        });
+        let held: Vec<(Entity, Mat4)> = held.collect();
+        let held = Held { rig_entity: entity, rig: &rig, skeleton: &skeleton, joints: &held };
         let displayed = displayed.bypass_change_detection();
         for shown in displayed.surface.pieces.iter_mut().chain(&mut displayed.edges.pieces) {
-            follow_skin(shown, entity, &rig, &entities, &mut rests, &mut commands, &mut bind_assets);
+            follow_skin(shown, &held, &mut commands, &mut bind_assets);
         }
     }
 }
 
-fn follow_skin(
-    shown: &mut Shown,
+/// The joints that can hold pieces.
+struct Held<'a> {
     rig_entity: Entity,
-    rig: &Rig,
-    entities: &JointEntities,
-    rests: &mut BTreeMap<Uid, (Entity, Mat4)>,
+    rig: &'a Rig,
+    skeleton: &'a DeformSkeleton,
+    /// The entity of each joint of the skeleton, and how the mesh stands to it at rest.
+    joints: &'a [(Entity, Mat4)],
+}
+
+fn follow_skin(
+    shown: &mut ShownPiece,
+    held: &Held,
     commands: &mut Commands,
     bind_assets: &mut Assets<SkinnedMeshInverseBindposes>,
 ) {
     let (Some(palette), Some(skin)) = (&shown.palette, &shown.key.skin) else { return };
     // Points without influences, and those of joints that are gone, stay where the rig is: there is no pose for them.
-    let free = (rig_entity, Mat4::IDENTITY);
-    let mut hold = |joint: u32| {
-        let Some(uid) = (joint != RIG).then(|| skin.joints.get(joint as usize)).flatten() else { return free };
-        *rests.entry(*uid).or_insert_with(|| {
-            let Some(entity) = entities.get(*uid).filter(|_| rig.joint(*uid).is_some()) else { return free };
-            let bind = Mat4::from(bevy::math::Affine3A::from(rig.rest_global(*uid)).inverse());
-            if bind.is_finite() { (entity, bind) } else { free }
-        })
+    let free = (held.rig_entity, Mat4::IDENTITY);
+    let holders = held.skeleton.holders(held.rig, skin);
+    let hold = |joint: &u32| {
+        let holder = if *joint == RIG { None } else { holders.get(*joint as usize).copied().flatten() };
+        holder.map_or(free, |holder| held.joints[holder])
     };
-    let (joints, binds): (Vec<Entity>, Vec<Mat4>) = palette.iter().map(|joint| hold(*joint)).unzip();
+    let (joints, binds): (Vec<Entity>, Vec<Mat4>) = palette.iter().map(hold).unzip();
     let moved = shown.binds != binds;
     let rejoined = shown.joints != joints || shown.bind_asset.is_none();
     if moved || rejoined {
@@ -315,7 +330,7 @@ fn follow_skin(
         let poses = SkinnedMeshInverseBindposes::from(shown.binds.clone());
         let handle = match shown.bind_asset.take() {
             Some(handle) => {
-                // The handle is held, so its place is there.
+                // The handle is alive, so its slot exists.
                 let _ = bind_assets.insert(handle.id(), poses);
                 handle
             }
@@ -329,19 +344,19 @@ fn follow_skin(
     }
 }
 
-impl Dress {
+impl PieceMaterial {
     fn material(self, materials: &[StandardMaterial]) -> StandardMaterial {
         let material = match self.look {
-            Look::Material(index) => materials.get(index).cloned().unwrap_or_else(looks::clay),
-            Look::Clay => looks::clay(),
-            Look::Painted => looks::painted(),
+            Look::Material(index) => materials.get(index).cloned().unwrap_or_else(materials::clay),
+            Look::Clay => materials::clay(),
+            Look::Painted => materials::painted(),
         };
-        if self.xray { looks::xray(material) } else { material }
+        if self.xray { materials::xray(material) } else { material }
     }
 }
 
-/// Gives pieces their materials, and shows or hides edges.
-pub(super) fn dress_pieces(
+/// Assigns the materials of pieces, and shows or hides edges.
+pub(super) fn assign_materials(
     mut commands: Commands,
     display: Res<MeshDisplay>,
     edges: Res<EdgeMaterials>,
@@ -360,18 +375,20 @@ pub(super) fn dress_pieces(
                 (_, Shading::Shaded, Some(material)) => Look::Material(material),
                 _ => Look::Clay,
             };
-            let dress = Dress { look, xray: display.xray };
-            let handle =
-                displayed.dresses.entry(dress).or_insert_with(|| materials.add(dress.material(&displayed.materials)));
-            if shown.dress.as_ref().is_none_or(|known| known.id() != handle.id().untyped()) {
-                shown.dress = Some(handle.clone().untyped());
+            let piece_material = PieceMaterial { look, xray: display.xray };
+            let handle = displayed
+                .piece_materials
+                .entry(piece_material)
+                .or_insert_with(|| materials.add(piece_material.material(&displayed.materials)));
+            if shown.piece_material.as_ref().is_none_or(|known| known.id() != handle.id().untyped()) {
+                shown.piece_material = Some(handle.clone().untyped());
                 commands.entity(shown.entity).try_insert(MeshMaterial3d(handle.clone()));
             }
         }
         let handle = if display.xray { &edges.xray } else { &edges.solid };
         let visible = if display.wireframe { Visibility::Inherited } else { Visibility::Hidden };
         for shown in &mut displayed.edges.pieces {
-            shown.dress = Some(handle.clone().untyped());
+            shown.piece_material = Some(handle.clone().untyped());
             commands.entity(shown.entity).try_insert((MeshMaterial3d(handle.clone()), visible));
         }
     }

@@ -1,4 +1,4 @@
-//! One layer of a mesh's picture, its surface or its edges: built in the background, put up piece by piece.
+//! A layer of a mesh's picture, its surface or its edges: built in the background, spawned piece by piece.
 
 use std::{
     collections::VecDeque,
@@ -23,19 +23,20 @@ use super::{
 };
 use crate::{mesh::model::Model, rig::SkinData};
 
-/// Bytes that go to the renderer in one frame, about; a piece more than that still goes whole.
+/// Approximate number of bytes handed to the renderer in one frame; a larger piece goes whole.
 const FRAME_BYTES: usize = 4 << 20;
-/// Models with fewer vertices are built at once: that takes less than waiting for the next frame.
+/// Largest number of vertices of a model that is built at once: this takes less time than waiting for the next frame.
 const SMALL: usize = 20_000;
-/// Frames for which what is replaced by a piece of another kind stays, until the renderer is sure to have the piece.
+/// Number of frames for which a replaced piece of another vertex kind stays, until the renderer certainly has the new
+/// one.
 const OVERLAP: u8 = 4;
 
-/// What a layer is built for.
+/// State that a layer is built for.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LayerKey {
     /// The weights.
     pub skin: Option<Arc<SkinData>>,
-    /// Which of them are painted.
+    /// Mode of the weight colours.
     pub colors: WeightColors,
 }
 
@@ -50,7 +51,7 @@ impl PartialEq for LayerKey {
     }
 }
 
-/// How a model is cut, found once and kept.
+/// Pieces into which a model is cut, computed once and kept.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Plans {
     surface: Arc<OnceLock<Vec<SurfacePlan>>>,
@@ -59,38 +60,38 @@ pub(super) struct Plans {
 
 /// A piece on the screen.
 #[derive(Debug)]
-pub(super) struct Shown {
-    /// What draws it.
+pub(super) struct ShownPiece {
+    /// Entity that draws it.
     pub entity: Entity,
     /// Index into the model's materials.
     pub material: Option<usize>,
-    /// What it was built for.
+    /// State that it was built for.
     pub key: LayerKey,
     /// See [`Piece::palette`].
     pub palette: Option<Vec<u32>>,
-    /// True if its vertices have colours.
+    /// Marks vertices with colours.
     colored: bool,
-    /// The entities of its palette's joints, and how the mesh stands to them at rest.
+    /// Entities of its palette's joints.
     pub joints: Vec<Entity>,
-    /// See `joints`.
+    /// Transforms of the mesh relative to each of `joints` at rest.
     pub binds: Vec<Mat4>,
     /// `binds` for the renderer.
     pub bind_asset: Option<Handle<SkinnedMeshInverseBindposes>>,
-    /// What it is drawn with.
-    pub dress: Option<UntypedHandle>,
+    /// Material that it is drawn with.
+    pub piece_material: Option<UntypedHandle>,
 }
 
 /// The pieces of one kind.
 #[derive(Debug)]
 pub(super) struct Layer {
     kind: DisplayPiece,
-    /// What the pieces are, or are being, built for.
+    /// State that the pieces are, or are being, built for.
     pub key: Option<LayerKey>,
-    /// What is on the screen.
-    pub pieces: Vec<Shown>,
-    /// Pieces of another model, until the first of this one comes.
+    /// Pieces on the screen.
+    pub pieces: Vec<ShownPiece>,
+    /// Entities of another model's pieces, until the first of this one is spawned.
     stale: Vec<Entity>,
-    /// Replaced pieces and for how many frames they stay.
+    /// Entities of replaced pieces, and the number of frames that they stay.
     retiring: Vec<(Entity, u8)>,
     job: Option<Job>,
 }
@@ -103,11 +104,11 @@ struct Job {
     landed: usize,
 }
 
-/// Where finished pieces wait.
+/// Queue of finished pieces.
 #[derive(Debug, Default)]
 struct Queue {
     pieces: Mutex<VecDeque<Piece>>,
-    /// How many there will be; 0 until the model is cut.
+    /// Number of pieces in all; 0 until the model is cut.
     total: AtomicUsize,
     built: AtomicUsize,
 }
@@ -124,12 +125,12 @@ impl Queue {
 }
 
 impl Layer {
-    /// A layer with nothing in it.
+    /// A layer without pieces.
     pub fn new(kind: DisplayPiece) -> Self {
         Self { kind, key: None, pieces: Vec::new(), stale: Vec::new(), retiring: Vec::new(), job: None }
     }
 
-    /// Starts to build the pieces for `key`; what is on the screen stays until they come.
+    /// Starts to build the pieces for `key`; the current pieces stay until they are replaced.
     pub fn start(&mut self, model: &Arc<Model>, plans: &Plans, key: LayerKey) {
         let queue = Arc::new(Queue::default());
         let (kind, model, plans, wanted, out) = (self.kind, model.clone(), plans.clone(), key.clone(), queue.clone());
@@ -142,18 +143,18 @@ impl Layer {
             Some(AsyncComputeTaskPool::get().spawn(async move { work() }))
         };
         self.key = Some(key.clone());
-        // An older task that runs already stops at its next piece.
+        // An older running task stops at its next piece.
         self.job = Some(Job { task, queue, key, landed: 0 });
     }
 
-    /// Forgets the model: its pieces stay until those of another come.
+    /// Drops the model: its pieces stay until those of another arrive.
     pub fn forget(&mut self) {
         self.stale.extend(self.pieces.drain(..).map(|shown| shown.entity));
         self.key = None;
         self.job = None;
     }
 
-    /// How much of a running job is done, 0 to 1.
+    /// Finished share of a running job, 0 to 1.
     pub fn progress(&self) -> Option<f32> {
         let job = self.job.as_ref()?;
         let total = job.queue.total.load(Ordering::Relaxed);
@@ -161,18 +162,18 @@ impl Layer {
         Some(if total == 0 { 0.0 } else { done as f32 / (2 * total) as f32 })
     }
 
-    /// True while pieces are coming or going.
+    /// Returns `true` while pieces are being spawned or removed.
     pub fn is_busy(&self) -> bool {
         self.job.is_some() || !self.retiring.is_empty()
     }
 
-    /// All entities that draw this layer.
+    /// Entities that draw this layer.
     pub fn entities(&self) -> impl Iterator<Item = Entity> {
         let pieces = self.pieces.iter().map(|shown| shown.entity);
         pieces.chain(self.stale.iter().copied()).chain(self.retiring.iter().map(|(entity, _)| *entity))
     }
 
-    /// Puts up finished pieces below `mesh`, as many as fit into a frame. True if there was any.
+    /// Spawns finished pieces below `mesh`, as many as fit into a frame. Returns `true` if there was any.
     pub fn land(&mut self, mesh: Entity, commands: &mut Commands, meshes: &mut Assets<Mesh>) -> bool {
         self.retiring.retain_mut(|(entity, frames)| {
             *frames -= 1;
@@ -182,7 +183,7 @@ impl Layer {
             *frames > 0
         });
         let Some(job) = &mut self.job else { return false };
-        // Asked before the queue is emptied: what is done has nothing to add.
+        // The task is checked before the queue is emptied: a finished task adds nothing more.
         let done = job.task.as_mut().is_none_or(|task| check_ready(task).is_some());
         if done {
             job.task = None;
@@ -196,7 +197,8 @@ impl Layer {
             self.stale.drain(..).for_each(|entity| commands.entity(entity).try_despawn());
             let handle = meshes.add(piece.mesh);
             let known = self.pieces.get(index);
-            let alike = |old: &&Shown| old.palette.is_some() == piece.palette.is_some() && old.colored == piece.colored;
+            let alike =
+                |old: &&ShownPiece| old.palette.is_some() == piece.palette.is_some() && old.colored == piece.colored;
             let entity = match known.filter(alike) {
                 Some(old) => commands.entity(old.entity).try_insert(Mesh3d(handle)).id(),
                 None => {
@@ -207,8 +209,8 @@ impl Layer {
             };
             let old = (index < self.pieces.len()).then(|| self.pieces.swap_remove(index));
             let old = old.filter(|old| old.entity == entity);
-            let (bind_asset, dress) = old.map_or((None, None), |old| (old.bind_asset, old.dress));
-            self.pieces.push(Shown {
+            let (bind_asset, piece_material) = old.map_or((None, None), |old| (old.bind_asset, old.piece_material));
+            self.pieces.push(ShownPiece {
                 entity,
                 material: piece.material,
                 key: job.key.clone(),
@@ -217,7 +219,7 @@ impl Layer {
                 joints: Vec::new(),
                 binds: Vec::new(),
                 bind_asset,
-                dress,
+                piece_material,
             });
             let last = self.pieces.len() - 1;
             self.pieces.swap(index, last);
@@ -231,21 +233,21 @@ impl Layer {
     }
 }
 
-impl Shown {
-    /// True if it shows weights.
+impl ShownPiece {
+    /// Returns `true` if the piece shows weights.
     pub fn painted(&self) -> bool {
         self.key.colors != WeightColors::Off
     }
 
-    /// What the renderer needs to hold the piece by its joints.
+    /// Inserts the components by which the renderer skins the piece to its joints.
     pub fn hold(&self, commands: &mut Commands, inverse_bindposes: Handle<SkinnedMeshInverseBindposes>) {
         let skinned = SkinnedMesh { inverse_bindposes, joints: self.joints.clone() };
         commands.entity(self.entity).try_insert((skinned, DynamicSkinnedMeshBounds));
     }
 }
 
-/// Builds all pieces, unless the layer stops waiting for them. In one go: a single thread may have to build the
-/// hierarchy that answers rays as well, and people want to see the mesh first.
+/// Builds all pieces, unless the layer has dropped its queue. One task builds all: a single thread may have to build
+/// the hierarchy for rays as well, and people want to see the mesh first.
 fn build(kind: DisplayPiece, model: &Model, plans: &Plans, key: &LayerKey, queue: &Arc<Queue>) {
     let skin = key.skin.as_deref();
     // The layer and this task hold the queue.
@@ -256,7 +258,7 @@ fn build(kind: DisplayPiece, model: &Model, plans: &Plans, key: &LayerKey, queue
             queue.total.store(plan.len(), Ordering::Relaxed);
             let painter = Painter::new(key.colors, skin);
             for piece in plan.iter().take_while(|_| !abandoned()) {
-                let material = piece.traits.material.and_then(|material| model.looks.materials.get(material));
+                let material = piece.traits.material.and_then(|material| model.material_set.materials.get(material));
                 let bumps =
                     painter.is_none() && material.is_some_and(|material| material.get("normalTexture").is_some());
                 queue.push(build_surface(model, piece, skin, painter.as_ref(), bumps));

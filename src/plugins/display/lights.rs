@@ -1,14 +1,14 @@
-//! Light that goes with the camera, so that a mesh looks the same from everywhere and no side of it is in the dark.
+//! Lights attached to the camera, so that a mesh looks the same from every direction and no side of it is in the dark.
 
 use bevy::{camera::Exposure, core_pipeline::tonemapping::Tonemapping, prelude::*};
 
 /// Light for a camera that looks at meshes: a key light over its left shoulder, a dimmer fill light from its right, a
-/// rim light from behind that sets outlines off, and light from all around. None casts shadows: they cost a software
-/// renderer most, and hide what is edited.
+/// rim light from behind that sets outlines off, and light from all around. They cast no shadows, which would cost a
+/// software renderer most of its time and hide edited parts.
 ///
-/// The values say how bright a white matte surface becomes that squarely faces the light, where 1 is white on the
-/// screen. Together they stay at about 1 where a surface faces the camera, which with [`Tonemapping::None`] shows
-/// colours as they were authored. Several cameras that are lit so light each other's pictures.
+/// The values are the brightness of a white matte surface that squarely faces the light, where 1 is white on the
+/// screen. Their sum is about 1 on a surface that faces the camera, which with [`Tonemapping::None`] shows colours as
+/// they were authored. The lights of several such cameras affect each other's pictures.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -39,8 +39,8 @@ impl ViewportLights {
     /// Components for the camera: the lights as its children, ambient light, exposure and no tone mapping.
     pub fn bundle(self) -> impl Bundle {
         let exposure = Exposure::BLENDER;
-        // What a light must have so that a white surface that faces it reflects 1: a matte surface spreads what it
-        // gets over pi.
+        // Illuminance at which a white surface that faces the light reflects 1: a matte surface spreads the light over
+        // pi.
         let white = 1.0 / exposure.exposure();
         let light = |brightness: f32, from: Vec3| {
             (

@@ -1,7 +1,7 @@
-//! Cutting a model into pieces of bounded size, each with vertices of its own.
+//! Plans of the pieces of a model: bounded in size, each with vertices of its own.
 //!
-//! The renderer gets a model piece by piece, so that no frame has to take a million triangles at once. Parts that look
-//! the same share pieces: an object of a thousand groups is not a thousand things to draw.
+//! The renderer gets a model piece by piece, so that no frame has to take a million triangles at once. Parts with equal
+//! materials and attributes share pieces: an object of a thousand groups does not become a thousand draws.
 
 use std::{collections::HashMap, ops::Range};
 
@@ -12,21 +12,21 @@ use crate::mesh::{
     model::{Model, Part},
 };
 
-/// Triangles in a piece of the surface at most.
+/// Largest number of triangles in a piece of the surface.
 const PIECE_TRIANGLES: usize = 1 << 16;
-/// Edges in a piece of the wire at most.
+/// Largest number of edges in a piece of the wire.
 const PIECE_EDGES: usize = 1 << 17;
-/// Vertices in any piece at most, so that indices take two bytes.
+/// Largest number of vertices in any piece, so that indices take two bytes.
 const PIECE_VERTICES: usize = u16::MAX as usize;
 /// Marks a vertex that a piece does not have.
 const ABSENT: u32 = u32::MAX;
 
-/// What the parts of a piece have in common.
+/// Common properties of the parts of a piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct PieceTraits {
     /// Index into the model's materials.
     pub material: Option<usize>,
-    /// Whether the file gives normals, tangents, two sets of texture coordinates, and colours.
+    /// Presence of normals, tangents, two sets of texture coordinates, and colours in the file.
     pub normals: bool,
     pub tangents: bool,
     pub uvs: [bool; 2],
@@ -50,11 +50,11 @@ impl PieceTraits {
 /// A piece of the surface.
 #[derive(Debug)]
 pub(super) struct SurfacePlan {
-    /// What its parts have in common.
+    /// Common properties of its parts.
     pub traits: PieceTraits,
-    /// Which vertices come from which part of the model.
+    /// Part of the model that each range of vertices comes from.
     pub runs: Vec<(usize, Range<usize>)>,
-    /// The vertex of the part that each vertex of the piece is.
+    /// Index in its part of each vertex of the piece.
     pub vertices: Vec<u32>,
     /// Triangles over the piece's vertices.
     pub triangles: Vec<[u32; 3]>,
@@ -73,7 +73,7 @@ impl SurfacePlan {
 /// A piece of the wire: edges over points of the model.
 #[derive(Debug, Default)]
 pub(super) struct EdgePlan {
-    /// The point of the model that each vertex of the piece is.
+    /// Point of the model of each vertex of the piece.
     pub points: Vec<u32>,
     /// Edges over the piece's vertices.
     pub edges: Vec<[u32; 2]>,
@@ -85,7 +85,7 @@ pub(super) fn plan_surface(model: &Model) -> Vec<SurfacePlan> {
     let mut order: Vec<PieceTraits> = Vec::new();
     let mut alike: HashMap<PieceTraits, Vec<usize>> = HashMap::new();
     for (number, part) in model.parts.iter().enumerate() {
-        let traits = PieceTraits::of(part, model.looks.materials.len());
+        let traits = PieceTraits::of(part, model.material_set.materials.len());
         let parts = alike.entry(traits).or_default();
         if parts.is_empty() {
             order.push(traits);
@@ -141,8 +141,8 @@ impl SurfacePlan {
     }
 }
 
-/// Cuts the edges of all polygons (triangles where the file has no polygons) into pieces. Each edge is there once,
-/// also along seams, where points of equal position meet.
+/// Cuts the edges of all polygons (triangles where the file has no polygons) into pieces. Each edge appears once, also
+/// along seams, where points of equal position meet.
 pub(super) fn plan_edges(model: &Model) -> Vec<EdgePlan> {
     let (welded, _) = weld(&model.points);
     let mut edges: Vec<([u32; 2], [u32; 2])> = Vec::new();

@@ -1,4 +1,4 @@
-//! Images of a model, decoded: within bounds, in a format every graphics card takes, with smaller copies for far away.
+//! Decoded images of a model: bounded in size, in a format that every graphics card takes, with mipmaps.
 
 use bevy::{
     asset::RenderAssetUsages,
@@ -8,12 +8,12 @@ use bevy::{
 
 use crate::mesh::model;
 
-/// Bytes that the decoded images of one model may take together.
+/// Largest size in bytes of the decoded images of one model together.
 const MOST_BYTES: u64 = 256 << 20;
 /// Longest side of a texture; larger images are halved until they fit. Graphics cards take more, not all do.
 const MOST_SIDE: u32 = 8192;
 
-/// What is left for images of one model.
+/// Remaining budget of bytes for the images of one model.
 pub(super) struct TextureBudget {
     bytes: u64,
 }
@@ -24,7 +24,8 @@ impl Default for TextureBudget {
     }
 }
 
-/// Decodes a PNG or JPEG file. `srgb` says whether it holds colours or numbers. The error is a sentence for people.
+/// Decodes a PNG or JPEG file. `srgb` is `true` for colours and `false` for numbers. The error is a sentence for
+/// people.
 pub(super) fn decode(
     source: &model::Image,
     srgb: bool,
@@ -83,7 +84,7 @@ fn header(bytes: &[u8]) -> Option<(&'static str, u32, u32, u8)> {
         match *bytes.get(at + 1)? {
             0xFF => at += 1,
             0x01 | 0xD0..=0xD9 => at += 2,
-            // Start of frame, all kinds but the tables that share its numbers.
+            // Start of frame: all markers of its range but the tables.
             kind @ 0xC0..=0xCF if !matches!(kind, 0xC4 | 0xC8 | 0xCC) => {
                 return Some(("image/jpeg", short(at + 7)?, short(at + 5)?, 1));
             }
@@ -134,8 +135,8 @@ fn with_mips(image: Image, pixels: Vec<u8>, size: [u32; 2], srgb: bool) -> Image
     made
 }
 
-/// Half the size, each pixel the mean of four. Means of encoded colours are a little dark at hard edges, which nobody
-/// sees in a copy for far away.
+/// Halves the size, each pixel the mean of four. Means of encoded colours are a little dark at hard edges, which is not
+/// visible in a small mipmap.
 fn halve(pixels: &[u8], [width, height]: [u32; 2]) -> (Vec<u8>, [u32; 2]) {
     let half = [(width / 2).max(1), (height / 2).max(1)];
     let mut out = Vec::with_capacity(half[0] as usize * half[1] as usize * 4);

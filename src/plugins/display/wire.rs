@@ -1,4 +1,4 @@
-//! Edges over a surface: thin lines, drawn a little nearer than they are so that the surface does not swallow them.
+//! Edges over a surface: thin lines, drawn a little nearer to the camera so that the surface does not hide them.
 
 use bevy::{
     asset::{load_internal_asset, uuid_handle},
@@ -14,7 +14,7 @@ use bevy::{
 
 const SHADER: Handle<Shader> = uuid_handle!("0f0c41d7-93a5-4b5e-9a61-6f2a0a4d5be3");
 
-/// Adds the material; its assets only, where there is no renderer.
+/// Adds the material; its assets only, without a renderer.
 pub(super) fn add_wire(app: &mut App) {
     if app.get_sub_app(RenderApp).is_some() {
         load_internal_asset!(app, SHADER, "wire.wgsl", Shader::from_wgsl);
@@ -47,7 +47,7 @@ impl Material for WireMaterial {
     }
 
     fn depth_bias(&self) -> f32 {
-        // Among what blends: after see-through surfaces, before what is drawn over everything.
+        // The order among blended objects: after see-through surfaces, before the rig's picture.
         1e5
     }
 

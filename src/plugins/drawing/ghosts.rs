@@ -1,4 +1,4 @@
-//! What tools are about to make: ghost joints, the line of a stroke, the span of a ray, the symmetry plane.
+//! Ghosts: planned joints, the line of a stroke, the span of a ray, and the symmetry plane.
 
 use bevy::prelude::*;
 
@@ -9,36 +9,37 @@ use super::{
 };
 use crate::{plugins::viewport::Sight, rig::operations::MirrorPlane};
 
-/// What the tool at work shows over a rig, in the rig's space.
+/// Ghosts of the current tool over a rig, in the rig's space.
 ///
-/// Retained: a tool replaces it when it changes (`ghosts.set_if_neq(..)`) and clears it with the default when it ends.
+/// The resource is retained: a tool replaces it when it changes (`ghosts.set_if_neq(..)`) and resets it to the default
+/// when it ends.
 #[derive(Resource, Debug, Clone, PartialEq, Default)]
 pub struct Ghosts {
-    /// The rig in whose space all of this is; `None` for the only one there is.
+    /// The rig whose space the ghosts are in; `None` for the only rig.
     pub rig: Option<Entity>,
     /// Joints that a click or Enter would make.
     pub joints: Vec<GhostJoint>,
     /// The line drawn so far, on the view plane: one point after another.
     pub stroke: Vec<Vec3>,
-    /// The near and the far end of the span that depth runs along; a tick marks where the first ghost joint is.
+    /// The near and the far end of the span of depths; a tick marks the first ghost joint.
     pub depth_span: Option<(Vec3, Vec3)>,
 }
 
 impl Ghosts {
-    /// True if there is nothing to show.
+    /// Returns `true` if there is nothing to show.
     pub fn is_empty(&self) -> bool {
         self.joints.is_empty() && self.stroke.len() < 2 && self.depth_span.is_none()
     }
 }
 
-/// A joint that is not there yet.
+/// A planned joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GhostJoint {
-    /// Where it would go.
+    /// Position of the joint.
     pub position: Vec3,
-    /// Where the parent is that it would get; `None` for a root.
+    /// Position of its parent; `None` for a root.
     pub parent: Option<Vec3>,
-    /// True for what symmetry adds on the other side: drawn fainter.
+    /// Marks joints that symmetry adds on the other side, which are drawn fainter.
     pub mirrored: bool,
 }
 
@@ -101,7 +102,7 @@ fn ghost_bone(pen: &mut Pen, ends: [Vec3; 2], tint: Tint, theme: &Theme) {
     }
 }
 
-/// A thin line from the near to the far hit with short bars at its ends, and a longer one where the joint goes.
+/// Draws a thin line from the near to the far hit with short bars at its ends, and a longer one at the joint.
 fn draw_span(pen: &mut Pen, span: [Vec3; 2], at: Option<Vec3>, theme: &Theme) {
     pen.line(span, 3.0, 0.0, fade(theme.outline, 0.4));
     pen.line(span, 1.4, 0.0, theme.depth);

@@ -8,14 +8,14 @@ use super::{
 };
 use crate::plugins::viewport::Sight;
 
-/// How many lines each way.
+/// Number of lines each way.
 const LINES: i32 = 48;
-/// In how many pieces a line is drawn, so that it can fade along.
+/// Number of pieces of a line, along which it fades.
 const PIECES: i32 = 12;
-/// Depth of a grid that lies in the view plane: behind everything.
+/// Depth of a grid in the view plane: behind the scene.
 const BEHIND: f32 = 1e-7;
 
-/// A plane of the world that the grid lies in: the directions of its lines and of its normal.
+/// A plane of the world for the grid: the directions of its lines and of its normal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GridPlane {
     /// x and z: the ground.
@@ -27,8 +27,8 @@ pub enum GridPlane {
 }
 
 impl GridPlane {
-    /// The plane that suits a view of the world: in an orthographic view straight along an axis the view plane, else
-    /// the ground.
+    /// The plane for a view of the world: the view plane in an orthographic view straight along an axis, else the
+    /// ground.
     pub fn of(sight: &Sight) -> Self {
         let towards = sight.plane.towards().abs();
         match sight.plane.eye {
@@ -48,7 +48,7 @@ impl GridPlane {
     }
 }
 
-/// Spacing of the finest lines: a power of ten, at least 9 pixels apart where the camera looks.
+/// Spacing of the finest lines: a power of ten, at least 9 pixels apart at the camera's focus.
 pub fn spacing(pixel: f32) -> f32 {
     let exponent = ops::log2(9.0 * pixel.max(1e-20)) / std::f32::consts::LOG2_10;
     ops::powf(10.0, exponent.ceil())
@@ -83,7 +83,7 @@ fn centre(sight: &Sight, plane: GridPlane) -> [f32; 2] {
     let towards = sight.plane.towards();
     let origin = sight.plane.origin;
     let slope = towards.dot(normal);
-    // Along the view onto the plane, unless that is far away; then straight down.
+    // The point along the view onto the plane, unless it is far away; then straight down.
     let along = if slope.abs() > 0.15 { origin - towards * (origin.dot(normal) / slope) } else { origin };
     plane.axes().map(|axis| along[axis])
 }
@@ -104,7 +104,7 @@ impl Grid<'_> {
         if self.flat {
             return point;
         }
-        // A little behind the plane, so that feet on the ground stay in front of it.
+        // The grid is a little behind the plane, so that feet on the ground stay in front of it.
         match self.sight.plane.eye {
             Some(eye) => point + (point - eye) * 2e-4,
             None => point - self.sight.plane.towards() * self.sight.pixel,
@@ -118,7 +118,7 @@ impl Grid<'_> {
             let middle = (across / step).round();
             for number in -LINES..=LINES {
                 let line = middle + number as f32;
-                // The axes, and lines that the next level draws.
+                // Lines that an axis or the next level draws.
                 if line == 0.0 || (level < 2 && line.rem_euclid(10.0) == 0.0) {
                     continue;
                 }
@@ -129,8 +129,8 @@ impl Grid<'_> {
         }
     }
 
-    /// A line through `start`, fading towards `reach` from the centre and, given the spacing of its kind, where that
-    /// gets too dense.
+    /// Draws a line through `start`, fading towards `reach` from the centre and, given the spacing of its kind, where
+    /// lines get too dense.
     fn line(
         &self,
         pen: &mut Pen,
@@ -147,7 +147,7 @@ impl Grid<'_> {
         };
         let mut from: Option<(Vec3, Tint)> = None;
         for piece in -PIECES..=PIECES {
-            // Pieces are shorter near the centre, where the eye is.
+            // Pieces are shorter near the centre, where detail matters.
             let part = piece as f32 / PIECES as f32;
             let [u, v] = place(part * part.abs());
             let point = self.point(u, v);
@@ -166,7 +166,7 @@ impl Grid<'_> {
         }
     }
 
-    /// 0 where lines `step` apart would be a few pixels apart, 1 where there is room.
+    /// Visibility of lines `step` apart at a point: 0 where they would be a few pixels apart, 1 where there is room.
     fn density(&self, point: Vec3, step: f32) -> f32 {
         let pixel = self.sight.pixel_at(point);
         if pixel <= 0.0 {

@@ -11,17 +11,17 @@ use super::theme::Tint;
 use crate::plugins::viewport::Sight;
 
 /// The part of the depth buffer that pictures over the mesh share: in front of everything else, yet ordered among
-/// themselves (1 is the near plane). In a perspective view only what almost touches the camera is in there, too; depth
-/// in an orthographic view is even, so the part must be thin: with Bevy's range of a kilometre, a metre.
+/// themselves (1 is the near plane). In a perspective view only objects that almost touch the camera share this range;
+/// depth in an orthographic view is linear, so the range must be thin: with Bevy's range of a kilometre, a metre.
 const FRONT: [f32; 2] = [0.9, 0.9998];
 const FLAT_FRONT: [f32; 2] = [0.999, 0.9998];
 
 /// Triangles with colours, in the rig's space.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Ink {
-    /// Places of the vertices.
+    /// Positions of the vertices.
     pub positions: Vec<[f32; 3]>,
-    /// Where each vertex goes in the depth buffer, 0 far to 1 near; exactly 0 leaves it where the camera has it.
+    /// Depth of each vertex in the depth buffer, 0 far to 1 near; exactly 0 keeps the camera's depth.
     pub depths: Vec<f32>,
     /// Colours of the vertices.
     pub tints: Vec<Tint>,
@@ -30,12 +30,12 @@ pub struct Ink {
 }
 
 impl Ink {
-    /// True if there is nothing to draw.
+    /// Returns `true` without triangles.
     pub fn is_empty(&self) -> bool {
         self.indices.is_empty()
     }
 
-    /// Empty ink with as much memory as `other` needs.
+    /// Empty ink with the capacity that `other` uses.
     pub fn with_capacity_of(other: &Self) -> Self {
         let (vertices, indices) = (other.positions.len(), other.indices.len());
         Self {
@@ -47,12 +47,12 @@ impl Ink {
     }
 }
 
-/// Where a picture goes in depth.
+/// Depth of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Layer {
-    /// Over the mesh, sorted among all that is over it.
+    /// Over the mesh, sorted among the pictures over it.
     Over,
-    /// In the scene: what is nearer hides it.
+    /// In the scene: nearer objects hide it.
     Scene,
     /// At exactly this depth (see [`Ink::depths`]).
     Fixed(f32),
@@ -60,11 +60,11 @@ pub enum Layer {
 
 /// Draws into [`Ink`] for one view.
 pub struct Pen<'a> {
-    /// What it draws into.
+    /// Ink that it draws into.
     pub ink: &'a mut Ink,
     /// The view it draws for.
     pub sight: &'a Sight,
-    /// Where it draws in depth.
+    /// Depth of its drawings.
     pub layer: Layer,
     towards: Vec3,
     focus: f32,
@@ -80,12 +80,12 @@ impl<'a> Pen<'a> {
         Self { ink, sight, layer: Layer::Over, towards, focus, span }
     }
 
-    /// Distance from the eye along the view; from the view plane where there is no eye.
+    /// Distance from the eye along the view; from the view plane in an orthographic view.
     pub fn distance(&self, position: Vec3) -> f32 {
         (self.sight.plane.eye.unwrap_or(self.sight.plane.origin) - position).dot(self.towards)
     }
 
-    /// Depth of a place that lies `lift` nearer to the camera than `position`. Nearer places have greater depths.
+    /// Depth of a point that lies `lift` nearer to the camera than `position`. Nearer points have greater depths.
     pub fn depth(&self, position: Vec3, lift: f32) -> f32 {
         let [far, near] = if self.sight.plane.eye.is_some() { FRONT } else { FLAT_FRONT };
         match self.layer {
@@ -94,7 +94,7 @@ impl<'a> Pen<'a> {
             Layer::Over => {
                 let distance = self.distance(position) - lift;
                 let part = match self.sight.plane.eye {
-                    // Affine in the reciprocal, so that flat faces stay flat in depth.
+                    // The depth is affine in the reciprocal distance, so that flat faces stay flat in depth.
                     Some(_) if distance > 0.0 => (self.focus / 32.0 / distance).min(1.0),
                     Some(_) => 1.0,
                     None => 0.5 - 0.5 * distance / (distance.abs() + self.span),
@@ -114,24 +114,24 @@ impl<'a> Pen<'a> {
         index
     }
 
-    /// A triangle of one colour.
+    /// Draws a triangle of one colour.
     pub fn triangle(&mut self, corners: [Vec3; 3], lift: f32, tint: Tint) {
         let corners = corners.map(|corner| self.vertex(corner, lift, tint));
         self.ink.indices.extend(corners);
     }
 
-    /// A flat quad of one colour, corners in turn.
+    /// Draws a flat quad of one colour, corners in turn.
     pub fn quad(&mut self, corners: [Vec3; 4], lift: f32, tint: Tint) {
         let [a, b, c, d] = corners.map(|corner| self.vertex(corner, lift, tint));
         self.ink.indices.extend([a, b, c, a, c, d]);
     }
 
-    /// A line `width` pixels wide, facing the camera, with square ends. What lies behind the camera is cut off.
+    /// Draws a line `width` pixels wide, facing the camera, with square ends. The part behind the camera is cut off.
     pub fn line(&mut self, ends: [Vec3; 2], width: f32, lift: f32, tint: Tint) {
         self.blend_line(ends, width, lift, [tint, tint]);
     }
 
-    /// A line whose colour runs from one end to the other.
+    /// Draws a line with a colour gradient.
     pub fn blend_line(&mut self, ends: [Vec3; 2], width: f32, lift: f32, tints: [Tint; 2]) {
         let Some([from, to]) = self.before_eye(ends) else { return };
         let along = to - from;
@@ -152,7 +152,7 @@ impl<'a> Pen<'a> {
         self.ink.indices.extend([a, b, c, a, c, d]);
     }
 
-    /// The part of a line that lies before the eye.
+    /// The part of a line before the eye.
     fn before_eye(&self, ends: [Vec3; 2]) -> Option<[Vec3; 2]> {
         if self.sight.plane.eye.is_none() {
             return Some(ends);
@@ -168,13 +168,13 @@ impl<'a> Pen<'a> {
         }
     }
 
-    /// How many corners a circle needs to look round.
+    /// Number of corners with which a circle looks round.
     fn corners(&self, centre: Vec3, radius: f32) -> u32 {
         let pixels = radius / self.sight.pixel_at(centre).max(f32::MIN_POSITIVE);
         ((pixels.max(0.0).sqrt() * 5.0) as u32).clamp(8, 48)
     }
 
-    /// A disc that faces the camera, with a lighter spot up and to the left that makes it look like a ball.
+    /// Draws a disc that faces the camera, with a lighter spot up and to the left that makes it look like a ball.
     pub fn ball(&mut self, centre: Vec3, radius: f32, lift: f32, spot: Tint, rim: Tint) {
         let (right, up) = (self.sight.plane.right * radius, self.sight.plane.up * radius);
         let middle = self.vertex(centre - right * 0.32 + up * 0.32, lift, spot);
@@ -186,7 +186,7 @@ impl<'a> Pen<'a> {
         }
     }
 
-    /// A ring that faces the camera, between two radii. `corners` of `None` makes it round.
+    /// Draws a ring that faces the camera, between two radii. `corners` of `None` makes it round.
     pub fn ring(&mut self, centre: Vec3, radii: [f32; 2], corners: Option<u32>, lift: f32, tint: Tint) {
         let (right, up) = (self.sight.plane.right, self.sight.plane.up);
         let count = corners.unwrap_or_else(|| self.corners(centre, radii[1]));
@@ -201,7 +201,7 @@ impl<'a> Pen<'a> {
     }
 }
 
-/// Points around the unit circle with their numbers. One sine for all of them: balls have many corners.
+/// Points around the unit circle with their numbers. A single sine gives all of them: balls have many corners.
 fn circle(count: u32) -> impl Iterator<Item = (u32, Vec2)> {
     let (sin, cos) = ops::sin_cos(TAU / count as f32);
     let turn = Vec2::new(cos, sin);

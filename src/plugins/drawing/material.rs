@@ -1,4 +1,4 @@
-//! The material of everything drawn here: vertex colours as they are, at a depth that each vertex names.
+//! Material of the drawing: unlit vertex colours, with a depth for each vertex.
 
 use bevy::{
     asset::{load_internal_asset, uuid_handle},
@@ -22,15 +22,15 @@ pub const DEPTH: MeshVertexAttribute =
 pub const TINT: MeshVertexAttribute =
     MeshVertexAttribute::new("Overlay_Tint", 0x7269_6773_6d02, VertexFormat::Unorm8x4);
 
-/// Vertex colours without light.
+/// Unlit material with vertex colours.
 #[derive(Asset, TypePath, AsBindGroup, Debug, Clone)]
 pub struct OverlayMaterial {
-    /// Multiplies all colours.
+    /// Factor of all colours.
     #[uniform(0)]
     pub color: LinearRgba,
-    /// Whether it hides what is behind it, or blends with it.
+    /// Opaque or blended.
     pub alpha_mode: AlphaMode,
-    /// Among blended things: later (positive) or earlier (negative) than things at the same distance.
+    /// Order among blended objects: later (positive) or earlier (negative) than objects at the same distance.
     pub order: f32,
 }
 
@@ -73,7 +73,7 @@ impl Material for OverlayMaterial {
     }
 }
 
-/// Adds the material; its assets only, where there is no renderer.
+/// Adds the material; its assets only, without a renderer.
 pub(super) fn add_material(app: &mut App) {
     if app.get_sub_app(RenderApp).is_some() {
         load_internal_asset!(app, SHADER, "overlay.wgsl", Shader::from_wgsl);

@@ -2,16 +2,16 @@
 
 use bevy::prelude::*;
 
-/// Pixels that a ball's radius never goes below.
+/// Least radius of a ball, in pixels.
 pub const LEAST_BALL: f32 = 4.0;
-/// Pixels that a ball's radius stays at while its bone grows, until the view is near.
+/// Usual radius of a ball in pixels, kept while its bone grows on the screen, until the view is near.
 pub const USUAL_BALL: f32 = 8.0;
 
 /// Radius in pixels of a joint's ball whose bone is `bone` pixels long.
 ///
-/// A twelfth of the bone, at most a fifth; between [`LEAST_BALL`] and [`USUAL_BALL`], and growing again, slowly, when a
-/// bone fills much of the view. `scale` multiplies everything but the least radius. Never less than [`LEAST_BALL`], also
-/// for lengths that are not finite.
+/// The radius is a twelfth of the bone, at most a fifth; between [`LEAST_BALL`] and [`USUAL_BALL`], and growing again,
+/// slowly, when a bone fills much of the view. `scale` multiplies everything but the least radius. Never less than
+/// [`LEAST_BALL`], also for lengths that are not finite.
 pub fn ball_radius(bone: f32, scale: f32) -> f32 {
     let bone = if bone.is_finite() { bone.max(0.0) } else { 0.0 };
     let wanted = (bone / 12.0).min(USUAL_BALL).max(bone / 40.0) * scale;
@@ -21,26 +21,26 @@ pub fn ball_radius(bone: f32, scale: f32) -> f32 {
 /// An octahedral bone: thin at both ends, widest a tenth of the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Octahedron {
-    /// Where the bone starts.
+    /// Start of the bone.
     pub head: Vec3,
-    /// Where it ends.
+    /// End of the bone.
     pub tail: Vec3,
-    /// The four corners of its widest place, in turn.
+    /// The four corners of its widest section, in turn.
     pub waist: [Vec3; 4],
 }
 
-/// Corners of a face of an [`Octahedron`] and the direction it faces (not of unit length).
+/// Corners of a face of an [`Octahedron`] and its outward normal (not of unit length).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Face {
     /// Corners.
     pub corners: [Vec3; 3],
-    /// Outwards.
+    /// Outward direction.
     pub normal: Vec3,
 }
 
 impl Octahedron {
-    /// A bone between two places, whose waist is `width` from its axis and has its corners where `side` points, as far
-    /// as that is possible. `None` for a bone without length.
+    /// A bone between two points, with a waist `width` from its axis whose corners lie in the direction of `side`, as
+    /// far as possible. `None` for a bone without length.
     pub fn new(head: Vec3, tail: Vec3, width: f32, side: Vec3) -> Option<Self> {
         let along = tail - head;
         let length = along.length();
@@ -52,7 +52,7 @@ impl Octahedron {
         let side = if side.length_squared() > 1e-6 { side.normalize() } else { axis.any_orthonormal_vector() };
         let other = axis.cross(side);
         let middle = head + along * 0.1;
-        // Corners halfway between the axes: flat sides to where the joint's axes point.
+        // The corners lie halfway between the axes: flat sides face the joint's axes.
         let (a, b) = ((side + other) * (width * 0.707), (other - side) * (width * 0.707));
         Some(Self { head, tail, waist: [middle + a, middle + b, middle - a, middle - b] })
     }

@@ -17,15 +17,15 @@ use crate::{
     rig::{NodeKind, Rig, Uid},
 };
 
-/// How a joint stands out.
+/// Emphasis of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Emphasis {
-    /// Like all others.
+    /// No emphasis.
     #[default]
     None,
-    /// Selected.
+    /// A selected joint.
     Selected,
-    /// Selected last.
+    /// The joint selected last.
     Active,
 }
 
@@ -34,24 +34,26 @@ pub enum Emphasis {
 pub struct DrawnJoint {
     /// Identity.
     pub uid: Uid,
-    /// Where it stands as posed, in the rig's space.
+    /// Posed position, in the rig's space.
     pub position: Vec3,
-    /// Its own axes as posed, in the rig's space, of unit length.
+    /// Posed axes, in the rig's space, of unit length.
     pub axes: Mat3,
-    /// The number of its parent in the list; parents come first.
+    /// Index of its parent in the list; parents come first.
     pub parent: Option<usize>,
     /// Joint or null.
     pub kind: NodeKind,
     /// Colour of its local group; `None` without one.
     pub color: Option<Tint>,
-    /// Whether it is selected.
+    /// Emphasis by the selection.
     pub emphasis: Emphasis,
-    /// True if a click would hit it.
+    /// Marks the joint that a click would hit.
     pub hovered: bool,
+    /// True if its layer hides it.
+    pub hidden: bool,
 }
 
-/// The joints of a rig in the order of [`Rig::walk`], as posed by `pose` (transforms to the rig's space); where that
-/// knows a joint not, it rests below its parent.
+/// The joints of a rig in the order of [`Rig::walk`], with the transforms `pose` to the rig's space; a joint without
+/// one rests below its parent.
 pub fn drawn_joints(
     rig: &Rig,
     selection: &Selection,
@@ -86,6 +88,7 @@ pub fn drawn_joints(
             color: color.map(|(_, tint)| *tint),
             emphasis: Emphasis::None,
             hovered: false,
+            hidden: false,
         });
     }
     for uid in &selection.0 {
@@ -103,20 +106,20 @@ pub fn drawn_joints(
 /// A bone as it is drawn: from a joint to a child, or the tail of a joint without children.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawnBone {
-    /// The number of the joint that moves it.
+    /// Index of the joint that moves it.
     pub joint: usize,
-    /// Where it ends.
+    /// Position of its end.
     pub tail: Vec3,
-    /// True for the tail of a joint without children.
+    /// Marks the tail of a joint without children.
     pub leaf: bool,
-    /// True for one of so many that leave their joint that only lines leave room to see them.
+    /// Marks one of many bones from a common joint, which are drawn as lines for lack of room.
     pub fan: bool,
 }
 
-/// From so many children on, the bones to them are a fan: those of a face that hang on the head.
+/// Least number of children of a joint whose bones form a fan, such as those of a face on the head.
 pub const FAN: usize = 12;
 
-/// How many children each joint has.
+/// Number of children of each joint.
 fn children(joints: &[DrawnJoint]) -> Vec<usize> {
     let mut children = vec![0; joints.len()];
     for parent in joints.iter().filter_map(|joint| joint.parent) {
@@ -125,14 +128,14 @@ fn children(joints: &[DrawnJoint]) -> Vec<usize> {
     children
 }
 
-/// All bones of a rig. A joint without children gets a tail as long as a third of the bone that leads to it, in the
-/// same direction, unless it is one of a fan.
+/// Bones of a rig. A joint without children gets a tail as long as a third of the bone that leads to it, in the same
+/// direction, unless it is part of a fan.
 pub fn bones(joints: &[DrawnJoint]) -> Vec<DrawnBone> {
     let children = children(joints);
     let mut list = Vec::with_capacity(joints.len() * 2);
     for (number, joint) in joints.iter().enumerate() {
         if let Some(parent) = joint.parent {
-            // A chain that leaves a fan is a bone as any other.
+            // A chain that leaves a fan is drawn as any other bone.
             let fan = children[parent] >= FAN && children[number] == 0 && joint.kind == NodeKind::Joint;
             list.push(DrawnBone { joint: parent, tail: joint.position, leaf: false, fan });
         }
@@ -147,7 +150,7 @@ pub fn bones(joints: &[DrawnJoint]) -> Vec<DrawnBone> {
 }
 
 /// Radii in pixels of the balls of all joints, by [`ball_radius`] of the shorter of the bone that leads to a joint and
-/// the longest that leaves it; of a fan, by twice the way to the nearest joint beside it.
+/// the longest that leaves it; in a fan, by twice the distance to the nearest joint.
 pub fn ball_radii(joints: &[DrawnJoint], bones: &[DrawnBone], sight: &Sight, scale: f32) -> Vec<f32> {
     let pixels = |joint: usize, length: f32| {
         let pixel = sight.pixel_at(joints[joint].position);
@@ -181,7 +184,7 @@ pub fn ball_radii(joints: &[DrawnJoint], bones: &[DrawnBone], sight: &Sight, sca
         .collect()
 }
 
-/// Draws a rig into `ink`. `labels` are written with strokes, at their pixels.
+/// Draws a rig into `ink`. `labels` are written with strokes at their pixel positions.
 pub fn draw_skeleton(
     joints: &[DrawnJoint],
     labels: &[(Vec2, String)],
@@ -192,10 +195,10 @@ pub fn draw_skeleton(
     let bones = bones(joints);
     let radii = ball_radii(joints, &bones, sight, settings.ball_scale);
     let mut artist = Artist { pen: Pen::new(ink, sight), theme: &settings.theme };
-    for bone in &bones {
+    for bone in bones.iter().filter(|bone| !joints[bone.joint].hidden) {
         artist.bone(bone, &joints[bone.joint]);
     }
-    for (joint, radius) in joints.iter().zip(&radii) {
+    for (joint, radius) in joints.iter().zip(&radii).filter(|(joint, _)| !joint.hidden) {
         artist.joint(joint, *radius);
         if settings.axes && joint.emphasis != Emphasis::None {
             artist.axes(joint, *radius);
@@ -212,7 +215,7 @@ struct Artist<'a> {
 }
 
 impl Artist<'_> {
-    /// The outline's colour and width in pixels.
+    /// Colour of the outline, and its width in pixels.
     fn outline(&self, joint: &DrawnJoint) -> Option<(Tint, f32)> {
         match joint.emphasis {
             Emphasis::None => None,
@@ -225,7 +228,7 @@ impl Artist<'_> {
         let (head, tail) = (joint.position, bone.tail);
         let pixel = self.pen.sight.pixel_at(head.midpoint(tail));
         let length = head.distance(tail);
-        // Too short to see, or all of it behind the camera.
+        // The bone is too short to see, or fully behind the camera.
         if !(pixel > 0.0 && length > 2.0 * pixel) {
             return;
         }
@@ -270,7 +273,7 @@ impl Artist<'_> {
         }
     }
 
-    /// Where the light comes from: from the camera, from above and a little from the left, so that faces differ.
+    /// Direction of the light: from the camera, from above and a little from the left, so that faces differ.
     fn light(&self) -> Vec3 {
         let plane = &self.pen.sight.plane;
         (plane.right * -0.45 + plane.up * 0.65 + plane.towards() * 0.6).normalize_or_zero()
@@ -318,7 +321,7 @@ impl Artist<'_> {
         }
     }
 
-    /// Three short lines along the null's own axes.
+    /// Draws three short lines along the null's own axes.
     fn cross(&mut self, joint: &DrawnJoint, radius: f32, pixel: f32) {
         let tint = match (joint.hovered, self.outline(joint)) {
             (true, _) => self.theme.hovered,
@@ -340,7 +343,7 @@ impl Artist<'_> {
         let axes = [joint.axes.x_axis, joint.axes.y_axis, joint.axes.z_axis];
         for (axis, tint) in axes.into_iter().zip(self.theme.axes) {
             let ends = [joint.position + axis * start, joint.position + axis * end];
-            // One of them usually runs inside the bone.
+            // One of the axes usually runs inside the bone.
             self.pen.layer = Layer::Fixed(0.999_86);
             self.pen.line(ends, 4.0, 0.0, self.theme.outline);
             self.pen.layer = Layer::Fixed(0.999_88);

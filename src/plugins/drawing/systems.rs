@@ -1,4 +1,4 @@
-//! When pictures are built, and the entities that show them.
+//! Systems that build pictures, and the entities that show them.
 
 use bevy::{
     asset::RenderAssetUsages,
@@ -9,15 +9,20 @@ use bevy::{
 };
 
 use super::{
-    DrawingCounts, Ghosts, LETTER, LabelChoice, LabelWish, RigDrawing, RigLabels, ghosts, grid,
+    DrawingCounts, Ghosts, LETTER, LabelCandidate, LabelChoice, RigDrawing, RigLabels,
+    controls::draw_controls,
+    ghosts, grid,
     ink::Ink,
     label_places,
     material::{DEPTH, OverlayMaterial, TINT},
     skeleton::{DrawnJoint, Emphasis, ball_radii, bones, draw_skeleton, drawn_joints},
+    theme::group_tint,
 };
 use crate::{
     plugins::{
-        document::{Hovered, Joint, JointEntities, JointOf, Selection, Symmetry},
+        controls::{NodeVisible, outline::ControlNodes},
+        document::{Hovered, Joint, JointEntities, NodeOf, Selection, Symmetry},
+        schema::{Control, NodeLayer, RigNodes},
         surface::{RigMesh, RigMeshes},
         viewport::{RigViewport, Sight},
     },
@@ -26,15 +31,15 @@ use crate::{
 
 /// The materials of all pictures.
 #[derive(Resource)]
-pub(super) struct Looks {
+pub(super) struct PictureMaterials {
     solid: Handle<OverlayMaterial>,
-    /// Blended, after everything else.
+    /// Blended material, drawn after everything else.
     glass: Handle<OverlayMaterial>,
-    /// Blended, before everything else.
+    /// Blended material, drawn before everything else.
     ground: Handle<OverlayMaterial>,
 }
 
-impl FromWorld for Looks {
+impl FromWorld for PictureMaterials {
     fn from_world(world: &mut World) -> Self {
         let mut materials = world.resource_mut::<Assets<OverlayMaterial>>();
         let mut add =
@@ -47,7 +52,7 @@ impl FromWorld for Looks {
     }
 }
 
-/// The entity that shows a picture of a rig; the rig it shows.
+/// Rig of a picture's entity.
 #[derive(Component, Debug)]
 #[relationship(relationship_target = Pictures)]
 pub(super) struct PictureOf(Entity);
@@ -57,7 +62,7 @@ pub(super) struct PictureOf(Entity);
 #[relationship_target(relationship = PictureOf, linked_spawn)]
 pub(super) struct Pictures(Vec<Entity>);
 
-/// One picture: its entity and the view it was built for.
+/// A picture: its entity and the view it was built for.
 #[derive(Debug, Default)]
 pub(super) struct Picture {
     entity: Option<Entity>,
@@ -66,35 +71,40 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// True if it has to be built again for this view.
+    /// Returns `true` if the picture has to be built again for this view.
     fn is_stale(&self, sight: Option<&Sight>) -> bool {
         self.sight.as_ref() != sight
     }
 }
 
-/// The pictures of a rig, and what its symmetry plane spans.
+/// Pictures of a rig, and the extent of its symmetry plane.
 #[derive(Component, Debug, Default)]
-pub(super) struct Drawn {
+pub(super) struct RigPictures {
     skeleton: Picture,
     ghosts: Picture,
     plane: Picture,
     bounds: Option<[Vec3; 2]>,
 }
 
-/// Shows ink: spawns, fills and hides entities.
+/// Access to the entities of pictures: spawns, fills and hides them.
 #[derive(SystemParam)]
-pub(super) struct Gallery<'w, 's> {
+pub(super) struct PictureEntities<'w, 's> {
     commands: Commands<'w, 's>,
     meshes: ResMut<'w, Assets<Mesh>>,
-    shown: Query<'w, 's, (&'static Mesh3d, &'static mut Visibility, &'static mut GlobalTransform), With<OverlayMesh>>,
+    shown: Query<
+        'w,
+        's,
+        (&'static Mesh3d, &'static mut Visibility, &'static mut GlobalTransform),
+        (With<OverlayMesh>, Without<Control>),
+    >,
 }
 
 /// Marks entities that show pictures.
 #[derive(Component, Debug)]
 pub(super) struct OverlayMesh;
 
-impl Gallery<'_, '_> {
-    /// Shows a picture with what is in its ink.
+impl PictureEntities<'_, '_> {
+    /// Shows a picture with its ink.
     fn show(
         &mut self,
         picture: &mut Picture,
@@ -122,7 +132,7 @@ impl Gallery<'_, '_> {
         shown.set_if_neq(visibility);
         stands.set_if_neq(place);
         if !picture.ink.is_empty() {
-            // A handle that is alive always has its place.
+            // The handle is alive, so its slot exists.
             let _ = self.meshes.insert(mesh.id(), mesh_of(&mut picture.ink));
         }
     }
@@ -138,7 +148,7 @@ fn mesh_of(ink: &mut Ink) -> Mesh {
         .with_inserted_indices(Indices::U32(ink.indices))
 }
 
-/// The view through the camera that counts.
+/// Access to the view of the camera that counts.
 #[derive(SystemParam)]
 pub(super) struct Views<'w, 's> {
     cameras: Query<
@@ -150,7 +160,7 @@ pub(super) struct Views<'w, 's> {
 }
 
 impl Views<'_, '_> {
-    /// What it sees of a thing that stands at `place`.
+    /// View of an object at `place`.
     fn sight(&self, place: &GlobalTransform) -> Option<Sight> {
         let active = self.cameras.iter().filter(|(_, camera, ..)| camera.is_active);
         let (_, camera, eye, projection, viewport) =
@@ -159,15 +169,15 @@ impl Views<'_, '_> {
     }
 }
 
-/// Gives rigs what drawing needs to remember, and finds out what their symmetry planes span.
+/// Adds the drawing's state to rigs, and updates the extents of their symmetry planes.
 pub(super) fn frame_planes(
     mut commands: Commands,
-    fresh: Query<Entity, (With<Rig>, Without<Drawn>)>,
-    mut rigs: Query<(&mut Drawn, &Rig, Ref<Symmetry>, Option<Ref<RigMeshes>>)>,
+    fresh: Query<Entity, (With<Rig>, Without<RigPictures>)>,
+    mut rigs: Query<(&mut RigPictures, &Rig, Ref<Symmetry>, Option<Ref<RigMeshes>>)>,
     meshes: Query<&RigMesh>,
 ) {
     for rig in &fresh {
-        commands.entity(rig).insert((Drawn::default(), RigLabels::default()));
+        commands.entity(rig).insert((RigPictures::default(), RigLabels::default()));
     }
     for (mut drawn, rig, symmetry, bound) in &mut rigs {
         let changed = symmetry.is_changed() || bound.as_ref().is_some_and(|bound| bound.is_changed());
@@ -185,21 +195,35 @@ pub(super) fn frame_planes(
     }
 }
 
+/// A node that looks otherwise than in the frame before.
+type NodeRedrawn = Or<(Changed<GlobalTransform>, Changed<NodeVisible>, Changed<Control>, Changed<NodeLayer>)>;
+
 /// Builds the pictures of rigs.
 pub(super) fn draw_rigs(
     settings: Res<RigDrawing>,
-    looks: Res<Looks>,
+    materials: Res<PictureMaterials>,
     views: Views,
     mut rigs: Query<
-        (Entity, Ref<Rig>, Ref<Selection>, Ref<Hovered>, &JointEntities, &GlobalTransform, &mut Drawn, &mut RigLabels),
+        (
+            Entity,
+            Ref<Rig>,
+            Ref<Selection>,
+            Ref<Hovered>,
+            &JointEntities,
+            &GlobalTransform,
+            Option<&RigNodes>,
+            &mut RigPictures,
+            &mut RigLabels,
+        ),
         Without<OverlayMesh>,
     >,
-    moved: Query<&JointOf, (With<Joint>, Changed<GlobalTransform>, Without<OverlayMesh>)>,
-    poses: Query<&GlobalTransform, (With<Joint>, Without<OverlayMesh>)>,
-    mut gallery: Gallery,
+    moved: Query<&NodeOf, (NodeRedrawn, Without<OverlayMesh>)>,
+    poses: Query<(&GlobalTransform, Option<&NodeVisible>, Option<&NodeLayer>), (With<Joint>, Without<OverlayMesh>)>,
+    controls: ControlNodes,
+    mut gallery: PictureEntities,
     mut counts: ResMut<DrawingCounts>,
 ) {
-    for (entity, rig, selection, hovered, entities, place, mut drawn, mut labels) in &mut rigs {
+    for (entity, rig, selection, hovered, entities, place, nodes, mut drawn, mut labels) in &mut rigs {
         let sight = views.sight(place).filter(|_| settings.rig);
         let changed = rig.is_changed() || selection.is_changed() || hovered.is_changed() || settings.is_changed();
         let stale = changed || drawn.skeleton.is_stale(sight.as_ref());
@@ -212,27 +236,34 @@ pub(super) fn draw_rigs(
         let mut texts = Vec::new();
         if let Some(sight) = &sight {
             let to_rig = place.affine().inverse();
-            let joints = drawn_joints(&rig, &selection, &hovered, |uid| {
-                let joint = entities.get(uid).and_then(|joint| poses.get(joint).ok())?;
-                Some(to_rig * joint.affine())
-            });
+            let node = |uid| entities.get(uid).and_then(|joint| poses.get(joint).ok());
+            let mut joints = drawn_joints(&rig, &selection, &hovered, |uid| Some(to_rig * node(uid)?.0.affine()));
+            for joint in &mut joints {
+                let Some((_, visible, layer)) = node(joint.uid) else { continue };
+                joint.hidden = visible.is_some_and(|visible| !visible.0);
+                joint.color = layer.and_then(|layer| layer.0.color).map(group_tint).or(joint.color);
+            }
             texts = labels_of(&rig, &joints, sight, &settings);
             let written: &[(Vec2, String)] = if settings.write_labels { &texts } else { &[] };
             draw_skeleton(&joints, written, sight, &settings, &mut drawn.ink);
+            if settings.controls {
+                let controls = controls.visible(nodes, to_rig);
+                draw_controls(&controls, &selection, &hovered, sight, &settings.theme, &mut drawn.ink);
+            }
         }
         labels.set_if_neq(RigLabels(texts));
-        gallery.show(drawn, Some(entity), *place, &looks.solid);
+        gallery.show(drawn, Some(entity), *place, &materials.solid);
         counts.rigs += 1;
     }
 }
 
-/// The labels that [`RigDrawing::labels`] asks for.
+/// Labels chosen by [`RigDrawing::labels`].
 fn labels_of(rig: &Rig, joints: &[DrawnJoint], sight: &Sight, settings: &RigDrawing) -> Vec<(Vec2, String)> {
     if settings.labels == LabelChoice::None {
         return Vec::new();
     }
     let radii = ball_radii(joints, &bones(joints), sight, settings.ball_scale);
-    let wishes: Vec<LabelWish> = joints
+    let candidates: Vec<LabelCandidate> = joints
         .iter()
         .zip(radii)
         .filter_map(|(joint, radius)| {
@@ -244,22 +275,22 @@ fn labels_of(rig: &Rig, joints: &[DrawnJoint], sight: &Sight, settings: &RigDraw
                 Emphasis::None => 0,
             };
             let text = rig.joint(joint.uid)?.data.label.as_deref()?;
-            // Room for the mark of a root and the ring of what is hovered.
+            // Room for the mark of a root and the ring of a hovered joint.
             let mark = if joint.hovered || joint.parent.is_none() { 7.0 } else { 0.0 };
-            Some(LabelWish { position: joint.position, radius: radius + mark, text, rank })
+            Some(LabelCandidate { position: joint.position, radius: radius + mark, text, rank })
         })
         .collect();
-    label_places(sight, &wishes, LETTER)
+    label_places(sight, &candidates, LETTER)
 }
 
 /// Builds the pictures of ghosts.
 pub(super) fn draw_ghosts(
     settings: Res<RigDrawing>,
-    looks: Res<Looks>,
+    materials: Res<PictureMaterials>,
     wanted: Res<Ghosts>,
     views: Views,
-    mut rigs: Query<(Entity, &GlobalTransform, &mut Drawn), Without<OverlayMesh>>,
-    mut gallery: Gallery,
+    mut rigs: Query<(Entity, &GlobalTransform, &mut RigPictures), Without<OverlayMesh>>,
+    mut gallery: PictureEntities,
     mut counts: ResMut<DrawingCounts>,
 ) {
     for (entity, place, mut drawn) in &mut rigs {
@@ -273,7 +304,7 @@ pub(super) fn draw_ghosts(
         if let Some(sight) = &sight {
             ghosts::draw_ghosts(&wanted, sight, &settings.theme, settings.ball_scale, &mut picture.ink);
         }
-        gallery.show(picture, Some(entity), *place, &looks.glass);
+        gallery.show(picture, Some(entity), *place, &materials.glass);
         counts.ghosts += 1;
     }
 }
@@ -281,10 +312,10 @@ pub(super) fn draw_ghosts(
 /// Builds the pictures of symmetry planes.
 pub(super) fn draw_planes(
     settings: Res<RigDrawing>,
-    looks: Res<Looks>,
+    materials: Res<PictureMaterials>,
     views: Views,
-    mut rigs: Query<(Entity, &GlobalTransform, &Symmetry, &mut Drawn), Without<OverlayMesh>>,
-    mut gallery: Gallery,
+    mut rigs: Query<(Entity, &GlobalTransform, &Symmetry, &mut RigPictures), Without<OverlayMesh>>,
+    mut gallery: PictureEntities,
     mut counts: ResMut<DrawingCounts>,
 ) {
     for (entity, place, symmetry, mut drawn) in &mut rigs {
@@ -299,7 +330,7 @@ pub(super) fn draw_planes(
         if let (Some(sight), Some((plane, bounds))) = (&sight, shown) {
             ghosts::draw_plane(&plane, bounds, sight, &settings.theme, &mut picture.ink);
         }
-        gallery.show(picture, Some(entity), *place, &looks.glass);
+        gallery.show(picture, Some(entity), *place, &materials.glass);
         counts.planes += 1;
     }
 }
@@ -307,10 +338,10 @@ pub(super) fn draw_planes(
 /// Builds the picture of the grid.
 pub(super) fn draw_grid(
     settings: Res<RigDrawing>,
-    looks: Res<Looks>,
+    materials: Res<PictureMaterials>,
     views: Views,
     mut picture: Local<Picture>,
-    mut gallery: Gallery,
+    mut gallery: PictureEntities,
     mut counts: ResMut<DrawingCounts>,
 ) {
     let place = GlobalTransform::IDENTITY;
@@ -322,6 +353,6 @@ pub(super) fn draw_grid(
     if let Some(sight) = &sight {
         grid::draw_grid(sight, &settings.theme, &mut picture.ink);
     }
-    gallery.show(&mut picture, None, place, &looks.ground);
+    gallery.show(&mut picture, None, place, &materials.ground);
     counts.grid += 1;
 }

@@ -1,4 +1,4 @@
-//! Every colour of the viewport in one place.
+//! Theme: the colours of the viewport.
 
 use bevy::prelude::*;
 
@@ -10,8 +10,8 @@ pub const BACKGROUND: Color = Color::srgb(0.232, 0.242, 0.262);
 
 /// Colours of rigs, ghosts, the grid and the symmetry plane.
 ///
-/// Bones take the colour of their joint's local group; everything else is told apart by brightness and outline, so that
-/// it reads on any group's colour, on light and dark meshes.
+/// Bones take the colour of their joint's local group; everything else differs by brightness and outline, so that it is
+/// readable on any group's colour, on light and dark meshes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Theme {
     /// Bones of joints without a group.
@@ -20,21 +20,21 @@ pub struct Theme {
     pub joint: Tint,
     /// Crosses of nulls and the lines from them.
     pub null: Tint,
-    /// Outlines of everything.
+    /// Outlines.
     pub outline: Tint,
-    /// Outlines of what is selected.
+    /// Outlines of selected joints.
     pub selected: Tint,
     /// Outline and ball of the joint selected last.
     pub active: Tint,
     /// Ring and ball of the joint that a click would hit.
     pub hovered: Tint,
-    /// Labels.
+    /// Text of labels.
     pub label: Tint,
     /// Local axes x, y and z.
     pub axes: [Tint; 3],
-    /// Joints that are not there yet.
+    /// Ghost joints.
     pub ghost: Tint,
-    /// Their other side.
+    /// Ghost joints on the other side.
     pub ghost_mirrored: Tint,
     /// The line of a stroke.
     pub stroke: Tint,
@@ -74,13 +74,13 @@ impl Default for Theme {
     }
 }
 
-/// A colour as groups store it: sRGB, 0 to 1 each.
+/// A group's colour (sRGB, 0 to 1 each) as a tint.
 pub fn group_tint(color: [f32; 3]) -> Tint {
     let byte = |part: f32| (part.clamp(0.0, 1.0) * 255.0).round() as u8;
     [byte(color[0]), byte(color[1]), byte(color[2]), 255]
 }
 
-/// Part of the way from one colour to another; the opacity is that of the first.
+/// A mix of two colours at `part` of the way; the opacity is that of the first.
 pub fn mix(from: Tint, to: Tint, part: f32) -> Tint {
     let channel = |a: u8, b: u8| (f32::from(a) + (f32::from(b) - f32::from(a)) * part).round() as u8;
     [channel(from[0], to[0]), channel(from[1], to[1]), channel(from[2], to[2]), from[3]]

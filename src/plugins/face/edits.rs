@@ -1,35 +1,36 @@
-//! A face as edits of a rig: joints, pairs, tags, weights; and away with the bones that it replaces.
+//! Edits that give a rig a face: joints, pairs, tags, weights; and the removal of the bones that it replaces.
 
 use std::{collections::BTreeMap, sync::Arc};
 
 use glam::{Affine3A, Quat, Vec3};
 
-use super::known::{FACE_GROUP, FaceRig, KnownBone, Placed};
+use super::placed_bones::{FACE_GROUP, FaceRig, PlacedBone, PlacementRecord};
 use crate::{
     algo::face::{
         auto::{AutoFace, FaceAnalysis},
         bones::{FaceBone, FaceBoneKind, Region},
     },
-    mesh::model::Weights,
+    mesh::{influences::keep_strongest, model::Weights},
     rig::{
-        GroupData, JointData, NodeKind, RestTransform, Rig, RigEdit, RigJoint, SkinData, Tag, TagKind, Uid, UidSource,
+        GroupData, JointData, NodeKind, RestTransform, Rig, RigEdit, RigJoint, SkinData, TagData, TagKind, Uid,
+        UidSource,
     },
 };
 
 /// The edits that give a rig a face.
 pub(super) struct FaceEdits {
-    /// In the order in which they are applied.
+    /// Edits in their order.
     pub edits: Vec<RigEdit>,
     /// The joint of each bone.
     pub joints: Vec<Uid>,
 }
 
-/// What is put into the rig.
+/// Face to put into the rig.
 pub(super) struct NewFace<'a> {
     pub analysis: &'a FaceAnalysis,
     pub face: &'a AutoFace,
     /// The bones of the rig that stay, in the order of the face's fixed places.
-    pub kept: &'a [KnownBone],
+    pub kept: &'a [PlacedBone],
     /// The mesh whose weights are set.
     pub mesh: Uid,
 }
@@ -54,7 +55,7 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
     };
     let feature = known.feature.unwrap_or_else(|| {
         let kind = TagKind::Feature { kind: FACE_GROUP.to_owned(), name: "Face".to_owned(), switch: String::new() };
-        let tag = Tag { uid: uids.next_uid(), enabled: true, comment: "controls of the face".to_owned(), kind };
+        let tag = TagData { uid: uids.next_uid(), enabled: true, comment: "controls of the face".to_owned(), kind };
         let uid = tag.uid;
         edits.push(RigEdit::AddTag { joint: head, tag: Box::new(tag), index: usize::MAX });
         uid
@@ -71,10 +72,10 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
         }
         let position = to_rig * bone.position;
         let global = Affine3A::from_rotation_translation(to_rig, position);
-        let placed = Placed { kind: bone.kind, label: bone.label.clone(), position };
+        let placed = PlacementRecord { kind: bone.kind, label: bone.label.clone(), position };
         let kind =
             TagKind::Command { module: "control".to_owned(), params: control(bone, eye), feature: Some(feature) };
-        let tag = Tag { uid: uids.next_uid(), enabled: true, comment: placed.comment(), kind };
+        let tag = TagData { uid: uids.next_uid(), enabled: true, comment: placed.comment(), kind };
         let joint = JointData {
             uid: *uid,
             label: Some(bone.label.clone()),
@@ -90,7 +91,7 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
     edits.push(RigEdit::SetSkin(mesh, Some(Arc::new(skin))));
     let stays: Vec<Uid> = kept.iter().map(|bone| bone.uid).collect();
     for bone in known.bones.iter().filter(|bone| !stays.contains(&bone.uid)) {
-        // A partner that stays must not name what goes.
+        // A partner that stays must not refer to a removed joint.
         let partner = rig.joint(bone.uid).and_then(|joint| joint.data.mirror);
         if let Some(partner) = partner.filter(|partner| stays.contains(partner)) {
             let renewed = joints.contains(&partner)
@@ -109,7 +110,7 @@ fn rig_affine(rig: &Rig, joint: Uid) -> Affine3A {
     Affine3A { matrix3: global.matrix3.into(), translation: global.translation.into() }
 }
 
-/// Makes neck and head. Their Y axes lie along their bones; X and Z are those of the head.
+/// Makes neck and head. Their Y axes lie along their bones; X and Z are the head's.
 fn skull(
     rig: &Rig,
     analysis: &FaceAnalysis,
@@ -136,7 +137,7 @@ fn skull(
     let root = Affine3A::IDENTITY;
     let neck = add("neck", NodeKind::Joint, local(&root, &neck_global), None, rig.roots().len());
     let head = add("head", NodeKind::Joint, local(&neck_global, &head_global), Some(neck), 0);
-    // Where the head ends is nothing that moves skin, but it shows how the bone lies.
+    // The end of the head moves no skin, but it shows the direction of the bone.
     add("head_end", NodeKind::Null, local(&head_global, &end_global), Some(head), 0);
     (Some(neck), head, head_global)
 }
@@ -148,7 +149,7 @@ fn local(parent: &Affine3A, global: &Affine3A) -> RestTransform {
     RestTransform { translation, rotation: rotation.normalize(), scale }
 }
 
-/// Bones that belong together name each other.
+/// Pairs mirrored bones.
 fn pairs(rig: &Rig, face: &AutoFace, joints: &[Uid], edits: &mut Vec<RigEdit>) {
     for (bone, uid) in face.bones.iter().zip(joints) {
         let Some(partner) = bone.pair.and_then(|pair| joints.get(pair)).copied() else { continue };
@@ -158,7 +159,7 @@ fn pairs(rig: &Rig, face: &AutoFace, joints: &[Uid], edits: &mut Vec<RigEdit>) {
     }
 }
 
-/// Parameters of a bone's control: how it looks, and limits within which skin moves as it does on a face.
+/// Parameters of a bone's control: its shape, and limits within which skin moves as on a face.
 fn control(bone: &FaceBone, eye: f32) -> String {
     let (shape, size) = match bone.kind {
         FaceBoneKind::Skin => ("sphere", 0.035),
@@ -203,13 +204,16 @@ fn limits(bone: &FaceBone) -> ([(f32, f32); 3], [(f32, f32); 3]) {
     ([both(side), (-down, up), both(depth)], [both(25.0); 3])
 }
 
-/// The weights of the whole mesh. On a rig that holds it already the face takes its share from what is there.
+/// The weights of the whole mesh. On a rig with weights the face takes its share from the existing ones.
 fn skin(rig: &Rig, new: &NewFace, known: &FaceRig, neck: Option<Uid>, head: Uid, joints: &[Uid]) -> SkinData {
     let NewFace { analysis, face, mesh, .. } = *new;
     let old = rig.skin(mesh).filter(|skin| skin.weights.len() == analysis.mesh_points);
     let face_joints: Vec<Uid> = known.bones.iter().map(|bone| bone.uid).chain(joints.iter().copied()).collect();
     let is_own = |uid: &Uid| Some(*uid) == neck || *uid == head || face_joints.contains(uid);
-    let body = old.filter(|skin| skin.joints.iter().any(|uid| !is_own(uid) && rig.joint(*uid).is_some()));
+    let subjects = old.map(|skin| skin.subjects.clone()).unwrap_or_default();
+    // Joints that commands created are not in the document, whether they are built or not.
+    let is_there = |uid: &Uid| rig.joint(*uid).is_some() || subjects.contains_key(uid);
+    let body = old.filter(|skin| skin.joints.iter().any(|uid| !is_own(uid) && is_there(uid)));
     let mut table = Table::default();
     let [neck_number, head_number] = [neck.unwrap_or(head), head].map(|uid| table.number(uid));
     let numbers: Vec<u32> = joints.iter().map(|uid| table.number(*uid)).collect();
@@ -225,10 +229,10 @@ fn skin(rig: &Rig, new: &NewFace, known: &FaceRig, neck: Option<Uid>, head: Uid,
     for (point, part) in of_part.iter().enumerate() {
         shares.clear();
         let mut add = |joint: u32, share: f32| *shares.entry(joint).or_default() += share;
-        // What a person has locked stays; all else shares what is left.
+        // Locked weights stay; all others share the rest.
         let held: Vec<(Uid, f32)> = old.map_or_else(Vec::new, |skin| {
             let influences = skin.weights.of(point).map(|(joint, weight)| (skin.joints[joint as usize], weight));
-            influences.filter(|(uid, _)| rig.joint(*uid).is_some()).collect()
+            influences.filter(|(uid, _)| is_there(uid)).collect()
         });
         let kept: f32 = held.iter().filter(|(uid, _)| locked(uid)).map(|(_, weight)| weight).sum();
         for (uid, weight) in held.iter().filter(|(uid, _)| locked(uid)) {
@@ -246,7 +250,7 @@ fn skin(rig: &Rig, new: &NewFace, known: &FaceRig, neck: Option<Uid>, head: Uid,
         let below = f32::max(below, 0.0) * free;
         match body {
             Some(_) => {
-                // Facial bones that were there gave the head's share away.
+                // Former facial bones had taken the head's share.
                 let others = held.iter().filter(|(uid, _)| !locked(uid));
                 let sum: f32 = others.clone().map(|(_, weight)| weight).sum();
                 for (uid, weight) in others {
@@ -266,17 +270,17 @@ fn skin(rig: &Rig, new: &NewFace, known: &FaceRig, neck: Option<Uid>, head: Uid,
                         add(head_number, below * of_head / (of_neck + of_head));
                     }
                     Some(_) => add(head_number, below),
-                    // The rest of a body stands with the neck until it gets joints of its own.
+                    // The rest of a body follows the neck until it gets joints of its own.
                     None => add(neck_number, below),
                 }
             }
         }
         weights.push(strongest(&shares));
     }
-    SkinData { joints: table.uids, weights, at_rest: true }
+    SkinData { joints: table.uids, weights, at_rest: true, subjects }
 }
 
-/// The joints that weights name, in the order in which they come up.
+/// Joints of the weights, in the order of their first use.
 #[derive(Default)]
 struct Table {
     uids: Vec<Uid>,
@@ -292,15 +296,10 @@ impl Table {
     }
 }
 
-/// At most eight influences, strongest first, summing to one.
+/// The strongest eight influences at most, strongest first, summing to one.
 fn strongest(shares: &BTreeMap<u32, f32>) -> Vec<(u32, f32)> {
     let mut list: Vec<(u32, f32)> =
         shares.iter().map(|(joint, share)| (*joint, *share)).filter(|(_, s)| *s > 1e-4).collect();
-    list.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    list.truncate(8);
-    let sum: f32 = list.iter().map(|(_, share)| share).sum();
-    for (_, share) in &mut list {
-        *share /= sum;
-    }
+    keep_strongest(&mut list, 8, 0.0);
     list
 }

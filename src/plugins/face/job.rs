@@ -1,4 +1,4 @@
-//! Placing a face in the background.
+//! Background jobs that place a face.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -17,12 +17,12 @@ use bevy::{
 use super::{
     Face, FaceExpressions, FacePlaced, FaceReport, FaceRequest,
     edits::{FaceEdits, NewFace, face_edits},
-    known::{FaceRig, KnownBone},
+    placed_bones::{FaceRig, PlacedBone},
     pose,
 };
 use crate::{
     algo::face::{
-        auto::{AutoFace, AutoSettings, FaceAnalysis, FaceError, FaceStep, Refitted},
+        auto::{AutoFace, AutoSettings, FaceAnalysis, FaceError, FaceFit, FaceStep},
         bones::{FaceBone, FaceBoneKind, FixedBone, label},
         expression::{BonePose, ExpressionSet},
         grouping::HeadGroup,
@@ -30,53 +30,59 @@ use crate::{
     mesh::{model::Model, shapes::Shapes},
     plugins::{
         document::EditRequest,
+        history::RigHistory,
+        landing::{JobBasis, Landing, ResultHeld, landing},
         surface::{RigMesh, SkinOf},
     },
     rig::{PoseOffset, Rig, RigEdit, StoredPose, Uid, UidSource, operations::Operation},
 };
 
-/// A face that is being placed; remove the component or call [`FaceJob::cancel`] to stop it.
+/// A job that places a face; remove the component or call [`FaceJob::cancel`] to stop it.
 #[derive(Component)]
 pub struct FaceJob {
     progress: Arc<Progress>,
-    /// Names of the shapes that are fitted.
+    /// Names of the shapes to fit.
     shapes: Option<Arc<Shapes>>,
-    task: Task<Result<Done, String>>,
+    task: Task<Result<JobResult, String>>,
+    /// The part of the document that the face is placed into.
+    basis: JobBasis,
+    /// A face that is finished and waits; see [`landing`](crate::plugins::landing).
+    held: Option<JobResult>,
 }
 
 #[derive(Default)]
 struct Progress {
     part: AtomicU32,
     cancelled: AtomicBool,
-    /// Steps in the order they began.
+    /// Steps in the order in which they began.
     steps: Mutex<Vec<(FaceStep, Instant)>>,
 }
 
-/// What a task brings back.
-struct Done {
+/// Result of a task.
+struct JobResult {
     analysis: Arc<FaceAnalysis>,
     settings: AutoSettings,
     rest: Arc<Model>,
     face: AutoFace,
-    fit: Option<Refitted>,
+    fit: Option<FaceFit>,
     /// Bones of the rig that stay, in the order of the face's fixed places.
-    kept: Vec<KnownBone>,
+    kept: Vec<PlacedBone>,
     times: Vec<(&'static str, Duration)>,
 }
 
 impl FaceJob {
-    /// How much is done, 0 to 1.
+    /// Finished share, 0 to 1.
     pub fn progress(&self) -> f32 {
         f32::from_bits(self.progress.part.load(Ordering::Relaxed))
     }
 
-    /// The step that runs.
+    /// The current step.
     pub fn step(&self) -> Option<FaceStep> {
         let steps = self.progress.steps.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         steps.last().map(|(step, _)| *step)
     }
 
-    /// Stops it; the rig stays as it was.
+    /// Cancels the job; the rig stays unchanged.
     pub fn cancel(&self) {
         self.progress.cancelled.store(true, Ordering::Relaxed);
     }
@@ -98,7 +104,7 @@ impl Progress {
         !self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// How long each step took until `end`; steps that ran several times are summed.
+    /// Duration of each step until `end`; steps that ran several times are summed.
     fn times(&self, end: Instant) -> Vec<(&'static str, Duration)> {
         let steps = self.steps.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let ends = steps.iter().skip(1).map(|(_, at)| *at).chain([end]);
@@ -129,8 +135,9 @@ pub(super) fn start(
             placed.write(FacePlaced { mesh: *entity, result });
             continue;
         };
+        let basis = JobBasis::of(rig, mesh.uid);
         let ready = face.filter(|face| face.serves(&mesh.rest, settings)).map(|face| face.analysis.clone());
-        let work = Work {
+        let work = JobInput {
             rig: rig.clone(),
             mesh: mesh.clone(),
             settings: settings.clone(),
@@ -141,12 +148,12 @@ pub(super) fn start(
         let progress = Arc::new(Progress::default());
         let told = progress.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move { work.run(&told) });
-        commands.entity(*entity).insert(FaceJob { progress, shapes: fit.clone(), task });
+        commands.entity(*entity).insert(FaceJob { progress, shapes: fit.clone(), task, basis, held: None });
     }
 }
 
-/// What a task works on.
-struct Work {
+/// Input of a task.
+struct JobInput {
     rig: Rig,
     mesh: RigMesh,
     settings: AutoSettings,
@@ -155,8 +162,8 @@ struct Work {
     ready: Option<Arc<FaceAnalysis>>,
 }
 
-impl Work {
-    fn run(self, progress: &Progress) -> Result<Done, String> {
+impl JobInput {
+    fn run(self, progress: &Progress) -> Result<JobResult, String> {
         let Self { rig, mesh, settings, shapes, expressions, ready } = self;
         let told = |step: FaceStep, part: f32| progress.told(step, part);
         let text = |error: FaceError| error.to_string();
@@ -169,13 +176,13 @@ impl Work {
         };
         let known = FaceRig::read(&rig);
         let turn = analysis.axes.rotation();
-        // A fit begins with the bones there are, whoever placed them; a placing keeps those that a person touched.
-        let kept: Vec<KnownBone> =
+        // A fit begins with all existing bones; a placement keeps the bones that a person has edited.
+        let kept: Vec<PlacedBone> =
             known.bones.iter().filter(|bone| bone.touched || shapes.is_some()).cloned().collect();
         let fixed: Vec<FixedBone> =
             kept.iter().map(|bone| FixedBone { position: turn * bone.position, kind: bone.kind }).collect();
         let bones = match &shapes {
-            // Jaw and eyes come on top of the bones that are asked for.
+            // Jaw and eyes come on top of the requested bones.
             Some(_) if !kept.is_empty() => kept.iter().filter(|b| b.kind == FaceBoneKind::Skin).count().max(1),
             _ => settings.bones,
         };
@@ -196,13 +203,12 @@ impl Work {
         };
         rename(&mut face.bones, &kept);
         let times = progress.times(Instant::now());
-        Ok(Done { analysis, settings, rest: mesh.rest.clone(), face, fit, kept, times })
+        Ok(JobResult { analysis, settings, rest: mesh.rest.clone(), face, fit, kept, times })
     }
 }
 
-/// Gives bones that stay the labels they have, and the others labels that no bone that stays has; pairs get a number in
-/// common.
-fn rename(bones: &mut [FaceBone], kept: &[KnownBone]) {
+/// Gives bones that stay their labels, and the others free labels; pairs get a common number.
+fn rename(bones: &mut [FaceBone], kept: &[PlacedBone]) {
     let stays = |bone: &FaceBone| bone.fixed.and_then(|fixed| kept.get(fixed));
     let mut taken: BTreeSet<String> = kept.iter().map(|bone| bone.label.clone()).collect();
     for at in 0..bones.len() {
@@ -234,16 +240,34 @@ fn rename(bones: &mut [FaceBone], kept: &[KnownBone]) {
 pub(super) fn land(
     mut commands: Commands,
     mut jobs: Query<(Entity, &mut FaceJob, &RigMesh, &SkinOf)>,
-    rigs: Query<&Rig>,
+    rigs: Query<(&Rig, &RigHistory)>,
     mut uids: ResMut<UidSource>,
     mut placed: MessageWriter<FacePlaced>,
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
-        let Some(result) = check_ready(&mut job.task) else { continue };
+        let was_held = job.held.is_some();
+        let finished = job.held.take().map(Ok).or_else(|| check_ready(&mut job.task));
+        let Some(finished) = finished else { continue };
+        let result = match (finished, rigs.get(of.0)) {
+            (Ok(done), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
+                Landing::Commit => Ok(done),
+                Landing::Drop => Err("the joints were changed while the face was placed; place it again".to_owned()),
+                Landing::Hold => {
+                    job.held = Some(done);
+                    if !was_held && history.can_redo() {
+                        let reason = "the face is ready, but placing it now would lose the steps that were undone; \
+                                      redo them, or go on editing, and the face follows if it still fits";
+                        commands.write_message(ResultHeld { mesh: entity, reason: reason.to_owned() });
+                    }
+                    continue;
+                }
+            },
+            (result, _) => result,
+        };
         let shapes = job.shapes.clone();
         commands.entity(entity).remove::<FaceJob>();
         let result = result.and_then(|done| {
-            let rig = rigs.get(of.0).map_err(|_| "the rig was closed meanwhile".to_owned())?;
+            let (rig, _) = rigs.get(of.0).map_err(|_| "the rig was closed meanwhile".to_owned())?;
             if done.kept.iter().any(|bone| rig.joint(bone.uid).is_none()) {
                 return Err("facial bones were deleted meanwhile; place the face again".to_owned());
             }
@@ -261,7 +285,7 @@ pub(super) fn land(
     }
 }
 
-impl Done {
+impl JobResult {
     fn edits(
         &self,
         rig: &Rig,
@@ -279,7 +303,7 @@ impl Done {
         (edits, self.report())
     }
 
-    /// Bones that stayed as joints but were moved by a fit.
+    /// Edits of bones that stayed as joints but were moved by a fit.
     fn moved(&self, rig: &Rig, joints: &[Uid]) -> Vec<RigEdit> {
         let to_rig = self.analysis.to_mesh();
         let all = self.face.bones.iter().zip(joints);
@@ -294,8 +318,8 @@ impl Done {
         .collect()
     }
 
-    /// A stored pose for each shape; those of the same name are replaced.
-    fn poses(&self, rig: &Rig, fit: &Refitted, shapes: &Shapes, joints: &[Uid], uids: &mut UidSource) -> Vec<RigEdit> {
+    /// Edits that store a pose for each shape; poses of the same name are replaced.
+    fn poses(&self, rig: &Rig, fit: &FaceFit, shapes: &Shapes, joints: &[Uid], uids: &mut UidSource) -> Vec<RigEdit> {
         let frames: Vec<pose::Frame> = joints.iter().map(|uid| pose::Frame::of(rig, *uid, &self.analysis)).collect();
         let mut added = rig.stored_poses().len();
         let mut edits = Vec::new();

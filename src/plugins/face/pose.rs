@@ -4,7 +4,7 @@ use std::{borrow::Cow, collections::BTreeMap};
 
 use bevy::prelude::*;
 
-use super::{ExpressRequest, Expressed, Expressions, Face, FaceExpressions, known::FaceRig};
+use super::{ExpressRequest, Expressed, Expressions, Face, FaceExpressions, placed_bones::FaceRig};
 use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis, FaceError},
@@ -20,7 +20,7 @@ use crate::{
     rig::{PoseOffset, RestTransform, Rig, RigEdit, SkinData, Uid, nearest::did_you_mean, operations::Operation},
 };
 
-/// How a facial joint rests: what turns motion in head space into a pose offset.
+/// Rest frame of a facial joint, which converts motion in head space to pose offsets.
 pub(super) struct Frame {
     to_rig: Quat,
     global: Quat,
@@ -29,7 +29,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Of a joint of the rig; of one that is about to be made, as it will be made.
+    /// The frame of a joint of the rig, or of one that is about to be made.
     pub fn of(rig: &Rig, joint: Uid, analysis: &FaceAnalysis) -> Self {
         let to_rig = analysis.to_mesh();
         match rig.joint(joint) {
@@ -48,7 +48,7 @@ impl Frame {
         }
     }
 
-    /// The offset of the joint's pose that moves and turns it so.
+    /// The pose offset of a movement and rotation in head space.
     pub fn offset(&self, pose: &BonePose) -> PoseOffset {
         let moved = self.to_rig * pose.translation;
         let in_parent = self.parent.inverse().transform_vector3(moved);
@@ -82,11 +82,11 @@ pub(super) fn express(
         };
         let analysed = match face {
             Some(face) if face.serves(&mesh.rest, &face.settings) => Ok(face.clone()),
-            // A file that was opened says where the bones are, not where the features are.
+            // An opened file has the positions of the bones, but not of the features.
             _ => analyse(mesh),
         };
         let result = analysed.map_err(|error| error.to_string()).and_then(|face| {
-            // What is previewed is taken back before the next preview or edit.
+            // A preview is undone before the next preview or edit.
             let settled = history.map_or(Cow::Borrowed(rig), |history| history.settled(rig));
             let edits = expression_edits(&settled, mesh, &face.analysis, &set.0, strengths)?;
             let operation = Operation::Named { name: "Express", edits };
@@ -108,7 +108,7 @@ fn analyse(mesh: &RigMesh) -> Result<Face, FaceError> {
     Ok(Face { analysis: analysis.into(), settings, rest: mesh.rest.clone() })
 }
 
-/// The face of a rig as the expressions see it.
+/// The face of a rig in the form of the expressions.
 struct Posed {
     known: FaceRig,
     bones: Vec<FaceBone>,
@@ -116,7 +116,7 @@ struct Posed {
     poses: Vec<BonePose>,
 }
 
-/// How the facial bones move for strengths. The error is a sentence without its point.
+/// Poses of the facial bones for strengths. The error is a sentence without its full stop.
 fn posed(
     rig: &Rig,
     mesh: &RigMesh,
@@ -139,7 +139,7 @@ fn posed(
 /// A blend of expressions and units by name; a unit's name may end in `_l` or `_r` for one side.
 ///
 /// # Errors
-/// A sentence without its point: an unknown name, a strength that is not a number.
+/// A sentence without its full stop: an unknown name, a strength that is not a number.
 pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<Mix, String> {
     let mut wanted = Vec::new();
     for (name, strength) in strengths {
@@ -156,7 +156,7 @@ pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<M
     Ok(Mix::of(&wanted, set.unit_set()))
 }
 
-/// The edits that pose the facial joints as strengths say. Facial joints that they do not move stand at rest.
+/// The edits that pose the facial joints for strengths. Facial joints that are not moved are reset to rest.
 fn expression_edits(
     rig: &Rig,
     mesh: &RigMesh,
@@ -173,11 +173,11 @@ fn expression_edits(
     Ok(edits.collect())
 }
 
-/// Where the analysed points of a rig's face are, in head space, while it shows expressions by name, each with a strength
-/// from 0 to 1.
+/// Positions of the analysed points of a rig's face, in head space, with expressions by name, each with a strength from
+/// 0 to 1.
 ///
 /// # Errors
-/// A sentence without its point: no facial bones, no weights, no such expression.
+/// A sentence without its full stop: no facial bones, no weights, no such expression.
 pub fn expressed_points(
     rig: &Rig,
     mesh: &RigMesh,
@@ -189,7 +189,7 @@ pub fn expressed_points(
     Ok(apply(&analysis.points, &weights, &bones, &poses))
 }
 
-/// The weights of the analysed points over neck (0), head (1, and whatever else there is) and the facial bones (from 2).
+/// The weights of the analysed points over neck (0), head (1, with all other joints) and the facial bones (from 2).
 fn analysed_weights(skin: &SkinData, known: &FaceRig, analysis: &FaceAnalysis) -> Weights {
     let numbers: Vec<u32> = skin
         .joints

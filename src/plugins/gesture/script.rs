@@ -1,4 +1,4 @@
-//! Running gestures one a frame and collecting the answers.
+//! Execution of gestures, one a frame, and their answers.
 
 use std::collections::VecDeque;
 
@@ -24,33 +24,33 @@ use crate::{
     },
 };
 
-/// Gestures that are to be made on the rig of this entity, and the answers so far.
+/// Gestures to carry out on the rig of this entity, and the answers so far.
 #[derive(Component, Default)]
 pub struct GestureScript {
     waiting: VecDeque<Gesture>,
-    /// One answer for each gesture that was made, in order.
+    /// Answers, one for each finished gesture, in order.
     pub answers: Vec<GestureAnswer>,
-    state: Hand,
+    state: UserState,
     pending: bool,
 }
 
-/// What came of one gesture.
+/// Answer to a gesture.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct GestureAnswer {
-    /// Its place in the list, from one.
+    /// Number of the gesture in the list, from one.
     pub number: usize,
-    /// Its name.
+    /// Name of the gesture.
     pub gesture: String,
-    /// True if it did what it says; false if there was nothing to act on or the change was refused.
+    /// Success; `false` if there was nothing to act on or the change was refused.
     pub done: bool,
-    /// What happened, for people. Empty for settings.
+    /// Description for people. Empty for settings.
     pub message: String,
-    /// Joints that it added.
+    /// Number of joints that it added.
     pub joints_added: usize,
 }
 
-/// What the user's hand remembers between gestures.
-struct Hand {
+/// State of the simulated user between gestures.
+struct UserState {
     view: View,
     place: PlaceSettings,
     recentre: bool,
@@ -58,7 +58,7 @@ struct Hand {
     joints_before: usize,
 }
 
-impl Default for Hand {
+impl Default for UserState {
     fn default() -> Self {
         Self { view: View::Front, place: PlaceSettings::default(), recentre: true, reach: None, joints_before: 0 }
     }
@@ -75,13 +75,13 @@ impl GestureScript {
         self.waiting.extend(gestures);
     }
 
-    /// True when every gesture has its answer.
+    /// Returns `true` when every gesture has its answer.
     pub fn is_done(&self) -> bool {
         self.waiting.is_empty() && !self.pending
     }
 }
 
-/// The requests that gestures become.
+/// Writers of the requests that gestures become.
 #[derive(SystemParam)]
 pub(super) struct Requests<'w> {
     edits: MessageWriter<'w, EditRequest>,
@@ -90,7 +90,7 @@ pub(super) struct Requests<'w> {
     strokes: MessageWriter<'w, StrokeRequest>,
 }
 
-/// The answers to them.
+/// Readers of the answers.
 #[derive(SystemParam)]
 pub(super) struct Answers<'w, 's> {
     edited: MessageReader<'w, 's, Edited>,
@@ -103,7 +103,7 @@ pub(super) struct Answers<'w, 's> {
 type Scripted<'a> =
     (Entity, &'a mut GestureScript, &'a Rig, &'a Selection, &'a mut Symmetry, Option<&'a RigSurface>, Has<RigMeshes>);
 
-/// Reads the answers to the last gesture of each script and makes the next one.
+/// Reads the answers to the last gesture of each script and carries out the next one.
 pub(super) fn run_scripts(mut scripts: Query<Scripted>, mut requests: Requests, mut answers: Answers) {
     answers.collect(&mut scripts);
     for (entity, mut script, rig, selection, mut symmetry, surface, has_mesh) in &mut scripts {
@@ -117,7 +117,7 @@ pub(super) fn run_scripts(mut scripts: Query<Scripted>, mut requests: Requests, 
         let name = name.split(['(', ' ', '{']).next().unwrap_or_default().to_owned();
         script.answers.push(GestureAnswer { number, gesture: name, done: true, ..Default::default() });
         let bounds = surface.map_or([Vec3::splat(-0.5), Vec3::splat(0.5)], RigSurface::bounds);
-        let mut act = Act { entity, rig, selection, bounds, state: &mut script.state, symmetry: &mut symmetry };
+        let mut act = GestureRun { entity, rig, selection, bounds, state: &mut script.state, symmetry: &mut symmetry };
         match act.make(gesture, &mut requests) {
             Ok(pending) => script.pending = pending,
             Err(message) => script.fail(message),
@@ -222,17 +222,17 @@ fn point(position: Vec3) -> String {
     format!("({:.4}, {:.4}, {:.4})", position.x, position.y, position.z)
 }
 
-/// One gesture being made.
-struct Act<'a, 'w> {
+/// Execution of one gesture.
+struct GestureRun<'a, 'w> {
     entity: Entity,
     rig: &'a Rig,
     selection: &'a Selection,
     bounds: [Vec3; 2],
-    state: &'a mut Hand,
+    state: &'a mut UserState,
     symmetry: &'a mut Mut<'w, Symmetry>,
 }
 
-impl Act<'_, '_> {
+impl GestureRun<'_, '_> {
     fn size(&self) -> f32 {
         (self.bounds[1] - self.bounds[0]).max_element()
     }
@@ -253,7 +253,7 @@ impl Act<'_, '_> {
         self.active().map(|_| self.selection.0.clone())
     }
 
-    /// Sends the requests of a gesture; true if an answer is to be waited for.
+    /// Sends the requests of a gesture; returns `true` if it has to wait for an answer.
     fn make(&mut self, gesture: Gesture, requests: &mut Requests) -> Result<bool, String> {
         let rig = self.entity;
         let mut operation = None;
@@ -334,13 +334,13 @@ impl Act<'_, '_> {
         }
     }
 
-    /// The operation of a gesture that changes joints as they are selected.
+    /// The operation of a gesture on the selected joints.
     fn operation(&self, gesture: Gesture) -> Result<Operation, String> {
         let plane = self.plane();
         let active = self.active()?;
         let joints = self.selected()?;
         let here = self.rig.position(active);
-        // A drag in a flat view keeps the depth.
+        // A drag in an orthographic view keeps the depth.
         let at_depth_of_active = |at: (f32, f32)| {
             let from = plane.project(here).unwrap_or_default();
             let delta = Vec2::from(at) - from;

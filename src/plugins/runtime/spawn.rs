@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use super::{ControlPose, InstanceMode, NodeSlot, RigRuntime, RuntimeNodeOf};
+use super::{ControlPose, InstanceMode, NodeOf, NodeSlot, RigRuntime};
 use crate::{mesh::model::Trs, rig::NodeType, solve::program::RigProgram};
 
 /// Makes an entity (that has, or gets, a `Transform`) an instance of a program: spawns what it needs of its nodes, and
@@ -12,7 +12,7 @@ use crate::{mesh::model::Trs, rig::NodeType, solve::program::RigProgram};
 pub fn spawn_instance(world: &mut World, rig: Entity, program: &Arc<RigProgram>, mode: InstanceMode) {
     let mut runtime = RigRuntime::new(Arc::clone(program), mode);
     for (slot, node) in program.nodes().iter().enumerate() {
-        let own = (NodeSlot(slot as u32), RuntimeNodeOf(rig), node.uid);
+        let own = (NodeSlot(slot as u32), NodeOf(rig), node.uid);
         let entity = match mode {
             InstanceMode::Hierarchy => {
                 let parent = node.parent.and_then(|parent| runtime.entity(parent)).unwrap_or(rig);
@@ -34,6 +34,9 @@ pub fn spawn_instance(world: &mut World, rig: Entity, program: &Arc<RigProgram>,
             }
         };
         runtime.attach(slot, entity);
+        if let Some(shown) = runtime.shown.get_mut(slot) {
+            *shown = transform(&node.base);
+        }
     }
     world.entity_mut(rig).insert_if_new(Transform::IDENTITY).insert(runtime);
 }

@@ -3,8 +3,9 @@
 use bevy::{math::Affine3A, prelude::*};
 use rayon::prelude::*;
 
-use super::{ControlPose, DrivenMorphs, InstanceMode, NodeSlot, RigRuntime, RuntimeNodeOf, spawn::transform};
+use super::{ControlPose, DrivenMorphs, InstanceMode, NodeOf, NodeSlot, RigRuntime, spawn::transform};
 use crate::{
+    plugins::schema::Attributes,
     rig::{PoseOffset, RestTransform},
     solve::program::{LANES, RigState},
 };
@@ -21,11 +22,11 @@ const JOINT_RUN: usize = 256;
 
 /// Notes which instances have a control that changed.
 pub(super) fn note_controls(
-    changed: Query<&RuntimeNodeOf, Or<(Changed<Transform>, Changed<ControlPose>)>>,
+    changed: Query<&NodeOf, Or<(Changed<Transform>, Changed<ControlPose>, Changed<Attributes>)>>,
     mut rigs: Query<&mut RigRuntime>,
 ) {
     let mut last = Entity::PLACEHOLDER;
-    for RuntimeNodeOf(rig) in &changed {
+    for NodeOf(rig) in &changed {
         // Nodes of one rig mostly follow one another.
         if *rig != last {
             last = *rig;
@@ -41,6 +42,7 @@ pub(super) fn solve(
     mut rigs: Query<&mut RigRuntime>,
     transforms: Query<&Transform>,
     poses: Query<&ControlPose>,
+    attributes: Query<&Attributes>,
     time: Res<Time>,
 ) {
     let dt = time.delta_secs();
@@ -48,13 +50,14 @@ pub(super) fn solve(
         for runtime in runtimes.iter_mut().flatten() {
             let unseen = runtime.bypass_change_detection();
             if std::mem::take(&mut unseen.is_due) {
-                gather(unseen, &transforms, &poses);
+                gather(unseen, &transforms, &poses, &attributes);
             }
         }
         let mut states = runtimes.iter_mut().flatten().map(|runtime| &mut runtime.bypass_change_detection().state);
         let ran = RigState::evaluate_together(std::array::from_fn(|_| states.next()), dt);
         for (runtime, ran) in runtimes.iter_mut().flatten().zip(ran) {
-            if ran {
+            // Places that somebody else wrote are looked at even where nothing had to run.
+            if ran || runtime.all_due || runtime.has_rewritten {
                 runtime.set_changed();
             }
         }
@@ -89,41 +92,113 @@ fn in_batches<const SIZE: usize, T: Send>(
     }
 }
 
-/// Takes the poses of an instance's controls.
-fn gather(runtime: &mut RigRuntime, transforms: &Query<&Transform>, poses: &Query<&ControlPose>) {
-    let RigRuntime { state, controls, mode, .. } = runtime;
+/// Takes the poses and attribute values of an instance's nodes from their entities.
+fn gather(
+    runtime: &mut RigRuntime,
+    transforms: &Query<&Transform>,
+    poses: &Query<&ControlPose>,
+    attributes: &Query<&Attributes>,
+) {
+    let RigRuntime { state, controls, mode, shown, rewritten, has_rewritten, attributes: holders, values, .. } =
+        runtime;
     for (slot, entity) in controls.iter() {
-        let slot = *slot as usize;
+        let at = *slot as usize;
         match mode {
             InstanceMode::Direct => {
                 if let Ok(pose) = poses.get(*entity) {
-                    state.set_offset_at(slot, (*pose).into());
+                    state.set_offset_at(at, (*pose).into());
                 }
             }
             InstanceMode::Hierarchy => {
                 let Ok(posed) = transforms.get(*entity) else { continue };
                 // What the rig itself wrote is no pose.
-                if *posed != transform(&state.local_at(slot)) {
-                    let base = state.program().nodes()[slot].base;
+                if *posed == shown[at] {
+                    continue;
+                }
+                if !shown[at].translation.is_nan() {
+                    let base = state.program().nodes()[at].base;
                     let (translation, rotation, scale) = (base.translation, base.rotation, base.scale);
                     let offset = PoseOffset::between(&RestTransform { translation, rotation, scale }, posed);
-                    state.set_offset_at(slot, offset);
+                    state.set_offset_at(at, offset);
                 }
+                rewritten[at] = true;
+                *has_rewritten = true;
+            }
+        }
+    }
+    for (entity, slots) in holders.iter() {
+        let Ok(Attributes(told)) = attributes.get(*entity) else { continue };
+        for slot in slots {
+            let slot = *slot as usize;
+            let value = told.get(&*state.program().attributes()[slot].name).copied();
+            if let Some(value) = value.filter(|value| !values[slot].is_nan() && *value != values[slot]) {
+                state.set_attribute_at(slot, value);
+                // Shown again after the run, in case the value is another one then.
+                values[slot] = value;
             }
         }
     }
 }
 
-/// Writes the transforms of driven nodes where every node is an entity.
-pub(super) fn scatter_locals(rigs: Query<&RigRuntime, Changed<RigRuntime>>, mut transforms: Query<&mut Transform>) {
-    for runtime in rigs.iter().filter(|runtime| runtime.mode == InstanceMode::Hierarchy) {
-        for (slot, entity) in &runtime.written {
-            let slot = *slot as usize;
-            if !runtime.state.is_moved(slot) {
+/// True if two transforms differ by rounding only.
+fn is_near(a: &Transform, b: &Transform) -> bool {
+    let size = a.translation.abs().max_element().max(1e-3);
+    (a.translation - b.translation).abs().max_element() <= 1e-6 * size
+        && (a.scale - b.scale).abs().max_element() <= 1e-6 * a.scale.abs().max_element().max(1e-3)
+        && a.rotation.dot(b.rotation) > 0.0
+        && (a.rotation - b.rotation).length_squared() <= 1e-12
+}
+
+/// Writes the transforms of nodes where every node is an entity: of those that moved, whose parent moved, or that
+/// somebody else wrote.
+pub(super) fn scatter_locals(
+    mut rigs: Query<&mut RigRuntime, Changed<RigRuntime>>,
+    mut transforms: Query<&mut Transform>,
+) {
+    for mut runtime in rigs.iter_mut().filter(|runtime| runtime.mode == InstanceMode::Hierarchy) {
+        let RigRuntime { state, written, shown, rewritten, has_rewritten, all_due, .. } =
+            runtime.bypass_change_detection();
+        let is_all = std::mem::take(all_due);
+        let nodes = state.program().nodes();
+        for (slot, entity) in written.iter() {
+            let at = *slot as usize;
+            let is_due = is_all
+                || state.is_moved(at)
+                || nodes[at].parent.is_some_and(|parent| state.is_moved(parent))
+                || std::mem::take(&mut rewritten[at]);
+            if !is_due {
                 continue;
             }
-            if let Ok(mut written) = transforms.get_mut(*entity) {
-                written.set_if_neq(transform(&runtime.state.local_at(slot)));
+            let Ok(mut written) = transforms.get_mut(*entity) else { continue };
+            let local = transform(&state.local_at(at));
+            if *written != local && !is_near(&written, &local) {
+                *written = local;
+            }
+            shown[at] = *written;
+        }
+        if std::mem::take(has_rewritten) {
+            rewritten.fill(false);
+        }
+    }
+}
+
+/// Writes values of attributes to the entities that hold them.
+pub(super) fn scatter_attributes(
+    mut rigs: Query<&mut RigRuntime, Changed<RigRuntime>>,
+    mut holders: Query<&mut Attributes>,
+) {
+    for mut runtime in &mut rigs {
+        let RigRuntime { state, attributes, values, .. } = runtime.bypass_change_detection();
+        for (entity, slots) in attributes.iter() {
+            let Ok(mut told) = holders.get_mut(*entity) else { continue };
+            for slot in slots {
+                let slot = *slot as usize;
+                let value = state.attribute_at(slot);
+                values[slot] = value;
+                let name = &*state.program().attributes()[slot].name;
+                if told.0.get(name) != Some(&value) {
+                    told.0.insert(name.to_owned(), value);
+                }
             }
         }
     }
@@ -168,10 +243,32 @@ pub(super) fn show_morphs(
     }
 }
 
+/// Puts nodes where the program has them, where propagation has them elsewhere: below an unevenly scaled node Bevy
+/// multiplies matrices, which shear, while programs never do.
+pub(super) fn correct_globals(
+    rigs: Query<(&RigRuntime, &GlobalTransform), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
+    mut nodes: Query<&mut GlobalTransform, Without<RigRuntime>>,
+) {
+    for (runtime, world) in rigs.iter().filter(|(runtime, _)| runtime.mode == InstanceMode::Hierarchy) {
+        let world = world.affine();
+        for (slot, entity) in &runtime.written {
+            let Ok(mut node) = nodes.get_mut(*entity) else { continue };
+            let wanted = world * runtime.state.global_at(*slot as usize).affine();
+            let now = node.affine();
+            let size = wanted.translation.abs().max_element().max(1e-3);
+            let is_off = (now.translation - wanted.translation).abs().max_element() > 2e-6 * size
+                || !now.matrix3.abs_diff_eq(wanted.matrix3, 2e-6 * wanted.matrix3.x_axis.length().max(1.0));
+            if is_off {
+                *node = GlobalTransform::from(wanted);
+            }
+        }
+    }
+}
+
 /// Writes where joints are in the world, where only they are entities.
 pub(super) fn scatter_globals(
     rigs: Query<(&RigRuntime, &GlobalTransform), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
-    mut joints: Query<(&NodeSlot, &RuntimeNodeOf, &mut GlobalTransform), Without<RigRuntime>>,
+    mut joints: Query<(&NodeSlot, &NodeOf, &mut GlobalTransform), Without<RigRuntime>>,
 ) {
     let is_direct = |(runtime, _): &(&RigRuntime, &GlobalTransform)| runtime.mode == InstanceMode::Direct;
     let place = |runtime: &RigRuntime, world: &Affine3A, slot: usize| {
@@ -188,9 +285,9 @@ pub(super) fn scatter_globals(
         return;
     }
     // All joints there are, in the order of memory and on all threads; those of one rig mostly follow one another.
-    let hand_out = |joints: &mut [Option<(&NodeSlot, &RuntimeNodeOf, Mut<GlobalTransform>)>]| {
+    let hand_out = |joints: &mut [Option<(&NodeSlot, &NodeOf, Mut<GlobalTransform>)>]| {
         let (mut last, mut rig) = (Entity::PLACEHOLDER, None);
-        for (NodeSlot(slot), RuntimeNodeOf(of), joint) in joints.iter_mut().flatten() {
+        for (NodeSlot(slot), NodeOf(of), joint) in joints.iter_mut().flatten() {
             if last != *of {
                 let found = rigs.get(*of).ok().filter(is_direct);
                 (last, rig) = (*of, found.map(|(runtime, world)| (runtime, world.affine())));

@@ -1,8 +1,8 @@
-//! Which joint a drawn chain hangs on.
+//! Parents of drawn chains.
 //!
-//! A stroke that starts on a joint continues from it, whatever is asked for here. For all others a person who draws a
-//! spine, an arm and a leg one after the other expects the leg on the pelvis, not on the hand that the last stroke left
-//! selected: [`StrokeParent::Natural`] is the rule for that.
+//! A stroke that starts on a joint always continues from it. For other strokes, a person who draws a spine, an arm and
+//! a leg one after the other expects the leg on the pelvis, not on the hand that the last stroke left selected:
+//! [`StrokeParent::Natural`] is the rule for that.
 
 use std::collections::BTreeSet;
 
@@ -13,36 +13,36 @@ use crate::{
     rig::{Rig, Uid, operations::MirrorPlane},
 };
 
-/// How the parent of a chain is chosen whose stroke starts on no joint.
+/// Rule for the parent of a chain whose stroke starts on no joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StrokeParent {
-    /// The active joint of the selection, whatever made it so; without one the chain is a root.
+    /// The active joint of the selection in any case; without one the chain is a root.
     #[default]
     Selected,
     /// The active joint if a person selected or placed it. If the last stroke left it selected: the joint of the bone
     /// beside which the chain starts, see [`nearest_parent`].
     Natural,
-    /// The joint of the bone beside which the chain starts, whatever is selected.
+    /// The joint of the bone beside which the chain starts, whatever the selection.
     Nearest,
-    /// This joint; `None` makes a root.
+    /// The given joint; `None` makes a root.
     Joint(Option<Uid>),
 }
 
-/// Why a chain hangs where it does.
+/// Reason for the parent of a chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParentReason {
     /// The stroke starts on that joint.
     StartsOn,
-    /// The joint is selected, or was asked for.
+    /// The joint is selected, or was requested.
     Selected,
     /// The chain starts beside that joint's bone.
     Nearest,
-    /// There is no joint to hang on: the chain is a root.
+    /// There is no joint to attach to: the chain is a root.
     Root,
 }
 
 impl ParentReason {
-    /// A sentence's end for the status line, after "the chain ": `joint` is the parent's name as people see it.
+    /// End of a sentence for the status line, after "the chain ": `joint` is the parent's name for people.
     pub fn describe(self, joint: &str) -> String {
         match self {
             Self::StartsOn => format!("continues from {joint}, on which the stroke starts"),
@@ -55,23 +55,23 @@ impl ParentReason {
     }
 }
 
-/// The joints that strokes left selected on this rig, and that nobody picked since: selected, but not chosen.
+/// The joints that strokes left selected on this rig, and that no person has picked since.
 ///
 /// Added to a rig's entity with its first chain.
 #[derive(Component, Debug, Clone, PartialEq, Eq, Default)]
 pub struct StrokeTips(pub(super) BTreeSet<Uid>);
 
 impl StrokeTips {
-    /// Whether a stroke and not a person selected the joint.
+    /// Returns `true` if a stroke and not a person selected the joint.
     pub fn contains(&self, joint: Uid) -> bool {
         self.0.contains(&joint)
     }
 }
 
-/// The parent of a chain whose stroke starts on no joint and whose first joint comes to `start`, in the rig's space.
+/// The parent of a chain whose stroke starts on no joint and whose first joint is at `start`, in the rig's space.
 ///
 /// `joints` are all joints with their places, parents first (as [`posed_joints`](super::super::picking::posed_joints)
-/// gives them), `tips` what strokes left selected.
+/// gives them), `tips` the joints that strokes left selected.
 pub fn stroke_parent(
     rule: StrokeParent,
     rig: &Rig,
@@ -86,7 +86,7 @@ pub fn stroke_parent(
     let (parent, reason) = match rule {
         StrokeParent::Selected => (active, ParentReason::Selected),
         StrokeParent::Natural if chosen.is_some() => (chosen, ParentReason::Selected),
-        // Nothing selected at all is a choice, too: of a root.
+        // An empty selection is a choice, too: that of a root.
         StrokeParent::Natural if active.is_none() => (None, ParentReason::Root),
         StrokeParent::Natural | StrokeParent::Nearest => {
             (nearest_parent(rig, symmetry, joints, start), ParentReason::Nearest)
@@ -96,11 +96,11 @@ pub fn stroke_parent(
     (parent, if parent.is_some() { reason } else { ParentReason::Root })
 }
 
-/// The joint of the bone beside which `start` lies: the nearer of the bone's two joints, where the tip of a chain counts
-/// only in the last quarter of its bone and beyond.
+/// The joint of the bone beside which `start` lies: the nearer of the bone's two joints, where the tip of a chain
+/// counts only in the last quarter of its bone and beyond.
 ///
-/// With a mirror plane only joints on it count, and those that several chains hang on already (a hand with fingers); all
-/// do if there are none.
+/// With a mirror plane only joints on it count, and joints with several chains already (a hand with fingers); without
+/// such joints all count.
 pub fn nearest_parent(rig: &Rig, symmetry: Option<MirrorPlane>, joints: &[(Uid, Vec3)], start: Vec3) -> Option<Uid> {
     let central = |joint: Uid| {
         let data = rig.joint(joint);
@@ -131,7 +131,7 @@ pub fn nearest_parent(rig: &Rig, symmetry: Option<MirrorPlane>, joints: &[(Uid, 
             }
             None => (start.distance(foot), joint),
         };
-        // Of bones equally near, those that meet in a joint, the first in the hierarchy says it.
+        // Of equally near bones, which meet in a joint, the first in the hierarchy decides.
         if best.is_none_or(|(least, _)| distance < least * (1.0 - 1e-5)) {
             best = Some((distance, owner));
         }

@@ -1,7 +1,7 @@
-//! What a stroke would do to a rig as it stands.
+//! Plans of strokes: their effect on a rig in its current state.
 //!
-//! Planning changes nothing and is one function: a preview that plans what the request then carries out cannot show
-//! anything else.
+//! Planning changes nothing and is one function, shared by preview and request, so that a preview shows exactly the
+//! result.
 
 use bevy::prelude::*;
 
@@ -19,38 +19,38 @@ use crate::{
     rig::{Rig, Uid, operations::Operation},
 };
 
-/// What a stroke is drawn on.
+/// Data that a stroke is planned on.
 #[derive(Clone, Copy)]
 pub struct StrokeScene<'a> {
     /// The rig.
     pub rig: &'a Rig,
-    /// What is selected.
+    /// Selection of the rig.
     pub selection: &'a Selection,
     /// Live mirroring.
     pub symmetry: &'a Symmetry,
-    /// What strokes left selected.
+    /// Joints that strokes left selected.
     pub tips: Option<&'a StrokeTips>,
     /// The posed surface.
     pub surface: &'a RigSurface,
-    /// Places of the joints as [`posed_joints`](crate::plugins::picking::posed_joints) gives them.
+    /// Posed positions of the joints as [`posed_joints`](crate::plugins::picking::posed_joints) gives them.
     pub posed: &'a [(Uid, Vec3)],
 }
 
-/// What a stroke would do.
+/// Plan of a stroke.
 #[derive(Debug, Clone)]
 pub enum StrokePlan {
-    /// This.
+    /// A complete plan.
     Ready {
-        /// The operation to ask for, if any.
-        operation: Option<Operation>,
-        /// What to tell.
+        /// The operation to request, if any.
+        operation: Option<Box<Operation>>,
+        /// Result to report.
         result: StrokeResult,
     },
-    /// It is a chain, which has to be found first: by following the stroke through the surface.
+    /// A chain, which has to be computed first by following the stroke through the surface.
     NeedsChain,
 }
 
-/// What a stroke would do to a rig as it stands. `chain` is what following it found, if that was done.
+/// Plans a stroke on a rig in its current state. `chain` is the result of following it, if that was done.
 pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<FoundChain>) -> StrokePlan {
     let StrokeScene { rig, selection, symmetry, tips, surface, posed } = *scene;
     let nothing = |why: String| StrokePlan::Ready { operation: None, result: StrokeResult::Nothing(why) };
@@ -58,15 +58,15 @@ pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<F
         StrokeKind::Erase { joints } => {
             let joints: Vec<Uid> = joints.into_iter().map(|number| posed[number].0).collect();
             let operation = Operation::Delete { joints: joints.clone(), keep_children: true };
-            StrokePlan::Ready { operation: Some(operation), result: StrokeResult::Erased(joints) }
+            StrokePlan::Ready { operation: Some(Box::new(operation)), result: StrokeResult::Erased(joints) }
         }
         StrokeKind::Insert { bone, t } => {
             let (child, end) = posed[bone];
             let parent = rig.joint(child).and_then(|joint| joint.parent);
             let start = parent.and_then(|parent| posed.iter().find(|(uid, _)| *uid == parent)).map(|(_, place)| *place);
             let Some(start) = start else { return nothing("the stroke crosses no bone".to_owned()) };
-            // The crossing tells where along the bone; in depth the joint is placed like a click there, but only if
-            // the bone itself runs through what the ray meets.
+            // The crossing gives the place along the bone; in depth the joint is placed like a click there, but only if
+            // the bone itself runs through the volumes of the ray.
             let along = start.lerp(end, t);
             let position = match request.plane.project(along) {
                 Some(point) if request.settings.recentre => {
@@ -79,7 +79,7 @@ pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<F
             };
             let position = rig.rest_from_pose(parent).transform_point3(position);
             let operation = Operation::Insert { child, position };
-            StrokePlan::Ready { operation: Some(operation), result: StrokeResult::Inserted { child } }
+            StrokePlan::Ready { operation: Some(Box::new(operation)), result: StrokeResult::Inserted { child } }
         }
         StrokeKind::Chain { start, .. } => {
             let chain = match chain {
@@ -98,16 +98,19 @@ pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<F
                 Some(from) => (Some(from), ParentReason::StartsOn),
                 None => stroke_parent(request.parent, rig, selection, tips, symmetry.0, posed, *first),
             };
-            // What is drawn on a posed mesh rests where the pose brings it to the line.
+            // Joints drawn on a posed mesh rest where the pose moves them to the line.
             let to_rest = rig.rest_from_pose(parent);
             let positions = positions.into_iter().map(|position| to_rest.transform_point3(position)).collect();
             let operation = Operation::Chain { positions, parent };
-            StrokePlan::Ready { operation: Some(operation), result: StrokeResult::Chain { chain, parent, why } }
+            StrokePlan::Ready {
+                operation: Some(Box::new(operation)),
+                result: StrokeResult::Chain { chain, parent, why },
+            }
         }
     }
 }
 
-/// What a stroke means by its shape alone: cheap enough to be asked for at every point. Joints are numbered as in
+/// Interpretation of a stroke by its shape alone: cheap enough for every pointer event. Joints are numbered as in
 /// `posed`.
 pub fn stroke_kind(request: &StrokeRequest, rig: &Rig, posed: &[(Uid, Vec3)]) -> StrokeKind {
     let flat = projected(rig, posed, &request.plane);
@@ -119,7 +122,7 @@ pub fn stroke_kind(request: &StrokeRequest, rig: &Rig, posed: &[(Uid, Vec3)]) ->
     }
 }
 
-/// Joints on the view plane, each with its parent's number; those behind the camera are nowhere.
+/// Joints on the view plane, each with its parent's index; joints behind the camera have no finite position.
 fn projected(rig: &Rig, posed: &[(Uid, Vec3)], plane: &ViewPlane) -> Vec<(Vec2, Option<usize>)> {
     let numbers: std::collections::HashMap<Uid, usize> =
         posed.iter().enumerate().map(|(n, (uid, _))| (*uid, n)).collect();
@@ -130,7 +133,7 @@ fn projected(rig: &Rig, posed: &[(Uid, Vec3)], plane: &ViewPlane) -> Vec<(Vec2, 
     posed.iter().map(project).collect()
 }
 
-/// Which entry/exit pair of a ray holds a point (or comes nearest to it), counted from one.
+/// Number of the ray's entry/exit pair that holds a point (or comes nearest to it), counted from one.
 fn volume_at(ray: &crate::mesh::ray::Ray, hits: &[crate::mesh::ray::Hit], point: Vec3) -> Option<u32> {
     let depth = (point - ray.origin).dot(ray.direction);
     let apart = |volume: &crate::mesh::surface::Volume| (volume.near - depth).max(depth - volume.far).max(0.0);

@@ -1,25 +1,25 @@
-//! One refresh of a surface: plain work on plain data, for a background task.
+//! Refresh of a surface: work on plain data, for a background task.
 
-use std::{collections::HashMap, sync::Arc};
+use std::sync::Arc;
 
 use bevy::math::{Affine3A, Vec3, Vec3A};
 
 use crate::{
     mesh::{model::Model, skinning::skin_points, surface::Surface},
-    rig::{SkinData, Uid},
+    rig::SkinData,
 };
 
-/// A mesh and how its rig holds it. Cheap to copy and to compare.
+/// A mesh with its pose. Cheap to copy and to compare.
 #[derive(Debug, Clone)]
 pub(super) struct PosedMesh {
     pub(super) rest: Arc<Model>,
     pub(super) triangles: Arc<[[u32; 3]]>,
-    /// Weights, and a matrix from rest to pose for each of their joints; `None` while the mesh stands at rest.
+    /// Weights, and a matrix from rest to pose for each of their joints; `None` while the mesh is at rest.
     pub(super) bend: Option<(Arc<SkinData>, Vec<Affine3A>)>,
 }
 
 impl PosedMesh {
-    /// Whether it is the same mesh, whatever its pose.
+    /// Returns `true` for the same mesh in any pose.
     fn is_same_mesh(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.rest, &other.rest) && Arc::ptr_eq(&self.triangles, &other.triangles)
     }
@@ -37,52 +37,51 @@ impl PosedMesh {
     }
 }
 
-/// Whether both are lists of the same meshes.
+/// Returns `true` if both are lists of the same meshes.
 pub(super) fn are_same_meshes(a: &[PosedMesh], b: &[PosedMesh]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.is_same_mesh(b))
 }
 
-/// Whether both are the same meshes in the same pose.
+/// Returns `true` if both are the same meshes in the same pose.
 pub(super) fn are_same(a: &[PosedMesh], b: &[PosedMesh]) -> bool {
     are_same_meshes(a, b) && a.iter().zip(b).all(|(a, b)| a.is_same_pose(b))
 }
 
-/// How a rig holds a mesh, if one of the joints of its weights has moved. `moves` gives the matrices from rest to pose of
-/// those that have.
+/// Weights and matrices of a mesh, if one of the joints of its weights has moved. `moves` holds the matrices from rest
+/// to pose of the moved joints.
 ///
 /// Weights that came with the file hold its bind pose; as long as nobody moves a joint that is the mesh at rest, and
 /// from there on the rest mesh follows its joints.
-pub(super) fn bend(skin: &Arc<SkinData>, moves: &HashMap<Uid, Affine3A>) -> Option<(Arc<SkinData>, Vec<Affine3A>)> {
-    let matrices = || skin.joints.iter().map(|uid| moves.get(uid));
-    let list = || matrices().map(|matrix| matrix.copied().unwrap_or(Affine3A::IDENTITY)).collect();
-    matrices().any(|matrix| matrix.is_some()).then(|| (skin.clone(), list()))
+pub(super) fn bend(skin: &Arc<SkinData>, moves: &[Option<Affine3A>]) -> Option<(Arc<SkinData>, Vec<Affine3A>)> {
+    let list = || moves.iter().map(|matrix| matrix.unwrap_or(Affine3A::IDENTITY)).collect();
+    moves.iter().any(|matrix| matrix.is_some()).then(|| (skin.clone(), list()))
 }
 
-/// What a refresh works on.
+/// Input of a refresh.
 pub(super) struct Refresh {
     /// The meshes, in order of their uids.
     pub(super) meshes: Vec<PosedMesh>,
-    /// A surface of the same meshes that can be refitted, in whatever pose.
+    /// A surface of the same meshes that can be refitted, in any pose.
     pub(super) base: Option<Arc<Surface>>,
-    /// The same, if there is one that nobody else uses: it is refitted itself, which saves a copy.
+    /// The same surface, if it has no other owner: it is refitted itself, which saves a copy.
     pub(super) spare: Option<Surface>,
-    /// Memory for points.
+    /// Buffer for points.
     pub(super) points: Vec<Vec3>,
 }
 
-/// What comes of it.
+/// Result of a refresh.
 pub(super) struct Refreshed {
     pub(super) surface: Arc<Surface>,
-    /// Whether it is `base` in another pose.
+    /// Marks a refit of `base`.
     pub(super) is_refit: bool,
-    /// Whether it can be refitted to any other pose: no triangle was left out.
+    /// Marks a surface that can be refitted to any other pose: no triangle was left out.
     pub(super) is_whole: bool,
-    /// Memory for points.
+    /// Buffer for points.
     pub(super) points: Vec<Vec3>,
 }
 
 impl Refresh {
-    /// How many points it works on.
+    /// Number of points of the meshes.
     pub(super) fn size(&self) -> usize {
         self.meshes.iter().map(|mesh| mesh.rest.points.len()).sum()
     }
@@ -92,7 +91,7 @@ impl Refresh {
         let Self { meshes, base, spare, points: mut memory } = self;
         let points = posed_points(&meshes, &mut memory);
         let old = spare.or_else(|| base.as_deref().cloned());
-        // A point that is not finite leaves no other way than to build without its triangles.
+        // With a point that is not finite, the surface has to be built without its triangles.
         let refitted = old.and_then(|mut surface| surface.refit(points).ok().map(|()| surface));
         let is_refit = refitted.is_some();
         let (surface, is_whole) = match refitted {
@@ -120,7 +119,7 @@ fn build(meshes: &[PosedMesh], points: &[Vec3]) -> (Surface, bool) {
     (surface, is_whole)
 }
 
-/// The points of all meshes, one mesh after the other. A single mesh at rest costs nothing.
+/// The points of all meshes, one mesh after the other. A single mesh at rest needs no copy.
 fn posed_points<'a>(meshes: &'a [PosedMesh], memory: &'a mut Vec<Vec3>) -> &'a [Vec3] {
     if let [PosedMesh { rest, bend: None, .. }] = meshes {
         return &rest.points;
@@ -143,7 +142,7 @@ fn posed_points<'a>(meshes: &'a [PosedMesh], memory: &'a mut Vec<Vec3>) -> &'a [
     memory
 }
 
-/// Whether two transforms are the same but for rounding.
+/// Returns `true` if two transforms are equal to within rounding.
 pub(super) fn is_same(a: &Affine3A, b: &Affine3A) -> bool {
     let tolerance = 1e-6;
     let near = |a: Vec3A, b: Vec3A| (a - b).abs().max_element() <= tolerance * b.abs().max_element().max(1.0);

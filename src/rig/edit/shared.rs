@@ -1,4 +1,4 @@
-//! Weights in an edit as plain data: that they are shared in memory is nothing a file should know.
+//! Serialisation of shared weights in an edit as plain data: files do not show that they are shared in memory.
 
 use std::sync::Arc;
 

@@ -14,7 +14,7 @@ pub struct FeatureKind {
     pub name: String,
     /// The name people see.
     pub title: String,
-    /// A sentence about what it is for.
+    /// A sentence about its purpose.
     pub about: String,
     /// The icon's file name in `assets/modules/`.
     pub icon: String,
@@ -42,7 +42,7 @@ pub struct UnknownKind {
     pub hint: String,
 }
 
-/// Name, title and purpose of the kinds that are always there.
+/// Name, title and purpose of the built-in kinds.
 const BUILT_IN: [(&str, &str, &str); 12] = [
     ("generic", "Feature", "Anything that fits no other kind."),
     ("limb", "Limb", "An arm, a leg or a part of one."),
@@ -83,7 +83,7 @@ impl FeatureKind {
 }
 
 impl FeatureKinds {
-    /// Adds a kind; returns the one of that name that it replaces.
+    /// Adds a kind; returns the kind of that name that it replaces.
     pub fn register(&mut self, kind: FeatureKind) -> Option<FeatureKind> {
         self.kinds.insert(kind.name.clone(), kind)
     }
@@ -93,7 +93,7 @@ impl FeatureKinds {
         self.kinds.get(name)
     }
 
-    /// All kinds, by name.
+    /// Kinds of feature, by name.
     pub fn iter(&self) -> impl Iterator<Item = &FeatureKind> {
         self.kinds.values()
     }

@@ -1,11 +1,11 @@
-//! A run of edits that is kept or taken back as a whole.
+//! Drafts: runs of edits that are kept or undone as a whole.
 
 use bevy::math::{Affine3, Mat3, Vec3};
 
 use super::{MirrorPlane, frame::Frame};
 use crate::rig::{EditError, PoseOffset, Rig, RigEdit, Uid, UidSource};
 
-/// A rig under change: edits are applied at once and remembered with their inverses.
+/// A rig under change: edits are applied at once and recorded with their inverses.
 pub struct Draft<'a> {
     rig: &'a mut Rig,
     uids: &'a mut UidSource,
@@ -16,26 +16,26 @@ pub struct Draft<'a> {
     notes: Vec<String>,
 }
 
-/// What an operation did.
+/// Result of an operation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outcome {
     /// The edits, in the order they were applied.
     pub edits: Vec<RigEdit>,
     /// The edits that take them back, in the order to apply them.
     pub inverses: Vec<RigEdit>,
-    /// The joints that should be selected afterwards; `None` to leave the selection.
+    /// The joints to select afterwards; `None` keeps the selection.
     pub selected: Option<Vec<Uid>>,
-    /// What people should know about it, a sentence each: tags that had no place, references that mean nothing.
+    /// Sentences for people: tags without a place, references to nothing.
     pub notes: Vec<String>,
 }
 
 impl<'a> Draft<'a> {
-    /// Begins on a rig; uids of added things come from `uids`.
+    /// Begins a draft on a rig; uids of added objects come from `uids`.
     pub fn new(rig: &'a mut Rig, uids: &'a mut UidSource, symmetry: Option<MirrorPlane>) -> Self {
         Self { rig, uids, symmetry, done: Vec::new(), inverses: Vec::new(), selected: None, notes: Vec::new() }
     }
 
-    /// The rig as it stands now.
+    /// The rig in its current state.
     pub fn rig(&self) -> &Rig {
         self.rig
     }
@@ -45,7 +45,7 @@ impl<'a> Draft<'a> {
         self.symmetry
     }
 
-    /// A uid that nothing in the rig has.
+    /// A uid that is free in the rig.
     pub fn next_uid(&mut self) -> Uid {
         loop {
             let uid = self.uids.next_uid();
@@ -63,12 +63,12 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// Says what should be selected afterwards.
+    /// Sets the joints to select afterwards.
     pub fn select(&mut self, joints: Vec<Uid>) {
         self.selected = Some(joints);
     }
 
-    /// Says something that people should know about what was done.
+    /// Adds a note for people about the result.
     pub fn note(&mut self, note: String) {
         self.notes.push(note);
     }
@@ -98,15 +98,15 @@ impl<'a> Draft<'a> {
         list
     }
 
-    /// Puts a joint at a transform in the rig's space; what hangs below keeps its own rest transform.
+    /// Sets the transform of a joint in the rig's space; joints below keep their own rest transforms.
     pub fn set_global(&mut self, joint: Uid, global: &Affine3) -> Result<(), EditError> {
         let parent = self.rig.joint(joint).ok_or(EditError::NoJoint(joint))?.parent;
         let rest = self.rig.local_rest(parent, global);
         self.apply(RigEdit::SetRest(joint, rest))
     }
 
-    /// Runs `change` on a joint and puts its children back where they were before. Poses go on turning it about the
-    /// same axes, and moving it the same way, however its own axes are turned now.
+    /// Runs `change` on a joint and restores the transforms of its children. Poses keep turning and moving the joint
+    /// along the same axes of the rig, whatever its own axes are now.
     pub fn keeping_children(
         &mut self,
         joint: Uid,
@@ -140,13 +140,13 @@ impl<'a> Draft<'a> {
         Ok(self.rig.position(joint))
     }
 
-    /// Ends the draft and keeps what was done.
+    /// Ends the draft and keeps its changes.
     pub fn finish(mut self) -> Outcome {
         self.inverses.reverse();
         Outcome { edits: self.done, inverses: self.inverses, selected: self.selected, notes: self.notes }
     }
 
-    /// Ends the draft and takes everything back.
+    /// Ends the draft and undoes its changes.
     pub fn take_back(self) {
         for inverse in self.inverses.iter().rev() {
             let undone = self.rig.apply(inverse);

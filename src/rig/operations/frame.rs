@@ -1,18 +1,18 @@
-//! What a pose's offset does, told in the rig's space, so that other axes can do the same.
+//! Frames of pose offsets: the effect of an offset in the rig's space, so that it can be expressed in other axes.
 
 use bevy::math::{Affine3, Mat3, Quat, Vec3};
 
 use crate::rig::{PoseOffset, Rig, Uid};
 
-/// Numbers this close are equal but for rounding.
+/// Largest difference by rounding between equal numbers.
 const ROUNDING: f32 = 1e-6;
 
-/// How the numbers of a joint's offset are meant in the rig's space, at rest.
+/// Meaning of a joint's pose offset in the rig's space, at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Frame {
-    /// Takes the offset's translation to the rig's space.
+    /// Map of the offset's translation to the rig's space.
     linear: Mat3,
-    /// The axes that rotation and scale are about: orthonormal, left-handed where an ancestor's scale is negative.
+    /// Axes of rotation and scale: orthonormal, left-handed if an ancestor's scale is negative.
     axes: Mat3,
 }
 
@@ -25,20 +25,20 @@ impl Frame {
         Self { linear: turned * Mat3::from_diagonal(found.data.rest.scale), axes: orthonormal(turned) }
     }
 
-    /// True if offsets mean the same here and there but for rounding.
+    /// Returns `true` if offsets mean the same in both frames but for rounding.
     pub fn is_like(&self, there: &Self) -> bool {
         self.linear.abs_diff_eq(there.linear, 1e-5) && self.axes.abs_diff_eq(there.axes, 1e-5)
     }
 
-    /// The offset that does at `there` what `offset` does here, taken to the other place by `change`: a rotation or a
+    /// The offset in the frame `there` with the effect of `offset` in this frame, mapped by `change`: a rotation or a
     /// reflection of the rig's space.
     pub fn carried(&self, offset: &PoseOffset, there: &Self, change: Mat3) -> PoseOffset {
         let translation = there.linear.inverse() * (change * (self.linear * offset.translation));
-        // An axis of rotation is turned the other way round by every reflection it passes.
+        // Each reflection reverses the axis of a rotation.
         let bridge = there.axes.transpose() * change * self.axes;
         let turned = bridge * offset.rotation.xyz() * bridge.determinant().signum();
         let rotation = Quat::from_xyzw(turned.x, turned.y, turned.z, offset.rotation.w).normalize();
-        // Factors along axes that are parallel to none over there are told as well as those axes can.
+        // Factors along axes that are parallel to none of the other frame's are approximated by its axes.
         let share = |row: Vec3| (row * row * offset.scale).element_sum();
         let scale = Vec3::new(share(bridge.row(0)), share(bridge.row(1)), share(bridge.row(2)));
         let even = offset.scale.max_element() - offset.scale.min_element() <= ROUNDING;

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::{Draft, OperationError};
 use crate::rig::{EditError, RigEdit, Uid};
 
-/// Deletes joints (and their partners). What hangs below moves up in place of its parent, or is deleted.
+/// Deletes joints (and their partners). The joints below move up in place of their parent, or are deleted.
 pub(super) fn delete(draft: &mut Draft, joints: &[Uid], keep_children: bool) -> Result<(), OperationError> {
     let joints = draft.with_partners(joints);
     if let Some(missing) = joints.iter().find(|joint| draft.rig().joint(**joint).is_none()) {
@@ -21,8 +21,8 @@ pub(super) fn delete(draft: &mut Draft, joints: &[Uid], keep_children: bool) -> 
             doomed.extend(draft.rig().hierarchy(joint).map(|j| j.data.uid).filter(|uid| seen.insert(*uid)));
         }
     }
-    // Children before parents. A hierarchy lists parents first, and a joint may be listed before its own ancestor
-    // is, so the order is by depth.
+    // Children are deleted before parents. A hierarchy lists parents first, and a joint may be listed before its own
+    // ancestor, so the order is by depth.
     let mut by_depth: Vec<(usize, Uid)> =
         doomed.iter().map(|uid| (draft.rig().ancestors(*uid).count(), *uid)).collect();
     by_depth.sort_by_key(|(depth, _)| std::cmp::Reverse(*depth));
@@ -54,7 +54,7 @@ fn lift_children(draft: &mut Draft, joint: Uid) -> Result<(), OperationError> {
     Ok(())
 }
 
-/// Hangs joints below `parent` where they are; partners hang below the partner of `parent`.
+/// Reparents joints below `parent` without moving them; partners go below the partner of `parent`.
 pub(super) fn reparent(draft: &mut Draft, joints: &[Uid], parent: Option<Uid>) -> Result<(), OperationError> {
     for &joint in joints {
         let partner = draft.partner(joint).filter(|partner| !joints.contains(partner));

@@ -9,17 +9,18 @@ use crate::rig::{EditError, Uid};
 /// An axis of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Axis {
-    /// Along the bone, as Maya and Unreal have it.
+    /// The X axis along the bone, as in Maya and Unreal.
     X,
-    /// Along the bone, as Blender has it.
+    /// The Y axis along the bone, as in Blender.
     #[default]
     Y,
-    /// Along the bone.
+    /// The Z axis along the bone.
     Z,
 }
 
-/// Turns joints so that `along` points at the child that continues the chain: the only child, or the one that turns
-/// least from the bone above. A joint without children takes its parent's rotation. Partners get the mirrored one.
+/// Turns joints so that `along` points at the child that continues the chain: the only child, or the one with the
+/// smallest turn from the bone above. A joint without children takes its parent's rotation. Partners get the mirrored
+/// rotation.
 pub(super) fn orient(draft: &mut Draft, joints: &[Uid], along: Axis) -> Result<(), OperationError> {
     let mut order: Vec<(usize, Uid)> = Vec::with_capacity(joints.len());
     for &joint in joints {
@@ -58,8 +59,8 @@ fn rotation_for(draft: &Draft, joint: Uid, along: Axis) -> Option<Quat> {
     }
 }
 
-/// The rotation that takes `along` to `direction` and the next axis as near as possible to the character's front
-/// (+Z), or to up where the bone itself points to the front.
+/// The rotation that takes `along` to `direction` and the next axis as near as possible to the character's front (+Z),
+/// or to up if the bone itself points to the front.
 fn frame(direction: Vec3, along: Axis) -> Quat {
     let hint = if direction.z.abs() < 0.9 { Vec3::Z } else { Vec3::Y };
     let side = direction.cross(hint).normalize();

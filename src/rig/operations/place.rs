@@ -36,12 +36,12 @@ pub(super) fn chain(draft: &mut Draft, positions: &[Vec3], parent: Option<Uid>) 
     Ok(())
 }
 
-/// Where the joints of a chain go with live mirroring across `plane`: each with the place of its other side. Joints of
-/// the middle are put on the plane and have none, and so has everything without a plane.
+/// Positions of a chain's joints with live mirroring across `plane`, each with the position of its other side. Central
+/// joints are put on the plane and have no other side; without a plane no joint has one.
 ///
-/// Of the middle is a chain as a whole that [runs along the plane](MirrorPlane::runs_along), a spine; of any other chain
-/// the joints within the plane's tolerance, and where it begins those within two, if it then leaves the plane by far
-/// more: a clavicle.
+/// A chain that [runs along the plane](MirrorPlane::runs_along), a spine, is central as a whole. In any other chain the
+/// joints within the plane's tolerance are central, and at its start the joints within two tolerances, if the chain
+/// then leaves the plane by far more (a clavicle).
 pub fn settle(positions: &[Vec3], plane: Option<&MirrorPlane>) -> Vec<(Vec3, Option<Vec3>)> {
     let Some(plane) = plane else { return positions.iter().map(|position| (*position, None)).collect() };
     let distance = |position: &Vec3| plane.distance(*position).abs();
@@ -59,10 +59,10 @@ pub fn settle(positions: &[Vec3], plane: Option<&MirrorPlane>) -> Vec<(Vec3, Opt
     settled.collect()
 }
 
-/// Puts a joint into the bone above `child`, on the other side too.
+/// Inserts a joint into the bone above `child`, and on the other side.
 pub(super) fn insert(draft: &mut Draft, child: Uid, position: Vec3) -> Result<(), OperationError> {
     let partner = draft.partner(child);
-    // A bone of the middle stays in the middle.
+    // A central bone stays in the middle.
     let plane = draft.symmetry().filter(|plane| partner.is_none() && plane.distance(position).abs() <= plane.tolerance);
     let position = plane.map_or(position, |plane| plane.onto(position));
     let joint = insert_one(draft, child, position)?;

@@ -1,19 +1,19 @@
-//! Posing, and poses that are kept.
+//! Posing, and stored poses.
 
 use std::collections::{BTreeMap, HashSet};
 
 use super::{Draft, OperationError, frame::Frame};
 use crate::rig::{AttributeValues, EditError, PoseOffset, RigEdit, StoredPose, Uid};
 
-/// Puts offsets on top of the rest pose, and their mirror images on the partners that are not in the list.
+/// Sets offsets on top of the rest pose, and their mirror images on the partners that are not in the list.
 pub(super) fn pose(draft: &mut Draft, offsets: &[(Uid, PoseOffset)]) -> Result<(), OperationError> {
     let listed: HashSet<Uid> = offsets.iter().map(|(joint, _)| *joint).collect();
     for &(joint, offset) in offsets {
         set(draft, joint, Some(offset))?;
         let partner = draft.partner(joint).filter(|partner| !listed.contains(partner));
         if let (Some(partner), Some(plane)) = (partner, draft.symmetry()) {
-            // What each side does is relative to its own ancestors: with those posed as mirror images of one another the
-            // whole pose is one; where one arm is raised and the other hangs, both elbows bend alike.
+            // Each side's offset is relative to its own ancestors: if those are mirror images of one another, so is the
+            // whole pose; if one arm is raised and the other hangs, both elbows bend alike.
             let (here, there) = (Frame::of(draft.rig(), joint), Frame::of(draft.rig(), partner));
             set(draft, partner, Some(here.carried(&offset, &there, plane.reflection())))?;
         }
@@ -21,8 +21,8 @@ pub(super) fn pose(draft: &mut Draft, offsets: &[(Uid, PoseOffset)]) -> Result<(
     Ok(())
 }
 
-/// Puts joints and their partners to rest, and sets their attributes to what their commands say; all joints and created
-/// nodes if none is listed.
+/// Resets joints and their partners to rest, and their attributes to the defaults of their commands; all joints and
+/// created nodes if none is listed.
 pub(super) fn reset(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationError> {
     let posed: Vec<Uid> = match joints {
         [] => draft.rig().pose().keys().chain(draft.rig().attribute_values().keys()).copied().collect(),
@@ -38,7 +38,7 @@ pub(super) fn reset(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationEr
     Ok(())
 }
 
-/// Keeps the current pose under a name; a pose of that name is replaced.
+/// Stores the current pose under a name; a pose of that name is replaced.
 pub(super) fn store(draft: &mut Draft, name: &str) -> Result<(), OperationError> {
     let name = checked_name(name)?;
     let (offsets, values) = (draft.rig().pose().clone(), draft.rig().attribute_values().clone());
@@ -62,7 +62,7 @@ pub(super) fn apply(draft: &mut Draft, uid: Uid) -> Result<(), OperationError> {
         set(draft, joint, None)?;
     }
     for (joint, offset) in stored {
-        // What is not there at present has its part waiting.
+        // The part of a node that does not exist at present waits for it.
         set(draft, joint, Some(offset))?;
     }
     let all = |values: &AttributeValues| -> BTreeMap<(Uid, String), f32> {
@@ -104,7 +104,7 @@ fn checked_name(name: &str) -> Result<&str, OperationError> {
     if name.is_empty() { Err(OperationError::NoName) } else { Ok(name) }
 }
 
-/// Sets an offset unless it is there already, so that what changes nothing is no step of the history.
+/// Sets an offset unless it is set already, so that an operation without effect makes no step of the history.
 fn set(draft: &mut Draft, joint: Uid, offset: Option<PoseOffset>) -> Result<(), EditError> {
     let offset = offset.filter(|offset| *offset != PoseOffset::IDENTITY);
     if draft.rig().offset(joint).copied() == offset {

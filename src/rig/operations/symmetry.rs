@@ -1,4 +1,4 @@
-//! The other side: mirror planes, live and afterwards.
+//! Symmetry: mirror planes, for live mirroring and for mirroring afterwards.
 
 use std::collections::HashMap;
 
@@ -12,9 +12,9 @@ use crate::rig::{EditError, JointData, RigEdit, Uid, label::mirrored_label};
 pub struct MirrorPlane {
     /// A point of the plane.
     pub point: Vec3,
-    /// Its normal, unit length.
+    /// Normal of the plane, of unit length.
     pub normal: Vec3,
-    /// Joints at most this far from the plane are on it, belong to both sides and are put exactly there.
+    /// Largest distance of central joints, which belong to both sides and are put exactly on the plane.
     pub tolerance: f32,
 }
 
@@ -39,8 +39,9 @@ impl MirrorPlane {
         point - self.normal * (2.0 * self.distance(point))
     }
 
-    /// Whether a line through these places runs along the plane, as a spine drawn by hand does: nowhere further from it
-    /// than five tolerances or a sixth of the line's length (but at least one tolerance), on average less than three.
+    /// Returns `true` if a line through these places runs along the plane, like a spine drawn by hand: nowhere further
+    /// from it than five tolerances or a sixth of the line's length (but at least one tolerance), on average less than
+    /// three tolerances.
     pub fn runs_along(&self, places: &[Vec3]) -> bool {
         let (Some(first), Some(last)) = (places.first(), places.last()) else { return false };
         let length = first.distance(*last);
@@ -49,24 +50,24 @@ impl MirrorPlane {
         places.iter().all(|place| self.distance(*place).abs() <= most) && mean.abs() <= 3.0 * self.tolerance
     }
 
-    /// Takes directions to the other side.
+    /// The reflection of directions.
     pub fn reflection(&self) -> Mat3 {
         let n = self.normal;
         Mat3::from_cols(Vec3::X - n * (2.0 * n.x), Vec3::Y - n * (2.0 * n.y), Vec3::Z - n * (2.0 * n.z))
     }
 
-    /// The transform on the other side: positions mirrored and every local axis mirrored too, with the local axis
-    /// across the plane turned over, so that it stays a proper rotation.
+    /// The transform on the other side: position and local axes mirrored, with the local axis across the plane turned
+    /// over, so that the rotation stays proper.
     pub fn mirrored_affine(&self, global: &Affine3) -> Affine3 {
         let reflect = self.reflection();
         Affine3 { matrix3: reflect * global.matrix3 * reflect, translation: self.mirrored(global.translation) }
     }
 }
 
-/// Makes or renews the other side of `joints` and all below them, across the draft's plane (or x = 0).
+/// Makes or updates the other side of `joints` and of their hierarchies, across the draft's plane (or x = 0).
 ///
-/// A joint on the plane is its own other side; an unpaired joint that stands at the mirrored place is the other side. Labels, local groups with a side in their name, locks and pairs are
-/// mirrored; tags stay with the side they were put on.
+/// A joint on the plane is its own other side; an unpaired joint at the mirrored place is the other side. Labels, local
+/// groups with a side in their name, locks and pairs are mirrored; tags stay with the side they were put on.
 pub(super) fn mirror(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationError> {
     let plane = draft.symmetry().unwrap_or_else(|| MirrorPlane::sagittal(height(draft)));
     let mut sources: Vec<Uid> = Vec::new();
@@ -148,8 +149,7 @@ pub(super) fn mirror(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationE
     Ok(())
 }
 
-/// A joint below `parent` that stands where the other side is wanted and is in no pair yet: the other side of a
-/// skeleton that was not made by mirroring.
+/// An unpaired joint below `parent` at the mirrored place: the other side of a skeleton that was not made by mirroring.
 fn standing_at(draft: &Draft, parent: Option<Uid>, plane: &MirrorPlane, place: Vec3) -> Option<Uid> {
     let unpaired = |uid: &&Uid| draft.rig().joint(**uid).is_some_and(|joint| joint.data.mirror.is_none());
     let near = draft

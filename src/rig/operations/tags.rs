@@ -1,6 +1,6 @@
-//! What people do to tags: add, order, change, copy and paste them, and turn features on and off.
+//! Operations on tags: add, order, change, copy and paste them, and turn features on and off.
 //!
-//! Live mirroring leaves tags alone; pasting them mirrored is how the other side gets them.
+//! Live mirroring leaves tags alone; pasting them mirrored puts them on the other side.
 
 mod clipboard;
 mod part;
@@ -14,21 +14,21 @@ pub use paste::{PasteTo, PasteWhat};
 
 use super::{Draft, OperationError};
 use crate::rig::{
-    EditError, Rig, RigEdit, Tag, TagKind, Uid,
+    EditError, Rig, RigEdit, TagData, TagKind, Uid,
     feature::{self, FeatureError, FeatureKey},
     reference::{BadReference, NameKind, bind_names, refresh_names},
 };
 
-/// One thing a person asks of tags. Tags are named by their uids, wherever in the rig they are.
+/// A change of tags that a person requests. Tags are identified by their uids, wherever in the rig they are.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TagOperation {
     /// Gives each joint a tag.
     Add {
-        /// Which joints.
+        /// Joints that get the tag.
         joints: Vec<Uid>,
-        /// What the tag is. Names without a uid in the parameters are bound.
+        /// Kind and data of the tag. Names without a uid in the parameters are bound.
         kind: TagKind,
-        /// Its place among the joint's tags; last if left out.
+        /// Index among the joint's tags; last if `None`.
         index: Option<usize>,
     },
     /// Deletes tags. Commands of a deleted feature are in none then.
@@ -37,11 +37,11 @@ pub enum TagOperation {
     Enable(Vec<Uid>, bool),
     /// Moves tags, in the order given, to a joint (their own or another), before one of its tags or to the end.
     Move {
-        /// Which.
+        /// Tags to move.
         tags: Vec<Uid>,
-        /// Where to.
+        /// Joint that gets the tags.
         joint: Uid,
-        /// Before which tag.
+        /// Tag to insert before; `None` appends.
         before: Option<Uid>,
     },
     /// Gives a tag a comment.
@@ -50,7 +50,7 @@ pub enum TagOperation {
     Params(Uid, String),
     /// Makes a feature tag another feature: kind, name, switch.
     Feature {
-        /// Which tag.
+        /// Tag to change.
         tag: Uid,
         /// The kind.
         kind: String,
@@ -61,15 +61,15 @@ pub enum TagOperation {
     },
     /// Attaches commands to a feature tag anywhere in the rig, or detaches them.
     Attach(Vec<Uid>, Option<Uid>),
-    /// Deletes what has been copied.
+    /// Deletes the copied tags from their joints.
     Cut(Arc<TagClipboard>),
-    /// Pastes what has been copied.
+    /// Pastes the copied tags.
     Paste {
-        /// What has been copied, from this rig or another.
+        /// The copied tags, from this rig or another.
         clipboard: Arc<TagClipboard>,
         /// Tags, values or both.
         what: PasteWhat,
-        /// Onto which joints.
+        /// Target joints.
         to: PasteTo,
     },
     /// Drops a part onto a chain of joints: the tags of the part's first joint go to the first, and so on, until either
@@ -79,8 +79,8 @@ pub enum TagOperation {
         part: Arc<Rig>,
         /// The joints, in order.
         joints: Vec<Uid>,
-        /// What joints and groups of the part that have no counterpart in `joints` mean in the rig; the others are found
-        /// by label or name.
+        /// Counterparts in the rig of the part's joints and groups that have none in `joints`; other references are
+        /// resolved by label or name.
         bindings: BTreeMap<Uid, Uid>,
     },
     /// Turns a combined feature on or off.
@@ -93,16 +93,16 @@ pub enum TagOperation {
     EnableGroup(Uid, bool),
 }
 
-/// Why an operation on tags did nothing.
+/// Error of an operation on tags. The rig is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TagError {
     /// No such tag.
     #[error("there is no tag {0} in the rig; it may have been deleted: choose another")]
     NoTag(Uid),
-    /// Not a command.
+    /// A tag that is not a command.
     #[error("tag {0} is no command; choose a command tag")]
     NotCommand(Uid),
-    /// Not a feature.
+    /// A tag that is not a feature.
     #[error("tag {0} is no feature; choose a feature tag")]
     NotFeature(Uid),
     /// A reference that cannot be read.
@@ -111,32 +111,32 @@ pub enum TagError {
     /// No feature or switch of that name.
     #[error(transparent)]
     Feature(#[from] FeatureError),
-    /// Nothing to paste.
+    /// An empty clipboard.
     #[error("nothing has been copied; copy tags first")]
     EmptyClipboard,
     /// A text that is no clipboard.
     #[error("the clipboard holds no tags: {0}; copy tags first")]
     NoClipboard(String),
-    /// Nothing to paste onto.
+    /// No joint to paste onto.
     #[error("no joint is selected to put tags on; select some")]
     NoTarget,
-    /// Nothing to paste onto on the other side.
+    /// No joint on the other side to paste onto.
     #[error("none of the copied joints has a joint on the other side; mirror the joints first")]
     NoMirror,
-    /// A name of the part that could mean several things in the rig.
+    /// A name of the part that fits several objects in the rig.
     #[error(
         "\"{name}\" of the part could be {} {kind}s of the rig ({}); choose one of them",
         candidates.len(),
         candidates.iter().map(|uid| uid.to_string()).collect::<Vec<_>>().join(", ")
     )]
     Ambiguous {
-        /// What it is.
+        /// Kind of the object.
         kind: NameKind,
-        /// Its uid in the part; bind this.
+        /// Uid of the object in the part, to be bound.
         uid: Uid,
-        /// Its name in the part.
+        /// Name of the object in the part.
         name: String,
-        /// To one of these.
+        /// Uids of the candidates in the rig.
         candidates: Vec<Uid>,
     },
 }
@@ -177,7 +177,7 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
     match operation {
         TagOperation::Add { joints, kind, index } => {
             for &joint in joints {
-                let tag = Tag { uid: draft.next_uid(), enabled: true, comment: String::new(), kind: kind.clone() };
+                let tag = TagData { uid: draft.next_uid(), enabled: true, comment: String::new(), kind: kind.clone() };
                 let tag = bound(draft, tag)?;
                 add(draft, joint, tag, index.unwrap_or(usize::MAX))?;
             }
@@ -221,7 +221,7 @@ fn apply(draft: &mut Draft, edits: Vec<RigEdit>) -> Result<(), OperationError> {
     edits.into_iter().try_for_each(|edit| Ok(draft.apply(edit)?))
 }
 
-fn found(draft: &Draft, tag: Uid) -> Result<(Uid, Tag), TagError> {
+fn found(draft: &Draft, tag: Uid) -> Result<(Uid, TagData), TagError> {
     let (joint, found) = draft.rig().find_tag(tag).ok_or(TagError::NoTag(tag))?;
     Ok((joint.data.uid, found.clone()))
 }
@@ -233,26 +233,26 @@ fn feature_tag(draft: &Draft, tag: Uid) -> Result<(), TagError> {
     }
 }
 
-fn add(draft: &mut Draft, joint: Uid, tag: Tag, index: usize) -> Result<(), OperationError> {
+fn add(draft: &mut Draft, joint: Uid, tag: TagData, index: usize) -> Result<(), OperationError> {
     Ok(draft.apply(RigEdit::AddTag { joint, tag: Box::new(tag), index })?)
 }
 
-/// Replaces a tag; one that is as it was already needs no edit.
-fn set(draft: &mut Draft, joint: Uid, tag: Tag) -> Result<(), OperationError> {
+/// Replaces a tag; an unchanged tag needs no edit.
+fn set(draft: &mut Draft, joint: Uid, tag: TagData) -> Result<(), OperationError> {
     if draft.rig().find_tag(tag.uid).is_some_and(|(_, now)| *now == tag) {
         return Ok(());
     }
     Ok(draft.apply(RigEdit::SetTag(joint, Box::new(tag)))?)
 }
 
-fn change(draft: &mut Draft, tag: Uid, change: impl FnOnce(&mut Tag)) -> Result<(), OperationError> {
+fn change(draft: &mut Draft, tag: Uid, change: impl FnOnce(&mut TagData)) -> Result<(), OperationError> {
     let (joint, mut tag) = found(draft, tag)?;
     change(&mut tag);
     set(draft, joint, tag)
 }
 
 /// The tag with uids beside all names in its references.
-fn bound(draft: &Draft, mut tag: Tag) -> Result<Tag, TagError> {
+fn bound(draft: &Draft, mut tag: TagData) -> Result<TagData, TagError> {
     if let TagKind::Command { params, .. } = &mut tag.kind {
         let (text, bad) = bind_names(params, draft.rig());
         let text = text.into_owned();
@@ -265,7 +265,7 @@ fn bound(draft: &Draft, mut tag: Tag) -> Result<Tag, TagError> {
 }
 
 /// Writes the current name beside every uid in a tag's references.
-fn refresh(rig: &Rig, tag: &mut Tag) {
+fn refresh(rig: &Rig, tag: &mut TagData) {
     if let TagKind::Command { params, .. } = &mut tag.kind {
         *params = refresh_names(params, rig).into_owned();
     }
@@ -311,7 +311,7 @@ fn relocate(draft: &mut Draft, tags: &[Uid], joint: Uid, before: Option<Uid>) ->
         Some(before) => old.iter().position(|tag| *tag == before).ok_or(EditError::NoTag(joint, before))?,
         None => old.len(),
     };
-    // Where the next tag stands that is not moved itself.
+    // The next tag that does not move itself.
     let next = old[start..].iter().find(|tag| !moved.contains(tag)).copied();
     let mut wanted: Vec<Uid> = old.iter().filter(|tag| !moved.contains(tag)).copied().collect();
     let place = next.and_then(|next| wanted.iter().position(|tag| *tag == next)).unwrap_or(wanted.len());

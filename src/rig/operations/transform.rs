@@ -1,4 +1,4 @@
-//! Moving, turning and scaling the rest pose.
+//! Moving, rotating and scaling the rest pose.
 
 use std::collections::HashSet;
 
@@ -7,7 +7,7 @@ use bevy::math::{Affine3, Vec3};
 use super::{Draft, OperationError};
 use crate::rig::{RestTransform, RigEdit, Uid};
 
-/// Puts joints at positions.
+/// Moves joints to positions in the rig's space.
 pub(super) fn place_at(draft: &mut Draft, to: &[(Uid, Vec3)], with_children: bool) -> Result<(), OperationError> {
     if to.iter().any(|(_, position)| !position.is_finite()) {
         return Err(OperationError::BadNumber("a joint's position is not finite; drag it back onto the mesh"));
@@ -22,7 +22,7 @@ pub(super) fn place_at(draft: &mut Draft, to: &[(Uid, Vec3)], with_children: boo
     set_globals(draft, targets, with_children)
 }
 
-/// Gives joints rest transforms relative to their parents, parents first, and their partners the mirrored ones.
+/// Sets rest transforms relative to parents, parents first, and the mirrored ones on partners.
 pub(super) fn rest(draft: &mut Draft, to: &[(Uid, RestTransform)], with_children: bool) -> Result<(), OperationError> {
     let listed: HashSet<Uid> = to.iter().map(|(joint, _)| *joint).collect();
     let mut to = to.to_vec();

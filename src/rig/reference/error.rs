@@ -1,4 +1,4 @@
-//! What can be wrong with the text of a reference.
+//! Errors in the text of a reference.
 
 use super::NameKind;
 use crate::rig::{
@@ -6,51 +6,51 @@ use crate::rig::{
     nearest::{did_you_mean, listed},
 };
 
-/// A text that is no reference, or one whose names nobody knows; where, and what to do.
+/// Error in the text of a reference: malformed, or with a name that is unknown or ambiguous; with the place and a hint.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("reference `{text}`, byte {at}: {problem}")]
 pub struct ReferenceError {
     /// The whole text.
     pub text: String,
-    /// Where in it, in bytes.
+    /// Byte offset of the error.
     pub at: usize,
-    /// What is wrong.
+    /// Kind of the error.
     pub problem: ReferenceProblem,
 }
 
-/// What is wrong with the text of a reference.
+/// Kind of an error in the text of a reference.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ReferenceProblem {
-    /// It does not start with `@`.
+    /// The text does not start with `@`.
     #[error("a reference starts with \"@\"; write @this, @joint NAME or another source")]
     NoSigil,
-    /// Something else belongs here.
+    /// An unexpected piece of text.
     #[error("{found} where {expected} belongs; {advice}")]
     Unexpected {
-        /// What stands there.
+        /// Text found.
         found: String,
-        /// What should.
+        /// Text expected.
         expected: &'static str,
-        /// What to do.
+        /// Hint.
         advice: &'static str,
     },
-    /// A word that is none of the allowed ones.
+    /// A word that is not allowed.
     #[error("\"{word}\" is no {what}{}", did_you_mean(word, known.iter().copied()))]
     UnknownWord {
         /// The word.
         word: String,
-        /// What it should be.
+        /// Kind of word expected.
         what: &'static str,
         /// The allowed words.
         known: &'static [&'static str],
     },
-    /// A filter that was there already.
+    /// A filter that appears twice.
     #[error("\"{0}:\" is there already; keep one of the two")]
     Twice(String),
-    /// A quotation mark without its partner.
+    /// A quotation mark without a closing one.
     #[error("the name that begins here has no end; close it with {0}")]
     OpenQuote(char),
-    /// An escape in quotes that is not known.
+    /// An unknown escape in quotes.
     #[error(
         "\"\\{0}\" is no escape; write \\\\ for a backslash, \\n for a line break, \\u{{...}} for a character's number"
     )]
@@ -64,43 +64,43 @@ pub enum ReferenceProblem {
     /// A name without a uid where names cannot be looked up.
     #[error("the {kind} \"{name}\" has no uid beside it; bind names to a rig first, or write NAME#UID")]
     Unbound {
-        /// What it names.
+        /// Kind of the named object.
         kind: NameKind,
         /// The name.
         name: String,
     },
-    /// A name that nothing has.
+    /// A name that does not exist.
     #[error("there is no {kind} \"{name}\"{}", did_you_mean(name, nearest))]
     Unknown {
-        /// What it should name.
+        /// Kind of the named object.
         kind: NameKind,
         /// The name.
         name: String,
-        /// Names that there are and that come near.
+        /// Similar names that exist.
         nearest: Vec<String>,
     },
-    /// A name that several have.
+    /// A name that several objects have.
     #[error("{} {kind}s are called \"{name}\": write {name}#UID with one of {}", candidates.len(), uids(candidates))]
     Ambiguous {
-        /// What it should name.
+        /// Kind of the named object.
         kind: NameKind,
         /// The name.
         name: String,
-        /// Who has it.
+        /// Uids of the objects with the name.
         candidates: Vec<Uid>,
     },
-    /// One reference was asked for.
+    /// Several references in place of one.
     #[error("one reference is needed here, not {0}; write a single one, without +")]
     NotOne(usize),
 }
 
-/// A number past the end of the nodes there are.
+/// A number past the end of a list of nodes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("pick:{number} asks for node {number} (counted from 0) of {count}; pick a lower number, or END")]
 pub struct PickError {
     /// The number.
     pub number: u32,
-    /// How many nodes there are.
+    /// Number of nodes.
     pub count: usize,
 }
 

@@ -1,11 +1,11 @@
-//! Names for uids and uids for names, where references are written and read.
+//! Look-up of names for uids and of uids for names, for writing and reading references.
 
 use std::{borrow::Cow, fmt};
 
 use super::{GroupScope, RigScope, params::text_field};
-use crate::rig::{Rig, RigJoint, Tag, TagKind, Uid};
+use crate::rig::{Rig, RigJoint, TagData, TagKind, Uid};
 
-/// What a uid of a reference names.
+/// Kind of object that a uid of a reference stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum NameKind {
     /// A rig, by its name.
@@ -32,24 +32,24 @@ impl fmt::Display for NameKind {
     }
 }
 
-/// Where to look a name up.
+/// Scope of a look-up by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NameScope {
     /// The rig.
     pub rig: RigScope,
-    /// The local group that the reference names; decides between bearers of one label.
+    /// The local group that the reference names; it decides between several bearers of one label.
     pub group: GroupScope,
 }
 
-/// Looks names and uids up.
+/// Look-up of names and uids.
 pub trait Names {
-    /// The current name of what that uid names; `None` if there is none, or it has no name.
+    /// The current name of an object; `None` if it does not exist or has no name.
     fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>>;
 
-    /// Who has that name, in the order of the document.
+    /// Uids of the objects with a name, in the order of the document.
     fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid>;
 
-    /// All names of that kind, for the nearest matches in errors.
+    /// Names of a kind, for the nearest matches in errors.
     fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>>;
 }
 
@@ -99,7 +99,7 @@ impl Names for Rig {
 pub struct RigNames<'a> {
     /// The rig that holds the tags.
     pub own: &'a Rig,
-    /// Other rigs that references may name.
+    /// Other rigs that references may refer to.
     pub others: &'a [&'a Rig],
 }
 
@@ -136,10 +136,10 @@ impl Names for RigNames<'_> {
     }
 }
 
-/// The label that a joint has, or that a command tag gives its nodes; `None` if it bears none.
+/// The label that a joint has, or that a command tag gives its nodes; `None` without one.
 ///
 /// A command gives a label if its parameters have a field `label` that is a text and not empty, at most one bracket
-/// deep (`creation: (label: "elbow")`). A command that gives none lets its nodes have the label of its joint.
+/// deep (`creation: (label: "elbow")`). The nodes of a command without one have the label of its joint.
 pub fn label_text(rig: &Rig, bearer: Uid) -> Option<Cow<'_, str>> {
     match rig.joint(bearer) {
         Some(joint) => joint.data.label.as_deref().map(Cow::Borrowed),
@@ -169,19 +169,19 @@ fn labelled<'a>(rig: &'a Rig, label: &'a str) -> impl Iterator<Item = &'a RigJoi
     rig.walk().filter(move |joint| joint.data.label.as_deref() == Some(label))
 }
 
-fn commands(rig: &Rig) -> impl Iterator<Item = (&RigJoint, &Tag)> {
+fn commands(rig: &Rig) -> impl Iterator<Item = (&RigJoint, &TagData)> {
     let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(move |tag| (joint, tag)));
     tags.filter(|(_, tag)| matches!(tag.kind, TagKind::Command { .. }))
 }
 
-fn module(tag: &Tag) -> Option<&str> {
+fn module(tag: &TagData) -> Option<&str> {
     match &tag.kind {
         TagKind::Command { module, .. } => Some(module),
         TagKind::Feature { .. } => None,
     }
 }
 
-fn command_name<'a>(joint: &'a RigJoint, tag: &'a Tag) -> Option<Cow<'a, str>> {
+fn command_name<'a>(joint: &'a RigJoint, tag: &'a TagData) -> Option<Cow<'a, str>> {
     let module = module(tag)?;
     Some(match &joint.data.label {
         Some(label) => Cow::Owned(format!("{module}/{label}")),
@@ -189,7 +189,7 @@ fn command_name<'a>(joint: &'a RigJoint, tag: &'a Tag) -> Option<Cow<'a, str>> {
     })
 }
 
-fn given_label(tag: &Tag) -> Option<Cow<'_, str>> {
+fn given_label(tag: &TagData) -> Option<Cow<'_, str>> {
     let TagKind::Command { params, .. } = &tag.kind else { return None };
     if !params.contains("label") {
         return None;

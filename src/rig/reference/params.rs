@@ -1,7 +1,7 @@
 //! References in the parameters of any tag, whether its module is installed or not.
 //!
-//! Parameters are RON text, and a reference in them is a string literal whose text begins with `@`. So they can be
-//! found, changed and named anew without knowing what else the parameters mean.
+//! Parameters are RON text, and a reference in them is a string literal whose text begins with `@`. So references can
+//! be found, changed and renamed without knowledge of the other parameters.
 
 use std::{borrow::Cow, collections::HashMap, ops::Range};
 
@@ -12,34 +12,34 @@ use super::{
 };
 use crate::rig::{
     Uid,
+    format::scan::{Token, fields, tokens},
     nearest::did_you_mean,
-    scan::{Token, fields, tokens},
     template::quoted,
 };
 
 /// A reference found in parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundReference {
-    /// Where its string literal stands, quotation marks included, in bytes.
+    /// Byte range of the string literal, quotation marks included.
     pub range: Range<usize>,
     /// The text, without quotation marks and escapes.
     pub text: String,
-    /// What it means; an error if it is no reference after all, or has a name without a uid.
+    /// The parsed references; an error if the text is no reference, or has a name without a uid.
     pub references: Result<NodeRefs, ReferenceError>,
 }
 
-/// A reference in parameters that cannot be read.
+/// A reference in parameters that cannot be parsed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{error}")]
 pub struct BadReference {
-    /// Where its string literal stands in the parameters, in bytes.
+    /// Byte range of the string literal in the parameters.
     pub range: Range<usize>,
-    /// What is wrong with it.
+    /// The error in it.
     pub error: ReferenceError,
 }
 
-/// The references in a tag's parameters, in order: string literals whose text begins with `@`. Comments, characters
-/// and byte strings are passed over.
+/// The references in a tag's parameters, in order: string literals whose text begins with `@`. Comments, characters and
+/// byte strings are skipped.
 pub fn references_in(params: &str) -> impl Iterator<Item = FoundReference> {
     literals(params).map(|Literal { range, text, .. }| {
         let references = text.parse();
@@ -47,9 +47,9 @@ pub fn references_in(params: &str) -> impl Iterator<Item = FoundReference> {
     })
 }
 
-/// The parameters with every reference changed as `change` says. What it leaves as it is stays as it is written, to the
-/// byte, and so does all around the references. Names stay beside the uids that they stood beside; other uids have
-/// none until [`refresh_names`]. What cannot be read as a reference is left alone.
+/// The parameters with every reference changed by `change`. Unchanged references keep their text, to the byte, and so
+/// does everything around the references. Names stay beside their uids; other uids have none until [`refresh_names`].
+/// Text that cannot be read as a reference is left alone.
 pub fn map_references(params: &str, mut change: impl FnMut(&mut NodeRef)) -> String {
     let rewritten = rewritten(params, literals(params), |text| {
         let mut places = Vec::new();
@@ -61,24 +61,24 @@ pub fn map_references(params: &str, mut change: impl FnMut(&mut NodeRef)) -> Str
     rewritten.into_owned()
 }
 
-/// The parameters with the current name beside every uid. The name beside a uid that nothing has stays, as a trace of
-/// what was meant. Names that stand alone stay as they are; see [`bind_names`].
+/// The parameters with the current name beside every uid. The name beside a uid that does not exist any more stays, as
+/// a hint for people. Names without uids stay unchanged; see [`bind_names`].
 pub fn refresh_names<'a>(params: &'a str, names: &dyn Names) -> Cow<'a, str> {
     rewritten(params, literals(params), |text| {
         let mut places = Vec::new();
-        // With names at hand, a name that stands alone does not keep the others from being refreshed.
+        // With a look-up at hand, a name without a uid does not keep the others from being refreshed.
         read_with(text, Some(names), &mut places).ok()?;
         places.retain(|place| place.has_uid);
         renamed(text, &places, names)
     })
 }
 
-/// The parameters with the uid beside every name, and what could not be bound: names that nothing or several have, and
-/// texts that are no references. Those stay as they are.
+/// The parameters with the uid beside every name, and the references that could not be bound: names of no object or of
+/// several, and texts that are no references. Those stay unchanged.
 pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<BadReference>) {
     let bad = literals(params).filter_map(|Literal { range, text, .. }| {
         let error = read_with(&text, Some(names), &mut Vec::new()).err()?;
-        // A text of some other meaning may begin with the same sign.
+        // A text with another purpose may begin with the same sign.
         let other = matches!(&error.problem, ReferenceProblem::UnknownWord { what: "source", .. });
         (!other).then_some(BadReference { range, error })
     });
@@ -91,15 +91,15 @@ pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<
     (bound, bad)
 }
 
-/// References as they stand in parameters, with the names that stand there: what errors should quote. Without names if
-/// they are not in the parameters.
+/// References as written in the parameters, with the names there, for quotation in errors. Without names if they are
+/// not in the parameters.
 pub fn written_as(params: &str, references: &NodeRefs) -> String {
     let mut found = references_in(params).filter(|found| found.references.as_ref() == Ok(references));
     found.next().map_or_else(|| references.to_string(), |found| found.text)
 }
 
-/// What to say about uids of references that nothing has any more, as the rest of a sentence: the names that stand
-/// beside them in the parameters, and the nearest there are. Empty if there is nothing to say.
+/// End of an error's sentence about uids that do not exist any more: the names beside them in the parameters, and the
+/// nearest existing ones. Empty if there is nothing to add.
 pub fn nearest_to_gone(params: &str, references: &NodeRefs, names: &dyn Names) -> String {
     let text = written_as(params, references);
     let mut places = Vec::new();
@@ -116,15 +116,15 @@ pub fn nearest_to_gone(params: &str, references: &NodeRefs, names: &dyn Names) -
 }
 
 /// The parameters with every uid changed that is a string literal of its own (`group: "0123456789abcdef"`), not part of
-/// a reference. What `change` returns nothing for stays.
+/// a reference. Uids for which `change` returns `None` stay.
 pub(in crate::rig) fn map_uids(params: &str, mut change: impl FnMut(Uid) -> Option<Uid>) -> String {
     let uid = |text: &str| text.parse::<Uid>().ok();
     let rewritten = rewritten(params, strings(params), |text| Some(change(uid(text)?)?.to_string()));
     rewritten.into_owned()
 }
 
-/// The parameters with the text changed of every field with one of these names, at most two brackets deep, whose value
-/// is a string literal.
+/// The parameters with changed texts of the fields with one of these names, at most two brackets deep, whose value is a
+/// string literal.
 pub(in crate::rig) fn map_text_fields(
     params: &str,
     names: &[&str],
@@ -156,7 +156,7 @@ struct Literal {
 
 /// String literals whose text begins with `@`.
 fn literals(params: &str) -> impl Iterator<Item = Literal> {
-    // Most parameters have none, and need not be cut into tokens.
+    // Most parameters contain none, and need not be split into tokens.
     let params = if params.contains('@') || params.contains("\\u") || params.contains("\\x") { params } else { "" };
     strings(params).filter(|literal| literal.text.starts_with('@'))
 }
@@ -180,7 +180,7 @@ fn decoded(params: &str, token: &Token) -> Option<Literal> {
     Some(Literal { range, text, raw })
 }
 
-/// The parameters with the texts of literals replaced where `replace` has something else.
+/// The parameters with the texts of literals replaced by the results of `replace`, if any.
 fn rewritten(
     params: &str,
     literals: impl Iterator<Item = Literal>,
@@ -230,7 +230,7 @@ fn renamed(text: &str, places: &[Written], names: &dyn Names) -> Option<String> 
     Some(out)
 }
 
-/// The names that stand in a text beside uids.
+/// The names beside uids in a text.
 struct KeptNames(HashMap<(NameKind, Uid), String>);
 
 impl KeptNames {
@@ -240,7 +240,7 @@ impl KeptNames {
     }
 }
 
-/// A name as written, read as the name of a module.
+/// A name as written, without quotation marks and escapes.
 fn unquoted(name: &str) -> Option<String> {
     match read_with(&format!("@module {name}"), None, &mut Vec::new()).ok()?.pop()?.source {
         Source::Module(name) => Some(name),

@@ -21,13 +21,13 @@ const TYPES: [&str; NodeTypes::NAMES.len()] = {
 };
 const PLACES: [&str; 5] = ["all", "none", "START", "MIDDLE", "END"];
 
-/// A uid with the name beside it, as it stands in a text.
+/// A uid with the name beside it, as written in a text.
 pub(super) struct Written {
     pub kind: NameKind,
     pub uid: Uid,
-    /// Where the name stands; empty, before the `#`, if there is none.
+    /// Byte range of the name; empty, before the `#`, without one.
     pub name: Range<usize>,
-    /// False if the name stands alone and was looked up.
+    /// Presence of a uid; `false` if the name stands alone and was looked up.
     pub has_uid: bool,
 }
 
@@ -36,7 +36,7 @@ pub(super) fn read(text: &str, names: Option<&dyn Names>) -> Result<Vec<NodeRef>
     read_with(text, names, &mut Vec::new())
 }
 
-/// As [`read`], and lists the uids with the places of their names.
+/// Reads a union of references as [`read`] does, and lists the uids with the places of their names.
 pub(super) fn read_with(
     text: &str,
     names: Option<&dyn Names>,
@@ -46,7 +46,7 @@ pub(super) fn read_with(
     reader.union()
 }
 
-/// Whether a name may have the character without quotation marks.
+/// Returns `true` for a character that a name may have without quotation marks.
 pub(super) fn is_bare(c: char) -> bool {
     c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | '/')
 }
@@ -115,7 +115,7 @@ impl<'a> Reader<'a, '_> {
             }
         }
         let filters = self.filters(&mut reference)?;
-        // Names are looked up once it is known in which rig.
+        // Names are looked up after the rig of the reference is known.
         if let Some(rig) = filters.rig {
             reference.rig = RigScope::Rig(self.look_up(NameScope::default(), NameKind::Rig, rig)?);
         }
@@ -341,7 +341,7 @@ impl<'a> Reader<'a, '_> {
         Err(self.error(start, ReferenceProblem::OpenQuote(quote)))
     }
 
-    /// The bare word here, perhaps an empty one.
+    /// The bare word at the current position, perhaps empty.
     fn word(&mut self) -> &'a str {
         self.blanks();
         let rest: &'a str = &self.text[self.at..];
@@ -350,7 +350,7 @@ impl<'a> Reader<'a, '_> {
         &rest[..length]
     }
 
-    /// True if this word stands here, alone and not as the name of a uid.
+    /// Returns `true` if this word comes next, not followed by a uid.
     fn ahead(&mut self, word: &str) -> bool {
         self.blanks();
         let start = self.at;
@@ -361,7 +361,7 @@ impl<'a> Reader<'a, '_> {
         is_it && alone
     }
 
-    /// True if a name or a uid stands here.
+    /// Returns `true` if a name or a uid comes next.
     fn names_ahead(&mut self) -> bool {
         self.blanks();
         let start = self.at;

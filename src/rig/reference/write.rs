@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::{GroupScope, NameKind, Names, NodeRef, Pick, PickAt, RigScope, Source, Top, text::is_bare};
 use crate::rig::Uid;
 
-/// Words that mean something of their own where a name may stand.
+/// Words with a meaning of their own where a name may be.
 const RESERVED: [&str; 3] = ["any", "own", "this"];
 
 /// Writes a union of references.
@@ -95,7 +95,7 @@ fn place_text(place: &PickAt) -> String {
     }
 }
 
-/// A name as it is written: bare if it can be.
+/// A name in its written form: bare if possible.
 pub(super) fn name_text(name: &str) -> String {
     if !name.is_empty() && name.chars().all(is_bare) && !RESERVED.contains(&name) {
         return name.to_owned();

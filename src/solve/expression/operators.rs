@@ -1,4 +1,4 @@
-//! What expressions are made of, in the terms of the evaluator.
+//! Operators and functions of expressions, in the evaluator's terms.
 //!
 //! The evaluator knows operators with one and two operands. A third argument travels in the second half of a pair.
 
@@ -31,7 +31,7 @@ pub(super) fn literal(number: f32) -> String {
     format!("#{:08x}", number.to_bits())
 }
 
-/// Finds literals.
+/// Matcher of literals.
 #[derive(Debug, Clone, Copy)]
 pub struct Literals;
 
@@ -41,7 +41,7 @@ impl MatchLiteral for Literals {
     }
 }
 
-/// How many arguments a function takes.
+/// Number of arguments of a function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Arity {
     One,
@@ -73,9 +73,9 @@ impl Arity {
 /// A function of the language.
 #[derive(Debug, Clone, Copy)]
 pub struct Function {
-    /// Its name.
+    /// Name of the function.
     pub name: &'static str,
-    /// Names of its arguments, and what it gives.
+    /// Names of the arguments, and the result.
     pub doc: &'static str,
     pub(super) symbol: &'static str,
     pub(super) arity: Arity,
@@ -115,7 +115,7 @@ macro_rules! more {
     };
 }
 
-/// All functions.
+/// Functions of the language.
 pub const FUNCTIONS: &[Function] = &[
     one!("abs", "(x): x without its sign", |x| x.abs()),
     one!("sign", "(x): -1, 0 or 1", |x| if x > 0.0 {
@@ -154,23 +154,23 @@ pub const FUNCTIONS: &[Function] = &[
     more!("if", Three, "(c, a, b): a if c is not zero, else b", |c, a, b| if c == 0.0 { b } else { a }),
 ];
 
-/// Numbers with a name.
+/// Named constants.
 pub(super) const CONSTANTS: &[(&str, f32)] = &[("pi", std::f32::consts::PI), ("tau", std::f32::consts::TAU)];
 
-/// Joins the second and the third argument.
+/// Operator that joins the second and the third argument.
 pub(super) const JOIN: &str = "@,";
 
-/// The sign in front of a parenthesis: zero minus.
+/// Sign in front of a parenthesis: zero minus.
 pub(super) const MINUS: &str = "@-";
 
-/// The sign in front of an operand, stronger than all else.
+/// Sign in front of an operand, which binds more strongly than all else.
 pub(super) const NEGATIVE: &str = "@~";
 
 fn truth(is: bool) -> f32 {
     f32::from(u8::from(is))
 }
 
-/// What stands between two operands: the text, how strongly it binds, and what it does.
+/// A binary operator: its text, its strength, and its function.
 pub(super) struct Infix {
     pub(super) text: &'static str,
     strength: i64,
@@ -183,7 +183,7 @@ macro_rules! infix {
     };
 }
 
-/// Longer texts first, so that the scan takes `<=` for one.
+/// Binary operators. Longer texts come first, so that the scan takes `<=` for one.
 pub(super) const INFIX: &[Infix] = &[
     infix!("||", 1, |a, b| truth(a != 0.0 || b != 0.0)),
     infix!("&&", 2, |a, b| truth(a != 0.0 && b != 0.0)),
@@ -211,15 +211,15 @@ impl Infix {
     }
 }
 
-/// The evaluator's list.
+/// The evaluator's list of operators.
 #[derive(Debug, Clone, Copy)]
 pub struct Operators;
 
 impl MakeOperators<Pair> for Operators {
     fn make<'a>() -> Vec<Operator<'a, Pair>> {
-        // None is marked commutative: the evaluator would take the order of equal strength lightly.
+        // No operator is marked commutative: the evaluator would reorder operators of equal strength.
         let binary = |apply, prio| BinOp { apply, prio, is_commutative: false };
-        // All can stand between operands, or the evaluator would search for names with regular expressions.
+        // All operators can be binary, or the evaluator would search for names with regular expressions.
         let never: fn(Pair, Pair) -> Pair = |_, _| Pair::of(f32::NAN);
         let infix = INFIX.iter().map(|infix| Operator::make_bin(infix.text, binary(infix.apply, infix.strength)));
         let functions = FUNCTIONS.iter().map(|function| match function.apply {

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::rig::nearest::nearest;
 
-/// What a scan leaves.
+/// Result of a scan.
 pub(super) struct Scanned {
     /// The evaluator's form.
     pub(super) canonical: String,
@@ -19,7 +19,7 @@ pub(super) struct Scanned {
 
 /// Scans a whole expression.
 pub(super) fn scan(text: &str, variables: &[&str]) -> Result<Scanned, ExpressionError> {
-    // Characters are counted no further than needed.
+    // Characters past the limit are not counted.
     let chars: Vec<char> = text.chars().take(MOST_CHARACTERS + 1).collect();
     if chars.len() > MOST_CHARACTERS {
         return Err(ExpressionError { column: MOST_CHARACTERS + 1, problem: Problem::TooLong });
@@ -46,7 +46,7 @@ struct Open {
     at: usize,
     function: Option<&'static Function>,
     commas: usize,
-    /// The last operator of this part was a power, or a comparison stands in it that nothing has ended.
+    /// Marks a part whose last operator was a power, or that has a comparison in it.
     power: bool,
     comparison: bool,
 }
@@ -63,14 +63,14 @@ struct Scan<'a> {
     at: usize,
     out: String,
     used: Vec<usize>,
-    /// Never empty: the first entry is the expression.
+    /// Open parentheses, never empty: the first entry is the whole expression.
     open: Vec<Open>,
     operands: usize,
-    /// An operand must come next.
+    /// Marks that an operand must come next.
     due: bool,
-    /// There was an odd number of minus signs in front of the operand that is due.
+    /// Marks an odd number of minus signs before the expected operand.
     negative: bool,
-    /// The operand that is due is an exponent.
+    /// Marks the expected operand as an exponent.
     after_power: bool,
 }
 
@@ -108,7 +108,7 @@ impl Scan<'_> {
         if self.operands > MOST_OPERANDS { error(at, Problem::TooManyOperands) } else { Ok(()) }
     }
 
-    /// Begins an operand at `from`, written `shown`; with its sign, which a power may bind more strongly.
+    /// Begins an operand at `from`, quoted as `shown`; writes its sign, unless a power may bind more strongly.
     fn begin(&mut self, from: usize, shown: String, is_simple: bool) -> Result<(), ExpressionError> {
         if !self.due {
             return error(from, Problem::NoOperator(shown));
@@ -178,7 +178,7 @@ impl Scan<'_> {
                 if !self.used.contains(&index) {
                     self.used.push(index);
                 }
-                // Equally many digits, so that the evaluator's order of names is that of numbers.
+                // All numbers have equally many digits, so that the evaluator's order of names is that of numbers.
                 format!("{{v{index:010}}}")
             }
             (None, Some((_, value))) => literal(*value),
@@ -193,7 +193,7 @@ impl Scan<'_> {
         Ok(())
     }
 
-    /// Opens a parenthesis, here at [`Scan::at`], of a function whose name stands at `from`.
+    /// Opens a parenthesis at [`Scan::at`], of a function whose name begins at `from`.
     fn open(&mut self, from: usize, function: Option<&'static Function>) -> Result<(), ExpressionError> {
         let shown = function.map_or("(", |function| function.name);
         self.begin(from, shown.to_owned(), false)?;
@@ -225,7 +225,7 @@ impl Scan<'_> {
         let written = match (function.arity, open.commas) {
             (Arity::Three, 1) => [")", function.symbol, "(("],
             (Arity::Three, 2) => [")", JOIN, "("],
-            // Too many of them are told at the end.
+            // A wrong number of arguments is reported at the closing parenthesis.
             (Arity::One | Arity::Three, _) => ["", "", ""],
             _ => [")", function.symbol, "("],
         };
@@ -258,7 +258,7 @@ impl Scan<'_> {
         Ok(())
     }
 
-    /// True if only blanks follow the parenthesis at `open`.
+    /// Returns `true` if only blanks follow the parenthesis at `open`.
     fn is_empty_since(&self, open: usize) -> bool {
         self.chars[open + 1..self.at].iter().all(|c| c.is_whitespace())
     }

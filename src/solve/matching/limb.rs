@@ -1,4 +1,4 @@
-//! Limbs between forward and inverse kinematics.
+//! Matching of limbs between forward and inverse kinematics.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ use crate::{
     solve::rotate::{about, direction},
 };
 
-/// What a switch says about a limb.
+/// The limb of a switch.
 pub(super) struct Limb<'a> {
     pub joints: &'a [Uid],
     pub fk: &'a [Uid],
@@ -18,15 +18,15 @@ pub(super) struct Limb<'a> {
     pub pole: Option<Uid>,
 }
 
-/// How near the end has to come, as a share of the limb's length. The elbow of a limb that is all but straight moves many
+/// Tolerance of the end's position, as a share of the limb's length. The elbow of an almost straight limb moves many
 /// times as far as its end.
 const NEAR: f32 = 1e-6;
 
 impl Limb<'_> {
-    /// Poses the controls so that the joints stand at `wanted` with the attribute at `after`.
+    /// Poses the controls so that the joints have the rig transforms `wanted` with the attribute at `after`.
     pub fn hold(&self, attempt: &mut Attempt<'_>, wanted: &[Trs], before: f32, after: f32) -> Result<(), MatchError> {
         let length: f32 = wanted.windows(2).map(|pair| pair[0].translation.distance(pair[1].translation)).sum();
-        // The solver starts from the forward pose, so that has to agree wherever it was not alone before.
+        // The solver starts from the forward pose, so that pose has to agree unless it held the limb alone before.
         if after < 1.0 || before > 0.0 {
             self.hold_forward(attempt, wanted, length)?;
         }
@@ -36,13 +36,13 @@ impl Limb<'_> {
         Ok(())
     }
 
-    /// Puts each forward control where its joint is held as wanted.
+    /// Poses each forward control so that its joint is held as wanted.
     fn hold_forward(&self, attempt: &mut Attempt<'_>, wanted: &[Trs], length: f32) -> Result<(), MatchError> {
-        // A limb whose first joint keeps its place may stand elsewhere than its controls do.
+        // A limb whose first joint keeps its place may be elsewhere than its controls.
         let mut moved = Vec3::ZERO;
         for (number, ((joint, control), wanted)) in self.joints.iter().zip(self.fk).zip(wanted).enumerate() {
             let Some((stand_in, translates)) = follows(attempt, *joint, *control) else { continue };
-            // The joint stands where the node stands that the control carries for it.
+            // The joint's place is that of the node which the control carries for it.
             let (now, carried) =
                 (attempt.global(*control)?, attempt.global(stand_in)?.relative_to(&attempt.global(*control)?));
             let rotation = (wanted.rotation * carried.rotation.conjugate()).normalize();
@@ -59,7 +59,7 @@ impl Limb<'_> {
         Ok(())
     }
 
-    /// Puts goal and pole where the solver holds the joints as wanted.
+    /// Poses goal and pole so that the solver holds the joints as wanted.
     fn hold_inverse(&self, attempt: &mut Attempt<'_>, wanted: &[Trs], length: f32) -> Result<(), MatchError> {
         let (Some(root), Some(end), Some(last)) = (wanted.first(), wanted.last(), self.joints.last()) else {
             return Ok(());
@@ -78,7 +78,7 @@ impl Limb<'_> {
             attempt.place_carried(pole, &Trs { translation: place, ..now })?;
         }
 
-        // A soft limb lags behind its goal: the goal goes ahead until the end is where it was.
+        // A soft limb lags behind its goal: the goal is moved ahead until the end is at its wanted place.
         let off = |attempt: &mut Attempt<'_>, ahead: f32| -> Result<f32, MatchError> {
             let line = direction(end.translation - root.translation).unwrap_or(Vec3::X);
             attempt.place_carried(self.goal, &at(end.translation + line * ahead))?;
@@ -108,7 +108,7 @@ impl Limb<'_> {
         Ok(())
     }
 
-    /// Where the pole holds the middle joint, as far from it as it was built.
+    /// Position of the pole that holds the middle joint, at the pole's built distance from it.
     fn pole_place(
         &self,
         attempt: &mut Attempt<'_>,
@@ -126,7 +126,7 @@ impl Limb<'_> {
         let upper = direction(mid.translation - root.translation).unwrap_or(Vec3::Y);
         let lower = direction(end.translation - mid.translation).unwrap_or(upper);
         let line = direction(end.translation - root.translation).unwrap_or(upper);
-        // As the solver tells bent limbs from straight ones.
+        // The same threshold as the solver's between bent and straight limbs.
         let axis = lower.cross(upper);
         let bend = if axis.length() > 1e-4 {
             axis.cross(line)
@@ -136,13 +136,13 @@ impl Limb<'_> {
         };
         let Some(bend) = direction(bend) else { return Ok(mid.translation) };
         let twist = solver.twist.as_ref().map_or(0.0, |twist| number(attempt, twist));
-        // The twist turns the plane of the bend about the line, and with it what lies beside the line.
+        // The twist turns the plane of the bend about the line, and so everything beside the line.
         let on_line = root.translation + line * (mid.translation - root.translation).dot(line);
         Ok(on_line + about(line, -twist.to_radians()) * (mid.translation - on_line + bend * far))
     }
 }
 
-/// What the limb's solver does.
+/// Nodes and parameters of the limb's solver.
 struct Solver {
     orients: bool,
     is_soft: bool,
@@ -177,7 +177,7 @@ impl Solver {
     }
 }
 
-/// The node on a forward control that stands for a joint, and whether the joint's position follows, too.
+/// The node on a forward control that a joint follows, and whether the joint's position follows, too.
 fn follows(attempt: &Attempt<'_>, joint: Uid, control: Uid) -> Option<(Uid, bool)> {
     let carrier = |node: Uid| attempt.rig.node(node)?.parent.map(|parent| attempt.rig.nodes[parent].uid);
     attempt.rig.constraints.iter().find_map(|built| match &*built.constraint {
@@ -192,7 +192,7 @@ fn follows(attempt: &Attempt<'_>, joint: Uid, control: Uid) -> Option<(Uid, bool
     })
 }
 
-/// The value of a number as things stand.
+/// Current value of a scalar.
 fn number(attempt: &Attempt<'_>, scalar: &Scalar) -> f32 {
     match scalar {
         Scalar::Value(value) => *value,

@@ -1,4 +1,4 @@
-//! Programs shared by equal content.
+//! Cache of programs, shared by equal content.
 
 use std::{
     collections::BTreeMap,
@@ -15,8 +15,8 @@ pub struct ProgramCache {
 }
 
 impl ProgramCache {
-    /// The program of a built rig: one that is in use already, or a compiled one. It is forgotten when the last
-    /// instance lets go of it.
+    /// The program of a built rig: a cached one, or a compiled one. The cache forgets it when its last instance is
+    /// dropped.
     ///
     /// # Errors
     ///
@@ -37,7 +37,7 @@ impl ProgramCache {
         self.programs.values().filter(|program| program.strong_count() > 0).count()
     }
 
-    /// True if no program is in use.
+    /// Returns `true` if no program is in use.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

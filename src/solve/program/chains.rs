@@ -10,7 +10,7 @@ use crate::{
     mesh::model::Trs,
     solve::{
         ccd::{CcdChain, CcdJoint, ccd},
-        fabrik::{Effort, fabrik, rotations_from_points},
+        fabrik::{IterationSettings, fabrik, rotations_from_points},
         rotate::{about, direction},
         spline::{ArcTable, Spline, SplineIk, SplineKind},
         twist::twist_angle,
@@ -19,7 +19,7 @@ use crate::{
     },
 };
 
-/// Two bones that reach for a goal.
+/// Two-bone inverse kinematics.
 pub(super) fn two_bone<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let op = &machine.tables.two_bones[at as usize];
     let before = op.links.map(|link| machine.x(link.input));
@@ -69,7 +69,7 @@ pub(super) fn two_bone<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     }
 }
 
-/// Rig transforms of a chain's joints as they stand, into the scratch memory.
+/// Writes the current rig transforms of a chain's joints into the scratch memory.
 fn pose<R: Registers>(machine: &mut Machine<'_, R>, parent: Trs, links: &[Link]) {
     let Scratch { globals, points, rotations, .. } = &mut *machine.scratch;
     globals.clear();
@@ -84,14 +84,14 @@ fn pose<R: Registers>(machine: &mut Machine<'_, R>, parent: Trs, links: &[Link])
     rotations.extend(globals.iter().map(|global| global.rotation));
 }
 
-/// Lengths of the bones between points, into the scratch memory; their sum.
+/// Writes the lengths of the bones between points into the scratch memory; returns their sum.
 fn measure(scratch: &mut Scratch) -> f32 {
     scratch.lengths.clear();
     scratch.lengths.extend(scratch.points.windows(2).map(|pair| pair[0].distance(pair[1])));
     scratch.lengths.iter().sum()
 }
 
-/// A chain of any length that reaches for a goal.
+/// Inverse kinematics of a chain of any length.
 pub(super) fn chain<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let tables = machine.tables;
     let op = &tables.chains[at as usize];
@@ -105,13 +105,13 @@ pub(super) fn chain<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     pose(machine, parent, links);
     let total = measure(machine.scratch);
     let root = machine.scratch.points[0];
-    let effort = Effort {
+    let settings = IterationSettings {
         tolerance: op.tolerance * total,
         iterations: op.iterations,
         bend: pole.map_or(Vec3::ZERO, |pole| pole - root),
     };
     if let Some(limits) = &op.limits {
-        // The solver knows no scale, so bones come with that of the joint above.
+        // The solver knows no scale, so bones are scaled by the joint above.
         let mut above = parent.scale;
         machine.scratch.joints.clear();
         machine.scratch.rotations.clear();
@@ -130,8 +130,8 @@ pub(super) fn chain<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
         posed.resize(last, (Vec3::ZERO, Quat::IDENTITY));
         let end = joints[last].offset;
         let chain = CcdChain { joints: &joints[..last], end, position: parent.translation, rotation: parent.rotation };
-        ccd(&chain, goal.translation, &effort, &mut rotations[..last], posed);
-        // From rotations in the joint above to rotations in the rig.
+        ccd(&chain, goal.translation, &settings, &mut rotations[..last], posed);
+        // Rotations relative to the joint above become rotations in the rig.
         let mut above = parent.rotation;
         for rotation in rotations.iter_mut() {
             above = (above * *rotation).normalize();
@@ -141,7 +141,7 @@ pub(super) fn chain<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
         let Scratch { points, before, lengths, rotations, .. } = &mut *machine.scratch;
         before.clear();
         before.extend_from_slice(points);
-        fabrik(points, lengths, goal.translation, &effort);
+        fabrik(points, lengths, goal.translation, &settings);
         rotations_from_points(before, points, rotations);
     }
     if let Some(offset) = op.orient_end
@@ -176,7 +176,7 @@ pub(super) fn spline<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
         let point = machine.x(*point).translation;
         machine.scratch.controls.push(point);
     }
-    // How far the last point has turned since it was built, as the first one sees it.
+    // Twist of the last point since it was built, relative to the first one.
     let turned = (first * op.ends[0].conjugate()).conjugate() * (last * op.ends[1].conjugate());
     let twist = machine.n(op.twist).to_radians() + twist_angle(turned, op.along);
     let solver = SplineIk { twist_end: twist, ..frames(machine.n(op.stretch), first * op.up) };
@@ -199,7 +199,7 @@ pub(super) fn frames(stretch: f32, up: Vec3) -> SplineIk {
     SplineIk { stretch, start: 0.0, up, twist_start: 0.0, twist_end: 0.0, axis: Vec3::Y, up_axis: Vec3::Z }
 }
 
-/// Leaves a chain as it is.
+/// Leaves a chain in its pose.
 fn copy<R: Registers>(machine: &mut Machine<'_, R>, links: &[Link]) {
     for link in links {
         let local = machine.x(link.input);

@@ -105,7 +105,7 @@ pub(super) fn aim<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     machine.put(op.out, local);
 }
 
-/// Keeps a transform between ends.
+/// Limits a transform to bounds.
 pub(super) fn limit<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let op = &machine.tables.limits[at as usize];
     let (input, base) = (machine.x(op.input), &machine.tables.bases[op.base as usize]);
@@ -114,7 +114,7 @@ pub(super) fn limit<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let rotation = op.rotate.clamp_rotation(offset.rotation, EulerOrder::Xyz);
     let scale = op.scale.clamp(offset.scale);
     let mut out = input;
-    // What is within its ends stays as it is, bit by bit.
+    // A value within its bounds keeps its bits.
     if translation != offset.translation {
         out.translation = base.translation + base.rotation * (base.scale * translation);
     }
@@ -127,7 +127,7 @@ pub(super) fn limit<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     machine.put(op.out, out);
 }
 
-/// Lags behind, swings and settles.
+/// Springs: the node lags behind, swings and settles.
 pub(super) fn spring<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let op = &machine.tables.springs[at as usize];
     let input = machine.x(op.input);
@@ -154,7 +154,7 @@ pub(super) fn spring<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     machine.put(op.out, local);
 }
 
-/// Where a spring takes a node that is to stand at `wanted`, in the rig's space.
+/// Rig transform of a spring whose target is `wanted`.
 fn swing(op: &SpringOp, motion: &Spring, state: &mut SpringState, wanted: &Trs, dt: f32) -> Trs {
     let mut out = *wanted;
     if !state.started {
@@ -175,7 +175,7 @@ fn swing(op: &SpringOp, motion: &Spring, state: &mut SpringState, wanted: &Trs, 
     out
 }
 
-/// Advances a point, and lets it rest where its motion can no longer be seen.
+/// Advances a point; stops it when its motion is too small to be seen.
 fn advance(motion: &Spring, state: &mut PointSpring, target: Vec3, dt: f32, size: f32) -> Vec3 {
     let is_near = |state: &PointSpring| {
         let near = 1e-6 * (target.abs().max_element() + size);
@@ -183,7 +183,7 @@ fn advance(motion: &Spring, state: &mut PointSpring, target: Vec3, dt: f32, size
             && (state.position - target).abs().max_element() <= near
             && state.velocity.abs().max_element() <= 10.0 * near
     };
-    // Only as time passes: running twice in one frame must not differ from running once.
+    // The point stops only as time passes: two runs in one frame must not differ from one.
     if dt > 0.0 && is_near(state) {
         *state = PointSpring::at(target);
         return target;

@@ -1,5 +1,5 @@
-//! Operations on their way to a program: registers are handed out, nodes and attributes found by uid, and constraints
-//! of one node chained in list order.
+//! Graph of operations from which a program is made: it hands out registers, finds nodes and attributes by uid, and
+//! chains the constraints of one node in list order.
 
 mod finish;
 
@@ -8,7 +8,7 @@ use std::{collections::HashMap, sync::Arc};
 use glam::Vec3;
 
 use super::{
-    Keep, Outside, ProgramError,
+    ExternalNode, Keep, ProgramError,
     error::describe,
     name,
     op::{N, Op, Pose, Span, Tables, X},
@@ -19,45 +19,45 @@ use crate::{
     solve::weights::multiply,
 };
 
-/// An operation and what it came from, for the order and for errors.
+/// An operation and its origin, for the order and for errors.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     pub op: Op,
-    /// The node it moves or belongs to.
+    /// The node that it moves or belongs to.
     pub node: usize,
-    /// The constraint, as an index of the rig's list.
+    /// Index of the constraint in the rig's list.
     pub constraint: Option<usize>,
 }
 
-/// What constraints give of a node.
+/// Register that constraints drive of a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Driven {
-    /// Nothing.
+    /// No register.
     Not,
-    /// Its local transform.
+    /// The local transform.
     Local(X),
-    /// Its rig transform at once.
+    /// The rig transform, written at once.
     Global,
 }
 
-/// What is known of a node while constraints are read.
+/// State of a node while constraints are read.
 #[derive(Debug, Clone, Default)]
 struct NodeState {
     /// Local transform after the constraints so far; `None` while nothing drives the node.
     local: Option<X>,
     /// Local transform after the last constraint that can move the origin.
     placed: Option<X>,
-    /// The step that still takes driven channels.
+    /// The step that still takes driven channels, with the channels so far.
     open: Option<(usize, Vec<(Channel, N)>)>,
-    /// The transform operation that leaves nothing of what came before it, if that is the last constraint.
+    /// The last operation, if it is a transform operation that replaces everything before it.
     whole: Option<u32>,
-    /// Register of the origin where that is read on its own.
+    /// Register of the origin where that is computed on its own.
     position: Option<X>,
     /// Attributes as constraints read them, in order.
     attributes: Vec<N>,
 }
 
-/// Operations and registers in the making.
+/// Operations and registers of an unfinished program.
 pub(super) struct Graph<'a> {
     pub rig: &'a BuiltRig,
     pub steps: Vec<Step>,
@@ -84,13 +84,13 @@ pub(super) struct Graph<'a> {
     /// Last values that constraints gave a driven attribute.
     driven: HashMap<(usize, usize), N>,
     morph_terms: Vec<(Arc<str>, Vec<N>)>,
-    /// Origins to be computed apart.
+    /// Nodes whose origins are computed on their own, with the registers.
     aliases: Vec<(usize, X)>,
 }
 
 impl<'a> Graph<'a> {
     /// A graph with a register for every node's rig transform: node `i` has register `i + 1`.
-    pub fn new(rig: &'a BuiltRig, keep: &Keep, outside: &[Outside]) -> Result<Self, ProgramError> {
+    pub fn new(rig: &'a BuiltRig, keep: &Keep, outside: &[ExternalNode]) -> Result<Self, ProgramError> {
         let mut index = HashMap::with_capacity(rig.nodes.len());
         let mut built: Vec<Trs> = Vec::with_capacity(rig.nodes.len());
         for (at, node) in rig.nodes.iter().enumerate() {
@@ -149,7 +149,7 @@ impl<'a> Graph<'a> {
         Ok(graph)
     }
 
-    /// A register for every attribute, and a second one for those that constraints drive.
+    /// Declares a register for every attribute, and a second one for attributes that constraints drive.
     fn declare_attributes(&mut self) {
         let mut driven: Vec<(Uid, &str)> = Vec::new();
         for constraint in &self.rig.constraints {
@@ -175,13 +175,13 @@ impl<'a> Graph<'a> {
         }
     }
 
-    /// A register for a transform.
+    /// Adds a register for a transform.
     pub fn new_x(&mut self) -> X {
         self.x.push(Trs::IDENTITY);
         X(self.x.len() as u32 - 1)
     }
 
-    /// A register for a number that begins with a value.
+    /// Adds a register for a number with an initial value.
     pub fn new_n(&mut self, value: f32) -> N {
         self.n.push(value);
         N(self.n.len() as u32 - 1)
@@ -197,12 +197,12 @@ impl<'a> Graph<'a> {
         register
     }
 
-    /// True if people and animation pose the node.
+    /// Returns `true` if people and animation may pose the node.
     pub fn is_posable(&self, node: usize) -> bool {
         self.all || self.exposed[node]
     }
 
-    /// True if the node's rig transform is a result of the program.
+    /// Returns `true` if the node's rig transform is a result of the program.
     pub fn is_kept(&self, node: usize) -> bool {
         self.is_posable(node) || self.rig.nodes[node].kind == NodeType::Joint
     }
@@ -222,7 +222,7 @@ impl<'a> Graph<'a> {
         self.rig.nodes[node].parent.map_or(X::RIG, |parent| self.global(parent))
     }
 
-    /// Number of a base in the table; 0 for the identity.
+    /// Index of a node's base in the table; 0 for the identity.
     pub fn base(&mut self, node: usize) -> u32 {
         let base = self.rig.nodes[node].base;
         if base == Trs::IDENTITY {
@@ -232,7 +232,7 @@ impl<'a> Graph<'a> {
         self.tables.bases.len() as u32 - 1
     }
 
-    /// Number of an axis in the table.
+    /// Index of an axis in the table.
     pub fn axis(&mut self, axis: Vec3) -> u32 {
         self.tables.axes.push(axis);
         self.tables.axes.len() as u32 - 1
@@ -272,8 +272,8 @@ impl<'a> Graph<'a> {
         })
     }
 
-    /// Register of a transform of which only the translation counts: where the origin of the node ends up, which does
-    /// not wait for constraints that only turn or scale the node.
+    /// Register of a transform whose translation alone is read: the final origin of the node, which does not wait for
+    /// constraints that only turn or scale the node.
     pub fn read_position(&mut self, constraint: usize, role: &'static str, node: Uid) -> Result<X, ProgramError> {
         let Some(at) = self.index.get(&node).copied() else { return self.read(constraint, role, node) };
         if let Some(register) = self.nodes[at].position {
@@ -294,7 +294,7 @@ impl<'a> Graph<'a> {
         }
     }
 
-    /// Takes the local transform of a node as the constraints so far left it, and the register for what comes next.
+    /// The register of a node's local transform after the constraints so far, and the register for its next state.
     ///
     /// `places` says that the constraint can move the node's origin.
     pub fn take_local(&mut self, node: usize, constraint: usize, places: bool) -> (X, X) {
@@ -322,19 +322,19 @@ impl<'a> Graph<'a> {
         out
     }
 
-    /// True if no later constraint drives a node.
+    /// Returns `true` if no later constraint drives a node.
     pub fn is_last(&self, constraint: usize, node: Uid) -> bool {
         self.last_on.get(&node) == Some(&constraint)
     }
 
-    /// Notes that a transform operation gives the whole transform of a node, whatever the node was before; if no other
-    /// constraint follows, it writes the rig transform at once.
+    /// Notes that a transform operation replaces the whole transform of a node; if no other constraint follows, the
+    /// operation writes the rig transform at once.
     pub fn is_whole(&mut self, node: usize, transform: u32) {
         self.nodes[node].whole = Some(transform);
     }
 
-    /// Adds a number to a channel of a node: to its base if nothing but channels were driven so far, else on top of what
-    /// the constraints so far left.
+    /// Adds a number to a channel of a node: to its base if only channels were driven so far, else on top of the
+    /// constraints so far.
     pub fn drive_channel(&mut self, node: usize, constraint: usize, channel: Channel, value: N) {
         if self.nodes[node].open.is_none() {
             let step = self.steps.len();
@@ -351,7 +351,7 @@ impl<'a> Graph<'a> {
         }
     }
 
-    /// Writes the driven channels of a node into the step that takes them.
+    /// Writes the driven channels of a node into their step.
     fn close(&mut self, node: usize) {
         let Some((step, list)) = self.nodes[node].open.take() else { return };
         let span = Span { start: self.tables.drives.len() as u32, len: list.len() as u32 };
@@ -361,7 +361,7 @@ impl<'a> Graph<'a> {
         }
     }
 
-    /// Gives an attribute a value; the last one that is given counts.
+    /// Sets the value of an attribute; the last value counts.
     pub fn drive_attribute(
         &mut self,
         constraint: usize,
@@ -439,7 +439,7 @@ impl<'a> Graph<'a> {
         Ok(register)
     }
 
-    /// Where a driven or settable attribute is read.
+    /// Register from which constraints read an attribute.
     pub fn attribute(&self, node: usize, number: usize) -> N {
         self.nodes[node].attributes[number]
     }

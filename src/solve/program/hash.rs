@@ -1,11 +1,11 @@
-//! A hash of what a program is compiled from, the same on every machine.
+//! Hash of the content that a program is compiled from, the same on every machine.
 
 use std::fmt::{self, Write};
 
 use super::{CompileOptions, Keep};
 use crate::{
     mesh::model::Trs,
-    rig::{AttributeKind, BuiltRig},
+    rig::{AttributeKind, BuiltRig, Channels, Limits},
 };
 
 /// 128 bits that stand for the content of a built rig and the options of its program: equal for equal content. Not
@@ -20,9 +20,10 @@ impl fmt::Display for ContentHash {
 }
 
 impl ContentHash {
-    /// The hash of what a program would be compiled from.
+    /// The hash of a built rig and its options.
     ///
-    /// What the program does not depend on (shapes and colours of controls, layers, groups, origins, names) does not count.
+    /// Data that the program does not depend on (shapes and colours of controls, layers, groups, origins, names) does
+    /// not count.
     pub fn of(rig: &BuiltRig, options: &CompileOptions) -> Self {
         let mut hasher = Hasher { low: 0x9E37_79B9_7F4A_7C15, high: 0xD1B5_4A32_D192_ED03 };
         hasher.word(rig.nodes.len() as u64);
@@ -32,6 +33,11 @@ impl ContentHash {
             hasher.word(node.parent.map_or(0, |parent| parent as u64 + 1));
             hasher.trs(&node.base);
             hasher.text(node.label.as_deref().unwrap_or_default());
+            if let Some(control) = &node.control
+                && (control.channels != Channels::default() || control.limits != Limits::default())
+            {
+                hasher.debug(&(control.channels, control.limits));
+            }
             hasher.word(node.attributes.len() as u64);
             for attribute in node.attributes.iter() {
                 hasher.text(&attribute.name);
@@ -53,7 +59,7 @@ impl ContentHash {
         hasher.word(rig.constraints.len() as u64);
         for constraint in &rig.constraints {
             hasher.word(constraint.uid.0);
-            // The text of a constraint holds all of its fields, also those that are added later, and is exact.
+            // The text of a constraint holds all of its fields, also fields added later, and is exact.
             hasher.debug(&constraint.constraint);
         }
         match &options.keep {

@@ -1,4 +1,4 @@
-//! Constraints become operations.
+//! Lowering of constraints to operations.
 
 mod chains;
 
@@ -19,7 +19,7 @@ use crate::{
     rig::{AimUp, AngleLimits, Constraint, KeyEase, Output, Scalar, Target, Uid},
     solve::{
         aim::Aim,
-        curve::{Beyond, Curve, CurveKey, Interpolation},
+        curve::{Curve, CurveKey, Extrapolation, Interpolation},
         expression::Expression,
         limit::Bounds,
         rotate::{direction, unit},
@@ -34,7 +34,7 @@ pub(super) fn lower(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
     Ok(())
 }
 
-/// One constraint on its way.
+/// Lowering of one constraint.
 struct Lower<'g, 'a> {
     at: usize,
     graph: &'g mut Graph<'a>,
@@ -115,7 +115,7 @@ impl Lower<'_, '_> {
                 };
                 let keys: Vec<CurveKey> =
                     keys.iter().map(|(x, y)| CurveKey { interpolation, ..CurveKey::new(*x, *y) }).collect();
-                let curve = Curve::new(&keys, [Beyond::Hold; 2]).map_err(|error| self.bad(error.to_string()))?;
+                let curve = Curve::new(&keys, [Extrapolation::Hold; 2]).map_err(|error| self.bad(error.to_string()))?;
                 let (driver, out) = (self.scalar(driver)?, self.graph.new_n(0.0));
                 self.graph.tables.keys.push(KeyOp { driver, curve, out });
                 let at = self.graph.tables.keys.len() - 1;
@@ -147,7 +147,7 @@ impl Lower<'_, '_> {
         if targets.is_empty() {
             return Err(self.too_few("targets", 0, 1));
         }
-        // An offset translation follows the turns and scales of the target; so do turns.
+        // An offset translation follows the turns and scales of the target, and so do rotations.
         let whole = rotate != [false; 3] || scale != [false; 3];
         let list = targets.iter().map(|target| self.target(target, whole)).collect::<Result<Vec<_>, _>>()?;
         let is_whole = !keep_pose
@@ -164,7 +164,7 @@ impl Lower<'_, '_> {
             self.graph.is_whole(node, at);
         }
         if is_whole && is_sure && scale[0] && self.graph.is_last(self.at, driven) {
-            // Nothing of the node's own counts.
+            // Nothing of the node's own transform is left.
             (input, parent) = (X::RIG, X::RIG);
         }
         let op = TransformOp { input, parent, pose, targets, weight, translate, rotate, scale, is_global: false, out };
@@ -285,7 +285,8 @@ impl Lower<'_, '_> {
         let [frequency, damping, weight] = [self.scalar(frequency)?, self.scalar(damping)?, self.scalar(weight)?];
         let (input, out) = self.graph.take_local(node, self.at, translate);
         let (parent, state) = (self.graph.parent(node), self.graph.tables.springs.len() as u32);
-        let op = SpringOp { input, parent, frequency, damping, weight, translate, tip, state, out };
+        let constraint = rig.constraints[self.at].uid;
+        let op = SpringOp { constraint, input, parent, frequency, damping, weight, translate, tip, state, out };
         self.graph.tables.springs.push(op);
         self.push(Op::Spring(state), node);
         Ok(())
@@ -322,7 +323,7 @@ impl Lower<'_, '_> {
         }
         if let Some((node, lift)) = toes {
             let (node, lift) = (self.driven("toes", *node)?, self.scalar(lift)?);
-            // Up is the other way about X than the roll, which lifts the heel.
+            // Degrees about X lower the front of the foot, the roll lifts the heel: the signs are opposite.
             let out = self.graph.new_n(0.0);
             self.push(Op::Linear { input: lift, factor: -1.0, add: 0.0, out }, node);
             self.turn(node, Vec3::X, out);
@@ -347,7 +348,7 @@ impl Lower<'_, '_> {
         Ok(out)
     }
 
-    /// Sends a calculated number where it goes.
+    /// Writes a calculated number to its output.
     fn output(&mut self, op: Op, output: &Output, value: N) -> Result<(), ProgramError> {
         match output {
             Output::Channel(node, channel) => {

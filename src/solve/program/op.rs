@@ -12,7 +12,7 @@ use glam::{Quat, Vec3};
 
 use crate::{
     mesh::model::Trs,
-    rig::Channel,
+    rig::{Channel, Uid},
     solve::{
         aim::Aim,
         curve::Curve,
@@ -34,12 +34,12 @@ impl X {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct N(pub u32);
 
-/// Slot of a pose offset; [`Pose::NONE`] for a node that nobody poses.
+/// Slot of a pose offset; [`Pose::NONE`] for a node that cannot be posed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Pose(pub u32);
 
 impl Pose {
-    /// Stands as it was built.
+    /// No pose: the node keeps its built transform.
     pub const NONE: Self = Self(u32::MAX);
 }
 
@@ -51,16 +51,16 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// As a range.
+    /// The span as a range.
     pub fn range(self) -> std::ops::Range<usize> {
         self.start as usize..(self.start + self.len) as usize
     }
 }
 
-/// One step of a program. Large ones are numbers of entries in [`Tables`].
+/// One operation of a program. Larger ones are indices of entries in [`Tables`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Op {
-    /// Rig transform of a node that nothing drives: its base (of the table; 0 is the identity) with its pose.
+    /// Rig transform of a node without constraints: its base (of the table; 0 is the identity) with its pose.
     Node {
         pose: Pose,
         base: u32,
@@ -74,7 +74,7 @@ pub(super) enum Op {
         drives: Span,
         out: X,
     },
-    /// Driven channels on top of what earlier constraints left.
+    /// Driven channels on top of earlier constraints.
     Drive {
         input: X,
         drives: Span,
@@ -86,14 +86,14 @@ pub(super) enum Op {
         local: X,
         out: X,
     },
-    /// Turns about an axis of its own (of the table) by degrees.
+    /// Turns about one of the node's own axes (of the table) by degrees.
     Turn {
         input: X,
         axis: u32,
         angle: N,
         out: X,
     },
-    /// Scales along an axis of its own and across it.
+    /// Scales along one of the node's own axes and across it.
     Scale {
         input: X,
         axis: u32,
@@ -126,7 +126,7 @@ pub(super) enum Op {
         b: N,
         out: N,
     },
-    /// Between two ends; `fallback` for what is not finite.
+    /// Clamps a number between two ends; `fallback` for one that is not finite.
     Clamp {
         input: N,
         ends: u32,
@@ -180,7 +180,7 @@ pub(super) struct Tables {
 pub(super) struct TargetReg {
     pub node: X,
     pub weight: N,
-    /// `None` to lie on the target.
+    /// Offset from the target; `None` to coincide with the target.
     pub offset: Option<Trs>,
 }
 
@@ -212,7 +212,7 @@ pub(super) struct FootOp {
     pub roll: N,
     pub break_angle: N,
     pub bank: N,
-    /// Degrees for heel, ball, toe, inner and outer.
+    /// Degrees of heel, ball, toe, inner and outer.
     pub outs: [N; 5],
 }
 
@@ -220,10 +220,10 @@ pub(super) struct FootOp {
 pub(super) struct TwistOp {
     pub source: X,
     pub reference: X,
-    /// Takes a rotation relative to the reference to one relative to the built base.
+    /// Rotation that makes a rotation relative to the reference one relative to the built base.
     pub rest: Quat,
     pub axis: Vec3,
-    /// Degrees.
+    /// Result in degrees.
     pub out: N,
 }
 
@@ -243,20 +243,20 @@ pub(super) struct StretchOp {
 pub(super) struct TransformOp {
     pub input: X,
     pub parent: X,
-    /// The pose that goes on top; none where it is not kept.
+    /// Pose on top of the result; none where it is not kept.
     pub pose: Pose,
     pub targets: Span,
     pub weight: N,
     pub translate: [bool; 3],
     pub rotate: [bool; 3],
     pub scale: [bool; 3],
-    /// True to write the rig transform instead of the local one; translations and rotations are then followed whole,
+    /// Writes the rig transform instead of the local one if `true`; translations and rotations are then followed whole,
     /// and so are scales, or not at all.
     pub is_global: bool,
     pub out: X,
 }
 
-/// Where up is for an aim.
+/// Up direction of an aim.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum UpReg {
     Direction(Vec3),
@@ -297,7 +297,7 @@ pub(super) struct ChainOp {
     pub links: Span,
     pub goal: X,
     pub pole: Option<X>,
-    /// One a joint but the last for cyclic coordinate descent; `None` for FABRIK.
+    /// Limits of all joints but the last, for cyclic coordinate descent; `None` for FABRIK.
     pub limits: Option<Box<[JointLimit]>>,
     pub iterations: u32,
     pub tolerance: f32,
@@ -314,9 +314,9 @@ pub(super) struct SplineOp {
     pub ends: [Quat; 2],
     /// Direction of the first bone as it was built, in the rig's space.
     pub along: Vec3,
-    /// A direction across it, in the space of the first point.
+    /// Direction across the first bone, in the space of the first point.
     pub up: Vec3,
-    /// From the frames along the curve to the joints, as they were built.
+    /// Rotations from the frames along the curve to the joints, as built.
     pub corrections: Box<[Quat]>,
     pub stretch: N,
     pub twist: N,
@@ -328,7 +328,7 @@ pub(super) struct LimitOp {
     pub input: X,
     pub base: u32,
     pub translate: Bounds,
-    /// Radians.
+    /// Bounds of Euler angles in radians.
     pub rotate: Bounds,
     pub scale: Bounds,
     pub out: X,
@@ -336,15 +336,17 @@ pub(super) struct LimitOp {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpringOp {
+    /// The constraint that it stands for.
+    pub constraint: Uid,
     pub input: X,
     pub parent: X,
     pub frequency: N,
     pub damping: N,
     pub weight: N,
     pub translate: bool,
-    /// Where the node's children lie, in its own space, if it swings.
+    /// Position of the node's children in its own space, if the spring swings.
     pub tip: Option<Vec3>,
-    /// Number of its state.
+    /// Index of the spring's state.
     pub state: u32,
     pub out: X,
 }

@@ -1,4 +1,4 @@
-//! The order of operations, what nobody needs, and what never changes.
+//! Order of operations, removal of unused ones, and separation of constant ones.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::rig::Uid;
 
-/// No operation.
+/// Marks a register without a writer.
 const NONE: u32 = u32::MAX;
 
 /// Registers that each operation reads and writes, transforms first, then numbers.
@@ -41,13 +41,13 @@ impl Wires {
         Self { reads, writer, is_posed }
     }
 
-    /// Operations that must come before another.
+    /// Operations that must run before another.
     fn before(&self, step: usize) -> impl Iterator<Item = usize> {
         self.reads[step].iter().map(|register| self.writer[*register]).filter(|at| *at != NONE).map(|at| at as usize)
     }
 }
 
-/// Orders the operations so that each comes after those that it reads from, nodes near their place in the rig.
+/// Orders the operations so that each comes after those that it reads from, close to their nodes' order in the rig.
 pub(super) fn sort(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
     let (transforms, numbers) = (graph.x.len(), graph.n.len());
     let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, numbers);
@@ -80,10 +80,10 @@ pub(super) fn sort(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
     Ok(())
 }
 
-/// Names a loop among the operations that wait for others for ever.
+/// Describes a cycle among the operations that were never ready.
 fn cycle(graph: &Graph<'_>, wires: &Wires, waits: &[usize]) -> ProgramError {
     let first = waits.iter().position(|count| *count > 0).unwrap_or_default();
-    // From each waiting operation one leads to another waiting one, so the walk runs into itself.
+    // Each waiting operation waits for another, so the walk runs into itself.
     let mut path = vec![first];
     let start = loop {
         let last = path[path.len() - 1];
@@ -95,7 +95,7 @@ fn cycle(graph: &Graph<'_>, wires: &Wires, waits: &[usize]) -> ProgramError {
     };
     let mut path = path.split_off(start);
     path.reverse();
-    // Begin with a constraint, so that the text does not depend on where the walk ran into the loop.
+    // The text begins with a constraint, so that it does not depend on the start of the walk.
     let begin = (0..path.len()).filter(|at| graph.steps[path[*at]].constraint.is_some());
     let begin = begin.min_by_key(|at| graph.steps[path[*at]].constraint).unwrap_or_default();
     path.rotate_left(begin);
@@ -133,7 +133,7 @@ fn cycle(graph: &Graph<'_>, wires: &Wires, waits: &[usize]) -> ProgramError {
     ProgramError::Cycle { loop_text, constraints, commands, nodes }
 }
 
-/// Drops operations whose results nobody needs, given the registers that are results.
+/// Drops operations whose results no register in `results` or `numbers` depends on.
 pub(super) fn prune(graph: &mut Graph<'_>, results: &[X], numbers: &[N]) {
     let transforms = graph.x.len();
     let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, graph.n.len());
@@ -158,7 +158,7 @@ pub(super) fn prune(graph: &mut Graph<'_>, results: &[X], numbers: &[N]) {
     });
 }
 
-/// Splits off the operations that depend on no input, on no pose, and on none of those numbers.
+/// Splits off the operations that depend on no input, on no pose, and on none of the registers in `numbers`.
 pub(super) fn split_fixed(graph: &mut Graph<'_>, numbers: &[N]) -> Vec<Step> {
     let transforms = graph.x.len();
     let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, graph.n.len());
@@ -167,7 +167,7 @@ pub(super) fn split_fixed(graph: &mut Graph<'_>, numbers: &[N]) -> Vec<Step> {
     numbers.iter().for_each(|N(register)| moves[transforms + *register as usize] = true);
     let mut changes = vec![false; graph.steps.len()];
     for (at, change) in changes.iter_mut().enumerate() {
-        // A spring moves by itself.
+        // A spring changes with time alone.
         *change = wires.is_posed[at]
             || matches!(graph.steps[at].op, super::op::Op::Spring(_))
             || wires.reads[at].iter().any(|register| moves[*register]);

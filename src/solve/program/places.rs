@@ -1,6 +1,6 @@
 //! Transforms of one instance, or of several in step.
 //!
-//! The formulas are written once for both, so that an instance comes to the same bits alone and among others, on every
+//! The formulas are written once for both, so that an instance gets the same bits alone and among others, on every
 //! platform: adding, multiplying, dividing and roots are rounded the same everywhere.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -14,19 +14,19 @@ use crate::{mesh::model::Trs, rig::PoseOffset};
 pub(super) trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// What tells numbers apart.
+    /// Result of a comparison, for each of the instances.
     type Mask: Copy;
 
     /// The same number for all.
     fn all(value: f32) -> Self;
 
-    /// The root.
+    /// The square root.
     fn root(self) -> Self;
 
-    /// Where it is zero.
+    /// Mask of the numbers that are zero.
     fn is_zero(self) -> Self::Mask;
 
-    /// `yes` where the mask says so, elsewhere `no`.
+    /// `yes` where the mask is set, elsewhere `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 }
 
@@ -90,7 +90,7 @@ pub(super) struct Place<T> {
 }
 
 impl<T: Real> Place<T> {
-    /// A transform relative to this one, in the space that this one is in.
+    /// Maps a transform relative to this one to the parent space of this one.
     #[inline(always)]
     pub fn place(&self, local: &Self) -> Self {
         Self {
@@ -100,15 +100,15 @@ impl<T: Real> Place<T> {
         }
     }
 
-    /// A pose offset on top of this one.
+    /// This transform with a pose offset on top.
     #[inline(always)]
     pub fn with(&self, offset: &Self) -> Self {
         let Self { translation, rotation, scale } = self.place(offset);
         Self { translation, rotation: unit(rotation), scale }
     }
 
-    /// A transform relative to this one: [`Self::with`] takes it back. Where an axis of this one is scaled to zero, the
-    /// translation is zero and the factor one.
+    /// A transform relative to this one, the inverse of [`Self::place`]. Where an axis of this one is scaled to zero,
+    /// the translation is zero and the factor one.
     #[inline(always)]
     pub fn relative(&self, transform: &Self) -> Self {
         let back = conjugate(self.rotation);
@@ -120,7 +120,7 @@ impl<T: Real> Place<T> {
         }
     }
 
-    /// `yes` where the mask says so, elsewhere `no`.
+    /// `yes` where the mask is set, elsewhere `no`.
     #[inline(always)]
     pub fn select(mask: T::Mask, yes: &Self, no: &Self) -> Self {
         let pick = |yes, no| T::select(mask, yes, no);
@@ -200,7 +200,7 @@ fn conjugate<T: Real>([x, y, z, w]: Turn<T>) -> Turn<T> {
     [-x, -y, -z, w]
 }
 
-/// With unit length.
+/// The quaternion scaled to unit length.
 #[inline(always)]
 pub(super) fn unit<T: Real>(q: Turn<T>) -> Turn<T> {
     let [x, y, z, w] = q;
@@ -208,7 +208,7 @@ pub(super) fn unit<T: Real>(q: Turn<T>) -> Turn<T> {
     q.map(|value| value * by)
 }
 
-/// Division axis by axis, with a value for what a divisor of zero hides.
+/// Division axis by axis, with the value `otherwise` for a divisor of zero.
 #[inline(always)]
 fn divided<T: Real>(value: [T; 3], by: [T; 3], otherwise: f32) -> [T; 3] {
     each(value, by, |value, by| T::select(by.is_zero(), T::all(otherwise), value / by))

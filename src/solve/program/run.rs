@@ -1,4 +1,4 @@
-//! Running operations.
+//! Execution of operations.
 
 use glam::{Quat, Vec3};
 
@@ -20,7 +20,7 @@ use crate::{
     },
 };
 
-/// Memory that operations use while they run; grows to what a program needs and is kept.
+/// Buffers of running operations; they grow to the size that a program needs and are kept.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scratch {
     pub points: Vec<Vec3>,
@@ -34,7 +34,7 @@ pub(super) struct Scratch {
     pub values: Vec<f32>,
 }
 
-/// Where one instance's transforms and numbers are.
+/// Transforms and numbers of one instance.
 pub(super) trait Registers {
     /// A transform.
     fn x(&self, register: X) -> Trs;
@@ -52,12 +52,12 @@ pub(super) trait Registers {
     fn offset(&self, pose: Pose) -> Option<PoseOffset>;
 }
 
-/// The registers of an instance by itself. With `TRACK`, it notes whether an operation changed any bit of what it wrote.
+/// The registers of a single instance. With `TRACK`, it notes whether an operation changed any bit of its results.
 pub(super) struct Alone<'a, const TRACK: bool> {
     pub x: &'a mut [Trs],
     pub n: &'a mut [f32],
     pub poses: &'a [PoseOffset],
-    /// True if the last operation changed something.
+    /// Marks that the last operation changed a register.
     pub changed: bool,
     /// A bit for each of the first transforms, set when it changes.
     pub moved: &'a mut [u64],
@@ -137,7 +137,7 @@ impl<R: Registers> Machine<'_, R> {
         self.registers.put_n(register, value);
     }
 
-    /// The pose offset of a slot; `None` where the node stands as built.
+    /// The pose offset of a slot; `None` for the identity or without a pose.
     #[inline]
     pub fn pose(&self, pose: Pose) -> Option<PoseOffset> {
         self.registers.offset(pose).filter(|offset| *offset != PoseOffset::IDENTITY)
@@ -241,7 +241,7 @@ impl<R: Registers> Machine<'_, R> {
         }
     }
 
-    /// The offset that driven channels make up.
+    /// The offset made of the driven channels.
     fn driven(&self, drives: Span) -> PoseOffset {
         let mut offset = PoseOffset::IDENTITY;
         let mut angles = Vec3::ZERO;
@@ -268,7 +268,7 @@ impl<R: Registers> Machine<'_, R> {
     fn foot(&mut self, at: u32) {
         let op = &self.tables.feet[at as usize];
         let break_angle = self.n(op.break_angle);
-        // Over as wide an angle as it bent, the ball straightens again.
+        // The ball straightens over as wide an angle as it bends.
         let straight_angle = 2.0 * break_angle;
         let controls = FootControls { roll: self.n(op.roll), break_angle, straight_angle, ..FootControls::default() };
         let [heel, ball, toe] = controls.split();
@@ -281,14 +281,14 @@ impl<R: Registers> Machine<'_, R> {
     }
 }
 
-/// A weight as a share, 0 to 1; what is not a number is 0.
+/// A weight clamped to 0 to 1; a NaN becomes 0.
 #[inline]
 pub(super) fn share(weight: f32) -> f32 {
-    // Also for NaN.
+    // The comparison handles NaN, too.
     if weight > 0.0 { weight.min(1.0) } else { 0.0 }
 }
 
-/// A transform relative to `parent`, in the space that the parent is in.
+/// Maps a transform relative to `parent` to the parent space of `parent`.
 #[inline]
 pub(super) fn place(parent: &Trs, local: &Trs) -> Trs {
     Place::from(parent).place(&local.into()).into()
@@ -312,7 +312,7 @@ fn turned_on(first: Quat, then: Quat) -> Quat {
     Quat::from_array(unit(times(first.to_array(), then.to_array())))
 }
 
-/// A number of an offset: angles in degrees.
+/// One channel of an offset; angles in degrees.
 fn channel_of(offset: &PoseOffset, channel: Channel) -> f32 {
     let angle = |axis: usize| EulerOrder::Xyz.angles(offset.rotation)[axis].to_degrees();
     match channel {
@@ -328,7 +328,7 @@ fn channel_of(offset: &PoseOffset, channel: Channel) -> f32 {
     }
 }
 
-/// True if two transforms are equal bit by bit.
+/// Returns `true` if two transforms are equal bit by bit.
 #[inline]
 pub(super) fn same_bits(a: &Trs, b: &Trs) -> bool {
     let bits = |trs: &Trs| {

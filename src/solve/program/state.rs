@@ -1,5 +1,6 @@
-//! What differs between instances of a program.
+//! Instances of a program: their inputs, results and registers.
 
+mod carry;
 mod four;
 
 use std::{cell::RefCell, sync::Arc};
@@ -19,23 +20,23 @@ use crate::{
     solve::{spring::PointSpring, weights::relative},
 };
 
-/// Past this share of operations that certainly run (one in so many), all are run without looking at what changed.
+/// Reciprocal of the share of changed operations above which all operations run without tracking changes.
 const FULL: usize = 6;
 
-/// What a state remembers between evaluations.
+/// Values that a state keeps between evaluations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Memory {
-    /// Everything: an evaluation runs only what its inputs changed. For editing.
+    /// All registers: an evaluation runs only operations whose inputs changed. For editing.
     #[default]
     Whole,
-    /// Inputs and results: an evaluation runs all, in memory that instances of a thread share. For crowds.
+    /// Inputs and results: an evaluation runs all operations, in memory that instances of a thread share. For crowds.
     Results,
 }
 
 /// A spring between evaluations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpringState {
-    /// False until it was put where its node is.
+    /// Marks a spring that has been placed at its node.
     pub started: bool,
     pub origin: PointSpring,
     pub tip: PointSpring,
@@ -49,7 +50,7 @@ impl Default for SpringState {
 }
 
 impl SpringState {
-    /// True if time alone changes nothing.
+    /// Returns `true` if time alone changes nothing.
     fn is_settled(&self) -> bool {
         let rests =
             |point: &PointSpring| point.velocity == Vec3::ZERO && point.position == point.target && point.left == 0.0;
@@ -57,7 +58,7 @@ impl SpringState {
     }
 }
 
-/// One instance of a [`RigProgram`]: its inputs, its results, and what is between. Cloning copies a few flat lists.
+/// One instance of a [`RigProgram`]: its inputs, registers and results. Cloning copies a few flat lists.
 ///
 /// Transforms are in the rig's space unless said otherwise; slots are those of the program's lists.
 #[derive(Debug, Clone)]
@@ -66,14 +67,14 @@ pub struct RigState {
     memory: Memory,
     poses: Vec<PoseOffset>,
     springs: Vec<SpringState>,
-    /// Registers; only the first of them where results are all that is remembered.
+    /// Registers; only the first of them with [`Memory::Results`].
     x: Vec<Trs>,
     n: Vec<f32>,
     /// A bit for each operation that has to run.
     dirty: Vec<u64>,
-    /// True if all have to run.
+    /// Marks that all operations have to run.
     all_dirty: bool,
-    /// True if any has to run.
+    /// Marks that any operation has to run.
     any_dirty: bool,
     /// A bit for each node register whose transform the last evaluation changed.
     moved: Vec<u64>,
@@ -90,8 +91,8 @@ struct Workspace {
 }
 
 impl Workspace {
-    /// Takes up what an instance puts in, and returns the first operation to run: what depends on attributes only
-    /// stands as it is where the instance before had the same ones.
+    /// Loads the inputs of an instance, and returns the first operation to run: operations that depend on attributes
+    /// only are skipped if the instance before had the same attributes.
     fn take(&mut self, state: &RigState) -> usize {
         let program = &state.program;
         let mut is_same = self.serial == program.serial;
@@ -111,7 +112,7 @@ impl Workspace {
         if is_same { program.settings } else { 0 }
     }
 
-    /// Hands an instance what came of it.
+    /// Stores the results in an instance.
     fn give(&self, state: &mut RigState) {
         let nodes = state.program.nodes.len() + 1;
         state.x[..nodes].copy_from_slice(&self.x[..nodes]);
@@ -136,12 +137,12 @@ thread_local! {
 }
 
 impl RigState {
-    /// An instance as it was built, that remembers everything.
+    /// An unposed instance with [`Memory::Whole`].
     pub fn new(program: Arc<RigProgram>) -> Self {
         Self::with_memory(program, Memory::Whole)
     }
 
-    /// An instance as it was built. Its results are there after the first evaluation.
+    /// An unposed instance. It has results after the first evaluation.
     pub fn with_memory(program: Arc<RigProgram>, memory: Memory) -> Self {
         let nodes = program.nodes.len() + 1;
         let (mut x, mut n) = (program.x.clone(), program.n.clone());
@@ -166,7 +167,7 @@ impl RigState {
         }
     }
 
-    /// The program.
+    /// Program of the instance.
     pub fn program(&self) -> &Arc<RigProgram> {
         &self.program
     }
@@ -176,7 +177,7 @@ impl RigState {
         self.program.hash
     }
 
-    /// True if an evaluation would do something: an input changed, or, if time passes, a spring moves.
+    /// Returns `true` if an evaluation would change anything: an input changed, or, if time passes, a spring moves.
     pub fn is_dirty(&self, dt: f32) -> bool {
         self.any_dirty || (dt > 0.0 && self.springs.iter().any(|spring| !spring.is_settled()))
     }
@@ -187,7 +188,7 @@ impl RigState {
         self.any_dirty = true;
     }
 
-    /// Poses a node.
+    /// Poses a node, within the channels and limits of its control.
     ///
     /// # Errors
     ///
@@ -204,7 +205,7 @@ impl RigState {
         Ok(())
     }
 
-    /// Poses the node of a slot; false if it takes no pose or the offset is not finite.
+    /// Poses the node of a slot, within the channels and limits of its control; false if it takes no pose or the offset is not finite.
     pub fn set_offset_at(&mut self, slot: usize, offset: PoseOffset) -> bool {
         let Some(node) = self.program.nodes.get(slot) else { return false };
         let Some(known) = self.poses.get_mut(node.pose.0 as usize) else { return false };
@@ -214,19 +215,23 @@ impl RigState {
         if !offset.is_valid() {
             return false;
         }
+        let offset = node.freedom.map_or(offset, |freedom| freedom.clamp(offset));
+        if *known == offset {
+            return true;
+        }
         *known = offset;
         mark(&mut self.dirty, self.program.pose_readers.get(node.pose.0 as usize));
         self.any_dirty = true;
         true
     }
 
-    /// The pose of a slot; as built for a node that takes none.
+    /// The pose of a slot; the identity for a node that takes none.
     pub fn offset_at(&self, slot: usize) -> PoseOffset {
         let node = self.program.nodes.get(slot);
         node.and_then(|node| self.poses.get(node.pose.0 as usize)).copied().unwrap_or_default()
     }
 
-    /// Sets an attribute to the nearest value that it can have.
+    /// Sets an attribute to the nearest allowed value.
     ///
     /// # Errors
     ///
@@ -242,7 +247,7 @@ impl RigState {
         Err(StateError::UnknownAttribute { node, name: name.to_owned() })
     }
 
-    /// Sets the attribute of a slot to the nearest value that it can have; false if it cannot be set.
+    /// Sets the attribute of a slot to the nearest allowed value; returns `false` if it cannot be set.
     pub fn set_attribute_at(&mut self, slot: usize, value: f32) -> bool {
         let Some(attribute) = self.program.attributes.get(slot).filter(|attribute| attribute.is_settable) else {
             return false;
@@ -256,7 +261,7 @@ impl RigState {
         true
     }
 
-    /// Says where an input is, in the rig's space.
+    /// Sets the transform of an input, in the rig's space.
     ///
     /// # Errors
     ///
@@ -266,7 +271,8 @@ impl RigState {
         if self.set_input_at(slot, transform) { Ok(()) } else { Err(StateError::NotFinite(node)) }
     }
 
-    /// Says where the input of a slot is, in the rig's space; false if there is none or the transform is not finite.
+    /// Sets the transform of the input of a slot, in the rig's space; returns `false` if there is none or the transform
+    /// is not finite.
     pub fn set_input_at(&mut self, slot: usize, transform: Trs) -> bool {
         if slot >= self.program.inputs.len() || !valid(&transform) {
             return false;
@@ -280,8 +286,8 @@ impl RigState {
         true
     }
 
-    /// Evaluates what changed, after `dt` seconds (springs move by it; other numbers than those above zero count as
-    /// zero). True if anything ran.
+    /// Evaluates the operations whose inputs changed, after `dt` seconds (springs move by it; a value not above zero
+    /// counts as zero). Returns `true` if any ran.
     ///
     /// The results are the same bits whatever was evaluated before, and whichever of the instance's inputs changed.
     /// Does not allocate once each thread has evaluated the program.
@@ -305,7 +311,7 @@ impl RigState {
         true
     }
 
-    /// As [`evaluate`](Self::evaluate), for several instances; true for those that ran.
+    /// Evaluates several instances as [`evaluate`](Self::evaluate) does; returns `true` for those that ran.
     ///
     /// Instances of one program that remember [`Memory::Results`] run in step, one operation for all of them before the
     /// next, their numbers side by side, so that a processor computes all of them at once. The results are the same bits
@@ -327,7 +333,7 @@ impl RigState {
         [true; LANES]
     }
 
-    /// Notes that results fit the inputs.
+    /// Marks the results as up to date.
     fn settle(&mut self) {
         self.any_dirty = false;
         self.all_dirty = false;
@@ -363,33 +369,33 @@ impl RigState {
                 machine.registers.changed = false;
                 machine.run(&program.ops[at]);
                 if machine.registers.changed {
-                    // Readers come later, so none is missed.
+                    // Readers come later in the list, so none is missed.
                     mark(dirty, program.op_readers.get(at));
                 }
             }
         }
     }
 
-    /// Where a node is; `None` if the program does not have it.
+    /// Rig transform of a node; `None` if the program does not have it.
     pub fn global(&self, node: Uid) -> Option<Trs> {
         self.program.node(node).map(|slot| *self.global_at(slot))
     }
 
-    /// Where the node of a slot is. The slot must be one of the program's.
+    /// Rig transform of the node of a slot, which must be one of the program's.
     pub fn global_at(&self, slot: usize) -> &Trs {
         &self.globals()[slot]
     }
 
-    /// Where all nodes are, by slot.
+    /// Rig transforms of all nodes, by slot.
     pub fn globals(&self) -> &[Trs] {
         &self.x[1..=self.program.nodes.len()]
     }
 
-    /// Where the node of a slot is relative to its parent (to the rig, if the program does not keep the parent). The
-    /// slot must be one of the program's.
+    /// Transform of the node of a slot relative to its parent (to the rig, if the program does not keep the parent).
+    /// The slot must be one of the program's.
     pub fn local_at(&self, slot: usize) -> Trs {
         let node = &self.program.nodes[slot];
-        // Of a program that leaves nodes out, parents may be missing.
+        // A program that drops nodes may lack parents.
         let is_whole = self.memory == Memory::Whole && self.program.nodes.len() == self.program.poses;
         match node.local {
             Some(local) if is_whole => self.x[local.0 as usize],
@@ -404,24 +410,24 @@ impl RigState {
         }
     }
 
-    /// Slots of nodes whose place the last evaluation changed (or may have changed).
+    /// Slots of nodes whose rig transforms the last evaluation changed (or may have changed).
     pub fn moved(&self) -> impl Iterator<Item = usize> {
         (0..self.program.nodes.len()).filter(|slot| self.is_moved(*slot))
     }
 
-    /// True if the last evaluation changed (or may have changed) the place of the node of a slot.
+    /// Returns `true` if the last evaluation changed (or may have changed) the rig transform of the node of a slot.
     pub fn is_moved(&self, slot: usize) -> bool {
         // The first register is the rig's space.
         let register = slot + 1;
         self.moved.get(register / 64).is_some_and(|word| word & (1 << (register % 64)) != 0)
     }
 
-    /// The value of an attribute, after what constraints do to it.
+    /// Value of an attribute, after all constraints.
     pub fn attribute(&self, node: Uid, name: &str) -> Option<f32> {
         self.program.attribute(node, name).map(|slot| self.n[slot])
     }
 
-    /// The value of the attribute of a slot, after what constraints do to it. The slot must be one of the program's.
+    /// Value of the attribute of a slot, after all constraints. The slot must be one of the program's.
     pub fn attribute_at(&self, slot: usize) -> f32 {
         self.n[slot]
     }
@@ -432,8 +438,8 @@ impl RigState {
         &self.n[first..first + self.program.morphs.len()]
     }
 
-    /// Multiplies inverse bind matrices with where joints are: what a skinned mesh in the rig's space is moved by.
-    /// `joints` are slots; lists are used as far as the shortest goes.
+    /// Multiplies the rig transforms of joints with inverse bind matrices: the matrices that move a skinned mesh in the
+    /// rig's space. `joints` are slots; lists are used as far as the shortest goes.
     pub fn skin_matrices(&self, joints: &[u32], inverse_binds: &[Affine3A], out: &mut [Affine3A]) {
         let globals = self.globals();
         for ((joint, bind), out) in joints.iter().zip(inverse_binds).zip(out) {
@@ -442,16 +448,16 @@ impl RigState {
     }
 }
 
-/// Seconds that count.
+/// `dt` in seconds, or zero if it is negative or not finite.
 fn elapsed(dt: f32) -> f32 {
     if dt > 0.0 && dt.is_finite() { dt } else { 0.0 }
 }
 
-/// Sets bits.
+/// Sets the bits of the items.
 #[inline]
 fn mark(bits: &mut [u64], items: &[u32]) {
     for item in items {
-        // A state that remembers results only has no bits.
+        // A state with [`Memory::Results`] has no bits.
         if let Some(word) = bits.get_mut(*item as usize / 64) {
             *word |= 1 << (item % 64);
         }

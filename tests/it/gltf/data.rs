@@ -9,13 +9,10 @@ use rigsmith::mesh::{
     model::{Channel, ChannelTarget, Clip, Interpolation, Model},
 };
 
-/// The files with skins among the test data, or `None` with a word to the user.
-pub fn skinned_files() -> Option<Vec<PathBuf>> {
-    let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
-        println!("skipped: RIGSMITH_DATA is not set");
-        return None;
-    };
-    let data = Path::new(&data);
+use crate::prerequisites::test_data;
+
+/// Files with skins below a folder of test meshes.
+pub fn skinned_files(data: PathBuf) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let is_gltf = |path: &Path| path.extension().is_some_and(|extension| extension == "glb" || extension == "gltf");
     for folder in ["creatures", "gltf_skinned", "hands"].map(|folder| data.join(folder)) {
@@ -27,7 +24,7 @@ pub fn skinned_files() -> Option<Vec<PathBuf>> {
     }
     files.sort();
     assert!(files.len() >= 10, "{files:?}");
-    Some(files)
+    files
 }
 
 pub fn read_file(path: &Path) -> Model {
@@ -129,7 +126,7 @@ fn posed(model: &Model, clip: Option<&Clip>, time: f32) -> Vec<Vec3> {
 #[test]
 fn characters_pose_the_same() {
     let settings = GltfWriteSettings { max_influences: 8, bind_unweighted: true, ..Default::default() };
-    for path in skinned_files().into_iter().flatten() {
+    for path in test_data().into_iter().flat_map(skinned_files) {
         let model = read_file(&path);
         let name = name_of(&path);
         let again = there_and_back(&format!("data_{name}"), &model, &settings);
@@ -174,7 +171,10 @@ fn read_by_other(glb: &[u8]) -> OtherView {
 #[test]
 fn another_reader_sees_the_same() {
     let settings = GltfWriteSettings { all_joints: true, bind_unweighted: true, ..Default::default() };
-    for path in skinned_files().into_iter().flatten().filter(|path| path.extension().is_some_and(|kind| kind == "glb"))
+    for path in test_data()
+        .into_iter()
+        .flat_map(skinned_files)
+        .filter(|path| path.extension().is_some_and(|kind| kind == "glb"))
     {
         let model = read_file(&path);
         let (points, weights, binds, times) = read_by_other(&std::fs::read(&path).unwrap());
@@ -225,12 +225,12 @@ fn another_reader_sees_the_same() {
 fn characters_come_back_whole() {
     let settings =
         GltfWriteSettings { max_influences: 8, all_joints: true, bind_unweighted: true, ..Default::default() };
-    for path in skinned_files().into_iter().flatten() {
+    for path in test_data().into_iter().flat_map(skinned_files) {
         let model = read_file(&path);
         let name = name_of(&path);
         let again = there_and_back(&format!("data_all_{name}"), &model, &settings);
         assert_eq!((&again.nodes, &again.skins, &again.clips), (&model.nodes, &model.skins, &model.clips), "{name}");
-        assert_eq!(again.looks, model.looks, "{name}");
+        assert_eq!(again.material_set, model.material_set, "{name}");
         let weighted = |model: &Model| model.weights.as_ref().unwrap().values.clone();
         assert_eq!(weighted(&again), weighted(&model), "{name}");
         let rigid = model.objects.iter().any(|object| object.node.is_some());

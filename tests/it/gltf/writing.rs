@@ -61,7 +61,10 @@ fn only_joints_that_deform() {
     assert_eq!(again.weights, model.weights);
     // The toe was all that wiggled.
     assert_eq!(again.clips, model.clips[..1]);
-    assert_eq!((&again.looks, &again.parts, &again.objects), (&model.looks, &model.parts, &model.objects));
+    assert_eq!(
+        (&again.material_set, &again.parts, &again.objects),
+        (&model.material_set, &model.parts, &model.objects)
+    );
 }
 
 #[test]

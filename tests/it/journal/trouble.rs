@@ -9,10 +9,7 @@ use std::{
 
 use rigsmith::{
     files::{DiskFile, Entry, Fault, FaultPlan, FaultyDisk},
-    plugins::{
-        document::RigBundle,
-        journal::{JournalTrouble, RigJournal, replayed_bundle},
-    },
+    plugins::journal::{JournalTrouble, RigJournal, replayed_bundle},
     prelude::{Change, EditRequest},
     test_app::test_app,
 };
@@ -239,8 +236,8 @@ fn an_app_keeps_what_its_rigs_ask_for_and_tells_trouble_once() {
     let plan = FaultPlan { at: 40, fault: Fault::NoSpace, lasting: true };
     let disk = Arc::new(FaultyDisk::new(RealDisk, Some(plan)));
     let mut app = test_app();
-    let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(1), "kept"), ..default() }).id();
-    let other = app.world_mut().spawn(RigBundle::default()).id();
+    let rig = app.world_mut().spawn(Rig::new(Uid(1), "kept")).id();
+    let other = app.world_mut().spawn(Rig::default()).id();
     let start = JournalStart { rig: app.world().get::<Rig>(rig).cloned(), ..start(folder.path()) };
     let journal = Journal::start(disk, start);
     app.world_mut().entity_mut(rig).insert(RigJournal::new(journal.clone()));

@@ -1,4 +1,4 @@
-//! The loop around the mutator: replays, runs until the time is up, and keeps what it finds.
+//! Loop around the mutator: replays findings, tries a set number of mutants, and keeps what it finds.
 
 use std::{
     fs,
@@ -11,26 +11,40 @@ use std::{
 use super::{Mutator, Random};
 
 /// One input that takes longer than this counts as a hang.
-const HANG: Duration = Duration::from_secs(10);
+const HANG: Duration = Duration::from_secs(60);
 /// Inputs grow by splicing and repeating, up to this many bytes or four times the largest seed.
 const MAX_LEN: usize = 64 << 10;
 /// How many mutants are kept as further seeds.
 const POOL: usize = 256;
+/// Mutants that a test tries, on every machine the same ones.
+const MUTANTS: u64 = 4000;
+/// Targets, each with a folder of findings of its own.
+const TARGETS: [&str; 8] = ["gestures", "gltf", "journal", "obj", "project", "rig", "skin", "template"];
+
+/// Extent of a run.
+#[derive(Debug, Clone, Copy)]
+enum Budget {
+    Mutants(u64),
+    Seconds(f64),
+}
 
 /// The folder of the findings of one target.
 pub fn findings(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz_findings").join(name)
 }
 
-/// Replays what was found before, then calls `check` with mutants of `seeds` until the time is up.
+/// Replays what was found before, then calls `check` with mutants of `seeds`: a set number of them, or as many as fit into
+/// `RIGSMITH_FUZZ_SECONDS`.
 ///
 /// `check` panics where something is wrong: a reader that must not panic, or a promise about what was read. Such an input, and
-/// one that takes longer than ten seconds, is written to `tests/fuzz_findings/NAME/`, and the test fails naming it.
+/// one that takes longer than a minute, is written to `tests/fuzz_findings/NAME/`, and the test fails naming it.
 pub fn run_fuzz(name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
-    run_fuzz_for(number_from("RIGSMITH_FUZZ_SECONDS").unwrap_or(2.0), name, seeds, dictionary, check);
+    assert!(TARGETS.contains(&name), "{name} is not among the targets");
+    let budget = number_from("RIGSMITH_FUZZ_SECONDS").map_or(Budget::Mutants(MUTANTS), Budget::Seconds);
+    run_fuzz_for(budget, name, seeds, dictionary, check);
 }
 
-fn run_fuzz_for(seconds: f64, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
+fn run_fuzz_for(budget: Budget, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
     assert!(!seeds.is_empty(), "{name}: no seeds");
     let keep = findings(name);
     let mut replayed: Vec<PathBuf> =
@@ -58,7 +72,11 @@ fn run_fuzz_for(seconds: f64, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]
     let mut mutator = Mutator::new(start, dictionary, MAX_LEN.max(4 * longest));
     let mut pool: Vec<Vec<u8>> = Vec::new();
     let (started, mut runs) = (Instant::now(), 0u64);
-    while started.elapsed().as_secs_f64() < seconds {
+    let goes_on = |runs: u64| match budget {
+        Budget::Mutants(count) => runs < count,
+        Budget::Seconds(seconds) => started.elapsed().as_secs_f64() < seconds,
+    };
+    while goes_on(runs) {
         let source = |random: &mut Random, pool: &[Vec<u8>]| -> Vec<u8> {
             // Mutants of mutants reach further, but most of the time goes to what is nearly right.
             if pool.is_empty() || !random.chance(4) { random.pick(seeds) } else { random.pick(pool) }
@@ -156,15 +174,35 @@ impl Watch {
 fn a_panic_is_found_and_kept_as_a_file() {
     let name = format!("self_test_{}", std::process::id());
     let outcome = catch_unwind(|| {
-        run_fuzz_for(60.0, &name, &[b"value 17".to_vec()], &[], |bytes| {
-            assert!(!bytes.ends_with(b"18446744073709551616"), "too large");
-        });
+        run_fuzz_for(Budget::Mutants(200_000), &name, &[b"value 17".to_vec()], &[], too_large);
     });
     let kept: Vec<_> = fs::read_dir(findings(&name)).unwrap().map(|entry| entry.unwrap().path()).collect();
     let content = fs::read(&kept[0]).unwrap();
+    // The next run fails with what was kept, before anything is mutated.
+    let replay = catch_unwind(|| run_fuzz_for(Budget::Mutants(0), &name, &[b"value 17".to_vec()], &[], too_large));
     fs::remove_dir_all(findings(&name)).unwrap();
     let message = *outcome.unwrap_err().downcast::<String>().unwrap();
     assert_eq!(kept.len(), 1);
     assert!(content.ends_with(b"18446744073709551616"));
     assert!(message.contains("too large") && message.contains(kept[0].to_str().unwrap()), "{message}");
+    let message = *replay.unwrap_err().downcast::<String>().unwrap();
+    assert!(message.contains("the finding") && message.contains("too large"), "{message}");
+}
+
+fn too_large(bytes: &[u8]) {
+    assert!(!bytes.ends_with(b"18446744073709551616"), "too large");
+}
+
+#[test]
+fn every_folder_of_findings_has_a_target_that_replays_it() {
+    let all = findings("");
+    let folders: Vec<String> = (fs::read_dir(&all).unwrap())
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .filter(|name| !name.starts_with("self_test_"))
+        .collect();
+    assert!(!folders.is_empty(), "{} is empty", all.display());
+    assert!(folders.iter().all(|folder| TARGETS.contains(&folder.as_str())), "{folders:?}");
+    for folder in folders {
+        assert!(fs::read_dir(all.join(&folder)).unwrap().count() > 0, "{folder} is empty");
+    }
 }

@@ -1,9 +1,6 @@
 //! A panel without a window: frames are run with raw input, and widgets are found by what they tell screen readers.
 
-use bevy::{
-    ecs::schedule::{LogLevel, ScheduleBuildSettings},
-    prelude::*,
-};
+use bevy::prelude::*;
 use bevy_egui::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, accesskit};
 use rigsmith::{
     editor::{
@@ -14,6 +11,7 @@ use rigsmith::{
     headless::headless_app,
     plugins::history::RigHistory,
     prelude::*,
+    test_app::strict_app,
 };
 
 /// What is being looked at.
@@ -34,8 +32,8 @@ pub struct Desk {
     /// Everything in the last frame: what it says, its value, and where it is.
     pub seen: Vec<Seen>,
     held: Modifiers,
-    /// How long drawing the last frame took.
-    pub drawing: std::time::Duration,
+    /// How many shapes the last frame was drawn with.
+    pub shapes: usize,
 }
 
 /// A widget.
@@ -56,13 +54,8 @@ impl Desk {
     pub fn with(sheet: Sheet, size: egui::Vec2) -> Self {
         let mut app = headless_app(1);
         app.add_plugins(PanelsPlugin);
-        let strict = ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
-        app.edit_schedule(Update, |schedule| {
-            schedule.set_build_settings(strict.clone());
-        });
-        app.finish();
-        app.cleanup();
-        let rig = app.world_mut().spawn(RigBundle { rig: Rig::new(Uid(1), "rig"), ..default() }).id();
+        let mut app = strict_app(app);
+        let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
         app.insert_resource(ActiveRig(rig));
         let ctx = egui::Context::default();
         ctx.enable_accesskit();
@@ -76,7 +69,7 @@ impl Desk {
             events: Vec::new(),
             seen: Vec::new(),
             held: Modifiers::NONE,
-            drawing: default(),
+            shapes: 0,
         };
         desk.frame();
         desk
@@ -93,12 +86,11 @@ impl Desk {
         };
         let mut requests = Requests::default();
         let (sheet, world) = (&mut self.sheet, self.app.world());
-        let started = std::time::Instant::now();
         let mut output = self.ctx.run_ui(input, |ui| match sheet {
             Sheet::Panel(panel) => panel.show(ui, world, &mut requests),
             Sheet::Overlay(overlay) => overlay.show(&ui.ctx().clone(), world, &mut requests),
         });
-        self.drawing = started.elapsed();
+        self.shapes = output.shapes.len();
         output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {
             self.seen = update.nodes.iter().filter_map(|(_, node)| seen(node)).collect();

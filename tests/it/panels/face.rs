@@ -32,13 +32,10 @@ fn written(desk: &Desk, word: &str) -> Option<egui::Rect> {
 }
 
 fn wait(desk: &mut Desk, mesh: Entity) {
-    for _ in 0..4000 {
-        desk.frame();
-        if desk.app.world().get::<FaceJob>(mesh).is_none() && desk.look("Cancel").is_none() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
+    desk.frame();
+    crate::bench::wait(desk, "the face", Desk::frame, |desk| {
+        desk.app.world().get::<FaceJob>(mesh).is_none() && desk.look("Cancel").is_none()
+    });
     desk.frames(12);
 }
 
@@ -96,10 +93,30 @@ fn the_merge_history_can_be_cut() {
     let (mut desk, mesh) = with_head();
     desk.click("Place face");
     wait(&mut desk, mesh);
-    let before = desk.app.world().get::<Face>(mesh).unwrap().analysis.clone();
+    let groups = |desk: &Desk| desk.app.world().get::<Face>(mesh).unwrap().analysis.groups.groups;
+    let before = groups(&desk);
+    assert!(before >= 3);
     desk.click("Grouping");
     desk.frames(20);
-    assert!(written(&desk, "groups").is_some(), "{:?}", desk.seen);
-    let tree = &before.groups.depth;
-    assert!(before.groups.groups >= 3 && tree.heights(12).is_sorted_by(|a, b| a >= b));
+    let slider = written(&desk, "groups").unwrap_or_else(|| panic!("{:?}", desk.seen));
+    assert!(written(&desk, HINT_AUTO).is_some(), "{:?}", desk.seen);
+    // Near the roots of the tree, which stands above its slider, all merges that are drawn are undone.
+    desk.click_at(egui::pos2(slider.left() + 60.0, slider.top() - 16.0));
+    desk.frames(2);
+    assert!(written(&desk, HINT_BY_HAND).is_some(), "{:?}", desk.seen);
+    desk.click("Place again");
+    wait(&mut desk, mesh);
+    let deep = groups(&desk);
+    assert!(deep > before && deep > 10, "{before} groups became {deep}");
+    // Cut near its top, and left to the mesh again.
+    let slider = written(&desk, "groups").unwrap();
+    desk.click_at(egui::pos2(slider.left() + 60.0, slider.top() - 90.0));
+    desk.frames(2);
+    desk.click("Place again");
+    wait(&mut desk, mesh);
+    let shallow = groups(&desk);
+    assert!(shallow < before.max(4), "{deep} groups became {shallow}");
 }
+
+const HINT_AUTO: &str = "Cut where every feature lies in the face. Front groups are joined.";
+const HINT_BY_HAND: &str = "Cut by hand; place again to use it. The front groups that hold features are joined.";

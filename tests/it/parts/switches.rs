@@ -3,7 +3,7 @@
 use bevy::math::{Quat, Vec3};
 use rigsmith::{
     rig::{Matching, RigEdit, Uid},
-    solve::matching::throw,
+    solve::matching::match_switch,
 };
 
 use super::Puppet;
@@ -13,7 +13,7 @@ fn thrown(puppet: &mut Puppet, control: Uid, attribute: &str, value: f32) {
     let switch =
         puppet.built.switches.iter().find(|switch| switch.control == control && *switch.attribute == *attribute);
     let switch = switch.unwrap_or_else(|| panic!("no switch {attribute}")).clone();
-    let thrown = throw(&puppet.built, &puppet.state, &switch, value).unwrap();
+    let thrown = match_switch(&puppet.built, &puppet.state, &switch, value).unwrap();
     for edit in thrown.edits {
         match edit {
             RigEdit::SetOffset(node, offset) => puppet.state.set_offset(node, offset.unwrap_or_default()).unwrap(),

@@ -3,7 +3,7 @@
 use super::*;
 use rigsmith::{
     rig::{Constraint, KeyEase, Output, Uid},
-    solve::program::{Exposed, Keep, Outside, ProgramError, StateError},
+    solve::program::{Exposed, ExternalNode, Keep, ProgramError, StateError},
 };
 
 fn error(rig: &RigBuilder) -> ProgramError {
@@ -186,7 +186,7 @@ fn outside_nodes_are_inputs() {
     rig.constrain(constraint);
     assert!(matches!(error(&rig), ProgramError::MissingNode { .. }));
     let rest = Trs { translation: Vec3::Z, ..Trs::IDENTITY };
-    let options = CompileOptions { inputs: vec![Outside { uid: wheel, rest }], ..CompileOptions::default() };
+    let options = CompileOptions { inputs: vec![ExternalNode { uid: wheel, rest }], ..CompileOptions::default() };
     for keep in [Keep::All, Keep::DeformAndExposed(vec![Exposed::Controls])] {
         let program = RigProgram::compile(&rig.rig, &CompileOptions { keep, ..options.clone() }).unwrap();
         let mut state = RigState::new(Arc::new(program));

@@ -1,30 +1,19 @@
 //! Running rigs in an app.
 
 use super::{biped::biped, *};
-use bevy::{
-    animation::AnimationPlugin,
-    ecs::schedule::{LogLevel, ScheduleBuildSettings},
-    prelude::*,
-    time::TimeUpdateStrategy,
-};
+use bevy::{animation::AnimationPlugin, prelude::*, time::TimeUpdateStrategy};
 use rigsmith::{
     plugins::runtime::{ControlPose, DrivenMorphs, InstanceMode, RigRuntime, RuntimePlugin, spawn_instance},
     rig::{Constraint, KeyEase, Output},
     solve::program::{Exposed, Keep},
+    test_app::strict_app,
 };
 
 fn app() -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), TransformPlugin, AnimationPlugin, RuntimePlugin));
     app.insert_resource(TimeUpdateStrategy::ManualDuration(std::time::Duration::from_millis(16)));
-    let strict = ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
-    // Bevy's own animation systems are ambiguous among themselves only where they share targets.
-    app.edit_schedule(Update, |schedule| {
-        schedule.set_build_settings(strict.clone());
-    });
-    app.finish();
-    app.cleanup();
-    app
+    strict_app(app)
 }
 
 fn program(keep: Keep) -> Arc<RigProgram> {

@@ -3,7 +3,7 @@
 use bevy::math::{Quat, Vec3};
 use rigsmith::solve::{
     ccd::{CcdChain, CcdJoint, ccd},
-    fabrik::{Effort, fabrik, rotations_from_points},
+    fabrik::{IterationSettings, fabrik, rotations_from_points},
     limit::{Bounds, JointLimit},
     rotate::EulerOrder,
     spline::{ArcTable, Spline, SplineIk, SplineKind},
@@ -23,7 +23,7 @@ fn chain(random: &mut Random, bones: usize) -> (Vec<Vec3>, Vec<f32>) {
     (points, lengths)
 }
 
-const HARD_WORK: Effort = Effort { tolerance: 1e-4, iterations: 400, bend: Vec3::Z };
+const HARD_WORK: IterationSettings = IterationSettings { tolerance: 1e-4, iterations: 400, bend: Vec3::Z };
 
 #[test]
 fn fabrik_reaches_and_keeps_lengths() {
@@ -67,7 +67,7 @@ fn a_chain_goes_straight_for_what_it_cannot_reach() {
         let (mut points, lengths) = chain(&mut random, bones);
         let (root, total) = (points[0], lengths.iter().sum::<f32>());
         let way = random.direction();
-        let outcome = fabrik(&mut points, &lengths, root + way * (total + 1.0), &Effort::default());
+        let outcome = fabrik(&mut points, &lengths, root + way * (total + 1.0), &IterationSettings::default());
         assert!(points[bones].distance(root + way * total) < 1e-5 * total);
         assert!((outcome.distance - 1.0).abs() < 1e-4);
     }
@@ -80,9 +80,9 @@ fn a_straight_chain_in_line_with_its_goal_bends_as_told() {
             let lengths = vec![1.0; bones];
             let mut points: Vec<Vec3> = (0..=bones).map(|i| Vec3::Y * i as f32).collect();
             let goal = Vec3::Y * (0.6 * bones as f32);
-            let effort = Effort { bend, ..HARD_WORK };
-            let outcome = fabrik(&mut points, &lengths, goal, &effort);
-            assert!(outcome.distance <= effort.tolerance, "{bones} bones, {bend}: {outcome:?}");
+            let settings = IterationSettings { bend, ..HARD_WORK };
+            let outcome = fabrik(&mut points, &lengths, goal, &settings);
+            assert!(outcome.distance <= settings.tolerance, "{bones} bones, {bend}: {outcome:?}");
             if bend.y == 0.0 && bend != Vec3::ZERO {
                 assert!(points[1].dot(bend) > 0.1, "{bones} bones, {bend}: {points:?}");
             }
@@ -93,8 +93,8 @@ fn a_straight_chain_in_line_with_its_goal_bends_as_told() {
             let chain = CcdChain { joints: &joints, end: Vec3::Y, position: Vec3::ZERO, rotation: Quat::IDENTITY };
             let mut rotations = vec![Quat::IDENTITY; bones];
             let mut posed = vec![(Vec3::ZERO, Quat::IDENTITY); bones];
-            let outcome = ccd(&chain, goal, &effort, &mut rotations, &mut posed);
-            assert!(outcome.distance <= effort.tolerance, "{bones} bones, {bend}: {outcome:?}");
+            let outcome = ccd(&chain, goal, &settings, &mut rotations, &mut posed);
+            assert!(outcome.distance <= settings.tolerance, "{bones} bones, {bend}: {outcome:?}");
             if bend.y == 0.0 && bend != Vec3::ZERO {
                 assert!(posed[1].0.dot(bend) > 0.01, "{bones} bones, {bend}: {posed:?}");
             }
@@ -143,8 +143,13 @@ fn ccd_reaches_within_limits() {
         let mut rotations = within(&mut random);
         let mut posed = vec![(Vec3::ZERO, Quat::IDENTITY); count];
         let before = end_of(&chain, &rotations).distance(goal);
-        let outcome =
-            ccd(&chain, goal, &Effort { tolerance: 1e-3, iterations: 200, bend: Vec3::Z }, &mut rotations, &mut posed);
+        let outcome = ccd(
+            &chain,
+            goal,
+            &IterationSettings { tolerance: 1e-3, iterations: 200, bend: Vec3::Z },
+            &mut rotations,
+            &mut posed,
+        );
         assert!((end_of(&chain, &rotations).distance(goal) - outcome.distance).abs() < 1e-4);
         assert!(outcome.distance <= before + 1e-3, "case {case}: from {before} to {}", outcome.distance);
         reached += usize::from(outcome.distance <= 1e-3);
@@ -307,10 +312,10 @@ fn chains_answer_anything_with_numbers() {
         let size = [0.0, 1.0, 1e-20, 1e15][case % 4];
         let mut points: Vec<Vec3> = (0..count).map(|_| random.point() * size).collect();
         let lengths: Vec<f32> = points.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
-        let effort = Effort { bend: hard(&mut random), ..Effort::default() };
+        let settings = IterationSettings { bend: hard(&mut random), ..IterationSettings::default() };
         let goal = if case % 5 == 0 { points.first().copied().unwrap_or(Vec3::ZERO) } else { hard(&mut random) };
         let before = points.clone();
-        fabrik(&mut points, &lengths, goal, &effort);
+        fabrik(&mut points, &lengths, goal, &settings);
         assert!(points.iter().all(|point| point.is_finite()), "{before:?} to {goal}: {points:?}");
         let mut rotations = vec![Quat::IDENTITY; count];
         rotations_from_points(&before, &points, &mut rotations);
@@ -326,7 +331,7 @@ fn chains_answer_anything_with_numbers() {
             .collect();
         let chain = CcdChain { joints: &joints, end: Vec3::ZERO, position: Vec3::ZERO, rotation: Quat::IDENTITY };
         let mut posed = vec![(Vec3::ZERO, Quat::IDENTITY); count];
-        ccd(&chain, goal, &effort, &mut rotations, &mut posed);
+        ccd(&chain, goal, &settings, &mut rotations, &mut posed);
         assert!(rotations.iter().all(|rotation| is_unit(*rotation)), "{chain:?} to {goal}: {rotations:?}");
 
         let spline = Spline { kind: SplineKind::Through, points: &before };

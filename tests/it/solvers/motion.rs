@@ -2,7 +2,7 @@
 
 use bevy::math::{Quat, Vec3};
 use rigsmith::solve::{
-    curve::{Beyond, Curve, CurveError, CurveKey, Interpolation},
+    curve::{Curve, CurveError, CurveKey, Extrapolation, Interpolation},
     spring::{PointSpring, RotationSpring, Spring},
 };
 
@@ -114,13 +114,13 @@ fn key(x: f32, y: f32, interpolation: Interpolation) -> CurveKey {
     CurveKey { interpolation, ..CurveKey::new(x, y) }
 }
 
-const HOLD: [Beyond; 2] = [Beyond::Hold; 2];
+const HOLD: [Extrapolation; 2] = [Extrapolation::Hold; 2];
 
 #[test]
 fn curves_pass_their_keys_as_told() {
     use Interpolation::{Constant, Linear, Smooth};
     let keys = [key(0.0, 1.0, Constant), key(1.0, 3.0, Linear), key(2.0, 5.0, Smooth), key(4.0, 5.5, Smooth)];
-    let curve = Curve::new(&keys, [Beyond::Linear, Beyond::Linear]).unwrap();
+    let curve = Curve::new(&keys, [Extrapolation::Linear, Extrapolation::Linear]).unwrap();
     let cases = [(-5.0, 1.0), (0.0, 1.0), (0.99, 1.0), (1.0, 3.0), (1.5, 4.0), (2.0, 5.0), (4.0, 5.5), (9.0, 5.5)];
     for (x, y) in cases {
         assert!((curve.evaluate(x) - y).abs() < 1e-5, "{x}: {} for {y}", curve.evaluate(x));
@@ -132,7 +132,7 @@ fn curves_pass_their_keys_as_told() {
     }
     // Given slopes count, inside and beyond.
     let steep = CurveKey { slope_in: Some(2.0), slope_out: Some(2.0), ..CurveKey::new(0.0, 0.0) };
-    let slopes = Curve::new(&[steep, CurveKey { x: 1.0, y: 2.0, ..steep }], [Beyond::Linear; 2]).unwrap();
+    let slopes = Curve::new(&[steep, CurveKey { x: 1.0, y: 2.0, ..steep }], [Extrapolation::Linear; 2]).unwrap();
     for x in [-1.0, 0.0, 0.25, 0.5, 1.0, 3.0] {
         assert!((slopes.evaluate(x) - 2.0 * x).abs() < 1e-5, "{x}");
     }
@@ -176,7 +176,8 @@ fn bad_keys_are_told() {
     let error = Curve::new(&[good, good], HOLD).unwrap_err();
     assert_eq!(error, CurveError::Order { key: 2, x: 1.0, before: 1.0 });
     assert!(error.to_string().contains("key 2") && error.to_string().contains("sort the keys"), "{error}");
-    let far = Curve::new(&[CurveKey::new(f32::MIN, f32::MAX), CurveKey::new(f32::MAX, f32::MIN)], [Beyond::Linear; 2]);
+    let far =
+        Curve::new(&[CurveKey::new(f32::MIN, f32::MAX), CurveKey::new(f32::MAX, f32::MIN)], [Extrapolation::Linear; 2]);
     let far = far.unwrap();
     for x in HARD {
         assert!(far.evaluate(x).is_finite() && far.evaluate(-x).is_finite(), "{x}");

@@ -1,4 +1,4 @@
-//! Moving the bones of a face so that they can show given shapes.
+//! Fit of a face's bones to given shapes.
 
 use glam::Vec3;
 
@@ -13,21 +13,21 @@ use crate::{
 
 /// A face whose bones were moved to fit shapes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Refitted {
+pub struct FaceFit {
     /// The face.
     pub face: AutoFace,
-    /// For each shape how each bone moves, in head space.
+    /// Poses of all bones for each shape, in head space.
     pub poses: Vec<Vec<BonePose>>,
     /// Root mean square error over points and shapes, in the mesh's unit.
     pub error: f32,
 }
 
 impl FaceAnalysis {
-    /// Moves the bones of a face, and weighs the points anew, so that the bones can show given shapes.
+    /// Moves the bones of a face and recomputes the weights, so that the bones can show given shapes.
     ///
-    /// `shapes` are displacements, one a point of the *mesh*, in the mesh's space and unit; `locked` says which bones must
-    /// stay. Returns the face, how its bones move in each shape (head space), and the root mean square error over points
-    /// and shapes. About two seconds for 57 shapes of 11,000 points and 40 bones.
+    /// `shapes` are displacements, one a point of the *mesh*, in the mesh's space and unit; `locked` marks bones that
+    /// must stay. Returns the face, the poses of its bones in each shape (head space), and the root mean square error
+    /// over points and shapes. About two seconds for 57 shapes of 11,000 points and 40 bones.
     ///
     /// # Errors
     /// [`FaceError::Fit`], or cancelled.
@@ -37,7 +37,7 @@ impl FaceAnalysis {
         shapes: &[Vec<Vec3>],
         locked: &[bool],
         progress: FaceProgress,
-    ) -> Result<Refitted, FaceError> {
+    ) -> Result<FaceFit, FaceError> {
         begin(progress, FaceStep::Fit)?;
         let turn = self.axes.rotation();
         let own = |shape: &Vec<Vec3>| -> Vec<Vec3> {
@@ -61,11 +61,11 @@ impl FaceAnalysis {
         face.weights = self.with_neck(&found.weights, &face.weights);
         let pose = |moved: &BoneMove| BonePose { translation: moved.translation, rotation: moved.rotation };
         let poses = found.moves.iter().map(|moves| moves.iter().map(pose).collect()).collect();
-        Ok(Refitted { face, poses, error: found.error })
+        Ok(FaceFit { face, poses, error: found.error })
     }
 
-    /// Weights over the head (0) and bones (from 1) as weights over neck, head and bones: where the neck held a part of
-    /// what the bones leave, it still does.
+    /// Converts weights over the head (0) and bones (from 1) to weights over neck, head and bones: the neck keeps its
+    /// former part of the head's share.
     fn with_neck(&self, fitted: &Weights, before: &Weights) -> Weights {
         let mut weights = Weights::default();
         for point in 0..fitted.len() {

@@ -1,14 +1,15 @@
-//! How well the planes across the axes mirror a mesh.
+//! Mirror symmetry of a mesh across the planes at right angles to the axes.
 
 use glam::Vec3;
 
-/// Cells along each side of the pictures.
+/// Cells along each side of the occupancy grid.
 const CELLS: i32 = 40;
 
-/// For each axis, how unlike the mesh is to its mirror image across the plane through `center`: 0 for alike, 1 for not at
-/// all.
+/// Asymmetry for each axis: the difference of the mesh from its mirror image across the plane through `center`, 0 for
+/// equal, 1 for disjoint.
 ///
-/// Compares which cells of a grid the surface passes, with neighbours allowed for a cell's worth of rounding.
+/// Compares the grid cells that the surface passes; neighbouring cells count as equal, which allows for rounding by a
+/// cell.
 pub fn skew(points: &[Vec3], triangles: &[[u32; 3]], center: Vec3, size: f32) -> Vec3 {
     let mut filled = vec![false; (CELLS * CELLS * CELLS) as usize];
     let scale = CELLS as f32 * 0.495 / size;

@@ -8,7 +8,7 @@ use crate::algo::face::{
     shells::{ShellKind, Shells},
 };
 
-/// Adds the bones of jaw and eyes: fixed ones where they are, others if `wanted` and the mesh has them.
+/// Adds the bones of jaw and eyes: fixed ones at their places, others if `wanted` and the mesh has them.
 pub(super) fn add(
     points: &[Vec3],
     shells: &Shells,
@@ -45,7 +45,7 @@ pub(super) fn add(
     }
 }
 
-/// The middle of an eyeball: that of the sphere which fits its points best, or of its box if there is none nearby.
+/// Centre of an eyeball: that of the best-fitting sphere, or of its box if no sphere fits nearby.
 fn ball_center(ball: &[Vec3]) -> Option<Vec3> {
     let low = ball.iter().copied().reduce(Vec3::min)?;
     let high = ball.iter().copied().reduce(Vec3::max)?;

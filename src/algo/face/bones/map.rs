@@ -1,10 +1,10 @@
-//! The map of a face: which part of it a place belongs to, measured from the landmarks.
+//! Map of a face: the part of the face at a place, measured from the landmarks.
 
 use glam::Vec3;
 
 use crate::algo::face::landmarks::Landmarks;
 
-/// Landmarks of less confidence say nothing about lids and lips.
+/// Least confidence at which landmarks locate lids and lips.
 const TRUSTED: f32 = 0.3;
 
 /// A part of the face that is clustered on its own.
@@ -38,7 +38,7 @@ pub(crate) struct Half {
     pub jaw: [Vec3; 9],
 }
 
-/// Both halves of a face, to look places up in.
+/// Both halves of a face, in which places are looked up.
 #[derive(Debug, Clone)]
 pub(crate) struct FaceMap {
     /// Left (+x), then right.
@@ -47,13 +47,13 @@ pub(crate) struct FaceMap {
     pub middle: f32,
     /// The distance of the outer corners of the eyes, or a guess.
     pub scale: f32,
-    /// False where the landmarks say too little: then everything is cheek.
+    /// Trust in the landmarks; without it every place is cheek.
     pub trusted: bool,
 }
 
 impl FaceMap {
-    /// From the landmarks; `symmetric` makes both halves their mean. `size` stands in for the eyes' distance where there
-    /// is none.
+    /// Makes the map of landmarks; `symmetric` makes both halves their mean. `size` replaces a missing distance of the
+    /// eyes.
     pub fn new(landmarks: &Landmarks, symmetric: bool, size: f32) -> Self {
         let middle = if landmarks.middle.is_finite() { landmarks.middle } else { 0.0 };
         let at = |i: usize, side: f32| {
@@ -89,14 +89,14 @@ impl FaceMap {
         Self { halves: [left, right], middle, scale, trusted }
     }
 
-    /// The half of a place and the place in it.
+    /// The half at a place, and the place in the half's coordinates.
     pub fn fold(&self, p: Vec3) -> (&Half, Vec3) {
         let x = p.x - self.middle;
         let half = if x < 0.0 { &self.halves[1] } else { &self.halves[0] };
         (half, Vec3::new(x.abs(), p.y, p.z))
     }
 
-    /// The part that a place on the skin belongs to.
+    /// The part at a place on the skin.
     pub fn part(&self, place: Vec3) -> Part {
         if !self.trusted {
             return Part::Cheek;
@@ -144,7 +144,7 @@ impl FaceMap {
         if p.y < height(&[corner, half.jaw[6]], p.x) { Part::Jaw } else { Part::Cheek }
     }
 
-    /// How near a place is to brows, eyes, nose and mouth: 1 on them, falling to 0 over half the face.
+    /// Nearness of a place to brows, eyes, nose and mouth: 1 on them, falling to 0 over half the face.
     pub fn restless(&self, place: Vec3) -> f32 {
         if !self.trusted {
             return 0.0;
@@ -156,14 +156,15 @@ impl FaceMap {
         1.0 / (1.0 + far * far)
     }
 
-    /// How far inside the corner of the lips a place is, as a share of half the mouth's width; negative outside.
+    /// Distance of a place inwards from the corner of the lips, as a share of half the mouth's width; negative outside.
     pub fn lip_inset(&self, place: Vec3) -> f32 {
         let (half, p) = self.fold(place);
         let corner = half.lip_corner();
         (corner.x - p.x) / corner.x.max(1e-3 * self.scale)
     }
 
-    /// How far inside the nearer corner of an eye a place is, as a share of half the eye's width; negative outside.
+    /// Distance of a place inwards from the nearer corner of an eye, as a share of half the eye's width; negative
+    /// outside.
     pub fn lid_inset(&self, place: Vec3) -> f32 {
         let (half, p) = self.fold(place);
         let (inner, outer) = (half.upper_lid[0], half.upper_lid[3]);
@@ -193,7 +194,7 @@ impl Half {
         mean(&mut self.jaw, &mut other.jaw);
     }
 
-    /// The corner of the mouth: between the corner of the red and that of the slit.
+    /// Corner of the mouth: between the outer corner of the lips and the end of the slit.
     pub fn lip_corner(&self) -> Vec3 {
         0.5 * (self.upper_lip[3] + self.upper_inner[2])
     }
@@ -220,7 +221,7 @@ impl Half {
             && p.y > height(&self.lower_lid, p.x)
     }
 
-    /// The part of the lips that a place belongs to, if any.
+    /// Part of the lips at a place, if any.
     fn lip(&self, p: Vec3, e: f32) -> Option<Part> {
         let over = p.y > height(&self.lip_line(), p.x);
         let corner = self.lip_corner();

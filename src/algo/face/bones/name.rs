@@ -9,7 +9,7 @@ use super::{
 };
 
 impl Region {
-    /// The word that labels begin with.
+    /// First word of the labels.
     pub fn word(self) -> &'static str {
         match self {
             Self::Forehead => "forehead",
@@ -26,7 +26,7 @@ impl Region {
 }
 
 impl Side {
-    /// The letter that labels end with.
+    /// Last letter of the labels.
     pub fn letter(self) -> char {
         match self {
             Self::Left => 'l',
@@ -36,7 +36,7 @@ impl Side {
     }
 }
 
-/// The region of a part, and its rank among the parts of one region.
+/// The region of a part, and the part's rank in the region.
 pub(crate) fn region(part: Part) -> (Region, u8) {
     match part {
         Part::Forehead => (Region::Forehead, 0),
@@ -63,7 +63,7 @@ pub(crate) fn name(seats: &[Seat], parts: &[Part], map: &FaceMap) -> Vec<FaceBon
         _ => Side::Left,
     };
     let partners = partners(seats, map);
-    // A right bone with a partner takes the number, region and place in the order of that.
+    // A right bone takes number, region and place in the order from its left partner.
     let lead = |i: usize| match partners[i] {
         Some(other) if side(&seats[i]) == Side::Right => other,
         _ => i,
@@ -111,7 +111,7 @@ pub(crate) fn name(seats: &[Seat], parts: &[Part], map: &FaceMap) -> Vec<FaceBon
     bones
 }
 
-/// Who mirrors whom: seats made as pairs, else those that are nearest to each other's mirror images.
+/// Partners by mirror symmetry: seats made as pairs, else seats nearest to each other's mirror images.
 fn partners(seats: &[Seat], map: &FaceMap) -> Vec<Option<usize>> {
     let mut partners = vec![None; seats.len()];
     for (i, a) in seats.iter().enumerate() {
@@ -143,7 +143,7 @@ fn partners(seats: &[Seat], map: &FaceMap) -> Vec<Option<usize>> {
     partners
 }
 
-/// The bones of jaw and eyes, which come on top of those of the skin.
+/// A bone of jaw or eyes, which come on top of the skin's bones.
 pub(crate) fn extra(position: Vec3, kind: FaceBoneKind, side: Side) -> FaceBone {
     let region = if kind == FaceBoneKind::Eye { Region::Eye } else { Region::Jaw };
     let label = super::label(region, side, 1, kind);

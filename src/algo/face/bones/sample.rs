@@ -1,4 +1,4 @@
-//! Places spread evenly over the visible skin of the facial mask.
+//! Sample points spread evenly over the visible skin of the facial mask.
 
 use glam::Vec3;
 
@@ -8,12 +8,12 @@ use crate::algo::face::{
     shells::{ShellKind, Shells},
 };
 
-/// Cells along the longer side of the grid that tells what is hidden.
+/// Cells along the longer side of the grid of depths.
 const CELLS: usize = 160;
-/// How far behind the front, as a share of the face's scale, skin counts as hidden.
+/// Depth behind the front from which skin counts as hidden, as a share of the face's scale.
 const HIDDEN: f32 = 0.06;
 
-/// Which points of the mask are seen from the front: skin, not the inner walls of mouth, nose and sockets.
+/// Marks points of the mask that are visible from the front: skin, not the inner walls of mouth, nose and sockets.
 ///
 /// Linear in the triangles: their corners and middles are laid into a grid of depths.
 pub(crate) fn visible_mask(
@@ -61,7 +61,7 @@ pub(crate) fn visible_mask(
     }
     for (p, seen) in points.iter().zip(&mut seen).filter(|(_, seen)| **seen) {
         let (x, y) = of(*p);
-        // The shallowest of the cells around: skin that falls away steeply is not behind itself.
+        // The shallowest of the cells around is compared: skin that falls away steeply does not hide itself.
         let mut least = f32::INFINITY;
         for y in y.saturating_sub(1)..=(y + 1).min(CELLS) {
             for x in x.saturating_sub(1)..=(x + 1).min(CELLS) {
@@ -73,14 +73,14 @@ pub(crate) fn visible_mask(
     seen
 }
 
-/// The triangles of one side of one part, to sample.
+/// The triangles of one side of one part, for sampling.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Patch {
     /// Corners of each triangle.
     pub corners: Vec<[Vec3; 3]>,
-    /// What each weighs.
+    /// Mass of each triangle.
     pub masses: Vec<f64>,
-    /// Lone points, where there is no area.
+    /// Points without triangles, where there is no area.
     pub points: Vec<Vec3>,
 }
 
@@ -90,7 +90,7 @@ impl Patch {
         self.masses.iter().sum()
     }
 
-    /// True where there is nothing to sample.
+    /// Returns `true` without triangles and points.
     pub fn is_empty(&self) -> bool {
         self.corners.is_empty() && self.points.is_empty()
     }
@@ -156,7 +156,8 @@ pub(crate) fn patches(
     patches
 }
 
-/// How much more a part of the face moves than plain skin; `near` is 1 beside eyes, nose and mouth, 0 far from them.
+/// Density of samples relative to plain skin, for the mobility of a part of the face; `near` is 1 beside eyes, nose and
+/// mouth, 0 far from them.
 fn density(part: Part, near: f32) -> f64 {
     let own = match part {
         Part::Nose => 1.3,

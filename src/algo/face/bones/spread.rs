@@ -1,4 +1,4 @@
-//! How many bones each part of the face gets, and where k-means puts them.
+//! Distribution of bones among the parts of the face, and their places by k-means.
 
 use glam::Vec3;
 
@@ -10,14 +10,14 @@ const SAMPLES: usize = 96;
 /// The most rounds of one run.
 const ROUNDS: usize = 100;
 
-/// A part of the face as the clustering sees it.
+/// Rules of the clustering for a part of the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PartRule {
-    /// Its share of the bones.
+    /// Share of the bones.
     pub share: f64,
-    /// True for parts that each side has on its own, false for those that cross the middle.
+    /// Marks parts that each side has on its own; other parts cross the middle.
     pub lateral: bool,
-    /// The most bones it takes.
+    /// Largest number of bones.
     pub most: usize,
 }
 
@@ -37,7 +37,7 @@ pub(crate) const PARTS: [PartRule; 7] = [
 pub(crate) struct Seat {
     pub place: Vec3,
     pub part: usize,
-    /// On the middle plane.
+    /// Marks a seat on the middle plane.
     pub middle: bool,
     /// Number of the pair, if it has a mirror image.
     pub pair: Option<usize>,
@@ -53,29 +53,30 @@ pub(crate) struct Fixed {
     pub middle: bool,
 }
 
-/// What is known of a half before it is clustered: fixed places, two to a slot where both sides are fixed.
+/// Fixed places of a half before it is clustered, two in one slot where both sides are fixed.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     first: Fixed,
     second: Option<Fixed>,
 }
 
-/// The bones of each part: `bones` in all, at least `least` each, none where there is nothing.
+/// Number of bones of each part: `bones` in all, at least `least` each, none for an empty part.
 ///
-/// Highest averages: the next bone, or pair of bones, goes where a part's share by its bones is largest.
+/// By the method of highest averages: the next bone, or pair of bones, goes to the part with the largest share per
+/// bone.
 pub(crate) fn quotas(bones: usize, least: &[usize], empty: &[bool], paired: bool) -> Vec<usize> {
     let mut quotas = least.to_vec();
     let mut left = bones.saturating_sub(quotas.iter().sum());
     while left > 0 {
         let mut best: Option<(f64, usize, usize)> = None;
         for (part, rule) in PARTS.iter().enumerate().filter(|(part, _)| !empty[*part]) {
-            // Where nothing else fits, a part of the middle takes any number; the rest has no limit.
+            // If nothing else fits, a part in the middle takes any number; the rest has no limit.
             let cost = if rule.lateral && paired { 2 } else { 1 };
             let have = quotas[part];
             if cost > left || have + cost > rule.most {
                 continue;
             }
-            // The rest comes late: a few bones are better spent on lips, brows and lids.
+            // The rest comes late: a few bones are more useful on lips, brows and lids.
             let offset = if part == 0 { 1.0 } else { 0.5 * cost as f64 };
             let score = rule.share / (have as f64 + offset);
             if best.is_none_or(|b| score > b.0) {
@@ -89,7 +90,7 @@ pub(crate) fn quotas(bones: usize, least: &[usize], empty: &[bool], paired: bool
     quotas
 }
 
-/// Runs k-means for one part.
+/// k-means of one part.
 pub(crate) struct Spreader<'a> {
     pub map: &'a FaceMap,
     pub settings: &'a FaceBonesSettings,
@@ -99,7 +100,7 @@ pub(crate) struct Spreader<'a> {
 }
 
 impl Spreader<'_> {
-    /// Seats of a part whose sides are told apart: `count` in all.
+    /// Seats of a part with separate sides: `count` in all.
     pub fn plain(
         &mut self,
         part: usize,
@@ -128,8 +129,8 @@ impl Spreader<'_> {
 
     /// Seats of a part in pairs, and on the middle plane where the part crosses it: `count` in all.
     ///
-    /// The samples of both sides are folded onto one. Of a part that crosses the plane, a strip along it as wide as its
-    /// bones are high is clustered on the plane, the rest beside it in pairs.
+    /// The samples of both sides are folded onto one. In a part that crosses the plane, a strip along the plane is
+    /// clustered on it, as wide as its bones are high, and the rest beside the strip in pairs.
     pub fn mirrored(
         &mut self,
         part: usize,
@@ -218,7 +219,7 @@ impl Spreader<'_> {
         slots
     }
 
-    /// The least seats that the fixed places of a part need when partners are counted.
+    /// Least number of seats for the fixed places of a part, with their partners.
     pub fn needed(&self, fixed: &[Fixed]) -> usize {
         fixed.iter().filter(|f| f.middle).count() + 2 * self.slots(fixed).len()
     }
@@ -253,9 +254,10 @@ fn area(c: &[Vec3; 3]) -> f64 {
     0.5 * f64::from((c[1] - c[0]).cross(c[2] - c[0]).length())
 }
 
-/// How many of `count` bones stand on the middle plane; sorts `folded` by its distance from the plane.
+/// Number of the `count` bones on the middle plane; sorts `folded` by its distance from the plane.
 ///
-/// As many as make the strip along the plane as wide as each of its bones is high, and leave an even number.
+/// The number makes the strip along the plane as wide as each of its bones is high, and leaves an even number beside
+/// it.
 fn middle_count(folded: &mut [Vec3], count: usize, least: usize, most: usize, area: f64) -> usize {
     folded.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
     let parity = count % 2;
@@ -278,7 +280,7 @@ fn middle_count(folded: &mut [Vec3], count: usize, least: usize, most: usize, ar
     best.1
 }
 
-/// Where the centroid `own` comes to rest when all others stay.
+/// Final place of the centroid `own` when all others stay.
 fn settle(points: &[Vec3], centroids: &[Vec3], own: usize) -> Vec3 {
     let mut centroids = centroids.to_vec();
     for _ in 0..8 {

@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::{
     BonePose, Mix, UnitSet,
-    gates::{Gates, Known},
+    openings::{OpeningLines, OpeningSide},
     pitch,
     text::{Part, UnitMove},
     yaw,
@@ -17,12 +17,12 @@ use crate::algo::face::{
 /// The field, ready to be sampled at points of the rest pose.
 pub(super) struct Field {
     scale: f32,
-    gates: Gates,
+    opening_lines: OpeningLines,
     sources: Vec<Source>,
-    /// How far the jaw is open, and about which point it turns.
+    /// Rotation of the jaw, and its pivot.
     jaw: Quat,
     pivot: Vec3,
-    /// How the left and the right eye turn.
+    /// Rotations of the left and the right eye.
     eyes: [Quat; 2],
 }
 
@@ -37,15 +37,15 @@ struct Source {
 struct Move {
     center: Vec3,
     by: Vec3,
-    /// One over the radii.
+    /// Reciprocals of the radii.
     narrow: [f32; 2],
     part: Part,
 }
 
 impl Field {
-    /// `None` if the landmarks are degenerate. The jaw turns about the jaw bone if there is one.
+    /// Makes the field; `None` if the landmarks are degenerate. The jaw turns about the jaw bone if there is one.
     pub fn new(mix: &Mix, units: &UnitSet, bones: &[FaceBone], landmarks: &Landmarks) -> Option<Self> {
-        let gates = Gates::new(landmarks)?;
+        let opening_lines = OpeningLines::new(landmarks)?;
         let distance = landmarks.eye_distance();
         let mut sources = Vec::new();
         let mut open = 0.0;
@@ -65,7 +65,7 @@ impl Field {
         let jaw_bone = bones.iter().find(|bone| bone.kind == FaceBoneKind::Jaw);
         Some(Self {
             scale: 1.0 / distance,
-            gates,
+            opening_lines,
             sources,
             jaw: pitch(open.clamp(0.0, 35.0)),
             pivot: jaw_bone.map_or_else(|| hinge(landmarks), |bone| bone.position),
@@ -73,27 +73,27 @@ impl Field {
         })
     }
 
-    /// How far the skin at `point` goes, in units of the mesh.
-    pub fn at(&self, point: Vec3, known: Known) -> Vec3 {
+    /// Displacement of the skin at `point`, in units of the mesh.
+    pub fn at(&self, point: Vec3, known: OpeningSide) -> Vec3 {
         let arm = point - self.pivot;
-        let mut sum = (self.jaw * arm - arm) * self.gates.jaw(point, known);
+        let mut sum = (self.jaw * arm - arm) * self.opening_lines.jaw(point, known);
         for source in &self.sources {
-            let share = self.gates.side(point, source.side) * source.strength;
+            let share = self.opening_lines.side(point, source.side) * source.strength;
             if share > 0.0 {
-                sum += source.at(point, known, self.scale, &self.gates) * (share / self.scale);
+                sum += source.at(point, known, self.scale, &self.opening_lines) * (share / self.scale);
             }
         }
         sum
     }
 
-    /// How a jaw or eye bone turns.
+    /// Pose of a jaw or eye bone.
     pub fn turn(&self, bone: &FaceBone) -> BonePose {
         let rotation = match bone.kind {
             FaceBoneKind::Skin => Quat::IDENTITY,
             FaceBoneKind::Jaw => self.jaw,
             FaceBoneKind::Eye => {
                 let [left, right] = self.eyes;
-                if self.gates.side(bone.position, 0) >= 0.5 { left } else { right }
+                if self.opening_lines.side(bone.position, 0) >= 0.5 { left } else { right }
             }
         };
         BonePose { translation: Vec3::ZERO, rotation }
@@ -101,8 +101,8 @@ impl Field {
 }
 
 impl Source {
-    /// In eye distances: near each place what was asked for, in between a blend, and less with distance.
-    fn at(&self, point: Vec3, known: Known, scale: f32, gates: &Gates) -> Vec3 {
+    /// Displacement in eye distances: near each place its own movement, in between a blend, and less with distance.
+    fn at(&self, point: Vec3, known: OpeningSide, scale: f32, opening_lines: &OpeningLines) -> Vec3 {
         let (mut sum, mut weights, mut outside) = (Vec3::ZERO, 0.0, 1.0);
         for one in &self.moves {
             let off = (point - one.center) * scale;
@@ -110,7 +110,7 @@ impl Source {
             if square >= 1.0 {
                 continue;
             }
-            let part = gates.part(one.part, point, known);
+            let part = opening_lines.part(one.part, point, known);
             let near = (1.0 - square) * (1.0 - square) * part;
             let weight = near / (square + 0.05);
             sum += one.by * weight;
@@ -144,7 +144,7 @@ impl Move {
     }
 }
 
-/// About where the lower jaw hangs: a little in front of and below the ears, where the outline begins.
+/// Approximate hinge of the lower jaw: a little in front of and below the ears, where the outline begins.
 fn hinge(landmarks: &Landmarks) -> Vec3 {
     let points = &landmarks.points;
     let outline = (points[0] + points[16] + points[1] + points[15]) * 0.25;

@@ -1,4 +1,4 @@
-//! Sets of units and expressions, those that come with the program among them.
+//! Sets of units and expressions, with the bundled ones.
 
 use std::{borrow::Cow, sync::LazyLock};
 
@@ -38,12 +38,12 @@ impl UnitSet {
         &self.units
     }
 
-    /// The place of a unit.
+    /// Index of a unit.
     pub fn index(&self, name: &str) -> Option<usize> {
         self.units.iter().position(|unit| unit.name == name)
     }
 
-    /// Adds the units of a file; none if there is an error: a malformed text or a name that is taken.
+    /// Adds the units of a file; adds none on an error (a malformed text or a name that is taken).
     pub fn add(&mut self, text: &str, file: &str) -> Result<(), ExpressionError> {
         let units = Unit::parse_list(text, file)?;
         if let Some(unit) = units.iter().find(|unit| self.index(&unit.name).is_some()) {
@@ -63,9 +63,9 @@ pub struct ExpressionSet {
 }
 
 impl ExpressionSet {
-    /// What comes with the program: neutral, happiness, anger, sadness, fear, disgust, surprise, and their units.
+    /// The bundled set: neutral, happiness, anger, sadness, fear, disgust, surprise, and their units.
     pub fn bundled() -> &'static Self {
-        // That the files have no errors is for a test to say.
+        // A test checks that the files have no errors.
         static BUNDLED: LazyLock<ExpressionSet> = LazyLock::new(|| {
             let files: Vec<(&str, &str)> = ExpressionSet::bundled_files().collect();
             ExpressionSet::parse(&files).unwrap_or_default()
@@ -77,7 +77,7 @@ impl ExpressionSet {
     /// may come after the expressions that use them.
     ///
     /// # Errors
-    /// The first of: a malformed text, a name that is taken, a unit that there is not.
+    /// The first of: a malformed text, a name that is taken, an unknown unit.
     pub fn parse(files: &[(&str, &str)]) -> Result<Self, ExpressionError> {
         let mut set = Self::default();
         let are_units = |file: &str| file.ends_with(".units.ron");
@@ -90,7 +90,7 @@ impl ExpressionSet {
         Ok(set)
     }
 
-    /// The bundled files: name and text, those of units first.
+    /// The bundled files: name and text, files of units first.
     pub fn bundled_files() -> impl Iterator<Item = (&'static str, &'static str)> {
         UNITS.into_iter().chain(EXPRESSIONS)
     }
@@ -105,17 +105,17 @@ impl ExpressionSet {
         self.units.units()
     }
 
-    /// The units as what mixes are made of.
+    /// The units as the set from which mixes are made.
     pub fn unit_set(&self) -> &UnitSet {
         &self.units
     }
 
-    /// Happiness, anger, sadness, fear, disgust and surprise, as far as the set has them.
+    /// Happiness, anger, sadness, fear, disgust and surprise, those that the set has.
     pub fn six(&self) -> impl Iterator<Item = &Expression> {
         SIX.iter().filter_map(|name| self.get(name))
     }
 
-    /// The names of the expressions, then those of the units.
+    /// Names of the expressions, then of the units.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let expressions = self.expressions.iter().map(|expression| expression.name.as_str());
         expressions.chain(self.units().iter().map(|unit| unit.name.as_str()))
@@ -126,8 +126,8 @@ impl ExpressionSet {
         self.expressions.iter().find(|expression| expression.name == name)
     }
 
-    /// The expression of a name, or a unit as an expression of its own: on both sides, or with `_l` or `_r` after its
-    /// name on one.
+    /// The expression of a name, or a unit as an expression of its own: on both sides, or on one with `_l` or `_r`
+    /// after its name.
     pub fn find(&self, name: &str) -> Option<Cow<'_, Expression>> {
         if let Some(expression) = self.get(name) {
             return Some(Cow::Borrowed(expression));

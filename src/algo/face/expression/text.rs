@@ -1,4 +1,4 @@
-//! The files of units and expressions: RON that a person can read and write, checked while it is read.
+//! File format of units and expressions: RON that a person can read and write, checked on reading.
 
 use std::fmt;
 
@@ -6,113 +6,114 @@ use glam::Vec3;
 use ron::{Options, extensions::Extensions, ser::PrettyConfig};
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned, de::Error};
 
-/// The longest text that is read, in bytes.
+/// Largest length of a text in bytes.
 pub const MAX_TEXT: usize = 256 << 10;
-/// The most units, moves or uses in one list.
+/// Largest number of units, moves or uses in one list.
 const MOST: usize = 256;
-/// The longest name, in bytes.
+/// Longest name in bytes.
 const LONGEST_NAME: usize = 64;
 
-/// Something wrong in a file of units or expressions, and where.
+/// Error in a file of units or expressions, with its place.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: line {line}, column {column}: {message}")]
 pub struct ExpressionError {
-    /// The file, as the caller calls it.
+    /// Name of the file, given by the caller.
     pub file: String,
-    /// 1-based line.
+    /// Line, from 1.
     pub line: usize,
-    /// 1-based column, in characters.
+    /// Column in characters, from 1.
     pub column: usize,
-    /// What is wrong and what to do.
+    /// Description of the problem, with a hint.
     pub message: String,
 }
 
-/// What one muscle, or a group that acts as one, does to the face.
+/// Movement of the face by one muscle, or a group that acts as one.
 ///
 /// Written for the character's left (+x), the right is its mirror image. Lengths are in eye distances (landmarks 36 to
 /// 45), x to the side, away from the middle, y up, z to the front.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unit {
-    /// Its name, such as `lip_corner_pull`.
+    /// Name, such as `lip_corner_pull`.
     #[serde(deserialize_with = "name")]
     pub name: String,
-    /// Which muscle, and what is seen.
+    /// Description: the muscle and its visible effect.
     #[serde(default)]
     pub about: String,
-    /// The most that several expressions may add up to.
+    /// Largest sum of strengths in a blend of expressions.
     #[serde(default = "one", deserialize_with = "limit")]
     pub limit: f32,
-    /// How the skin moves.
+    /// Movements of the skin.
     #[serde(default, deserialize_with = "few")]
     pub moves: Vec<UnitMove>,
-    /// How far the jaw opens, in degrees.
+    /// Opening of the jaw in degrees.
     #[serde(default, deserialize_with = "angle")]
     pub jaw: f32,
-    /// How the eyeballs turn.
+    /// Rotation of the eyeballs.
     #[serde(default)]
     pub gaze: Gaze,
 }
 
-/// A turn of an eyeball in degrees.
+/// Rotation of an eyeball in degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Gaze {
-    /// To the side, away from the nose.
+    /// Angle to the side, away from the nose.
     #[serde(deserialize_with = "angle")]
     pub out: f32,
-    /// Up.
+    /// Angle upwards.
     #[serde(deserialize_with = "angle")]
     pub up: f32,
 }
 
-/// A place of the skin, and where it goes.
+/// Movement of a place of the skin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UnitMove {
-    /// The mean of these landmarks (Multi-PIE numbers, those of the character's left).
+    /// Landmarks whose mean is the place (Multi-PIE numbers of the character's left).
     #[serde(deserialize_with = "marks")]
     pub at: Vec<u8>,
-    /// Added to it.
+    /// Offset added to the mean of `at`.
     #[serde(default, deserialize_with = "vector")]
     pub offset: Vec3,
-    /// Where it goes from there.
+    /// Displacement of the place.
     #[serde(default, deserialize_with = "vector")]
     pub by: Vec3,
-    /// Added to `by`: a share of the way from `at` to the mean of these landmarks, such as one lid to the other.
+    /// Landmarks whose mean gives a direction from `at`, such as from one lid to the other; a share of the way is added
+    /// to `by`.
     #[serde(default, deserialize_with = "targets")]
     pub toward: Vec<u8>,
-    /// How much of that way; negative is away from them.
+    /// Share of the way to `toward`; negative is away from it.
     #[serde(default, deserialize_with = "share")]
     pub share: f32,
-    /// How far the skin around goes along: the radii of an ellipse, in x and y.
+    /// Reach of the movement in the skin around: the radii of an ellipse, in x and y.
     #[serde(deserialize_with = "reach")]
     pub reach: (f32, f32),
-    /// Which skin this is for.
+    /// Skin that the movement applies to.
     #[serde(default)]
     pub part: Part,
 }
 
-/// The skin that a move is for. Lips part at the mouth's line, lids at the eye's; beyond the corners both blend.
+/// Skin that a move applies to. Lips divide at the mouth's line, lids at the eye's; beyond the corners both blend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Part {
-    /// All.
+    /// The whole skin.
     #[default]
     Everywhere,
-    /// What is above the mouth.
+    /// Skin above the mouth's line.
     UpperLip,
-    /// What is below it.
+    /// Skin below the mouth's line.
     LowerLip,
-    /// What is above the eye.
+    /// Skin above the eye's line.
     UpperLid,
-    /// What is below it.
+    /// Skin below the eye's line.
     LowerLid,
 }
 
-/// One side of the face, or both.
+/// Side of the face, or both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Sides {
-    /// Both.
+    /// Both sides.
     #[default]
     Both,
     /// The character's left, +x.
@@ -122,44 +123,44 @@ pub enum Sides {
 }
 
 impl Sides {
-    /// Whether 0, the left, or 1, the right, belongs to it.
+    /// Returns `true` if side 0 (left) or 1 (right) is included.
     pub(super) fn has(self, side: usize) -> bool {
         matches!((self, side), (Self::Both, _) | (Self::Left, 0) | (Self::Right, 1))
     }
 }
 
-/// Units at strengths, under a name.
+/// Named combination of units with strengths.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expression {
-    /// Its name, such as `happiness`.
+    /// Name, such as `happiness`.
     #[serde(deserialize_with = "name")]
     pub name: String,
-    /// What it looks like.
+    /// Description of the appearance.
     #[serde(default)]
     pub about: String,
-    /// What it is made of.
+    /// Units of the expression.
     #[serde(deserialize_with = "few")]
     pub units: Vec<UnitUse>,
 }
 
-/// A unit in an expression.
+/// Use of a unit in an expression.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UnitUse {
-    /// Its name.
+    /// Name of the unit.
     #[serde(deserialize_with = "name")]
     pub unit: String,
-    /// On which side.
+    /// Side of the unit.
     #[serde(default)]
     pub side: Sides,
-    /// How strongly, 0 to 1.
+    /// Strength, 0 to 1.
     #[serde(default = "one", deserialize_with = "strength")]
     pub strength: f32,
 }
 
 impl Unit {
-    /// Reads a file of units; `file` is what errors call it. Names are unique in it.
+    /// Reads a file of units; `file` is its name in errors. Names are unique in it.
     pub fn parse_list(text: &str, file: &str) -> Result<Vec<Self>, ExpressionError> {
         #[derive(Deserialize)]
         #[serde(transparent)]
@@ -181,19 +182,19 @@ impl Unit {
 }
 
 impl Expression {
-    /// Reads a file with one expression; `file` is what errors call it. Whether its units exist is checked by
-    /// [`ExpressionSet::add`](super::ExpressionSet::add).
+    /// Reads a file with one expression; `file` is its name in errors.
+    /// [`ExpressionSet::add`](super::ExpressionSet::add) checks that its units exist.
     pub fn parse(text: &str, file: &str) -> Result<Self, ExpressionError> {
         parse(text, file)
     }
 
-    /// The text of its file.
+    /// The text of the expression's file.
     pub fn to_text(&self) -> Result<String, ron::Error> {
         ron::ser::to_string_pretty(self, PrettyConfig::default())
     }
 }
 
-/// Reads any of our values.
+/// Reads a value of any of these types.
 fn parse<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, ExpressionError> {
     if text.len() > MAX_TEXT {
         let message =
@@ -225,7 +226,7 @@ pub(super) fn located(text: &str, file: &str, offset: usize, message: String) ->
     }
 }
 
-/// Where a name in quotes is last in a text, 0 if nowhere.
+/// Byte offset of the last quoted occurrence of a name in a text, 0 without one.
 pub(super) fn last_quoted(text: &str, name: &str) -> usize {
     text.rfind(&format!("\"{name}\"")).unwrap_or(0)
 }
@@ -234,7 +235,7 @@ fn one() -> f32 {
     1.0
 }
 
-/// A number in a range; `what` and the range are told otherwise.
+/// A number in a range; the error names `what` and the range.
 fn number<'de, D: Deserializer<'de>>(reader: D, what: &str, least: f32, most: f32) -> Result<f32, D::Error> {
     checked(f32::deserialize(reader)?, what, least, most)
 }

@@ -1,24 +1,24 @@
-//! Where the face ends and the neck begins: the line of the jaw, seen from the side.
+//! Border between face and neck: the line of the jaw, seen from the side.
 
 use glam::{Vec2, Vec3};
 
 use super::profile;
 use crate::algo::face::landmarks::Landmarks;
 
-/// How far from the jaw's line still belongs to the face, as a share of the distance of the eyes: the line runs along
-/// the bone's edge, and landmarks that were found on a mesh are not exact.
+/// Distance from the jaw's line that still belongs to the face, as a share of the distance of the eyes: the line runs
+/// along the bone's edge, and landmarks found on a mesh are not exact.
 const MARGIN: f32 = 0.15;
 
 /// The jaw's line from ear to chin, as depth and height.
 pub struct Jaw {
-    /// By depth, hindmost first.
+    /// Places of the line by depth, hindmost first.
     line: Vec<Vec2>,
     margin: f32,
     chin: f32,
 }
 
 impl Jaw {
-    /// The lower of the two sides, so that no landmark is left out where they differ.
+    /// Makes the line of the lower of the two sides, so that it leaves no landmark out where they differ.
     pub fn new(landmarks: &Landmarks) -> Self {
         let mut line: Vec<Vec2> = (0..=8)
             .map(|index| {
@@ -27,7 +27,7 @@ impl Jaw {
             })
             .collect();
         line.sort_by(|a, b| a.x.total_cmp(&b.x));
-        // Never falling towards the back, as a line of found landmarks may by mistake.
+        // The line must not fall towards the back, as a line of wrong landmarks may.
         let mut lowest = f32::MAX;
         for place in &mut line {
             lowest = lowest.min(place.y);
@@ -43,7 +43,7 @@ impl Jaw {
         self.chin
     }
 
-    /// True if a point is not below the jaw.
+    /// Returns `true` if a point is not below the jaw.
     pub fn above(&self, point: Vec3) -> bool {
         let at = profile(point);
         let next = self.line.partition_point(|place| place.x < at.x);
@@ -52,12 +52,12 @@ impl Jaw {
             (Some(end), None) | (None, Some(end)) => end.y,
             (None, None) => f32::MIN,
         };
-        // The line is steep near the ears, so that nearness counts and not only height.
+        // The line is steep near the ears, so the distance counts and not only the height.
         at.y >= height || self.line.windows(2).any(|ends| near(at, ends[0], ends[1], self.margin))
     }
 }
 
-/// True if a place lies within `reach` of a segment.
+/// Returns `true` if a place lies within `reach` of a segment.
 fn near(at: Vec2, from: Vec2, to: Vec2, reach: f32) -> bool {
     let along = to - from;
     let share = ((at - from).dot(along) / along.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);

@@ -1,8 +1,8 @@
-//! Points spread evenly over a surface.
+//! Sample points spread evenly over a surface.
 
 use glam::Vec3;
 
-/// How many points.
+/// Number of points.
 const SAMPLES: usize = 2000;
 
 /// Points spread evenly over the area of triangles, the same every time.

@@ -1,29 +1,29 @@
-//! The head of a beast: spheres about its snout, and at which end that is.
+//! Head of a quadruped: spheres about its snout, and the search for the snout's end.
 
 use glam::Vec3;
 
 use super::{Body, Cut, PLANES, neck};
 use crate::mesh::adjacency;
 
-/// How far the neck may be, as a share of the way to the farthest place.
+/// Largest distance of the neck, as a share of the distance to the farthest place.
 const FARTHEST: f32 = 0.55;
-/// The neck of a beast ends where a ring is this much longer than the shortest.
+/// Widening of a ring, relative to the shortest one, at which a quadruped's neck ends.
 const WIDENS: f32 = 1.06;
-/// Rings of a head are so long at the least, as a share of the longest that may be its neck: a nose is no head.
+/// Least length of a head's rings, as a share of the longest ring up to its neck: a nose alone is no head.
 const HEAD: f32 = 0.4;
-/// Feet are lower than this share of the height.
+/// Largest height of feet, as a share of the body's height.
 const FEET: f32 = 0.12;
-/// How far out the ends of a beast begin, as a share of its half length.
+/// Distance at which the ends of a quadruped begin, as a share of its half length.
 const END: f32 = 0.4;
 
-/// What a sphere about the snout cuts out of the part that hangs together with it.
+/// Intersection of a sphere about the snout with the part connected to the snout.
 #[derive(Debug, Clone, Copy)]
 struct Ring {
     center: Vec3,
     length: f32,
 }
 
-/// Cuts a beast that looks along +z behind its head.
+/// Cuts a quadruped that looks along +z behind its head.
 pub(super) fn cut(body: &Body) -> Option<Cut> {
     let tip = tip(body)?;
     let from = body.places[tip];
@@ -32,7 +32,7 @@ pub(super) fn cut(body: &Body) -> Option<Cut> {
     let farthest = body.places.iter().map(|place| (*place - from).with_x(0.0).length()).fold(0.0, f32::max);
     let rings = rings(body, &away, tip, farthest);
     let lengths: Vec<f32> = rings.iter().map(|ring| ring.length).collect();
-    // No head reaches to the feet.
+    // A head does not reach to the feet.
     let ground = body.low.y + FEET * body.size().y;
     let feet = body.places.iter().zip(&away).filter(|(place, _)| place.y < ground).map(|(_, away)| *away);
     let last = (feet.fold(f32::MAX, f32::min) / farthest).min(FARTHEST) * PLANES as f32;
@@ -43,8 +43,8 @@ pub(super) fn cut(body: &Body) -> Option<Cut> {
     Some(Cut { away, reach, tip, plane: (center, toward) })
 }
 
-/// How much higher the middle of a beast stands at its front end (+z) than at its back, as a share of its height: a head
-/// is carried higher than a rump or a tail. None if it does not stand on legs, or upright.
+/// Height of a quadruped's middle at its front end (+z) above that at its back, as a share of its height: a head is
+/// carried higher than a rump or a tail. `None` if the body does not stand on legs, or is upright.
 pub fn carriage(body: &Body) -> Option<f32> {
     let size = body.size();
     if size.is_nan() || size.min_element() <= 0.0 || body.is_biped() || !body.stands(None) {
@@ -60,7 +60,7 @@ pub fn carriage(body: &Body) -> Option<f32> {
     Some((top(1.0) - top(-1.0)) / size.y)
 }
 
-/// The snout: far out along z, high, and in the middle.
+/// The snout: a place far out along z, high, and in the middle.
 fn tip(body: &Body) -> Option<usize> {
     let (island_of, islands) = adjacency::islands(&body.joined, body.places.len());
     let areas = body.areas(&body.joined, &island_of, islands);
@@ -75,7 +75,7 @@ fn tip(body: &Body) -> Option<usize> {
         .max_by(|a, b| worth(*a).total_cmp(&worth(*b)))
 }
 
-/// Rings at equal steps from the tip to `farthest`, of triangles that hang together with the tip nearer to it.
+/// Rings at equal steps from the tip to `farthest`, of triangles that are connected with the tip on its side.
 fn rings(body: &Body, away: &[f32], tip: usize, farthest: f32) -> Vec<Ring> {
     let ends = |triangle: &[u32; 3]| {
         let at = triangle.map(|corner| away[corner as usize]);
@@ -124,7 +124,7 @@ fn rings(body: &Body, away: &[f32], tip: usize, farthest: f32) -> Vec<Ring> {
     rings
 }
 
-/// Places that hang together so far.
+/// Union-find of connected places.
 struct Joined(Vec<u32>);
 
 impl Joined {

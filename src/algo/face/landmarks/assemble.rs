@@ -1,5 +1,5 @@
-//! From what was measured to 68 places: the mean face is bent until it passes through the measured features, and laid
-//! onto the skin.
+//! Assembly of the 68 landmarks: the mean face is bent until it passes through the measured features, and laid onto the
+//! skin.
 
 use glam::{Vec2, Vec3, vec2, vec3};
 
@@ -12,24 +12,24 @@ use super::{
     search::{Pose, fit_height},
 };
 
-/// What was measured on one head.
-pub(super) struct Measured {
+/// Measurements of one head.
+pub(super) struct Measurements {
     /// Normalised places of the landmarks (u, v), and the depth of the mean face there.
     pub places: [Vec3; 68],
-    /// Half way between the eyes, in head space.
+    /// Point half way between the eyes, in head space.
     pub center: Vec2,
     /// The eye distance.
     pub size: f32,
     /// Heights along the profile.
     pub profile: Profile,
-    /// True if both eye openings were found.
+    /// Marks that both eye openings were found.
     pub eyes: bool,
-    /// True if the lips' line and both its ends were found.
+    /// Marks that the lips' line and both its ends were found.
     pub lips: bool,
 }
 
-/// How far the corner at the nose lies beyond the visible opening, and how much lower, as shares of the opening's
-/// width: the opening narrows to a cleft there.
+/// Offset of the eye corner at the nose beyond and below the visible opening, as shares of the opening's width: the
+/// opening narrows to a cleft there.
 const CLEFT: Vec2 = vec2(0.12, 0.07);
 
 /// The corners of an eye from its opening: (outer, inner), in head space.
@@ -39,8 +39,8 @@ fn corners(eye: &EyeOpening) -> (Vec2, Vec2) {
     (eye.outer - vec2(along.x * 0.015, 0.0), inner)
 }
 
-/// Both openings if they were found and mirror each other well enough to be believed.
-fn believed(eyes: &[Option<EyeOpening>; 2], pose: &Pose) -> Option<[EyeOpening; 2]> {
+/// Both openings, if they were found and mirror each other closely.
+fn symmetric_openings(eyes: &[Option<EyeOpening>; 2], pose: &Pose) -> Option<[EyeOpening; 2]> {
     let [Some(right), Some(left)] = eyes else { return None };
     let flip = |place: Vec2| vec2(2.0 * pose.center.x - place.x, place.y);
     let far = 0.09 * pose.size;
@@ -48,14 +48,14 @@ fn believed(eyes: &[Option<EyeOpening>; 2], pose: &Pose) -> Option<[EyeOpening; 
     near.then(|| [right.clone(), left.clone()])
 }
 
-/// Bends the mean face through what the fine map shows. With `even`, both sides are made the same.
+/// Bends the mean face through the features of the fine map. With `even`, both sides are made the same.
 pub(super) fn measure(
     relief_map: &crate::algo::face::depth_map::DepthMap,
     pose: &Pose,
     eyes: &[Option<EyeOpening>; 2],
     even: bool,
-) -> Measured {
-    let eyes = believed(eyes, pose);
+) -> Measurements {
+    let eyes = symmetric_openings(eyes, pose);
     let (mut center, mut size) = (pose.center, pose.size);
     if let Some([right, left]) = &eyes {
         let ((a, b), (c, d)) = (corners(right), corners(left));
@@ -114,11 +114,11 @@ pub(super) fn measure(
         }
     }
     let lips = ends.iter().all(Option::is_some) && profile.slit > 0.008;
-    Measured { places, center, size, profile, eyes: eyes.is_some(), lips }
+    Measurements { places, center, size, profile, eyes: eyes.is_some(), lips }
 }
 
 fn set_eye(places: &mut [Vec3; 68], eye: &EyeOpening, side: usize, center: Vec2, size: f32) {
-    // Outer corner, upper lid from there, inner corner, lower lid back.
+    // Order: outer corner, upper lid from there, inner corner, lower lid back.
     let order: [usize; 6] = if side == 0 { [36, 37, 38, 39, 40, 41] } else { [45, 44, 43, 42, 47, 46] };
     let (outer, inner) = corners(eye);
     let along = |part: f32| eye.outer.x + (eye.inner.x - eye.outer.x) * part;
@@ -144,7 +144,7 @@ fn set_mouth(places: &mut [Vec3; 68], mean: &[Vec3; 68], profile: &Profile, ends
     let usual = |end: Option<(f32, f32)>| end.unwrap_or((-mean[48].x, line + mean[48].y - mean_line));
     let other = |own: Option<(f32, f32)>, other: Option<(f32, f32)>| usual(own.or(other));
     let own = [other(ends[0], ends[1]), other(ends[1], ends[0])];
-    // Mouths are nearly even; what the two ends differ by is half noise.
+    // Mouths are nearly symmetric; half of the difference of the two ends is noise.
     let half = |a: f32, b: f32| 0.75 * a + 0.25 * b;
     let sides = [0, 1].map(|i| (half(own[i].0, own[1 - i].0), half(own[i].1, own[1 - i].1)));
     for index in 48..68 {

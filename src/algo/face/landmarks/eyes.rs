@@ -1,4 +1,4 @@
-//! Eye openings: where the front view sees an eyeball, a hole or a dent between the lids.
+//! Eye openings: an eyeball, a hole or a dent between the lids in the front view.
 
 use glam::{Vec2, vec2};
 
@@ -13,7 +13,7 @@ pub(super) struct EyeOpening {
     pub outer: Vec2,
     /// The corner at the nose.
     pub inner: Vec2,
-    /// From the outer to the inner corner in even steps: heights of the lower and the upper lid.
+    /// Heights of the lower and the upper lid from the outer to the inner corner in even steps.
     pub lids: Vec<(f32, f32)>,
 }
 
@@ -29,7 +29,8 @@ impl EyeOpening {
     }
 }
 
-/// Looks for the opening of the eye on one side (`side` −1 right, 1 left). `eyeball` tells which triangles are eyeball.
+/// Looks for the opening of the eye on one side (`side` −1 right, 1 left). `eyeball` tells whether a triangle belongs
+/// to an eyeball.
 pub(super) fn find_opening(
     map: &DepthMap,
     pose: &Pose,
@@ -54,7 +55,7 @@ pub(super) fn find_opening(
     let scale = pose.size / frame.pixel;
     let least = (0.004 * scale * scale) as usize;
     if open.iter().filter(|&&open| open).count() < least {
-        // No hole and no eyeball: a dent that neither a tall nor a wide window fills.
+        // Without hole and eyeball: a dent that neither a tall nor a wide window fills.
         let (tall, wide) = (((0.085 * scale) as usize).max(2), ((0.2 * scale) as usize).max(2));
         let mut filled = vec![f32::INFINITY; width * height];
         for x in 0..width {
@@ -102,7 +103,7 @@ pub(super) fn find_opening(
     Some(EyeOpening { outer, inner, lids })
 }
 
-/// Closing along a line: what a window of `reach` either side cannot get into is filled.
+/// Morphological closing along a line: gaps narrower than a window of `reach` either side are filled.
 fn close(line: &[f32], reach: usize) -> Vec<f32> {
     let slide = |line: &[f32], pick: fn(f32, f32) -> f32| -> Vec<f32> {
         (0..line.len())
@@ -115,7 +116,7 @@ fn close(line: &[f32], reach: usize) -> Vec<f32> {
     slide(&slide(line, f32::max), f32::min)
 }
 
-/// The connected set (sides touching) that `judge` (area, bounds in pixels) likes most, if it likes any.
+/// The connected set (sides touching) with the highest positive score by `judge` (area, bounds in pixels), if any.
 fn largest(open: &[bool], width: usize, height: usize, judge: impl Fn(f32, Vec2, Vec2) -> f32) -> Option<Vec<bool>> {
     let mut label = vec![0u32; open.len()];
     let (mut best, mut best_worth, mut next) = (0, 0.0, 0);

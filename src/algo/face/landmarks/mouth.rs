@@ -13,7 +13,7 @@ pub(super) fn lip_corner(relief: &Relief, side: f32, start: f32, tall: f32) -> O
     let reach = 0.09 * tall;
     let half = (reach / STEP) as usize;
     let count = 2 * half + 1;
-    // How deep the valley at height `v` of a column is, on a line of `count` depths around the last height.
+    // Depth and height of the valley at height `v` of a column, on a line of `count` depths around the last height.
     let valley = |u: f32, around: f32, slack: usize| -> (f32, f32) {
         let span = half + slack;
         let mut line = relief.line(vec2(side * u, around + span as f32 * STEP), vec2(0.0, -STEP), count + 2 * slack);
@@ -45,7 +45,7 @@ pub(super) fn lip_corner(relief: &Relief, side: f32, start: f32, tall: f32) -> O
     }
     let end = track.iter().skip(8).position(|step| step.2 < 0.12 * strong)? + 8;
     let (u, _, _) = *track.get(end)?;
-    // Past the end the valley is lost, so the height is that a little before it.
+    // The valley is lost past its end, so the height is taken a little before it.
     let (_, v, _) = *track.get(end * 9 / 10)?;
     Some((u, v))
 }

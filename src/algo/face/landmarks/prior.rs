@@ -1,4 +1,4 @@
-//! What a face is like before looking at it: mean landmarks and the mean relief of adult heads.
+//! Prior of the landmark search: mean landmarks and the mean relief of adult heads.
 //!
 //! Normalised face coordinates: the origin half way between the outer eye corners at the height and depth of the four
 //! eye corners, the unit is the distance of the outer eye corners, axes as in head space. Means over measured heads,
@@ -23,7 +23,7 @@ pub(super) fn mean_landmarks() -> [Vec3; 68] {
     all
 }
 
-/// Right half and middle (x from the character's right is negative).
+/// Landmarks of the right half and the middle (x of the character's right is negative).
 const HALF: [(usize, [f32; 3]); 39] = [
     (0, [-0.820, 0.048, -0.587]),
     (1, [-0.811, -0.200, -0.557]),

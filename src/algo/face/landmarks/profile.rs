@@ -6,7 +6,7 @@ use super::relief::{Relief, smooth};
 
 /// Step along the profile, in eye distances.
 const STEP: f32 = 0.008;
-/// Where it begins and ends.
+/// Start and end of the profile, in eye distances.
 const TOP: f32 = 0.6;
 const BOTTOM: f32 = -1.7;
 
@@ -33,16 +33,16 @@ pub(super) struct Profile {
     pub pogonion: f32,
     /// The lower edge of the chin.
     pub menton: f32,
-    /// How far the lips' line lies behind the lips.
+    /// Depth of the lips' line behind the lips.
     pub slit: f32,
-    /// How far the nose stands out.
+    /// Height of the nose above the face.
     pub nose: f32,
 }
 
 /// Depths along the profile.
 pub(super) struct Curve {
     depths: Vec<f32>,
-    /// Columns beside the middle, for what runs across.
+    /// Columns beside the middle, for features that run across.
     beside: Vec<Vec<f32>>,
 }
 
@@ -52,9 +52,9 @@ impl Curve {
         let count = ((TOP - BOTTOM) / STEP) as usize;
         let lines = [-0.012f32, 0.0, 0.012].map(|u| relief.line(vec2(u, TOP), vec2(0.0, -STEP), count));
         let mut depths: Vec<f32> = (0..count).map(|i| lines.iter().map(|line| line[i]).sum::<f32>() / 3.0).collect();
-        // Below the last thing seen it falls away, so that a cut neck looks like one that recedes.
+        // Below the last covered pixel the profile falls away, so that a cut neck looks like a receding one.
         let seen = (0..count).rposition(|i| relief.at(0.0, TOP - i as f32 * STEP).is_some()).unwrap_or(0);
-        // Between open lips there may be nothing at all.
+        // Between open lips there may be no surface at all.
         let nothing: Vec<bool> = (0..seen).map(|i| relief.at(0.0, TOP - i as f32 * STEP).is_none()).collect();
         let mut first = 0;
         for run in nothing.chunk_by(|a, b| a == b) {
@@ -88,7 +88,7 @@ impl Curve {
         get(index) * (1.0 - part) + get(index + 1) * part
     }
 
-    /// How far a line lies behind short chords across the height `v`; a slit counts as a deep fold.
+    /// Depth of a line behind short chords across the height `v`; a slit counts as a deep fold.
     fn hollow(line: &[f32], v: f32, tall: f32) -> f32 {
         let here = Self::on(line, v);
         let chord = |reach: f32| 0.5 * (Self::on(line, v + reach * tall) + Self::on(line, v - reach * tall)) - here;
@@ -120,8 +120,8 @@ impl Curve {
         self.best(from, to, |v, depth| side * (a + slope * (v - from) - depth))
     }
 
-    /// The edges of open lips, upper and lower: the tallest stretch below the nose that lies far behind what is above
-    /// and below it.
+    /// Edges of open lips, upper and lower: the tallest stretch below the nose that lies far behind the skin above and
+    /// below it.
     fn gap(&self, subnasale: f32, tall: f32) -> Option<(f32, f32)> {
         let (start, count) = (subnasale - 0.08 * tall, (0.75 * tall / STEP) as usize);
         let line: Vec<f32> = (0..count).map(|i| self.at(start - i as f32 * STEP)).collect();
@@ -153,14 +153,14 @@ impl Curve {
         (best.1 > best.0 + 1).then_some((start - (best.0 as f32 - 0.5) * STEP, start - (best.1 as f32 - 0.5) * STEP))
     }
 
-    /// Finds the features; `tall` is how tall the face is for its width.
+    /// Finds the features; `tall` is the height of the face relative to its width.
     pub fn features(&self, tall: f32) -> Profile {
         let t = tall;
         let tip = self.best(-0.1 * t, -0.62 * t, |_, depth| depth);
         let glabella = self.best(0.15 * t, 0.42 * t, |v, depth| depth - 0.3 * (v - 0.25 * t).abs());
         let nasion = self.off_line(glabella, tip, 1.0);
         let subnasale = self.off_line(tip, tip - 0.34 * t, 1.0);
-        // The lips' line is the deepest fold that runs across, about where it usually is.
+        // The lips' line is the deepest fold that runs across, near its usual height.
         let across = |v: f32| {
             let sides: f32 = self.beside.iter().map(|line| Self::hollow(line, v, t)).sum();
             (Self::hollow(&self.depths, v, t) * 2.0 + sides) / (self.beside.len() + 2) as f32
@@ -175,7 +175,7 @@ impl Curve {
         let upper_lip = self.best(upper_edge + 0.02 * t, upper_edge + 0.15 * t, |_, depth| depth);
         let mut lower_lip = self.best(lower_edge - 0.02 * t, lower_edge - 0.15 * t, |_, depth| depth);
         if lower_lip > lower_edge - 0.03 * t {
-            // A lip that lies far behind the upper one is no maximum.
+            // A lip that lies far behind the upper one is not a maximum.
             lower_lip = self.off_line(lower_edge, lower_edge - 0.17 * t, -1.0);
         }
         let chin = self.best(lower_lip - 0.2 * t, lower_lip - 0.55 * t, |v, depth| {

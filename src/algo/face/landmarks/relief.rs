@@ -1,4 +1,4 @@
-//! The face close up: a fine depth map in normalised face coordinates.
+//! Close-up of the face: a fine depth map in normalised face coordinates.
 
 use glam::{Vec2, Vec3, vec2};
 
@@ -19,9 +19,9 @@ pub(super) fn close_up(pose: &Pose) -> DepthFrame {
 /// distances, too.
 #[derive(Debug)]
 pub(super) struct Relief<'a> {
-    /// What is seen.
+    /// Depth map of the visible surface.
     pub map: &'a DepthMap,
-    /// Where half way between the eyes is.
+    /// Point half way between the eyes, in head space.
     pub center: Vec2,
     /// The eye distance.
     pub size: f32,
@@ -33,7 +33,7 @@ impl Relief<'_> {
         self.map.sample(self.center + vec2(u, v) * self.size).map(|z| z / self.size)
     }
 
-    /// The place in head space that (u, v, depth) means.
+    /// Position in head space of (u, v, depth).
     pub fn place(&self, u: f32, v: f32, depth: f32) -> Vec3 {
         (self.center + vec2(u, v) * self.size).extend(depth * self.size)
     }
@@ -46,7 +46,7 @@ impl Relief<'_> {
     }
 }
 
-/// Fills gaps along a line straight from one end to the other.
+/// Fills gaps along a line by interpolating between their ends.
 pub(super) fn fill(raw: &[Option<f32>]) -> Vec<f32> {
     let mut filled: Vec<f32> = raw.iter().map(|depth| depth.unwrap_or(0.0)).collect();
     let mut last: Option<usize> = None;

@@ -1,7 +1,8 @@
-//! Where the face is: the plane of symmetry, the height of the eyes and the size of the face, from a coarse depth map.
+//! Position of the face: the plane of symmetry, the height of the eyes and the size of the face, from a coarse depth
+//! map.
 //!
-//! The mean relief of a face is laid over the map at every height and size; what remains after a fit of offset, pitch,
-//! bend and strength tells how well it matches.
+//! The mean relief of a face is laid over the map at every height and size; the residual of a fit of offset, pitch,
+//! bend and strength gives the quality of the match.
 
 use bevy::math::ops;
 use glam::{Vec2, Vec3};
@@ -9,20 +10,20 @@ use glam::{Vec2, Vec3};
 use super::prior::{RELIEF, RELIEF_STEP, RELIEF_TOP};
 use crate::algo::face::depth_map::DepthMap;
 
-/// Where the face is in head space.
+/// Position of the face in head space.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Pose {
-    /// Half way between the eyes.
+    /// Point half way between the eyes.
     pub center: Vec2,
     /// The distance of the outer eye corners.
     pub size: f32,
-    /// How well the mean relief matches, -1 to 1.
+    /// Quality of the match with the mean relief, -1 to 1.
     pub match_: f32,
-    /// How much deeper the relief is than the mean's.
+    /// Depth of the relief relative to the mean's.
     pub gain: f32,
-    /// How tall the face is for its width, relative to the mean's.
+    /// Ratio of height to width of the face, relative to the mean's.
     pub tall: f32,
-    /// The match less what speaks against a face here.
+    /// Quality of the match less penalties for implausible faces.
     pub worth: f32,
 }
 
@@ -51,10 +52,10 @@ pub(super) fn exact_mirror(points: &[Vec3], low: Vec3, high: Vec3) -> Option<f32
     })
 }
 
-/// Places where the map is more like its mirror image than near them, best first, at most `most`.
+/// Local maxima of the map's mirror symmetry, as x, best first, at most `most`.
 ///
-/// Between `from` and `to`, looking within `reach` either side and between the heights `rows`; depths that differ by
-/// more than `far` count as that.
+/// The search runs between `from` and `to`, within `reach` either side and between the heights `rows`; differences of
+/// depth are limited to `far`.
 pub(super) fn mirror_axes(
     map: &DepthMap,
     (from, to): (f32, f32),
@@ -101,7 +102,7 @@ pub(super) fn mirror_axes(
     found.into_iter().map(|(_, place)| place).collect()
 }
 
-/// For each row how far the head reaches from `middle` to the right (−x) and left (+x), over `solid` pixels.
+/// Reach of the head in each row from `middle` to the right (−x) and left (+x), over `solid` pixels.
 fn reaches(map: &DepthMap, solid: &[bool], middle: f32) -> Vec<(f32, f32)> {
     let (width, pixel) = (map.frame.width, map.frame.pixel);
     let center = map.frame.pixels(Vec2::new(middle, 0.0)).x.round().clamp(0.0, width as f32 - 1.0) as usize;
@@ -148,8 +149,8 @@ fn gram(map: &DepthMap, pose: &Pose, stride: usize) -> Option<[[f64; 5]; 5]> {
     (seen * 10 >= asked * 8).then_some(gram)
 }
 
-/// How well depth and relief go together with offset, pitch and bend taken out (partial correlation), and how much
-/// deeper the depths are, from a Gram matrix: its Cholesky factor holds both.
+/// Partial correlation of depth and relief without offset, pitch and bend, and the ratio of the depths to the relief,
+/// from a Gram matrix: its Cholesky factor holds both.
 fn correlation(gram: &[[f64; 5]; 5]) -> Option<(f32, f32)> {
     let mut factor = [[0.0f64; 5]; 5];
     for i in 0..5 {
@@ -167,7 +168,7 @@ fn correlation(gram: &[[f64; 5]; 5]) -> Option<(f32, f32)> {
     (total > 1e-6 && own > 1e-9).then(|| ((with / total) as f32, (with / own) as f32))
 }
 
-/// How well the mean face fits at a pose: its `match_`, `gain` and `worth` are filled in.
+/// A pose with `match_`, `gain` and `worth` of the mean face filled in; `None` if it cannot be a face.
 fn judge(map: &DepthMap, reaches: &[(f32, f32)], pose: Pose, stride: usize) -> Option<Pose> {
     let row = map.frame.pixels(pose.center).y.round();
     let (right, left) = *reaches.get(row.max(0.0) as usize)?;
@@ -176,8 +177,8 @@ fn judge(map: &DepthMap, reaches: &[(f32, f32)], pose: Pose, stride: usize) -> O
         return None;
     }
     let (match_, gain) = correlation(&gram(map, &pose, stride)?)?;
-    // A relief much flatter or deeper than the mean's, a head much wider or narrower, or more on one side than on the
-    // other, is less likely a face.
+    // A face is less likely with a relief much flatter or deeper than the mean's, a head much wider or narrower, or
+    // much of the head on one side.
     let depth = if gain > 0.0 { 0.12 * ops::ln(gain).abs() } else { 1.0 };
     let wide = 0.5 * (ops::ln(width / 1.9).abs() - 0.3).max(0.0);
     let uneven = 0.5 * ((right - left).abs() / (right + left) - 0.1).max(0.0);
@@ -185,7 +186,7 @@ fn judge(map: &DepthMap, reaches: &[(f32, f32)], pose: Pose, stride: usize) -> O
     Some(Pose { match_, gain, worth: match_ - depth - wide - uneven - tall, ..pose })
 }
 
-/// How tall a face is for its width once its eyes are known.
+/// Height of a face relative to its width, once its eyes are known.
 pub(super) fn fit_height(map: &DepthMap, pose: &Pose) -> f32 {
     let worth = |tall: f32| {
         let (match_, _) = correlation(&gram(map, &Pose { tall, ..*pose }, 1)?)?;
@@ -195,12 +196,12 @@ pub(super) fn fit_height(map: &DepthMap, pose: &Pose) -> f32 {
     steps.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(pose.tall, |(_, tall)| tall)
 }
 
-/// What eyeballs that are loose parts tell of a face's place.
+/// Position of the face from eyeballs that are loose parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EyeHint {
-    /// Half way between their centres.
+    /// Point half way between their centres.
     pub center: Vec2,
-    /// The distance of outer eye corners that belongs to their distance.
+    /// Distance of outer eye corners that corresponds to their distance.
     pub size: f32,
 }
 
@@ -211,7 +212,7 @@ pub(super) fn guess(middle: f32, low: Vec3, high: Vec3) -> Pose {
     Pose { center, size: 0.55 * size.x.min(0.75 * size.y), gain: 1.0, tall: 1.0, ..Pose::default() }
 }
 
-/// The best place and size of a face whose plane of symmetry is at `middle`. `solid` tells what the head
+/// The best position and size of a face whose plane of symmetry is at `middle`. `solid` marks pixels that the head
 /// covers.
 pub(super) fn find_face(map: &DepthMap, solid: &[bool], middle: f32, hint: Option<EyeHint>) -> Option<Pose> {
     let frame = &map.frame;

@@ -1,4 +1,4 @@
-//! Onto the skin: the closest place of the skin to a few places, and what lies behind a place.
+//! Queries on the skin: the closest place of the skin to a few places, and depths behind a place.
 
 use glam::{Vec2, Vec3};
 
@@ -73,7 +73,7 @@ fn closest_on_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
     edges.into_iter().min_by(|x, y| x.distance_squared(p).total_cmp(&y.distance_squared(p))).unwrap_or(a)
 }
 
-/// The depths at which the line along z through `place` meets the triangles that `keep` keeps, nearest to the viewer
+/// The depths at which the line along z through `place` meets the triangles that `keep` accepts, nearest to the viewer
 /// first.
 pub(super) fn depths_at(
     place: Vec2,

@@ -1,4 +1,4 @@
-//! How far a face looks sideways or is tilted: its plane of symmetry, fitted to the depth map.
+//! Turn and tilt of a face: its plane of symmetry, fitted to the depth map.
 
 use bevy::math::ops;
 use glam::{Vec2, Vec3, vec2, vec3};

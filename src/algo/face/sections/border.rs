@@ -17,8 +17,8 @@ pub struct End {
 }
 
 impl End {
-    /// True if this is where a neck was cut from its body: large, behind or below the face, and not the rim of a mask,
-    /// which is as wide and as high as all of it.
+    /// Returns `true` if a neck was cut from its body here: the border is large, behind or below the face, and not the
+    /// rim of a mask, which is as wide and as high as the whole mesh.
     pub fn is_neck(&self, low: Vec3, high: Vec3, center: Vec3) -> bool {
         let (size, whole) = (self.high - self.low, high - low);
         let rim = size.x > 0.85 * whole.x && size.y > 0.85 * whole.y;
@@ -59,7 +59,7 @@ pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
     Some(end)
 }
 
-/// Edges of one triangle only, by their ends.
+/// Edges of exactly one triangle, by their ends.
 fn lonely(triangles: &[[u32; 3]], count: usize) -> Vec<[u32; 2]> {
     let sides = || {
         let edges = |triangle: &[u32; 3]| {
@@ -68,7 +68,7 @@ fn lonely(triangles: &[[u32; 3]], count: usize) -> Vec<[u32; 2]> {
         };
         triangles.iter().flat_map(edges).filter(|(a, b)| a != b).map(|(a, b)| (a.min(b), a.max(b)))
     };
-    // Each edge goes to the list of its lower end; lists are short.
+    // Each edge is stored in the list of its lower end; lists are short.
     let mut starts = vec![0_u32; count + 1];
     for (low, _) in sides() {
         starts[low as usize + 1] += 1;

@@ -1,10 +1,10 @@
-//! Which shells are the eyes: two balls of one size, side by side.
+//! Search for the eyes among the shells: two balls of one size, side by side.
 
 use glam::Vec3;
 
 use super::{Island, ShellKind};
 
-/// A shell that is a ball, or a good part of one.
+/// A shell with the shape of a ball, or of a large part of one.
 #[derive(Debug, Clone, Copy)]
 struct Ball {
     shell: usize,
@@ -12,12 +12,12 @@ struct Ball {
     radius: f32,
 }
 
-/// Radius of an eye, at most, as a share of the size of all shells.
+/// Largest radius of an eye, as a share of the size of all shells.
 const LARGEST: f32 = 0.2;
-/// How far points of a ball lie from it, as a share of its radius (root of the mean square). The cornea's bulge and the
-/// hole behind it have to pass.
+/// Largest deviation of points from a ball, as a share of its radius (root of the mean square). It admits the cornea's
+/// bulge and the hole behind the eyeball.
 const ROUND: f32 = 0.12;
-/// Fewest points of a ball; a sphere runs through any four.
+/// Least number of points of a ball; a sphere runs through any four.
 const FEWEST: usize = 8;
 
 /// Marks the eyes among `kinds`.
@@ -32,8 +32,8 @@ pub fn find(points: &[Vec3], shell_of: &[u32], islands: &[Island], kinds: &mut [
     let Some((left, right)) = pair(&balls, (low.z + high.z) * 0.5) else { return };
     for (eye, kind) in [(left, ShellKind::LeftEye), (right, ShellKind::RightEye)] {
         for (shell, island) in islands.iter().enumerate() {
-            // Cornea and iris are often shells of their own; all that lies within the eye turns with it. Lashes reach
-            // out of it.
+            // Cornea and iris are often shells of their own; every shell within the eye turns with it. Lashes reach out
+            // of it.
             let reach = (island.low - eye.center).abs().max((island.high - eye.center).abs());
             if shell == eye.shell || (island.area > 0.0 && reach.max_element() <= eye.radius * 1.15) {
                 kinds[shell] = kind;
@@ -42,7 +42,7 @@ pub fn find(points: &[Vec3], shell_of: &[u32], islands: &[Island], kinds: &mut [
     }
 }
 
-/// All shells that are balls.
+/// All shells with the shape of a ball.
 fn balls(points: &[Vec3], shell_of: &[u32], islands: &[Island], size: f32) -> Vec<Ball> {
     let fits = |island: &Island| {
         let extent = island.high - island.low;
@@ -58,10 +58,10 @@ fn balls(points: &[Vec3], shell_of: &[u32], islands: &[Island], size: f32) -> Ve
     members.iter().enumerate().filter_map(|(shell, members)| ball(shell, members, &islands[shell], size)).collect()
 }
 
-/// The sphere through a shell's points by least squares, if it is one.
+/// The sphere through a shell's points by least squares; `None` if the shell is not a ball.
 ///
-/// |p|² = 2 c·p + (r² - |c|²) is linear in the centre c and the rest. Solved about the middle of the box, in units of it,
-/// by Gauss elimination in double precision.
+/// |p|² = 2 c·p + (r² - |c|²) is linear in the centre c and the rest. It is solved about the middle of the box, in
+/// units of the box, by Gauss elimination in double precision.
 fn ball(shell: usize, members: &[Vec3], island: &Island, size: f32) -> Option<Ball> {
     if members.len() < FEWEST {
         return None;
@@ -84,7 +84,7 @@ fn ball(shell: usize, members: &[Vec3], island: &Island, size: f32) -> Option<Ba
     let radius = square.max(0.0).sqrt() as f32;
     let off = |member: &Vec3| ((*member - middle) / unit).distance(center) - radius;
     let error = members.iter().map(|member| off(member) * off(member)).sum::<f32>() / members.len() as f32;
-    // A ball, not a bowl cut from a much larger one.
+    // The test accepts a ball, but not a bowl cut from a much larger one.
     let round = error.sqrt() <= ROUND * radius && (0.6..1.4).contains(&radius);
     (round && radius * unit <= LARGEST * size).then(|| Ball {
         shell,
@@ -115,8 +115,8 @@ fn solve(mut system: [[f64; 5]; 4]) -> Option<[f64; 4]> {
 
 /// The two balls most like a pair of eyes, left one first.
 ///
-/// Of one size, side by side rather than above each other or behind, and the largest such: beads and buttons are
-/// smaller. In doubt those in front.
+/// The balls have one size and lie side by side rather than above or behind each other. The largest pair wins, since
+/// beads and buttons are smaller; of equal pairs the one in front.
 fn pair(balls: &[Ball], middle: f32) -> Option<(Ball, Ball)> {
     let mut best: Option<(f32, Ball, Ball)> = None;
     for (index, a) in balls.iter().enumerate() {

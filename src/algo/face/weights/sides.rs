@@ -1,4 +1,4 @@
-//! Which lip and which lid a vertex belongs to, told along the surface.
+//! Sides of lips and lids: the upper or lower rim of each vertex, found along the surface.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -7,25 +7,25 @@ use glam::Vec3;
 use super::{Face, smooth};
 use crate::algo::face::bones::{FaceBoneKind, Region, map::line_distance};
 
-/// The upper or lower of lips or lids.
+/// Upper or lower rim of lips or lids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rim {
-    /// Neither.
+    /// Neither rim.
     None,
-    /// Above the opening.
+    /// Rim above the opening.
     Upper,
-    /// Below it.
+    /// Rim below the opening.
     Lower,
 }
 
 /// The openings of a face: mouth, left eye, right eye.
 pub(crate) const OPENINGS: usize = 3;
 
-/// What lies above and below the openings.
+/// Rims of vertices and bones at the openings.
 pub(crate) struct Sides {
-    /// Of each vertex, by opening.
+    /// Rim of each vertex, by opening.
     rims: [Vec<Rim>; OPENINGS],
-    /// Of each bone, by opening.
+    /// Rim of each bone, by opening.
     bones: Vec<[Rim; OPENINGS]>,
 }
 
@@ -63,17 +63,17 @@ impl Sides {
         Self { rims, bones }
     }
 
-    /// The lip that a vertex belongs to.
+    /// Lip of a vertex.
     pub fn lip(&self, vertex: usize) -> Rim {
         self.rims[0][vertex]
     }
 
-    /// The rim of an opening that a vertex belongs to.
+    /// Rim of a vertex at an opening.
     pub fn rim(&self, vertex: usize, opening: usize) -> Rim {
         self.rims[opening][vertex]
     }
 
-    /// How much of its weight a bone keeps on a vertex: nothing across an opening, all elsewhere, and smoothly less
+    /// Share of its weight that a bone keeps on a vertex: nothing across an opening, all elsewhere, and smoothly less
     /// from the corners of the opening inwards.
     pub fn keep(&self, face: &Face, vertex: usize, bone: usize) -> f32 {
         let mut keep = 1.0;
@@ -88,7 +88,7 @@ impl Sides {
         keep
     }
 
-    /// True if two bones lie across an opening from each other.
+    /// Returns `true` if two bones lie across an opening from each other.
     pub fn apart(&self, a: usize, b: usize) -> bool {
         let across = |o: usize| {
             matches!((self.bones[a][o], self.bones[b][o]), (Rim::Upper, Rim::Lower) | (Rim::Lower, Rim::Upper))
@@ -96,7 +96,7 @@ impl Sides {
         (0..OPENINGS).any(across)
     }
 
-    /// True if a bone may be the nearest one of a vertex.
+    /// Returns `true` if a bone may be the nearest one of a vertex.
     pub fn allows(&self, vertex: usize, bone: usize) -> bool {
         (0..OPENINGS).all(|o| {
             !matches!((self.bones[bone][o], self.rims[o][vertex]), (Rim::Upper, Rim::Lower) | (Rim::Lower, Rim::Upper))
@@ -112,7 +112,7 @@ pub(crate) fn inset(face: &Face, opening: usize, p: Vec3) -> f32 {
 /// The surroundings of an opening.
 struct Zone {
     center: Vec3,
-    /// Half the width and the height that it reaches from the center.
+    /// Half the size of the zone around the centre, in each direction.
     reach: Vec3,
     upper: Vec<Vec3>,
     lower: Vec<Vec3>,
@@ -165,7 +165,7 @@ impl Zone {
     }
 }
 
-/// Gives each vertex of a zone to the rim that is nearer along the surface.
+/// Assigns each vertex of a zone to the rim that is nearer along the surface.
 fn flood(face: &Face, zone: &Zone, rims: &mut [Rim]) {
     let inside: Vec<usize> = (0..face.places.len()).filter(|&v| face.skin[v] && zone.holds(face.places[v])).collect();
     if inside.is_empty() {
@@ -174,7 +174,7 @@ fn flood(face: &Face, zone: &Zone, rims: &mut [Rim]) {
     let mut distance = vec![f32::INFINITY; rims.len()];
     let mut heap = BinaryHeap::new();
     for (line, rim) in [(&zone.upper, Rim::Upper), (&zone.lower, Rim::Lower)] {
-        // Seeds: what of the visible skin is about as near to the line as the nearest vertex to each of its points.
+        // Seeds: visible skin about as near to the line as the nearest vertex to each of its points.
         for &p in line {
             let near = |v: usize| face.places[v].distance(p);
             let seen = inside.iter().copied().filter(|&v| face.mask[v]);
@@ -207,7 +207,7 @@ fn flood(face: &Face, zone: &Zone, rims: &mut [Rim]) {
     }
 }
 
-/// Non-negative floats in an order that a heap understands.
+/// Non-negative float as an integer with the same order, for the heap.
 fn order(x: f32) -> u32 {
     x.to_bits()
 }

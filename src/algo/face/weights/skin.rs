@@ -14,11 +14,11 @@ use crate::algo::{
     weights::ldl::{LANES, Lane, Ldl, Symmetric},
 };
 
-/// Width of a heat step as a share of the distance of neighbouring bones.
+/// Width of a heat step, as a share of the distance of neighbouring bones.
 const WIDTH: f32 = 0.36;
-/// Bones count as no further apart than this share of the face's scale.
+/// Largest distance of bones that counts, as a share of the face's scale.
 const WIDEST: f32 = 0.22;
-/// The largest share that the jaw takes of the skin.
+/// The largest share of the jaw in the skin.
 const JAW: f32 = 0.5;
 
 /// Rows of all welded vertices that are skin; the others stay empty.
@@ -40,7 +40,7 @@ pub(crate) fn rows(
         }
         index
     };
-    // The nearest bone of each vertex and how far its heat goes.
+    // The nearest bone of each vertex, and the width of its heat step.
     let start: Vec<(usize, f32)> = active
         .par_iter()
         .map(|&v| {
@@ -77,7 +77,7 @@ pub(crate) fn rows(
                     }
                 }
                 None if column == bones.len() + 1 => {
-                    // Between the corners, what the jaw carries inside the mouth ends at the upper lip.
+                    // Between the corners, inner walls that follow the jaw end at the upper lip.
                     let is_upper = sides.lip(v) == Rim::Upper;
                     let kept = if is_upper { 1.0 - inset(face, 0, face.places[v]) } else { 1.0 };
                     row.push((face.jaw.unwrap_or(HEAD), value * kept));
@@ -90,7 +90,7 @@ pub(crate) fn rows(
     Ok(rows)
 }
 
-/// Shares what the head holds with the neck, and gives the jaw its part.
+/// Divides the head's share between head and neck, and gives the jaw its share.
 fn settle(face: &Face, sides: &Sides, v: usize, row: &mut Row) {
     if row.is_empty() {
         row.push((HEAD, 1.0));
@@ -101,7 +101,7 @@ fn settle(face: &Face, sides: &Sides, v: usize, row: &mut Row) {
     let mut others: Row = Vec::with_capacity(2);
     for e in row.iter_mut() {
         e.1 /= total;
-        // What is the jaw's inside the mouth stays so.
+        // Inner walls that follow the jaw keep their weight.
         if Some(e.0) != face.jaw {
             if share > 0.0
                 && let Some(jaw) = face.jaw
@@ -123,7 +123,7 @@ fn settle(face: &Face, sides: &Sides, v: usize, row: &mut Row) {
     }
 }
 
-/// How much of the skin at a vertex follows the jaw.
+/// Share of the jaw in the skin at a vertex.
 fn jaw_share(face: &Face, sides: &Sides, v: usize) -> f32 {
     if face.jaw.is_none() || !face.map.trusted {
         return 0.0;
@@ -133,7 +133,7 @@ fn jaw_share(face: &Face, sides: &Sides, v: usize) -> f32 {
     let (half, q) = face.map.fold(p);
     let below = face.below_lips(p);
     let mut share = smooth(-0.1 * e, 0.25 * e, below);
-    // Between the corners the slit parts what follows from what does not.
+    // Between the corners the slit separates the skin that follows the jaw from the rest.
     let corner = half.lip_corner();
     let near = inset(face, 0, p) * smooth(0.35 * e, 0.05 * e, below.abs());
     let own = match sides.lip(v) {
@@ -148,7 +148,7 @@ fn jaw_share(face: &Face, sides: &Sides, v: usize) -> f32 {
     JAW * share * smooth(0.05, 0.45, forward) * smooth(face.chin - 0.35 * e, face.chin - 0.02 * e, p.y)
 }
 
-/// 1 for inner walls that the jaw carries, 0 for all else outside the bones' patches.
+/// Column of a vertex outside the bones' patches: 1 for inner walls that follow the jaw, 0 for all else.
 fn inner(face: &Face, v: usize) -> usize {
     let (half, p) = face.map.fold(face.places[v]);
     let corner = half.lip_corner();
@@ -158,7 +158,7 @@ fn inner(face: &Face, v: usize) -> usize {
         && (p.y - corner.y).abs() < 0.45 * face.map.scale
         && p.z > face.pivot.z
         && p.z < half.lip_line()[0].z;
-    // In front of the chin's own skin there is none of it.
+    // Inner walls do not lie in front of the chin's own skin.
     usize::from(mouth && p.y > face.chin + 0.05 * face.map.scale && face.below_lips(face.places[v]) > 0.0)
 }
 
@@ -178,7 +178,7 @@ fn spacings(face: &Face, sides: &Sides, bones: &[usize]) -> Vec<f32> {
             near.truncate(3);
             let mean =
                 if near.is_empty() { 0.5 * face.map.scale } else { near.iter().sum::<f32>() / near.len() as f32 };
-            // Few bones do not blur a whole face.
+            // The limit keeps few bones from blurring a whole face.
             mean.min(WIDEST * face.map.scale)
         })
         .collect()
@@ -213,8 +213,8 @@ fn around(face: &Face, reach: f32) -> Vec<u32> {
 
 /// Lets the patches spread: `(A + t L) w = A w₀`, twice, where `t` follows the distance of the bones.
 ///
-/// Answers a column a patch, a value a vertex of `active`; the last but one column is the head's, which also lies all
-/// around. Columns of a vertex sum to one.
+/// Returns a column for each patch with a value for each vertex of `active`; the last but one column is the head's,
+/// which also surrounds the patches. The values of a vertex sum to one.
 fn spread(
     face: &Face,
     active: &[u32],

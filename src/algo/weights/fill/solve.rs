@@ -7,6 +7,7 @@ use faer::{
 };
 
 use super::Graph;
+use crate::mesh::influences::keep_strongest;
 
 /// Influences of one node: joint and weight.
 pub(crate) type Sparse = Vec<(u32, f32)>;
@@ -44,17 +45,7 @@ pub(super) fn add(sum: &mut Sparse, joint: u32, weight: f32) {
 /// Sorts influences strongest first, keeps `most`, leaves out traces and makes them sum to one; empty if nothing is
 /// positive.
 pub(crate) fn prune(mut influences: Sparse, most: usize) -> Sparse {
-    influences.retain(|i| i.1 > 0.0 && i.1.is_finite());
-    influences.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    influences.truncate(most.max(1));
-    // Scaled by the largest first, so that the sum of huge values stays finite.
-    let top = influences.first().map_or(1.0, |i| i.1);
-    let sum: f32 = influences.iter().map(|i| i.1 / top).sum();
-    influences.retain(|i| i.1 / top > LEAST * sum);
-    let sum: f32 = influences.iter().map(|i| i.1 / top).sum();
-    for influence in &mut influences {
-        influence.1 = influence.1 / top / sum;
-    }
+    keep_strongest(&mut influences, most, LEAST);
     influences
 }
 

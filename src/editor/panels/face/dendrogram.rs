@@ -1,4 +1,4 @@
-//! The merge history in depth as a tree, and where it is cut.
+//! The merge history in depth as a tree, with its cut.
 
 use bevy_egui::egui::{self, Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
 
@@ -7,20 +7,20 @@ use crate::algo::{
     linkage::Dendrogram,
 };
 
-/// Leaves that are drawn; what lies below them is one line.
+/// Number of drawn leaves; each stands for the subtree below it.
 const LEAVES: usize = 16;
 
 /// A cluster that is drawn.
 struct Branch {
-    /// Where it stands from front (0) to back (1).
+    /// Position from front (0) to back (1).
     at: f32,
     height: f32,
     children: Option<(usize, usize)>,
     group: HeadGroup,
 }
 
-/// Draws the tree. A click between two heights cuts there at the next placing; a double click leaves the choice to the
-/// program again.
+/// Draws the tree. A click between two heights cuts there at the next placement; a double click restores the automatic
+/// choice.
 pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usize>) {
     let tree = &analysis.groups.depth;
     let heights = tree.heights(LEAVES);
@@ -31,7 +31,7 @@ pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usi
     let size = vec2(ui.available_width(), 110.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let area = rect.shrink2(vec2(8.0, 8.0));
-    // Small heights matter as much as large ones.
+    // The square root makes small heights visible.
     let level = |height: f32| area.bottom() - area.height() * (height / top).max(0.0).sqrt();
     let cut = groups.unwrap_or(analysis.groups.groups).clamp(1, heights.len() + 1);
     draw(ui, area, tree, analysis, &level);
@@ -58,7 +58,7 @@ pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usi
     });
 }
 
-/// A height between the merge that is undone last and the one before it.
+/// A height between the merges on both sides of the cut.
 fn cut_height(heights: &[f32], groups: usize) -> f32 {
     let above = groups.checked_sub(2).and_then(|last| heights.get(last)).copied().unwrap_or(heights[0] * 1.1);
     let below = heights.get(groups - 1).copied().unwrap_or(0.0);
@@ -88,7 +88,7 @@ fn color(group: HeadGroup) -> Color32 {
     }
 }
 
-/// The upper part of the tree, children before what they make; the root is last.
+/// The upper part of the tree, children before parents; the root is last.
 fn branches(tree: &Dendrogram, analysis: &FaceAnalysis) -> Vec<Branch> {
     let points = tree.points;
     let Some(root) = points.checked_add(tree.merges.len()).and_then(|n| n.checked_sub(1)) else { return Vec::new() };
@@ -105,7 +105,7 @@ fn branches(tree: &Dendrogram, analysis: &FaceAnalysis) -> Vec<Branch> {
             open.push(cluster);
         }
     }
-    // Any point of a cluster tells where it lies: clusters in depth do not overlap.
+    // Any point of a cluster gives its position: clusters in depth do not overlap.
     let point = |mut cluster: usize| {
         while let Some(merge) = merge(cluster) {
             cluster = merge.first as usize;
@@ -123,7 +123,7 @@ fn branches(tree: &Dendrogram, analysis: &FaceAnalysis) -> Vec<Branch> {
         let height = merge(*cluster).map_or(0.0, |merge| merge.height);
         branches.push(Branch { at: place as f32 / last, height, children: None, group: group(*cluster) });
     }
-    // Merges are numbered by height, so what is made later lies higher.
+    // Merges are numbered by height, so later ones are higher.
     open.sort_unstable();
     for cluster in open {
         let Some(merge) = merge(cluster) else { continue };

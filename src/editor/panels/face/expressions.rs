@@ -1,4 +1,4 @@
-//! Sliders for what the face shows, each with a little picture of it.
+//! Sliders of expressions, each with a thumbnail.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ pub(super) fn show(
 ) {
     let set = set(world);
     let current = world.get::<Expressions>(entity).map(|shown| shown.0.clone()).unwrap_or_default();
-    // While a slider is dragged, what was asked for last has yet to be shown.
+    // While a slider is dragged, the last request may not be shown yet.
     let before = held.clone().unwrap_or(current);
     let mut next = before.clone();
     let mut dragging = false;
@@ -79,7 +79,7 @@ pub(super) fn show(
     }
 }
 
-/// One slider; true while it is dragged, and true when it was let go or typed into.
+/// Draws a slider; returns whether it is dragged, and whether it was released or typed into.
 fn strength(ui: &mut Ui, name: &str, strengths: &mut BTreeMap<String, f32>) -> (bool, bool) {
     let mut value = strengths.get(name).copied().unwrap_or(0.0);
     ui.spacing_mut().slider_width = (ui.available_width() - 56.0).max(40.0);

@@ -1,4 +1,4 @@
-//! Little pictures of expressions, drawn by the program itself from the rig's own bones and weights.
+//! Thumbnails of expressions, drawn on the CPU from the rig's own bones and weights.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -17,11 +17,11 @@ use crate::{
 /// Pixels along a side.
 const PIXELS: usize = 112;
 
-/// Pictures of one face.
+/// Thumbnails of one face.
 #[derive(Default)]
 pub(super) struct Pictures {
     textures: BTreeMap<String, TextureHandle>,
-    /// What they were drawn from.
+    /// Analysis and weights that they were drawn from.
     of: Option<(Arc<FaceAnalysis>, Arc<SkinData>)>,
 }
 
@@ -31,7 +31,7 @@ impl Pictures {
         self.textures.get(name)
     }
 
-    /// Draws one more of the pictures that are missing, or all anew where bones or weights have changed.
+    /// Draws one of the missing thumbnails, or all again after a change of bones or weights.
     pub fn renew(&mut self, ctx: &egui::Context, rig: &Rig, mesh: &RigMesh, face: Option<&Face>, set: &ExpressionSet) {
         let (Some(face), Some(skin)) = (face, rig.skin(mesh.uid)) else { return };
         let same = |(analysis, bound): &(Arc<FaceAnalysis>, Arc<SkinData>)| {
@@ -49,12 +49,12 @@ impl Pictures {
         let image = draw(&points, &face.analysis);
         let texture = ctx.load_texture(format!("face {}", expression.name), image, TextureOptions::LINEAR);
         self.textures.insert(expression.name.clone(), texture);
-        // The next one in the next frame, so that no frame is long.
+        // The next one is drawn in the next frame, so that no frame is long.
         ctx.request_repaint();
     }
 }
 
-/// The face from the front: nearest triangle a pixel, lit from above the camera.
+/// The face from the front: nearest triangle at each pixel, lit from above the camera.
 fn draw(points: &[Vec3], analysis: &FaceAnalysis) -> ColorImage {
     let marks = &analysis.landmarks.points;
     let (low, high) =

@@ -3,10 +3,10 @@
 use bevy_egui::egui::{Key, Modifiers, Ui};
 
 use super::{HierarchyPanel, select};
-use crate::editor::{panel::Requests, panels::shown::Shown};
+use crate::editor::{panel::Requests, panels::displayed_rig::DisplayedRig};
 
-/// Takes the keys that are the tree's, unless something is being typed.
-pub(super) fn press(panel: &mut HierarchyPanel, ui: &Ui, shown: &Shown, requests: &mut Requests) {
+/// Handles the tree's keys, unless a text field has the focus.
+pub(super) fn press(panel: &mut HierarchyPanel, ui: &Ui, shown: &DisplayedRig, requests: &mut Requests) {
     if ui.ctx().egui_wants_keyboard_input() {
         return;
     }

@@ -1,4 +1,4 @@
-//! The menu of a row. It is about all selected joints: the click that opens it selects its row.
+//! Context menu of a row. It applies to all selected joints: the click that opens it selects its row.
 
 use bevy_egui::egui::{Button, Response, Ui};
 
@@ -6,14 +6,14 @@ use super::{HierarchyPanel, select};
 use crate::{
     editor::{
         panel::Requests,
-        panels::{groups, shown::Shown},
+        panels::{displayed_rig::DisplayedRig, groups},
     },
     plugins::document::EditRequest,
     rig::{Uid, operations::Operation},
 };
 
-/// The menu while it is open.
-pub(super) fn show(panel: &mut HierarchyPanel, response: &Response, shown: &Shown, requests: &mut Requests) {
+/// Draws the menu while it is open.
+pub(super) fn show(panel: &mut HierarchyPanel, response: &Response, shown: &DisplayedRig, requests: &mut Requests) {
     response.context_menu(|ui| {
         ui.set_min_width(170.0);
         let joints = shown.selection.0.clone();
@@ -68,8 +68,8 @@ fn entry(ui: &mut Ui, text: &str, key: &str) -> bool {
     clicked
 }
 
-/// The group that all of `joints` are in: its name, or an empty one if none is in any.
-fn current_group<'a>(shown: &'a Shown, joints: &[Uid]) -> Option<&'a str> {
+/// Name of the group that all of `joints` are in, or an empty text if none has a group.
+fn current_group<'a>(shown: &'a DisplayedRig, joints: &[Uid]) -> Option<&'a str> {
     let group = |joint: &Uid| shown.rig.joint(*joint).and_then(|joint| joint.data.group);
     let first = group(joints.first()?);
     if joints.iter().any(|joint| group(joint) != first) {

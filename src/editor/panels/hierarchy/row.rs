@@ -1,4 +1,4 @@
-//! One row of the tree.
+//! A row of the tree.
 
 use bevy_egui::egui::{
     Align2, CursorIcon, FontId, Id, LayerId, Order, PointerButton, Rect, Response, Sense, Stroke, StrokeKind, Ui,
@@ -10,22 +10,22 @@ use crate::{
     editor::{
         panel::Requests,
         panels::{
+            displayed_rig::DisplayedRig,
             fields::{self, Renaming},
             groups, list,
-            shown::Shown,
         },
     },
     rig::{NodeKind, Uid},
 };
 
-/// Draws a row and takes what is done to it.
+/// Draws a row and handles its input.
 pub(super) fn show(
     panel: &mut HierarchyPanel,
     ui: &mut Ui,
     rect: Rect,
     tree: &Tree,
     number: usize,
-    shown: &Shown,
+    shown: &DisplayedRig,
     requests: &mut Requests,
 ) {
     let row = tree.rows[number];
@@ -55,7 +55,7 @@ pub(super) fn show(
     menu::show(panel, &response, shown, requests);
 }
 
-/// How far a level is indented: less in a narrow panel, so that names stay readable.
+/// Indentation of a level: less in a narrow panel, so that names stay readable.
 fn indent(ui: &Ui, rect: Rect, tree: &Tree) -> f32 {
     let room = rect.width() - 110.0;
     (room / tree.deepest.max(1) as f32).clamp(3.0, 14.0).min(ui.spacing().indent)
@@ -75,14 +75,14 @@ fn text_rect(ui: &Ui, rect: Rect, tree: &Tree, row: Row) -> Rect {
     rect.with_min_x(left.min(rect.right() - 24.0))
 }
 
-/// Paints the row; true if the name did not fit.
+/// Paints the row; returns `true` if the name did not fit.
 fn paint(
     ui: &mut Ui,
     rect: Rect,
     tree: &Tree,
     row: Row,
     selected: bool,
-    shown: &Shown,
+    shown: &DisplayedRig,
     response: &Response,
     fold: Option<&Response>,
 ) -> bool {
@@ -118,14 +118,15 @@ fn paint(
     list::line(ui, text, &shown.name(row.joint), color)
 }
 
-/// Clicks select: alone, with control one more or less, with shift all from the last one.
+/// Handles clicks: a plain click selects the joint alone, Control adds or removes it, Shift selects the range from the
+/// last one.
 fn click(
     panel: &mut HierarchyPanel,
     ui: &Ui,
     response: &Response,
     tree: &Tree,
     number: usize,
-    shown: &Shown,
+    shown: &DisplayedRig,
     requests: &mut Requests,
 ) {
     let joint = tree.rows[number].joint;
@@ -168,14 +169,14 @@ fn click(
     }
 }
 
-/// Drags hang joints below another.
+/// Handles drags, which move joints below another.
 fn drag(
     panel: &HierarchyPanel,
     ui: &Ui,
     response: &Response,
     rect: Rect,
     joint: Uid,
-    shown: &Shown,
+    shown: &DisplayedRig,
     requests: &mut Requests,
 ) {
     if response.drag_started_by(PointerButton::Primary) {
@@ -200,8 +201,8 @@ fn drag(
     }
 }
 
-/// What is being dragged, or why it cannot be dropped here, beside the pointer.
-fn carried(ui: &Ui, joints: &[Uid], shown: &Shown, refused: Option<&str>) {
+/// Paints the dragged joints, or the reason why they cannot be dropped here, beside the pointer.
+fn carried(ui: &Ui, joints: &[Uid], shown: &DisplayedRig, refused: Option<&str>) {
     let Some(pointer) = ui.input(|input| input.pointer.latest_pos()) else { return };
     let text = match (refused, joints) {
         (Some(refused), _) => refused.to_owned(),
@@ -221,8 +222,8 @@ fn carried(ui: &Ui, joints: &[Uid], shown: &Shown, refused: Option<&str>) {
     painter.galley(at, galley, visuals.strong_text_color());
 }
 
-/// The field in place of a name.
-fn rename(panel: &mut HierarchyPanel, ui: &mut Ui, rect: Rect, id: Id, shown: &Shown, requests: &mut Requests) {
+/// Draws the text field in place of a name.
+fn rename(panel: &mut HierarchyPanel, ui: &mut Ui, rect: Rect, id: Id, shown: &DisplayedRig, requests: &mut Requests) {
     let Some(rename) = panel.rename.as_mut() else { return };
     match fields::rename(ui, rect, id.with("rename"), "Rename", &mut rename.text, &mut rename.focused) {
         Renaming::Typing => {}

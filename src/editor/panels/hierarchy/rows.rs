@@ -1,4 +1,4 @@
-//! The rows of the tree: which joints are listed, and how deep.
+//! Rows of the tree: the listed joints and their depths.
 
 use std::collections::HashSet;
 
@@ -9,18 +9,18 @@ use crate::rig::{Rig, RigJoint, Uid};
 pub struct Row {
     /// The joint.
     pub joint: Uid,
-    /// How many joints are above it.
+    /// Number of joints above it.
     pub depth: usize,
-    /// True if it has children that could be listed.
+    /// Marks a joint with children that could be listed.
     pub parent: bool,
-    /// True if they are listed.
+    /// Marks a joint whose children are listed.
     pub open: bool,
-    /// False for a joint that is listed only because one below it matches the filter.
+    /// Match with the filter; `false` for a joint that is listed only because one below it matches.
     pub matches: bool,
 }
 
-/// The joints that are listed, top to bottom: all but those below a folded one, or, with a filter, those that match it
-/// and everything above them. All words of the filter must be in the label or the group's name, in any case.
+/// The listed joints, top to bottom: all but those below a folded one, or, with a filter, those that match it and their
+/// ancestors. All words of the filter must be in the label or the group's name, in any case.
 pub fn rows(rig: &Rig, folded: &HashSet<Uid>, filter: &str) -> Vec<Row> {
     let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
     if words.is_empty() { unfolded(rig, folded) } else { matching(rig, &words) }
@@ -47,7 +47,7 @@ fn matching(rig: &Rig, words: &[String]) -> Vec<Row> {
         let group = joint.data.group.and_then(|uid| groups.iter().find(|(group, _)| *group == uid));
         words.iter().all(|word| name.contains(word) || group.is_some_and(|(_, name)| name.contains(word)))
     };
-    // Parents come first: their number is known, and reversed, children tell their parents that they are listed.
+    // Parents come first, so their numbers are known; in reverse order, children mark their parents as listed.
     let mut numbers = std::collections::HashMap::with_capacity(rig.len());
     let mut all: Vec<(Row, Option<usize>, bool)> = Vec::with_capacity(rig.len());
     for joint in rig.walk() {

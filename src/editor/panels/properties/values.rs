@@ -1,4 +1,4 @@
-//! What the selected joints have in common, and the operations that change it.
+//! Common values of the selected joints, and the operations that change them.
 
 use std::{collections::HashMap, f32::consts::PI};
 
@@ -6,8 +6,8 @@ use bevy::{math::EulerRot, prelude::*};
 
 use crate::{
     editor::panels::{
+        displayed_rig::{DisplayedRig, Stamp},
         fields::Shared,
-        shown::{Shown, Stamp},
     },
     rig::{JointData, NodeKind, PoseOffset, Rig, Uid, operations::Operation},
 };
@@ -18,15 +18,15 @@ pub(super) struct Values {
     made_from: Option<(Stamp, Stamp)>,
     /// The selected joints, the active one last.
     pub joints: Vec<Uid>,
-    /// Empty for no label.
+    /// Label, empty for none.
     pub label: Shared<String>,
     pub group: Shared<Option<Uid>>,
     pub kind: Shared<NodeKind>,
     pub locked: Shared<bool>,
-    /// True if one of them does not stand as it rests.
+    /// Marks that one of the joints is not at rest.
     pub posed: bool,
     vectors: [[Shared<f32>; 3]; Part::ALL.len()],
-    /// From each joint to its children, at rest.
+    /// Distances at rest from each joint to its children.
     pub lengths: Vec<f32>,
     /// The size of the skeleton, for the speed of drags.
     extent: f32,
@@ -44,11 +44,11 @@ pub(super) enum Part {
     Rotation,
     /// Rest scale.
     Scale,
-    /// What the pose turns on top, degrees as above, about the joint's own axes at rest.
+    /// Rotation by the pose, in degrees as above, about the joint's own axes at rest.
     PoseRotation,
-    /// What the pose moves on top, along the joint's own axes at rest.
+    /// Translation by the pose, along the joint's own axes at rest.
     PosePosition,
-    /// What the pose scales on top.
+    /// Scale by the pose.
     PoseScale,
 }
 
@@ -64,7 +64,7 @@ impl Part {
     ];
 }
 
-/// Angles as they were typed last: of the many that say the same rotation, the ones that people expect to see.
+/// Angles as they were typed last: of the many triples for one rotation, the ones that people expect to see.
 #[derive(Debug, Clone, Default)]
 struct Typed {
     rest: Vec<(Uid, Vec3)>,
@@ -72,8 +72,8 @@ struct Typed {
 }
 
 impl Values {
-    /// Reads them again if the rig or the selection changed.
-    pub fn refresh(&mut self, shown: &Shown) {
+    /// Reads the values again after a change of the rig or the selection.
+    pub fn refresh(&mut self, shown: &DisplayedRig) {
         let key = (shown.stamp(), shown.selection_stamp());
         if self.made_from == Some(key) {
             return;
@@ -119,12 +119,12 @@ impl Values {
         })
     }
 
-    /// What the joints have in common of one of their vectors.
+    /// Common values of one of the joints' vectors.
     pub fn vector(&self, part: Part) -> [Shared<f32>; 3] {
         self.vectors[part as usize]
     }
 
-    /// The operation that gives all selected joints a number on an axis of one of their vectors.
+    /// The operation that sets a number on an axis of one of the vectors of all selected joints.
     pub fn set(&mut self, rig: &Rig, part: Part, axis: usize, number: f32, with_children: bool) -> Operation {
         let joints: Vec<&JointData> =
             self.joints.iter().filter_map(|uid| rig.joint(*uid)).map(|joint| &joint.data).collect();
@@ -172,7 +172,7 @@ impl Values {
         }
     }
 
-    /// How far a pixel of a drag goes, in model units.
+    /// Change per pixel of a drag, in model units.
     pub fn speed(&self) -> f64 {
         let extent = if self.extent.is_finite() && self.extent > 0.0 { self.extent } else { 1.0 };
         f64::from(extent) / 1000.0
@@ -192,7 +192,7 @@ fn vector(rig: &Rig, joint: &JointData, part: Part, typed: &Typed) -> Vec3 {
     }
 }
 
-/// Angles in degrees; those that were typed, if they still say the same.
+/// Angles in degrees; the typed ones, if they still give the same rotation.
 fn angles(uid: Uid, turned: Quat, typed: &[(Uid, Vec3)]) -> Vec3 {
     let known = typed.iter().find(|(joint, _)| *joint == uid).map(|(_, angles)| *angles);
     if let Some(known) = known.filter(|known| rotation(*known).dot(turned).abs() > 1.0 - 1e-6) {
@@ -202,7 +202,7 @@ fn angles(uid: Uid, turned: Quat, typed: &[(Uid, Vec3)]) -> Vec3 {
     Vec3::new(x, y, z) * (180.0 / PI)
 }
 
-/// The rotation that angles in degrees say.
+/// The rotation of angles in degrees.
 fn rotation(angles: Vec3) -> Quat {
     let [x, y, z] = (angles * (PI / 180.0)).to_array();
     Quat::from_euler(EulerRot::XYZ, x, y, z).normalize()

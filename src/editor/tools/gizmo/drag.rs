@@ -1,4 +1,4 @@
-//! From the pointer to a movement, a turn or factors.
+//! Drags of handles: conversion of pointer positions to movements, rotations and factors.
 
 use std::f32::consts::{PI, TAU};
 
@@ -7,27 +7,27 @@ use bevy::{math::ops, prelude::*};
 use super::{GizmoFrame, Handle, LENGTH, RING};
 use crate::plugins::viewport::Sight;
 
-/// Steps while snapping: turns in radians.
+/// Step of rotations while snapping, in radians.
 pub const TURN_STEP: f32 = PI / 12.0;
-/// Steps while snapping: factors.
+/// Step of factors while snapping.
 pub const SCALE_STEP: f32 = 0.1;
-/// The least factor; from there on things would turn inside out.
+/// Least factor; below it objects would turn inside out.
 const LEAST_FACTOR: f32 = 0.01;
-/// Pixels that double an even scale.
+/// Distance in pixels that doubles a uniform scale.
 const DOUBLING: f32 = 120.0;
-/// A plane seen at a lower sine than this is measured along its edge.
+/// Least sine of the angle at which a plane is measured on its face; a flatter plane is measured along its edge.
 const EDGE_ON: f32 = 0.2;
 
-/// What a drag has come to since the press. In the rig's space.
+/// Result of a drag since the press, in the rig's space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delta {
     /// A movement.
     Move(Vec3),
     /// A turn.
     Turn {
-        /// About this axis, unit length.
+        /// Axis of unit length.
         axis: Vec3,
-        /// By this angle, in radians.
+        /// Angle in radians.
         angle: f32,
     },
     /// Factors along the axes of the frame.
@@ -35,7 +35,7 @@ pub enum Delta {
 }
 
 impl Delta {
-    /// True if nothing is changed.
+    /// Returns `true` if nothing changes.
     pub fn is_none(&self) -> bool {
         match self {
             Self::Move(by) => *by == Vec3::ZERO,
@@ -45,23 +45,23 @@ impl Delta {
     }
 }
 
-/// A handle that is being dragged. The view is that of the press: nothing turns under the pointer.
+/// A drag of a handle. It uses the view of the press throughout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GizmoDrag {
     /// The handle.
     pub handle: Handle,
-    /// Where the gizmo stood at the press.
+    /// Frame of the gizmo at the press.
     pub frame: GizmoFrame,
     sight: Sight,
     press: Vec2,
     last: Vec2,
-    /// The turn so far, in radians: it may go round more than once.
+    /// Angle so far, in radians; it may exceed a full turn.
     angle: f32,
     delta: Delta,
 }
 
 impl GizmoDrag {
-    /// A press on a handle.
+    /// Starts a drag with a press on a handle.
     pub fn new(handle: Handle, frame: GizmoFrame, sight: Sight, press: Vec2) -> Self {
         let delta = match handle {
             Handle::MoveAxis(_) | Handle::MovePlane(_) | Handle::MoveView => Delta::Move(Vec3::ZERO),
@@ -71,9 +71,9 @@ impl GizmoDrag {
         Self { handle, frame, sight, press, last: press, angle: 0.0, delta }
     }
 
-    /// What the drag has come to with the pointer at a pixel. `snap` is the step of movements, in the rig's units; turns
-    /// and factors have steps of their own. Where a pixel means nothing (beyond the horizon of a plane), it is what it
-    /// was before.
+    /// The result of the drag with the pointer at a pixel. `snap` is the step of movements, in the rig's units;
+    /// rotations and factors have steps of their own. For a pixel without a position (beyond the horizon of a plane),
+    /// the result stays.
     pub fn to(&mut self, at: Vec2, snap: Option<f32>) -> Delta {
         let GizmoFrame { axes, .. } = self.frame;
         let view = &self.sight.plane;
@@ -85,7 +85,7 @@ impl GizmoDrag {
             Handle::ViewRing => Some(self.turned(self.sight.towards(self.frame.origin), at, snap)),
             Handle::ScaleAxis(axis) => {
                 self.along(axes[axis], self.press).zip(self.along(axes[axis], at)).map(|(a, b)| {
-                    // A handle grabbed near the middle would scale out of all measure.
+                    // The limit keeps a handle grabbed near the middle from scaling excessively.
                     let least = 0.25 * LENGTH * self.sight.pixel_at(self.frame.origin);
                     let mut factors = Vec3::ONE;
                     factors[axis] = stepped_factor(1.0 + (b - a) / a.max(least), snap);
@@ -102,7 +102,7 @@ impl GizmoDrag {
         self.delta
     }
 
-    /// What the drag came to last.
+    /// Last result of the drag.
     pub fn delta(&self) -> Delta {
         self.delta
     }
@@ -125,7 +125,7 @@ impl GizmoDrag {
         Delta::Turn { axis, angle }
     }
 
-    /// The turn about an axis that takes one pixel to another, from half a turn back to half a turn on.
+    /// The rotation about an axis that takes one pixel to another, between minus and plus half a turn.
     fn angle_between(&self, axis: Vec3, from: Vec2, to: Vec2) -> f32 {
         let origin = self.frame.origin;
         let towards = self.sight.towards(origin);
@@ -142,7 +142,7 @@ impl GizmoDrag {
         angle - TAU * (angle / TAU).round()
     }
 
-    /// How far along an axis from the middle a pixel means: the place that appears nearest to it.
+    /// Position of a pixel along an axis from the middle: the nearest point on the screen.
     fn along(&self, axis: Vec3, at: Vec2) -> Option<f32> {
         let GizmoFrame { origin, .. } = self.frame;
         let step = LENGTH * self.sight.pixel_at(origin);
@@ -160,7 +160,7 @@ impl GizmoDrag {
         (is_before && far.is_finite()).then_some(far)
     }
 
-    /// Where a pixel meets the plane through the middle.
+    /// Intersection of a pixel's line of sight with the plane through the middle.
     fn met(&self, normal: Vec3, at: Vec2) -> Option<Vec3> {
         let (eye, direction) = self.line(at);
         let slope = direction.dot(normal);
@@ -173,7 +173,7 @@ impl GizmoDrag {
         (is_before && place.is_finite()).then_some(place)
     }
 
-    /// The line of sight through a pixel. That of a flat view begins nearby, where numbers are exact.
+    /// The line of sight through a pixel. In an orthographic view it starts nearby, where numbers are exact.
     fn line(&self, at: Vec2) -> (Vec3, Vec3) {
         let plane = &self.sight.plane;
         let on_plane = plane.lift(self.sight.point(at));

@@ -1,4 +1,4 @@
-//! The bar under a previewed stroke: how many joints, how far it may stray, accept or cancel.
+//! The bar under a previewed stroke: number of joints, threshold, accept or cancel.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -17,7 +17,7 @@ use crate::{
 /// Shows the bar while there is a preview.
 pub(super) struct StrokeBar;
 
-/// The most joints that the bar offers; the wheel goes on.
+/// Largest number of joints on the bar; the wheel goes further.
 const MOST: usize = 60;
 
 impl ViewportPainter for StrokeBar {
@@ -34,7 +34,7 @@ impl ViewportPainter for StrokeBar {
         });
         egui::Area::new(egui::Id::new("stroke bar"))
             .order(egui::Order::Middle)
-            // In a corner, where it hides no limb.
+            // The bar is in a corner, where it hides no limb.
             .pivot(egui::Align2::LEFT_BOTTOM)
             .fixed_pos(area.left_bottom() + egui::vec2(12.0, -12.0))
             .constrain_to(area)

@@ -1,4 +1,4 @@
-//! The gizmo over the viewport.
+//! Painting of the gizmo over the viewport.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Color32, Stroke};
@@ -10,7 +10,7 @@ use crate::editor::{
     tools::gizmo::{Handle, HandleLine, HandleShape, LinePaint},
 };
 
-/// Paints handles, and the switch for arrows in Pose mode.
+/// Painter of handles, and of the switch for arrows in Pose mode.
 pub(super) struct GizmoPainter;
 
 const AXES: [Color32; 3] =
@@ -64,7 +64,7 @@ fn paint_shape(painter: &egui::Painter, corner: egui::Pos2, shape: &HandleShape,
         let points: Vec<egui::Pos2> = line.points.iter().map(|point| corner + egui::vec2(point.x, point.y)).collect();
         match line.paint {
             LinePaint::Line => {
-                // A dark rim keeps the line apart from a mesh of its colour.
+                // A dark rim separates the line from a mesh of the same colour.
                 let rim = Color32::from_black_alpha(90).gamma_multiply(fade);
                 painter.add(egui::Shape::line(points.clone(), Stroke::new(wide + 1.5, rim)));
                 let wide = if shape.handle == Handle::ViewRing && !is_hovered { 1.25 } else { wide };

@@ -1,8 +1,8 @@
-//! What the gizmo looks like now, and what the status line says of it.
+//! Display of the gizmo, and its hints in the status line.
 
 use bevy::{prelude::*, window::RequestRedraw};
 
-use super::{Aim, GizmoTool, PoseMoves, Start, edits_rest};
+use super::{GizmoTarget, GizmoTool, PoseMoves, Start, edits_rest};
 use crate::{
     editor::{
         ActiveRig,
@@ -17,7 +17,7 @@ use crate::{
     plugins::document::ShowRest,
 };
 
-/// Shows the rest pose for as long as it is edited.
+/// Shows the rest pose while it is edited.
 pub(super) fn show_rest(
     mode: Res<Mode>,
     tool: Res<GizmoTool>,
@@ -30,13 +30,14 @@ pub(super) fn show_rest(
     for (rig, mut show_rest) in &mut rigs {
         let is_active = active.as_ref().is_some_and(|active| active.0 == rig);
         if show_rest.set_if_neq(ShowRest(wanted && is_active)) {
-            // Joints follow in the next frame; without this it would come with the next movement of the pointer.
+            // Joints follow in the next frame, which has to be requested: otherwise it would come with the next
+            // movement of the pointer.
             redraw.write(RequestRedraw);
         }
     }
 }
 
-/// Keeps handles and the status line true.
+/// Updates handles and the status line.
 pub(super) fn show(
     mode: Res<Mode>,
     settings: Res<EditorSettings>,
@@ -57,7 +58,7 @@ pub(super) fn show(
     if !is_stale && !tool.is_changed() {
         return;
     }
-    let aim = Aim::new(*mode, settings.gizmo_space, moves.0, &scene);
+    let aim = GizmoTarget::new(*mode, settings.gizmo_space, moves.0, &scene);
     let shapes = aim.as_ref().zip(scene.sight()).map(|(aim, sight)| aim.frame.shapes(aim.parts, &sight));
     let shapes = shapes.unwrap_or_default();
     let tool = tool.bypass_change_detection();
@@ -94,8 +95,14 @@ fn verb(mode: Mode) -> &'static str {
     }
 }
 
-/// What a drag would do now.
-fn describe(rig: &EditedRig, mode: Mode, aim: &Aim, handle: Option<Handle>, settings: &EditorSettings) -> String {
+/// Description of the effect of a drag.
+fn describe(
+    rig: &EditedRig,
+    mode: Mode,
+    aim: &GizmoTarget,
+    handle: Option<Handle>,
+    settings: &EditorSettings,
+) -> String {
     let what = match aim.joints.as_slice() {
         [only] => rig.name(*only),
         several => joints(several.len()),

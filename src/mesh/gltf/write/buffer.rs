@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::floats;
 
-/// What a view holds, as the GPU sees it.
+/// Content of a view, as the GPU uses it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Target {
     Vertices,
@@ -21,12 +21,12 @@ pub(super) struct Bin {
     bytes: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
-    /// Key times already written, which channels of a clip mostly share.
+    /// Accessors of key times already written: channels of a clip mostly share them.
     times: BTreeMap<Vec<u8>, usize>,
 }
 
 impl Bin {
-    /// Appends bytes; returns the view.
+    /// Appends bytes as a view; returns its index.
     pub(super) fn view(&mut self, bytes: &[u8], target: Target) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let mut view = Map::new();
@@ -53,7 +53,7 @@ impl Bin {
         self.accessors.len() - 1
     }
 
-    /// Floats, `N` an element.
+    /// Appends floats, `N` an element; returns the accessor.
     pub(super) fn floats<const N: usize>(&mut self, elements: &[[f32; N]], target: Target) -> usize {
         let kind = match N {
             1 => "SCALAR",
@@ -66,7 +66,7 @@ impl Bin {
         self.accessor(&bytes, target, 5126, kind, elements.len())
     }
 
-    /// Positions, with the bounds that glTF demands of them.
+    /// Appends positions, with the bounds that glTF demands; returns the accessor.
     pub(super) fn positions(&mut self, positions: &[Vec3]) -> usize {
         let elements: Vec<[f32; 3]> = positions.iter().map(Vec3::to_array).collect();
         let index = self.floats(&elements, Target::Vertices);
@@ -76,7 +76,7 @@ impl Bin {
         index
     }
 
-    /// Key times, rising; the same times are written once.
+    /// Appends key times, rising; equal times are written once.
     pub(super) fn times(&mut self, times: &[f32]) -> usize {
         let bytes = little_endian(times, f32::to_le_bytes);
         if let Some(known) = self.times.get(&bytes) {
@@ -88,7 +88,7 @@ impl Bin {
         index
     }
 
-    /// Vertex indices below `vertices`, as small as they go; the largest value of each type is reserved.
+    /// Appends vertex indices below `vertices` in the smallest type; the largest value of each type is reserved.
     pub(super) fn indices(&mut self, indices: &[u32], vertices: usize) -> usize {
         if vertices <= 65535 {
             let bytes = little_endian(indices, |index| (index as u16).to_le_bytes());
@@ -99,7 +99,7 @@ impl Bin {
         }
     }
 
-    /// Joints of vertices, as bytes if the skin has few.
+    /// Appends joints of vertices, as bytes if the skin has few.
     pub(super) fn joints(&mut self, joints: &[[u16; 4]], of: usize) -> usize {
         if of <= 256 {
             let bytes = little_endian(joints.as_flattened(), |joint| [joint as u8]);
@@ -117,7 +117,7 @@ impl Bin {
         }
     }
 
-    /// Accessors, views and bytes.
+    /// Finishes the buffer: accessors, views and bytes.
     pub(super) fn finish(mut self) -> (Vec<Value>, Vec<Value>, Vec<u8>) {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         (self.accessors, self.views, self.bytes)

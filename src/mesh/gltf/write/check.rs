@@ -1,11 +1,11 @@
-//! A model is checked before it is written: everything after this may index freely.
+//! Validation of a model before it is written: the code after it may index freely.
 
 use crate::mesh::{
     gltf::GltfError,
     model::{ChannelTarget, Interpolation, Model, Part, Weights},
 };
 
-/// Fails at the first thing that does not fit together.
+/// Checks the model; fails at the first inconsistency.
 pub(super) fn check(model: &Model) -> Result<(), GltfError> {
     let fail = |what: String| Err(GltfError::model(what));
     for (i, node) in model.nodes.iter().enumerate() {
@@ -66,7 +66,7 @@ fn check_part(model: &Model, part: &Part) -> Result<(), &'static str> {
     let Some(object) = model.objects.get(part.object) else {
         return Err("refers to an object that is not there");
     };
-    if part.material.is_some_and(|material| material >= model.looks.materials.len()) {
+    if part.material.is_some_and(|material| material >= model.material_set.materials.len()) {
         return Err("refers to a material that is not there");
     }
     let count = part.vertices.len();

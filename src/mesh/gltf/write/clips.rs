@@ -1,4 +1,4 @@
-//! Clips become animations, as far as their nodes and objects are written.
+//! Animations of clips, for the nodes and objects that are written.
 
 use serde_json::{Map, Value};
 

@@ -1,4 +1,4 @@
-//! Objects and parts become meshes and nodes.
+//! Meshes and nodes of objects and parts.
 
 use glam::{DAffine3, Vec3, Vec4};
 use serde_json::{Map, Value};
@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use super::{
     buffer::{Bin, Target},
     floats, insert_list, insert_name,
-    looks::uv_sets,
+    materials::uv_sets,
     skeleton::{Skeleton, insert_transform},
 };
 use crate::mesh::{
@@ -96,7 +96,7 @@ fn mesh(object: &Object, primitives: Vec<Value>) -> Value {
     let mut extras = object.extras.clone();
     if object.morph_names.iter().any(|name| !name.is_empty()) {
         let names: Value = object.morph_names.iter().map(|name| Value::from(name.as_str())).collect();
-        // Extras that are no object have no room for names.
+        // Extras that are not an object cannot hold names.
         if let Value::Object(map) = extras.get_or_insert_with(|| Map::new().into()) {
             map.insert("targetNames".to_owned(), names);
         }
@@ -107,8 +107,8 @@ fn mesh(object: &Object, primitives: Vec<Value>) -> Value {
     mesh.into()
 }
 
-/// How a rigid part hangs below its node: where that is possible its vertices stay in model space and the mesh's node
-/// undoes the carrier's rest transform; else the vertices are moved into the carrier's space.
+/// Transform of a rigid part below its node. If the carrier's rest transform is invertible, the vertices stay in model
+/// space and the mesh's node undoes it; else the vertices are moved into the carrier's space.
 fn placement(model: &Model, carrier: usize, parts: &[&Part]) -> (Trs, Bake) {
     let mut world = DAffine3::IDENTITY;
     let mut node = Some(carrier);
@@ -169,9 +169,9 @@ fn primitive(
         let tangents: Vec<[f32; 4]> = pick(&part.tangents, &used).zip(&normals).map(one).collect();
         put("TANGENT", bin.floats(&tangents, Target::Vertices));
     }
-    // A set that is missing below others, or that the material's textures need, is written as zeros.
+    // An empty set below other sets, or one that the material's textures need, is written as zeros.
     let own_sets = part.uvs.iter().rposition(|uvs| !uvs.is_empty()).map_or(0, |last| last + 1);
-    let sets = own_sets.max(part.material.map_or(0, |material| uv_sets(&model.looks.materials[material])));
+    let sets = own_sets.max(part.material.map_or(0, |material| uv_sets(&model.material_set.materials[material])));
     for set in 0..sets {
         let mut uvs: Vec<[f32; 2]> =
             part.uvs.get(set).map_or(vec![], |uvs| pick(uvs, &used).map(|uv| uv.to_array()).collect());
@@ -225,7 +225,7 @@ fn morphs(part: &Part, used: &[u32], normals: &[Vec3], bake: &Bake, bin: &mut Bi
     for morph in &part.morphs {
         let mut target = Map::new();
         let mut positions: Vec<Vec3> = pick(&morph.positions, used).map(|offset| bake.vector(offset)).collect();
-        // A target must have something; not every program takes one without positions.
+        // Some programs refuse a target without positions.
         positions.resize(used.len(), Vec3::ZERO);
         target.insert("POSITION".to_owned(), bin.positions(&positions).into());
         if !morph.normals.is_empty() && !normals.is_empty() {

@@ -1,4 +1,4 @@
-//! Which nodes are written, and the skins over them.
+//! Selection of the written nodes, and the skins over them.
 
 use serde_json::{Map, Value};
 
@@ -15,21 +15,21 @@ use crate::mesh::{
 /// The name of the node that joins several roots.
 const COMMON_ROOT: &str = "skeleton";
 
-/// The chosen nodes, and influences cut to what is written.
+/// The written nodes, and the influences over them.
 pub(super) struct Skeleton {
     /// The glTF node of each of the model's nodes.
     pub(super) node_of: Vec<Option<usize>>,
     /// The glTF nodes at the scene's root.
     pub(super) roots: Vec<usize>,
-    /// Roots of the model's nodes below the common root.
+    /// The model's root nodes below the common root.
     joined: Vec<usize>,
     /// Influences of each point of a skinned object, over the model's nodes.
     influences: Weights,
     /// The glTF skin of each of the model's skins.
     pub(super) skin_of: Vec<Option<usize>>,
-    /// For each skin, the written joints by node, with their place in the skin.
+    /// Written joints of each skin by node, with their position in the skin.
     slots: Vec<Vec<(usize, u16)>>,
-    /// For each skin the node that points without weights go to.
+    /// Joint of each skin that points without weights are bound to.
     root_joints: Vec<Option<usize>>,
 }
 
@@ -152,7 +152,7 @@ impl Skeleton {
         skins
     }
 
-    /// The number of written joints of a skin.
+    /// Number of written joints of a skin.
     pub(super) fn joint_count(&self, skin: usize) -> usize {
         self.slots[skin].len()
     }
@@ -174,7 +174,7 @@ impl Skeleton {
     }
 }
 
-/// A transform, without what is identity.
+/// Inserts a transform's components, but for those that are the identity.
 pub(super) fn insert_transform(map: &mut Map<String, Value>, trs: &Trs) {
     if trs.translation != Trs::IDENTITY.translation {
         map.insert("translation".to_owned(), floats(&trs.translation.to_array()));
@@ -206,7 +206,7 @@ fn skinned_points(model: &Model) -> Vec<Vec<u32>> {
     points
 }
 
-/// The strongest `most` influences of the given points, summing to one.
+/// The `most` strongest influences of the given points, summing to one.
 fn cut(model: &Model, skinned: &[Vec<u32>], most: usize) -> Weights {
     let mut wanted = vec![false; model.points.len()];
     skinned.iter().flatten().for_each(|point| wanted[*point as usize] = true);
@@ -227,7 +227,7 @@ fn cut(model: &Model, skinned: &[Vec<u32>], most: usize) -> Weights {
     out
 }
 
-/// Roots that need a common parent: those above the joints of a skin that has several.
+/// Roots that need a common parent: the roots above a skin with joints below several of them.
 fn joined_roots(model: &Model, slots: &[Vec<(usize, u16)>]) -> Vec<usize> {
     let mut root_of: Vec<usize> = Vec::with_capacity(model.nodes.len());
     for (node, entry) in model.nodes.iter().enumerate() {

@@ -6,18 +6,18 @@ use ron::ser::PrettyConfig;
 use serde::{Deserialize, Serialize};
 
 use super::TagError;
-use crate::rig::{EditError, GroupData, Rig, Tag, TagKind, Uid, parse_ron};
+use crate::rig::{EditError, GroupData, Rig, TagData, TagKind, Uid, parse_ron};
 
-/// Which joints something is done to.
+/// Joints that an operation applies to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TagScope {
-    /// These, in this order.
+    /// The listed joints, in this order.
     Joints(Vec<Uid>),
-    /// These and all below them, in the order of the document.
+    /// The listed joints and their hierarchies, in the order of the document.
     Hierarchy(Vec<Uid>),
-    /// Those in a local group.
+    /// The joints in a local group.
     Group(Uid),
-    /// All of the rig.
+    /// All joints of the rig.
     Rig,
 }
 
@@ -27,7 +27,7 @@ pub enum TagScope {
 pub struct TagClipboard {
     /// The rig they were copied from.
     pub rig: Uid,
-    /// The joints that carried them, in order; one without tags keeps its place in the list.
+    /// The joints that carried the tags, in order; a joint without tags keeps its place in the list.
     pub joints: Vec<CopiedJoint>,
 }
 
@@ -35,20 +35,20 @@ pub struct TagClipboard {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CopiedJoint {
-    /// Its uid.
+    /// Uid of the joint.
     pub uid: Uid,
     /// The joint on the other side.
     #[serde(default)]
     pub mirror: Option<Uid>,
-    /// Its local group: references to it mean the group that they are pasted into.
+    /// Local group of the joint: references to it become references to the group of the target.
     #[serde(default)]
     pub group: Option<Uid>,
-    /// Its identifier tags, if they were copied, too.
+    /// Identifier tags of the joint, if they were copied, too.
     #[serde(default)]
     pub identifiers: Option<CopiedIdentifiers>,
-    /// Its tags.
+    /// Tags of the joint.
     #[serde(default)]
-    pub tags: Vec<Tag>,
+    pub tags: Vec<TagData>,
 }
 
 /// The identifier tags of a joint.
@@ -102,7 +102,7 @@ impl TagClipboard {
         rig: &Rig,
         scope: &TagScope,
         identifiers: bool,
-        mut wanted: impl FnMut(&Tag) -> bool,
+        mut wanted: impl FnMut(&TagData) -> bool,
     ) -> Result<Self, EditError> {
         let joints = scope.joints(rig)?.into_iter().filter_map(|uid| rig.joint(uid));
         let joints = joints.map(|joint| CopiedJoint {
@@ -131,7 +131,7 @@ impl TagClipboard {
         Ok(all)
     }
 
-    /// True if there is nothing to paste.
+    /// Returns `true` if there is nothing to paste.
     pub fn is_empty(&self) -> bool {
         self.joints.iter().all(|joint| joint.tags.is_empty() && joint.identifiers.is_none())
     }
@@ -152,7 +152,7 @@ impl TagClipboard {
 
     /// The text form, RON.
     pub fn to_text(&self) -> String {
-        // Nothing in a clipboard is beyond RON.
+        // A clipboard holds nothing that RON cannot write.
         ron::ser::to_string_pretty(self, PrettyConfig::default().struct_names(true)).unwrap_or_default()
     }
 

@@ -16,9 +16,9 @@ use crate::rig::{
 /// Puts the tags of a part's joints (parents first, siblings as authored) onto `joints` in order, until either list
 /// ends.
 ///
-/// Joints without a label get the part's, joints without a local group the part's group, which is created. What the
-/// part's references name becomes its counterpart; where there is none, what `bindings` says, or what has the same
-/// label or name in the rig.
+/// Joints without a label get the part's, joints without a local group the part's group, which is created. References
+/// of the part are mapped to the counterparts of their nodes; without one, to the entry in `bindings`, or to the object
+/// with the same label or name in the rig.
 pub(super) fn drop_part(
     draft: &mut Draft,
     part: &Rig,
@@ -76,7 +76,7 @@ pub(super) fn drop_part(
     Ok(())
 }
 
-/// Each group of the part becomes the group that one of its counterparts is in, or is created.
+/// Maps each group of the part to the group of its first grouped counterpart, or creates it.
 fn groups(draft: &mut Draft, part: &Rig, pairs: &[(&JointData, Uid)], remap: &mut Remap) -> Result<(), OperationError> {
     for group in part.groups() {
         let members: Vec<Uid> =
@@ -110,7 +110,7 @@ fn free_name(rig: &Rig, name: &str) -> String {
     std::iter::once(name.to_owned()).chain(numbered).find(is_free).unwrap_or_default()
 }
 
-/// Finds what references of the part mean in the rig where they name what has not been put onto a joint.
+/// Binds references of the part to nodes that were not put onto a joint.
 fn bind(
     draft: &mut Draft,
     part: &Rig,
@@ -141,7 +141,7 @@ fn bind(
         let candidates = match kind {
             NameKind::Command => Vec::new(),
             _ if name.is_empty() => Vec::new(),
-            // Which joint bears the label decides what the reference means once one of them is renamed.
+            // The bearer of the label decides the meaning of the reference once a bearer is renamed.
             NameKind::Joint | NameKind::Label => draft.rig().find(NameScope::default(), NameKind::Joint, &name),
             NameKind::Group | NameKind::Rig => draft.rig().find(NameScope::default(), kind, &name),
         };

@@ -8,28 +8,27 @@ use super::{
     remap::{Remap, mirror_names, other_side, pair_tags},
     set,
 };
-use crate::rig::{EditError, RigEdit, Tag, TagKind, Uid, label::mirrored_label};
+use crate::rig::{EditError, RigEdit, TagData, TagKind, Uid, label::mirrored_label};
 
-/// What of copied tags is pasted.
+/// Part of the copied tags that is pasted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum PasteWhat {
     /// Tags without their values: commands with the defaults of their modules. Identifier tags are all value.
     Tags,
-    /// Values into the tags that are there: of the same module or kind, in order.
+    /// Values into the existing tags: of the same module or kind, in order.
     Values,
     /// Tags with their values.
     #[default]
     Both,
 }
 
-/// Where copied tags are pasted.
+/// Target of copied tags.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PasteTo {
-    /// Onto these joints: what comes from one joint onto each of them, what comes from several in order, until either
-    /// list ends.
+    /// The listed joints: tags of one joint go onto each of them, tags of several in order, until either list ends.
     Joints(Vec<Uid>),
-    /// Onto the joints on the other side of those that they were copied from. References are mirrored, and so are names
-    /// and labels; values with a side are for modules to mirror, see [`TagClipboard::map_params`].
+    /// The joints on the other side of the source joints. References are mirrored, and so are names and labels; modules
+    /// mirror values with a side, see [`TagClipboard::map_params`].
     Mirror,
 }
 
@@ -69,7 +68,7 @@ pub(super) fn paste(
     if what != PasteWhat::Tags {
         pairs.iter().try_for_each(|pair| paste_identifiers(draft, pair, mirrored))?;
     }
-    // Where one joint's tags go to several, each has copies of its own that know nothing of one another.
+    // Tags of one joint that go to several have independent copies on each.
     let sets: Vec<&[Pair]> = match clipboard.joints.len() {
         1 => pairs.chunks(1).collect(),
         _ => vec![&pairs],
@@ -129,7 +128,7 @@ fn mirrored_pairs<'a>(draft: &mut Draft, clipboard: &'a TagClipboard) -> Result<
     Ok(pairs)
 }
 
-/// Copied joints become those that they are pasted onto, and so do their groups where that is clear.
+/// Maps copied joints to their targets, and their groups if that is unambiguous.
 fn joints_and_groups(draft: &Draft, pairs: &[Pair], remap: &mut Remap) {
     for (joint, target) in pairs {
         remap.uids.insert(joint.uid, *target);
@@ -178,7 +177,7 @@ fn paste_tags(
     refresh_all(draft, &pasted)
 }
 
-/// Names in references can be told once all copies are there.
+/// Refreshes names in references once all copies exist.
 pub(super) fn refresh_all(draft: &mut Draft, tags: &[Uid]) -> Result<(), OperationError> {
     for &uid in tags {
         let (joint, mut tag) = found(draft, uid)?;
@@ -209,12 +208,12 @@ fn paste_values(draft: &mut Draft, pairs: &[Pair], mut remap: Remap, mirrored: b
         }
         refresh(draft.rig(), &mut copy);
         let (joint, now) = found(draft, uid)?;
-        set(draft, joint, Tag { kind: with_values(now.kind, copy.kind), ..now })?;
+        set(draft, joint, TagData { kind: with_values(now.kind, copy.kind), ..now })?;
     }
     Ok(())
 }
 
-/// The tag with the values of another; which feature it is in is no value.
+/// The tag with the values of another; membership in a feature is not a value.
 fn with_values(now: TagKind, from: TagKind) -> TagKind {
     match (now, from) {
         (TagKind::Command { module, feature, .. }, TagKind::Command { params, .. }) => {

@@ -1,14 +1,14 @@
-//! What uids in copied tags mean where the tags are put.
+//! Mapping of uids in copied tags to the uids at their target.
 
 use std::collections::{HashMap, HashSet};
 
 use crate::rig::{
-    Rig, Tag, TagKind, Uid,
+    Rig, TagData, TagKind, Uid,
     label::mirrored_label,
     reference::{NameKind, map_references, map_text_fields, map_uids},
 };
 
-/// Uids of joints, tags and groups, and what they become. Others stay.
+/// Map of uids of joints, tags and groups. Others stay.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Remap {
     pub uids: HashMap<Uid, Uid>,
@@ -21,7 +21,7 @@ impl Remap {
         self.uids.get(&uid).copied()
     }
 
-    /// The parameters with references, and uids that stand alone, changed.
+    /// The parameters with mapped references and mapped uids that stand alone.
     pub fn params(&self, params: &str) -> String {
         let referred = map_references(params, |reference| {
             for (kind, uid) in reference.uids_mut() {
@@ -35,7 +35,7 @@ impl Remap {
     }
 
     /// A copy of a tag under its next uid. A feature that is not in `rig` and not among the copies is left out.
-    pub fn tag(&self, rig: &Rig, tag: &Tag) -> Tag {
+    pub fn tag(&self, rig: &Rig, tag: &TagData) -> TagData {
         let mut tag = tag.clone();
         tag.uid = self.get(tag.uid).unwrap_or(tag.uid);
         if let TagKind::Command { params, feature, .. } = &mut tag.kind {
@@ -49,8 +49,8 @@ impl Remap {
     }
 }
 
-/// The other side of everything in a rig that has one: joints, their tags (the same module or kind at the same place
-/// among its like), and the local groups of joints.
+/// Counterparts on the other side of a rig: joints, their tags (the tag of the same module or kind with the same
+/// number), and the local groups of joints.
 pub(super) fn other_side(rig: &Rig) -> HashMap<Uid, Uid> {
     let mut other = HashMap::new();
     let mut groups: HashMap<Uid, Option<Uid>> = HashMap::new();
@@ -60,7 +60,7 @@ pub(super) fn other_side(rig: &Rig) -> HashMap<Uid, Uid> {
         pair_tags(&mut other, &joint.data.tags, &mirror.data.tags);
         if let (Some(group), Some(partner)) = (joint.data.group, mirror.data.group) {
             let known = groups.entry(group).or_insert(Some(partner));
-            // A group whose joints' partners are in several has no other side.
+            // A group whose joints' partners are in several groups has no other side.
             if *known != Some(partner) {
                 *known = None;
             }
@@ -79,7 +79,7 @@ pub(super) fn other_side(rig: &Rig) -> HashMap<Uid, Uid> {
 }
 
 /// Pairs each tag with the one at the same place among those of its module or kind.
-pub(super) fn pair_tags(pairs: &mut HashMap<Uid, Uid>, from: &[Tag], to: &[Tag]) {
+pub(super) fn pair_tags(pairs: &mut HashMap<Uid, Uid>, from: &[TagData], to: &[TagData]) {
     let mut used: HashSet<Uid> = HashSet::new();
     for tag in from {
         if let Some(like) = to.iter().find(|other| is_like(tag, other) && !used.contains(&other.uid)) {
@@ -89,7 +89,7 @@ pub(super) fn pair_tags(pairs: &mut HashMap<Uid, Uid>, from: &[Tag], to: &[Tag])
     }
 }
 
-fn is_like(a: &Tag, b: &Tag) -> bool {
+fn is_like(a: &TagData, b: &TagData) -> bool {
     match (&a.kind, &b.kind) {
         (TagKind::Command { module: a, .. }, TagKind::Command { module: b, .. }) => a == b,
         (TagKind::Feature { kind: a, .. }, TagKind::Feature { kind: b, .. }) => a == b,
@@ -97,8 +97,8 @@ fn is_like(a: &Tag, b: &Tag) -> bool {
     }
 }
 
-/// The names that a tag gives (node names, labels, a feature's name) with the other side in them.
-pub(super) fn mirror_names(tag: &mut Tag) {
+/// Mirrors the names that a tag gives (node names, labels, a feature's name).
+pub(super) fn mirror_names(tag: &mut TagData) {
     match &mut tag.kind {
         TagKind::Command { params, .. } => *params = map_text_fields(params, &["name", "label"], mirrored_label),
         TagKind::Feature { name, .. } => {

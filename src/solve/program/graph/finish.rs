@@ -1,4 +1,4 @@
-//! The ends of a graph: what makes the final values of nodes, attributes and morph targets.
+//! Completion of a graph: the operations that make the final values of nodes, attributes and morph targets.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,7 @@ use crate::{
 impl Graph<'_> {
     /// Ends every node, attribute and morph target with the operation that makes its final value.
     ///
-    /// Returns what drives the nodes.
+    /// Returns the driven register of each node.
     pub(in super::super) fn finish(&mut self) -> Vec<Driven> {
         for node in 0..self.rig.nodes.len() {
             self.close(node);

@@ -1,4 +1,4 @@
-//! Constraints on chains of joints.
+//! Lowering of constraints on chains of joints.
 
 use glam::{Quat, Vec3};
 
@@ -156,7 +156,7 @@ impl Lower<'_, '_> {
     }
 }
 
-/// What takes the frames that the solver lays along the curve of the built rig to the joints as they were built.
+/// Rotations from the frames that the solver lays along the curve of the built rig to the joints as built.
 fn corrections(rests: &[Trs], controls: &[Vec3], up: Vec3) -> Box<[Quat]> {
     let lengths: Vec<f32> = rests.windows(2).map(|pair| pair[0].translation.distance(pair[1].translation)).collect();
     let (mut positions, mut rotations) = (vec![Vec3::ZERO; rests.len()], vec![Quat::IDENTITY; rests.len()]);

@@ -1,4 +1,4 @@
-//! What operations read and write, in one place for all that numbers, orders and connects them.
+//! Operands of operations, listed in one place for renumbering, ordering and connecting.
 
 use super::{Link, N, Op, Pose, Tables, TargetReg, UpReg, X};
 
@@ -12,7 +12,7 @@ pub(in super::super) enum Operand<'a> {
 }
 
 impl Op {
-    /// Shows every operand of an operation, reads before writes.
+    /// Calls `f` with every operand of an operation, reads before writes.
     pub(in super::super) fn visit(&mut self, tables: &mut Tables, mut f: impl FnMut(Operand<'_>)) {
         use Operand::{ReadN, ReadX, WriteN, WriteX};
         match self {

@@ -1,7 +1,7 @@
-//! Instances of one program in step: each operation for all of them before the next.
+//! Evaluation of four instances of one program in step: each operation for all of them before the next.
 //!
-//! Registers hold the same number of all instances side by side. Operations that most of a rig is made of work on all at
-//! once; others, and those in which instances go different ways, on one instance after the other. Both come to the same
+//! Registers hold the same number of all instances side by side. The most frequent operations work on all at once;
+//! others, and those in which instances differ in their branches, on one instance after the other. Both give the same
 //! bits, since the formulas are the same; see [`Place`].
 
 use wide::f32x4;
@@ -39,7 +39,7 @@ struct Columns {
     poses: Vec<Posed>,
 }
 
-/// Pose offsets, and which of them are any.
+/// Pose offsets, with a mask of the instances that have one.
 #[derive(Clone, Copy)]
 struct Posed {
     offset: Place<f32x4>,
@@ -52,8 +52,8 @@ struct Column<'a> {
     lane: usize,
 }
 
-/// What running takes besides registers.
-struct Around<'a> {
+/// Data of a run besides the registers.
+struct RunContext<'a> {
     tables: &'a Tables,
     springs: [&'a mut [SpringState]; LANES],
     scratch: &'a mut Scratch,
@@ -61,22 +61,22 @@ struct Around<'a> {
 }
 
 impl Four {
-    /// Evaluates instances of one program that remember results only.
+    /// Evaluates instances of one program with [`Memory::Results`].
     pub fn evaluate(&mut self, mut states: [&mut RigState; LANES], dt: f32) {
         let first = self.take(&states);
         let program = states[0].program.clone();
-        let mut around = Around {
+        let mut context = RunContext {
             tables: &program.tables,
             springs: states.each_mut().map(|state| state.springs.as_mut_slice()),
             scratch: &mut self.scratch,
             dt,
         };
-        program.ops[first..].iter().for_each(|op| self.registers.run(op, &mut around));
+        program.ops[first..].iter().for_each(|op| self.registers.run(op, &mut context));
         self.give(states);
     }
 
-    /// Takes up what instances put in, and returns the first operation to run: what depends on attributes only stands as
-    /// it is where the instances before had the same ones.
+    /// Loads the inputs of the instances, and returns the first operation to run: operations that depend on attributes
+    /// only are skipped if the instances before had the same attributes.
     fn take(&mut self, states: &[&mut RigState; LANES]) -> usize {
         let program = &states[0].program;
         let Columns { x, n, poses } = &mut self.registers;
@@ -108,7 +108,7 @@ impl Four {
         if is_same { program.settings } else { 0 }
     }
 
-    /// Hands instances what came of them.
+    /// Stores the results in the instances.
     fn give(&self, states: [&mut RigState; LANES]) {
         let Columns { x, n, .. } = &self.registers;
         let [a, b, c, d] = states;
@@ -139,8 +139,8 @@ impl Columns {
 
     /// Runs one operation.
     #[inline]
-    fn run(&mut self, op: &Op, around: &mut Around) {
-        let bases = &around.tables.bases;
+    fn run(&mut self, op: &Op, context: &mut RunContext) {
+        let bases = &context.tables.bases;
         match *op {
             Op::Node { pose, base, parent, out } => {
                 let above = self.x(parent);
@@ -167,7 +167,7 @@ impl Columns {
                 self.put(out, global);
             }
             Op::Turn { input, axis, angle: N(angle), out } => {
-                let (angles, axis) = (self.n[angle as usize], around.tables.axes[axis as usize]);
+                let (angles, axis) = (self.n[angle as usize], context.tables.axes[axis as usize]);
                 let mut local = *self.x(input);
                 let is_turned = angles.map(|angle| angle != 0.0 && angle.is_finite());
                 let turns = angles.map(|angle| about(axis, angle.to_radians()).to_array());
@@ -178,25 +178,25 @@ impl Columns {
                 self.put(out, local);
             }
             Op::Transform(at) => {
-                if self.follow(around.tables, at).is_none() {
-                    self.run_each(op, around);
+                if self.follow(context.tables, at).is_none() {
+                    self.run_each(op, context);
                 }
             }
-            _ => self.run_each(op, around),
+            _ => self.run_each(op, context),
         }
     }
 
     /// Runs one operation on one instance after the other.
-    fn run_each(&mut self, op: &Op, around: &mut Around) {
-        for (lane, springs) in around.springs.iter_mut().enumerate() {
+    fn run_each(&mut self, op: &Op, context: &mut RunContext) {
+        for (lane, springs) in context.springs.iter_mut().enumerate() {
             let registers = Column { columns: self, lane };
             let mut machine =
-                Machine { tables: around.tables, registers, springs, scratch: around.scratch, dt: around.dt };
+                Machine { tables: context.tables, registers, springs, scratch: context.scratch, dt: context.dt };
             machine.run(op);
         }
     }
 
-    /// Follows targets where all instances follow the same one, whole; none where they do not.
+    /// Follows a target whole if all instances follow the same one; returns `None` otherwise.
     fn follow(&mut self, tables: &Tables, at: u32) -> Option<()> {
         let op = &tables.transforms[at as usize];
         let above = |N(register): N, least: f32| {
@@ -240,7 +240,7 @@ impl Columns {
 }
 
 impl Posed {
-    /// What poses make of a place; what is `still` for instances without one.
+    /// The transform `moved` for instances with a pose, `still` for those without.
     #[inline(always)]
     fn pick(&self, moved: &Place<f32x4>, still: impl FnOnce() -> Place<f32x4>) -> Place<f32x4> {
         if self.is_posed.all() { *moved } else { Place::select(self.is_posed, moved, &still()) }
@@ -329,7 +329,7 @@ fn one(place: &Place<f32x4>, lane: usize) -> Place<f32> {
     Place { translation: place.translation.map(pick), rotation: place.rotation.map(pick), scale: place.scale.map(pick) }
 }
 
-/// All bits where the answer is yes.
+/// Mask with all bits set where `is_so` is.
 #[inline(always)]
 fn mask(is_so: [bool; LANES]) -> f32x4 {
     f32x4::new(is_so.map(|is_so| f32::from_bits(if is_so { u32::MAX } else { 0 })))

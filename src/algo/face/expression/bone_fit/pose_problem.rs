@@ -1,0 +1,138 @@
+//! Problems of a pose, folded skin and crossed lips or lids, and their repair.
+
+use glam::Vec3;
+
+use super::FittedFace;
+use crate::algo::face::{
+    bones::FaceBoneKind,
+    expression::{BonePose, apply, limited},
+};
+
+/// Problems of a pose.
+#[derive(Default)]
+struct PoseProblems {
+    /// Corners of the triangles that flip.
+    folded: Vec<[u32; 3]>,
+    /// Points of lips and lids of which the first should be above the second, and the missing distance.
+    crossed: Vec<([u32; 2], f32)>,
+}
+
+impl PoseProblems {
+    fn count(&self) -> usize {
+        self.folded.len() + self.crossed.len()
+    }
+}
+
+impl FittedFace<'_> {
+    /// Repairs a pose, in as many rounds as there are parts; returns the number of remaining problems.
+    pub(super) fn repaired(&self, poses: &mut [BonePose], parts: &[f32]) -> usize {
+        let mut problems = self.problems(poses);
+        for part in parts {
+            if problems.count() == 0 {
+                break;
+            }
+            self.relax(poses, &problems.folded, *part);
+            self.part(poses, &problems.crossed);
+            problems = self.problems(poses);
+        }
+        problems.count()
+    }
+
+    /// Finds triangles that turn by more than a right angle, and lips and lids that cross.
+    fn problems(&self, poses: &[BonePose]) -> PoseProblems {
+        if self.moving.is_empty() && self.apart.is_empty() {
+            return PoseProblems::default();
+        }
+        let posed = apply(self.points, self.weights, self.bones, poses);
+        let normal = |points: &[Vec3], corners: [u32; 3]| {
+            let [a, b, c] = corners.map(|corner| points[corner as usize]);
+            (b - a).cross(c - a)
+        };
+        let turned = |corners: &[u32; 3]| normal(self.points, *corners).dot(normal(&posed, *corners)) < 0.0;
+        let folded = self.moving.iter().map(|&index| self.triangles[index as usize]).filter(turned).collect();
+        let slack = 0.002 * self.landmarks.eye_distance();
+        let mut crossed = Vec::new();
+        for &[above, below] in &self.apart {
+            let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
+            let rest = gap(self.points);
+            // Lips that touch at rest may keep touching.
+            let least = if rest > slack { 0.3 * rest } else { rest - slack };
+            if gap(&posed) < least {
+                crossed.push(([above, below], least - gap(&posed)));
+            }
+        }
+        PoseProblems { folded, crossed }
+    }
+
+    /// Raises the first of two points above the second by the missing distance, with the least movement of bones.
+    fn part(&self, poses: &mut [BonePose], crossed: &[([u32; 2], f32)]) {
+        let mut more = vec![0.0_f32; poses.len()];
+        for &([above, below], missing) in crossed {
+            let mut shares = vec![0.0_f32; poses.len()];
+            for (point, sign) in [(above, 1.0), (below, -1.0)] {
+                for (joint, weight) in self.influences(point as usize) {
+                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < shares.len()) else {
+                        continue;
+                    };
+                    if self.bones[bone].kind == FaceBoneKind::Skin {
+                        shares[bone] += sign * weight;
+                    }
+                }
+            }
+            let square: f32 = shares.iter().map(|share| share * share).sum();
+            // Points with equal influences cannot be moved apart.
+            if square < 0.01 {
+                continue;
+            }
+            for (more, share) in more.iter_mut().zip(shares) {
+                let asked = missing * share / square;
+                // Neighbouring pairs ask for about the same movement, which counts once.
+                if asked.abs() > more.abs() {
+                    *more = asked;
+                }
+            }
+        }
+        for (pose, more) in poses.iter_mut().zip(more).filter(|(_, more)| *more != 0.0) {
+            pose.translation = limited(pose.translation + Vec3::Y * more, self.landmarks);
+        }
+    }
+
+    /// Brings the movements of the bones at some corners nearer to each other, by the share `part`.
+    fn relax(&self, poses: &mut [BonePose], folded: &[[u32; 3]], part: f32) {
+        let jaw = self.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw);
+        let jaw = jaw.map(|bone| (bone, poses[bone].affine(self.bones[bone].position)));
+        let mut alike = vec![(Vec3::ZERO, 0.0_f32); self.bones.len()];
+        for &corners in folded {
+            let mut mean = Vec3::ZERO;
+            for corner in corners {
+                for (joint, weight) in self.influences(corner as usize) {
+                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < poses.len()) else {
+                        continue;
+                    };
+                    mean += weight / 3.0
+                        * match jaw {
+                            Some((jaw, turn)) if jaw == bone => {
+                                let point = self.points[corner as usize];
+                                turn.transform_point3(point) - point
+                            }
+                            _ => poses[bone].translation,
+                        };
+                }
+            }
+            for corner in corners {
+                for (joint, weight) in self.influences(corner as usize) {
+                    let bone = (joint as usize).wrapping_sub(2);
+                    if let Some((sum, weights)) = alike.get_mut(bone) {
+                        *sum += mean * weight;
+                        *weights += weight;
+                    }
+                }
+            }
+        }
+        for ((pose, bone), (sum, weights)) in poses.iter_mut().zip(self.bones).zip(alike) {
+            if bone.kind == FaceBoneKind::Skin && weights > 0.0 {
+                pose.translation += (sum / weights - pose.translation) * (part * weights.min(1.0)).min(1.0);
+            }
+        }
+    }
+}

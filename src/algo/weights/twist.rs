@@ -1,0 +1,130 @@
+//! Twist joints: how the flesh of a bone is shared among the joints along it.
+//!
+//! A twist joint turns about its bone by a share of the twist and does nothing else, so it must hold flesh of that bone
+//! only: skin is bound as if there were none, and what a bone then holds is shared among its joints by how far along it
+//! a point lies, linearly from one to the next. So shares never cross the next joint of the limb, and points that other
+//! bones hold stay as they are.
+
+use glam::Vec3;
+
+use super::WeightJoint;
+
+/// Twist joints closer than this share of the bone to its start stand in for the joint there.
+const AT_START: f32 = 0.01;
+
+/// The joints that are bound, and those that share their bones.
+pub(crate) struct Limbs {
+    /// The joints without twist joints.
+    pub joints: Vec<WeightJoint>,
+    /// Those of them that take part.
+    pub free: Vec<u32>,
+    /// The index of each of them among all joints.
+    places: Vec<u32>,
+    /// The bones with twist joints of each of them.
+    bones: Vec<Vec<Bone>>,
+}
+
+/// A bone with the joints that share it.
+struct Bone {
+    start: Vec3,
+    along: Vec3,
+    /// Places from 0 at the start to 1 at the end, rising, with the joints there.
+    stations: Vec<(f32, u32)>,
+}
+
+impl Limbs {
+    /// Takes apart checked joints; `free` are those that take part.
+    pub fn new(joints: &[WeightJoint], free: &[u32]) -> Self {
+        let mut is_free = vec![false; joints.len()];
+        for &joint in free {
+            is_free[joint as usize] = true;
+        }
+        let places: Vec<u32> = (0..joints.len() as u32).filter(|&j| joints[j as usize].twist.is_none()).collect();
+        let mut number = vec![None; joints.len()];
+        for (core, &place) in places.iter().enumerate() {
+            number[place as usize] = Some(core);
+        }
+        let core = |joint: usize| {
+            let joint = joints[joint];
+            let mut parent = joint.parent;
+            while let Some(twist) = parent.filter(|&parent| number[parent].is_none()) {
+                parent = joints[twist].parent;
+            }
+            WeightJoint { parent: parent.and_then(|parent| number[parent]), ..joint }
+        };
+        let bones: Vec<Vec<Bone>> = places.iter().map(|&place| bones(joints, place, &is_free)).collect();
+        let takes_part = |core: &usize| is_free[places[*core] as usize] || !bones[*core].is_empty();
+        let free = (0..places.len()).filter(takes_part).map(|core| core as u32).collect();
+        Self { joints: places.iter().map(|&place| core(place as usize)).collect(), free, places, bones }
+    }
+
+    /// Influences of the bound joints at a point as influences of all joints.
+    pub fn spread(&self, point: Vec3, influences: impl Iterator<Item = (u32, f32)>) -> Vec<(u32, f32)> {
+        let mut row = Vec::new();
+        for (joint, weight) in influences {
+            let bones = self.bones[joint as usize].iter();
+            let nearest = bones.min_by(|a, b| a.distance(point).total_cmp(&b.distance(point)));
+            match nearest {
+                Some(bone) => row.extend(bone.shares(point).map(|(joint, share)| (joint, weight * share))),
+                None => row.push((self.places[joint as usize], weight)),
+            }
+        }
+        row
+    }
+}
+
+/// The bones of a joint that free twist joints share.
+fn bones(joints: &[WeightJoint], owner: u32, is_free: &[bool]) -> Vec<Bone> {
+    let start = joints[owner as usize].head;
+    let mut bones: Vec<(Vec3, Bone)> = Vec::new();
+    for (joint, data) in joints.iter().enumerate() {
+        let Some(twist) = data.twist.filter(|twist| twist.joint == owner as usize && is_free[joint]) else { continue };
+        let along = twist.end - start;
+        let at = place(data.head - start, along);
+        match bones.iter_mut().find(|(end, _)| *end == twist.end) {
+            Some((_, bone)) => bone.stations.push((at, joint as u32)),
+            None => bones.push((twist.end, Bone { start, along, stations: vec![(at, joint as u32)] })),
+        }
+    }
+    let complete = |(_, mut bone): (Vec3, Bone)| {
+        bone.stations.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        if is_free[owner as usize] {
+            match bone.stations[0].0 < AT_START {
+                true => bone.stations.push((1.0, owner)),
+                false => bone.stations.insert(0, (0.0, owner)),
+            }
+        }
+        bone
+    };
+    bones.into_iter().map(complete).collect()
+}
+
+/// How far along a bone a point lies, 0 at the start and 1 at the end.
+fn place(point: Vec3, along: Vec3) -> f32 {
+    // Divided first: squares of small or large units leave the range of numbers.
+    let length = along.length();
+    let at = (point / length).dot(along / length);
+    if at.is_finite() { at.clamp(0.0, 1.0) } else { 0.0 }
+}
+
+impl Bone {
+    fn distance(&self, point: Vec3) -> f32 {
+        point.distance(self.start + self.along * place(point - self.start, self.along))
+    }
+
+    /// The joints that share the flesh at a point, with shares that sum to one.
+    fn shares(&self, point: Vec3) -> impl Iterator<Item = (u32, f32)> + use<> {
+        let at = place(point - self.start, self.along);
+        let next = self.stations.partition_point(|(place, _)| *place <= at);
+        let (_, after) = self.stations[next.min(self.stations.len() - 1)];
+        let shares = match next.checked_sub(1).map(|before| (self.stations[before], self.stations.get(next))) {
+            Some(((from, before), Some((to, _)))) => {
+                let share = (at - from) / (to - from);
+                [(before, 1.0 - share), (after, share)]
+            }
+            Some(((_, before), None)) => [(before, 1.0), (before, 0.0)],
+            None => [(after, 1.0), (after, 0.0)],
+        };
+        shares.into_iter().filter(|(_, share)| *share > 0.0)
+    }
+}

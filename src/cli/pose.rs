@@ -1,0 +1,185 @@
+//! `rigsmith pose`: the app on the command line. Builds a rig, writes the entities of its controls, and gives what the
+//! entities say.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::Value;
+
+use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, build, skin};
+use crate::{
+    files::{FileKind, RealDisk, load_project, store_model, store_rig},
+    headless::{
+        Workbench,
+        posing::{ControlWrite, PoseError},
+    },
+    mesh::model::Trs,
+    plugins::commands::BuildStep,
+    rig::{Rig, RigEdit, bake::baked, operations::Operation},
+};
+
+/// What is posed, and how; shared with `rigsmith render`.
+#[derive(Args, Debug, Clone, Default)]
+pub(super) struct PoseSteps {
+    /// Writes one value: CONTROL.translate=(x,y,z), CONTROL.rotate=(x,y,z) in degrees, CONTROL.scale=(x,y,z), all
+    /// relative to rest in the control's own axes, or NODE.ATTRIBUTE=value; CONTROL is a name, a label or a reference
+    /// (@...); may be repeated
+    #[arg(long = "set", value_name = "NODE.CHANNEL=VALUE", allow_hyphen_values = true)]
+    pub set: Vec<String>,
+    /// Throws a switch before anything is set, without a jump: NAME=ik, fk or the name of a space; NAME is a local group,
+    /// a control or a joint of the limb; may be repeated
+    #[arg(long = "switch", value_name = "NAME=VALUE")]
+    pub switches: Vec<String>,
+    /// Frames of a sixtieth of a second that pass afterwards, for springs
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub frames: u32,
+}
+
+impl PoseSteps {
+    /// True if nothing is asked for.
+    pub(super) fn is_empty(&self) -> bool {
+        self.set.is_empty() && self.switches.is_empty() && self.frames == 0
+    }
+}
+
+/// Arguments of `rigsmith pose`.
+#[derive(Args, Debug)]
+pub(super) struct PoseArgs {
+    /// The rig: a .rig.ron, or a project (.rigsmith.ron), whose pose is kept
+    rig: PathBuf,
+    /// A mesh to bind to what is built
+    #[arg(long)]
+    mesh: Option<PathBuf>,
+    #[command(flatten)]
+    steps: PoseSteps,
+    /// A stored pose of a project to begin with
+    #[arg(long, value_name = "NAME")]
+    pose: Option<String>,
+    /// The file to write: .glb or .gltf for the posed character, .rig.ron for the posed skeleton, .png for a picture
+    #[arg(short, long)]
+    output: Option<Output>,
+    #[command(flatten)]
+    weights: WeightArgs,
+    #[command(flatten)]
+    export: ExportArgs,
+}
+
+impl From<PoseError> for Failure {
+    fn from(error: PoseError) -> Self {
+        match error {
+            PoseError::Syntax(_) => Self::Usage(error.to_string()),
+            error => Self::Input(Box::new(error)),
+        }
+    }
+}
+
+pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
+    let kind = args.output.as_deref().map(FileKind::of);
+    let is_picture = args.output.as_deref().is_some_and(is_png);
+    if let (Some(output), false) = (&args.output, is_picture)
+        && !matches!(kind, Some(Some(FileKind::Glb | FileKind::Gltf | FileKind::Template)))
+    {
+        return Err(Failure::Usage(format!("cannot write `{}`; give .glb, .gltf, .rig.ron or .png", output.display())));
+    }
+    let writes = parsed(&args.steps)?;
+    let mut report = Report::default();
+    let rig = read(args, &mut report)?;
+    let mut bench = Workbench::with_rig(SEED, rig);
+    run_steps(&mut bench, &args.steps, &writes)?;
+    let nodes = bench.nodes()?;
+    let error = nodes.iter().map(|node| node.entity.translation.distance(node.program.translation)).fold(0.0, f32::max);
+    report.line(format!("{} nodes; entities and program differ by {error:e} at most", nodes.len()));
+    report.set("nodes", Value::Array(nodes.iter().map(|node| node.json()).collect()));
+    report.set("error", error);
+    if let Some(output) = &args.output {
+        if is_picture {
+            picture(args, output, &bench, &mut report)?;
+        } else {
+            write(args, output, &bench, &mut report)?;
+        }
+        report.line(format!("wrote {}", output.display()));
+        report.set("output", output.display().to_string());
+    }
+    Ok(report)
+}
+
+fn is_png(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"))
+}
+
+/// The values of `--set`.
+pub(super) fn parsed(steps: &PoseSteps) -> Result<Vec<ControlWrite>, Failure> {
+    steps.set.iter().map(|text| Ok(text.parse::<ControlWrite>()?)).collect()
+}
+
+/// Builds, switches, writes, and lets time pass.
+pub(super) fn run_steps(bench: &mut Workbench, steps: &PoseSteps, writes: &[ControlWrite]) -> Result<(), Failure> {
+    if let Some(error) = bench.build(BuildStep::All).error {
+        return Err(Failure::Input(Box::new(error)));
+    }
+    for switch in &steps.switches {
+        let wrong = || Failure::Usage(format!("--switch {switch}: write NAME=VALUE, for example arm_l=fk"));
+        let (name, value) = switch.split_once('=').ok_or_else(wrong)?;
+        bench.switch(name.trim(), value.trim())?;
+    }
+    bench.pose(writes)?;
+    bench.frames(steps.frames);
+    Ok(())
+}
+
+fn read(args: &PoseArgs, report: &mut Report) -> Result<Rig, Failure> {
+    let mut rig = if FileKind::of(&args.rig) == Some(FileKind::Project) {
+        let mut project = load_project(&RealDisk, &args.rig)?;
+        report.notes(project.notes);
+        let empty = || Failure::Input(format!("`{}` has no rig to pose", args.rig.display()).into());
+        (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)?
+    } else {
+        skin::load_rig(&args.rig, report)?
+    };
+    if let Some(name) = &args.pose {
+        let stored = rig.stored_poses().iter().find(|pose| pose.name == *name).map(|pose| pose.uid);
+        let stored = stored.ok_or_else(|| {
+            let known: Vec<&str> = rig.stored_poses().iter().map(|pose| pose.name.as_str()).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            Failure::Input(format!("no stored pose is called \"{name}\"; stored poses: {known}").into())
+        })?;
+        let mut uids = crate::rig::UidSource::seeded(SEED);
+        let applied = Operation::ApplyPose(stored).run(&mut rig, &mut uids, None);
+        applied.map_err(|error| Failure::Input(Box::new(error)))?;
+    }
+    Ok(rig)
+}
+
+/// Writes the character, or the skeleton, as the entities stand.
+fn write(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
+    let built = bench.built().ok_or(PoseError::NotBuilt)?;
+    let locals = bench.posed_locals()?;
+    if FileKind::of(output) == Some(FileKind::Template) {
+        let mut skeleton = baked(bench.rig(), built);
+        let joints: Vec<_> = skeleton.walk().map(|joint| joint.data.uid).collect();
+        for joint in joints {
+            if let Some(local) = locals.get(&joint) {
+                let set = RigEdit::SetRest(joint, (*local).into());
+                skeleton.apply(&set).map_err(|error| Failure::Input(Box::new(error)))?;
+            }
+        }
+        report.notes(store_rig(&RealDisk, output, &skeleton)?);
+        return Ok(());
+    }
+    let posed: Vec<Trs> = built.nodes.iter().map(|node| locals.get(&node.uid).copied().unwrap_or(node.base)).collect();
+    let (model, settings) =
+        build::character_of(bench.rig(), built, &posed, args.mesh.as_deref(), &args.weights, &args.export, report)?;
+    report.notes(store_model(&RealDisk, output, &model, &settings)?);
+    Ok(())
+}
+
+#[cfg(feature = "render")]
+fn picture(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
+    super::render::picture_of(bench.posed_document()?, args.mesh.as_deref(), &args.weights, output, report)
+}
+
+#[cfg(not(feature = "render"))]
+fn picture(_: &PoseArgs, output: &Output, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
+    let reason = format!("cannot draw `{}`: this program was built without pictures", output.display());
+    Err(Failure::Usage(reason))
+}

@@ -1,0 +1,93 @@
+//! The place that a save really goes to: links followed, and nothing replaced that should not be.
+
+use std::{
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
+
+use super::{SaveError, SaveStep, folder_of, temp::Temp};
+use crate::files::disk::{Disk, EntryKind};
+
+/// As many links in a row as Linux follows.
+const MAX_LINKS: usize = 40;
+
+/// Place that the bytes for a path really go to.
+pub(super) struct Target {
+    /// As the caller gave it, for messages.
+    pub path: PathBuf,
+    /// With links followed.
+    pub file: PathBuf,
+    /// The folder of that file.
+    pub folder: PathBuf,
+    /// True if something is there that is replaced.
+    pub exists: bool,
+}
+
+impl Target {
+    pub fn find(disk: &dyn Disk, path: &Path) -> Result<Self, SaveError> {
+        let named = |path: PathBuf| SaveError::NoName { path };
+        let mut file = path.to_path_buf();
+        for _ in 0..=MAX_LINKS {
+            if file.file_name().is_none() || ends_in_separator(&file) {
+                let is_folder = disk.entry(&file, true).is_ok_and(|entry| entry.kind == EntryKind::Folder);
+                let path = path.to_path_buf();
+                return Err(if is_folder { SaveError::IsFolder { path } } else { named(path) });
+            }
+            let folder = folder_of(&file).to_path_buf();
+            let path = path.to_path_buf();
+            let entry = match disk.entry(&file, false) {
+                Ok(entry) => entry,
+                Err(error) if error.kind() == ErrorKind::NotFound => {
+                    return Ok(Self { path, file, folder, exists: false });
+                }
+                Err(error) if error.kind() == ErrorKind::NotADirectory => {
+                    return Err(SaveError::NoFolder { path, folder });
+                }
+                Err(error) => return Err(SaveError::new(&path, &folder, 0, SaveStep::Inspect, error)),
+            };
+            match entry.kind {
+                EntryKind::Folder => return Err(SaveError::IsFolder { path }),
+                EntryKind::Other => return Err(SaveError::NotAFile { path }),
+                // Renaming would replace a protected file without asking.
+                EntryKind::File if entry.read_only => return Err(SaveError::WriteProtected { path }),
+                EntryKind::File => {
+                    return Ok(Self { path, file, folder, exists: true });
+                }
+                EntryKind::Link => {
+                    let link = disk
+                        .read_link(&file)
+                        .map_err(|source| SaveError::new(&path, &folder, 0, SaveStep::Inspect, source))?;
+                    file = folder.join(link);
+                }
+            }
+        }
+        Err(SaveError::LinkLoop { path: path.to_path_buf() })
+    }
+
+    /// Writes `bytes` to a temporary file beside the target, with its permissions, syncs it and reads it back.
+    pub fn stage<'d>(&self, disk: &'d dyn Disk, bytes: &[u8]) -> Result<Temp<'d>, SaveError> {
+        let mut temp = Temp::anchor(disk, &self.folder).map_err(|error| self.failed(bytes, SaveStep::Create, error))?;
+        temp.fill(bytes, self.exists.then_some(self.file.as_path()))
+            .map_err(|(step, error)| self.failed(bytes, step, error))?;
+        Ok(temp)
+    }
+
+    /// Puts a finished temporary file in the target's place.
+    pub fn replace(&self, temp: Temp, bytes: &[u8]) -> Result<(), SaveError> {
+        temp.rename_to(&self.file).map_err(|error| self.failed(bytes, SaveStep::Replace, error))
+    }
+
+    /// Waits until the name of the file in place has reached the device.
+    pub fn confirm(&self, disk: &dyn Disk) -> Result<(), SaveError> {
+        disk.sync_folder(&self.folder).map_err(|source| SaveError::Unconfirmed { path: self.path.clone(), source })
+    }
+
+    fn failed(&self, bytes: &[u8], step: SaveStep, source: std::io::Error) -> SaveError {
+        SaveError::new(&self.path, &self.folder, bytes.len(), step, source)
+    }
+}
+
+/// `Path` drops a trailing separator, but whoever writes one means a folder.
+fn ends_in_separator(path: &Path) -> bool {
+    path.as_os_str().as_encoded_bytes().last().is_some_and(|&byte| std::path::is_separator(char::from(byte)))
+}

@@ -1,0 +1,71 @@
+//! Reading back what is about to be written, with the readers that will have to read it.
+//!
+//! Nothing is replaced by a file that cannot be read. What arrives on the disk is compared with these bytes when it is saved.
+
+use std::path::Path;
+
+use super::{
+    FileKind, FileSet, LoadError, StoreError,
+    load::{in_source, surviving},
+    stem,
+};
+use crate::{
+    mesh::{
+        gltf::read_gltf,
+        model::Model,
+        obj::{self, ObjSettings},
+    },
+    rig::{project::read_project, skin::SkinFile, template::read_template, text},
+};
+
+/// Reads a model that is to be saved, and counts what came back.
+pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
+    let path = set.path();
+    let is_obj = FileKind::of(path) == Some(FileKind::Obj);
+    let read = || {
+        if is_obj {
+            let mut sidecar = |name: &str| set.companion(name).map(<[u8]>::to_vec);
+            obj::read_model(set.bytes(), &stem(path), &ObjSettings::default(), &mut sidecar)
+                .map_err(|source| LoadError::Obj { path: path.into(), source })
+        } else {
+            let none = || "it is not among the companions".to_owned();
+            let mut external = |name: &str| set.companion(name).map(<[u8]>::to_vec).ok_or_else(none);
+            Ok(read_gltf(set.bytes(), &path.display().to_string(), &mut external)?)
+        }
+    };
+    let back = readable(path, surviving(path, read))?;
+    let same = |what, written: usize, read: usize| match written == read {
+        true => Ok(()),
+        false => Err(StoreError::Lost { path: path.into(), what, written, read }),
+    };
+    let triangles = |model: &Model| model.parts.iter().map(|part| part.triangles.len()).sum::<usize>();
+    if is_obj {
+        same("points", model.points.len(), back.points.len())?;
+    }
+    same("triangles", triangles(model), triangles(&back))?;
+    same("finite points", back.points.len(), back.points.iter().filter(|point| point.is_finite()).count())
+}
+
+/// Reads a template that is to be saved.
+pub(super) fn template(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    readable(path, read_template(bytes).map(drop).map_err(|source| in_source(path, bytes, source)))
+}
+
+/// Reads a `.rig` that is to be saved.
+pub(super) fn rig_text(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    readable(path, text::parse(bytes).map(drop).map_err(|source| LoadError::RigText { path: path.into(), source }))
+}
+
+/// Reads weights that are to be saved.
+pub(super) fn skin(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    readable(path, SkinFile::read(bytes).map(drop).map_err(|source| LoadError::Skin { path: path.into(), source }))
+}
+
+/// Reads a project that is to be saved.
+pub(super) fn project(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    readable(path, read_project(bytes).map(drop).map_err(|source| in_source(path, bytes, source)))
+}
+
+fn readable<T>(path: &Path, read: Result<T, LoadError>) -> Result<T, StoreError> {
+    read.map_err(|source| StoreError::Unreadable { path: path.into(), source: Box::new(source) })
+}

@@ -1,0 +1,385 @@
+//! Building and posing on a workbench: through the same requests and the same entities as in an app.
+
+use std::{collections::BTreeMap, str::FromStr, sync::Arc, time::Duration};
+
+use bevy::{math::EulerRot, prelude::*, time::TimeUpdateStrategy};
+use serde_json::{Value, json};
+
+use super::{Workbench, WorkbenchError};
+use crate::{
+    mesh::model::Trs,
+    plugins::{
+        commands::{BuildDone, BuildRequest, BuildStep, BuiltEntities, Processor, RunFailure},
+        controls::{SwitchError, SwitchRequest, find_switches},
+        document::JointEntities,
+        runtime::RigRuntime,
+        schema::Attributes,
+    },
+    processor::{FindError, RunReport},
+    rig::{BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::did_you_mean},
+};
+
+/// One value that is written to an entity: `CONTROL.translate=(x,y,z)`, `.rotate=(x,y,z)` in degrees about X, Y and Z in
+/// that order, `.scale=(x,y,z)`, all relative to where the control stands at rest, in its own axes; or
+/// `NODE.ATTRIBUTE=value`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControlWrite {
+    /// The node: a name, a label, or a reference that begins with `@`.
+    pub node: String,
+    /// The value.
+    pub value: WriteValue,
+}
+
+/// The channel that a [`ControlWrite`] sets.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WriteValue {
+    /// Units of the rig.
+    Translate(Vec3),
+    /// Degrees.
+    Rotate(Vec3),
+    /// Factors.
+    Scale(Vec3),
+    /// An attribute by name.
+    Attribute(String, f32),
+}
+
+/// The reason why a control was not posed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PoseError {
+    /// The text is no write.
+    #[error("\"{0}\" sets nothing: write CONTROL.translate=(x,y,z), .rotate, .scale, or NODE.ATTRIBUTE=value")]
+    Syntax(String),
+    /// The rig is not built.
+    #[error("the rig is not built; build it first")]
+    NotBuilt,
+    /// The built rig cannot run.
+    #[error("the built rig cannot run: {0}")]
+    CannotRun(String),
+    /// No node of that name.
+    #[error("no {what} is called \"{name}\"{nearest}")]
+    NoNode {
+        /// The kind of node that was looked for.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// The nearest names, as the rest of a sentence.
+        nearest: String,
+    },
+    /// Several nodes of that name.
+    #[error("\"{name}\" may be any of {candidates}; write one of these names")]
+    Ambiguous {
+        /// The name.
+        name: String,
+        /// Names of the nodes that it may mean.
+        candidates: String,
+    },
+    /// The node has no such attribute.
+    #[error("\"{node}\" has no attribute \"{attribute}\"{known}")]
+    NoAttribute {
+        /// The node.
+        node: String,
+        /// The attribute.
+        attribute: String,
+        /// Those there are, as the rest of a sentence.
+        known: String,
+    },
+    /// A reference that finds nothing.
+    #[error(transparent)]
+    Reference(#[from] FindError),
+    /// A switch that is not there.
+    #[error(transparent)]
+    Switch(#[from] SwitchError),
+    /// See [`WorkbenchError`].
+    #[error(transparent)]
+    Workbench(#[from] WorkbenchError),
+}
+
+impl FromStr for ControlWrite {
+    type Err = PoseError;
+
+    fn from_str(text: &str) -> Result<Self, PoseError> {
+        let wrong = || PoseError::Syntax(text.to_owned());
+        let (target, value) = text.rsplit_once('=').ok_or_else(wrong)?;
+        let (node, channel) = target.trim().rsplit_once('.').ok_or_else(wrong)?;
+        let node = node.trim().to_owned();
+        let number = |text: &str| text.trim().parse::<f32>().ok().filter(|number| number.is_finite()).ok_or_else(wrong);
+        let vector = || -> Result<Vec3, PoseError> {
+            let inner = value.trim().strip_prefix('(').and_then(|text| text.strip_suffix(')')).ok_or_else(wrong)?;
+            let numbers = inner.split(',').map(number).collect::<Result<Vec<f32>, _>>()?;
+            <[f32; 3]>::try_from(numbers).map(Vec3::from).map_err(|_| wrong())
+        };
+        let value = match channel.trim() {
+            "translate" => WriteValue::Translate(vector()?),
+            "rotate" => WriteValue::Rotate(vector()?),
+            "scale" => WriteValue::Scale(vector()?),
+            "" => return Err(wrong()),
+            attribute => WriteValue::Attribute(attribute.to_owned(), number(value)?),
+        };
+        if node.is_empty() { Err(wrong()) } else { Ok(Self { node, value }) }
+    }
+}
+
+/// A node as its entity has it and as the program has it, in the rig's space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PosedNode {
+    /// The node.
+    pub node: BuiltNode,
+    /// The uid of its parent; `None` below the rig.
+    pub parent: Option<Uid>,
+    /// The place of the entity.
+    pub entity: Transform,
+    /// The place that the program gives.
+    pub program: Transform,
+}
+
+impl PosedNode {
+    /// The node as a JSON object: `name`, `label`, `uid`, `kind`, `parent`, `position`, `rotation`, `scale`,
+    /// `program_position`, `program_rotation`, `deform`.
+    pub fn json(&self) -> Value {
+        let Self { node, parent, entity, program } = self;
+        let kind = match node.kind {
+            NodeType::Joint => "joint",
+            NodeType::Null => "null",
+            NodeType::Control => "control",
+        };
+        json!({
+            "name": &*node.name,
+            "label": node.label.as_deref(),
+            "uid": node.uid.to_string(),
+            "kind": kind,
+            "parent": parent.map(|parent| parent.to_string()),
+            "position": entity.translation.to_array(),
+            "rotation": entity.rotation.to_array(),
+            "scale": entity.scale.to_array(),
+            "program_position": program.translation.to_array(),
+            "program_rotation": program.rotation.to_array(),
+            "deform": node.kind == NodeType::Joint,
+        })
+    }
+}
+
+impl Workbench {
+    /// Builds the rig, steps it or rolls it back, as a [`BuildRequest`] in an app does.
+    pub fn build(&mut self, step: BuildStep) -> RunReport {
+        self.app.world_mut().resource_mut::<Messages<BuildDone>>().clear();
+        self.app.world_mut().write_message(BuildRequest { rig: self.rig, step });
+        self.app.update();
+        let done = self.app.world_mut().resource_mut::<Messages<BuildDone>>().drain().last();
+        done.map(|done| done.report).unwrap_or_default()
+    }
+
+    /// The processor of the rig; `None` before the first build.
+    pub fn processor(&self) -> Option<&Processor> {
+        self.app.world().get::<Processor>(self.rig)
+    }
+
+    /// The running program.
+    ///
+    /// # Errors
+    /// If the rig is not built, or what is built cannot run.
+    pub fn runtime(&self) -> Result<&RigRuntime, PoseError> {
+        let world = self.app.world();
+        if let Some(failure) = world.get::<RunFailure>(self.rig) {
+            return Err(PoseError::CannotRun(failure.0.clone()));
+        }
+        world.get::<RigRuntime>(self.rig).ok_or(PoseError::NotBuilt)
+    }
+
+    /// Writes values to the entities of controls and nodes, and lets the rig follow for one frame.
+    ///
+    /// # Errors
+    /// See [`PoseError`]; nothing is written then.
+    pub fn pose(&mut self, writes: &[ControlWrite]) -> Result<(), PoseError> {
+        let runtime = self.runtime()?;
+        let program = Arc::clone(runtime.state().program());
+        let mut found = Vec::with_capacity(writes.len());
+        for write in writes {
+            let node = self.find_node(&write.node, &write.value)?;
+            found.push((self.entity(node.uid).ok_or(PoseError::NotBuilt)?, node, &write.value));
+        }
+        for (entity, node, value) in found {
+            let world = self.app.world_mut();
+            if let WriteValue::Attribute(name, value) = value {
+                if let Some(mut attributes) = world.get_mut::<Attributes>(entity) {
+                    attributes.0.insert(name.clone(), *value);
+                }
+                continue;
+            }
+            let base = program.node(node.uid).map_or(node.base, |slot| program.nodes()[slot].base);
+            let rest = RestTransform::from(base);
+            let Some(mut transform) = world.get_mut::<Transform>(entity) else { continue };
+            let before = PoseOffset::between(&rest, &transform);
+            let offset = match value {
+                WriteValue::Translate(translation) => PoseOffset { translation: *translation, ..before },
+                WriteValue::Rotate(degrees) => {
+                    let [x, y, z] = degrees.to_array().map(f32::to_radians);
+                    PoseOffset { rotation: Quat::from_euler(EulerRot::XYZ, x, y, z), ..before }
+                }
+                WriteValue::Scale(scale) => PoseOffset { scale: *scale, ..before },
+                WriteValue::Attribute(..) => before,
+            };
+            *transform = offset.on(&rest);
+        }
+        self.app.update();
+        self.runtime().map(drop)
+    }
+
+    /// Throws switches by the words of a person, without a jump: see [`find_switches`].
+    ///
+    /// # Errors
+    /// No such switch, no such value, or a rig that is not built.
+    pub fn switch(&mut self, name: &str, value: &str) -> Result<(), PoseError> {
+        let built = self.built().ok_or(PoseError::NotBuilt)?;
+        for (control, attribute, value) in find_switches(built, self.rig(), name, value)? {
+            self.app.world_mut().write_message(SwitchRequest { rig: self.rig, control, attribute, value });
+            self.app.update();
+            self.refused().map_or(Ok(()), Err)?;
+        }
+        Ok(())
+    }
+
+    /// Lets time pass in frames of a sixtieth of a second, so that springs move.
+    pub fn frames(&mut self, count: u32) {
+        let step = TimeUpdateStrategy::ManualDuration(Duration::from_nanos(16_666_667));
+        self.app.insert_resource(step);
+        (0..count).for_each(|_| self.app.update());
+    }
+
+    /// All nodes of the built rig as their entities and as the program have them.
+    ///
+    /// # Errors
+    /// If the rig is not built or cannot run.
+    pub fn nodes(&self) -> Result<Vec<PosedNode>, PoseError> {
+        let (world, state) = (self.app.world(), self.runtime()?.state());
+        let built = self.built().ok_or(PoseError::NotBuilt)?;
+        let to_rig = world.get::<GlobalTransform>(self.rig).copied().unwrap_or_default().affine().inverse();
+        let nodes = built.nodes.iter().filter_map(|node| {
+            let global = world.get::<GlobalTransform>(self.entity(node.uid)?)?;
+            let entity = GlobalTransform::from(to_rig * global.affine()).compute_transform();
+            let place = state.global(node.uid)?;
+            let (translation, rotation, scale) = (place.translation, place.rotation, place.scale);
+            let parent = node.parent.map(|parent| built.nodes[parent].uid);
+            Some(PosedNode { node: node.clone(), parent, entity, program: Transform { translation, rotation, scale } })
+        });
+        Ok(nodes.collect())
+    }
+
+    fn entity(&self, node: Uid) -> Option<Entity> {
+        let world = self.app.world();
+        let joint = world.get::<JointEntities>(self.rig)?.get(node);
+        joint.or_else(|| world.get::<BuiltEntities>(self.rig)?.get(node))
+    }
+
+    /// The node that a write means. A name wins over a label; among controls of one label the one that is in effect wins:
+    /// the goal of a limb while it follows inverse kinematics, else the forward control.
+    fn find_node(&self, name: &str, value: &WriteValue) -> Result<BuiltNode, PoseError> {
+        let built = self.built().ok_or(PoseError::NotBuilt)?;
+        let state = self.runtime()?.state();
+        let (what, is_meant): (&'static str, Box<dyn Fn(&BuiltNode) -> bool>) = match value {
+            WriteValue::Attribute(..) => ("node", Box::new(|node: &BuiltNode| !node.attributes.is_empty())),
+            _ => ("control", Box::new(|node: &BuiltNode| node.kind == NodeType::Control)),
+        };
+        let of_kind = || built.nodes.iter().filter(|node| is_meant(node));
+        let mut found: Vec<&BuiltNode> = if name.starts_with('@') {
+            let processor = self.processor().ok_or(PoseError::NotBuilt)?;
+            let uids = processor.builder().find(self.rig(), name)?;
+            uids.iter().filter_map(|uid| built.node(*uid)).filter(|node| is_meant(node)).collect()
+        } else {
+            let named: Vec<&BuiltNode> = of_kind().filter(|node| *node.name == *name).collect();
+            if named.is_empty() {
+                of_kind().filter(|node| node.label.as_deref() == Some(name)).collect()
+            } else {
+                named
+            }
+        };
+        if let WriteValue::Attribute(attribute, _) = value {
+            let with: Vec<&BuiltNode> = found
+                .iter()
+                .copied()
+                .filter(|node| node.attributes.iter().any(|known| *known.name == **attribute))
+                .collect();
+            if with.is_empty()
+                && let Some(node) = found.first()
+            {
+                let known = did_you_mean(attribute, node.attributes.iter().map(|attribute| attribute.name.to_string()));
+                let (node, attribute) = (node.name.to_string(), attribute.clone());
+                return Err(PoseError::NoAttribute { node, attribute, known });
+            }
+            found = with;
+        }
+        if found.len() > 1 {
+            let in_effect = |node: &Uid| {
+                let mut of = built.switches.iter().filter_map(|switch| match &switch.matching {
+                    Matching::IkFk { fk, goal, .. } if goal == node || fk.contains(node) => {
+                        let on = state.attribute(switch.control, &switch.attribute).unwrap_or_default() >= 0.5;
+                        Some(on == (goal == node))
+                    }
+                    _ => None,
+                });
+                of.next_back()
+            };
+            let active: Vec<&BuiltNode> =
+                found.iter().copied().filter(|node| in_effect(&node.uid) == Some(true)).collect();
+            if active.len() == 1 {
+                found = active;
+            }
+        }
+        match found[..] {
+            [node] => Ok(node.clone()),
+            [] => {
+                let names =
+                    of_kind().flat_map(|node| [Some(node.name.to_string()), node.label.as_deref().map(str::to_owned)]);
+                let nearest = did_you_mean(name, names.flatten());
+                Err(PoseError::NoNode { what, name: name.to_owned(), nearest })
+            }
+            _ => {
+                let names: Vec<&str> = found.iter().map(|node| &*node.name).collect();
+                Err(PoseError::Ambiguous { name: name.to_owned(), candidates: names.join(", ") })
+            }
+        }
+    }
+}
+
+impl Workbench {
+    /// The document with the pose and the attribute values that the entities have now, as somebody would store it.
+    ///
+    /// # Errors
+    /// If the rig is not built or cannot run.
+    pub fn posed_document(&self) -> Result<Rig, PoseError> {
+        let state = self.runtime()?.state();
+        let mut rig = self.rig().clone();
+        let mut edits = Vec::new();
+        for (slot, node) in state.program().nodes().iter().enumerate() {
+            let offset = Some(state.offset_at(slot)).filter(|offset| *offset != PoseOffset::IDENTITY);
+            if rig.offset(node.uid).copied() != offset {
+                edits.push(RigEdit::SetOffset(node.uid, offset));
+            }
+        }
+        for (slot, attribute) in state.program().attributes().iter().enumerate().filter(|(_, known)| known.is_settable)
+        {
+            let (node, value) = (state.program().nodes()[attribute.node].uid, state.attribute_at(slot));
+            let known = rig.attribute_value(node, &attribute.name).unwrap_or(attribute.default);
+            if known.to_bits() != value.to_bits() {
+                edits.push(RigEdit::SetAttributeValue(node, attribute.name.to_string(), Some(value)));
+            }
+        }
+        let edits = RigEdit::Batch(edits);
+        rig.apply(&edits).map_err(|error| WorkbenchError::Refused(error.to_string()))?;
+        Ok(rig)
+    }
+
+    /// Where the entities of the built nodes stand relative to their parents, by uid.
+    ///
+    /// # Errors
+    /// If the rig is not built or cannot run.
+    pub fn posed_locals(&self) -> Result<BTreeMap<Uid, Trs>, PoseError> {
+        let built = self.built().ok_or(PoseError::NotBuilt)?;
+        self.runtime()?;
+        let local = |node: &BuiltNode| {
+            let local = self.app.world().get::<Transform>(self.entity(node.uid)?)?;
+            let Transform { translation, rotation, scale } = *local;
+            Some((node.uid, Trs { translation, rotation, scale }))
+        };
+        Ok(built.nodes.iter().filter_map(local).collect())
+    }
+}

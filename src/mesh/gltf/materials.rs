@@ -1,0 +1,212 @@
+//! Materials, textures and samplers, carried unread; images, loaded. Only references and extensions are inspected.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Map, Value};
+
+use super::{
+    GltfError, MAX_IMAGE_BYTES,
+    accessor::Source,
+    budget::{Budget, Notes},
+    json::{At, copy, whole},
+    uri,
+};
+use crate::mesh::model::{Image, MaterialSet};
+
+/// Fields of a glTF image that [`Image`] has fields for.
+pub(super) const OWN_FIELDS: [&str; 4] = ["name", "uri", "mimeType", "bufferView"];
+
+/// Reads materials, textures, samplers and images.
+pub(super) fn read(
+    source: &Source,
+    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    notes: &Notes,
+) -> Result<MaterialSet, GltfError> {
+    let document = source.document;
+    let root = &document.root;
+    let mut material_set = MaterialSet { images: images(source, external, notes)?, ..Default::default() };
+    let count = |key: &str| Ok::<_, GltfError>(root.array(key)?.len());
+    let (textures, samplers, images) = (count("textures")?, count("samplers")?, count("images")?);
+    for at in root.objects("materials")? {
+        let at = at?;
+        check_textures(at.map, &at.place, textures, 0)?;
+        material_set.materials.push(carried(&at, source.budget, notes)?);
+    }
+    for at in root.objects("textures")? {
+        let at = at?;
+        at.index("sampler", samplers, "sampler")?;
+        at.index("source", images, "image")?;
+        if let Some(extensions) = at.object("extensions")? {
+            for (name, value) in extensions.map {
+                if let Some(value) = value.as_object().filter(|value| value.contains_key("source")) {
+                    let extension = At { map: value, place: extensions.sub(name) };
+                    extension.index("source", images, "image")?;
+                }
+            }
+        }
+        material_set.textures.push(carried(&at, source.budget, notes)?);
+    }
+    for at in root.objects("samplers")? {
+        material_set.samplers.push(carried(&at?, source.budget, notes)?);
+    }
+
+    let mut found = BTreeSet::new();
+    for value in material_set.materials.iter().chain(&material_set.textures).chain(&material_set.samplers) {
+        find_extensions(value, &mut found);
+    }
+    for image in &material_set.images {
+        image.rest.values().for_each(|value| find_extensions(value, &mut found));
+        find_extension_names(image.rest.get("extensions"), &mut found);
+    }
+    let (used, required) = (&document.extensions_used, &document.extensions_required);
+    (material_set.extensions_used, material_set.extensions_required) = declare(found, used, required);
+    Ok(material_set)
+}
+
+/// The extensions to declare when `found` are used: in the order of the lists given, undeclared ones last.
+pub(super) fn declare(
+    found: BTreeSet<&str>,
+    used: &[impl AsRef<str>],
+    required: &[impl AsRef<str>],
+) -> (Vec<String>, Vec<String>) {
+    let required = required.iter().map(AsRef::as_ref).filter(|name| found.contains(name)).map(str::to_owned).collect();
+    let mut rest = found;
+    let mut list = Vec::new();
+    for name in used.iter().map(AsRef::as_ref) {
+        list.extend(rest.take(name).map(str::to_owned));
+    }
+    list.extend(rest.into_iter().map(str::to_owned));
+    (list, required)
+}
+
+/// A copy of an object, without references to packets of metadata that are not carried.
+fn carried(at: &At, budget: &Budget, notes: &Notes) -> Result<Value, GltfError> {
+    let mut map = Map::new();
+    for (key, value) in at.map {
+        map.insert(key.clone(), copy(value, budget, &at.place)?);
+    }
+    if let Some(Value::Object(extensions)) = map.get_mut("extensions")
+        && extensions.shift_remove("KHR_xmp_json_ld").is_some()
+    {
+        notes.add("Metadata (KHR_xmp_json_ld) of a material, texture or sampler was not kept");
+    }
+    Ok(Value::Object(map))
+}
+
+/// Checks every `...Texture` in a material, also in its extensions, to refer to a texture.
+fn check_textures(map: &Map<String, Value>, place: &str, textures: usize, depth: usize) -> Result<(), GltfError> {
+    for (key, value) in map {
+        let Some(inner) = value.as_object().filter(|_| key != "extras" && depth < 8) else {
+            continue;
+        };
+        let at = At { map: inner, place: format!("{place}/{key}") };
+        if key.ends_with("Texture") {
+            at.index("index", textures, "texture")?;
+        }
+        check_textures(inner, &at.place, textures, depth + 1)?;
+    }
+    Ok(())
+}
+
+/// Names of the extensions anywhere in a value.
+pub(super) fn find_extensions<'a>(value: &'a Value, found: &mut BTreeSet<&'a str>) {
+    match value {
+        Value::Object(map) => {
+            find_extension_names(map.get("extensions"), found);
+            // Extras belong to the user; an object named `extensions` in them declares none.
+            map.iter().filter(|(key, _)| *key != "extras").for_each(|(_, value)| find_extensions(value, found));
+        }
+        Value::Array(list) => list.iter().for_each(|value| find_extensions(value, found)),
+        _ => {}
+    }
+}
+
+fn find_extension_names<'a>(extensions: Option<&'a Value>, found: &mut BTreeSet<&'a str>) {
+    found.extend(extensions.and_then(Value::as_object).into_iter().flat_map(Map::keys).map(String::as_str));
+}
+
+fn images(
+    source: &Source,
+    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    notes: &Notes,
+) -> Result<Vec<Image>, GltfError> {
+    let mut images = Vec::new();
+    let mut total = 0u64;
+    for at in source.document.root.objects("images")? {
+        let at = at?;
+        let mut image = Image { name: at.name().to_owned(), ..Default::default() };
+        let mut mime = at.text("mimeType")?.unwrap_or_default().to_owned();
+        if let Some(view) = at.index("bufferView", source.document.views.len(), "buffer view")? {
+            image.bytes = source.view(view)?.to_vec();
+        } else if let Some(text) = at.text("uri")? {
+            let place = at.sub("uri");
+            if text.len() as u64 > MAX_IMAGE_BYTES * 2 {
+                return Err(too_large(place));
+            }
+            match uri::resolve(text, &place)? {
+                uri::Resolved::Data { mime: of_uri, bytes } => {
+                    image.bytes = bytes;
+                    mime = if mime.is_empty() { of_uri } else { mime };
+                }
+                uri::Resolved::File(path) => match external(&path) {
+                    Ok(bytes) => {
+                        let file = path.rsplit('/').next().unwrap_or_default();
+                        image.bytes = bytes;
+                        image.name = if image.name.is_empty() { file.to_owned() } else { image.name };
+                    }
+                    Err(what) => {
+                        notes.add(format!("The image \"{path}\" could not be loaded ({what}) and is left out"));
+                        image.rest.insert("uri".to_owned(), Value::String(text.to_owned()));
+                    }
+                },
+            }
+        } else {
+            return Err(GltfError::at(at.place, "an image needs a uri or a bufferView"));
+        }
+        total = total.saturating_add(image.bytes.len() as u64);
+        if total > MAX_IMAGE_BYTES {
+            return Err(too_large(at.place));
+        }
+        image.mime = sniff(&image.bytes).map_or(mime, str::to_owned);
+        for (key, value) in at.map.iter().filter(|(key, _)| !OWN_FIELDS.contains(&key.as_str())) {
+            image.rest.insert(key.clone(), copy(value, source.budget, &at.place)?);
+        }
+        images.push(image);
+    }
+    Ok(images)
+}
+
+fn too_large(place: String) -> GltfError {
+    GltfError::at(place, format!("the images have more than {} MiB together", MAX_IMAGE_BYTES >> 20))
+}
+
+/// The media type by the first bytes, which are right more often than a file's `mimeType`.
+pub(super) fn sniff(bytes: &[u8]) -> Option<&'static str> {
+    let is = |at: usize, magic: &[u8]| bytes.get(at..).is_some_and(|bytes| bytes.starts_with(magic));
+    if is(0, b"\x89PNG\r\n\x1a\n") {
+        Some("image/png")
+    } else if is(0, b"\xFF\xD8\xFF") {
+        Some("image/jpeg")
+    } else if is(0, b"RIFF") && is(8, b"WEBP") {
+        Some("image/webp")
+    } else if is(0, b"\xABKTX 20\xBB\r\n\x1a\n") {
+        Some("image/ktx2")
+    } else if is(0, b"DDS ") {
+        Some("image/vnd-ms.dds")
+    } else if is(4, b"ftypavif") {
+        Some("image/avif")
+    } else {
+        None
+    }
+}
+
+/// Maps the index in a field through `map`; removes the field if there is nothing to map to.
+pub(super) fn remap(object: &mut Map<String, Value>, key: &str, map: &[Option<usize>]) {
+    let Some(index) = object.get(key).and_then(whole) else {
+        return;
+    };
+    match map.get(index).copied().flatten() {
+        Some(to) => object.insert(key.to_owned(), Value::from(to)),
+        None => object.shift_remove(key),
+    };
+}

@@ -1,0 +1,19 @@
+//! Influences of one point, in the order and scale in which [`Weights`](super::model::Weights) keep them.
+
+/// Keeps the strongest influences of a point, strongest first and equal ones by joint, and makes them sum to one.
+///
+/// At most `most` stay, and beside the strongest none that is weaker than `least` times their sum. Weights that are not
+/// finite or not positive are left out; nothing is left where there is no other.
+pub fn keep_strongest(influences: &mut Vec<(u32, f32)>, most: usize, least: f32) {
+    influences.retain(|(_, weight)| weight.is_finite() && *weight > 0.0);
+    influences.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    influences.truncate(most.max(1));
+    // The sum of huge weights is finite in double precision.
+    let sum = |influences: &[(u32, f32)]| influences.iter().map(|(_, weight)| f64::from(*weight)).sum::<f64>();
+    let (floor, mut is_first) = (f64::from(least) * sum(influences), true);
+    influences.retain(|(_, weight)| std::mem::take(&mut is_first) || f64::from(*weight) >= floor);
+    let total = sum(influences);
+    for (_, weight) in influences {
+        *weight = (f64::from(*weight) / total) as f32;
+    }
+}

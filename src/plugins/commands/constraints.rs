@@ -1,0 +1,99 @@
+//! Constraints as entities: the node that each drives, the nodes that it reads, in the order in which they run.
+
+use bevy::prelude::*;
+
+use super::Built;
+use crate::{
+    plugins::{
+        document::{
+            JointEntities, TagEntities,
+            entities::{BuiltEntities, EntityIndex, MirroredConstraint, Part},
+        },
+        schema::{Constrains, ConstraintKind, ConstraintTarget, ConstraintTargets, CreatedBy},
+    },
+    rig::{Constraint, Dependency, Scalar, Uid},
+};
+
+/// Makes the entities of constraints equal to the build.
+pub(super) fn follow_constraints(
+    mut commands: Commands,
+    mut rigs: Query<(Entity, &Built, &JointEntities, &TagEntities, &mut BuiltEntities), Changed<Built>>,
+    mut index: ResMut<EntityIndex>,
+) {
+    for (rig_entity, built, joints, tags, mut known) in &mut rigs {
+        let known = known.bypass_change_detection();
+        let constraints = &built.0.constraints;
+        let is_built = |uid: &Uid| constraints.iter().any(|constraint| constraint.uid == *uid);
+        if known.constraints.len() > constraints.len() || !known.constraints.keys().all(is_built) {
+            let gone: Vec<Uid> = known.constraints.keys().filter(|uid| !is_built(uid)).copied().collect();
+            for uid in gone {
+                if let Some(mirrored) = known.constraints.remove(&uid) {
+                    index.remove(mirrored.entity);
+                    commands.entity(mirrored.entity).try_despawn();
+                }
+            }
+        }
+        let mut is_reordered = false;
+        for constraint in constraints {
+            let entity_of = |node: Uid| joints.get(node).or_else(|| known.get(node));
+            let read = constraint.constraint.reads().into_iter().filter_map(|dependency| match dependency {
+                Dependency::Node(node) => Some(node),
+                Dependency::Attribute(..) => None,
+            });
+            let driven = constraint.constraint.drives().last().map(|dependency| match dependency {
+                Dependency::Node(node) | Dependency::Attribute(node, _) => *node,
+            });
+            let read: Vec<Uid> = read.collect();
+            let nodes: Vec<Option<Entity>> = driven.iter().chain(&read).map(|node| entity_of(*node)).collect();
+            if !is_reordered
+                && known.constraints.get(&constraint.uid).is_some_and(|known| known.is_same(constraint, &nodes))
+            {
+                continue;
+            }
+            let weights = weights(&constraint.constraint);
+            let targets = read.iter().enumerate().filter_map(|(number, node)| {
+                Some(ConstraintTarget {
+                    node: entity_of(*node)?,
+                    weight: weights.get(number).copied().unwrap_or(Some(1.0)),
+                })
+            });
+            let bundle = (ConstraintKind(constraint.constraint.kind()), ConstraintTargets(targets.collect()));
+            let entity = match known.constraints.get(&constraint.uid) {
+                Some(mirrored) => {
+                    commands.entity(mirrored.entity).try_insert(bundle).try_remove::<Constrains>();
+                    mirrored.entity
+                }
+                None => {
+                    // Later constraints are put in again after it, so that those of a node stay in their order.
+                    is_reordered = true;
+                    let named = (constraint.uid, Name::new(constraint.constraint.kind()), ChildOf(rig_entity));
+                    let entity = commands.spawn((named, bundle)).id();
+                    index.insert(entity, rig_entity, constraint.uid, Part::Constraint);
+                    entity
+                }
+            };
+            if let Some(driven) = driven.and_then(entity_of) {
+                commands.entity(entity).try_insert(Constrains(driven));
+            }
+            if let Some(tag) = tags.get(constraint.command) {
+                commands.entity(entity).try_insert(CreatedBy(tag));
+            }
+            let mirrored = MirroredConstraint { entity, constraint: constraint.constraint.clone(), nodes };
+            known.constraints.insert(constraint.uid, mirrored);
+        }
+    }
+}
+
+/// Weights of the targets that have some, in the order of [`Constraint::reads`]; `None` where an attribute gives it.
+fn weights(constraint: &Constraint) -> Vec<Option<f32>> {
+    match constraint {
+        Constraint::Transform { targets, .. } | Constraint::Aim { targets, .. } => targets
+            .iter()
+            .map(|target| match target.weight {
+                Scalar::Value(weight) => Some(weight),
+                _ => None,
+            })
+            .collect(),
+        _ => Vec::new(),
+    }
+}

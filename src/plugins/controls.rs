@@ -1,0 +1,221 @@
+//! Controls in an app: which of them are visible, and switches that are thrown without a jump.
+//!
+//! A node is visible unless its layer is hidden, or its attribute [`VISIBLE`] is below one half. Commands drive that
+//! attribute like any other, so the controls of inverse kinematics hide while a limb follows the forward ones.
+
+pub mod outline;
+
+use bevy::prelude::*;
+
+use super::{
+    RigSystems,
+    commands::Built,
+    configure_sets,
+    document::{EditRefused, EditRequest},
+    runtime::RigRuntime,
+    schema::{Attributes, Control, NodeLayer},
+};
+use crate::{
+    rig::{AttributeKind, BuiltRig, Matching, Rig, SwitchData, Uid, nearest::did_you_mean, operations::Operation},
+    solve::matching::{MatchError, match_switch},
+};
+
+/// The name of the attribute that hides a node below one half.
+pub const VISIBLE: &str = "visible";
+
+/// Adds visibility of nodes, and switches.
+pub struct ControlsPlugin;
+
+impl Plugin for ControlsPlugin {
+    fn build(&self, app: &mut App) {
+        configure_sets(app);
+        app.add_message::<SwitchRequest>()
+            .add_message::<EditRequest>()
+            .add_message::<EditRefused>()
+            .add_systems(Update, throw_switches.in_set(RigSystems::Gesture))
+            .add_systems(PostUpdate, show_nodes.after(RigSystems::Solve));
+    }
+}
+
+/// Whether a node is to be seen and picked; on every control and every node of a layer.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[component(immutable)]
+#[reflect(Component)]
+pub struct NodeVisible(pub bool);
+
+/// Asks to set the attribute of a switch (inverse and forward kinematics, spaces) while what it matches stays where it
+/// is: one step of the history.
+#[derive(Message, Debug, Clone, PartialEq)]
+pub struct SwitchRequest {
+    /// The rig.
+    pub rig: Entity,
+    /// The node that carries the attribute.
+    pub control: Uid,
+    /// The attribute.
+    pub attribute: String,
+    /// Its next value.
+    pub value: f32,
+}
+
+/// The reason why a switch was not thrown.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SwitchError {
+    /// No switch of that name.
+    #[error("there is no switch \"{name}\" in the built rig{nearest}; switches: {known}")]
+    NoSwitch {
+        /// The name that was asked for.
+        name: String,
+        /// The nearest name, as the rest of a sentence.
+        nearest: String,
+        /// All names.
+        known: String,
+    },
+    /// The switch has no such value.
+    #[error("switch \"{name}\" has no value \"{value}\"; write one of: {known}")]
+    NoValue {
+        /// The name of the switch.
+        name: String,
+        /// The value that was asked for.
+        value: String,
+        /// All values.
+        known: String,
+    },
+    /// The rig is not built, or cannot run.
+    #[error("the rig is not built, so it has no switches; build it first")]
+    NotBuilt,
+    /// See [`MatchError`].
+    #[error(transparent)]
+    Match(#[from] MatchError),
+}
+
+fn throw_switches(
+    mut requests: MessageReader<SwitchRequest>,
+    rigs: Query<(&Built, &RigRuntime)>,
+    mut commands: Commands,
+) {
+    for SwitchRequest { rig, control, attribute, value } in requests.read() {
+        match edits_of(rigs.get(*rig).ok(), *control, attribute, *value) {
+            Ok(operation) => {
+                commands.write_message(EditRequest::operation(*rig, operation));
+            }
+            Err(error) => {
+                commands.write_message(EditRefused { rig: *rig, reason: error.to_string() });
+            }
+        }
+    }
+}
+
+fn edits_of(
+    rig: Option<(&Built, &RigRuntime)>,
+    control: Uid,
+    attribute: &str,
+    value: f32,
+) -> Result<Operation, SwitchError> {
+    let (built, runtime) = rig.ok_or(SwitchError::NotBuilt)?;
+    let found = built.0.switches.iter().find(|switch| switch.control == control && *switch.attribute == *attribute);
+    let switch = found.ok_or_else(|| SwitchError::NoSwitch {
+        name: attribute.to_owned(),
+        nearest: String::new(),
+        known: names(&built.0),
+    })?;
+    let matched = match_switch(&built.0, runtime.state(), switch, value)?;
+    let name = match switch.matching {
+        Matching::IkFk { .. } => "Switch kinematics",
+        Matching::Space { .. } => "Switch space",
+    };
+    Ok(Operation::Named { name, edits: matched.edits })
+}
+
+fn names(built: &BuiltRig) -> String {
+    let names: Vec<String> = built.switches.iter().filter_map(|switch| name_of(built, switch)).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+/// The name of a switch: that of its control and its attribute.
+fn name_of(built: &BuiltRig, switch: &SwitchData) -> Option<String> {
+    built.node(switch.control).map(|node| format!("{}.{}", node.name, switch.attribute))
+}
+
+/// Switches by the words of a person: the name of a local group (`arm_l`), the label or the name of the control that
+/// carries the attribute, the label of a joint that the switch matches, or `CONTROL.ATTRIBUTE`; and the number of a value
+/// in words: `ik`, `fk`, the name of a choice, or a number.
+///
+/// # Errors
+/// No such switch, or no such value; with the ones there are.
+pub fn find_switches(
+    built: &BuiltRig,
+    rig: &Rig,
+    name: &str,
+    value: &str,
+) -> Result<Vec<(Uid, String, f32)>, SwitchError> {
+    let is_meant = |switch: &&std::sync::Arc<SwitchData>| {
+        let Some(control) = built.node(switch.control) else { return false };
+        let matched = match &switch.matching {
+            Matching::IkFk { joints, .. } => joints.clone(),
+            Matching::Space { control } => vec![*control],
+        };
+        let of_node = |uid: &Uid| {
+            let node = built.node(*uid);
+            let group = node.and_then(|node| node.group).and_then(|group| rig.group(group));
+            node.is_some_and(|node| node.label.as_deref() == Some(name))
+                || group.is_some_and(|group| group.name == name)
+        };
+        *control.name == *name
+            || control.label.as_deref() == Some(name)
+            || name_of(built, switch).as_deref() == Some(name)
+            || matched.iter().any(of_node)
+    };
+    let mut first_error = None;
+    let mut found = Vec::new();
+    for switch in built.switches.iter().filter(is_meant) {
+        match number_of(built, switch, name, value) {
+            Ok(number) => found.push((switch.control, switch.attribute.to_string(), number)),
+            Err(error) => first_error = first_error.or(Some(error)),
+        }
+    }
+    match (found.is_empty(), first_error) {
+        (false, _) => Ok(found),
+        (true, Some(error)) => Err(error),
+        (true, None) => {
+            let known: Vec<String> = built.switches.iter().filter_map(|switch| name_of(built, switch)).collect();
+            let nearest = did_you_mean(name, known.iter().map(String::as_str));
+            Err(SwitchError::NoSwitch { name: name.to_owned(), nearest, known: names(built) })
+        }
+    }
+}
+
+fn number_of(built: &BuiltRig, switch: &SwitchData, name: &str, value: &str) -> Result<f32, SwitchError> {
+    let attribute = built.node(switch.control).into_iter().flat_map(|node| node.attributes.iter());
+    let choices: Vec<&str> =
+        match attribute.clone().find(|known| known.name == switch.attribute).map(|known| &known.kind) {
+            Some(AttributeKind::Choice(names)) => names.iter().map(String::as_str).collect(),
+            _ if matches!(switch.matching, Matching::IkFk { .. }) => vec!["fk", "ik"],
+            _ => Vec::new(),
+        };
+    let number = choices.iter().position(|choice| *choice == value).map(|number| number as f32);
+    number.or_else(|| value.parse().ok().filter(|number: &f32| number.is_finite())).ok_or_else(|| {
+        SwitchError::NoValue {
+            name: name.to_owned(),
+            value: value.to_owned(),
+            known: if choices.is_empty() { "a number".to_owned() } else { choices.join(", ") },
+        }
+    })
+}
+
+/// Works out which nodes are visible, where something changed.
+fn show_nodes(
+    mut commands: Commands,
+    nodes: Query<
+        (Entity, Option<&NodeLayer>, Option<&Attributes>, Option<&NodeVisible>),
+        (Or<(With<Control>, With<NodeLayer>)>, Or<(Changed<NodeLayer>, Changed<Attributes>, Changed<Control>)>),
+    >,
+) {
+    for (entity, layer, attributes, shown) in &nodes {
+        let is_in = layer.is_none_or(|layer| layer.0.visible);
+        let is_on = attributes.and_then(|attributes| attributes.0.get(VISIBLE)).is_none_or(|value| *value >= 0.5);
+        let visible = NodeVisible(is_in && is_on);
+        if shown != Some(&visible) {
+            commands.entity(entity).try_insert(visible);
+        }
+    }
+}

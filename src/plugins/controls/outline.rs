@@ -1,0 +1,81 @@
+//! Outlines of visible controls in the rig's space: what is drawn of them and what a click can hit.
+
+use bevy::{ecs::system::SystemParam, math::Affine3A, prelude::*};
+
+use super::NodeVisible;
+use crate::{
+    algo::view::ViewPlane,
+    plugins::schema::{Control, NodeLayer, RigNodes},
+    rig::{ControlData, LayerDisplay, Uid, shapes::shape},
+};
+
+/// A visible control.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControlOutline {
+    /// Identity.
+    pub uid: Uid,
+    /// Lines of its shape in the rig's space.
+    pub lines: Vec<Vec<Vec3>>,
+    /// sRGB colour, 0 to 1 each: that of its layer, or its own.
+    pub color: [f32; 3],
+    /// How its layer shows it.
+    pub display: LayerDisplay,
+}
+
+/// The controls of rigs.
+#[derive(SystemParam)]
+pub struct ControlNodes<'w, 's> {
+    nodes: Query<'w, 's, Node>,
+}
+
+type Node = (
+    &'static Uid,
+    &'static Control,
+    &'static GlobalTransform,
+    Option<&'static NodeVisible>,
+    Option<&'static NodeLayer>,
+);
+
+impl ControlNodes<'_, '_> {
+    /// The visible controls of a rig, in the order of its nodes. `to_rig` takes the world to the rig's space.
+    pub fn visible(&self, nodes: Option<&RigNodes>, to_rig: Affine3A) -> Vec<ControlOutline> {
+        let controls = nodes.into_iter().flat_map(|nodes| nodes.iter()).filter_map(|node| self.nodes.get(node).ok());
+        let visible = controls.filter(|(_, _, _, visible, _)| visible.is_none_or(|visible| visible.0));
+        visible
+            .map(|(uid, control, place, _, layer)| ControlOutline {
+                uid: *uid,
+                lines: lines_of(&control.0, to_rig * place.affine()),
+                color: layer.and_then(|layer| layer.0.color).unwrap_or(control.0.color),
+                display: layer.map_or(LayerDisplay::Normal, |layer| layer.0.display),
+            })
+            .collect()
+    }
+}
+
+/// The lines of a control's shape, where the control stands at `place`. A shape that is not in the library is a circle.
+pub fn lines_of(control: &ControlData, place: Affine3A) -> Vec<Vec<Vec3>> {
+    let place = place * control.offset.affine();
+    let lines = shape(&control.shape).or_else(|| shape("circle")).unwrap_or_default();
+    let moved = |point: &Vec3| place.transform_point3(*point * control.size);
+    lines.iter().map(|line| line.iter().map(moved).collect()).collect()
+}
+
+/// The control whose outline passes nearest to a point of the view plane, within `reach` (rig units on that plane). Of
+/// several at the same distance the first wins.
+pub fn control_at(controls: &[ControlOutline], plane: &ViewPlane, point: Vec2, reach: f32) -> Option<Uid> {
+    let mut best: Option<(f32, Uid)> = None;
+    for control in controls.iter().filter(|control| control.display == LayerDisplay::Normal) {
+        for line in &control.lines {
+            for ends in line.windows(2) {
+                let (Some(a), Some(b)) = (plane.project(ends[0]), plane.project(ends[1])) else { continue };
+                let along = b - a;
+                let part = (point - a).dot(along) / along.length_squared().max(f32::MIN_POSITIVE);
+                let distance = point.distance(a + along * part.clamp(0.0, 1.0));
+                if distance <= reach && best.is_none_or(|(nearest, _)| distance < nearest) {
+                    best = Some((distance, control.uid));
+                }
+            }
+        }
+    }
+    best.map(|(_, uid)| uid)
+}

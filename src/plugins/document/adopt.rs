@@ -1,0 +1,227 @@
+//! Writes of other people to a rig's entities become edits.
+//!
+//! Each frame, before requested edits: an entity that says otherwise than what was last written to it was written by
+//! somebody else, one without a place in the index was spawned, one in the index that is gone was despawned. Every write
+//! is tried on the document by itself; those that the document takes become one step of the history, the others are put
+//! back and told once.
+
+mod despawned;
+mod groups;
+mod joints;
+mod sorting;
+mod tags;
+mod trial;
+
+use std::collections::{BTreeSet, HashSet};
+
+use bevy::{
+    ecs::{
+        entity_disabling::Disabled,
+        query::{Allow, QueryData},
+        system::SystemParam,
+    },
+    prelude::*,
+};
+
+use self::trial::Trial;
+use super::{
+    EditRefused,
+    entities::{BuiltEntities, EntityIndex, GroupEntities, JointEntities, Part, TagEntities},
+};
+use crate::{
+    plugins::schema::{
+        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, Null, Tag,
+        TagOf, Tags,
+    },
+    rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
+};
+
+/// Edits that entities asked for, a list a rig; carried out before what is requested in the same frame.
+#[derive(Resource, Debug, Default)]
+pub(super) struct EntityEdits(pub Vec<(Entity, Vec<RigEdit>)>);
+
+/// Everything that an entity may tell of a document.
+#[derive(QueryData)]
+pub(super) struct View {
+    joint: Has<Joint>,
+    null: Has<Null>,
+    label: Option<&'static NodeLabel>,
+    in_group: Option<&'static InGroup>,
+    rest: Option<&'static RestTransform>,
+    transform: Option<&'static Transform>,
+    child_of: Option<&'static ChildOf>,
+    uid: Option<&'static Uid>,
+    tag: Option<&'static Tag>,
+    command: Option<&'static CommandTag>,
+    feature: Option<&'static FeatureTag>,
+    tag_of: Option<&'static TagOf>,
+    in_feature: Option<&'static InFeature>,
+    group: Option<&'static LocalGroup>,
+    group_of: Option<&'static GroupOf>,
+    tags: Option<&'static Tags>,
+    created: Has<CreatedRole>,
+}
+
+type JointWritten = Or<(
+    Added<Joint>,
+    Changed<NodeLabel>,
+    Changed<InGroup>,
+    Changed<RestTransform>,
+    Changed<ChildOf>,
+    Changed<Uid>,
+    Changed<Tags>,
+)>;
+
+type TagWritten =
+    Or<(Changed<Tag>, Changed<CommandTag>, Changed<FeatureTag>, Changed<TagOf>, Changed<InFeature>, Changed<Uid>)>;
+
+/// Entities that were written since the last frame, by this plugin or by others.
+#[derive(SystemParam)]
+pub(super) struct Written<'w, 's> {
+    nodes: Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>)>, JointWritten, Allow<Disabled>)>,
+    tags: Query<'w, 's, Entity, (TagWritten, Allow<Disabled>)>,
+    groups: Query<'w, 's, Entity, (Or<(Changed<LocalGroup>, Changed<GroupOf>)>, Allow<Disabled>)>,
+    uid: RemovedComponents<'w, 's, Uid>,
+    of_joints: (
+        RemovedComponents<'w, 's, Joint>,
+        RemovedComponents<'w, 's, NodeLabel>,
+        RemovedComponents<'w, 's, InGroup>,
+        RemovedComponents<'w, 's, RestTransform>,
+        RemovedComponents<'w, 's, ChildOf>,
+    ),
+    of_tags: (
+        RemovedComponents<'w, 's, Tag>,
+        RemovedComponents<'w, 's, CommandTag>,
+        RemovedComponents<'w, 's, FeatureTag>,
+        RemovedComponents<'w, 's, TagOf>,
+        RemovedComponents<'w, 's, InFeature>,
+    ),
+    of_groups: (RemovedComponents<'w, 's, LocalGroup>, RemovedComponents<'w, 's, GroupOf>),
+    rigs: RemovedComponents<'w, 's, Rig>,
+}
+
+/// Touched entities, by what they are or seem to be; sorted, so that the same writes give the same edits.
+#[derive(Default)]
+struct Touched {
+    joints: BTreeSet<Entity>,
+    tags: BTreeSet<Entity>,
+    groups: BTreeSet<Entity>,
+    uids: BTreeSet<Entity>,
+}
+
+impl Written<'_, '_> {
+    fn take(&mut self) -> Touched {
+        let mut touched = Touched::default();
+        touched.joints.extend(self.nodes.iter());
+        touched.tags.extend(self.tags.iter());
+        touched.groups.extend(self.groups.iter());
+        touched.uids.extend(self.uid.read());
+        let (joint, label, group, rest, child_of) = &mut self.of_joints;
+        touched
+            .joints
+            .extend(joint.read().chain(label.read()).chain(group.read()).chain(rest.read()).chain(child_of.read()));
+        let (tag, command, feature, tag_of, in_feature) = &mut self.of_tags;
+        touched.tags.extend(
+            tag.read().chain(command.read()).chain(feature.read()).chain(tag_of.read()).chain(in_feature.read()),
+        );
+        let (group, group_of) = &mut self.of_groups;
+        touched.groups.extend(group.read().chain(group_of.read()));
+        touched
+    }
+}
+
+type Views<'w, 's> = Query<'w, 's, View, Allow<Disabled>>;
+
+/// The components of a rig that a trial works on.
+pub(super) type RigParts = (
+    &'static mut Rig,
+    &'static mut JointEntities,
+    &'static mut TagEntities,
+    &'static mut GroupEntities,
+    Option<&'static mut BuiltEntities>,
+);
+
+/// Takes up what was written to entities.
+pub(super) fn adopt_writes(
+    mut commands: Commands,
+    mut written: Written,
+    views: Views,
+    mut rigs: Query<RigParts>,
+    mut uids: ResMut<UidSource>,
+    mut index: ResMut<EntityIndex>,
+    mut edits: ResMut<EntityEdits>,
+    mut refused: MessageWriter<EditRefused>,
+) {
+    let touched = written.take();
+    let closed: HashSet<Entity> = written.rigs.read().filter(|rig| !rigs.contains(*rig)).collect();
+    if !closed.is_empty() {
+        index.forget_rigs(&closed);
+    }
+    if touched.joints.is_empty() && touched.tags.is_empty() && touched.groups.is_empty() && touched.uids.is_empty() {
+        return;
+    }
+    // Mostly this plugin itself wrote, and nothing differs.
+    let by_rig = sorting::sort_by_rig(&touched, &views, &index, |entity| rigs.contains(entity));
+    for (rig_entity, writes) in by_rig {
+        let Ok((mut rig, mut joints, mut tags, mut groups, mut built)) = rigs.get_mut(rig_entity) else { continue };
+        let mut trial = Trial::new(rig_entity, rig.bypass_change_detection(), &mut uids);
+        let mut adoption = Adoption {
+            commands: &mut commands,
+            views: &views,
+            index: &mut index,
+            trial: &mut trial,
+            joints: joints.bypass_change_detection(),
+            tags: tags.bypass_change_detection(),
+            groups: groups.bypass_change_detection(),
+            built: built.as_mut().map(|built| built.bypass_change_detection()),
+        };
+        adoption.groups_written(&writes);
+        adoption.joints_spawned(&writes);
+        adoption.joints_written(&writes);
+        adoption.tags_written(&writes);
+        adoption.orders_written(&writes);
+        adoption.despawned(&writes);
+        let outcome = trial.finish();
+        for reason in outcome.refused {
+            warn!("{reason}");
+            refused.write(EditRefused { rig: rig_entity, reason });
+        }
+        if outcome.respawn {
+            rig.set_changed();
+            joints.set_changed();
+        }
+        if !outcome.edits.is_empty() {
+            edits.0.push((rig_entity, outcome.edits));
+        }
+    }
+}
+
+/// One rig's writes on their way into a document.
+struct Adoption<'a, 'b, 'w, 's, 'v, 'q> {
+    pub commands: &'a mut Commands<'w, 's>,
+    pub views: &'a Views<'v, 'q>,
+    pub index: &'a mut EntityIndex,
+    pub trial: &'a mut Trial<'b>,
+    pub joints: &'a mut JointEntities,
+    pub tags: &'a mut TagEntities,
+    pub groups: &'a mut GroupEntities,
+    pub built: Option<&'a mut BuiltEntities>,
+}
+
+impl Adoption<'_, '_, '_, '_, '_, '_> {
+    pub(super) fn rig(&self) -> &Rig {
+        self.trial.rig()
+    }
+
+    pub(super) fn uid_of(&self, entity: Entity, part: Part) -> Option<Uid> {
+        self.index.uid_of(entity, self.trial.rig_entity, part)
+    }
+
+    /// Puts back a uid that was removed or replaced.
+    pub(super) fn hold_uid(&mut self, entity: Entity, uid: Uid, told: Option<Uid>) {
+        if told != Some(uid) {
+            self.commands.entity(entity).try_insert(uid);
+            self.trial.refuse(format!("the uid of entity {entity} stays {uid}: an identity never changes"));
+        }
+    }
+}

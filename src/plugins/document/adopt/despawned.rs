@@ -1,0 +1,109 @@
+//! Entities that were despawned: deletions, and nodes that come back.
+
+use std::collections::{HashMap, HashSet};
+
+use bevy::prelude::*;
+
+use super::{
+    super::entities::{Indexed, Part},
+    Adoption,
+    sorting::RigWrites,
+};
+use crate::rig::{RigEdit, Uid, operations::Operation};
+
+impl Adoption<'_, '_, '_, '_, '_, '_> {
+    /// Deletes what was despawned, or lets it come back where its entity went along with a created node.
+    pub fn despawned(&mut self, writes: &RigWrites) {
+        let dead: HashMap<Entity, Indexed> = writes.dead.iter().copied().collect();
+        let is_joint = |indexed: &Indexed| indexed.part == Part::Joint;
+        let joints = writes.dead.iter().map(|(_, indexed)| *indexed).filter(is_joint);
+        let along: HashSet<Uid> =
+            joints.map(|joint| joint.uid).filter(|joint| self.went_along(*joint, &dead)).collect();
+        let mut deleted = Vec::new();
+        for (entity, indexed) in &writes.dead {
+            self.index.remove(*entity);
+            match indexed.part {
+                Part::Joint if along.contains(&indexed.uid) => self.forget_joint(indexed.uid),
+                Part::Joint => deleted.push(indexed.uid),
+                Part::Node | Part::Constraint => {
+                    if let Some(built) = &mut self.built {
+                        built.nodes.remove(&indexed.uid);
+                        built.constraints.remove(&indexed.uid);
+                    }
+                    self.trial.respawn = true;
+                    if indexed.part == Part::Node {
+                        let reason =
+                            "a created node was despawned and comes back; switch off or delete its command instead";
+                        self.trial.refuse(reason.to_owned());
+                    }
+                }
+                Part::Tag | Part::Group => {}
+            }
+        }
+        deleted.retain(|joint| self.rig().joint(*joint).is_some());
+        deleted.sort_unstable();
+        if !deleted.is_empty() {
+            for joint in &deleted {
+                self.forget_joint(*joint);
+            }
+            let delete = Operation::Delete { joints: deleted, keep_children: false };
+            self.trial.operate("a despawned joint", &delete);
+        }
+        for (_, indexed) in &writes.dead {
+            let uid = indexed.uid;
+            match indexed.part {
+                Part::Tag => {
+                    let bearer = self.rig().find_tag(uid).map(|(joint, _)| joint.data.uid);
+                    // The tags of a joint that comes back come back with it.
+                    if let Some(joint) = bearer.filter(|joint| self.joints.get(*joint).is_some()) {
+                        self.trial.edit("a despawned tag", vec![RigEdit::RemoveTag(joint, uid)]);
+                    }
+                    self.tags.tags.remove(&uid);
+                    for mirrored in self.joints.joints.values_mut() {
+                        mirrored.tags.retain(|tag| *tag != uid);
+                    }
+                }
+                Part::Group => {
+                    self.groups.groups.remove(&uid);
+                    let members =
+                        self.rig().walk().filter(|joint| joint.data.group == Some(uid)).map(|joint| joint.data.uid);
+                    let mut edits: Vec<RigEdit> = members.map(|joint| RigEdit::SetGroup(joint, None)).collect();
+                    edits.push(RigEdit::RemoveLocalGroup(uid));
+                    if self.rig().group(uid).is_some() {
+                        self.trial.edit("a despawned local group", edits);
+                    }
+                    for mirrored in self.joints.joints.values_mut().filter(|mirrored| mirrored.group == Some(uid)) {
+                        mirrored.group = None;
+                    }
+                }
+                Part::Joint | Part::Node | Part::Constraint => {}
+            }
+        }
+    }
+
+    /// True if a joint's entity went with a created node above it, and not by itself or with another joint.
+    fn went_along(&self, joint: Uid, dead: &HashMap<Entity, Indexed>) -> bool {
+        let mut above = self.joints.joints.get(&joint).and_then(|mirrored| mirrored.parent);
+        let mut is_created = false;
+        while let Some(indexed) = above.and_then(|above| dead.get(&above)) {
+            is_created = indexed.part == Part::Node;
+            above = match indexed.part {
+                Part::Joint => self.joints.joints.get(&indexed.uid).and_then(|mirrored| mirrored.parent),
+                _ => self.built.as_ref().and_then(|built| built.nodes.get(&indexed.uid)).and_then(|node| node.parent),
+            };
+        }
+        is_created
+    }
+
+    fn forget_joint(&mut self, joint: Uid) {
+        self.trial.respawn = true;
+        let Some(mirrored) = self.joints.joints.remove(&joint) else { return };
+        self.joints.posed.remove(&joint);
+        for tag in mirrored.tags {
+            if let Some(tag) = self.tags.tags.remove(&tag) {
+                self.index.remove(tag.entity);
+                self.commands.entity(tag.entity).try_despawn();
+            }
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Local groups as their entities tell them.
+
+use bevy::prelude::*;
+
+use super::{super::entities::Part, Adoption, sorting::RigWrites};
+use crate::{
+    plugins::schema::{GroupOf, LocalGroup},
+    rig::{GroupData, RigEdit},
+};
+
+impl Adoption<'_, '_, '_, '_, '_, '_> {
+    pub fn groups_written(&mut self, writes: &RigWrites) {
+        for &entity in &writes.spawned_groups {
+            let Some(group) =
+                self.views.get(entity).ok().and_then(|view| view.group.cloned().map(|g| (g, view.uid.copied())))
+            else {
+                continue;
+            };
+            let (group, asked) = group;
+            let uid = self.trial.free_uid(asked);
+            let data = GroupData { uid, name: group.name, color: group.color, enabled: group.enabled };
+            let added = RigEdit::AddLocalGroup(data.clone(), usize::MAX);
+            if self.trial.edit("a spawned local group", vec![added]) {
+                self.commands.entity(entity).try_insert((uid, Name::new(data.name.clone())));
+                self.index.insert(entity, self.trial.rig_entity, uid, Part::Group);
+                self.groups.groups.insert(uid, (entity, data));
+            } else {
+                // The entity stays, without a rig.
+                self.commands.entity(entity).try_remove::<GroupOf>();
+            }
+        }
+        for &(entity, uid) in &writes.groups {
+            let Some((_, data)) = self.groups.groups.get(&uid).cloned() else { continue };
+            let Ok(view) = self.views.get(entity) else { continue };
+            self.hold_uid(entity, uid, view.uid.copied());
+            if view.group_of != Some(&GroupOf(self.trial.rig_entity)) {
+                self.commands.entity(entity).try_insert(GroupOf(self.trial.rig_entity));
+                self.trial
+                    .refuse(format!("local group \"{}\" stays with its rig; add one to the other rig", data.name));
+            }
+            let told = view.group.map(|group| GroupData {
+                uid,
+                name: group.name.clone(),
+                color: group.color,
+                enabled: group.enabled,
+            });
+            let is_taken = match &told {
+                Some(told) if *told == data => continue,
+                Some(told) => self.trial.edit("a write to a local group", vec![RigEdit::SetLocalGroup(told.clone())]),
+                None => {
+                    self.trial
+                        .refuse(format!("local group \"{}\" cannot lose its `LocalGroup`; despawn it", data.name));
+                    false
+                }
+            };
+            match told.filter(|_| is_taken) {
+                Some(told) => {
+                    self.commands.entity(entity).try_insert(Name::new(told.name.clone()));
+                    self.groups.groups.insert(uid, (entity, told));
+                }
+                None => {
+                    let group = LocalGroup { name: data.name, color: data.color, enabled: data.enabled };
+                    self.commands.entity(entity).try_insert(group);
+                }
+            }
+        }
+    }
+}

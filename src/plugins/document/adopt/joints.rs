@@ -1,0 +1,203 @@
+//! Joints and created nodes as their entities tell them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bevy::prelude::*;
+
+use super::{
+    super::{
+        entities::{MirroredJoint, Part},
+        follow::{rest_of, write_group, write_label},
+    },
+    Adoption,
+    sorting::RigWrites,
+};
+use crate::{
+    plugins::schema::{Joint, NodeOf},
+    rig::{JointData, NodeKind, RigEdit, Uid},
+};
+
+impl Adoption<'_, '_, '_, '_, '_, '_> {
+    /// Adds spawned joints, those above before those below.
+    pub fn joints_spawned(&mut self, writes: &RigWrites) {
+        let mut open: BTreeSet<Entity> = writes.spawned_joints.iter().copied().collect();
+        loop {
+            let parent_of =
+                |entity: Entity| self.views.get(entity).ok().and_then(|view| view.child_of.map(ChildOf::parent));
+            let ready: Vec<Entity> = open
+                .iter()
+                .copied()
+                .filter(|entity| parent_of(*entity).is_none_or(|above| !open.contains(&above)))
+                .collect();
+            if ready.is_empty() {
+                return;
+            }
+            for entity in ready {
+                open.remove(&entity);
+                self.joint_spawned(entity);
+            }
+        }
+    }
+
+    fn joint_spawned(&mut self, entity: Entity) {
+        let rig_entity = self.trial.rig_entity;
+        let Ok(view) = self.views.get(entity) else { return };
+        let Some(above) = view.child_of.map(ChildOf::parent) else { return };
+        let parent = if above == rig_entity { None } else { self.uid_of(above, Part::Joint) };
+        if parent.is_none() && above != rig_entity {
+            let reason = "a joint was spawned below an entity that is no joint of the document; spawn it below a joint or \
+                          the rig";
+            self.commands.entity(entity).try_remove::<ChildOf>();
+            return self.trial.refuse(reason.to_owned());
+        }
+        let group_entity = view.in_group.map(|group| group.0);
+        let rest = rest_of(view.rest, view.transform);
+        let label = view.label.map(|label| label.0.clone()).filter(|label| !label.is_empty());
+        let group = group_entity.and_then(|group| self.uid_of(group, Part::Group));
+        let kind = if view.null { NodeKind::Null } else { NodeKind::Joint };
+        let asked = view.uid.copied();
+        let uid = self.trial.free_uid(asked);
+        let data = JointData { uid, label: label.clone(), group, kind, rest, ..JointData::default() };
+        let added = RigEdit::AddJoint { joint: Box::new(data), parent, index: usize::MAX };
+        if !self.trial.edit("a spawned joint", vec![added]) {
+            // The entity stays, outside of the rig.
+            self.commands.entity(entity).try_remove::<ChildOf>();
+            return;
+        }
+        self.commands.entity(entity).try_insert((uid, rest, NodeOf(rig_entity)));
+        write_label(self.commands, entity, label.as_deref());
+        if group_entity.is_some() && group.is_none() {
+            write_group(self.commands, entity, None);
+        }
+        self.index.insert(entity, rig_entity, uid, Part::Joint);
+        self.joints
+            .joints
+            .insert(uid, MirroredJoint { entity, label, group, rest, parent: Some(above), tags: Vec::new() });
+    }
+
+    pub fn joints_written(&mut self, writes: &RigWrites) {
+        for &(entity, uid) in &writes.joints {
+            let Some(mirrored) = self.joints.joints.get(&uid).filter(|mirrored| mirrored.entity == entity).cloned()
+            else {
+                continue;
+            };
+            let Ok(view) = self.views.get(entity) else { continue };
+            if self.rig().joint(uid).is_none() {
+                continue;
+            }
+            self.hold_uid(entity, uid, view.uid.copied());
+            if !view.joint {
+                self.commands.entity(entity).try_insert(Joint);
+                self.trial.refuse(format!("joint {uid} cannot lose its `Joint`; despawn its entity to delete it"));
+            }
+            let mut next = mirrored.clone();
+            let label = view.label.map(|label| label.0.clone()).filter(|label| !label.is_empty());
+            if label != mirrored.label {
+                if self.trial.edit("a write to a label", vec![RigEdit::SetLabel(uid, label.clone())]) {
+                    next.label.clone_from(&label);
+                }
+                // The name goes along, and an empty label is none.
+                match &label {
+                    Some(label) if next.label == Some(label.clone()) => {
+                        self.commands.entity(entity).try_insert(Name::new(label.clone()));
+                    }
+                    _ => write_label(self.commands, entity, next.label.as_deref()),
+                }
+            }
+            let told_group = view.in_group.map(|group| self.uid_of(group.0, Part::Group));
+            if told_group != mirrored.group.map(Some) {
+                let is_taken = match told_group {
+                    Some(None) => {
+                        self.trial
+                            .refuse(format!("joint {uid} cannot be in a group of another rig; add one to this rig"));
+                        false
+                    }
+                    told => {
+                        let group = told.flatten();
+                        self.trial.edit("a write to a group", vec![RigEdit::SetGroup(uid, group)])
+                    }
+                };
+                if is_taken {
+                    next.group = told_group.flatten();
+                } else {
+                    write_group(self.commands, entity, mirrored.group.and_then(|group| self.groups.get(group)));
+                }
+            }
+            let rest = view.rest.copied();
+            if rest != Some(mirrored.rest) {
+                let set = rest.map(|rest| RigEdit::SetRest(uid, rest));
+                if set.is_some_and(|set| self.trial.edit("a write to a rest pose", vec![set])) {
+                    // The transform follows the document, which still says what was written last.
+                } else {
+                    self.commands.entity(entity).try_insert(mirrored.rest);
+                }
+            }
+            if mirrored.parent.is_some() && view.child_of.map(ChildOf::parent) != mirrored.parent {
+                self.joint_moved(entity, uid, &mirrored, view.child_of.map(ChildOf::parent));
+            }
+            self.joints.joints.insert(uid, next);
+        }
+        let written: BTreeMap<Uid, Entity> = writes.nodes.iter().map(|(entity, uid)| (*uid, *entity)).collect();
+        for (uid, entity) in written {
+            self.node_written(entity, uid);
+        }
+    }
+
+    fn joint_moved(&mut self, entity: Entity, uid: Uid, mirrored: &MirroredJoint, above: Option<Entity>) {
+        let rig_entity = self.trial.rig_entity;
+        let parent = match above {
+            None => Some(None),
+            Some(above) if above == rig_entity => Some(None),
+            Some(above) => self.uid_of(above, Part::Joint).map(Some),
+        };
+        let is_taken = match parent {
+            None => {
+                let reason = format!("joint {uid} can only hang below joints of its own rig that are in the document");
+                self.trial.refuse(reason);
+                false
+            }
+            Some(parent) if self.rig().joint(uid).is_some_and(|joint| joint.parent == parent) => false,
+            Some(parent) => {
+                let set = RigEdit::SetParent { joint: uid, parent, index: usize::MAX };
+                self.trial.edit("a write to a parent", vec![set])
+            }
+        };
+        // Where the edit puts it is written after the build; until then it hangs where it hung, if that is still there.
+        if let Some(before) = mirrored.parent.filter(|before| !is_taken && self.views.contains(*before)) {
+            self.commands.entity(entity).try_insert(ChildOf(before));
+        }
+        self.trial.respawn |= !is_taken;
+    }
+
+    /// Created nodes follow their command: what somebody else writes to them is put back.
+    fn node_written(&mut self, entity: Entity, uid: Uid) {
+        let Some(mirrored) = self.built.as_ref().and_then(|built| built.nodes.get(&uid)).cloned() else { return };
+        let (Some(node), Ok(view)) =
+            (mirrored.node.as_ref().filter(|_| mirrored.entity == entity), self.views.get(entity))
+        else {
+            return;
+        };
+        self.hold_uid(entity, uid, view.uid.copied());
+        if mirrored.is_parked {
+            return;
+        }
+        let group = node.group.and_then(|group| self.groups.get(group));
+        let is_as_built = view.label.map(|label| label.0.as_str()) == node.label.as_deref()
+            && view.in_group.map(|group| group.0) == group
+            && view.rest.copied() == Some(node.base.into())
+            && view.child_of.map(ChildOf::parent) == mirrored.parent;
+        if !is_as_built {
+            write_label(self.commands, entity, node.label.as_deref());
+            self.commands
+                .entity(entity)
+                .try_insert((Name::new(node.name.to_string()), crate::rig::RestTransform::from(node.base)));
+            write_group(self.commands, entity, group);
+            if let Some(parent) = mirrored.parent {
+                self.commands.entity(entity).try_insert(ChildOf(parent));
+            }
+            let reason =
+                format!("\"{}\" was created by a command and stays as that says; change the command", node.name);
+            self.trial.refuse(reason);
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Touched entities, handed to the rigs that they belong to or ask to belong to.
+
+use std::collections::BTreeMap;
+
+use bevy::prelude::*;
+
+use super::{
+    super::entities::{EntityIndex, Indexed, Part},
+    Touched, Views,
+};
+use crate::{plugins::schema::GroupOf, rig::Uid};
+
+/// Touched entities of one rig.
+#[derive(Default)]
+pub(super) struct RigWrites {
+    pub joints: Vec<(Entity, Uid)>,
+    pub spawned_joints: Vec<Entity>,
+    pub nodes: Vec<(Entity, Uid)>,
+    pub tags: Vec<(Entity, Uid)>,
+    pub spawned_tags: Vec<Entity>,
+    pub groups: Vec<(Entity, Uid)>,
+    pub spawned_groups: Vec<Entity>,
+    pub dead: Vec<(Entity, Indexed)>,
+}
+
+/// Joints one below the other, at most; a longer chain of parents is a circle.
+const MAX_DEPTH: usize = 1 << 20;
+
+/// Hands touched entities to the rigs that they belong to or ask to belong to.
+pub(super) fn sort_by_rig(
+    touched: &Touched,
+    views: &Views,
+    index: &EntityIndex,
+    is_rig: impl Fn(Entity) -> bool,
+) -> BTreeMap<Entity, RigWrites> {
+    let mut rigs: BTreeMap<Entity, RigWrites> = BTreeMap::new();
+    // The rig above a joint that is not known yet.
+    let rig_above = |joint: Entity| {
+        let mut at = joint;
+        for _ in 0..MAX_DEPTH {
+            if is_rig(at) {
+                return Some(at);
+            }
+            if let Some(indexed) = index.get(at) {
+                return Some(indexed.rig);
+            }
+            at = views.get(at).ok()?.child_of?.parent();
+        }
+        None
+    };
+    for entity in &touched.uids {
+        let Some(indexed) = index.get(*entity) else { continue };
+        let writes = rigs.entry(indexed.rig).or_default();
+        match (views.contains(*entity), indexed.part) {
+            (false, _) => writes.dead.push((*entity, indexed)),
+            (true, Part::Joint) => writes.joints.push((*entity, indexed.uid)),
+            (true, Part::Tag) => writes.tags.push((*entity, indexed.uid)),
+            (true, Part::Group) => writes.groups.push((*entity, indexed.uid)),
+            (true, Part::Node | Part::Constraint) => writes.nodes.push((*entity, indexed.uid)),
+        }
+    }
+    for entity in touched.joints.iter().filter(|entity| views.contains(**entity)) {
+        match index.get(*entity) {
+            Some(Indexed { rig, uid, part: Part::Joint }) => rigs.entry(rig).or_default().joints.push((*entity, uid)),
+            Some(Indexed { rig, uid, part: Part::Node }) => rigs.entry(rig).or_default().nodes.push((*entity, uid)),
+            Some(_) => {}
+            None => {
+                let is_joint = views.get(*entity).is_ok_and(|view| view.joint && !view.created);
+                if let Some(rig) = rig_above(*entity).filter(|rig| is_joint && rig != entity) {
+                    rigs.entry(rig).or_default().spawned_joints.push(*entity);
+                }
+            }
+        }
+    }
+    for entity in touched.tags.iter().filter(|entity| views.contains(**entity)) {
+        match index.get(*entity) {
+            Some(Indexed { rig, uid, part: Part::Tag }) => rigs.entry(rig).or_default().tags.push((*entity, uid)),
+            Some(_) => {}
+            None => {
+                let Ok(view) = views.get(*entity) else { continue };
+                let is_tag = view.command.is_some() || view.feature.is_some();
+                let rig = view.tag_of.filter(|_| is_tag).and_then(|of| rig_above(of.0));
+                if let Some(rig) = rig {
+                    rigs.entry(rig).or_default().spawned_tags.push(*entity);
+                }
+            }
+        }
+    }
+    for entity in touched.groups.iter().filter(|entity| views.contains(**entity)) {
+        match index.get(*entity) {
+            Some(Indexed { rig, uid, part: Part::Group }) => rigs.entry(rig).or_default().groups.push((*entity, uid)),
+            Some(_) => {}
+            None => {
+                let Ok(view) = views.get(*entity) else { continue };
+                if let (Some(_), Some(GroupOf(rig))) = (view.group, view.group_of)
+                    && is_rig(*rig)
+                {
+                    rigs.entry(*rig).or_default().spawned_groups.push(*entity);
+                }
+            }
+        }
+    }
+    rigs
+}

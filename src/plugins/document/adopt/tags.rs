@@ -1,0 +1,179 @@
+//! Tags, their joints and their order as their entities tell them.
+
+use bevy::prelude::*;
+
+use super::{
+    super::{
+        entities::{MirroredTag, Part},
+        follow::write_tag,
+    },
+    Adoption,
+    sorting::RigWrites,
+};
+use crate::{
+    plugins::schema::TagOf,
+    rig::{RigEdit, TagData, TagKind, Uid},
+};
+
+impl Adoption<'_, '_, '_, '_, '_, '_> {
+    pub fn tags_written(&mut self, writes: &RigWrites) {
+        // Features first: commands of the same frame may be in them.
+        let is_feature = |entity: &Entity| self.views.get(*entity).is_ok_and(|view| view.command.is_none());
+        let (features, commands): (Vec<Entity>, Vec<Entity>) = writes.spawned_tags.iter().partition(|e| is_feature(e));
+        for entity in features.into_iter().chain(commands) {
+            self.tag_spawned(entity);
+        }
+        for &(entity, uid) in &writes.tags {
+            self.tag_written(entity, uid);
+        }
+    }
+
+    /// The tag that an entity tells; `None` if it has neither a command nor a feature, or is in no feature of this rig.
+    fn told_tag(&self, entity: Entity, uid: Uid) -> Option<TagData> {
+        let view = self.views.get(entity).ok()?;
+        let (enabled, comment) = view.tag.map_or((true, String::new()), |tag| (tag.enabled, tag.comment.clone()));
+        let kind = match (view.command, view.feature) {
+            (Some(command), _) => {
+                let feature = match view.in_feature {
+                    Some(feature) => Some(self.uid_of(feature.0, Part::Tag)?),
+                    None => None,
+                };
+                TagKind::Command { module: command.module.clone(), params: command.params.clone(), feature }
+            }
+            (None, Some(feature)) => TagKind::Feature {
+                kind: feature.kind.clone(),
+                name: feature.name.clone(),
+                switch: feature.switch.clone(),
+            },
+            (None, None) => return None,
+        };
+        Some(TagData { uid, enabled, comment, kind })
+    }
+
+    fn tag_spawned(&mut self, entity: Entity) {
+        let Ok(view) = self.views.get(entity) else { return };
+        let Some(bearer) = view.tag_of.map(|of| of.0) else { return };
+        let Some(joint) = self.uid_of(bearer, Part::Joint) else {
+            let reason =
+                "a tag was spawned on an entity that is no joint of the document; put it on a joint".to_owned();
+            return self.tag_refused(entity, Some(reason));
+        };
+        let uid = self.trial.free_uid(view.uid.copied());
+        let Some(data) = self.told_tag(entity, uid) else {
+            let reason = "a spawned tag is in a feature of another rig; put it into one of its own rig".to_owned();
+            return self.tag_refused(entity, Some(reason));
+        };
+        // Its place among the tags of the joint that the document knows.
+        let before = self.views.get(bearer).ok().and_then(|view| view.tags).map_or(usize::MAX, |tags| {
+            tags.iter()
+                .take_while(|other| *other != entity)
+                .filter(|other| self.uid_of(*other, Part::Tag).is_some())
+                .count()
+        });
+        let added = RigEdit::AddTag { joint, tag: Box::new(data.clone()), index: before };
+        if !self.trial.edit("a spawned tag", vec![added]) {
+            return self.tag_refused(entity, None);
+        }
+        self.commands.entity(entity).try_insert(uid);
+        self.index.insert(entity, self.trial.rig_entity, uid, Part::Tag);
+        self.tags.tags.insert(uid, MirroredTag { entity, joint, data });
+        if let Some(mirrored) = self.joints.joints.get_mut(&joint) {
+            mirrored.tags.insert(before.min(mirrored.tags.len()), uid);
+        }
+    }
+
+    /// Takes a spawned tag that the document does not take off its joint; the entity stays.
+    fn tag_refused(&mut self, entity: Entity, reason: Option<String>) {
+        self.commands.entity(entity).try_remove::<TagOf>();
+        if let Some(reason) = reason {
+            self.trial.refuse(reason);
+        }
+    }
+
+    fn tag_written(&mut self, entity: Entity, uid: Uid) {
+        let Some(mirrored) = self.tags.tags.get(&uid).filter(|mirrored| mirrored.entity == entity).cloned() else {
+            return;
+        };
+        let Ok(view) = self.views.get(entity) else { return };
+        let Some((bearer, _)) = self.rig().find_tag(uid) else { return };
+        let joint = bearer.data.uid;
+        self.hold_uid(entity, uid, view.uid.copied());
+        let told = self.told_tag(entity, uid);
+        if told.as_ref() != Some(&mirrored.data) {
+            let is_taken = match &told {
+                Some(told) => self.trial.edit("a write to a tag", vec![RigEdit::SetTag(joint, Box::new(told.clone()))]),
+                None => {
+                    let reason =
+                        format!("tag {uid} needs a command or a feature of its own rig; despawn it to delete it");
+                    self.trial.refuse(reason);
+                    false
+                }
+            };
+            match told.filter(|_| is_taken) {
+                Some(told) => {
+                    if let Some(known) = self.tags.tags.get_mut(&uid) {
+                        known.data = told;
+                    }
+                }
+                None => write_tag(self.commands, entity, &mirrored.data, None, self.tags),
+            }
+        }
+        let above = view.tag_of.map(|of| of.0);
+        let known = self.joints.get(mirrored.joint);
+        if above == known {
+            return;
+        }
+        let target = above.and_then(|above| self.uid_of(above, Part::Joint));
+        let data = self.rig().find_tag(uid).map(|(_, tag)| tag.clone());
+        let is_taken = match (target, data) {
+            (Some(target), Some(data)) if self.rig().joint(target).is_some() => {
+                let add = RigEdit::AddTag { joint: target, tag: Box::new(data), index: usize::MAX };
+                self.trial.edit("a tag on another joint", vec![RigEdit::RemoveTag(joint, uid), add])
+            }
+            _ => {
+                self.trial.refuse(format!("tag {uid} can only be on a joint of its own rig; despawn it to delete it"));
+                false
+            }
+        };
+        if let (false, Some(known)) = (is_taken, known) {
+            self.commands.entity(entity).try_insert(TagOf(known));
+            // The order is written anew, too.
+            if let Some(joint) = self.joints.joints.get_mut(&mirrored.joint) {
+                joint.tags.clear();
+            }
+            self.trial.respawn = true;
+        }
+    }
+
+    /// Takes over the order of tags that somebody changed in a joint's `Tags`.
+    pub fn orders_written(&mut self, writes: &RigWrites) {
+        for &(entity, uid) in &writes.joints {
+            let Some(mirrored) = self.joints.joints.get(&uid).filter(|mirrored| mirrored.entity == entity) else {
+                continue;
+            };
+            let Some(joint) = self.rig().joint(uid) else { continue };
+            let known: Vec<Uid> = joint.data.tags.iter().map(|tag| tag.uid).collect();
+            let told: Vec<Uid> = self.views.get(entity).ok().and_then(|view| view.tags).map_or_else(Vec::new, |tags| {
+                tags.iter().filter_map(|tag| self.uid_of(tag, Part::Tag)).filter(|tag| known.contains(tag)).collect()
+            });
+            let is_same_set = told.len() == known.len();
+            if !is_same_set || told == known || told == mirrored.tags {
+                continue;
+            }
+            let mut edits = Vec::new();
+            let mut now = known;
+            for (at, tag) in told.iter().enumerate() {
+                let Some((_, data)) = self.rig().find_tag(*tag).filter(|_| now[at] != *tag) else { continue };
+                edits.push(RigEdit::RemoveTag(uid, *tag));
+                edits.push(RigEdit::AddTag { joint: uid, tag: Box::new(data.clone()), index: at });
+                now.retain(|other| other != tag);
+                now.insert(at, *tag);
+            }
+            if self.trial.edit("an order of tags", edits)
+                && let Some(mirrored) = self.joints.joints.get_mut(&uid)
+            {
+                mirrored.tags = told;
+            }
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Entities that stand for the parts of a document and of what is built, found both ways: from uid to entity on each
+//! rig, and from entity to uid in one index.
+//!
+//! Beside each entity stands the value that was last written to it. What an entity says otherwise was written by
+//! somebody else; what the document says otherwise has still to be written.
+
+use std::{
+    collections::{BTreeMap, HashMap, HashSet},
+    sync::Arc,
+};
+
+use bevy::{ecs::entity::EntityHashMap, prelude::*};
+
+use crate::rig::{BuiltConstraint, BuiltNode, GroupData, PoseOffset, RestTransform, TagData, Uid};
+
+/// The parts of a rig that have entities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::plugins) enum Part {
+    /// A joint of the document.
+    Joint,
+    /// A tag.
+    Tag,
+    /// A local group.
+    Group,
+    /// A created node.
+    Node,
+    /// A constraint.
+    Constraint,
+}
+
+/// The meaning of an entity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::plugins) struct Indexed {
+    /// The rig.
+    pub rig: Entity,
+    /// The uid of the part.
+    pub uid: Uid,
+    /// The kind of part.
+    pub part: Part,
+}
+
+/// All entities that stand for a part of some rig.
+#[derive(Resource, Debug, Default)]
+pub(in crate::plugins) struct EntityIndex(EntityHashMap<Indexed>);
+
+impl EntityIndex {
+    /// The meaning of an entity; `None` for one that stands for nothing.
+    pub fn get(&self, entity: Entity) -> Option<Indexed> {
+        self.0.get(&entity).copied()
+    }
+
+    /// The uid of an entity that stands for such a part of this rig.
+    pub fn uid_of(&self, entity: Entity, rig: Entity, part: Part) -> Option<Uid> {
+        self.get(entity).filter(|indexed| indexed.rig == rig && indexed.part == part).map(|indexed| indexed.uid)
+    }
+
+    /// Notes what an entity stands for.
+    pub fn insert(&mut self, entity: Entity, rig: Entity, uid: Uid, part: Part) {
+        self.0.insert(entity, Indexed { rig, uid, part });
+    }
+
+    /// Forgets an entity.
+    pub fn remove(&mut self, entity: Entity) -> Option<Indexed> {
+        self.0.remove(&entity)
+    }
+
+    /// Forgets all entities of rigs that are gone.
+    pub fn forget_rigs(&mut self, gone: &HashSet<Entity>) {
+        self.0.retain(|_, indexed| !gone.contains(&indexed.rig));
+    }
+}
+
+/// The entities of a rig's joints.
+#[derive(Component, Debug, Default)]
+pub struct JointEntities {
+    pub(super) joints: HashMap<Uid, MirroredJoint>,
+    /// The offsets of the document that the joints' transforms were last set to.
+    pub(super) posed: BTreeMap<Uid, PoseOffset>,
+}
+
+/// A joint's entity and the values that it was last given.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::plugins) struct MirroredJoint {
+    pub entity: Entity,
+    pub label: Option<String>,
+    pub group: Option<Uid>,
+    pub rest: RestTransform,
+    /// The entity that it hangs below; `None` until it was placed.
+    pub parent: Option<Entity>,
+    /// Its tags in order.
+    pub tags: Vec<Uid>,
+}
+
+impl JointEntities {
+    /// The entity of a joint.
+    pub fn get(&self, joint: Uid) -> Option<Entity> {
+        self.joints.get(&joint).map(|mirrored| mirrored.entity)
+    }
+
+    pub(in crate::plugins) fn mirrored_mut(&mut self, joint: Uid) -> Option<&mut MirroredJoint> {
+        self.joints.get_mut(&joint)
+    }
+
+    /// The offset of the document that a joint was last posed by.
+    pub(in crate::plugins) fn posed(&self, joint: Uid) -> Option<&PoseOffset> {
+        self.posed.get(&joint)
+    }
+
+    pub(super) fn set_posed(&mut self, joint: Uid, offset: Option<&PoseOffset>) {
+        match offset {
+            Some(offset) => self.posed.insert(joint, *offset),
+            None => self.posed.remove(&joint),
+        };
+    }
+}
+
+/// The entities of a rig's tags.
+#[derive(Component, Debug, Default)]
+pub struct TagEntities {
+    pub(super) tags: HashMap<Uid, MirroredTag>,
+}
+
+/// A tag's entity and the values that it was last given.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MirroredTag {
+    pub entity: Entity,
+    pub joint: Uid,
+    pub data: TagData,
+}
+
+impl TagEntities {
+    /// The entity of a tag.
+    pub fn get(&self, tag: Uid) -> Option<Entity> {
+        self.tags.get(&tag).map(|mirrored| mirrored.entity)
+    }
+}
+
+/// The entities of a rig's local groups.
+#[derive(Component, Debug, Default)]
+pub struct GroupEntities {
+    pub(super) groups: HashMap<Uid, (Entity, GroupData)>,
+}
+
+impl GroupEntities {
+    /// The entity of a local group.
+    pub fn get(&self, group: Uid) -> Option<Entity> {
+        self.groups.get(&group).map(|(entity, _)| *entity)
+    }
+}
+
+/// The entities of the nodes and constraints that a rig's commands created, parked ones included.
+#[derive(Component, Debug, Default)]
+pub struct BuiltEntities {
+    pub(in crate::plugins) nodes: BTreeMap<Uid, MirroredNode>,
+    pub(in crate::plugins) constraints: BTreeMap<Uid, MirroredConstraint>,
+    /// Joints of the document with the values that the build last gave them.
+    pub(in crate::plugins) joints: HashMap<Uid, (Entity, BuiltNode)>,
+}
+
+/// A created node's entity and the values that it was last given.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::plugins) struct MirroredNode {
+    pub entity: Entity,
+    pub is_parked: bool,
+    pub node: Option<BuiltNode>,
+    pub parent: Option<Entity>,
+}
+
+/// A constraint's entity and the values that it was last given.
+#[derive(Debug, Clone)]
+pub(in crate::plugins) struct MirroredConstraint {
+    pub entity: Entity,
+    pub constraint: Arc<crate::rig::Constraint>,
+    /// Entities of the nodes that it names, as they were.
+    pub nodes: Vec<Option<Entity>>,
+}
+
+impl MirroredConstraint {
+    pub fn is_same(&self, built: &BuiltConstraint, nodes: &[Option<Entity>]) -> bool {
+        self.nodes == nodes
+            && (Arc::ptr_eq(&self.constraint, &built.constraint) || *self.constraint == *built.constraint)
+    }
+}
+
+impl BuiltEntities {
+    /// The entity of a created node that is part of the rig at present.
+    pub fn get(&self, node: Uid) -> Option<Entity> {
+        self.nodes.get(&node).filter(|mirrored| !mirrored.is_parked).map(|mirrored| mirrored.entity)
+    }
+
+    /// The entity of a created node, parked or not.
+    pub fn any(&self, node: Uid) -> Option<Entity> {
+        self.nodes.get(&node).map(|mirrored| mirrored.entity)
+    }
+
+    /// All created nodes that are part of the rig at present, by uid.
+    pub fn iter(&self) -> impl Iterator<Item = (Uid, Entity)> {
+        self.nodes.iter().filter(|(_, mirrored)| !mirrored.is_parked).map(|(uid, mirrored)| (*uid, mirrored.entity))
+    }
+
+    /// The entity of a constraint.
+    pub fn constraint(&self, constraint: Uid) -> Option<Entity> {
+        self.constraints.get(&constraint).map(|mirrored| mirrored.entity)
+    }
+}

@@ -1,0 +1,301 @@
+//! Entities of joints, groups and tags follow the document: one component is written where one value changed.
+
+use std::collections::HashSet;
+
+use bevy::prelude::*;
+
+use super::{
+    ShowRest,
+    entities::{EntityIndex, GroupEntities, JointEntities, MirroredJoint, MirroredTag, Part, TagEntities},
+};
+use crate::{
+    plugins::{
+        runtime::RigRuntime,
+        schema::{
+            CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf, Null, Tag, TagOf,
+        },
+    },
+    rig::{NodeKind, PoseOffset, RestTransform, Rig, TagKind, Uid},
+};
+
+type Followed<'a> = (
+    Entity,
+    Ref<'a, Rig>,
+    &'a mut JointEntities,
+    &'a mut GroupEntities,
+    Option<&'a ShowRest>,
+    Has<RigRuntime>,
+    Option<&'a Name>,
+    Option<&'a Uid>,
+);
+
+/// Makes the entities of groups and joints equal to the document. The place of a joint in the hierarchy is set after the
+/// build, which may put it below a created node.
+pub(in crate::plugins) fn follow_rigs(
+    mut commands: Commands,
+    mut rigs: Query<Followed, Or<(Changed<Rig>, Changed<ShowRest>)>>,
+    mut places: Query<(&mut Transform, &mut RestTransform), With<Joint>>,
+    mut index: ResMut<EntityIndex>,
+) {
+    for (rig_entity, rig, mut joints, mut groups, show_rest, is_running, name, uid) in &mut rigs {
+        let rig: &Rig = &rig;
+        if name.is_none_or(|name| name.as_str() != rig.about().name) {
+            commands.entity(rig_entity).try_insert(Name::new(rig.about().name.clone()));
+        }
+        if uid != Some(&rig.uid()) {
+            commands.entity(rig_entity).try_insert(rig.uid());
+        }
+        follow_groups(&mut commands, rig_entity, rig, groups.bypass_change_detection(), &mut index);
+        let known = joints.bypass_change_detection();
+        let mut is_other = false;
+        let mut gone: Vec<(Uid, Entity)> = (known.joints.iter())
+            .filter(|(uid, _)| rig.joint(**uid).is_none())
+            .map(|(uid, mirrored)| (*uid, mirrored.entity))
+            .collect();
+        gone.sort_unstable();
+        for (uid, entity) in gone {
+            index.remove(entity);
+            if let Ok(mut entity) = commands.get_entity(entity) {
+                // Children that stay get another parent after the build; they must not go along.
+                entity.detach_all_children().try_despawn();
+            }
+            known.joints.remove(&uid);
+            known.posed.remove(&uid);
+            is_other = true;
+        }
+        let is_posed = !show_rest.is_some_and(|show_rest| show_rest.0);
+        for joint in rig.walk() {
+            let data = &joint.data;
+            let offset = rig.offset(data.uid).filter(|_| is_posed);
+            let Some(mirrored) = known.joints.get_mut(&data.uid) else {
+                let posed = offset.copied().unwrap_or_default().on(&data.rest);
+                let parent = joint.parent.and_then(|parent| known.get(parent)).unwrap_or(rig_entity);
+                let bundle = (Joint, data.uid, data.rest, posed, NodeOf(rig_entity), ChildOf(parent));
+                let mut entity = commands.spawn(bundle);
+                if data.kind == NodeKind::Null {
+                    entity.insert(Null);
+                }
+                let entity = entity.id();
+                let mut mirrored = MirroredJoint {
+                    entity,
+                    label: None,
+                    group: None,
+                    rest: data.rest,
+                    parent: Some(parent),
+                    tags: Vec::new(),
+                };
+                describe(
+                    &mut commands,
+                    &mut mirrored,
+                    data.label.as_deref(),
+                    data.group,
+                    groups.bypass_change_detection(),
+                );
+                index.insert(entity, rig_entity, data.uid, Part::Joint);
+                known.joints.insert(data.uid, mirrored);
+                known.set_posed(data.uid, offset);
+                is_other = true;
+                continue;
+            };
+            let entity = mirrored.entity;
+            let old_rest = std::mem::replace(&mut mirrored.rest, data.rest);
+            describe(&mut commands, mirrored, data.label.as_deref(), data.group, groups.bypass_change_detection());
+            let is_posed_otherwise = known.posed.get(&data.uid) != offset;
+            if !is_posed_otherwise && old_rest == data.rest {
+                continue;
+            }
+            let Ok((mut pose, mut rest)) = places.get_mut(entity) else { continue };
+            rest.set_if_neq(data.rest);
+            // A rig that runs gives the places of all its nodes itself.
+            if !is_running {
+                let before = known.posed.get(&data.uid).copied().unwrap_or_default();
+                // What an animation or a game put on top of the rest pose stays there, unless the document poses anew.
+                let offset_now = match offset {
+                    _ if !is_posed_otherwise && *pose != before.on(&old_rest) => PoseOffset::between(&old_rest, &pose),
+                    offset => offset.copied().unwrap_or_default(),
+                };
+                pose.set_if_neq(offset_now.on(&data.rest));
+            }
+            known.set_posed(data.uid, offset);
+        }
+        if is_other {
+            joints.set_changed();
+        }
+    }
+}
+
+/// Writes label, name and group where they are others than before.
+fn describe(
+    commands: &mut Commands,
+    mirrored: &mut MirroredJoint,
+    label: Option<&str>,
+    group: Option<Uid>,
+    groups: &GroupEntities,
+) {
+    if mirrored.label.as_deref() != label {
+        mirrored.label = label.map(str::to_owned);
+        write_label(commands, mirrored.entity, label);
+    }
+    if mirrored.group != group {
+        mirrored.group = group;
+        write_group(commands, mirrored.entity, group.and_then(|group| groups.get(group)));
+    }
+}
+
+pub(super) fn write_label(commands: &mut Commands, entity: Entity, label: Option<&str>) {
+    match label {
+        Some(label) => commands.entity(entity).try_insert((NodeLabel(label.to_owned()), Name::new(label.to_owned()))),
+        None => commands.entity(entity).try_remove::<(NodeLabel, Name)>(),
+    };
+}
+
+pub(super) fn write_group(commands: &mut Commands, entity: Entity, group: Option<Entity>) {
+    match group {
+        Some(group) => commands.entity(entity).try_insert(InGroup(group)),
+        None => commands.entity(entity).try_remove::<InGroup>(),
+    };
+}
+
+fn follow_groups(
+    commands: &mut Commands,
+    rig_entity: Entity,
+    rig: &Rig,
+    known: &mut GroupEntities,
+    index: &mut EntityIndex,
+) {
+    let mut gone: Vec<Uid> = known.groups.keys().filter(|uid| rig.group(**uid).is_none()).copied().collect();
+    gone.sort_unstable();
+    for uid in gone {
+        if let Some((entity, _)) = known.groups.remove(&uid) {
+            index.remove(entity);
+            commands.entity(entity).try_despawn();
+        }
+    }
+    for group in rig.groups() {
+        let told = LocalGroup { name: group.name.clone(), color: group.color, enabled: group.enabled };
+        match known.groups.get_mut(&group.uid) {
+            Some((_, data)) if data == group => {}
+            Some((entity, data)) => {
+                data.clone_from(group);
+                commands.entity(*entity).try_insert((told, Name::new(group.name.clone())));
+            }
+            None => {
+                let bundle = (told, group.uid, GroupOf(rig_entity), Name::new(group.name.clone()));
+                let entity = commands.spawn(bundle).id();
+                index.insert(entity, rig_entity, group.uid, Part::Group);
+                known.groups.insert(group.uid, (entity, group.clone()));
+            }
+        }
+    }
+}
+
+/// Makes the tag entities equal to the document.
+pub(in crate::plugins) fn follow_tags(
+    mut commands: Commands,
+    mut rigs: Query<(Entity, &Rig, &mut JointEntities, &mut TagEntities), Changed<Rig>>,
+    mut index: ResMut<EntityIndex>,
+) {
+    for (rig_entity, rig, mut joints, mut tags) in &mut rigs {
+        let (joints, known) = (joints.bypass_change_detection(), &mut *tags.bypass_change_detection());
+        let mut gone: Vec<Uid> = known.tags.keys().filter(|uid| rig.find_tag(**uid).is_none()).copied().collect();
+        gone.sort_unstable();
+        for uid in gone {
+            if let Some(mirrored) = known.tags.remove(&uid) {
+                index.remove(mirrored.entity);
+                commands.entity(mirrored.entity).try_despawn();
+            }
+        }
+        // All entities first: commands point at features that may come later.
+        let mut fresh: HashSet<Uid> = HashSet::new();
+        for joint in rig.walk() {
+            for tag in &joint.data.tags {
+                if known.get(tag.uid).is_some() {
+                    continue;
+                }
+                let entity = commands.spawn(tag.uid).id();
+                index.insert(entity, rig_entity, tag.uid, Part::Tag);
+                known.insert_fresh(joint.data.uid, tag, entity);
+                fresh.insert(tag.uid);
+            }
+        }
+        for joint in rig.walk() {
+            let data = &joint.data;
+            let Some(mirrored) = joints.joints.get_mut(&data.uid) else { continue };
+            let is_ordered = mirrored.tags.iter().copied().eq(data.tags.iter().map(|tag| tag.uid));
+            let bearer = mirrored.entity;
+            if !is_ordered {
+                mirrored.tags = data.tags.iter().map(|tag| tag.uid).collect();
+            }
+            for tag in &data.tags {
+                let is_fresh = fresh.contains(&tag.uid);
+                let Some(before) = known.tags.get_mut(&tag.uid) else { continue };
+                let entity = before.entity;
+                if !is_ordered || before.joint != data.uid {
+                    before.joint = data.uid;
+                    // Taken out and put in again, each in turn: the last comes last.
+                    commands.entity(entity).try_remove::<TagOf>().try_insert(TagOf(bearer));
+                }
+                if !is_fresh && before.data == *tag {
+                    continue;
+                }
+                let old = std::mem::replace(&mut before.data, tag.clone());
+                write_tag(&mut commands, entity, tag, (!is_fresh).then_some(&old), known);
+            }
+        }
+    }
+}
+
+/// Writes the components of a tag that are others than before; all for a tag without a value before.
+pub(super) fn write_tag(
+    commands: &mut Commands,
+    entity: Entity,
+    tag: &crate::rig::TagData,
+    old: Option<&crate::rig::TagData>,
+    known: &TagEntities,
+) {
+    let mut target = commands.entity(entity);
+    if old.is_none_or(|old| (old.enabled, &old.comment) != (tag.enabled, &tag.comment)) {
+        target.try_insert(Tag { enabled: tag.enabled, comment: tag.comment.clone() });
+    }
+    let parts = |kind: &TagKind| match kind {
+        TagKind::Command { feature, .. } => *feature,
+        TagKind::Feature { .. } => None,
+    };
+    match &tag.kind {
+        TagKind::Command { module, params, .. } => {
+            let is_same = |old: &crate::rig::TagData| matches!(&old.kind, TagKind::Command { module: m, params: p, .. } if (m, p) == (module, params));
+            if !old.is_some_and(is_same) {
+                let command = CommandTag { module: module.clone(), params: params.clone() };
+                target.try_insert(command).try_remove::<FeatureTag>();
+            }
+        }
+        TagKind::Feature { kind, name, switch } => {
+            if old.is_none_or(|old| old.kind != tag.kind) {
+                let feature = FeatureTag { kind: kind.clone(), name: name.clone(), switch: switch.clone() };
+                target.try_insert(feature).try_remove::<CommandTag>();
+            }
+        }
+    }
+    let feature = parts(&tag.kind);
+    if old.map(|old| parts(&old.kind)) != Some(feature) {
+        match feature.and_then(|feature| known.get(feature)) {
+            Some(feature) => target.try_insert(InFeature(feature)),
+            None => target.try_remove::<InFeature>(),
+        };
+    }
+}
+
+impl TagEntities {
+    fn insert_fresh(&mut self, joint: Uid, tag: &crate::rig::TagData, entity: Entity) {
+        self.tags.insert(tag.uid, MirroredTag { entity, joint, data: tag.clone() });
+    }
+}
+
+/// The rest pose of a joint that somebody spawned: the rest transform, or the transform where that was left out.
+pub(super) fn rest_of(rest: Option<&RestTransform>, transform: Option<&Transform>) -> RestTransform {
+    match (rest, transform) {
+        (Some(rest), _) if *rest != RestTransform::default() => *rest,
+        (_, Some(transform)) => (*transform).into(),
+        (rest, None) => rest.copied().unwrap_or_default(),
+    }
+}

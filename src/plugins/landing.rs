@@ -1,0 +1,73 @@
+//! Results of background jobs: each lands on the document that it was computed for, or not at all.
+//!
+//! A job (weights, a face) starts from a document that people go on editing. Committing its result is a step of the
+//! history, and a step that is committed after an undo cuts off what could be done again. So a result waits while
+//! something can be redone, and while a drag is under way; and it is dropped, with a message, once the joints that it
+//! was computed from are others for good.
+
+use bevy::prelude::*;
+
+use super::history::RigHistory;
+use crate::rig::{NodeKind, Rig, Uid};
+
+/// The result of a background job waits, because committing it now would cut off steps that can be redone.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct ResultHeld {
+    /// The mesh that the job is for.
+    pub mesh: Entity,
+    /// The reason and the way out, for people.
+    pub reason: String,
+}
+
+/// Hash of everything in a document that a job on one mesh depends on: its joints, where they rest, and, where joints
+/// are locked, the weights that stay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct JobBasis(u64);
+
+impl JobBasis {
+    /// The basis that a document gives now.
+    pub(super) fn of(rig: &Rig, mesh: Uid) -> Self {
+        // FNV-1a over words; only compared within one process.
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let mut put = |word: u64| hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3);
+        let mut any_locked = false;
+        for joint in rig.walk() {
+            let rest = &joint.data.rest;
+            put(joint.data.uid.0);
+            put(joint.parent.map_or(0, |parent| parent.0));
+            put(u64::from(joint.data.kind == NodeKind::Joint) | u64::from(joint.data.locked) << 1);
+            rest.translation.to_array().iter().for_each(|number| put(u64::from(number.to_bits())));
+            rest.rotation.to_array().iter().for_each(|number| put(u64::from(number.to_bits())));
+            rest.scale.to_array().iter().for_each(|number| put(u64::from(number.to_bits())));
+            any_locked |= joint.data.locked;
+        }
+        if let Some(skin) = rig.skin(mesh).filter(|_| any_locked) {
+            skin.joints.iter().for_each(|joint| put(joint.0));
+            skin.weights.values.iter().for_each(|weight| put(u64::from(weight.to_bits())));
+            skin.weights.joints.iter().for_each(|joint| put(u64::from(*joint)));
+        }
+        Self(hash)
+    }
+}
+
+/// The decision about a finished job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Landing {
+    /// The result is committed.
+    Commit,
+    /// The result waits: steps can be redone, or a drag is under way.
+    Hold,
+    /// The joints are others for good.
+    Drop,
+}
+
+/// Decides about the result of a job that started from `basis`.
+pub(super) fn landing(basis: JobBasis, rig: &Rig, mesh: Uid, history: &RigHistory) -> Landing {
+    if history.is_previewing() || history.can_redo() {
+        Landing::Hold
+    } else if JobBasis::of(rig, mesh) == basis {
+        Landing::Commit
+    } else {
+        Landing::Drop
+    }
+}

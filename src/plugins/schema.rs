@@ -1,0 +1,235 @@
+//! Components and relations that tell a rig: the same in an app, in the editor and in a game.
+//!
+//! The [`Rig`](crate::rig::Rig) component is the document; everything else here stands on entities that follow it. A
+//! component that tells something of the document may be written, and the write becomes an edit: see the table in
+//! [`plugins`](super). Components that tell results are immutable or are put back.
+//!
+//! | thing | components |
+//! | --- | --- |
+//! | rig | `Rig`, [`Uid`], `Transform` |
+//! | local group | [`LocalGroup`], `Uid`, [`GroupOf`] the rig |
+//! | joint | [`Joint`], `Uid`, `RestTransform`, `Transform`, [`NodeOf`] the rig, `ChildOf`; [`NodeLabel`], [`InGroup`], [`Null`] |
+//! | tag | [`Tag`], `Uid`, [`TagOf`] a joint, and [`CommandTag`] or [`FeatureTag`]; [`InFeature`] |
+//! | created node | [`CreatedBy`] a command, [`CreatedRole`], `Uid`, `RestTransform`, `Transform`, [`NodeOf`], `ChildOf`, and [`Control`], [`Null`] or [`Joint`]; [`NodeLabel`], [`InGroup`], [`NodeLayer`], [`Attributes`] |
+//! | constraint | [`Constrains`] a node, [`ConstraintKind`], [`ConstraintTargets`], [`CreatedBy`] a command, `Uid` |
+
+use std::collections::BTreeMap;
+
+use bevy::prelude::*;
+
+use crate::rig::{ControlData, LayerData, RestTransform, Uid};
+
+/// A joint of the document, or one that a command created. Its [`Transform`] is the pose relative to its parent, its
+/// [`RestTransform`] the rest pose.
+///
+/// Spawning an entity with this component below a rig or one of its joints adds a joint to the document; its rest pose
+/// is the `RestTransform`, or the `Transform` where that was left out.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Component)]
+#[require(Transform, RestTransform)]
+pub struct Joint;
+
+/// A node that carries others and never moves the mesh. On a joint of the document: a joint without weights.
+#[derive(Component, Reflect, Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[reflect(Component)]
+pub struct Null;
+
+/// The rig that a node belongs to: joints, created nodes, and the nodes of a game's instance.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[relationship(relationship_target = RigNodes)]
+#[reflect(Component)]
+pub struct NodeOf(pub Entity);
+
+/// The nodes of a rig; they go with it.
+#[derive(Component, Reflect, Debug, Default)]
+#[relationship_target(relationship = NodeOf, linked_spawn)]
+#[reflect(Component)]
+pub struct RigNodes(Vec<Entity>);
+
+/// The label of a joint or created node, by which references find it.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
+#[reflect(Component)]
+pub struct NodeLabel(pub String);
+
+/// A local group of a rig: a named, coloured set of nodes that can be left out of the build.
+#[derive(Component, Reflect, Debug, Clone, PartialEq)]
+#[reflect(Component)]
+pub struct LocalGroup {
+    /// The name people see.
+    pub name: String,
+    /// sRGB colour of the group's nodes, 0 to 1 each.
+    pub color: [f32; 3],
+    /// False to leave the group's joints out of the built rig.
+    pub enabled: bool,
+}
+
+/// The rig of a local group.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[relationship(relationship_target = LocalGroups)]
+#[reflect(Component)]
+pub struct GroupOf(pub Entity);
+
+/// The local groups of a rig, in order; they go with it.
+#[derive(Component, Reflect, Debug, Default)]
+#[relationship_target(relationship = GroupOf, linked_spawn)]
+#[reflect(Component)]
+pub struct LocalGroups(Vec<Entity>);
+
+/// The local group of a joint or created node.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[relationship(relationship_target = GroupMembers)]
+#[reflect(Component)]
+pub struct InGroup(pub Entity);
+
+/// The nodes in a local group.
+#[derive(Component, Reflect, Debug, Default)]
+#[relationship_target(relationship = InGroup)]
+#[reflect(Component)]
+pub struct GroupMembers(Vec<Entity>);
+
+/// A tag of a joint. Together with [`TagOf`] and a [`CommandTag`] or a [`FeatureTag`] it adds a tag to the document.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
+#[reflect(Component)]
+pub struct Tag {
+    /// False to skip the tag in a build.
+    pub enabled: bool,
+    /// A note for people.
+    pub comment: String,
+}
+
+impl Default for Tag {
+    fn default() -> Self {
+        Self { enabled: true, comment: String::new() }
+    }
+}
+
+/// The joint that carries a tag. A joint's tags are in its [`Tags`], in order.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[relationship(relationship_target = Tags)]
+#[reflect(Component)]
+pub struct TagOf(pub Entity);
+
+/// The tags of a joint, in order; they go with it.
+#[derive(Component, Reflect, Debug, Default)]
+#[relationship_target(relationship = TagOf, linked_spawn)]
+#[reflect(Component)]
+pub struct Tags(Vec<Entity>);
+
+/// A command: a module that runs when the rig is built.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
+#[reflect(Component)]
+#[require(Tag)]
+pub struct CommandTag {
+    /// The module's name.
+    pub module: String,
+    /// The module's parameters as RON.
+    pub params: String,
+}
+
+/// A feature: turns the commands that are in it on and off.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
+#[reflect(Component)]
+#[require(Tag)]
+pub struct FeatureTag {
+    /// The kind, from the registry.
+    pub kind: String,
+    /// The name; empty if the feature only organises.
+    pub name: String,
+    /// The part of the combined feature.
+    pub switch: String,
+}
+
+/// The feature tag that a command is in.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[relationship(relationship_target = FeatureCommands)]
+#[reflect(Component)]
+pub struct InFeature(pub Entity);
+
+/// The commands in a feature.
+#[derive(Component, Reflect, Debug, Default)]
+#[relationship_target(relationship = InFeature)]
+#[reflect(Component)]
+pub struct FeatureCommands(Vec<Entity>);
+
+/// The command tag that made a node or a constraint.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[relationship(relationship_target = CreatedNodes)]
+#[reflect(Component)]
+pub struct CreatedBy(pub Entity);
+
+/// The nodes and constraints that a command made.
+#[derive(Component, Reflect, Debug, Default)]
+#[relationship_target(relationship = CreatedBy)]
+#[reflect(Component)]
+pub struct CreatedNodes(Vec<Entity>);
+
+/// The purpose of a created node.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
+#[component(immutable)]
+#[reflect(Component)]
+pub struct CreatedRole {
+    /// The role that the module gives it.
+    pub role: String,
+    /// The node that it was made for.
+    pub subject: Uid,
+    /// Its number among several for the same purpose.
+    pub number: u32,
+}
+
+/// A node that people and animations move. Its `Transform` is its pose; the channels and limits hold for whoever writes it.
+#[derive(Component, Reflect, Debug, Clone, PartialEq)]
+#[component(immutable)]
+#[reflect(Component)]
+pub struct Control(pub ControlData);
+
+/// The layer that a node is shown in.
+#[derive(Component, Reflect, Debug, Clone, PartialEq)]
+#[component(immutable)]
+#[reflect(Component)]
+pub struct NodeLayer(pub LayerData);
+
+/// Values of a node's attributes by name, as they are in effect. Writing a value drives the rig in the same frame, as
+/// writing a control's `Transform` does; an attribute that a constraint drives is put back.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
+#[reflect(Component)]
+pub struct Attributes(pub BTreeMap<String, f32>);
+
+/// A node that is rolled back. It has no place in the rig until it is built again.
+#[derive(Component, Reflect, Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[component(immutable)]
+#[reflect(Component)]
+pub struct Parked;
+
+/// The node that a constraint drives (the last one of those that it drives). Constraints on one node run in the order
+/// of its [`NodeConstraints`].
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[relationship(relationship_target = NodeConstraints)]
+#[reflect(Component)]
+pub struct Constrains(pub Entity);
+
+/// The constraints on a node, in the order in which they run.
+#[derive(Component, Reflect, Debug, Default)]
+#[relationship_target(relationship = Constrains)]
+#[reflect(Component)]
+pub struct NodeConstraints(Vec<Entity>);
+
+/// The kind of a constraint: `transform`, `aim`, `two_bone`, and so on.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[component(immutable)]
+#[reflect(Component)]
+pub struct ConstraintKind(pub &'static str);
+
+/// The nodes that a constraint reads, in order, with their weights.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
+#[component(immutable)]
+#[reflect(Component)]
+pub struct ConstraintTargets(pub Vec<ConstraintTarget>);
+
+/// One node that a constraint reads.
+#[derive(Reflect, Debug, Clone, Copy, PartialEq)]
+pub struct ConstraintTarget {
+    /// The node.
+    pub node: Entity,
+    /// Its weight; `None` where an attribute gives it.
+    pub weight: Option<f32>,
+}

@@ -1,0 +1,42 @@
+//! The command processor: from tags on joints to a built rig, stepwise, reversibly, and only where something changed.
+//!
+//! A [`Builder`] follows one rig. [`Builder::sync`] takes over what the document says, [`Builder::run_to`] carries out
+//! commands up to a place in the list. The built world keeps what every command wrote side by side with what stood
+//! there before, so looking at it as of an earlier command (rolling back, stepping) is exact and costs nothing; and as
+//! what every command read is kept, too, a command runs again only if its parameters, its place or something that it
+//! read has changed. When it writes the same as before, nothing after it runs (early cut-off).
+//!
+//! Modules see the world through a [`BuildScope`] only. Nothing here knows an `App`.
+
+mod amount;
+mod authoring;
+mod axis;
+mod builder;
+mod creation;
+mod error;
+mod error_references;
+mod follow;
+pub mod form;
+mod ik;
+mod list;
+mod module;
+mod resolve;
+mod review;
+mod scope;
+mod signal;
+mod snapshot;
+mod world;
+
+pub use amount::Amount;
+pub use authoring::{check_finite, check_limits, degrees};
+pub use axis::Axis;
+pub use builder::{Builder, CommandState, CommandStatus, FindError, RunReport};
+pub use creation::Creation;
+pub use error::{BuildError, BuildProblem, ModuleError};
+pub use follow::{FollowParams, TargetParams};
+pub use ik::{Ik, IkSolver, JointAngles};
+pub use list::{BuildRange, ListEntry};
+pub use module::{DynModule, ModuleInfo, Modules, Parameter, RigModule};
+pub use review::{locate, review};
+pub use scope::{BuildScope, Side};
+pub use world::{Aspect, NodeId, Value};

@@ -1,0 +1,468 @@
+//! The processor: follows a document, carries out what has to be carried out, and knows how far it has come.
+
+mod find;
+mod follow;
+mod loops;
+
+use std::{
+    cmp::Reverse,
+    collections::{BinaryHeap, HashSet},
+    sync::Arc,
+    time::Instant,
+};
+
+pub use find::FindError;
+
+use super::{
+    BuildError, BuildProblem, BuildRange, BuildScope, DynModule, ListEntry, ModuleError, Modules, error_references,
+    resolve::Asker,
+    scope::Trace,
+    snapshot,
+    world::{Aspect, NOWHERE, NodeId, Value, World, same},
+};
+use crate::rig::{BuiltRig, Rig, Uid};
+
+/// Where a command stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CommandState {
+    /// Not carried out yet, or rolled back.
+    Pending,
+    /// Carried out.
+    Done,
+    /// Passed over: its tag, its feature or its joint's group is off.
+    Skipped,
+    /// It failed and the build stands before it.
+    Failed,
+}
+
+/// What is known about a command.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommandStatus {
+    /// Where it stands.
+    pub state: CommandState,
+    /// How long it took when it ran last, in microseconds.
+    pub micros: f32,
+    /// How often it ran since the builder was made.
+    pub runs: u32,
+    /// Why it failed, if it did.
+    pub error: Option<BuildProblem>,
+}
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RunReport {
+    /// Commands that were executed, in order.
+    pub executed: Vec<Uid>,
+    /// The command that stopped it.
+    pub error: Option<BuildError>,
+    /// How many commands are in effect now.
+    pub cursor: usize,
+}
+
+/// What has to be done about a command before it counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Due {
+    Nothing,
+    /// Something that it read may have changed.
+    Check,
+    Run,
+}
+
+struct Command {
+    joint: Uid,
+    module: Arc<str>,
+    params: Arc<str>,
+    loaded: Option<Result<Arc<dyn DynModule>, BuildProblem>>,
+    active: bool,
+    trace: Trace,
+    /// True if it looked for nodes when it ran last.
+    asks: bool,
+    /// The run in which it ran last.
+    ran_in: u32,
+    due: Due,
+    error: Option<BuildProblem>,
+    micros: f32,
+    runs: u32,
+}
+
+/// Builds one rig, and keeps what it takes to build it again where something changed.
+pub struct Builder {
+    modules: Arc<Modules>,
+    range: BuildRange,
+    rig: Uid,
+    world: World,
+    commands: Vec<Command>,
+    list: Vec<u32>,
+    due: BinaryHeap<Reverse<(u32, u32)>>,
+    cursor: u32,
+    failed: Option<u32>,
+    breakpoints: HashSet<Uid>,
+    /// Whether something that can close a circle of constraints has changed, and from which place on.
+    graph_changed: Option<u32>,
+    /// From which place on references may find other nodes than before.
+    structure_changed: Option<u32>,
+    /// Counts runs.
+    run: u32,
+}
+
+impl Builder {
+    /// A builder that knows these modules.
+    pub fn new(modules: Arc<Modules>) -> Self {
+        Self {
+            modules,
+            range: BuildRange::Rig,
+            rig: Uid(0),
+            world: World::default(),
+            commands: Vec::new(),
+            list: Vec::new(),
+            due: BinaryHeap::new(),
+            cursor: 0,
+            failed: None,
+            breakpoints: HashSet::new(),
+            graph_changed: None,
+            structure_changed: None,
+            run: 0,
+        }
+    }
+
+    /// Builds all of a rig from nothing.
+    ///
+    /// # Errors
+    /// The first command that fails.
+    pub fn build(rig: &Rig, modules: &Arc<Modules>) -> Result<BuiltRig, BuildError> {
+        let mut builder = Self::new(modules.clone());
+        builder.sync(rig);
+        match builder.run_all().error {
+            Some(error) => Err(error),
+            None => Ok(builder.built()),
+        }
+    }
+
+    /// Commands of other joints are left out of the list from the next [`Builder::sync`] on.
+    pub fn set_range(&mut self, range: BuildRange) {
+        self.range = range;
+    }
+
+    /// Somebody (`None`: the document) changed what a cell holds: whoever read it later has to be looked at.
+    /// `circles` is true if that may have closed a circle of constraints.
+    fn changed(&mut self, node: NodeId, aspect: Aspect, writer: Option<u32>, circles: bool) {
+        let from = writer.map(|writer| self.world.places[writer as usize]);
+        let later = |world: &World, number: u32| {
+            let place = world.places[number as usize];
+            place != NOWHERE && from.is_none_or(|from| place > from)
+        };
+        let readers: Vec<u32> = self.world.cell(node, aspect).readers.clone();
+        for number in readers {
+            if later(&self.world, number) {
+                self.mark(number, Due::Check);
+            }
+        }
+        if aspect.is_structure() {
+            let from = from.map_or(0, |from| from + 1);
+            self.structure_changed = Some(self.structure_changed.map_or(from, |before| before.min(from)));
+        }
+        if circles {
+            let from = from.unwrap_or(0);
+            self.graph_changed = Some(self.graph_changed.map_or(from, |before| before.min(from)));
+        }
+    }
+
+    /// Lets all commands that look for nodes look again, from where one of them may find others.
+    fn spread_structure(&mut self) {
+        let Some(from) = self.structure_changed.take() else { return };
+        for at in from as usize..self.list.len() {
+            let number = self.list[at];
+            let command = &self.commands[number as usize];
+            if command.due == Due::Nothing && command.asks {
+                self.mark(number, Due::Check);
+            }
+        }
+    }
+
+    /// What a command wrote to a cell.
+    fn own(&self, number: u32, node: NodeId, aspect: Aspect) -> Option<&Value> {
+        let writes = &self.world.cell(node, aspect).writes;
+        writes.iter().find(|(writer, _)| *writer == number).map(|(_, value)| value)
+    }
+
+    /// The commands in order.
+    pub fn list(&self) -> Vec<ListEntry> {
+        let entry = |number: &u32| {
+            let command = &self.commands[*number as usize];
+            ListEntry {
+                command: self.world.commands[*number as usize],
+                joint: command.joint,
+                module: command.module.clone(),
+                active: command.active,
+            }
+        };
+        self.list.iter().map(entry).collect()
+    }
+
+    /// The number of commands in the list.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// True if there is no command.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// How many commands are in effect: those before this place in the list. After a change of the document that may be
+    /// fewer than before, until the next run.
+    pub fn cursor(&self) -> usize {
+        let waiting = |Reverse((place, number)): &Reverse<(u32, u32)>| {
+            let is_due = self.commands[*number as usize].due != Due::Nothing;
+            (is_due && self.world.places[*number as usize] == *place).then_some(*place)
+        };
+        self.due.iter().filter_map(waiting).min().map_or(self.cursor, |due| due.min(self.cursor)) as usize
+    }
+
+    /// What is known about a command; `None` if it is not in the list.
+    pub fn status(&self, tag: Uid) -> Option<CommandStatus> {
+        let number = self.world.creator_of(tag)?;
+        let place = Some(self.world.places[number as usize]).filter(|place| *place != NOWHERE)?;
+        let command = &self.commands[number as usize];
+        let cursor = self.cursor() as u32;
+        let state = match () {
+            () if self.failed == Some(number) && place == cursor => CommandState::Failed,
+            () if place >= cursor => CommandState::Pending,
+            () if !command.active => CommandState::Skipped,
+            () => CommandState::Done,
+        };
+        let error = command.error.clone().filter(|_| state == CommandState::Failed);
+        Some(CommandStatus { state, micros: command.micros, runs: command.runs, error })
+    }
+
+    /// A run with [`Builder::run`] stops before commands with a breakpoint.
+    pub fn set_breakpoint(&mut self, tag: Uid, on: bool) {
+        if on {
+            self.breakpoints.insert(tag);
+        } else {
+            self.breakpoints.remove(&tag);
+        }
+    }
+
+    /// Tags with a breakpoint.
+    pub fn breakpoints(&self) -> &HashSet<Uid> {
+        &self.breakpoints
+    }
+
+    /// Carries out all commands, whatever the breakpoints.
+    pub fn run_all(&mut self) -> RunReport {
+        self.run_to(self.list.len())
+    }
+
+    /// Goes on to the next breakpoint, or to the end. Starts over a breakpoint that it stands at.
+    pub fn run(&mut self) -> RunReport {
+        let from = (self.cursor() + 1).min(self.list.len());
+        let stop = self.list[from..]
+            .iter()
+            .position(|number| self.breakpoints.contains(&self.world.commands[*number as usize]));
+        self.run_to(stop.map_or(self.list.len(), |at| from + at))
+    }
+
+    /// Carries out the next command.
+    pub fn step_forward(&mut self) -> RunReport {
+        self.run_to(self.cursor() + 1)
+    }
+
+    /// Rolls the last command back.
+    pub fn step_back(&mut self) -> RunReport {
+        self.run_to(self.cursor().saturating_sub(1))
+    }
+
+    /// Carries out the rest of the commands of the joint whose turn it is.
+    pub fn joint_forward(&mut self) -> RunReport {
+        let at = self.cursor();
+        let joint = self.list.get(at).map(|number| self.commands[*number as usize].joint);
+        let same = |number: &&u32| Some(self.commands[**number as usize].joint) == joint;
+        let count = self.list.get(at..).unwrap_or_default().iter().take_while(same).count();
+        self.run_to(at + count)
+    }
+
+    /// Rolls back the commands of the joint that was last.
+    pub fn joint_back(&mut self) -> RunReport {
+        let at = self.cursor();
+        let joint = at.checked_sub(1).map(|at| self.commands[self.list[at] as usize].joint);
+        let same = |number: &&u32| Some(self.commands[**number as usize].joint) == joint;
+        let count = self.list[..at].iter().rev().take_while(same).count();
+        self.run_to(at - count)
+    }
+
+    /// Rolls everything back.
+    pub fn roll_back(&mut self) -> RunReport {
+        self.run_to(0)
+    }
+
+    /// Goes to a place in the list, forwards or backwards: commands before it are in effect then, unless one of them
+    /// fails. Executes only what has not been executed as things stand now.
+    pub fn run_to(&mut self, place: usize) -> RunReport {
+        let target = place.min(self.list.len()) as u32;
+        self.run = self.run.wrapping_add(1);
+        let mut report = RunReport::default();
+        let mut failed = None;
+        while let Some(Reverse((place, number))) = self.due.peek().copied() {
+            if place >= target {
+                break;
+            }
+            self.due.pop();
+            let due = self.commands[number as usize].due;
+            if due == Due::Nothing || self.world.places[number as usize] != place {
+                continue;
+            }
+            if due == Due::Check && self.holds(number) {
+                self.commands[number as usize].due = Due::Nothing;
+                continue;
+            }
+            self.commands[number as usize].due = Due::Nothing;
+            let result = self.execute(number);
+            if self.commands[number as usize].active {
+                report.executed.push(self.world.commands[number as usize]);
+            }
+            if let Err(problem) = result {
+                failed = Some((number, problem));
+                break;
+            }
+        }
+        let reached = failed.as_ref().map_or(target, |(number, _)| self.world.places[*number as usize]);
+        failed = self.loop_before(reached).or(failed);
+        self.failed = None;
+        self.cursor = target;
+        if let Some((number, problem)) = failed {
+            // It is tried again in the next run: whatever made it fail may be gone.
+            self.mark(number, Due::Run);
+            self.cursor = self.world.places[number as usize];
+            self.failed = Some(number);
+            self.commands[number as usize].error = Some(problem.clone());
+            report.error = Some(self.error(number, problem));
+        }
+        report.cursor = self.cursor as usize;
+        report
+    }
+
+    fn error(&self, number: u32, problem: BuildProblem) -> BuildError {
+        let command = &self.commands[number as usize];
+        let joint = self.world.id(command.joint);
+        let label = joint.and_then(|joint| self.world.label(joint, self.world.places[number as usize]));
+        BuildError {
+            command: self.world.commands[number as usize],
+            joint: command.joint,
+            joint_label: label.map_or_else(|| command.joint.to_string(), |label| label.to_string()).into(),
+            module: (*command.module).into(),
+            problem,
+        }
+    }
+
+    fn asker(&self, number: u32) -> Option<Asker> {
+        let joint = self.world.id(self.commands[number as usize].joint)?;
+        Some(Asker { rig: self.rig, joint, place: self.world.places[number as usize] })
+    }
+
+    /// True if the command would read the same as before.
+    fn holds(&self, number: u32) -> bool {
+        let command = &self.commands[number as usize];
+        command.error.is_none() && self.asker(number).is_some_and(|asker| command.trace.holds(&self.world, asker))
+    }
+
+    fn execute(&mut self, number: u32) -> Result<(), BuildProblem> {
+        let old = std::mem::take(&mut self.commands[number as usize].trace);
+        let before = self.take_back(number, &old);
+        let mut trace = Trace::default();
+        let started = Instant::now();
+        let result = if self.commands[number as usize].active { self.construct(number, &mut trace) } else { Ok(()) };
+        if result.is_err() {
+            let reads = std::mem::take(&mut trace.reads);
+            self.take_back(number, &trace);
+            trace = Trace { reads, ..Trace::default() };
+        }
+        // Early cut-off: only what is not as before concerns others.
+        for (node, aspect) in &trace.writes {
+            let was = before.binary_search_by_key(&(*node, *aspect), |(node, aspect, _)| (*node, *aspect));
+            let was = was.ok().map(|at| &before[at].2);
+            let now = self.own(number, *node, *aspect);
+            if !same(now, was) {
+                let circles = *aspect == Aspect::Parent || *aspect == Aspect::Constraint && !drives_alike(now, was);
+                self.changed(*node, *aspect, Some(number), circles);
+            }
+        }
+        for (node, aspect, _) in &before {
+            if self.own(number, *node, *aspect).is_none() {
+                // Taking something away never closes a circle.
+                self.changed(*node, *aspect, Some(number), *aspect == Aspect::Parent);
+            }
+        }
+        let command = &mut self.commands[number as usize];
+        command.asks = trace.asks();
+        command.trace = trace;
+        command.ran_in = self.run;
+        if command.active {
+            command.runs += 1;
+            command.micros = started.elapsed().as_nanos() as f32 / 1000.0;
+        }
+        command.error = result.clone().err();
+        self.spread_structure();
+        result
+    }
+
+    fn construct(&mut self, number: u32, trace: &mut Trace) -> Result<(), BuildProblem> {
+        let Some(asker) = self.asker(number) else {
+            return Err(ModuleError::other("the joint of the tag is not in the built rig").into());
+        };
+        let command = &mut self.commands[number as usize];
+        let modules = &self.modules;
+        let loaded = command.loaded.get_or_insert_with(|| modules.load(&command.module, &command.params));
+        let module = loaded.clone()?;
+        let name = command.module.clone();
+        let mut scope = BuildScope { world: &mut self.world, trace, asker, command: number, module: name };
+        if let Err(problem) = module.construct(&mut scope) {
+            let params = &self.commands[number as usize].params;
+            return Err(error_references::as_written(problem, params, &self.world, asker.place));
+        }
+        let made = trace.writes.iter().filter(|(_, aspect)| *aspect == Aspect::Constraint);
+        let made: Vec<NodeId> = made.map(|(node, _)| *node).collect();
+        for constraint in made {
+            self.check_loop(constraint, asker.place + 1)?;
+        }
+        Ok(())
+    }
+
+    /// Removes what a command wrote, and returns it; unregisters what it read.
+    fn take_back(&mut self, number: u32, trace: &Trace) -> Vec<(NodeId, Aspect, Value)> {
+        for read in &trace.reads {
+            if let super::scope::Read::Cell(node, aspect, _) = read {
+                let readers = &mut self.world.cell_mut(*node, *aspect).readers;
+                if let Ok(at) = readers.binary_search(&number) {
+                    readers.remove(at);
+                }
+            }
+        }
+        let mut values = Vec::with_capacity(trace.writes.len());
+        for (node, aspect) in &trace.writes {
+            let writes = &mut self.world.cell_mut(*node, *aspect).writes;
+            if let Some(at) = writes.iter().position(|(writer, _)| *writer == number) {
+                values.push((*node, *aspect, writes.swap_remove(at).1));
+            }
+        }
+        values.sort_unstable_by_key(|(node, aspect, _)| (*node, *aspect));
+        values
+    }
+
+    /// The built rig as the commands before the cursor made it.
+    pub fn built(&self) -> BuiltRig {
+        snapshot::snapshot(&self.world, self.cursor() as u32)
+    }
+}
+
+/// True if two constraints drive the same and read the same, so that none of them can close a circle that the other
+/// does not.
+fn drives_alike(now: Option<&Value>, was: Option<&Value>) -> bool {
+    match (now, was) {
+        (Some(Value::Constraint(_, now)), Some(Value::Constraint(_, was))) => {
+            now.drives() == was.drives() && now.reads() == was.reads()
+        }
+        _ => false,
+    }
+}

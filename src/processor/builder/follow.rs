@@ -1,0 +1,192 @@
+//! Taking over what the document says: joints, tags, and what is switched off.
+
+use std::{
+    cmp::Reverse,
+    collections::{HashMap, HashSet},
+    sync::Arc,
+};
+
+use super::{Builder, Command, Due};
+use crate::{
+    mesh::model::Trs,
+    processor::{
+        list::{features, groups_off, is_on, joints_in},
+        scope::Trace,
+        world::{Aspect, Birth, NOWHERE, NodeId, Value, same},
+    },
+    rig::{NodeKind, NodeType, Rig, RigEdit, TagKind, Uid},
+};
+
+impl Builder {
+    /// Takes over what the document says now. Nothing is carried out: see [`Builder::run_to`].
+    pub fn sync(&mut self, rig: &Rig) {
+        self.rig = rig.uid();
+        self.sync_joints(rig);
+        self.sync_list(rig);
+        self.spread_structure();
+    }
+
+    /// Takes over one edit that was applied to the document since the last [`Builder::sync`]. What concerns one tag or
+    /// one transform takes no look at anything else.
+    pub fn touch(&mut self, rig: &Rig, edit: &RigEdit) {
+        if !self.touch_one(rig, edit) {
+            self.sync(rig);
+        }
+    }
+
+    /// True if that was all there is to do.
+    fn touch_one(&mut self, rig: &Rig, edit: &RigEdit) -> bool {
+        match edit {
+            RigEdit::SetTag(joint, tag) => {
+                let TagKind::Command { module, params, .. } = &tag.kind else { return false };
+                let tags = rig.joint(*joint).map(|joint| &joint.data.tags);
+                let Some(tag) = tags.and_then(|tags| tags.iter().find(|now| now.uid == tag.uid)) else { return false };
+                let Some(number) = self.world.creator_of(tag.uid) else { return false };
+                let TagKind::Command { feature, .. } = &tag.kind else { return false };
+                let command = &mut self.commands[number as usize];
+                // Without a feature, its own switch and that of its group decide; the latter has not changed.
+                if feature.is_some() || tag.enabled != command.active || **module != *command.module {
+                    return false;
+                }
+                if *params != *command.params {
+                    command.params = params.as_str().into();
+                    command.loaded = None;
+                    self.mark(number, Due::Run);
+                }
+                true
+            }
+            RigEdit::SetOffset(..) | RigEdit::SetAttributeValue(..) | RigEdit::SetSkin(..) => true,
+            _ => false,
+        }
+    }
+
+    fn sync_joints(&mut self, rig: &Rig) {
+        let off = groups_off(rig);
+        let before = std::mem::take(&mut self.world.joints);
+        let mut seen = HashSet::with_capacity(rig.len());
+        // Joints that are left out: their children hang on what is above, and stay where they are.
+        let mut left_out: HashMap<Uid, (Option<NodeId>, Trs)> = HashMap::new();
+        for (order, joint) in rig.walk().enumerate() {
+            let data = &joint.data;
+            let rest: Trs = data.rest.into();
+            let (parent, base) = match joint.parent {
+                Some(parent) => match left_out.get(&parent) {
+                    Some((above, between)) => (*above, *between * rest),
+                    None => (self.world.id(parent), rest),
+                },
+                None => (None, rest),
+            };
+            if data.group.is_some_and(|group| off.contains(&group)) {
+                left_out.insert(data.uid, (parent, base));
+                continue;
+            }
+            let node = self.world.slot(data.uid, None);
+            seen.insert(node);
+            self.world.joints.push(node);
+            let kind = match data.kind {
+                NodeKind::Joint => NodeType::Joint,
+                NodeKind::Null => NodeType::Null,
+            };
+            let label: Option<Arc<str>> = data.label.as_deref().map(Into::into);
+            let birth = Birth { kind, name: None, origin: None, order: order as u32 };
+            self.set_document(node, Aspect::Birth, Some(Value::Birth(Arc::new(birth))));
+            self.set_document(node, Aspect::Parent, Some(Value::Parent(parent)));
+            self.set_document(node, Aspect::Base, Some(Value::Base(base)));
+            self.set_document(node, Aspect::Label, Some(Value::Label(label)));
+            self.set_document(node, Aspect::Group, Some(Value::Group(data.group)));
+        }
+        for node in before.into_iter().filter(|node| !seen.contains(node)) {
+            for aspect in [Aspect::Birth, Aspect::Parent, Aspect::Base, Aspect::Label, Aspect::Group] {
+                self.set_document(node, aspect, None);
+            }
+        }
+    }
+
+    fn set_document(&mut self, node: NodeId, aspect: Aspect, value: Option<Value>) {
+        let cell = self.world.cell_mut(node, aspect);
+        if !same(cell.document.as_ref(), value.as_ref()) {
+            cell.document = value;
+            self.changed(node, aspect, None, aspect == Aspect::Parent);
+        }
+    }
+
+    fn sync_list(&mut self, rig: &Rig) {
+        let features = features(rig);
+        let off = groups_off(rig);
+        let mut list = Vec::with_capacity(self.list.len());
+        for uid in joints_in(rig, &self.range) {
+            let Some(joint) = rig.joint(uid) else { continue };
+            let built = !joint.data.group.is_some_and(|group| off.contains(&group));
+            for tag in &joint.data.tags {
+                let TagKind::Command { module, params, .. } = &tag.kind else { continue };
+                let number = self.world.command(tag.uid);
+                let active = built && is_on(tag, &features);
+                if number as usize == self.commands.len() {
+                    self.commands.push(Command {
+                        joint: uid,
+                        module: module.as_str().into(),
+                        params: params.as_str().into(),
+                        loaded: None,
+                        active,
+                        trace: Trace::default(),
+                        asks: false,
+                        ran_in: 0,
+                        due: Due::Nothing,
+                        error: None,
+                        micros: 0.0,
+                        runs: 0,
+                    });
+                    self.mark(number, Due::Run);
+                } else {
+                    let command = &mut self.commands[number as usize];
+                    let reads_anew = *command.module != **module || *command.params != **params;
+                    if reads_anew {
+                        command.module = module.as_str().into();
+                        command.params = params.as_str().into();
+                        command.loaded = None;
+                    }
+                    if reads_anew || command.active != active || command.joint != uid {
+                        (command.active, command.joint) = (active, uid);
+                        self.mark(number, Due::Run);
+                    }
+                }
+                list.push(number);
+            }
+        }
+        if list == self.list {
+            return;
+        }
+        // With other places, everything may read something else, and everything has to be looked at.
+        let had_any = !self.list.is_empty();
+        let reached = self.list.get(self.cursor as usize).copied();
+        for number in std::mem::replace(&mut self.list, list) {
+            self.world.places[number as usize] = NOWHERE;
+        }
+        self.due.clear();
+        for at in 0..self.list.len() {
+            let number = self.list[at];
+            self.world.places[number as usize] = at as u32;
+            let command = &mut self.commands[number as usize];
+            command.due = command.due.max(Due::Check);
+            self.due.push(Reverse((at as u32, number)));
+        }
+        self.graph_changed = Some(0);
+        let still = reached.map(|number| self.world.places[number as usize]).filter(|place| *place != NOWHERE);
+        let end = if had_any { self.list.len() as u32 } else { 0 };
+        self.cursor = still.unwrap_or(end);
+        if self.failed.is_some_and(|number| self.world.places[number as usize] == NOWHERE) {
+            self.failed = None;
+        }
+    }
+
+    pub(super) fn mark(&mut self, number: u32, due: Due) {
+        let command = &mut self.commands[number as usize];
+        if command.due < due {
+            command.due = due;
+            let place = self.world.places[number as usize];
+            if place != NOWHERE {
+                self.due.push(Reverse((place, number)));
+            }
+        }
+    }
+}

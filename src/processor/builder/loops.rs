@@ -1,0 +1,109 @@
+//! Circles: constraints that drive what they follow.
+
+use std::{collections::HashSet, sync::Arc};
+
+use super::Builder;
+use crate::{
+    processor::{
+        BuildProblem, ModuleError,
+        world::{Aspect, NodeId, Value},
+    },
+    rig::{Constraint, Dependency},
+};
+
+impl Builder {
+    /// The first command before `target` that closes a circle which was not there when it ran.
+    pub(super) fn loop_before(&mut self, target: u32) -> Option<(u32, BuildProblem)> {
+        let from = self.graph_changed.take()?;
+        if (target as usize) < self.list.len() {
+            self.graph_changed = Some(from.min(target));
+        }
+        let mut constraints: Vec<(u32, u32, NodeId)> = Vec::new();
+        for place in from..target {
+            let number = self.list[place as usize];
+            let command = &self.commands[number as usize];
+            // What ran just now was looked at when it ran.
+            if command.ran_in == self.run {
+                continue;
+            }
+            let writes = command.trace.writes.iter();
+            let own = writes.filter(|(_, aspect)| *aspect == Aspect::Constraint);
+            constraints.extend(own.map(|(node, _)| (place, number, *node)));
+        }
+        for (place, number, constraint) in constraints {
+            if let Err(problem) = self.check_loop(constraint, place + 1) {
+                self.graph_changed = Some(from);
+                return Some((number, problem.into()));
+            }
+        }
+        None
+    }
+
+    /// Refuses a constraint whose input depends on what it drives.
+    pub(super) fn check_loop(&self, constraint: NodeId, place: u32) -> Result<(), ModuleError> {
+        let Some(Value::Constraint(_, data)) = self.world.read_at(constraint, Aspect::Constraint, place) else {
+            return Ok(());
+        };
+        let drives = data.drives();
+        // Breadth first, in an order that only the rig decides: the shortest way round is told.
+        let mut found: Vec<(Dependency, Option<usize>)> = data.reads().into_iter().map(|read| (read, None)).collect();
+        let mut seen: HashSet<Dependency> = HashSet::new();
+        let mut next = 0;
+        while next < found.len() {
+            let at = found[next].0.clone();
+            if drives.contains(&at) {
+                return Err(ModuleError::Cycle(self.trail(&found, next, place)));
+            }
+            if seen.insert(at.clone()) {
+                found.extend(self.depends_on(&at, constraint, place).into_iter().map(|read| (read, Some(next))));
+            }
+            next += 1;
+        }
+        Ok(())
+    }
+
+    /// What decides where something is: its parent, and what the constraints that drive it read.
+    fn depends_on(&self, at: &Dependency, except: NodeId, place: u32) -> Vec<Dependency> {
+        let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = at;
+        let Some(node) = self.world.id(*uid) else { return Vec::new() };
+        let parent = self.world.parent(node, place).filter(|_| matches!(at, Dependency::Node(_)));
+        let mut needs: Vec<Dependency> =
+            parent.into_iter().map(|parent| Dependency::Node(self.world.uid(parent))).collect();
+        let driven_by = self.world.slots[node.0 as usize].driven_by.iter();
+        let mut drivers: Vec<((u32, u32), &Arc<Constraint>)> = driven_by
+            .filter(|driver| **driver != except)
+            .filter_map(|driver| match self.world.read_at(*driver, Aspect::Constraint, place) {
+                Some(Value::Constraint(number, other)) if other.drives().contains(at) => {
+                    let creator = self.world.slots[driver.0 as usize].creator?;
+                    Some(((self.world.places[creator as usize], *number), other))
+                }
+                _ => None,
+            })
+            .collect();
+        drivers.sort_by_key(|(key, _)| *key);
+        needs.extend(drivers.into_iter().flat_map(|(_, other)| other.reads()));
+        needs
+    }
+
+    /// The circle in names: from what is driven over what it needs back to itself.
+    fn trail(&self, found: &[(Dependency, Option<usize>)], end: usize, place: u32) -> String {
+        let mut names = Vec::new();
+        let mut at = Some(end);
+        while let Some(index) = at {
+            names.push(self.dependency_name(&found[index].0, place));
+            at = found[index].1;
+        }
+        names.push(names[0].clone());
+        names.reverse();
+        names.join(" \u{2192} ")
+    }
+
+    fn dependency_name(&self, dependency: &Dependency, place: u32) -> String {
+        let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = dependency;
+        let name = self.world.id(*uid).map_or_else(|| uid.to_string(), |node| self.world.name(node, place));
+        match dependency {
+            Dependency::Node(_) => name,
+            Dependency::Attribute(_, attribute) => format!("{name}.{attribute}"),
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! Forms: how a module's parameters are laid out for editing, the `*.ui.ron` files.
+//!
+//! ```ron
+//! (
+//!     title: "Control",
+//!     content: [
+//!         Node(param: "at"),
+//!         Frame(label: "Shape", content: [
+//!             Menu(param: "shape", options: ["circle", "cube"]),
+//!             Slider(param: "relative_size", min: 0.05, max: 2.0, step: 0.05),
+//!             Color(param: "color"),
+//!         ]),
+//!         Separator,
+//!         Comment("Limits stop a person, never a constraint."),
+//!     ],
+//! )
+//! ```
+//!
+//! Every element but frames, separators and comments is bound to a parameter: `param` is its name, or a path into it
+//! (`creation.label`, `limits.rotate`). What an element shows before anything is written comes from the module, and so
+//! do the label (the name with blanks) and the tip (the parameter's line of documentation) where they are left out.
+
+use bevy::reflect::TypeInfo;
+use serde::{Deserialize, Serialize};
+
+use super::ModuleInfo;
+use crate::rig::{SourceError, fields, nearest::did_you_mean, ron_options, utf8};
+
+/// The longest form that is read, in bytes.
+pub const MAX_BYTES: usize = 1 << 20;
+
+/// The form of a module.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Form {
+    /// What people read at the top.
+    pub title: String,
+    /// The elements from top to bottom.
+    pub content: Vec<FormElement>,
+}
+
+/// One element of a form.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum FormElement {
+    /// Elements that belong together, to fold away.
+    Frame {
+        /// What stands above them.
+        label: String,
+        /// Folded out at first.
+        #[serde(default = "yes")]
+        open: bool,
+        /// The elements.
+        content: Vec<FormElement>,
+    },
+    /// A line of text.
+    Text(Bound),
+    /// A box to check.
+    Check(Bound),
+    /// One of several values.
+    Menu {
+        /// The parameter.
+        param: String,
+        /// See [`Bound::label`].
+        #[serde(default)]
+        label: String,
+        /// The values as they stand in files, without quotation marks.
+        options: Vec<String>,
+    },
+    /// A number between two ends.
+    Slider {
+        /// The parameter.
+        param: String,
+        /// See [`Bound::label`].
+        #[serde(default)]
+        label: String,
+        /// The lowest value that the slider reaches; others can be typed.
+        min: f32,
+        /// The highest.
+        max: f32,
+        /// What it moves by.
+        #[serde(default = "hundredth")]
+        step: f32,
+        /// What stands after the number, such as a unit.
+        #[serde(default)]
+        unit: String,
+    },
+    /// A number, or the name of an attribute that it follows ([`Amount`](super::Amount)).
+    Amount(Bound),
+    /// A number without ends.
+    Number {
+        /// The parameter.
+        param: String,
+        /// See [`Bound::label`].
+        #[serde(default)]
+        label: String,
+        /// What dragging by a pixel adds.
+        #[serde(default = "hundredth")]
+        step: f32,
+        /// What stands after the number, such as a unit.
+        #[serde(default)]
+        unit: String,
+    },
+    /// Three numbers or three boxes, for X, Y and Z.
+    Vector(Bound),
+    /// Three pairs of lowest and highest values, each of which may be open, for X, Y and Z.
+    Limits(Bound),
+    /// An sRGB colour; may be left out where the parameter may.
+    Color(Bound),
+    /// References to nodes.
+    Node(Bound),
+    /// Keys of a curve: pairs of numbers, the first ones increasing.
+    Curve(Bound),
+    /// Several values of one kind, one a line.
+    List(Bound),
+    /// A line across.
+    Separator,
+    /// A note for people.
+    Comment(String),
+}
+
+/// What every element with nothing else to say is bound to.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bound {
+    /// The parameter, or a path into it.
+    pub param: String,
+    /// What stands beside it; the last name of the path, with blanks, if empty.
+    #[serde(default)]
+    pub label: String,
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn hundredth() -> f32 {
+    0.01
+}
+
+impl FormElement {
+    /// The parameter that it edits, and its label as written; `None` for frames, separators and comments.
+    pub fn bound(&self) -> Option<(&str, &str)> {
+        match self {
+            Self::Text(bound)
+            | Self::Check(bound)
+            | Self::Vector(bound)
+            | Self::Limits(bound)
+            | Self::Color(bound)
+            | Self::Node(bound)
+            | Self::Curve(bound)
+            | Self::Amount(bound)
+            | Self::List(bound) => Some((&bound.param, &bound.label)),
+            Self::Menu { param, label, .. } | Self::Slider { param, label, .. } | Self::Number { param, label, .. } => {
+                Some((param, label))
+            }
+            Self::Frame { .. } | Self::Separator | Self::Comment(_) => None,
+        }
+    }
+
+    /// What stands beside it: as written, or the last name of the parameter's path with blanks.
+    pub fn label(&self) -> String {
+        match self.bound() {
+            Some((param, "")) => {
+                let name = param.rsplit('.').next().unwrap_or(param).replace('_', " ");
+                let mut chars = name.chars();
+                chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
+            }
+            Some((_, label)) => label.to_owned(),
+            None => match self {
+                Self::Frame { label, .. } => label.clone(),
+                Self::Comment(text) => text.clone(),
+                _ => String::new(),
+            },
+        }
+    }
+
+    /// The kind of element as it is called in files.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Frame { .. } => "Frame",
+            Self::Text(_) => "Text",
+            Self::Check(_) => "Check",
+            Self::Menu { .. } => "Menu",
+            Self::Slider { .. } => "Slider",
+            Self::Number { .. } => "Number",
+            Self::Vector(_) => "Vector",
+            Self::Limits(_) => "Limits",
+            Self::Color(_) => "Color",
+            Self::Node(_) => "Node",
+            Self::Curve(_) => "Curve",
+            Self::List(_) => "List",
+            Self::Amount(_) => "Amount",
+            Self::Separator => "Separator",
+            Self::Comment(_) => "Comment",
+        }
+    }
+}
+
+impl Form {
+    /// All elements, those in frames after their frame.
+    pub fn elements(&self) -> Vec<&FormElement> {
+        fn add<'a>(elements: &'a [FormElement], list: &mut Vec<&'a FormElement>) {
+            for element in elements {
+                list.push(element);
+                if let FormElement::Frame { content, .. } = element {
+                    add(content, list);
+                }
+            }
+        }
+        let mut list = Vec::new();
+        add(&self.content, &mut list);
+        list
+    }
+}
+
+/// Reads a form, whatever module it is for.
+///
+/// # Errors
+/// [`SourceError`] with line and column.
+pub fn read_form(bytes: &[u8]) -> Result<Form, SourceError> {
+    parse(utf8(bytes, MAX_BYTES, "form")?)
+}
+
+/// What an element is bound to stands in the element's own brackets.
+fn parse(text: &str) -> Result<Form, SourceError> {
+    let options = ron_options().with_default_extension(ron::extensions::Extensions::UNWRAP_VARIANT_NEWTYPES);
+    options.from_str(text).map_err(|error| SourceError::from_ron(text, &error))
+}
+
+/// Reads the form of a module and checks that every element edits a parameter that the module has, of a type that the
+/// element can edit, and each only once.
+///
+/// # Errors
+/// The first thing wrong, with line and column.
+pub fn read_module_form(bytes: &[u8], module: &ModuleInfo) -> Result<Form, SourceError> {
+    let text = utf8(bytes, MAX_BYTES, "form")?;
+    let form = parse(text)?;
+    // The elements' parameters stand in the text in the order of the elements.
+    let mut places = fields(text).into_iter().filter(|field| field.name == "param").map(|field| field.start);
+    let mut seen: Vec<&str> = Vec::new();
+    for element in form.elements() {
+        let Some((param, _)) = element.bound() else { continue };
+        let place = places.next().unwrap_or_default();
+        let wrong = |message: String| SourceError::at(text, place, message);
+        let info = type_at(module, param).map_err(wrong)?;
+        if seen.contains(&param) {
+            return Err(wrong(format!("`{param}` is edited twice; keep one of the two")));
+        }
+        seen.push(param);
+        check(element, info).map_err(|needed| {
+            let kind = element.kind();
+            wrong(format!("a {kind} cannot edit `{param}`, which is {}: {needed}", info.short_path()))
+        })?;
+        if let FormElement::Menu { options, .. } = element {
+            let quoted = info.bare().short_path() == "String";
+            for option in options {
+                let value = if quoted { format!("{option:?}") } else { option.clone() };
+                let set = param.rsplit('.').fold(value, |value, name| format!("({name}: {value})"));
+                let known = module.parse(&set);
+                known.map_err(|error| wrong(format!("`{param}` cannot be \"{option}\": {}", error.message)))?;
+            }
+        }
+    }
+    Ok(form)
+}
+
+/// A type, and the type behind an `Option`.
+#[derive(Clone, Copy)]
+struct TypeAt {
+    info: Option<&'static TypeInfo>,
+    path: &'static bevy::reflect::TypePathTable,
+}
+
+impl TypeAt {
+    fn short_path(&self) -> &'static str {
+        self.path.short_path()
+    }
+
+    /// Without an `Option` around it.
+    fn bare(self) -> Self {
+        if let Some(TypeInfo::Enum(info)) = self.info
+            && info.type_path_table().short_path().starts_with("Option<")
+            && let Some(bevy::reflect::enums::VariantInfo::Tuple(some)) = info.variant("Some")
+            && let Some(field) = some.field_at(0)
+        {
+            return Self { info: field.type_info(), path: field.type_path_table() };
+        }
+        self
+    }
+}
+
+fn type_at(module: &ModuleInfo, path: &str) -> Result<TypeAt, String> {
+    let mut at = TypeAt { info: Some(module.type_info), path: module.type_info.type_path_table() };
+    let mut before = String::new();
+    for name in path.split('.') {
+        let Some(TypeInfo::Struct(info)) = at.info else {
+            return Err(format!("`{before}` of {} has no parts; name it as a whole", module.name));
+        };
+        let Some(field) = info.field(name) else {
+            let nearest = did_you_mean(name, info.field_names().iter().copied());
+            return Err(format!("the module {} has no parameter `{path}`{nearest}", module.name));
+        };
+        at = TypeAt { info: field.type_info(), path: field.type_path_table() };
+        before = if before.is_empty() { name.to_owned() } else { format!("{before}.{name}") };
+    }
+    Ok(at)
+}
+
+/// Says what to write instead if an element cannot edit a type.
+fn check(element: &FormElement, at: TypeAt) -> Result<(), &'static str> {
+    let bare = at.bare();
+    let path = bare.short_path();
+    let is_enum = matches!(bare.info, Some(TypeInfo::Enum(_)));
+    let is_number = matches!(path, "f32" | "f64" | "u8" | "u16" | "u32" | "u64" | "usize" | "i32" | "i64");
+    let is_list = path.starts_with("Vec<");
+    let fits = match element {
+        FormElement::Text(_) => matches!(path, "String" | "Uid"),
+        FormElement::Check(_) => path == "bool",
+        FormElement::Menu { options, .. } => {
+            if options.is_empty() {
+                return Err("list the `options`");
+            }
+            path == "String" || is_enum
+        }
+        FormElement::Slider { min, max, .. } => {
+            if min >= max {
+                return Err("`min` has to be below `max`");
+            }
+            is_number
+        }
+        FormElement::Number { .. } => is_number,
+        FormElement::Vector(_) => matches!(path, "Vec3" | "[f32; 3]" | "[bool; 3]"),
+        FormElement::Limits(_) => path.starts_with("[(Option<f32>, Option<f32>); 3]"),
+        FormElement::Color(_) => path == "[f32; 3]",
+        FormElement::Node(_) => matches!(path, "NodeRef" | "NodeRefs"),
+        FormElement::Curve(_) => path == "Vec<(f32, f32)>",
+        FormElement::List(_) => is_list,
+        FormElement::Amount(_) => path == "Amount",
+        FormElement::Frame { .. } | FormElement::Separator | FormElement::Comment(_) => true,
+    };
+    if fits {
+        return Ok(());
+    }
+    Err(match path {
+        "bool" => "use Check",
+        "NodeRef" | "NodeRefs" => "use Node",
+        "String" | "Uid" => "use Text or Menu",
+        "Vec3" | "[bool; 3]" => "use Vector",
+        "[f32; 3]" => "use Color or Vector",
+        "Vec<(f32, f32)>" => "use Curve or List",
+        _ if path.starts_with("[(Option<f32>") => "use Limits",
+        _ if is_number => "use Slider or Number",
+        "Amount" => "use Amount",
+        _ if is_enum => "use Menu",
+        _ if is_list => "use List",
+        _ => "name the parts of it one by one",
+    })
+}

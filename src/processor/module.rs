@@ -1,0 +1,191 @@
+//! Modules: what a command tag can do, and the registry that finds them by name.
+
+use std::{any::TypeId, collections::BTreeMap, sync::Arc};
+
+use bevy::reflect::{Reflect, TypeInfo, Typed};
+use serde::{Serialize, de::DeserializeOwned};
+
+use super::{BuildProblem, BuildScope, ModuleError};
+use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_options};
+
+/// What a command does: its fields are the parameters of the tag, [`RigModule::construct`] is the work.
+///
+/// Give the type `#[serde(default, deny_unknown_fields)]`, so that tags may leave parameters out and misspelt ones are
+/// told. There is no destructor to write: everything that goes through the scope is taken back exactly.
+pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + Send + Sync + 'static {
+    /// The name in tags, in `snake_case`.
+    const NAME: &'static str;
+    /// What it does, in one or two sentences.
+    const DOC: &'static str;
+    /// A line about each parameter: (name, what it is, with its unit and range).
+    const PARAMETERS: &'static [(&'static str, &'static str)];
+    /// The form that edits its parameters, as text: see [`Form`](super::form::Form). Without one, a form is made
+    /// from the parameters' types.
+    const FORM: Option<&'static str> = None;
+    /// Its icon as SVG text: 24 by 24 units, lines in `currentColor`.
+    const ICON: Option<&'static str> = None;
+
+    /// Makes nodes and constraints.
+    ///
+    /// # Errors
+    /// Whatever keeps it from doing so; nothing of what it did so far stays then.
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError>;
+
+    /// Turns values that have a side (axes, colours by side) into those of the other side of the character, for tags
+    /// that are pasted mirrored. References are mirrored already.
+    fn mirror(&mut self) {}
+}
+
+/// A [`RigModule`] whose type is not known: parameters, ready to be carried out.
+pub trait DynModule: Send + Sync {
+    /// See [`RigModule::construct`].
+    ///
+    /// # Errors
+    /// See [`RigModule::construct`].
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError>;
+}
+
+impl<M: RigModule> DynModule for M {
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        RigModule::construct(self, scope)
+    }
+}
+
+/// One parameter of a module.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// The name.
+    pub name: &'static str,
+    /// Its Rust type, without the path.
+    pub kind: String,
+    /// What it is.
+    pub doc: &'static str,
+    /// The value where a tag leaves it out, as RON.
+    pub default: String,
+}
+
+type Parse = fn(&str) -> Result<Arc<dyn DynModule>, SourceError>;
+type Mirror = fn(&str) -> Result<String, SourceError>;
+
+/// A registered module.
+#[derive(Debug, Clone)]
+pub struct ModuleInfo {
+    /// The name in tags.
+    pub name: &'static str,
+    /// What it does.
+    pub doc: &'static str,
+    /// Its parameters in order.
+    pub parameters: Vec<Parameter>,
+    /// See [`RigModule::FORM`].
+    pub form: Option<&'static str>,
+    /// See [`RigModule::ICON`].
+    pub icon: Option<&'static str>,
+    /// Identity of its type, for reflection.
+    pub type_id: TypeId,
+    /// Its type, for forms made by reflection.
+    pub type_info: &'static TypeInfo,
+    parse: Parse,
+    mirror: Mirror,
+}
+
+impl ModuleInfo {
+    /// Reads a tag's parameters.
+    ///
+    /// # Errors
+    /// [`SourceError`] with line and column in the text.
+    pub fn parse(&self, params: &str) -> Result<Arc<dyn DynModule>, SourceError> {
+        (self.parse)(params)
+    }
+
+    /// The parameters for the other side of the character, as RON. References are left as they are.
+    ///
+    /// # Errors
+    /// [`SourceError`] with line and column in the text.
+    pub fn mirrored(&self, params: &str) -> Result<String, SourceError> {
+        (self.mirror)(params)
+    }
+}
+
+/// All modules by name.
+#[derive(Debug, Clone, Default, bevy::ecs::resource::Resource)]
+pub struct Modules {
+    by_name: BTreeMap<&'static str, ModuleInfo>,
+}
+
+impl Modules {
+    /// No module at all.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Registers a module; one of the same name is replaced.
+    pub fn add<M: RigModule>(&mut self) -> &mut Self {
+        let info = ModuleInfo {
+            name: M::NAME,
+            doc: M::DOC,
+            parameters: parameters::<M>(),
+            form: M::FORM,
+            icon: M::ICON,
+            type_id: TypeId::of::<M>(),
+            type_info: M::type_info(),
+            parse: |text| Ok(Arc::new(read::<M>(text)?)),
+            mirror: |text| {
+                let mut module = read::<M>(text)?;
+                module.mirror();
+                Ok(written(&module))
+            },
+        };
+        self.by_name.insert(M::NAME, info);
+        self
+    }
+
+    /// The module of that name.
+    pub fn get(&self, name: &str) -> Option<&ModuleInfo> {
+        self.by_name.get(name)
+    }
+
+    /// All modules, sorted by name.
+    pub fn iter(&self) -> impl Iterator<Item = &ModuleInfo> {
+        self.by_name.values()
+    }
+
+    /// The module of that name with its parameters read.
+    ///
+    /// # Errors
+    /// If there is no such module, or its parameters cannot be read.
+    pub fn load(&self, name: &str, params: &str) -> Result<Arc<dyn DynModule>, BuildProblem> {
+        let Some(info) = self.get(name) else {
+            let nearest = did_you_mean(name, self.by_name.keys());
+            return Err(BuildProblem::NoModule { module: name.to_owned(), nearest });
+        };
+        Ok(info.parse(params)?)
+    }
+}
+
+fn read<M: RigModule>(text: &str) -> Result<M, SourceError> {
+    parse_ron(if text.trim().is_empty() { "()" } else { text })
+}
+
+/// Never fails for the types that parameters have.
+fn written<M: RigModule>(module: &M) -> String {
+    ron_options().to_string(module).unwrap_or_default()
+}
+
+fn parameters<M: RigModule>() -> Vec<Parameter> {
+    let TypeInfo::Struct(info) = M::type_info() else { return Vec::new() };
+    let default = M::default();
+    let parameter = |field: &bevy::reflect::NamedField| {
+        let doc = M::PARAMETERS.iter().find(|(name, _)| *name == field.name()).map_or("", |(_, doc)| doc);
+        let kind = field.type_path_table().short_path().to_owned();
+        Parameter { name: field.name(), kind, doc, default: default_text(&default, field.name()) }
+    };
+    info.iter().map(parameter).collect()
+}
+
+/// The default of one field as RON, as it may stand in a tag.
+fn default_text<M: RigModule>(default: &M, field: &str) -> String {
+    let text = written(default);
+    let fields = crate::rig::fields(&text);
+    let found = fields.iter().find(|known| known.depth == 1 && known.name == field);
+    found.map_or_else(String::new, |found| text[found.value..found.end].trim().trim_end_matches(',').to_owned())
+}

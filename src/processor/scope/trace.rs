@@ -1,0 +1,70 @@
+//! What a command read and wrote, and who it makes.
+
+use crate::{
+    processor::{
+        resolve::{self, Asker},
+        world::{Aspect, NodeId, Value, World, same},
+    },
+    rig::{Uid, reference::NodeRefs},
+};
+
+/// Something that a command read, with what it found.
+#[derive(Debug, Clone)]
+pub(in crate::processor) enum Read {
+    Cell(NodeId, Aspect, Option<Value>),
+    References(NodeRefs, Option<Vec<NodeId>>),
+    Children(NodeId, Vec<NodeId>),
+}
+
+/// What a command read and wrote.
+#[derive(Debug, Clone, Default)]
+pub(in crate::processor) struct Trace {
+    pub reads: Vec<Read>,
+    pub writes: Vec<(NodeId, Aspect)>,
+    /// How many nodes and constraints it made.
+    pub made: u32,
+}
+
+impl Trace {
+    pub fn asks(&self) -> bool {
+        self.reads.iter().any(|read| !matches!(read, Read::Cell(..)))
+    }
+
+    /// True if everything that was read is still so.
+    pub fn holds(&self, world: &World, asker: Asker) -> bool {
+        self.reads.iter().all(|read| match read {
+            Read::Cell(node, aspect, value) => same(world.read_at(*node, *aspect, asker.place), value.as_ref()),
+            Read::References(references, nodes) => {
+                resolve::resolve(world, asker, references).ok().as_ref() == nodes.as_ref()
+            }
+            Read::Children(node, children) => world_children(world, *node, asker.place) == *children,
+        })
+    }
+}
+
+pub(super) fn world_children(world: &World, node: NodeId, place: u32) -> Vec<NodeId> {
+    let all = (0..world.slots.len() as u32).map(NodeId);
+    let mut children: Vec<NodeId> =
+        all.filter(|child| world.parent(*child, place) == Some(node) && world.exists(*child, place)).collect();
+    resolve::sort(world, &mut children, place);
+    children
+}
+
+/// The identity of a created node: the same for the same command, role, subject and number.
+pub(super) fn created_uid(command: Uid, role: &str, subject: Uid, number: u32) -> Uid {
+    let mut hash = mix(command.0 ^ 0x5249_4753_4d49_5448);
+    for byte in role.bytes() {
+        hash = mix(hash ^ u64::from(byte));
+    }
+    hash = mix(hash ^ subject.0);
+    hash = mix(hash ^ u64::from(number));
+    Uid(hash.max(1))
+}
+
+/// One round of SplitMix64's finaliser.
+fn mix(value: u64) -> u64 {
+    let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}

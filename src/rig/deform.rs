@@ -1,0 +1,209 @@
+//! Deform joints: the joints that move meshes, where they rest, and who holds weights whose joint is not built.
+//!
+//! Weights, the posed surface, the picture and the exported character all ask [`DeformSkeleton`], so that a mesh hangs
+//! on the same joints everywhere. Of a rig that is built these are the joints as they are built, with those that
+//! commands created (twist joints, joints between others); of any other rig the document's joints at rest.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use bevy::math::{Affine3, Vec3};
+
+use super::{BuiltRig, Constraint, NodeKind, NodeType, RestTransform, Rig, SkinData, Uid};
+use crate::mesh::model::Weights;
+
+/// One joint or null of a [`DeformSkeleton`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeformJoint {
+    /// Identity, by which weights name the joint.
+    pub uid: Uid,
+    /// Index of the parent in [`DeformSkeleton::joints`], smaller than the joint's own.
+    pub parent: Option<usize>,
+    /// Transform from the joint's space to the rig's, at rest.
+    pub rest: Affine3,
+    /// False for nulls of the document, which only say where bones end.
+    pub deforms: bool,
+    /// The node that a command created the joint for; `None` for joints of the document.
+    pub subject: Option<Uid>,
+    /// The bone along which the joint takes shares of the twist, if it is a twist joint.
+    pub twist: Option<TwistSegment>,
+}
+
+/// The bone that a twist joint shares with the joint that owns it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwistSegment {
+    /// Index of the joint at the start of the bone.
+    pub joint: usize,
+    /// The end of the bone in the rig's space.
+    pub end: Vec3,
+}
+
+/// The joints that can move a mesh, parents before children.
+#[derive(Debug, Clone, Default)]
+pub struct DeformSkeleton {
+    joints: Vec<DeformJoint>,
+    index: HashMap<Uid, usize>,
+}
+
+impl DeformSkeleton {
+    /// The joints of a rig; as they are built, if it is. Created nulls and controls are passed over: what hangs on one
+    /// hangs on the nearest joint above it.
+    pub fn new(rig: &Rig, built: Option<&BuiltRig>) -> Self {
+        let mut skeleton = Self::default();
+        match built {
+            Some(built) => skeleton.add_built(built),
+            None => skeleton.add_document(rig),
+        }
+        skeleton
+    }
+
+    /// All joints.
+    pub fn joints(&self) -> &[DeformJoint] {
+        &self.joints
+    }
+
+    /// The place of a joint in [`DeformSkeleton::joints`].
+    pub fn index(&self, joint: Uid) -> Option<usize> {
+        self.index.get(&joint).copied()
+    }
+
+    /// For each joint that weights name, the joint that holds its share: itself; while it is not built, the node that
+    /// it was created for, or the nearest joint above it. `None` for joints that were deleted.
+    pub fn holders(&self, rig: &Rig, skin: &SkinData) -> Vec<Option<usize>> {
+        skin.joints.iter().map(|joint| self.holder(rig, skin, *joint)).collect()
+    }
+
+    fn holder(&self, rig: &Rig, skin: &SkinData, joint: Uid) -> Option<usize> {
+        let mut joint = joint;
+        // A subject may itself be created; a damaged file may name subjects in a circle.
+        for _ in 0..=skin.subjects.len() {
+            let above = || rig.ancestors(joint).find_map(|ancestor| self.index(ancestor.data.uid));
+            if let Some(found) = self.index(joint).or_else(above) {
+                return Some(found);
+            }
+            joint = *skin.subjects.get(&joint)?;
+        }
+        None
+    }
+
+    /// The nodes that created joints were made for, for [`SkinData::subjects`].
+    pub fn subjects(&self) -> BTreeMap<Uid, Uid> {
+        self.joints.iter().filter_map(|joint| Some((joint.uid, joint.subject?))).collect()
+    }
+
+    fn add(&mut self, joint: DeformJoint) {
+        self.index.insert(joint.uid, self.joints.len());
+        self.joints.push(joint);
+    }
+
+    fn add_document(&mut self, rig: &Rig) {
+        for (joint, (uid, rest)) in rig.walk().zip(rig.rest_globals()) {
+            self.add(DeformJoint {
+                uid,
+                parent: joint.parent.and_then(|parent| self.index(parent)),
+                rest,
+                deforms: joint.data.kind == NodeKind::Joint,
+                subject: None,
+                twist: None,
+            });
+        }
+    }
+
+    fn add_built(&mut self, built: &BuiltRig) {
+        let mut globals: Vec<Affine3> = Vec::with_capacity(built.nodes.len());
+        // The nearest joint of the skeleton at or above each node.
+        let mut places: Vec<Option<usize>> = Vec::with_capacity(built.nodes.len());
+        for node in &built.nodes {
+            let above = node.parent.and_then(|parent| Some((globals.get(parent)?, places.get(parent)?)));
+            let (global, parent) = above.map_or((Affine3::IDENTITY, None), |(global, place)| (*global, *place));
+            let rest = global * RestTransform::from(node.base).affine();
+            globals.push(rest);
+            let deforms = node.kind == NodeType::Joint;
+            if !deforms && node.origin.is_some() {
+                places.push(parent);
+                continue;
+            }
+            places.push(Some(self.joints.len()));
+            let subject = node.origin.as_ref().map(|origin| origin.subject);
+            self.add(DeformJoint { uid: node.uid, parent, rest, deforms, subject, twist: None });
+        }
+        for constraint in &built.constraints {
+            if let Constraint::Twist { driven, .. } = &*constraint.constraint {
+                let driven = driven.iter().filter_map(|(joint, _)| self.index(*joint));
+                let driven: Vec<usize> = driven.filter(|joint| self.joints[*joint].deforms).collect();
+                self.note_twist(&driven);
+            }
+        }
+    }
+
+    /// Notes the bone of the joints that share one twist. Joints that other bones begin at are no twist joints: they
+    /// are bones of the limb themselves.
+    fn note_twist(&mut self, driven: &[usize]) {
+        let set: HashSet<usize> = driven.iter().copied().collect();
+        let mut carries = HashSet::new();
+        for (at, joint) in self.joints.iter().enumerate().rev() {
+            if let Some(parent) = joint.parent
+                && (!set.contains(&at) || carries.contains(&at))
+            {
+                carries.insert(parent);
+            }
+        }
+        let twists: Vec<usize> = driven.iter().copied().filter(|joint| !carries.contains(joint)).collect();
+        let Some(first) = twists.first() else { return };
+        let above = |joint: usize| self.joints[joint].parent;
+        let owner = std::iter::successors(above(*first), |joint| above(*joint))
+            .find(|joint| !set.contains(joint) && self.joints[*joint].deforms);
+        let Some(owner) = owner else { return };
+        let Some(end) = self.bone_end(owner, &twists) else { return };
+        for joint in twists {
+            self.joints[joint].twist = Some(TwistSegment { joint: owner, end });
+        }
+    }
+
+    /// The end of the bone of `owner` on which twist joints lie: the joint after them on the same line, or the place
+    /// where the next of equally spaced joints would be. `None` if nothing gives the bone a length.
+    fn bone_end(&self, owner: usize, twists: &[usize]) -> Option<Vec3> {
+        /// The least cosine between the bone and the line of its twist joints.
+        const ALONG: f32 = 0.98;
+        let place = |joint: usize| self.joints[joint].rest.translation;
+        let start = place(owner);
+        let mut line: Vec<Vec3> = twists.iter().map(|joint| place(*joint) - start).collect();
+        line.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+        let last = *line.last()?;
+        let ends = (0..self.joints.len())
+            .filter(|joint| self.joints[*joint].parent == Some(owner) && !twists.contains(joint))
+            .map(|joint| place(joint) - start)
+            .filter(|end| end.length_squared() > 0.0);
+        let direction = last.normalize_or_zero();
+        let aligned = |end: &Vec3| end.normalize_or_zero().dot(direction);
+        let best = ends.max_by(|a, b| aligned(a).total_cmp(&aligned(b)));
+        if let Some(end) = best
+            && (direction == Vec3::ZERO || aligned(&end) > ALONG && end.length() > last.length())
+        {
+            return Some(start + end);
+        }
+        let before = line.len().checked_sub(2).map_or(Vec3::ZERO, |at| line[at]);
+        (last != before).then(|| start + last + (last - before))
+    }
+}
+
+/// Weights over other joints: `place` gives the index of each. Shares of joints that become one add up, and those of
+/// joints without a place are left out.
+pub fn replaced_joints(weights: &Weights, place: &[Option<usize>]) -> Weights {
+    if place.iter().enumerate().all(|(number, place)| *place == Some(number)) {
+        return weights.clone();
+    }
+    let mut result = Weights::default();
+    let mut row: Vec<(u32, f32)> = Vec::new();
+    for point in 0..weights.len() {
+        row.clear();
+        for (joint, value) in weights.of(point) {
+            let Some(joint) = place.get(joint as usize).copied().flatten() else { continue };
+            match row.iter_mut().find(|(other, _)| *other == joint as u32) {
+                Some((_, sum)) => *sum += value,
+                None => row.push((joint as u32, value)),
+            }
+        }
+        result.push(row.iter().copied());
+    }
+    result
+}

@@ -1,0 +1,367 @@
+//! Reading projects, strictly and with places.
+
+use std::{
+    borrow::Cow,
+    collections::{HashMap, HashSet},
+};
+
+use bevy::math::{Quat, Vec3};
+use serde::{Deserialize, Deserializer, de::Error as _, de::IgnoredAny};
+
+use super::{
+    FORMAT, JournalReference, MAX_BYTES, MeshReference, Project, ProjectRig, ProjectView, ReadProject, SkinReference,
+};
+use crate::rig::{
+    AttributeValues, EditError, PoseOffset, Rig, RigEdit, SourceError, StoredPose, Uid,
+    format::scan::{self, Field},
+    format::source::{ron_options, utf8},
+    format::version::Format,
+    template,
+};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ProjectFile {
+    #[serde(rename = "format")]
+    _format: u32,
+    name: String,
+    #[serde(default)]
+    meshes: Vec<MeshReference>,
+    #[serde(default)]
+    rigs: Vec<RigFile>,
+    #[serde(default)]
+    view: ProjectView,
+    #[serde(default)]
+    journal: Option<JournalReference>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RigFile {
+    /// Read as a template, from the text.
+    #[serde(rename = "rig")]
+    _rig: IgnoredAny,
+    #[serde(default)]
+    skins: Vec<SkinReference>,
+    #[serde(default)]
+    pose: Vec<OffsetFile>,
+    #[serde(default)]
+    values: Vec<ValueFile>,
+    #[serde(default)]
+    poses: Vec<PoseFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PoseFile {
+    uid: Uid,
+    name: String,
+    #[serde(default)]
+    offsets: Vec<OffsetFile>,
+    #[serde(default)]
+    values: Vec<ValueFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ValueFile {
+    node: Uid,
+    name: String,
+    value: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OffsetFile {
+    joint: Uid,
+    #[serde(default)]
+    translation: (f32, f32, f32),
+    #[serde(default = "no_rotation")]
+    rotation: (f32, f32, f32, f32),
+    #[serde(default = "no_scale")]
+    scale: (f32, f32, f32),
+}
+
+impl OffsetFile {
+    fn offset(&self) -> PoseOffset {
+        let (x, y, z, w) = self.rotation;
+        PoseOffset {
+            translation: <[f32; 3]>::from(self.translation).into(),
+            rotation: Quat::from_xyzw(x, y, z, w),
+            scale: <[f32; 3]>::from(self.scale).into(),
+        }
+    }
+}
+
+fn no_rotation() -> (f32, f32, f32, f32) {
+    (0.0, 0.0, 0.0, 1.0)
+}
+
+fn no_scale() -> (f32, f32, f32) {
+    (1.0, 1.0, 1.0)
+}
+
+pub(super) fn vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {
+    let (x, y, z) = Deserialize::deserialize(deserializer)?;
+    Ok(Vec3::new(x, y, z))
+}
+
+pub(super) fn mesh_hash<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u128, D::Error> {
+    let text = Cow::<'de, str>::deserialize(deserializer)?;
+    let number = is_hexadecimal(&text, 32).then(|| u128::from_str_radix(&text, 16).ok()).flatten();
+    number.ok_or_else(|| D::Error::custom(format!("\"{text}\" is no hash of a mesh: it has 32 hexadecimal digits")))
+}
+
+pub(super) fn content_hash<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+    let text = Cow::<'de, str>::deserialize(deserializer)?;
+    let number = is_hexadecimal(&text, 16).then(|| u64::from_str_radix(&text, 16).ok()).flatten();
+    number.ok_or_else(|| D::Error::custom(format!("\"{text}\" is no hash of a file: it has 16 hexadecimal digits")))
+}
+
+fn is_hexadecimal(text: &str, digits: usize) -> bool {
+    text.len() == digits && text.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+const PROJECT: Format = Format { what: "project", number: FORMAT, known: known_names };
+
+/// Reads a project. Nothing is returned unless all of it is right, but for the view, which is no reason to refuse one.
+pub fn read_project(bytes: &[u8]) -> Result<ReadProject, SourceError> {
+    let text = utf8(bytes, MAX_BYTES, "project")?;
+    let fields = scan::fields(text);
+    let mut notes = Vec::new();
+    let known = PROJECT.readable(text, &fields, 1, &mut notes)?;
+    let file: ProjectFile = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
+    let places = Places::new(text, &fields);
+    let ProjectFile { name, meshes, rigs, mut view, journal, .. } = file;
+    let rigs = read_rigs(&places, rigs, &meshes, &mut notes)?;
+    check_meshes(&places, &meshes, &rigs)?;
+    if view.camera.is_some_and(|camera| !camera.is_finite()) {
+        view.camera = None;
+        notes.push("the view's camera is not finite; the whole character is shown instead".to_owned());
+    }
+    Ok(ReadProject { project: Project { name, meshes, rigs, view, journal }, notes })
+}
+
+fn check_meshes(places: &Places, meshes: &[MeshReference], rigs: &[ProjectRig]) -> Result<(), SourceError> {
+    let mut seen = HashSet::new();
+    let known: HashSet<Uid> = rigs.iter().map(|rig| rig.rig.uid()).collect();
+    for (mesh, element) in meshes.iter().zip(places.elements(places.top("meshes"))) {
+        if !seen.insert(mesh.uid) {
+            let message = format!("mesh {} is listed twice; give the second a uid of its own", mesh.uid);
+            return Err(places.error(element, "uid", message));
+        }
+        if !known.contains(&mesh.rig) {
+            let message = format!("the mesh belongs to the rig {}, which is not in the file; correct it", mesh.rig);
+            return Err(places.error(element, "rig", message));
+        }
+    }
+    Ok(())
+}
+
+fn read_rigs(
+    places: &Places,
+    files: Vec<RigFile>,
+    meshes: &[MeshReference],
+    notes: &mut Vec<String>,
+) -> Result<Vec<ProjectRig>, SourceError> {
+    let known: HashSet<Uid> = meshes.iter().map(|mesh| mesh.uid).collect();
+    let mut rigs: Vec<ProjectRig> = Vec::with_capacity(files.len());
+    let mut seen = HashSet::new();
+    let mut templates = Templates { text: places.text, line: 1, counted: 0 };
+    for (file, element) in files.into_iter().zip(places.elements(places.top("rigs"))) {
+        let field = places.within(element, "rig").map(|field| &places.fields[field]);
+        let mut rig = templates.read(field, notes)?;
+        if !seen.insert(rig.uid()) {
+            let message = format!("rig {} is in the project twice; give the second a uid of its own", rig.uid());
+            return Err(places.error(element, "rig", message));
+        }
+        let mut skinned = HashSet::new();
+        for (skin, place) in file.skins.iter().zip(places.elements(places.within(element, "skins"))) {
+            if !known.contains(&skin.mesh) {
+                let message = format!("the weights are of the mesh {}, which is not in the file; add it", skin.mesh);
+                return Err(places.error(place, "mesh", message));
+            }
+            if !skinned.insert(skin.mesh) {
+                let message = format!("mesh {} has weights twice; keep one of the two", skin.mesh);
+                return Err(places.error(place, "mesh", message));
+            }
+        }
+        read_pose(places, element, &mut rig, &file.pose)?;
+        let values = places.within(element, "values");
+        for (node, values) in read_values(places, values, &file.values)? {
+            for (name, value) in values {
+                let edit = RigEdit::SetAttributeValue(node, name, Some(value));
+                rig.apply(&edit).map_err(|error| places.error(element, "values", error.to_string()))?;
+            }
+        }
+        read_stored_poses(places, element, &mut rig, &file.poses)?;
+        rigs.push(ProjectRig { rig, skins: file.skins });
+    }
+    Ok(rigs)
+}
+
+fn read_pose(
+    places: &Places,
+    element: Option<usize>,
+    rig: &mut Rig,
+    offsets: &[OffsetFile],
+) -> Result<(), SourceError> {
+    let mut seen = HashSet::new();
+    for (offset, place) in offsets.iter().zip(places.elements(places.within(element, "pose"))) {
+        if !seen.insert(offset.joint) {
+            return Err(places.error(place, "joint", twice(offset.joint)));
+        }
+        let edit = RigEdit::SetOffset(offset.joint, Some(offset.offset()));
+        rig.apply(&edit).map_err(|error| places.error(place, named(&error), error.to_string()))?;
+    }
+    Ok(())
+}
+
+fn read_stored_poses(
+    places: &Places,
+    element: Option<usize>,
+    rig: &mut Rig,
+    poses: &[PoseFile],
+) -> Result<(), SourceError> {
+    for (pose, place) in poses.iter().zip(places.elements(places.within(element, "poses"))) {
+        let mut stored = StoredPose { uid: pose.uid, name: pose.name.clone(), ..Default::default() };
+        for (offset, at) in pose.offsets.iter().zip(places.elements(places.within(place, "offsets"))) {
+            if !offset.offset().is_valid() {
+                let error = EditError::BadTransform(offset.joint);
+                return Err(places.error(at, named(&error), error.to_string()));
+            }
+            if stored.offsets.insert(offset.joint, offset.offset()).is_some() {
+                return Err(places.error(at, "joint", twice(offset.joint)));
+            }
+        }
+        stored.values = read_values(places, places.within(place, "values"), &pose.values)?;
+        let edit = RigEdit::AddStoredPose(Box::new(stored), usize::MAX);
+        rig.apply(&edit).map_err(|error| places.error(place, "uid", error.to_string()))?;
+    }
+    Ok(())
+}
+
+fn read_values(places: &Places, list: Option<usize>, files: &[ValueFile]) -> Result<AttributeValues, SourceError> {
+    let mut values = AttributeValues::new();
+    for (file, at) in files.iter().zip(places.elements(list)) {
+        if !file.value.is_finite() {
+            let error = EditError::BadValue(file.node, file.name.clone());
+            return Err(places.error(at, "value", error.to_string()));
+        }
+        if values.entry(file.node).or_default().insert(file.name.clone(), file.value).is_some() {
+            let message = format!("attribute \"{}\" of {} has two values; keep one of them", file.name, file.node);
+            return Err(places.error(at, "name", message));
+        }
+    }
+    Ok(values)
+}
+
+fn twice(joint: Uid) -> String {
+    format!("joint {joint} is in the pose twice; keep one of the two")
+}
+
+/// The field that an edit's error is about.
+fn named(error: &EditError) -> &'static str {
+    if matches!(error, EditError::BadTransform(_)) { "rotation" } else { "joint" }
+}
+
+/// The names that a field may have where it stands; `None` where anything may stand, and in rigs, which are templates.
+fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
+    let above = |field: &Field| field.parent.map(|parent| &fields[parent]);
+    let mut path = [""; 3];
+    let mut parents = std::iter::successors(above(field), |field| above(field));
+    for (name, parent) in path.iter_mut().zip(&mut parents) {
+        *name = parent.name;
+    }
+    if parents.next().is_some() {
+        return None;
+    }
+    const OFFSET: &[&str] = &["joint", "translation", "rotation", "scale"];
+    match (field.depth, path) {
+        (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "view", "journal"]),
+        (3, ["meshes", "", ""]) => Some(&["uid", "rig", "path", "hash", "nodes"]),
+        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses"]),
+        (5, ["skins", "rigs", ""]) => Some(&["mesh", "path", "hash", "at_rest"]),
+        (5, ["pose", "rigs", ""]) => Some(OFFSET),
+        (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets", "values"]),
+        (7, ["offsets", "poses", "rigs"]) => Some(OFFSET),
+        (5, ["values", "rigs", ""]) | (7, ["values", "poses", "rigs"]) => Some(&["node", "name", "value"]),
+        (2, ["view", "", ""]) => Some(&["camera", "mode", "shading", "switches"]),
+        (3, ["camera", "view", ""]) => Some(&["yaw", "pitch", "distance", "focus", "orthographic"]),
+        (2, ["journal", "", ""]) => Some(&["file", "last"]),
+        _ => None,
+    }
+}
+
+/// Finds the places where things are declared. Structs are known by their bracket.
+struct Places<'a> {
+    text: &'a str,
+    fields: &'a [Field<'a>],
+    /// The fields of each struct.
+    structs: HashMap<usize, Vec<usize>>,
+    /// The structs of each list, by the field whose value the list is.
+    lists: HashMap<usize, Vec<usize>>,
+}
+
+impl<'a> Places<'a> {
+    fn new(text: &'a str, fields: &'a [Field<'a>]) -> Self {
+        let mut structs: HashMap<usize, Vec<usize>> = HashMap::new();
+        let mut lists: HashMap<usize, Vec<usize>> = HashMap::new();
+        for (number, field) in fields.iter().enumerate() {
+            structs.entry(field.bracket).or_default().push(number);
+            if let Some(list) = field.parent.filter(|parent| fields[*parent].depth + 2 == field.depth) {
+                let brackets = lists.entry(list).or_default();
+                if brackets.last() != Some(&field.bracket) {
+                    brackets.push(field.bracket);
+                }
+            }
+        }
+        Self { text, fields, structs, lists }
+    }
+
+    /// The field of the outermost struct with that name.
+    fn top(&self, name: &str) -> Option<usize> {
+        self.within(self.fields.iter().find(|field| field.depth == 1).map(|field| field.bracket), name)
+    }
+
+    /// The field with that name in a struct.
+    fn within(&self, bracket: Option<usize>, name: &str) -> Option<usize> {
+        self.structs.get(&bracket?)?.iter().copied().find(|field| self.fields[*field].name == name)
+    }
+
+    /// The structs in the list that is a field's value, then `None` for ever.
+    fn elements(&self, list: Option<usize>) -> impl Iterator<Item = Option<usize>> {
+        let brackets = list.and_then(|list| self.lists.get(&list)).map_or(&[] as &[usize], Vec::as_slice);
+        brackets.iter().copied().map(Some).chain(std::iter::repeat(None))
+    }
+
+    /// An error at a field of a struct, or at the struct.
+    fn error(&self, bracket: Option<usize>, name: &str, message: String) -> SourceError {
+        let first = || self.structs.get(&bracket?)?.first().copied();
+        let field = self.within(bracket, name).or_else(first);
+        SourceError::at(self.text, field.map_or(0, |field| self.fields[field].start), message)
+    }
+}
+
+/// Reads the templates that stand in a text, in its order.
+struct Templates<'a> {
+    text: &'a str,
+    line: usize,
+    counted: usize,
+}
+
+impl Templates<'_> {
+    /// The rig that is the value of a field.
+    fn read(&mut self, field: Option<&Field>, notes: &mut Vec<String>) -> Result<Rig, SourceError> {
+        let Some(field) = field.filter(|field| field.value >= self.counted) else {
+            return Err(SourceError::at(self.text, 0, "a rig of the project cannot be found in it; take a backup"));
+        };
+        self.line += self.text[self.counted..field.value].matches('\n').count();
+        self.counted = field.value;
+        let text = &self.text[field.value..field.end];
+        let template = template::read_text(text.strip_suffix(',').unwrap_or(text), self.line)
+            .map_err(|error| SourceError::at(self.text, field.value + error.offset, error.message))?;
+        notes.extend(template.notes);
+        Ok(template.rig)
+    }
+}

@@ -1,0 +1,158 @@
+//! Writing projects.
+
+use std::fmt::Write;
+
+use bevy::math::{Quat, Vec3};
+
+use super::{FORMAT, Project, ProjectRig, ProjectView};
+use crate::rig::{
+    AttributeValues, PoseOffset, Rig, Uid,
+    format::scan,
+    template::{quoted, vector, write_template},
+};
+
+/// The text of a project. The same project gives the same bytes.
+pub fn write_project(project: &Project) -> String {
+    let mut out = String::new();
+    write_into(&mut out, project).unwrap_or_default();
+    out
+}
+
+fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
+    let format = if project.rigs.iter().any(|entry| needs_values(&entry.rig)) { FORMAT } else { 1 };
+    writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
+    writeln!(out, "    meshes: [")?;
+    for mesh in &project.meshes {
+        writeln!(out, "        (\n            uid: \"{}\",\n            rig: \"{}\",", mesh.uid, mesh.rig)?;
+        writeln!(out, "            path: {},\n            hash: \"{:032x}\",", quoted(&mesh.path), mesh.hash)?;
+        if !mesh.nodes.is_empty() {
+            writeln!(out, "            nodes: [")?;
+            for node in &mesh.nodes {
+                writeln!(out, "                \"{node}\",")?;
+            }
+            writeln!(out, "            ],")?;
+        }
+        writeln!(out, "        ),")?;
+    }
+    writeln!(out, "    ],\n    rigs: [")?;
+    for rig in &project.rigs {
+        write_rig(out, rig)?;
+    }
+    writeln!(out, "    ],")?;
+    write_view(out, &project.view)?;
+    if let Some(journal) = &project.journal {
+        writeln!(out, "    journal: (file: {}, last: {}),", quoted(&journal.file), journal.last)?;
+    }
+    writeln!(out, ")")
+}
+
+fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
+    write!(out, "        (\n            rig: ")?;
+    write_indented(out, &write_template(&entry.rig), "            ");
+    writeln!(out, ",\n            skins: [")?;
+    for skin in &entry.skins {
+        writeln!(
+            out,
+            "                (mesh: \"{}\", path: {}, hash: \"{:016x}\", at_rest: {}),",
+            skin.mesh,
+            quoted(&skin.path),
+            skin.hash,
+            skin.at_rest
+        )?;
+    }
+    writeln!(out, "            ],\n            pose: [")?;
+    write_offsets(out, entry.rig.pose(), "                ")?;
+    writeln!(out, "            ],")?;
+    write_values(out, entry.rig.attribute_values(), "            ")?;
+    writeln!(out, "            poses: [")?;
+    for pose in entry.rig.stored_poses() {
+        writeln!(out, "                (\n                    uid: \"{}\",", pose.uid)?;
+        writeln!(out, "                    name: {},\n                    offsets: [", quoted(&pose.name))?;
+        write_offsets(out, &pose.offsets, "                        ")?;
+        writeln!(out, "                    ],")?;
+        write_values(out, &pose.values, "                    ")?;
+        writeln!(out, "                ),")?;
+    }
+    writeln!(out, "            ],\n        ),")
+}
+
+/// True if the rig's poses say something that format 1 has no place for.
+fn needs_values(rig: &Rig) -> bool {
+    !rig.attribute_values().is_empty()
+        || rig.stored_poses().iter().any(|pose| !pose.values.is_empty())
+        || rig.pose().keys().any(|node| rig.joint(*node).is_none())
+}
+
+/// A list of values, if there are any.
+fn write_values(out: &mut String, values: &AttributeValues, indent: &str) -> std::fmt::Result {
+    if values.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "{indent}values: [")?;
+    for (node, values) in values {
+        for (name, value) in values {
+            writeln!(out, "{indent}    (node: \"{node}\", name: {}, value: {value:?}),", quoted(name))?;
+        }
+    }
+    writeln!(out, "{indent}],")
+}
+
+/// The text of a template further to the right. What stands in parameters of modules stays as it is: a line break
+/// there may be part of a text.
+fn write_indented(out: &mut String, text: &str, indent: &str) {
+    let text = text.trim_end();
+    let fields = scan::fields(text);
+    let mut fixed = fields.iter().filter(|field| field.name == "params").map(|field| field.value..field.end).peekable();
+    let mut at = 0;
+    for line in text.split_inclusive('\n') {
+        while fixed.next_if(|range| range.end <= at).is_some() {}
+        if at > 0 && fixed.peek().is_none_or(|range| range.start >= at) {
+            out.push_str(indent);
+        }
+        out.push_str(line);
+        at += line.len();
+    }
+}
+
+fn write_offsets<'a>(
+    out: &mut String,
+    offsets: impl IntoIterator<Item = (&'a Uid, &'a PoseOffset)>,
+    indent: &str,
+) -> std::fmt::Result {
+    for (joint, offset) in offsets {
+        write!(out, "{indent}(joint: \"{joint}\"")?;
+        if offset.translation != Vec3::ZERO {
+            write!(out, ", translation: {}", vector(offset.translation))?;
+        }
+        if offset.rotation != Quat::IDENTITY {
+            let [x, y, z, w] = offset.rotation.to_array();
+            write!(out, ", rotation: ({x:?}, {y:?}, {z:?}, {w:?})")?;
+        }
+        if offset.scale != Vec3::ONE {
+            write!(out, ", scale: {}", vector(offset.scale))?;
+        }
+        writeln!(out, "),")?;
+    }
+    Ok(())
+}
+
+fn write_view(out: &mut String, view: &ProjectView) -> std::fmt::Result {
+    writeln!(out, "    view: (")?;
+    if let Some(camera) = view.camera.filter(|camera| camera.is_finite()) {
+        writeln!(
+            out,
+            "        camera: (yaw: {:?}, pitch: {:?}, distance: {:?}, focus: {}, orthographic: {}),",
+            camera.yaw,
+            camera.pitch,
+            camera.distance,
+            vector(camera.focus),
+            camera.orthographic
+        )?;
+    }
+    writeln!(out, "        mode: {},\n        shading: {},", quoted(&view.mode), quoted(&view.shading))?;
+    writeln!(out, "        switches: {{")?;
+    for (name, on) in &view.switches {
+        writeln!(out, "            {}: {on},", quoted(name))?;
+    }
+    writeln!(out, "        }},\n    ),")
+}

@@ -1,0 +1,212 @@
+//! Where things stand in a RON text, whatever they mean.
+//!
+//! The RON reader says what is wrong with a text but not where each value came from. One pass over the text finds every
+//! `name: value` pair, so that errors name the line of a value that only makes no sense together with others.
+
+/// A `name: value` pair of a RON text.
+pub(crate) struct Field<'a> {
+    /// The name.
+    pub name: &'a str,
+    /// How many brackets are open around it.
+    pub depth: usize,
+    /// Which bracket it stands in; fields of one struct have the same.
+    pub bracket: usize,
+    /// The index of the field whose value it stands in.
+    pub parent: Option<usize>,
+    /// Where the name starts, in bytes.
+    pub start: usize,
+    /// Where the value starts.
+    pub value: usize,
+    /// Where the value ends, with the comma after it, if any; the end of the text if it is cut short.
+    pub end: usize,
+}
+
+struct Open {
+    bracket: usize,
+    owner: Option<usize>,
+    current: Option<usize>,
+}
+
+/// All fields of a text in the order of their names. Time is linear, and no depth of nesting is too deep.
+pub(crate) fn fields(text: &str) -> Vec<Field<'_>> {
+    let mut fields: Vec<Field> = Vec::new();
+    let mut outer: Vec<Open> = Vec::new();
+    let mut here = Open { bracket: 0, owner: None, current: None };
+    let mut brackets = 0;
+    let mut before: Option<Token> = None;
+    for token in tokens(text) {
+        match token.text {
+            "(" | "[" | "{" => {
+                brackets += 1;
+                let owner = here.current.or(here.owner);
+                outer.push(std::mem::replace(&mut here, Open { bracket: brackets, owner, current: None }));
+            }
+            ")" | "]" | "}" => {
+                if let Some(open) = outer.pop() {
+                    let closed = std::mem::replace(&mut here, open);
+                    end_at(&mut fields, closed.current, token.start);
+                }
+            }
+            "," => end_at(&mut fields, here.current.take(), token.start + 1),
+            ":" if here.current.is_none() => {
+                if let Some(name) = before.as_ref().filter(|name| name.is_word()) {
+                    here.current = Some(fields.len());
+                    fields.push(Field {
+                        name: name.text,
+                        depth: outer.len(),
+                        bracket: here.bracket,
+                        parent: here.owner,
+                        start: name.start,
+                        value: token.start + 1,
+                        end: text.len(),
+                    });
+                }
+            }
+            _ => {}
+        }
+        before = Some(token);
+    }
+    fields
+}
+
+fn end_at(fields: &mut [Field], field: Option<usize>, end: usize) {
+    if let Some(field) = field.and_then(|field| fields.get_mut(field)) {
+        field.end = end;
+    }
+}
+
+/// Where the elements of the outermost list start, in bytes.
+pub(crate) fn elements(text: &str) -> Vec<usize> {
+    let mut starts = Vec::new();
+    let (mut depth, mut expected) = (0_usize, false);
+    for token in tokens(text) {
+        match token.text {
+            ")" | "]" | "}" => depth = depth.saturating_sub(1),
+            "," if depth == 1 => expected = true,
+            opening => {
+                if expected && depth == 1 {
+                    starts.push(token.start);
+                    expected = false;
+                }
+                if matches!(opening, "(" | "[" | "{") {
+                    depth += 1;
+                    expected |= depth == 1;
+                }
+            }
+        }
+    }
+    starts
+}
+
+pub(in crate::rig) struct Token<'a> {
+    pub text: &'a str,
+    pub start: usize,
+}
+
+impl Token<'_> {
+    fn is_word(&self) -> bool {
+        self.text.starts_with(|c: char| c.is_alphabetic() || c == '_')
+    }
+}
+
+/// Strings, characters, words and single punctuation marks; comments are passed over.
+pub(in crate::rig) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
+    let bytes = text.as_bytes();
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        loop {
+            let mut start = at;
+            if let Some(blank) = text[at..].chars().next().filter(|c| is_blank(*c)) {
+                at += blank.len_utf8();
+                continue;
+            }
+            match *bytes.get(at)? {
+                b'/' if bytes.get(at + 1) == Some(&b'/') => {
+                    at = text[at..].find('\n').map_or(text.len(), |n| at + n);
+                    continue;
+                }
+                b'/' if bytes.get(at + 1) == Some(&b'*') => {
+                    at = comment_end(bytes, at + 2);
+                    continue;
+                }
+                b'"' => at = quote_end(bytes, at + 1, b'"'),
+                b'\'' => at = character_end(text, at + 1),
+                c if is_word(c) => {
+                    let word = text[at..].find(|c: char| c.is_ascii() && !is_word(c as u8) || is_blank(c));
+                    at = word.map_or(text.len(), |length| at + length);
+                    if matches!(&text[start..at], "r" | "br")
+                        && let Some(end) = raw_end(bytes, at)
+                    {
+                        (start, at) = (at, end);
+                    }
+                }
+                _ => at += 1,
+            }
+            return Some(Token { text: &text[start..at], start });
+        }
+    })
+}
+
+/// What RON takes for white space.
+fn is_blank(c: char) -> bool {
+    matches!(c, ' ' | '\t'..='\r' | '\u{85}' | '\u{200E}' | '\u{200F}' | '\u{2028}' | '\u{2029}')
+}
+
+fn is_word(c: u8) -> bool {
+    c.is_ascii_alphanumeric() || c == b'_' || c >= 0x80
+}
+
+/// Comments of RON nest.
+fn comment_end(bytes: &[u8], mut at: usize) -> usize {
+    let mut depth = 1;
+    while at < bytes.len() && depth > 0 {
+        match (bytes[at], bytes.get(at + 1)) {
+            (b'*', Some(b'/')) => (depth, at) = (depth - 1, at + 2),
+            (b'/', Some(b'*')) => (depth, at) = (depth + 1, at + 2),
+            _ => at += 1,
+        }
+    }
+    while at < bytes.len() && bytes[at] & 0xC0 == 0x80 {
+        at += 1;
+    }
+    at
+}
+
+/// The end of a string whose first character is at `at`.
+fn quote_end(bytes: &[u8], mut at: usize, quote: u8) -> usize {
+    while let Some(&byte) = bytes.get(at) {
+        match byte {
+            b'\\' => at += 2,
+            byte if byte == quote => return at + 1,
+            _ => at += 1,
+        }
+    }
+    bytes.len()
+}
+
+/// The end of a character literal, or of the mark alone if it begins none.
+fn character_end(text: &str, at: usize) -> usize {
+    let bytes = text.as_bytes();
+    if bytes.get(at) == Some(&b'\\') {
+        return quote_end(bytes, at, b'\'');
+    }
+    let end = at + text[at..].chars().next().map_or(0, char::len_utf8);
+    if end > at && bytes.get(end) == Some(&b'\'') { end + 1 } else { at }
+}
+
+/// The end of a raw string whose marks start at `at`.
+fn raw_end(bytes: &[u8], at: usize) -> Option<usize> {
+    let hashes = bytes[at..].iter().take_while(|byte| **byte == b'#').count();
+    if bytes.get(at + hashes) != Some(&b'"') {
+        return None;
+    }
+    let mut end = at + hashes + 1;
+    while end < bytes.len() {
+        let closing = bytes[end] == b'"';
+        end += 1;
+        if closing && bytes[end..].iter().take(hashes).filter(|byte| **byte == b'#').count() == hashes {
+            return Some(end + hashes);
+        }
+    }
+    Some(bytes.len())
+}

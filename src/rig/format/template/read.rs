@@ -1,0 +1,411 @@
+//! Reading templates, strictly and with places.
+
+use std::collections::{HashMap, HashSet};
+
+use bevy::math::{Quat, Vec3};
+use ron::value::RawValue;
+use serde::Deserialize;
+
+use super::{FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader, write::feature_summaries};
+use crate::rig::{
+    GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError, TagData, TagKind, Uid,
+    format::scan::{self, Field},
+    format::source::{parse_ron, ron_options, utf8},
+    format::version::{Format, blanked},
+    reference::{bind_names, refresh_names},
+};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TemplateFile {
+    #[serde(rename = "format")]
+    _format: u32,
+    uid: Uid,
+    name: String,
+    #[serde(default)]
+    version: String,
+    #[serde(default)]
+    kind: String,
+    #[serde(default)]
+    author: String,
+    #[serde(default)]
+    description: String,
+    #[serde(default)]
+    preview: Option<String>,
+    #[serde(default)]
+    joint_count: Option<usize>,
+    #[serde(default)]
+    features: Vec<FeatureSummary>,
+    #[serde(default)]
+    groups: Vec<GroupFile>,
+    #[serde(default)]
+    joints: Vec<JointFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GroupFile {
+    uid: Uid,
+    name: String,
+    color: (f32, f32, f32),
+    #[serde(default = "yes")]
+    enabled: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JointFile {
+    uid: Uid,
+    #[serde(default)]
+    parent: Option<Uid>,
+    #[serde(default)]
+    label: Option<String>,
+    #[serde(default)]
+    group: Option<Uid>,
+    #[serde(default)]
+    mirror: Option<Uid>,
+    #[serde(default)]
+    kind: NodeKind,
+    #[serde(default)]
+    locked: bool,
+    translation: (f32, f32, f32),
+    #[serde(default = "no_rotation")]
+    rotation: (f32, f32, f32, f32),
+    #[serde(default = "no_scale")]
+    scale: (f32, f32, f32),
+    #[serde(default)]
+    tags: Vec<TagFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+enum TagFile {
+    Command {
+        uid: Uid,
+        #[serde(default = "yes")]
+        enabled: bool,
+        #[serde(default)]
+        comment: String,
+        module: String,
+        #[serde(default)]
+        feature: Option<Uid>,
+        params: Box<RawValue>,
+    },
+    Feature {
+        uid: Uid,
+        #[serde(default = "yes")]
+        enabled: bool,
+        #[serde(default)]
+        comment: String,
+        kind: String,
+        name: String,
+        #[serde(default)]
+        switch: String,
+    },
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn no_rotation() -> (f32, f32, f32, f32) {
+    (0.0, 0.0, 0.0, 1.0)
+}
+
+fn no_scale() -> (f32, f32, f32) {
+    (1.0, 1.0, 1.0)
+}
+
+const TEMPLATE: Format = Format { what: "template", number: FORMAT, known: known_names };
+
+/// Reads a template. Nothing is returned unless all of it is right.
+pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
+    read_text(utf8(bytes, MAX_BYTES, "template")?, 1)
+}
+
+/// Reads a template that stands in another file, where its first line has the number `first_line`.
+pub(in crate::rig) fn read_text(text: &str, first_line: usize) -> Result<Template, SourceError> {
+    let mut notes = Vec::new();
+    let fields = scan::fields(text);
+    let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
+    let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
+    let rig = build(&Places { text, fields: &fields }, file, &mut notes)?;
+    Ok(Template { rig, notes })
+}
+
+/// Reads the header alone; what follows may be missing or wrong. `bytes` may be the first part of a file.
+pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
+    };
+    let fields = scan::fields(text);
+    let is_list = |field: &&Field| field.depth == 1 && matches!(field.name, "groups" | "joints");
+    let mut passed_over = TEMPLATE.unknown(&fields);
+    passed_over.extend(fields.iter().filter(is_list));
+    passed_over.sort_unstable_by_key(|field| field.start);
+    let whole = parse_ron(&blanked(text, &passed_over));
+    let Some(first) = fields.iter().find(is_list) else { return whole };
+    // Where the lists are cut short or wrong, what stands before them is enough.
+    whole.or_else(|_| parse_ron(&format!("{})", &text[..first.start])))
+}
+
+/// The names that a field may have where it stands; `None` where anything may stand (parameters of modules).
+fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
+    let parent = field.parent.map(|parent| &fields[parent]);
+    let above = parent.and_then(|parent| parent.parent).map(|above| fields[above].name);
+    match (field.depth, parent.map(|parent| parent.name)) {
+        (1, None) => Some(&[
+            "format",
+            "uid",
+            "name",
+            "version",
+            "kind",
+            "author",
+            "description",
+            "preview",
+            "joint_count",
+            "features",
+            "groups",
+            "joints",
+        ]),
+        (3, Some("features")) => Some(&["kind", "name", "switches"]),
+        (3, Some("groups")) => Some(&["uid", "name", "color", "enabled"]),
+        (3, Some("joints")) => Some(&[
+            "uid",
+            "parent",
+            "label",
+            "group",
+            "mirror",
+            "kind",
+            "locked",
+            "translation",
+            "rotation",
+            "scale",
+            "tags",
+        ]),
+        (5, Some("tags")) if above == Some("joints") => {
+            Some(&["uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch"])
+        }
+        _ => None,
+    }
+}
+
+fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result<Rig, SourceError> {
+    let mut rig = Rig::new(file.uid, file.name.clone());
+    rig.about = RigAbout {
+        name: file.name,
+        version: file.version,
+        kind: file.kind,
+        author: file.author,
+        description: file.description,
+        preview: file.preview,
+    };
+    let mut seen = HashSet::new();
+    let mut unique = |uid: Uid| match seen.insert(uid) {
+        true => Ok(()),
+        false => Err(places.error(uid, 1, "uid", format!("uid {uid} is used twice; give the second a uid of its own"))),
+    };
+    for group in file.groups {
+        unique(group.uid)?;
+        let color: [f32; 3] = group.color.into();
+        if color.iter().any(|part| !part.is_finite()) {
+            return Err(places.error(
+                group.uid,
+                0,
+                "color",
+                "the colour is not finite; use numbers from 0 to 1".into(),
+            ));
+        }
+        rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
+    }
+    let count = file.joints.len();
+    if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count) {
+        notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
+    }
+    add_joints(&mut rig, file.joints, places, unique)?;
+    bind_references(&mut rig, notes);
+    if feature_summaries(&rig) != sorted(file.features) {
+        notes.push("the header lists other features than the tags; saving corrects it".to_owned());
+    }
+    Ok(rig)
+}
+
+/// Puts uids beside names that stand alone in references, as people write them, and current names beside uids.
+fn bind_references(rig: &mut Rig, notes: &mut Vec<String>) {
+    let mut edits = Vec::new();
+    for joint in rig.walk() {
+        for tag in &joint.data.tags {
+            let TagKind::Command { module, params, feature } = &tag.kind else { continue };
+            let (bound, bad) = bind_names(params, rig);
+            let on = joint.data.label.as_deref().unwrap_or("without a label");
+            notes.extend(bad.iter().map(|bad| format!("{module} {} on joint {on}: {bad}; it stays as it is", tag.uid)));
+            let named = refresh_names(&bound, rig);
+            if *named != **params {
+                let kind = TagKind::Command { module: module.clone(), params: named.into_owned(), feature: *feature };
+                edits.push(RigEdit::SetTag(joint.data.uid, Box::new(TagData { kind, ..tag.clone() })));
+            }
+        }
+    }
+    for edit in edits {
+        let done = rig.apply(&edit);
+        debug_assert!(done.is_ok(), "a tag of the rig was refused: {done:?}");
+    }
+}
+
+fn sorted(mut features: Vec<FeatureSummary>) -> Vec<FeatureSummary> {
+    features.iter_mut().for_each(|feature| feature.switches.sort_unstable());
+    features.sort_unstable();
+    features
+}
+
+fn add_joints(
+    rig: &mut Rig,
+    joints: Vec<JointFile>,
+    places: &Places,
+    mut unique: impl FnMut(Uid) -> Result<(), SourceError>,
+) -> Result<(), SourceError> {
+    let mut data = HashMap::with_capacity(joints.len());
+    let mut children: HashMap<Option<Uid>, Vec<Uid>> = HashMap::new();
+    let known: HashSet<Uid> = joints.iter().map(|joint| joint.uid).collect();
+    let features: HashSet<Uid> = joints.iter().flat_map(|joint| &joint.tags).filter_map(feature_uid).collect();
+    let mut order = Vec::with_capacity(joints.len());
+    for joint in joints {
+        let uid = joint.uid;
+        unique(uid)?;
+        for (what, other) in [("parent", joint.parent), ("mirror", joint.mirror)] {
+            if let Some(other) = other.filter(|other| !known.contains(other)) {
+                return Err(places.error(uid, 0, what, format!(
+                    "joint {uid} names the {what} {other}, which is not in the file; correct it or leave the field out"
+                )));
+            }
+        }
+        if let Some(group) = joint.group.filter(|group| rig.group(*group).is_none()) {
+            return Err(places.error(
+                uid,
+                0,
+                "group",
+                format!("joint {uid} is in the local group {group}, which is not in the file; add it under `groups`"),
+            ));
+        }
+        let (x, y, z, w) = joint.rotation;
+        let rest = RestTransform {
+            translation: <[f32; 3]>::from(joint.translation).into(),
+            rotation: Quat::from_xyzw(x, y, z, w),
+            scale: Vec3::from(<[f32; 3]>::from(joint.scale)),
+        };
+        if !rest.is_valid() {
+            let finite = |v: Vec3| v.is_finite();
+            let wrong = match (finite(rest.translation), finite(rest.scale)) {
+                (false, _) => "translation",
+                (true, false) => "scale",
+                (true, true) => "rotation",
+            };
+            return Err(places.error(uid, 0, wrong, format!(
+                "joint {uid} has a transform that is not finite or whose rotation is not of length 1; correct the numbers"
+            )));
+        }
+        let mut tags = Vec::with_capacity(joint.tags.len());
+        for tag in joint.tags {
+            let tag = tag_from(tag);
+            unique(tag.uid)?;
+            if let TagKind::Command { feature: Some(feature), .. } = &tag.kind
+                && !features.contains(feature)
+            {
+                return Err(places.error(
+                    tag.uid,
+                    0,
+                    "feature",
+                    format!(
+                        "tag {} is in the feature {feature}, which is not in the file; add it or leave the field out",
+                        tag.uid
+                    ),
+                ));
+            }
+            tags.push(tag);
+        }
+        order.push(uid);
+        children.entry(joint.parent).or_default().push(uid);
+        data.insert(
+            uid,
+            JointData {
+                uid,
+                label: joint.label,
+                group: joint.group,
+                kind: joint.kind,
+                rest,
+                mirror: joint.mirror,
+                locked: joint.locked,
+                tags,
+            },
+        );
+    }
+    // Parents first, whatever the order in the file.
+    let mut stack: Vec<(Option<Uid>, Uid)> = Vec::new();
+    let push = |stack: &mut Vec<_>, parent: Option<Uid>| {
+        stack.extend(children.get(&parent).into_iter().flatten().rev().map(|child| (parent, *child)));
+    };
+    push(&mut stack, None);
+    while let Some((parent, uid)) = stack.pop() {
+        let Some(joint) = data.remove(&uid) else { continue };
+        let edit = RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX };
+        rig.apply(&edit).map_err(|error| places.error(uid, 0, "uid", error.to_string()))?;
+        push(&mut stack, Some(uid));
+    }
+    match order.into_iter().find(|uid| data.contains_key(uid)) {
+        Some(uid) => Err(places.error(
+            uid,
+            0,
+            "parent",
+            format!("joint {uid} is its own ancestor; give one joint of the cycle another parent"),
+        )),
+        None => Ok(()),
+    }
+}
+
+fn feature_uid(tag: &TagFile) -> Option<Uid> {
+    match tag {
+        TagFile::Feature { uid, .. } => Some(*uid),
+        TagFile::Command { .. } => None,
+    }
+}
+
+fn tag_from(tag: TagFile) -> TagData {
+    match tag {
+        TagFile::Command { uid, enabled, comment, module, feature, params } => TagData {
+            uid,
+            enabled,
+            comment,
+            kind: TagKind::Command { module, params: params.trim().get_ron().to_owned(), feature },
+        },
+        TagFile::Feature { uid, enabled, comment, kind, name, switch } => {
+            TagData { uid, enabled, comment, kind: TagKind::Feature { kind, name, switch } }
+        }
+    }
+}
+
+/// Finds the places where things are declared.
+struct Places<'a> {
+    text: &'a str,
+    fields: &'a [Field<'a>],
+}
+
+impl Places<'_> {
+    /// An error at the field `name` of the `nth` thing that is declared with that uid (or of the first).
+    fn error(&self, uid: Uid, nth: usize, name: &str, message: String) -> SourceError {
+        let digits = uid.to_string();
+        let declares = |field: &&Field| {
+            let value = self.text[field.value..field.end].trim_start().trim_start_matches('"');
+            field.depth > 1
+                && field.name == "uid"
+                && known_names(self.fields, field).is_some()
+                && value.get(..digits.len()).is_some_and(|value| value.eq_ignore_ascii_case(&digits))
+        };
+        let declared: Vec<&Field> = self.fields.iter().filter(declares).collect();
+        let thing = declared.get(nth).or(declared.first());
+        let field = thing.and_then(|uid| self.fields.iter().find(|f| f.bracket == uid.bracket && f.name == name));
+        let at = field.or(thing.copied()).map_or(0, |field| field.start);
+        SourceError::at(self.text, at, message)
+    }
+}

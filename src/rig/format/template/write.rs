@@ -1,0 +1,186 @@
+//! Writing templates.
+
+use std::{
+    collections::{BTreeMap, HashSet},
+    fmt::Write,
+};
+
+use bevy::math::{Quat, Vec3};
+
+use super::{FORMAT, FeatureSummary};
+use crate::rig::{NodeKind, Rig, RigJoint, TagData, TagKind, Uid, reference::refresh_names};
+
+/// The text of a rig's template. The same rig gives the same bytes. References in parameters are written with the current
+/// names beside the uids.
+pub fn write_template(rig: &Rig) -> String {
+    let mut out = String::new();
+    write_into(&mut out, rig).unwrap_or_default();
+    out
+}
+
+fn write_into(out: &mut String, rig: &Rig) -> std::fmt::Result {
+    let about = rig.about();
+    writeln!(out, "(\n    format: {FORMAT},\n    uid: \"{}\",", rig.uid())?;
+    writeln!(out, "    name: {},\n    version: {},", quoted(&about.name), quoted(&about.version))?;
+    writeln!(out, "    kind: {},\n    author: {},", quoted(&about.kind), quoted(&about.author))?;
+    writeln!(out, "    description: {},", quoted(&about.description))?;
+    if let Some(preview) = &about.preview {
+        writeln!(out, "    preview: {},", quoted(preview))?;
+    }
+    writeln!(out, "    joint_count: {},", rig.len())?;
+    write_features(out, rig)?;
+    writeln!(out, "    groups: [")?;
+    for group in rig.groups() {
+        let [r, g, b] = group.color;
+        write!(out, "        (uid: \"{}\", name: {}, color: ({r:?}, {g:?}, {b:?})", group.uid, quoted(&group.name))?;
+        writeln!(out, "{}),", if group.enabled { "" } else { ", enabled: false" })?;
+    }
+    writeln!(out, "    ],\n    joints: [")?;
+    let features: HashSet<Uid> = rig.walk().flat_map(|joint| &joint.data.tags).filter_map(feature_uid).collect();
+    for joint in rig.walk() {
+        write_joint(out, rig, joint, &features)?;
+    }
+    writeln!(out, "    ],\n)")
+}
+
+fn write_features(out: &mut String, rig: &Rig) -> std::fmt::Result {
+    let features = feature_summaries(rig);
+    if features.is_empty() {
+        return writeln!(out, "    features: [],");
+    }
+    writeln!(out, "    features: [")?;
+    for feature in features {
+        let switches: Vec<String> = feature.switches.iter().map(|switch| quoted(switch)).collect();
+        let switches = switches.join(", ");
+        writeln!(
+            out,
+            "        (kind: {}, name: {}, switches: [{switches}]),",
+            quoted(&feature.kind),
+            quoted(&feature.name)
+        )?;
+    }
+    writeln!(out, "    ],")
+}
+
+/// Named features of the rig with their switches, sorted.
+pub(super) fn feature_summaries(rig: &Rig) -> Vec<FeatureSummary> {
+    let mut features: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
+    for tag in rig.walk().flat_map(|joint| &joint.data.tags) {
+        if let TagKind::Feature { kind, name, switch } = &tag.kind
+            && !name.is_empty()
+        {
+            let switches = features.entry((kind, name)).or_default();
+            if !switch.is_empty() && !switches.contains(&switch.as_str()) {
+                switches.push(switch);
+            }
+        }
+    }
+    let summary = |((kind, name), mut switches): ((&str, &str), Vec<&str>)| {
+        switches.sort_unstable();
+        FeatureSummary {
+            kind: kind.to_owned(),
+            name: name.to_owned(),
+            switches: switches.into_iter().map(str::to_owned).collect(),
+        }
+    };
+    features.into_iter().map(summary).collect()
+}
+
+fn feature_uid(tag: &TagData) -> Option<Uid> {
+    matches!(tag.kind, TagKind::Feature { .. }).then_some(tag.uid)
+}
+
+/// References to things that have been deleted are left out: they mean nothing, and readers refuse them.
+fn write_joint(out: &mut String, rig: &Rig, joint: &RigJoint, features: &HashSet<Uid>) -> std::fmt::Result {
+    let data = &joint.data;
+    write!(out, "        (\n            uid: \"{}\",", data.uid)?;
+    write_uid(out, "parent", joint.parent)?;
+    if let Some(label) = &data.label {
+        write!(out, "\n            label: {},", quoted(label))?;
+    }
+    write_uid(out, "group", data.group)?;
+    write_uid(out, "mirror", data.mirror.filter(|mirror| rig.joint(*mirror).is_some()))?;
+    if data.kind == NodeKind::Null {
+        write!(out, "\n            kind: Null,")?;
+    }
+    if data.locked {
+        write!(out, "\n            locked: true,")?;
+    }
+    let rest = &data.rest;
+    write!(out, "\n            translation: {},", vector(rest.translation))?;
+    if rest.rotation != Quat::IDENTITY {
+        let [x, y, z, w] = rest.rotation.to_array();
+        write!(out, "\n            rotation: ({x:?}, {y:?}, {z:?}, {w:?}),")?;
+    }
+    if rest.scale != Vec3::ONE {
+        write!(out, "\n            scale: {},", vector(rest.scale))?;
+    }
+    if !data.tags.is_empty() {
+        writeln!(out, "\n            tags: [")?;
+        for tag in &data.tags {
+            write_tag(out, rig, tag, features)?;
+        }
+        write!(out, "            ],")?;
+    }
+    writeln!(out, "\n        ),")
+}
+
+fn write_tag(out: &mut String, rig: &Rig, tag: &TagData, features: &HashSet<Uid>) -> std::fmt::Result {
+    let name = match tag.kind {
+        TagKind::Command { .. } => "Command",
+        TagKind::Feature { .. } => "Feature",
+    };
+    write!(out, "                {name}(\n                    uid: \"{}\",", tag.uid)?;
+    if !tag.enabled {
+        write!(out, "\n                    enabled: false,")?;
+    }
+    if !tag.comment.is_empty() {
+        write!(out, "\n                    comment: {},", quoted(&tag.comment))?;
+    }
+    match &tag.kind {
+        TagKind::Command { module, params, feature } => {
+            write!(out, "\n                    module: {},", quoted(module))?;
+            if let Some(feature) = feature.filter(|feature| features.contains(feature)) {
+                write!(out, "\n                    feature: \"{feature}\",")?;
+            }
+            write!(out, "\n                    params: {},", refresh_names(params, rig))?;
+        }
+        TagKind::Feature { kind, name, switch } => {
+            write!(out, "\n                    kind: {}, name: {},", quoted(kind), quoted(name))?;
+            if !switch.is_empty() {
+                write!(out, "\n                    switch: {},", quoted(switch))?;
+            }
+        }
+    }
+    writeln!(out, "\n                ),")
+}
+
+fn write_uid(out: &mut String, field: &str, uid: Option<Uid>) -> std::fmt::Result {
+    match uid {
+        Some(uid) => write!(out, "\n            {field}: \"{uid}\","),
+        None => Ok(()),
+    }
+}
+
+pub(in crate::rig) fn vector(v: Vec3) -> String {
+    format!("({:?}, {:?}, {:?})", v.x, v.y, v.z)
+}
+
+/// A RON string literal.
+pub(in crate::rig) fn quoted(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 2);
+    out.push('"');
+    for c in text.chars() {
+        match c {
+            '"' => out.push_str("\\\""),
+            '\\' => out.push_str("\\\\"),
+            '\n' => out.push_str("\\n"),
+            '\r' => out.push_str("\\r"),
+            '\t' => out.push_str("\\t"),
+            c if c.is_control() => out.push_str(&format!("\\u{{{:x}}}", c as u32)),
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}

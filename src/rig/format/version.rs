@@ -1,0 +1,76 @@
+//! Format numbers: a file of a newer version opens as far as it is understood, and what is not understood is named.
+
+use std::borrow::Cow;
+
+use super::{scan::Field, source::SourceError};
+
+/// The names that a field may have where it stands; `None` where anything may stand.
+pub(super) type KnownNames = fn(&[Field], &Field) -> Option<&'static [&'static str]>;
+
+/// One kind of file.
+pub(super) struct Format {
+    /// What it is called.
+    pub what: &'static str,
+    /// The number that is written.
+    pub number: u32,
+    /// Its fields.
+    pub known: KnownNames,
+}
+
+impl Format {
+    /// The text as it can be read here. In a file of a newer format, fields that are not known are blanks, so that all
+    /// places stay, and are named in `notes`; `first_line` is the number of the text's first line.
+    pub fn readable<'a>(
+        &self,
+        text: &'a str,
+        fields: &[Field],
+        first_line: usize,
+        notes: &mut Vec<String>,
+    ) -> Result<Cow<'a, str>, SourceError> {
+        let format = fields.iter().find(|field| field.depth == 1 && field.name == "format");
+        let number = format.and_then(|field| {
+            let rest = text[field.value..field.end].trim_start();
+            let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+            rest[..digits].parse::<u32>().ok()
+        });
+        let newer = match (number, format) {
+            (Some(0), Some(field)) => {
+                return Err(SourceError::at(text, field.start, "format 0 was never released; the first is format: 1"));
+            }
+            (Some(newer), _) if newer > self.number => newer,
+            _ => return Ok(Cow::Borrowed(text)),
+        };
+        notes.push(format!(
+            "the {} has format {newer}, newer than {}: update Rigsmith, or save under another name to keep what it does not know",
+            self.what, self.number
+        ));
+        let unknown = self.unknown(fields);
+        let (mut line, mut counted) = (first_line, 0);
+        for field in &unknown {
+            line += text[counted..field.start].matches('\n').count();
+            counted = field.start;
+            notes.push(format!("line {line}: the field `{}` is of a newer format and is not kept", field.name));
+        }
+        Ok(Cow::Owned(blanked(text, &unknown)))
+    }
+
+    /// The fields that are not known.
+    pub fn unknown<'f, 'a>(&self, fields: &'f [Field<'a>]) -> Vec<&'f Field<'a>> {
+        let is_unknown = |field: &&Field| (self.known)(fields, field).is_some_and(|known| !known.contains(&field.name));
+        fields.iter().filter(is_unknown).collect()
+    }
+}
+
+/// The text without these fields: blanks in their place, so that lines and columns stay.
+pub(super) fn blanked(text: &str, without: &[&Field]) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut at = 0;
+    for field in without.iter().filter(|field| field.start < field.end) {
+        let from = field.start.max(at);
+        out.push_str(&text[at..from]);
+        out.extend(text[from..field.end.max(from)].chars().map(|c| if c == '\n' { '\n' } else { ' ' }));
+        at = field.end.max(from);
+    }
+    out.push_str(&text[at..]);
+    out
+}

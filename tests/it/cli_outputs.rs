@@ -1,0 +1,158 @@
+//! What commands write over: what they were told to, and nothing else.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use rigsmith::{
+    files::{RealDisk, load_model, store_model},
+    mesh::{gltf::GltfWriteSettings, model::Image},
+};
+
+fn rigsmith(folder: &Path, args: &[&str]) -> (i32, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_rigsmith")).current_dir(folder).args(args).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let said = text(&output.stdout) + &text(&output.stderr);
+    assert!(!said.contains("panicked"), "{args:?} panicked: {said}");
+    (output.status.code().unwrap(), said)
+}
+
+const BOX: &str = "o box\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
+    f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+const RIG: &str = "rig 1\njoint 0 -1 0 -0.5 0 root\njoint 1 0 0 0.5 0 tip\n";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("b.obj", BOX), ("a.rig", RIG), ("no_mesh.gltf", r#"{"asset":{"version":"2.0"}}"#)] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files.into_iter().filter(|path| path.is_file()).map(|path| (path.clone(), fs::read(path).unwrap())).collect()
+}
+
+#[test]
+fn images_of_a_model_replace_no_photographs() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let mut model = load_model(&RealDisk, &at("b.obj")).unwrap();
+    let image = |name: &str, mime: &str, bytes: &[u8]| Image {
+        name: name.into(),
+        mime: mime.into(),
+        bytes: bytes.to_vec(),
+        ..Default::default()
+    };
+    model.material_set.images =
+        vec![image("holiday", "image/png", b"\x89PNG\r\n\x1a\n"), image("wedding", "image/jpeg", b"\xff\xd8\xff\xe0")];
+    store_model(&RealDisk, &at("album.glb"), &model, &GltfWriteSettings::default()).unwrap();
+    fs::create_dir(at("out")).unwrap();
+    let photographs = ["out/holiday.png", "out/wedding.jpg", "out/new.bin"];
+    photographs.iter().for_each(|name| fs::write(at(name), "a photograph").unwrap());
+    let (code, said) = rigsmith(folder.path(), &["convert", "album.glb", "out/new.gltf"]);
+    assert_eq!(code, 0, "{said}");
+    for name in photographs {
+        assert_eq!(fs::read_to_string(at(name)).unwrap(), "a photograph", "{name}");
+    }
+    let back = load_model(&RealDisk, &at("out/new.gltf")).unwrap();
+    assert_eq!((back.material_set.images.len(), back.notes), (2, vec![]));
+}
+
+#[test]
+fn an_input_is_no_output() {
+    let folder = folder();
+    let run = |args: &[&str]| rigsmith(folder.path(), args);
+    assert_eq!(run(&["skin", "a.rig", "b.obj", "-o", "hero.glb", "--save-weights", "hero.skin"]).0, 0);
+    fs::write(folder.path().join("strokes.ron"), "[]").unwrap();
+    #[cfg(unix)]
+    for (name, to) in
+        [("link.obj", "b.obj"), ("link.skin", "hero.skin"), ("picture.png", "b.obj"), ("link.glb", "b.obj")]
+    {
+        std::os::unix::fs::symlink(to, folder.path().join(name)).unwrap();
+    }
+    fs::create_dir(folder.path().join("sub")).unwrap();
+    let before = contents(folder.path());
+    let refused: &[&[&str]] = &[
+        // Outputs beside the main one are never an input or the main output.
+        &["skin", "a.rig", "b.obj", "-o", "c.glb", "--save-weights", "b.obj"],
+        &["skin", "a.rig", "b.obj", "-o", "c.glb", "--save-weights", "b.obj", "--in-place"],
+        &["skin", "a.rig", "b.obj", "-o", "c.skin", "--save-weights", "c.skin"],
+        &["skin", "a.rig", "b.obj", "-o", "c.skin", "--save-weights", "./sub/../C.SKIN"],
+        &["skin", "a.rig", "b.obj", "-o", "c.glb", "--weights-from", "hero.skin", "--save-weights", "hero.skin"],
+        &["skin", "a.rig", "b.obj", "-o", "hero.skin", "--weights-from", "hero.skin"],
+        &["skin", "hero.glb", "b.obj", "-o", "./hero.glb"],
+        &["convert", "b.obj", "b.obj"],
+        &["convert", "b.obj", "./sub/../b.obj"],
+        &["sketch", "hero.glb", "strokes.ron", "-o", "hero.glb"],
+        &["face", "hero.glb", "-o", "hero.glb"],
+        &["build", "hero.glb", "-o", "hero.glb"],
+        #[cfg(unix)]
+        &["skin", "a.rig", "b.obj", "-o", "c.glb", "--weights-from", "hero.skin", "--save-weights", "link.skin"],
+        #[cfg(unix)]
+        &["convert", "link.obj", "b.obj"],
+        #[cfg(unix)]
+        &["convert", "b.obj", "link.obj"],
+        #[cfg(unix)]
+        &["convert", "b.obj", "link.glb", "--in-place"],
+        #[cfg(all(unix, feature = "render"))]
+        &["render", "b.obj", "-o", "picture.png"],
+    ];
+    for args in refused {
+        let (code, said) = run(args);
+        assert_eq!(code, 2, "{args:?}: {said}");
+        assert!(["input", "other output", ".skin"].iter().any(|words| said.contains(words)), "{args:?}: {said}");
+        assert!(contents(folder.path()) == before, "{args:?} changed something");
+    }
+    // Whoever says so may.
+    for args in [&["convert", "hero.glb", "hero.glb", "--in-place"][..], &["convert", "b.obj", "b.obj", "--in-place"]] {
+        let (code, said) = run(args);
+        assert_eq!(code, 0, "{args:?}: {said}");
+    }
+    assert_eq!(load_model(&RealDisk, &folder.path().join("b.obj")).unwrap().face_count(), 6);
+}
+
+#[test]
+fn nothing_is_written_where_there_is_nothing_to_write() {
+    let folder = folder();
+    fs::write(folder.path().join("body.obj"), BOX).unwrap();
+    fs::write(folder.path().join("body.glb"), "work of days").unwrap();
+    let before = contents(folder.path());
+    for output in ["body.obj", "body.glb", "new.obj", "new.gltf"] {
+        let (code, said) = rigsmith(folder.path(), &["convert", "no_mesh.gltf", output]);
+        assert_eq!(code, 1, "{output}: {said}");
+        assert!(said.contains("mesh") && said.contains(output), "{said}");
+        assert!(contents(folder.path()) == before, "{output}");
+    }
+}
+
+#[test]
+fn a_skeleton_goes_through_glb_and_back() {
+    let folder = folder();
+    for (from, to) in [("a.rig", "a.glb"), ("a.glb", "back.rig"), ("a.rig", "a.gltf"), ("a.gltf", "again.rig")] {
+        let (code, said) = rigsmith(folder.path(), &["convert", from, to]);
+        assert_eq!(code, 0, "{from} to {to}: {said}");
+    }
+    let joints = |name: &str| {
+        let text = fs::read_to_string(folder.path().join(name)).unwrap();
+        text.lines().filter(|line| line.starts_with("joint")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(joints("a.rig"), joints("back.rig"));
+    assert_eq!(joints("a.rig"), joints("again.rig"));
+}
+
+#[test]
+fn the_demonstration_keeps_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let glb = folder.path().join("biped.glb");
+    fs::write(&glb, "somebody's biped").unwrap();
+    let (code, said) = rigsmith(folder.path(), &["--json"]);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("kept the biped.glb"), "{said}");
+    assert_eq!(fs::read_to_string(&glb).unwrap(), "somebody's biped");
+}

@@ -1,0 +1,275 @@
+//! Built = seen: entities against the program, at every step of a build, after moves by whoever makes them.
+
+use bevy::{
+    animation::{AnimatedBy, AnimationTargetId, animated_field},
+    prelude::*,
+};
+use rigsmith::{
+    plugins::{
+        commands::{Attributes, BuildStep, Built, Control},
+        runtime::RigRuntime,
+    },
+    prelude::*,
+    rig::{NodeType, PoseOffset},
+};
+
+use super::{NEAR, Stage, shipped};
+
+#[test]
+fn entities_stand_as_the_program_says_at_every_step() {
+    for (name, rig) in shipped() {
+        let mut stage = Stage::new(rig);
+        stage.step(BuildStep::RollBack);
+        let mut steps = 0;
+        loop {
+            let off = stage.off();
+            assert!(off <= NEAR, "{name} after {steps} commands: {off}");
+            stage.step(BuildStep::Forward);
+            let cursor =
+                stage.app.world().get::<rigsmith::plugins::commands::Processor>(stage.rig).unwrap().builder().cursor();
+            if cursor == steps {
+                break;
+            }
+            steps = cursor;
+        }
+        let whole = stage.app.world().get::<Built>(stage.rig).unwrap().clone();
+        assert!(steps > 0, "{name} has commands");
+        for back in (0..steps).rev() {
+            stage.step(BuildStep::Back);
+            let off = stage.off();
+            assert!(off <= NEAR, "{name} back at {back} commands: {off}");
+        }
+        stage.step(BuildStep::All);
+        assert_eq!(stage.app.world().get::<Built>(stage.rig).unwrap().0, whole.0, "{name}");
+        assert!(stage.off() <= NEAR && stage.off_from_document() <= NEAR, "{name}");
+    }
+}
+
+#[test]
+fn a_rig_that_is_spawned_and_built_stands_as_it_was_drawn() {
+    let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
+    let rests: Vec<(Uid, Vec3)> = rig.rest_globals().into_iter().map(|(uid, rest)| (uid, rest.translation)).collect();
+    let mut stage = Stage::built(rig);
+    for _ in 0..4 {
+        stage.app.update();
+    }
+    for (joint, rest) in rests {
+        let entity = stage.node(joint).unwrap();
+        let now = stage.get::<GlobalTransform>(entity).unwrap().translation();
+        assert!(now.distance(rest) < 2e-5, "{joint} jumped from {rest} to {now}");
+    }
+}
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+
+    fn signed(&mut self) -> f32 {
+        (self.next() >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+}
+
+#[test]
+fn random_moves_keep_entities_and_program_together() {
+    let rounds: usize = std::env::var("RIGSMITH_SEEDS").ok().and_then(|count| count.parse().ok()).unwrap_or(40);
+    for (number, (name, rig)) in shipped().into_iter().enumerate() {
+        let mut random = Random(number as u64 + 1);
+        let mut stage = Stage::built(rig);
+        let built = stage.app.world().get::<Built>(stage.rig).unwrap().0.clone();
+        let controls: Vec<Uid> =
+            built.nodes.iter().filter(|node| node.kind == NodeType::Control).map(|node| node.uid).collect();
+        let attributes: Vec<(Uid, String)> = (built.nodes.iter())
+            .flat_map(|node| node.attributes.iter().map(|attribute| (node.uid, attribute.name.to_string())))
+            .collect();
+        for round in 0..rounds {
+            let turn = Quat::from_euler(EulerRot::XYZ, random.signed(), random.signed(), random.signed());
+            let shift = 0.1 * Vec3::new(random.signed(), random.signed(), random.signed());
+            let what = random.below(10);
+            match what {
+                0..4 if !controls.is_empty() => {
+                    let entity = stage.node(controls[random.below(controls.len())]).unwrap();
+                    let mut transform = stage.app.world_mut().get_mut::<Transform>(entity).unwrap();
+                    transform.rotation *= turn;
+                    transform.translation += shift;
+                    stage.app.update();
+                }
+                4..6 if !controls.is_empty() => {
+                    let control = controls[random.below(controls.len())];
+                    let offset = PoseOffset { translation: shift, rotation: turn, scale: Vec3::ONE };
+                    stage.change(Change::Do(Operation::Pose(vec![(control, offset)])));
+                }
+                6 if !attributes.is_empty() => {
+                    let (node, attribute) = &attributes[random.below(attributes.len())];
+                    let entity = stage.node(*node).unwrap();
+                    let mut values = stage.app.world_mut().get_mut::<Attributes>(entity).unwrap();
+                    values.0.insert(attribute.clone(), 2.0 * random.signed());
+                    stage.app.update();
+                }
+                7 => stage.change(Change::Undo),
+                8 => stage.change(Change::Redo),
+                _ => {
+                    let mut place = stage.app.world_mut().get_mut::<Transform>(stage.rig).unwrap();
+                    place.translation += shift;
+                    place.rotation *= turn;
+                    stage.app.update();
+                }
+            }
+            let off = stage.off();
+            // Measured in shares of the size within the rig; the rig itself has walked away by then.
+            assert!(off <= 2.0 * NEAR, "{name}, round {round}, {what}: {off}");
+        }
+    }
+}
+
+fn biped() -> Stage {
+    let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
+    Stage::built(rig)
+}
+
+fn place(stage: &Stage, entity: Entity) -> Vec3 {
+    stage.get::<GlobalTransform>(entity).unwrap().translation()
+}
+
+#[test]
+fn writing_the_transform_of_a_control_drives_the_rig_in_the_same_frame() {
+    let mut stage = biped();
+    let (hand, control) = hand_and_control(&stage);
+    let before = place(&stage, hand);
+    stage.app.world_mut().get_mut::<Transform>(control).unwrap().translation += Vec3::new(0.0, 0.05, 0.05);
+    stage.app.update();
+    let moved = place(&stage, hand) - before;
+    assert!(moved.length() > 0.02, "the hand follows: {moved}");
+    let written = *stage.get::<Transform>(control).unwrap();
+    stage.app.update();
+    assert_eq!(*stage.get::<Transform>(control).unwrap(), written, "and stays");
+}
+
+/// The left wrist and the control whose movement moves it most.
+fn hand_and_control(stage: &Stage) -> (Entity, Entity) {
+    let built = &stage.app.world().get::<Built>(stage.rig).unwrap().0;
+    let labels: Vec<&str> = built.nodes.iter().filter_map(|node| node.label.as_deref()).collect();
+    assert!(labels.contains(&"hand_l"), "{labels:?}");
+    let hand = built.find_label("hand_l").unwrap().uid;
+    let wrist = stage.runtime().state().global(hand).unwrap().translation;
+    let mut best = (0.0, hand);
+    for node in built.nodes.iter().filter(|node| node.kind == NodeType::Control) {
+        let mut state = stage.runtime().state().clone();
+        let offset = PoseOffset { translation: Vec3::new(0.0, 0.01, 0.01), ..PoseOffset::IDENTITY };
+        if state.set_offset(node.uid, offset).is_err() {
+            continue;
+        }
+        state.evaluate(0.0);
+        let moved = state.global(hand).unwrap().translation.distance(wrist);
+        let is_near = state.global(node.uid).unwrap().translation.distance(wrist) < 0.1;
+        if moved > best.0 && is_near {
+            best = (moved, node.uid);
+        }
+    }
+    (stage.node(hand).unwrap(), stage.node(best.1).unwrap())
+}
+
+#[test]
+fn an_animation_drives_controls_in_the_same_frame() {
+    let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
+    let mut app = rigsmith::headless::headless_app(1);
+    app.add_plugins((bevy::asset::AssetPlugin::default(), bevy::animation::AnimationPlugin));
+    app.finish();
+    app.cleanup();
+    let rig = app.world_mut().spawn(rig).id();
+    app.update();
+    let mut stage = Stage { app, rig };
+    stage.step(BuildStep::All);
+    let (hand, control) = hand_and_control(&stage);
+    let before = place(&stage, hand);
+    let at_rest = stage.get::<Transform>(control).unwrap().translation;
+    let mut clip = AnimationClip::default();
+    let id = AnimationTargetId::from_name(&Name::new("control"));
+    let keys = [(0.0, at_rest + Vec3::new(0.0, 0.06, 0.04)), (10.0, at_rest + Vec3::new(0.0, 0.06, 0.04))];
+    clip.add_curve_to_target(
+        id,
+        AnimatableCurve::new(animated_field!(Transform::translation), AnimatableKeyframeCurve::new(keys).unwrap()),
+    );
+    let clip = stage.app.world_mut().resource_mut::<Assets<AnimationClip>>().add(clip);
+    let (graph, node) = AnimationGraph::from_clip(clip);
+    let graph = stage.app.world_mut().resource_mut::<Assets<AnimationGraph>>().add(graph);
+    let mut player = AnimationPlayer::default();
+    player.play(node).repeat();
+    let rig = stage.rig;
+    stage.app.world_mut().entity_mut(rig).insert((AnimationGraphHandle(graph), player));
+    stage.app.world_mut().entity_mut(control).insert((id, AnimatedBy(rig)));
+    for _ in 0..3 {
+        stage.app.update();
+    }
+    assert!(place(&stage, hand).distance(before) > 0.02, "the hand follows the clip");
+    assert!(stage.off() <= NEAR);
+}
+
+#[test]
+fn posing_in_the_document_and_undoing_it_reaches_the_entity_of_the_control() {
+    let mut stage = biped();
+    let (_, control) = hand_and_control(&stage);
+    let uid = *stage.get::<Uid>(control).unwrap();
+    let before = *stage.get::<Transform>(control).unwrap();
+    let offset = PoseOffset { translation: Vec3::new(0.0, 0.1, 0.0), ..PoseOffset::IDENTITY };
+    stage.change(Change::Do(Operation::Pose(vec![(uid, offset)])));
+    let posed = *stage.get::<Transform>(control).unwrap();
+    assert!(posed.translation.distance(before.translation) > 0.05);
+    // A rebuild keeps the pose, also where it replaces the program.
+    let tag = stage.document().walk().flat_map(|joint| joint.data.tags.clone()).next().unwrap();
+    let joint = stage.document().find_tag(tag.uid).unwrap().0.data.uid;
+    let mut other = tag.clone();
+    other.comment = "a remark".into();
+    stage.edit(vec![RigEdit::SetTag(joint, Box::new(other))]);
+    assert_eq!(*stage.get::<Transform>(control).unwrap(), posed);
+    let moved = rigsmith::rig::RestTransform { translation: Vec3::new(0.0, 0.02, 0.0), ..default() };
+    let root = stage.document().roots()[0];
+    let rest = stage.document().joint(root).unwrap().data.rest;
+    let rest = rigsmith::rig::RestTransform { translation: rest.translation + moved.translation, ..rest };
+    stage.edit(vec![RigEdit::SetRest(root, rest)]);
+    assert!(stage.off() <= NEAR && stage.off_from_document() <= NEAR);
+    stage.change(Change::Undo);
+    stage.change(Change::Undo);
+    stage.change(Change::Undo);
+    let back = *stage.get::<Transform>(control).unwrap();
+    assert!(back.translation.distance(before.translation) < 1e-6, "{back:?} {before:?}");
+    assert!(stage.off_from_document() <= NEAR);
+}
+
+#[test]
+fn a_build_that_executes_nothing_writes_nothing() {
+    let mut stage = biped();
+    stage.app.update();
+    stage.app.update();
+    let tick = stage.app.world().read_change_tick();
+    stage.step(BuildStep::All);
+    let world = stage.app.world();
+    let written: Vec<Entity> = world
+        .iter_entities()
+        .filter(|entity| {
+            let since = |ticks: Option<bevy::ecs::change_detection::ComponentTicks>| {
+                ticks.is_some_and(|ticks| ticks.is_changed(tick, world.read_change_tick()))
+            };
+            since(entity.get_change_ticks::<Transform>())
+                || since(entity.get_change_ticks::<GlobalTransform>())
+                || since(entity.get_change_ticks::<Built>())
+                || since(entity.get_change_ticks::<RigRuntime>())
+                || since(entity.get_change_ticks::<Control>())
+                || since(entity.get_change_ticks::<Name>())
+                || since(entity.get_change_ticks::<ChildOf>())
+        })
+        .map(|entity| entity.id())
+        .collect();
+    assert!(written.is_empty(), "{} entities were written", written.len());
+}

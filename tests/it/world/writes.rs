@@ -1,0 +1,230 @@
+//! Both ways: writing, spawning and despawning entities is editing, undoable like any other edit.
+
+use bevy::prelude::*;
+use rigsmith::{
+    plugins::{
+        commands::{BuildStep, Built, BuiltEntities},
+        document::{GroupEntities, TagEntities},
+        schema::{
+            CommandTag, Constrains, ConstraintTargets, CreatedBy, FeatureTag, GroupOf, InFeature, InGroup, Joint,
+            LocalGroup, NodeLabel, Tag, TagOf, Tags,
+        },
+    },
+    prelude::*,
+    rig::{RestTransform, TagKind, template::write_template},
+};
+
+use super::{NEAR, Stage, shipped};
+
+fn chain() -> Stage {
+    let mut stage = Stage::new(Rig::new(Uid(1000), "rig"));
+    for number in 1..=3 {
+        let joint = rigsmith::rig::JointData {
+            uid: Uid(number),
+            label: Some(format!("j{number}")),
+            rest: RestTransform::from_translation(Vec3::Y),
+            ..default()
+        };
+        let parent = (number > 1).then(|| Uid(number - 1));
+        stage.edit(vec![RigEdit::AddJoint { joint: Box::new(joint), parent, index: 0 }]);
+    }
+    stage
+}
+
+fn steps(stage: &Stage) -> usize {
+    stage.get::<rigsmith::plugins::history::RigHistory>(stage.rig).unwrap().steps().1
+}
+
+fn text(stage: &Stage) -> String {
+    write_template(stage.document())
+}
+
+#[test]
+fn writing_a_component_is_one_undoable_edit_and_an_equal_value_is_none() {
+    let mut stage = chain();
+    let before = (text(&stage), steps(&stage));
+    let joint = stage.node(Uid(2)).unwrap();
+    let group = stage
+        .app
+        .world_mut()
+        .spawn((LocalGroup { name: "arm".into(), color: [1.0, 0.0, 0.0], enabled: true }, GroupOf(stage.rig)));
+    let group = group.id();
+    stage.app.world_mut().entity_mut(joint).insert((
+        NodeLabel("elbow".into()),
+        RestTransform::from_translation(Vec3::new(0.0, 2.0, 0.0)),
+        InGroup(group),
+    ));
+    stage.app.update();
+    let data = &stage.document().joint(Uid(2)).unwrap().data;
+    assert_eq!((data.label.as_deref(), data.rest.translation.y), (Some("elbow"), 2.0));
+    assert_eq!(stage.document().group(data.group.unwrap()).unwrap().name, "arm");
+    assert_eq!(stage.get::<Name>(joint).unwrap().as_str(), "elbow");
+    assert_eq!(stage.get::<GlobalTransform>(joint).unwrap().translation().y, 3.0, "the pose follows the rest pose");
+    assert_eq!(steps(&stage), before.1 + 1, "writes of one frame are one step");
+    assert_eq!(stage.get::<GroupEntities>(stage.rig).unwrap().get(data.group.unwrap()), Some(group), "the same entity");
+
+    // Equal values, and what the mirror wrote itself.
+    stage.app.world_mut().entity_mut(joint).insert(NodeLabel("elbow".into()));
+    for _ in 0..3 {
+        stage.app.update();
+    }
+    assert_eq!(steps(&stage), before.1 + 1);
+
+    // Colour and name of the group, then everything back.
+    stage.app.world_mut().get_mut::<LocalGroup>(group).unwrap().color = [0.0, 1.0, 0.0];
+    stage.app.update();
+    assert_eq!(stage.document().groups()[0].color, [0.0, 1.0, 0.0]);
+    stage.change(Change::Undo);
+    assert_eq!(stage.get::<LocalGroup>(group).unwrap().color, [1.0, 0.0, 0.0], "undo reaches the entity");
+    stage.change(Change::Undo);
+    assert_eq!(text(&stage), before.0);
+    assert_eq!(stage.get::<NodeLabel>(joint), Some(&NodeLabel("j2".into())));
+    assert!(stage.app.world().get_entity(group).is_err());
+    stage.change(Change::Redo);
+    assert_eq!(stage.get::<NodeLabel>(joint), Some(&NodeLabel("elbow".into())));
+}
+
+#[test]
+fn spawning_and_despawning_adds_and_deletes() {
+    let mut stage = chain();
+    let before = text(&stage);
+    let parent = stage.node(Uid(3)).unwrap();
+    let world = stage.app.world_mut();
+    let upper = world.spawn((Joint, Transform::from_xyz(0.0, 0.5, 0.0), ChildOf(parent), NodeLabel("new".into()))).id();
+    let lower = world.spawn((Joint, Transform::from_xyz(0.0, 0.25, 0.0), ChildOf(upper))).id();
+    let feature = FeatureTag { kind: "generic".into(), name: "extras".into(), switch: String::new() };
+    let feature = world.spawn((feature, TagOf(upper))).id();
+    let command = CommandTag { module: "control".into(), params: "()".into() };
+    let command =
+        world.spawn((command, Tag { enabled: false, comment: "later".into() }, InFeature(feature), TagOf(upper))).id();
+    stage.app.update();
+    let uid = *stage.get::<Uid>(upper).unwrap();
+    let data = &stage.document().joint(uid).unwrap().data;
+    assert_eq!((data.label.as_deref(), data.rest.translation.y), (Some("new"), 0.5));
+    assert_eq!(data.tags.len(), 2);
+    let TagKind::Command { feature: of, .. } = &data.tags[1].kind else { panic!("{data:?}") };
+    assert_eq!((*of, data.tags[1].enabled), (Some(data.tags[0].uid), false));
+    assert_eq!(stage.get::<TagEntities>(stage.rig).unwrap().get(data.tags[1].uid), Some(command));
+    assert_eq!(stage.document().joint(*stage.get::<Uid>(lower).unwrap()).unwrap().parent, Some(uid));
+    assert_eq!(stage.document().len(), 5);
+
+    // Tag order, and another joint for a tag.
+    stage.app.world_mut().entity_mut(upper).insert_related::<TagOf>(0, &[command]);
+    stage.app.update();
+    let order = |stage: &Stage| -> Vec<Uid> {
+        stage.document().joint(uid).unwrap().data.tags.iter().map(|tag| tag.uid).collect()
+    };
+    assert_eq!(order(&stage)[0], *stage.get::<Uid>(command).unwrap());
+    stage.app.world_mut().entity_mut(command).insert(TagOf(lower));
+    stage.app.update();
+    assert_eq!(order(&stage).len(), 1);
+    assert_eq!(stage.get::<Tags>(lower).unwrap().iter().collect::<Vec<_>>(), [command]);
+
+    // A despawned subtree goes as one step, and its weights, tags and references with it.
+    let with_new = text(&stage);
+    stage.app.world_mut().entity_mut(upper).despawn();
+    stage.app.update();
+    assert_eq!(stage.document().len(), 3);
+    stage.change(Change::Undo);
+    assert_eq!(text(&stage), with_new);
+    assert!(stage.node(uid).is_some_and(|entity| entity != upper), "deleted entities come back as others");
+    for _ in 0..3 {
+        stage.change(Change::Undo);
+    }
+    assert_eq!(text(&stage), before);
+}
+
+#[test]
+fn reparenting_an_entity_reparents_the_joint() {
+    let mut stage = chain();
+    let (one, three) = (stage.node(Uid(1)).unwrap(), stage.node(Uid(3)).unwrap());
+    stage.app.world_mut().entity_mut(three).insert(ChildOf(one));
+    stage.app.update();
+    assert_eq!(stage.document().joint(Uid(3)).unwrap().parent, Some(Uid(1)));
+    stage.app.world_mut().entity_mut(three).remove::<ChildOf>();
+    stage.app.update();
+    assert_eq!(stage.document().joint(Uid(3)).unwrap().parent, None);
+    assert_eq!(stage.get::<ChildOf>(three).unwrap().parent(), stage.rig, "below the rig, as a root is");
+    stage.change(Change::Undo);
+    assert_eq!(stage.get::<ChildOf>(three).unwrap().parent(), one);
+
+    // Below itself, below a stranger: refused aloud, once, and put back.
+    let stranger = stage.app.world_mut().spawn(Transform::default()).id();
+    stage.app.world_mut().entity_mut(one).insert(ChildOf(stranger));
+    stage.app.world_mut().resource_mut::<Messages<EditRefused>>().clear();
+    let mut told = 0;
+    for _ in 0..4 {
+        stage.app.update();
+        told += stage.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().count();
+    }
+    assert_eq!(told, 1);
+    assert_eq!(stage.get::<ChildOf>(one).unwrap().parent(), stage.rig);
+}
+
+#[test]
+fn nothing_that_happens_to_entities_panics_or_leaves_a_stale_handle() {
+    let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
+    let mut stage = Stage::built(rig);
+    let tag = stage.document().walk().flat_map(|joint| joint.data.tags.iter()).next().unwrap().uid;
+    let tag_entity = stage.get::<TagEntities>(stage.rig).unwrap().get(tag).unwrap();
+    stage.app.world_mut().entity_mut(tag_entity).despawn();
+    stage.edit(vec![RigEdit::SetLabel(stage.document().roots()[0], Some("top".into()))]);
+    assert!(stage.document().find_tag(tag).is_none());
+    assert!(stage.off() <= NEAR);
+    stage.change(Change::Undo);
+    stage.change(Change::Undo);
+
+    // A created node is no edit: told, and back in the next frame, with the joints that went along.
+    let nodes: Vec<(Uid, Entity)> = stage.get::<BuiltEntities>(stage.rig).unwrap().iter().collect();
+    let joints = stage.document().len();
+    for (uid, _) in nodes.iter().step_by(37) {
+        let entity = stage.node(*uid).unwrap();
+        stage.app.world_mut().entity_mut(entity).despawn();
+        stage.app.world_mut().resource_mut::<Messages<EditRefused>>().clear();
+        stage.app.update();
+        assert!(!stage.app.world().resource::<Messages<EditRefused>>().is_empty(), "it is told");
+        assert_eq!(stage.document().len(), joints, "and no joint is deleted");
+        assert!(stage.node(*uid).is_some_and(|again| again != entity));
+        assert!(stage.off() <= NEAR);
+    }
+    // What the build wrote stays as it was built.
+    let control = stage.labelled("hand_l");
+    let label = stage.get::<NodeLabel>(control).cloned();
+    let node =
+        nodes.iter().map(|(uid, _)| stage.node(*uid).unwrap()).find(|entity| stage.get::<NodeLabel>(*entity).is_some());
+    let node = node.unwrap();
+    let known = stage.get::<NodeLabel>(node).cloned();
+    stage.app.world_mut().entity_mut(node).insert(NodeLabel("mine".into()));
+    stage.app.update();
+    stage.app.update();
+    assert_eq!((stage.get::<NodeLabel>(node).cloned(), stage.get::<NodeLabel>(control).cloned()), (known, label));
+
+    // The rig itself.
+    let rig = stage.rig;
+    stage.app.world_mut().entity_mut(rig).despawn();
+    stage.app.update();
+    assert_eq!(stage.app.world_mut().query::<&Joint>().iter(stage.app.world()).count(), 0);
+}
+
+#[test]
+fn constraints_are_entities_that_name_their_nodes() {
+    let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
+    let mut stage = Stage::built(rig);
+    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+    assert!(built.constraints.len() > 50);
+    let known = |stage: &Stage, uid: Uid| stage.get::<BuiltEntities>(stage.rig).unwrap().constraint(uid);
+    for constraint in &built.constraints {
+        let entity = known(&stage, constraint.uid).expect("a constraint has an entity");
+        let by = stage.get::<CreatedBy>(entity).unwrap().0;
+        assert_eq!(stage.get::<Uid>(by), Some(&constraint.command));
+        let targets = stage.get::<ConstraintTargets>(entity).unwrap();
+        assert!(targets.0.iter().all(|target| stage.get::<Uid>(target.node).is_some()));
+        if let Some(Constrains(node)) = stage.get::<Constrains>(entity) {
+            assert!(stage.get::<Uid>(*node).is_some());
+        }
+    }
+    stage.step(BuildStep::RollBack);
+    assert!(built.constraints.iter().all(|constraint| known(&stage, constraint.uid).is_none()));
+    stage.step(BuildStep::All);
+    assert!(built.constraints.iter().all(|constraint| known(&stage, constraint.uid).is_some()));
+}
