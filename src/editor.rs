@@ -5,6 +5,7 @@
 
 pub mod actions;
 pub mod app;
+pub mod building;
 pub mod camera;
 pub mod dock;
 pub mod files;

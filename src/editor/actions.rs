@@ -55,6 +55,14 @@ pub enum Action {
     ResetPose,
     /// Stores the pose under a name.
     StorePose,
+    /// Carries out all commands of the rig.
+    Build,
+    /// Takes back all commands of the rig.
+    RollBack,
+    /// Carries out the next command.
+    StepForward,
+    /// Takes back the last command.
+    StepBack,
     /// Switches gizmos between world, local and view axes.
     GizmoSpace,
     /// Frames the selected joints, or the whole character if none is selected.
@@ -85,6 +93,8 @@ pub enum Action {
     LocalAxes,
     /// Shows or hides the grid.
     Grid,
+    /// Shows or hides the controls of the built rig.
+    Controls,
     /// Shows or hides the list of keys.
     Help,
 }

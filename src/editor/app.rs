@@ -137,6 +137,7 @@ impl Plugin for EditorPlugin {
             LabelsPlugin,
             ReportPlugin,
             FilesPlugin,
+            super::building::BuildingPlugin,
             super::render_errors::RenderErrorsPlugin,
         ))
         .insert_resource(WinitSettings {

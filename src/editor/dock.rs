@@ -40,7 +40,7 @@ impl Default for Layout {
         let tabs = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let tree = dock.main_surface_mut();
         let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy"]));
-        let [centre, right] = tree.split_right(centre, 0.75, tabs(&["Properties", "Skinning", "Face"]));
+        let [centre, right] = tree.split_right(centre, 0.75, tabs(&["Properties", "Controls", "Skinning", "Face"]));
         let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Poses"]));
         let [_, _] = tree.split_below(centre, 0.84, tabs(&["Log"]));
         Self { dock }

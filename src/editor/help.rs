@@ -69,6 +69,10 @@ pub fn describe(action: Action) -> String {
         Action::Skin => "Skin",
         Action::ResetPose => "Reset pose",
         Action::StorePose => "Store pose",
+        Action::Build => "Build the rig",
+        Action::RollBack => "Roll the build back",
+        Action::StepForward => "Carry out the next command",
+        Action::StepBack => "Take back the last command",
         Action::GizmoSpace => "World, local or view axes",
         Action::FrameSelected => "Frame selected",
         Action::FrameAll => "Frame all",
@@ -84,6 +88,7 @@ pub fn describe(action: Action) -> String {
         Action::Labels => "Labels",
         Action::LocalAxes => "Local axes",
         Action::Grid => "Grid",
+        Action::Controls => "Controls",
         Action::Help => "Keys",
     };
     text.to_owned()

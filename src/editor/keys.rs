@@ -120,6 +120,10 @@ const DEFAULTS: &[(&str, Action)] = &[
     ("B", Action::Skin),
     ("Shift+P", Action::ResetPose),
     ("Ctrl+P", Action::StorePose),
+    ("Ctrl+B", Action::Build),
+    ("Ctrl+Shift+B", Action::RollBack),
+    ("Ctrl+Right", Action::StepForward),
+    ("Ctrl+Left", Action::StepBack),
     ("V", Action::GizmoSpace),
     ("F", Action::FrameSelected),
     ("Home", Action::FrameAll),
@@ -135,6 +139,7 @@ const DEFAULTS: &[(&str, Action)] = &[
     ("L", Action::Labels),
     ("Shift+L", Action::LocalAxes),
     ("Shift+G", Action::Grid),
+    ("Shift+C", Action::Controls),
     ("F1", Action::Help),
 ];
 

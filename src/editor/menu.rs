@@ -101,6 +101,11 @@ pub(super) fn show(
             entries(
                 ui,
                 &[
+                    Some(("Build", Action::Build)),
+                    Some(("Roll back", Action::RollBack)),
+                    Some(("Next command", Action::StepForward)),
+                    Some(("Last command back", Action::StepBack)),
+                    None,
                     Some(("Skin", Action::Skin)),
                     None,
                     Some(("Reset pose", Action::ResetPose)),
@@ -128,6 +133,7 @@ pub(super) fn show(
                     Some(("Labels", Action::Labels)),
                     Some(("Local axes", Action::LocalAxes)),
                     Some(("Grid", Action::Grid)),
+                    Some(("Controls", Action::Controls)),
                 ],
             );
         });

@@ -3,6 +3,7 @@
 //! Each panel reads the active rig whenever it is drawn and keeps only state that is not part of the rig: folded
 //! entries, text being typed. Long lists draw the visible rows only.
 
+pub mod controls;
 pub mod face;
 pub mod hierarchy;
 pub mod history;
@@ -37,6 +38,7 @@ impl Plugin for PanelsPlugin {
         ))
         .add_panel(hierarchy::HierarchyPanel::default())
         .add_panel(properties::PropertiesPanel::default())
+        .add_panel(controls::ControlsPanel::default())
         .add_panel(skinning::SkinningPanel::default())
         .add_panel(face::FacePanel::default())
         .add_panel(poses::PosesPanel::default())

@@ -33,6 +33,7 @@ fn switch(
                 }
             }
             Action::LocalAxes => drawing.axes = !drawing.axes,
+            Action::Controls => drawing.controls = !drawing.controls,
             Action::Grid => drawing.grid = !drawing.grid,
             _ => {}
         }

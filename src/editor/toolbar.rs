@@ -72,6 +72,8 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
             Action::Labels,
         );
         switch(ui, drawing.is_some_and(|d| d.axes), "Axes", "The axes of the selected joints", Action::LocalAxes);
+        let controls = drawing.is_some_and(|d| d.controls);
+        switch(ui, controls, "Controls", "The controls of the built rig, in Select and Pose mode", Action::Controls);
         switch(ui, drawing.is_some_and(|d| d.grid), "Grid", "The ground", Action::Grid);
     });
 }

@@ -29,11 +29,22 @@ pub struct ControlsPlugin;
 impl Plugin for ControlsPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_message::<SwitchRequest>()
+        app.init_resource::<ControlsInUse>()
+            .add_message::<SwitchRequest>()
             .add_message::<EditRequest>()
             .add_message::<EditRefused>()
             .add_systems(Update, throw_switches.in_set(RigSystems::Gesture))
             .add_systems(PostUpdate, show_nodes.after(RigSystems::Solve));
+    }
+}
+
+/// Controls are drawn, and picked before joints, while this is true: people who draw a skeleton turn it off.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ControlsInUse(pub bool);
+
+impl Default for ControlsInUse {
+    fn default() -> Self {
+        Self(true)
     }
 }
 

@@ -35,6 +35,7 @@ impl Plugin for DrawingPlugin {
     fn build(&self, app: &mut App) {
         material::add_material(app);
         app.init_resource::<RigDrawing>()
+            .init_resource::<super::controls::ControlsInUse>()
             .init_resource::<Ghosts>()
             .init_resource::<DrawingCounts>()
             .init_resource::<systems::PictureMaterials>()

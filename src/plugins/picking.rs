@@ -14,8 +14,11 @@ use bevy::{
 
 use super::{
     RigSystems, configure_sets,
-    controls::outline::{ControlNodes, control_at},
-    document::{Hovered, JointEntities, NodeOf, Selection},
+    controls::{
+        ControlsInUse,
+        outline::{ControlNodes, control_at},
+    },
+    document::{Hovered, JointEntities, NodeOf, Selection, entities::BuiltEntities},
     schema::RigNodes,
     surface::{Answer, RigMeshes, RigSurface, answer},
 };
@@ -34,7 +37,7 @@ impl Plugin for PickingPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.init_resource::<LastClick>()
-            .init_resource::<PickControls>()
+            .init_resource::<ControlsInUse>()
             .add_message::<PickRequest>()
             .add_message::<HoverRequest>()
             .add_message::<HoverJoint>()
@@ -170,17 +173,8 @@ type PickItem<'a> = (
     Option<&'a RigSurface>,
     Option<&'a RigMeshes>,
     Option<&'a RigNodes>,
+    Option<&'a BuiltEntities>,
 );
-
-/// Whether clicks meet controls before joints: while people pose, not while they draw a skeleton.
-#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PickControls(pub bool);
-
-impl Default for PickControls {
-    fn default() -> Self {
-        Self(true)
-    }
-}
 
 /// Forgets the last click after an edit, which may change the joints under it.
 fn forget_click(changed: Query<Entity, Changed<Rig>>, mut last: ResMut<LastClick>) {
@@ -196,7 +190,7 @@ fn pick(
     mut selections: Query<&mut Selection>,
     joints: Query<&GlobalTransform>,
     controls: ControlNodes,
-    picks_controls: Res<PickControls>,
+    in_use: Res<ControlsInUse>,
     mut last: ResMut<LastClick>,
     mut picked: MessageWriter<Picked>,
 ) {
@@ -207,16 +201,19 @@ fn pick(
         let (Ok(seen), Ok(mut selection)) = (rigs.get(request.rig), selections.get_mut(request.rig)) else {
             return false;
         };
-        let (rig, entities, place, surface, meshes, nodes) = seen;
+        let (rig, entities, place, surface, meshes, nodes, created) = seen;
         if busy.contains(&request.rig) {
             return true;
         }
         let found: Vec<Uid> = match &request.what {
             Pick::None => Vec::new(),
             Pick::All => rig.walk().map(|joint| joint.data.uid).collect(),
-            Pick::Joints(joints) => joints.iter().copied().filter(|joint| rig.joint(*joint).is_some()).collect(),
+            Pick::Joints(joints) => {
+                let is_created = |node: Uid| created.is_some_and(|created| created.get(node).is_some());
+                joints.iter().copied().filter(|node| rig.joint(*node).is_some() || is_created(*node)).collect()
+            }
             Pick::Click { plane, point, reach }
-                if let Some(control) = met(&controls, &picks_controls, place, nodes, plane, *point, *reach) =>
+                if let Some(control) = met(&controls, &in_use, place, nodes, plane, *point, *reach) =>
             {
                 vec![control]
             }
@@ -251,14 +248,14 @@ fn pick(
 /// The control whose outline a click meets.
 fn met(
     controls: &ControlNodes,
-    picks_controls: &PickControls,
+    in_use: &ControlsInUse,
     place: &GlobalTransform,
     nodes: Option<&RigNodes>,
     plane: &ViewPlane,
     point: Vec2,
     reach: f32,
 ) -> Option<Uid> {
-    let visible = picks_controls.0.then(|| controls.visible(nodes, place.affine().inverse()))?;
+    let visible = in_use.0.then(|| controls.visible(nodes, place.affine().inverse()))?;
     control_at(&visible, plane, point, reach)
 }
 
@@ -286,7 +283,7 @@ fn hover(
     moved: Query<&NodeOf, Changed<GlobalTransform>>,
     joints: Query<&GlobalTransform>,
     controls: ControlNodes,
-    picks_controls: Res<PickControls>,
+    in_use: Res<ControlsInUse>,
     last: Res<LastClick>,
     mut hovered: Query<&mut Hovered>,
 ) {
@@ -314,8 +311,7 @@ fn hover(
         let joint = match spots.get(&rig) {
             None => None,
             Some(spot)
-                if let Some(control) =
-                    met(&controls, &picks_controls, seen.2, seen.5, &spot.plane, spot.point, spot.reach) =>
+                if let Some(control) = met(&controls, &in_use, seen.2, seen.5, &spot.plane, spot.point, spot.reach) =>
             {
                 Some(control)
             }

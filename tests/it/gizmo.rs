@@ -7,6 +7,7 @@ use rigsmith::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        building::BuildingPlugin,
         camera::ViewportSight,
         mode::Mode,
         pointer::{ModifierKeys, PointerAct, ViewportPointer},
@@ -19,14 +20,17 @@ use rigsmith::{
     },
     headless::headless_app,
     plugins::{
+        commands::{BuildFailure, Built},
+        controls::{ControlsInUse, outline::lines_of},
         document::{JointEntities, ShowRest},
         history::RigHistory,
         journal::RigJournal,
+        runtime::RigRuntime,
         viewport::{RigViewport, Sight},
     },
     prelude::*,
     rig::{
-        PoseOffset,
+        Matching, PoseOffset,
         operations::MirrorPlane,
         step::{Committed, StepSink},
     },
@@ -474,4 +478,78 @@ fn control_snaps_and_clicks_on_handles_pick_what_is_there() {
     bench.app.update();
     assert_eq!(bench.app.world().get::<Selection>(bench.rig).unwrap().0, [top]);
     assert_eq!(bench.steps(), steps, "a click is no drag");
+}
+
+/// The bundled biped in the window: its commands are carried out when it is opened, a click in Pose mode takes the control
+/// of the hand, and the arrow of the gizmo moves control, hand and elbow as one step.
+#[test]
+fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
+    let file = std::fs::read("assets/templates/biped.rig.ron").unwrap();
+    let rig = rigsmith::rig::template::read_template(&file).unwrap().rig;
+    for sight in sights(Transform::IDENTITY) {
+        let mut app = headless_app(1);
+        app.add_plugins((ToolsPlugin, BuildingPlugin));
+        let mut app = strict_app(app);
+        let rig = app.world_mut().spawn(rig.clone()).id();
+        app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
+        app.update();
+        app.update();
+        let mut bench = Bench { app, rig, sink: Sink::default() };
+        let world = bench.app.world();
+        let built = world.get::<Built>(rig).expect("a rig with commands is built when it is opened").0.clone();
+        assert!(world.get::<BuildFailure>(rig).is_none());
+        let wrist = built.find_label("hand_l").unwrap().uid;
+        let global = |bench: &Bench, node: Uid| {
+            bench.app.world().get::<RigRuntime>(bench.rig).unwrap().state().global(node).unwrap().translation
+        };
+        let at_wrist = global(&bench, wrist);
+        let goal = built.switches.iter().find_map(|switch| match &switch.matching {
+            Matching::IkFk { goal, .. } if global(&bench, *goal).distance(at_wrist) < 0.05 => Some(*goal),
+            _ => None,
+        });
+        let goal = goal.expect("the hand has a control of inverse kinematics");
+
+        bench.mode(Mode::Pose);
+        // Any place of the outline that no other control covers.
+        let control = built.node(goal).unwrap().control.clone().unwrap();
+        let place = bench.app.world().get::<RigRuntime>(rig).unwrap().state().global(goal).unwrap();
+        let lines = lines_of(&control, place.affine().into());
+        let mut picked = false;
+        for point in lines.iter().flatten() {
+            let at = sight.project(*point).unwrap();
+            for act in [PointerAct::Moved, PointerAct::Pressed, PointerAct::Released { dragged: false, count: 1 }] {
+                bench.pointer(at, act, ModifierKeys::default());
+            }
+            bench.app.update();
+            if bench.app.world().get::<Selection>(rig).unwrap().0 == [goal] {
+                picked = true;
+                break;
+            }
+        }
+        assert!(picked, "no click on its outline takes the control");
+        bench.app.update();
+
+        let (steps, hand, elbow) = (bench.steps(), at_wrist, built.find_label("lower_arm_l").map(|node| node.uid));
+        let elbow = elbow.map(|elbow| (elbow, global(&bench, elbow)));
+        let from = bench.grip(Handle::MoveAxis(1));
+        bench.drag(from, Vec2::new(-20.0, -30.0), ModifierKeys::default());
+        let during = global(&bench, wrist);
+        bench.release(from + Vec2::new(-20.0, -30.0));
+        bench.app.update();
+        let moved = global(&bench, wrist);
+        assert!(moved.distance(hand) > 0.02, "the hand stays at {moved}");
+        assert!(moved.distance(during) < 1e-5, "the release keeps what was shown");
+        assert!(moved.distance(global(&bench, goal)) < 1e-3, "the hand is where its control is");
+        if let Some((elbow, before)) = elbow {
+            assert!(global(&bench, elbow).distance(before) > 1e-3, "the elbow follows");
+        }
+        assert_eq!(bench.steps(), steps + 1);
+        bench.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+        bench.app.update();
+        assert!(global(&bench, wrist).distance(hand) < 1e-5);
+
+        // Drawing a skeleton, nobody takes a control by mistake.
+        bench.mode(Mode::Move);
+        assert!(!bench.app.world().resource::<ControlsInUse>().0);
+    }
 }

@@ -14,6 +14,7 @@ use rigsmith::{
         notice::Notice,
         panel::EditorPanel,
         panels::{
+            controls::ControlsPanel,
             hierarchy::{HierarchyPanel, rows::rows},
             history::HistoryPanel,
             log::{LogBook, LogPanel},
@@ -23,7 +24,12 @@ use rigsmith::{
             toasts::Toasts,
         },
     },
-    plugins::{document::Hovered, skinning::SkinningJob},
+    plugins::{
+        commands::{BuildRequest, BuildStep, Built},
+        document::Hovered,
+        runtime::RigRuntime,
+        skinning::SkinningJob,
+    },
     prelude::*,
 };
 
@@ -501,4 +507,56 @@ fn only_rows_in_view_are_drawn() {
     });
     assert_eq!(few, many, "widgets and shapes");
     assert!(few.0 > 20 && few.1 > 20, "{few:?}");
+}
+
+#[test]
+fn the_controls_panel_poses_resets_and_switches() {
+    let mut desk = Desk::new(ControlsPanel::default());
+    assert!(desk.look("The rig has no commands yet.").is_some());
+    let file = std::fs::read("assets/templates/biped.rig.ron").unwrap();
+    let rig = rigsmith::rig::template::read_template(&file).unwrap().rig;
+    let entity = desk.rig;
+    desk.app.world_mut().entity_mut(entity).insert(rig);
+    desk.app.world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });
+    desk.frames(3);
+    let built = desk.app.world().get::<Built>(entity).unwrap().0.clone();
+    let switch = built.switches.iter().find(|switch| matches!(switch.matching, rigsmith::rig::Matching::IkFk { .. }));
+    let switch = switch.unwrap();
+    let rigsmith::rig::Matching::IkFk { goal, .. } = &switch.matching else { unreachable!() };
+    let state = |desk: &Desk| desk.app.world().get::<RigRuntime>(entity).unwrap().state().clone();
+
+    // The pose of the selected control.
+    desk.app.world_mut().get_mut::<Selection>(entity).unwrap().0 = vec![*goal];
+    desk.frames(2);
+    let steps = desk.steps().0;
+    desk.click("Translation Y");
+    desk.type_text("0.125");
+    desk.key(Key::Enter);
+    desk.frames(2);
+    assert_eq!(desk.steps().0, steps + 1);
+    let slot = state(&desk).program().node(*goal).unwrap();
+    assert_eq!(state(&desk).offset_at(slot).translation, Vec3::new(0.0, 0.125, 0.0));
+    desk.click("Reset");
+    desk.frames(2);
+    assert_eq!(state(&desk).offset_at(slot).translation, Vec3::ZERO);
+
+    // A switch is thrown without a jump, and back by an undo.
+    let before = state(&desk);
+    let is_ik = before.attribute(switch.control, &switch.attribute).unwrap() >= 0.5;
+    let name = built.node(switch.control).unwrap().name.to_string();
+    assert!(desk.look(&name).is_some(), "{name}");
+    desk.click(if is_ik { "FK" } else { "IK" });
+    desk.frames(2);
+    let after = state(&desk);
+    assert_ne!(after.attribute(switch.control, &switch.attribute).unwrap() >= 0.5, is_ik);
+
+    // The build steps back and forwards.
+    let (place, all) = {
+        let processor = desk.app.world().get::<rigsmith::plugins::commands::Processor>(entity).unwrap();
+        (processor.builder().cursor(), processor.builder().len())
+    };
+    assert_eq!(place, all);
+    desk.click("◀");
+    desk.frames(2);
+    assert!(desk.look(&format!("{} of {all} commands", all - 1)).is_some());
 }

@@ -153,6 +153,14 @@ impl Numbers {
         edited
     }
 
+    /// One number beside its name.
+    pub fn number(&mut self, ui: &mut Ui, name: &str, shown: f32, look: Look) -> Option<NumberEdit> {
+        labelled(ui, name, |ui| {
+            let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+            self.field(ui, name, RichText::new(""), Shared { value: shown, mixed: false }, look, size)
+        })
+    }
+
     /// Draws one field. Escape drops the typed or dragged value.
     fn field(
         &mut self,

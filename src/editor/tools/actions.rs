@@ -15,7 +15,7 @@ use crate::{
         document::EditRequest,
         picking::{Pick, PickRequest},
     },
-    rig::operations::Operation,
+    rig::{Uid, operations::Operation},
 };
 
 /// Carries out deleting, selecting all or none, and mirroring.
@@ -37,7 +37,9 @@ pub(super) fn act_on_selection(
     for ActionRequest(action) in actions.read() {
         let Some(rig) = scene.rig() else { continue };
         let pick = |what| PickRequest { rig: rig.entity, what, add: false };
-        let selected = rig.selection.0.clone();
+        let is_joint = |node: &Uid| rig.rig.joint(*node).is_some();
+        let selected: Vec<Uid> = rig.selection.0.iter().copied().filter(is_joint).collect();
+        let count = selected.len();
         let operation = match action {
             Action::SelectAll => {
                 picks.write(pick(Pick::All));
@@ -52,11 +54,11 @@ pub(super) fn act_on_selection(
             Action::MirrorSelected => Operation::Mirror { joints: selected },
             _ => continue,
         };
-        if rig.selection.0.is_empty() {
+        if count == 0 {
             notices.write(Notice::info("No joint is selected: click one first, or drag a box around some."));
             continue;
         }
-        let what = joints(rig.selection.0.len());
+        let what = joints(count);
         notices.write(
             match action {
                 Action::MirrorSelected => Notice::done(format!("Made the other side of {what} and all below.")),

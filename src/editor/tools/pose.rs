@@ -5,10 +5,10 @@ use bevy::{
     prelude::*,
 };
 
-use super::gizmo::Delta;
-use crate::rig::{PoseOffset, RestTransform, Rig, Uid};
+use super::{gizmo::Delta, scene::EditedRig};
+use crate::rig::{PoseOffset, RestTransform, Uid};
 
-/// A joint in its pose at the start of a drag.
+/// A joint or control in its pose at the start of a drag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosedJoint {
     /// The joint.
@@ -24,9 +24,25 @@ pub struct PosedJoint {
 }
 
 impl PosedJoint {
-    /// Collects the current poses of joints. Joints that are not in the rig are left out.
-    pub fn gather(rig: &Rig, joints: &[Uid]) -> Vec<Self> {
+    /// Collects the current poses of joints and controls: those of the running program where the rig is built, else those
+    /// of the document. Nodes that are in neither, or cannot be posed, are left out.
+    pub fn gather(rig: &EditedRig, joints: &[Uid]) -> Vec<Self> {
         let posed = |&joint: &Uid| {
+            if let Some((state, slot)) = rig.built_slot(joint) {
+                let nodes = state.program().nodes();
+                let node = &nodes[slot];
+                let above = std::iter::successors(node.parent, |above| nodes[*above].parent);
+                let mut above = above.map(|above| nodes[above].uid);
+                return node.is_posable().then(|| Self {
+                    joint,
+                    rest: node.base.into(),
+                    offset: state.offset_at(slot),
+                    parent: node.parent.map_or(Affine3::IDENTITY, |parent| state.global_at(parent).affine().into()),
+                    axes: own_axes(&state.global_at(slot).affine().into()),
+                    carried: above.any(|above| joints.contains(&above)),
+                });
+            }
+            let rig = &rig.rig;
             let found = rig.joint(joint)?;
             Some(Self {
                 joint,

@@ -5,12 +5,15 @@ use bevy::{ecs::system::SystemParam, math::Affine3, prelude::*};
 use crate::{
     editor::{ActiveRig, camera::ViewportSight},
     plugins::{
+        commands::Built,
         document::{JointEntities, Selection, Symmetry},
         picking::posed_joints,
+        runtime::RigRuntime,
         surface::{RigMeshes, RigSurface},
         viewport::Sight,
     },
-    rig::{Rig, Uid},
+    rig::{BuiltNode, Rig, Uid},
+    solve::program::RigState,
 };
 
 /// Access to the active rig and its view.
@@ -30,6 +33,8 @@ type RigQuery = (
     &'static GlobalTransform,
     Option<Ref<'static, RigSurface>>,
     Has<RigMeshes>,
+    Option<Ref<'static, RigRuntime>>,
+    Option<&'static Built>,
 );
 
 /// The active rig.
@@ -50,6 +55,10 @@ pub struct EditedRig<'a> {
     pub surface: Option<Ref<'a, RigSurface>>,
     /// Marks a rig with a mesh, even if its surface is still being built.
     pub has_mesh: bool,
+    /// The running program of a built rig.
+    pub runtime: Option<Ref<'a, RigRuntime>>,
+    /// What its commands have built.
+    pub built: Option<&'a Built>,
 }
 
 impl Scene<'_, '_> {
@@ -61,8 +70,9 @@ impl Scene<'_, '_> {
     /// The active rig, if it exists.
     pub fn rig(&self) -> Option<EditedRig<'_>> {
         let entity = self.active.as_ref()?.0;
-        let (rig, selection, symmetry, entities, place, surface, has_mesh) = self.rigs.get(entity).ok()?;
-        Some(EditedRig { entity, rig, selection, symmetry, entities, place, surface, has_mesh })
+        let (rig, selection, symmetry, entities, place, surface, has_mesh, runtime, built) =
+            self.rigs.get(entity).ok()?;
+        Some(EditedRig { entity, rig, selection, symmetry, entities, place, surface, has_mesh, runtime, built })
     }
 
     /// Posed positions of a rig's joints, in the rig's space.
@@ -78,15 +88,43 @@ impl Scene<'_, '_> {
                 rig.rig.is_changed()
                     || rig.selection.is_changed()
                     || rig.symmetry.is_changed()
+                    || rig.runtime.is_some_and(|runtime| runtime.is_changed())
                     || rig.surface.is_some_and(|surface| surface.is_changed())
             })
     }
 }
 
 impl EditedRig<'_> {
-    /// A joint's name for people: its label, or the first digits of its uid.
-    pub fn name(&self, joint: Uid) -> String {
-        joint_name(&self.rig, joint)
+    /// Name of a joint or created node for people: its label, its name, or the first digits of its uid.
+    pub fn name(&self, node: Uid) -> String {
+        match self.built_node(node).filter(|_| self.rig.joint(node).is_none()) {
+            Some(created) => created.name.to_string(),
+            None => joint_name(&self.rig, node),
+        }
+    }
+
+    /// A node of the built rig.
+    pub fn built_node(&self, node: Uid) -> Option<&BuiltNode> {
+        self.built?.0.node(node)
+    }
+
+    /// The running state and the slot of a built node; `None` for a rig that is not built.
+    pub fn built_slot(&self, node: Uid) -> Option<(&RigState, usize)> {
+        let state = self.runtime.as_ref()?.state();
+        Some((state, state.program().node(node)?))
+    }
+
+    /// Transform of a joint or created node as posed, in the rig's space.
+    pub fn posed_global(&self, node: Uid) -> Affine3 {
+        match self.built_slot(node) {
+            Some((state, slot)) => state.global_at(slot).affine().into(),
+            None => self.rig.posed_global(node),
+        }
+    }
+
+    /// True for a joint of the document and for a node that commands created.
+    pub fn has_node(&self, node: Uid) -> bool {
+        self.rig.joint(node).is_some() || self.built_slot(node).is_some()
     }
 
     /// The joint on the other side; a central joint itself.

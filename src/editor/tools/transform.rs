@@ -228,7 +228,7 @@ fn press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) ->
         several => joints(several.len()),
     };
     let from = if mode == Mode::Pose {
-        Start::Pose(PosedJoint::gather(&rig.rig, &aim.joints))
+        Start::Pose(PosedJoint::gather(&rig, &aim.joints))
     } else {
         Start::Rest(aim.joints.iter().map(|joint| (*joint, rig.rig.position(*joint))).collect())
     };
@@ -315,11 +315,16 @@ fn rest_operation(places: &[(Uid, Vec3)], gizmo: &GizmoDrag, delta: &Delta, with
     }
 }
 
-/// The selected joints that a gizmo moves: with live mirroring only the active joint's side; the other side follows.
-fn one_side(rig: &EditedRig, plane: Option<&MirrorPlane>) -> Vec<Uid> {
-    let selected: Vec<Uid> = rig.selection.0.iter().copied().filter(|joint| rig.rig.joint(*joint).is_some()).collect();
+/// The selected joints that a gizmo moves, in Pose mode (`posing`) controls, too: with live mirroring only the active
+/// joint's side; the other side follows.
+fn one_side(rig: &EditedRig, posing: bool, plane: Option<&MirrorPlane>) -> Vec<Uid> {
+    let is_there = |node: &Uid| if posing { rig.has_node(*node) } else { rig.rig.joint(*node).is_some() };
+    let selected: Vec<Uid> = rig.selection.0.iter().copied().filter(is_there).collect();
     let (Some(plane), Some(active)) = (plane, rig.selection.active()) else { return selected };
-    let side = |joint: Uid| plane.distance(rig.rig.position(joint));
+    let side = |joint: Uid| match rig.rig.joint(joint) {
+        Some(_) => plane.distance(rig.rig.position(joint)),
+        None => plane.distance(rig.posed_global(joint).translation),
+    };
     let sign = if side(active) < -plane.tolerance { -1.0 } else { 1.0 };
     let is_kept = |joint: &Uid| {
         let partner = rig.rig.joint(*joint).and_then(|found| found.data.mirror);

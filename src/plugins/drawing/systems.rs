@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     plugins::{
-        controls::{NodeVisible, outline::ControlNodes},
+        controls::{ControlsInUse, NodeVisible, outline::ControlNodes},
         document::{Hovered, Joint, JointEntities, NodeOf, Selection, Symmetry},
         schema::{Control, NodeLayer, RigNodes},
         surface::{RigMesh, RigMeshes},
@@ -220,12 +220,17 @@ pub(super) fn draw_rigs(
     moved: Query<&NodeOf, (NodeRedrawn, Without<OverlayMesh>)>,
     poses: Query<(&GlobalTransform, Option<&NodeVisible>, Option<&NodeLayer>), (With<Joint>, Without<OverlayMesh>)>,
     controls: ControlNodes,
+    in_use: Res<ControlsInUse>,
     mut gallery: PictureEntities,
     mut counts: ResMut<DrawingCounts>,
 ) {
     for (entity, rig, selection, hovered, entities, place, nodes, mut drawn, mut labels) in &mut rigs {
         let sight = views.sight(place).filter(|_| settings.rig);
-        let changed = rig.is_changed() || selection.is_changed() || hovered.is_changed() || settings.is_changed();
+        let changed = rig.is_changed()
+            || selection.is_changed()
+            || hovered.is_changed()
+            || settings.is_changed()
+            || in_use.is_changed();
         let stale = changed || drawn.skeleton.is_stale(sight.as_ref());
         let posed = || moved.iter().any(|joint| joint.0 == entity);
         if !stale && !posed() {
@@ -246,7 +251,7 @@ pub(super) fn draw_rigs(
             texts = labels_of(&rig, &joints, sight, &settings);
             let written: &[(Vec2, String)] = if settings.write_labels { &texts } else { &[] };
             draw_skeleton(&joints, written, sight, &settings, &mut drawn.ink);
-            if settings.controls {
+            if settings.controls && in_use.0 {
                 let controls = controls.visible(nodes, to_rig);
                 draw_controls(&controls, &selection, &hovered, sight, &settings.theme, &mut drawn.ink);
             }

@@ -273,3 +273,84 @@ fn a_build_that_executes_nothing_writes_nothing() {
         .collect();
     assert!(written.is_empty(), "{} entities were written", written.len());
 }
+
+/// A chain of three joints whose middle one has a control: it may only move along Y by up to a tenth, and turn about Z by
+/// up to ten degrees.
+fn limited() -> (Stage, Uid) {
+    let mut stage = Stage::new(Rig::new(Uid(1000), "rig"));
+    for number in 1..=3 {
+        let joint = rigsmith::rig::JointData {
+            uid: Uid(number),
+            label: Some(format!("j{number}")),
+            rest: rigsmith::rig::RestTransform::from_translation(Vec3::Y),
+            ..default()
+        };
+        let parent = (number > 1).then(|| Uid(number - 1));
+        stage.edit(vec![RigEdit::AddJoint { joint: Box::new(joint), parent, index: 0 }]);
+    }
+    let params = "(channels: (translate: (false, true, false), rotate: (false, false, true), \
+                  scale: (false, false, false)), \
+                  limits: (translate: ((None, None), (-0.1, 0.1), (None, None)), \
+                  rotate: ((None, None), (None, None), (-10.0, 10.0))))";
+    let kind = rigsmith::rig::TagKind::Command { module: "control".into(), params: params.into(), feature: None };
+    let tag = rigsmith::rig::TagData { uid: Uid(77), enabled: true, comment: String::new(), kind };
+    stage.edit(vec![RigEdit::AddTag { joint: Uid(2), tag: Box::new(tag), index: 0 }]);
+    stage.step(BuildStep::All);
+    let built = &stage.get::<Built>(stage.rig).unwrap().0;
+    let control = built.nodes.iter().find(|node| node.kind == NodeType::Control);
+    let control = control.unwrap_or_else(|| panic!("no control in {:?}", built.nodes)).uid;
+    (stage, control)
+}
+
+#[test]
+fn channels_and_limits_hold_for_whoever_writes() {
+    let far = PoseOffset {
+        translation: Vec3::splat(5.0),
+        rotation: Quat::from_rotation_z(core::f32::consts::FRAC_PI_2),
+        scale: Vec3::splat(3.0),
+    };
+    let check = |stage: &Stage, control: Uid, who: &str| {
+        let entity = stage.node(control).unwrap();
+        let rest = *stage.get::<rigsmith::rig::RestTransform>(entity).unwrap();
+        let offset = PoseOffset::between(&rest, stage.get::<Transform>(entity).unwrap());
+        assert!(offset.translation.distance(Vec3::new(0.0, 0.1, 0.0)) < 1e-6, "{who}: {offset:?}");
+        let angle = offset.rotation.angle_between(Quat::IDENTITY).to_degrees();
+        assert!((angle - 10.0).abs() < 1e-3, "{who}: {angle}");
+        assert!(offset.scale.distance(Vec3::ONE) < 1e-6, "{who}: {offset:?}");
+        // The joint that follows the control is held, too.
+        let tip = stage.get::<GlobalTransform>(stage.node(Uid(3)).unwrap()).unwrap().translation();
+        let wanted = Vec3::new(-(10.0_f32.to_radians().sin()), 2.1 + 10.0_f32.to_radians().cos(), 0.0);
+        assert!(tip.distance(wanted) < 1e-4, "{who}: {tip}, not {wanted}");
+        assert!(stage.off() <= NEAR, "{who}");
+    };
+
+    let (mut stage, control) = limited();
+    let entity = stage.node(control).unwrap();
+    let rest = *stage.get::<rigsmith::rig::RestTransform>(entity).unwrap();
+    *stage.app.world_mut().get_mut::<Transform>(entity).unwrap() = far.on(&rest);
+    stage.app.update();
+    check(&stage, control, "code");
+
+    let (mut stage, control) = limited();
+    stage.change(Change::Do(Operation::Pose(vec![(control, far)])));
+    check(&stage, control, "an edit");
+    stage.change(Change::Undo);
+    let entity = stage.node(control).unwrap();
+    let rest = *stage.get::<rigsmith::rig::RestTransform>(entity).unwrap();
+    assert!(PoseOffset::between(&rest, stage.get::<Transform>(entity).unwrap()).translation.length() < 1e-6);
+
+    // Limits that come later hold a pose that is there already.
+    let (mut stage, control) = limited();
+    let loose = {
+        let mut tag = stage.document().find_tag(Uid(77)).unwrap().1.clone();
+        tag.kind = rigsmith::rig::TagKind::Command { module: "control".into(), params: "()".into(), feature: None };
+        tag
+    };
+    stage.edit(vec![RigEdit::SetTag(Uid(2), Box::new(loose))]);
+    let entity = stage.node(control).unwrap();
+    *stage.app.world_mut().get_mut::<Transform>(entity).unwrap() = far.on(&rest);
+    stage.app.update();
+    assert!(stage.get::<Transform>(entity).unwrap().translation.x > 4.0, "nothing holds it now");
+    stage.change(Change::Undo);
+    check(&stage, control, "limits that come back");
+}

@@ -40,11 +40,20 @@ impl GizmoTarget {
             Mode::Select | Mode::Place | Mode::Stroke | Mode::Weights => return None,
         }
         let (rig, sight) = (scene.rig()?, scene.sight()?);
-        let joints = one_side(&rig, rig.symmetry.0.as_ref());
+        let joints = one_side(&rig, mode == Mode::Pose, rig.symmetry.0.as_ref());
         let active = rig.selection.active().filter(|active| joints.contains(active)).or(joints.last().copied())?;
-        let is_root = rig.rig.joint(active).is_some_and(|joint| joint.parent.is_none());
-        parts.moves |= mode == Mode::Pose && (moves || is_root);
-        let own = if mode == Mode::Pose { rig.rig.posed_global(active) } else { rig.rig.rest_global(active) };
+        if mode == Mode::Pose {
+            let joint = rig.rig.joint(active);
+            let control = rig.built_node(active).and_then(|node| node.control.as_ref());
+            let channels = control.map(|control| control.channels);
+            let is_root = joint.is_some_and(|joint| joint.parent.is_none());
+            parts.moves = match channels {
+                Some(channels) => channels.translate.contains(&true),
+                None => moves || is_root,
+            };
+            parts.turns = channels.is_none_or(|channels| channels.rotate.contains(&true));
+        }
+        let own = if mode == Mode::Pose { rig.posed_global(active) } else { rig.rig.rest_global(active) };
         let origin = if mode == Mode::Pose || space == GizmoSpace::Local {
             own.translation
         } else {
