@@ -389,6 +389,7 @@ fn read_rig(bodies: &Path, body: &str, rig: &str) -> Skeleton {
             tail: None,
             deforms: true,
             twist: None,
+            halves: None,
         })
         .collect();
     let tails = names.iter().map(|name| vector(&bones[name]["tail"])).collect();

@@ -11,6 +11,7 @@ pub mod control;
 pub mod driven_key;
 pub mod duplicate_chain;
 pub mod expression;
+pub mod half_joint;
 pub mod ik_fk_switch;
 pub mod ik_handle;
 pub mod insert_joints;
@@ -43,6 +44,7 @@ pub fn register(modules: &mut Modules) {
     modules.add::<driven_key::DrivenKey>();
     modules.add::<duplicate_chain::DuplicateChainModule>();
     modules.add::<expression::Expression>();
+    modules.add::<half_joint::HalfJoint>();
     modules.add::<ik_fk_switch::IkFkSwitch>();
     modules.add::<ik_handle::IkHandle>();
     modules.add::<insert_joints::InsertJointsModule>();

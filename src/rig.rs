@@ -25,7 +25,7 @@ mod uid;
 
 pub use built::{
     Attribute, AttributeKind, BuiltConstraint, BuiltNode, BuiltRig, Channels, ControlData, LayerData, LayerDisplay,
-    Limits, Matching, NodeType, Origin, SwitchData,
+    Limits, Matching, NodeType, Origin, SwitchData, VISIBLE,
 };
 pub use constraint::{
     AimUp, AngleLimits, ChainSolver, Channel, Constraint, Dependency, KeyEase, Output, Scalar, Target,

@@ -18,6 +18,7 @@ mod claim;
 mod coarse;
 pub mod fill;
 mod finish;
+mod half;
 mod heat;
 pub(crate) mod laplacian;
 pub(crate) mod ldl;
@@ -48,6 +49,9 @@ pub struct WeightJoint {
     /// The bone whose twist the joint shares, for twist joints: they have no flesh of their own but take shares of
     /// the bone's, linearly between one twist joint and the next.
     pub twist: Option<TwistBone>,
+    /// Index of the joint whose bend this one takes by half, for half joints: they have no flesh of their own but take
+    /// what is shared between that joint and those above it.
+    pub halves: Option<usize>,
 }
 
 /// A bone with twist joints along it.
@@ -153,6 +157,12 @@ pub enum WeightError {
     /// A twist joint whose bone does not exist.
     #[error("twist joint {joint} names a bone that does not exist, ends nowhere or is that of another twist joint")]
     Twist {
+        /// Index of such a joint.
+        joint: usize,
+    },
+    /// A half joint without a joint whose bend it takes.
+    #[error("half joint {joint} names a joint that does not exist, or is itself a half or twist joint")]
+    Half {
         /// Index of such a joint.
         joint: usize,
     },

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule},
+    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, NodeId, RigModule},
     rig::{
-        AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
+        Attribute, AttributeKind, Constraint, KeyEase, Matching, NodeType, Output, Scalar, SwitchData, Target, VISIBLE,
         reference::{NodeRef, NodeRefs},
     },
 };
@@ -68,6 +68,8 @@ pub struct IkFkSwitch {
     pub orient_end: bool,
     /// Bend of a straight limb.
     pub prefer: Option<Vec3>,
+    /// Controls without effect are hidden.
+    pub hide: bool,
     /// Name, group and label of the nulls on the forward controls.
     pub creation: Creation,
 }
@@ -92,6 +94,7 @@ impl Default for IkFkSwitch {
             twist: Amount::Value(0.0),
             orient_end: true,
             prefer: None,
+            hide: true,
             creation: Creation::default(),
         }
     }
@@ -122,6 +125,7 @@ impl RigModule for IkFkSwitch {
             "prefer",
             "Direction in the rig's space in which a straight limb bends; as built, or to the pole, if left out.",
         ),
+        ("hide", "Controls of the kinematics that has no effect are hidden: their attribute \"visible\" is driven."),
         ("creation", "Name, group and label of the nulls that stand on the forward controls for the joints."),
     ];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.ui.ron"));
@@ -189,6 +193,9 @@ impl RigModule for IkFkSwitch {
             orient_end: self.orient_end,
             ..Ik::new(chain.clone(), goal)
         })?;
+        if self.hide {
+            self.hide_idle(scope, control, &fk, [Some(goal), pole])?;
+        }
         let switch = SwitchData {
             command: scope.command(),
             control: scope.uid(control),
@@ -206,5 +213,37 @@ impl RigModule for IkFkSwitch {
 
     fn mirror(&mut self) {
         self.prefer = self.prefer.map(|prefer| prefer * Vec3::new(-1.0, 1.0, 1.0));
+    }
+}
+
+impl IkFkSwitch {
+    /// Drives the attribute [`VISIBLE`] of both kinds of controls by the switch. Between its ends all are visible. Left out
+    /// are nodes that are no controls, the one that carries the switch, and those whose visibility is driven already.
+    fn hide_idle(
+        &self,
+        scope: &mut BuildScope<'_>,
+        control: NodeId,
+        fk: &[NodeId],
+        inverse: [Option<NodeId>; 2],
+    ) -> Result<(), ModuleError> {
+        let forward = fk.iter().map(|node| (*node, [(0.0, 1.0), (1.0, 0.0)]));
+        let inverse = inverse.into_iter().flatten().map(|node| (node, [(0.0, 0.0), (1e-3, 1.0)]));
+        let nodes: Vec<_> = forward.chain(inverse).collect();
+        for (node, keys) in nodes {
+            let is_taken = scope.attributes(node).iter().any(|known| *known.name == *VISIBLE);
+            if node == control || is_taken || scope.kind(node) != Some(NodeType::Control) {
+                continue;
+            }
+            let kind = AttributeKind::Number { min: Some(0.0), max: Some(1.0) };
+            scope.add_attribute(node, Attribute { name: VISIBLE.into(), kind, default: 1.0 })?;
+            let constraint = Constraint::DrivenKey {
+                driver: Scalar::attribute(scope.uid(control), self.attribute.as_str()),
+                keys: keys.to_vec(),
+                ease: KeyEase::Step,
+                output: Output::Attribute(scope.uid(node), VISIBLE.into()),
+            };
+            scope.constrain("visible", node, 0, constraint)?;
+        }
+        Ok(())
     }
 }

@@ -20,8 +20,7 @@ use crate::{
     solve::matching::{MatchError, match_switch},
 };
 
-/// The name of the attribute that hides a node below one half.
-pub const VISIBLE: &str = "visible";
+pub use crate::rig::VISIBLE;
 
 /// Adds visibility of nodes, and switches.
 pub struct ControlsPlugin;

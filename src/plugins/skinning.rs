@@ -125,6 +125,7 @@ impl SkinningInput {
             tail: None,
             deforms: joint.deforms,
             twist: joint.twist.map(|twist| TwistBone { joint: twist.joint, end: twist.end }),
+            halves: joint.halves,
         });
         let joints = joints.collect();
         let uids = skeleton.joints().iter().map(|joint| joint.uid).collect();

@@ -121,6 +121,9 @@ pub enum NodeType {
     Control,
 }
 
+/// Name of the attribute that hides its node, and keeps it from being picked, below one half.
+pub const VISIBLE: &str = "visible";
+
 /// Appearance of a control and its free channels.
 #[derive(bevy::reflect::Reflect, Debug, Clone, PartialEq)]
 pub struct ControlData {

@@ -26,7 +26,12 @@ pub struct DeformJoint {
     pub subject: Option<Uid>,
     /// The bone along which the joint takes shares of the twist, if it is a twist joint.
     pub twist: Option<TwistSegment>,
+    /// Index of the joint whose bend the joint takes by half, if it is a half joint.
+    pub halves: Option<usize>,
 }
+
+/// Role of created joints that take half of the bend of the joint they are made for, and of the skin on it.
+pub const HALF: &str = "half";
 
 /// The bone that a twist joint shares with the joint that owns it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,6 +109,7 @@ impl DeformSkeleton {
                 deforms: joint.data.kind == NodeKind::Joint,
                 subject: None,
                 twist: None,
+                halves: None,
             });
         }
     }
@@ -124,7 +130,9 @@ impl DeformSkeleton {
             }
             places.push(Some(self.joints.len()));
             let subject = node.origin.as_ref().map(|origin| origin.subject);
-            self.add(DeformJoint { uid: node.uid, parent, rest, deforms, subject, twist: None });
+            let half = node.origin.as_ref().filter(|origin| deforms && *origin.role == *HALF);
+            let halves = half.and_then(|origin| self.index(origin.subject)).filter(|joint| self.joints[*joint].deforms);
+            self.add(DeformJoint { uid: node.uid, parent, rest, deforms, subject, twist: None, halves });
         }
         for constraint in &built.constraints {
             if let Constraint::Twist { driven, .. } = &*constraint.constraint {

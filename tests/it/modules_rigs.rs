@@ -214,6 +214,7 @@ fn forms_edit_what_modules_have() {
     let names = [
         "driven_key",
         "expression",
+        "half_joint",
         "ik_fk_switch",
         "ik_handle",
         "morph",
@@ -683,6 +684,26 @@ fn twist_joints_take_their_share() {
             let angle = degrees(rest, now);
             assert!((angle - 60.0 * share).abs() < 0.1, "counter {counter}: {angle} and not {}", 60.0 * share);
         }
+    }
+}
+
+#[test]
+fn half_joints_take_half_of_a_bend_and_stay_on_it() {
+    for share in [0.5_f32, 0.25] {
+        let mut bench = Bench::new(&ARM);
+        let tag = bench.tag(4, "half_joint", &format!("(at: \"{} + {}\", share: {share})", joint(2), joint(3)));
+        let mut play = bench.play();
+        let halves: Vec<Uid> = play.built.find_role(Uid(tag), "half").map(|node| node.uid).collect();
+        assert_eq!(halves.len(), 2);
+        let rest: Vec<Quat> = halves.iter().map(|half| play.at(*half).rotation).collect();
+        let bend = Quat::from_axis_angle(Vec3::new(0.3, 1.0, -0.2).normalize(), 90f32.to_radians());
+        play.pose(Uid(3), [0.0, 0.02, 0.0], bend);
+        let (upper, lower) =
+            (degrees(rest[0], play.at(halves[0]).rotation), degrees(rest[1], play.at(halves[1]).rotation));
+        assert!(upper < 0.1, "nothing bends at the upper joint: {upper}");
+        assert!((lower - 90.0 * share).abs() < 0.1, "{lower} and not {}", 90.0 * share);
+        let (at, half) = (play.joint(3).translation, play.at(halves[1]).translation);
+        assert!(at.distance(half) < 1e-6, "it stays on the bend");
     }
 }
 

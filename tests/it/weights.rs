@@ -8,7 +8,7 @@ use rigsmith::{
 };
 
 fn joint(head: [f32; 3], parent: Option<usize>) -> WeightJoint {
-    WeightJoint { head: head.into(), parent, tail: None, deforms: true, twist: None }
+    WeightJoint { head: head.into(), parent, tail: None, deforms: true, twist: None, halves: None }
 }
 
 /// A tube along x from 0 to 4 with four sides and a cap at either end.
@@ -214,7 +214,14 @@ fn twisted(shares: &[f32]) -> Vec<WeightJoint> {
     let (start, end) = (joints[0].head, joints[1].head);
     for share in shares {
         let twist = Some(TwistBone { joint: 0, end });
-        joints.push(WeightJoint { head: start.lerp(end, *share), parent: Some(0), tail: None, deforms: true, twist });
+        joints.push(WeightJoint {
+            head: start.lerp(end, *share),
+            parent: Some(0),
+            tail: None,
+            deforms: true,
+            twist,
+            halves: None,
+        });
     }
     joints
 }
@@ -530,6 +537,7 @@ proptest! {
                 tail: tail.then(|| place(head) + Vec3::X * scale),
                 deforms: *deforms,
                 twist: (i > 0 && *twist).then(|| TwistBone { joint: 0, end: place(head) + Vec3::Y * scale }),
+                halves: (i > 0 && !*twist && parent % 5 == 0).then_some(0),
             })
             .collect();
         let settings = WeightSettings { max_influences: most, method, voxel_resolution: 16, ..WeightSettings::default() };
@@ -539,4 +547,24 @@ proptest! {
         prop_assert_eq!(report.by_surface + report.by_voxels + report.by_fill + report.by_nearest + report.given, points.len());
         prop_assert_eq!(run(), (weights, report));
     }
+}
+
+/// Half joints take what both sides of a bend hold in common, and nothing else changes.
+#[test]
+fn half_joints_hold_what_both_sides_share() {
+    let (points, triangles) = tube();
+    let plain = tube_joints();
+    let mut joints = plain.clone();
+    joints.push(WeightJoint { parent: Some(1), halves: Some(1), ..plain[1] });
+    let (without, with) = (bind(&points, &triangles, &plain).0, bind(&points, &triangles, &joints).0);
+    let mut most = 0.0_f32;
+    for point in 0..points.len() {
+        let (upper, lower, held) = (weight(&without, point, 0), weight(&without, point, 1), weight(&with, point, 3));
+        let common = upper.min(lower);
+        most = most.max(held);
+        assert!((held - 2.0 * common).abs() < 0.02, "{held} of {upper} and {lower}");
+        assert!((weight(&with, point, 0) - (upper - common)).abs() < 0.02);
+        assert!((weight(&with, point, 1) - (lower - common)).abs() < 0.02);
+    }
+    assert!(most > 0.9, "the middle of the bend is the half joint's: {most}");
 }

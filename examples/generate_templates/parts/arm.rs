@@ -103,6 +103,7 @@ pub fn tags(writer: &mut Writer, around: &Around) {
         elbow.switch("@command elbow role:control", ", rotate: false"),
     );
     twists(writer, at, ("upper_arm_l", "forearm_l"), ("forearm_l", "hand_l"));
+    halves(writer, at, &["upper_arm_l", "forearm_l"]);
 }
 
 /// A control that carries the switches of a limb and goes with its end.
@@ -117,6 +118,21 @@ pub fn settings(writer: &mut Writer, at: &str, name: &str) {
              rotate: (false, false, false), scale: (false, false, false)), creation: (name: \"{name}\"))"
         ),
     );
+}
+
+/// Joints that turn by half of a limb's bends, so that skin keeps its volume there, in the feature `volume`.
+pub fn halves(writer: &mut Writer, at: &str, bends: &[&str]) {
+    writer.feature(at, "deform", "volume");
+    for bend in bends {
+        let name = format!("{}_half_l", bend.trim_end_matches("_l"));
+        writer.optional(
+            "volume",
+            at,
+            &format!("{bend}_half"),
+            "half_joint",
+            format!("(at: \"@joint {bend}\", creation: (name: \"{name}\"))"),
+        );
+    }
 }
 
 /// How many joints share the twist of a bone.

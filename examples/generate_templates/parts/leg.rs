@@ -3,7 +3,7 @@
 use super::{
     super::writer::{LEFT, Writer},
     Around,
-    arm::{settings, twists},
+    arm::{halves, settings, twists},
     joints,
 };
 
@@ -126,4 +126,5 @@ pub fn tags(writer: &mut Writer, around: &Around) {
         knee.switch("@command knee role:control", ", rotate: false"),
     );
     twists(writer, at, ("thigh_l", "shin_l"), ("shin_l", "foot_l"));
+    halves(writer, at, &["thigh_l", "shin_l"]);
 }

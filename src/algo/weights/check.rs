@@ -26,10 +26,15 @@ pub(crate) fn input(
     if let Some(joint) = joints.iter().position(|j| !j.head.is_finite() || j.tail.is_some_and(|t| !t.is_finite())) {
         return Err(WeightError::Joint { joint });
     }
-    let is_broken =
-        |twist: &TwistBone| !twist.end.is_finite() || joints.get(twist.joint).is_none_or(|j| j.twist.is_some());
+    let is_broken = |twist: &TwistBone| {
+        !twist.end.is_finite() || joints.get(twist.joint).is_none_or(|j| j.twist.is_some() || j.halves.is_some())
+    };
     if let Some(joint) = joints.iter().position(|j| j.twist.as_ref().is_some_and(is_broken)) {
         return Err(WeightError::Twist { joint });
+    }
+    let is_half = |j: usize| joints.get(j).is_none_or(|j| j.twist.is_some() || j.halves.is_some());
+    if let Some(joint) = joints.iter().position(|j| j.halves.is_some_and(is_half)) {
+        return Err(WeightError::Half { joint });
     }
     if let Some(triangle) = triangles.iter().position(|t| t.iter().any(|&p| p as usize >= points.len())) {
         return Err(WeightError::Triangle { triangle });

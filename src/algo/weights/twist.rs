@@ -7,14 +7,14 @@
 
 use glam::Vec3;
 
-use super::WeightJoint;
+use super::{WeightJoint, half::Halves};
 
 /// Twist joints closer than this share of the bone to its start stand in for the joint there.
 const AT_START: f32 = 0.01;
 
 /// The joints that are bound, and those that share their bones.
 pub(crate) struct Limbs {
-    /// The joints without twist joints.
+    /// The joints without twist and half joints.
     pub joints: Vec<WeightJoint>,
     /// Those of them that take part.
     pub free: Vec<u32>,
@@ -22,6 +22,7 @@ pub(crate) struct Limbs {
     places: Vec<u32>,
     /// The bones with twist joints of each of them.
     bones: Vec<Vec<Bone>>,
+    halves: Halves,
 }
 
 /// A bone with the joints that share it.
@@ -39,7 +40,8 @@ impl Limbs {
         for &joint in free {
             is_free[joint as usize] = true;
         }
-        let places: Vec<u32> = (0..joints.len() as u32).filter(|&j| joints[j as usize].twist.is_none()).collect();
+        let is_core = |joint: &WeightJoint| joint.twist.is_none() && joint.halves.is_none();
+        let places: Vec<u32> = (0..joints.len() as u32).filter(|&j| is_core(&joints[j as usize])).collect();
         let mut number = vec![None; joints.len()];
         for (core, &place) in places.iter().enumerate() {
             number[place as usize] = Some(core);
@@ -55,7 +57,13 @@ impl Limbs {
         let bones: Vec<Vec<Bone>> = places.iter().map(|&place| bones(joints, place, &is_free)).collect();
         let takes_part = |core: &usize| is_free[places[*core] as usize] || !bones[*core].is_empty();
         let free = (0..places.len()).filter(takes_part).map(|core| core as u32).collect();
-        Self { joints: places.iter().map(|&place| core(place as usize)).collect(), free, places, bones }
+        Self {
+            joints: places.iter().map(|&place| core(place as usize)).collect(),
+            free,
+            places,
+            bones,
+            halves: Halves::new(joints, &is_free),
+        }
     }
 
     /// Influences of the bound joints at a point as influences of all joints.
@@ -69,6 +77,7 @@ impl Limbs {
                 None => row.push((self.places[joint as usize], weight)),
             }
         }
+        self.halves.take(&mut row);
         row
     }
 }

@@ -354,3 +354,32 @@ fn channels_and_limits_hold_for_whoever_writes() {
     stage.change(Change::Undo);
     check(&stage, control, "limits that come back");
 }
+
+/// Controls whose kinematics has no effect are neither seen nor picked; a blend of both shows both.
+#[test]
+fn controls_without_effect_are_hidden() {
+    let mut stage = biped();
+    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+    let limbs = built.switches.iter().filter_map(|switch| match &switch.matching {
+        rigsmith::rig::Matching::IkFk { fk, goal, .. } if *goal != switch.control => {
+            Some((switch.control, switch.attribute.to_string(), fk.clone(), *goal))
+        }
+        _ => None,
+    });
+    let limbs: Vec<_> = limbs.collect();
+    assert!(limbs.len() >= 4, "arms and legs");
+    let visible = |stage: &Stage, node: Uid| {
+        let entity = stage.node(node).unwrap();
+        stage.get::<rigsmith::plugins::controls::NodeVisible>(entity).unwrap().0
+    };
+    for (control, attribute, fk, goal) in limbs {
+        for (value, forward, inverse) in [(0.0, true, false), (0.4, true, true), (1.0, false, true)] {
+            let edit = RigEdit::SetAttributeValue(control, attribute.clone(), Some(value));
+            stage.edit(vec![edit]);
+            assert_eq!(visible(&stage, goal), inverse, "the goal at {value}");
+            for node in fk.iter().filter(|node| **node != control) {
+                assert_eq!(visible(&stage, *node), forward, "a forward control at {value}");
+            }
+        }
+    }
+}

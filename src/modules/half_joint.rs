@@ -1,0 +1,80 @@
+//! `half_joint`: joints that turn by half of a bend, so that skin keeps its volume there.
+
+use bevy::reflect::Reflect;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    mesh::model::Trs,
+    processor::{BuildScope, Creation, ModuleError, RigModule},
+    rig::{
+        Constraint, NodeType, Scalar, Target,
+        deform::HALF,
+        reference::{NodeRef, NodeRefs},
+    },
+};
+
+/// Makes a joint for each of some joints that turns halfway between it and its parent. Role: `half`.
+///
+/// Skinning gives it the skin that both hold in common: see `algo/weights`.
+///
+/// ```
+/// # use rigsmith::{processor::RigModule, modules::half_joint::HalfJoint};
+/// let params = r#"(at: "@joint shin_l#0000000000000002", share: 0.5)"#;
+/// # assert!(rigsmith::modules::all().load(HalfJoint::NAME, params).is_ok());
+/// ```
+#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HalfJoint {
+    /// The joints that bend.
+    pub at: NodeRefs,
+    /// Share of the bend.
+    pub share: f32,
+    /// Name, groups and label of the joints that are made.
+    pub creation: Creation,
+}
+
+impl Default for HalfJoint {
+    fn default() -> Self {
+        Self { at: NodeRef::this().into(), share: 0.5, creation: Creation::default() }
+    }
+}
+
+impl RigModule for HalfJoint {
+    const NAME: &'static str = "half_joint";
+    const DOC: &'static str =
+        "Makes joints that turn by half of a bend: skin on knees, elbows, hips and shoulders keeps its volume.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("at", "The joints that bend, such as a shin; each needs a parent."),
+        ("share", "Share of the bend, 0 (the parent's side) to 1."),
+        ("creation", "Name, groups and label of the joints that are made; by default those of each joint."),
+    ];
+    const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/half_joint.ui.ron"));
+    const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/half_joint.svg"));
+
+    fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        scope.in_range("share", self.share, 0.0..=1.0)?;
+        for (joint, number) in scope.resolve_some("at", &self.at)?.into_iter().zip(0..) {
+            let Some(parent) = scope.parent(joint) else {
+                let problem = format!("{} has no parent, so nothing bends there; leave it out", scope.name(joint));
+                return Err(ModuleError::reference("at", &self.at, problem));
+            };
+            let creation = scope.creation_for(&self.creation, joint, number);
+            let half = scope.spawn(NodeType::Joint, HALF, joint, 0, Some(joint), Trs::IDENTITY, &creation)?;
+            let target = |node: Trs, uid, weight| Target { node: uid, weight: Scalar::Value(weight), offset: node };
+            let (above, own) = (scope.kept_offset(joint, parent), Trs::IDENTITY);
+            let targets =
+                vec![target(above, scope.uid(parent), 1.0 - self.share), target(own, scope.uid(joint), self.share)];
+            let constraint = Constraint::Transform {
+                driven: scope.uid(half),
+                targets,
+                translate: [false; 3],
+                rotate: [true; 3],
+                scale: [false; 3],
+                weight: Scalar::Value(1.0),
+                keep_pose: false,
+            };
+            scope.constrain("half", joint, 0, constraint)?;
+        }
+        Ok(())
+    }
+}
