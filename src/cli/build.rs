@@ -14,19 +14,18 @@ use super::{
 };
 use crate::{
     files::{FileKind, RealDisk, load_model, store_model, store_rig},
-    headless::Workbench,
+    headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,
         model::{Model, Trs},
     },
-    modules,
+    plugins::commands::BuildStep,
     processor::{Builder, CommandState},
     rig::{
         BuiltRig, Rig, RigEdit, Uid,
         bake::baked,
         feature::{FeatureError, choose_switch, features_named, set_feature},
     },
-    solve::program::{CompileOptions, RigProgram, RigState},
 };
 
 /// Arguments of `rigsmith build`.
@@ -76,11 +75,11 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     let mut rig = skin::load_rig(&args.rig, &mut report)?;
     switch_features(&mut rig, &args.feature)?;
     switch_groups(&mut rig, &args.group)?;
-    let mut builder = Builder::new(Arc::new(modules::all()));
-    builder.sync(&rig);
-    let outcome = builder.run_to(args.until.unwrap_or(usize::MAX));
-    let built = Arc::new(builder.built());
-    let lines = trace(&mut report, &rig, &builder, &outcome.executed);
+    let mut bench = Workbench::with_rig(SEED, rig);
+    let outcome = bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
+    let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
+    let builder = bench.processor().ok_or(PoseError::NotBuilt)?.builder();
+    let lines = trace(&mut report, rig, builder, &outcome.executed);
     if args.trace {
         report.lines.extend(lines);
     }
@@ -103,9 +102,10 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
         return Ok(report);
     }
     // Also without a file: what cannot run, a circle through parents for one, is no rig.
-    let posed = posed(&rig, &built)?;
+    let locals = bench.posed_locals()?;
+    let posed: Vec<Trs> = built.nodes.iter().map(|node| locals.get(&node.uid).copied().unwrap_or(node.base)).collect();
     if let Some(output) = &args.output {
-        let notes = write(args, output, &rig, &built, &posed, &mut report)?;
+        let notes = write(args, output, rig, built, &posed, &mut report)?;
         report.notes(notes);
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -203,7 +203,7 @@ fn write(
     args: &BuildArgs,
     output: &Output,
     rig: &Rig,
-    built: &Arc<BuiltRig>,
+    built: &BuiltRig,
     posed: &[Trs],
     report: &mut Report,
 ) -> Result<Vec<String>, Failure> {
@@ -246,29 +246,6 @@ pub(super) fn character_of(
     let mut settings = export.settings();
     settings.all_joints |= mesh.is_none();
     Ok((model, settings))
-}
-
-/// Where every node of the built rig is with the rig's pose, relative to its parent.
-fn posed(rig: &Rig, built: &BuiltRig) -> Result<Vec<Trs>, Failure> {
-    let program =
-        RigProgram::compile(built, &CompileOptions::default()).map_err(|error| Failure::Input(Box::new(error)))?;
-    let mut state = RigState::new(Arc::new(program));
-    for (node, offset) in rig.pose() {
-        // Poses of nodes that are not built at present wait for them.
-        let _ = state.set_offset(*node, *offset);
-    }
-    for (node, values) in rig.attribute_values() {
-        for (name, value) in values {
-            let _ = state.set_attribute(*node, name, *value);
-        }
-    }
-    state.evaluate(0.0);
-    let globals: Vec<Trs> = built.nodes.iter().map(|node| state.global(node.uid).unwrap_or_default()).collect();
-    let local = |(at, node): (usize, &crate::rig::BuiltNode)| match node.parent {
-        Some(parent) => globals[at].relative_to(&globals[parent]),
-        None => globals[at],
-    };
-    Ok(built.nodes.iter().enumerate().map(local).collect())
 }
 
 /// Moves the nodes of an exported model to where the pose puts them; bind poses stay.
