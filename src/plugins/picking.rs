@@ -66,7 +66,7 @@ pub enum Pick {
         /// Largest distance, in model units, of clicks at the same spot.
         reach: f32,
     },
-    /// All joints in a box between two opposite corners.
+    /// Joints in a box between two opposite corners.
     Box {
         /// The view.
         plane: ViewPlane,
@@ -75,9 +75,9 @@ pub enum Pick {
     },
     /// The listed joints.
     Joints(Vec<Uid>),
-    /// All joints.
+    /// Every joint of the rig.
     All,
-    /// No joint.
+    /// Empty selection.
     None,
 }
 
@@ -172,7 +172,7 @@ type PickItem<'a> = (
     Option<&'a RigNodes>,
 );
 
-/// Whether clicks meet controls before joints: while people pose, not while they draw a skeleton.
+/// True if clicks meet controls before joints: the mode for posing. False while a skeleton is drawn.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PickControls(pub bool);
 
