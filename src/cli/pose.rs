@@ -1,5 +1,5 @@
-//! `rigsmith pose`: the app on the command line. Builds a rig, writes the entities of its controls, and gives what the
-//! entities say.
+//! `rigsmith pose`: the app on the command line. Builds a rig, writes the entities of its controls, and reports or
+//! exports the resulting transforms.
 
 use std::path::{Path, PathBuf};
 

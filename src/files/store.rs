@@ -115,7 +115,7 @@ pub enum StoreError {
 /// reading back what is to be written. Returns notes about content that the format could not keep, a sentence each.
 ///
 /// # Errors
-/// [`StoreError`]; what was there before is still there. A model that the format would hold nothing of is an error, too.
+/// [`StoreError`]; the former file is unchanged. A model without any content that the format can hold is an error, too.
 pub fn store_model(
     disk: &dyn Disk,
     path: &Path,

@@ -175,7 +175,7 @@ impl Workbench {
     /// Running program of the rig.
     ///
     /// # Errors
-    /// If the rig is not built, or what is built cannot run.
+    /// If the rig is not built, or the built rig cannot run.
     pub fn runtime(&self) -> Result<&RigRuntime, PoseError> {
         let world = self.app.world();
         if let Some(failure) = world.get::<RunFailure>(self.rig) {
@@ -226,7 +226,7 @@ impl Workbench {
     /// Sets the switches that `name` matches, without moving the nodes that they match: see [`find_switches`].
     ///
     /// # Errors
-    /// No such switch, no such value, or a rig that is not built.
+    /// The built rig has no such switch or value, or the rig is not built.
     pub fn switch(&mut self, name: &str, value: &str) -> Result<(), PoseError> {
         let built = self.built().ok_or(PoseError::NotBuilt)?;
         for (control, attribute, value) in find_switches(built, self.rig(), name, value)? {

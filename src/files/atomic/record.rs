@@ -1,8 +1,8 @@
 //! Record of a set that is being saved: its companions, which may be left over if the process dies.
 //!
-//! The anchor of a set's save names the companions that are about to be put in place and those that the former main
-//! file refers to. Whoever finds the record of a dead process removes the ones that no file refers to; which these are
-//! depends on how far the save got, and need not be known.
+//! The anchor of a set's save lists the companions that are about to be put in place and those that the former main
+//! file refers to. A later save that finds the record of a dead process removes the companions that no file refers to,
+//! without knowing how far the save got.
 
 use std::{
     io::{self, ErrorKind, Read},

@@ -7,7 +7,8 @@ use crate::rig::skin::content_hash;
 pub(super) const MAGIC: [u8; 8] = *b"RIGJRNL\0";
 /// Format that this version writes, and the highest one that it reads.
 ///
-/// A later format has to mix its number into the checksums, so that they tell the format where the prelude is damaged.
+/// A later format has to mix its number into the checksums, so that they reveal the format where the prelude is
+/// damaged.
 pub const JOURNAL_FORMAT: u32 = 1;
 /// Bytes before the first frame: magic, format, session.
 pub(super) const PRELUDE: usize = 8 + 4 + 8;

@@ -8,7 +8,7 @@ use std::{
 
 use crate::files::DiskFile;
 
-/// Changes that come within this time share a sync, unless someone waits for it.
+/// Longest time for which changes wait to share a sync, unless a caller waits for it.
 const GROUP: Duration = Duration::from_millis(50);
 
 /// Result of a sync: `Err` with the reason for a failure.

@@ -27,7 +27,7 @@ use crate::{
 /// them and its remedy. Weights of a mesh that has changed are transferred to it.
 ///
 /// # Errors
-/// [`LoadError`] for what is wrong in the project file itself.
+/// [`LoadError`] for errors in the project file itself.
 pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadError> {
     let read = load_project_file(disk, path)?;
     let Project { name, meshes: references, rigs: entries, view, journal } = read.project;

@@ -32,7 +32,7 @@ impl ProjectFiles {
 /// could not be kept, a sentence each.
 ///
 /// # Errors
-/// [`StoreError`]; what was there before is still there.
+/// [`StoreError`]; the former files are unchanged.
 pub fn store_project(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> Result<Vec<String>, StoreError> {
     let ProjectFiles { set, notes } = project_files(disk, path, project)?;
     save_set(disk, &set)?;
@@ -45,7 +45,7 @@ pub fn store_project(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
 /// Meshes are named relative to the project's folder; where they have no folder in common, by their absolute path.
 ///
 /// # Errors
-/// [`StoreError`] if a file cannot hold what it should.
+/// [`StoreError`] if a file cannot hold its content.
 pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> Result<ProjectFiles, StoreError> {
     let mut notes = Vec::new();
     let mut set = FileSet::new(path);
