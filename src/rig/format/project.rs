@@ -19,8 +19,8 @@ use crate::rig::{Rig, Uid};
 
 /// Highest format that this version reads; written only for content that needs it.
 ///
-/// Format 2 adds values of attributes, and poses of nodes that are no joints. Projects without them are written in format
-/// 1.
+/// Format 2 adds values of attributes, and poses of nodes that are not joints. Projects without them are written in
+/// format 1.
 pub const FORMAT: u32 = 2;
 
 /// Largest size in bytes of a project that is read.

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! - The first line that is neither blank nor a comment is `rig` and the version of the format.
-//! - Every other line is a joint: its own number, its parent's (`-1` for a root; several roots are fine), its position in
-//!   model units, and optionally its label. Joints and parents stand in any order.
+//! - Every other line is a joint: its own number, its parent's (`-1` for a root; several roots are allowed), its
+//!   position in model units, and optionally its label. Joints and parents may come in any order.
 //! - Numbers are unique and may leave gaps; joints are taken in ascending order and renumbered from 0.
 //! - Fields are separated by any white space; lines end in `\n`, `\r\n` or `\r`; a byte order mark is skipped.
 //! - `#` at the start of a field begins a comment; inside a field it is an ordinary character (`arm#2` is a label).

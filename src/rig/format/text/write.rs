@@ -45,8 +45,8 @@ impl fmt::Display for Relabelled {
 /// are reported. Time is linear.
 ///
 /// # Errors
-/// [`RigTextError::WriteParent`], [`RigTextError::WriteCycle`] and [`RigTextError::WriteNotFinite`], for what could not be read
-/// back.
+/// [`RigTextError::WriteParent`], [`RigTextError::WriteCycle`] and [`RigTextError::WriteNotFinite`], for skeletons that
+/// could not be read back.
 pub fn write(rig: &RigText) -> Result<Written, RigTextError> {
     for (i, joint) in rig.joints.iter().enumerate() {
         if let Some(parent) = joint.parent.filter(|&parent| parent >= rig.joints.len()) {
