@@ -1,4 +1,4 @@
-//! A rig and its mesh without a window, for the command line, pipelines and tests.
+//! Workbench: a rig and its mesh without a window, for the command line, pipelines and tests.
 //!
 //! A [`Workbench`] is an app with [`RigPlugins`] and a rig in it. It drives the same plugins as the window, and waits
 //! for their background work.
@@ -71,7 +71,7 @@ impl Workbench {
 
     /// A workbench with a loaded rig.
     pub fn with_rig(seed: u64, rig: Rig) -> Self {
-        // A rig made with the same seed uses its first uids already.
+        // A rig that was made with the same seed already has its first uids.
         let known = rig.walk().map(|joint| joint.data.uid).chain([rig.uid()]);
         let seed = known.fold(seed, |seed, uid| seed.rotate_left(1) ^ uid.0);
         let mut bench = Self::new(seed, "");
@@ -117,13 +117,13 @@ impl Workbench {
         }
     }
 
-    /// Gives the rig what its commands built, so that meshes are bound to the built joints and exported with them.
+    /// Sets the result of the rig's commands, so that meshes are bound to the built joints and exported with them.
     pub fn set_built(&mut self, built: Arc<BuiltRig>) {
         self.app.world_mut().entity_mut(self.rig).insert(Built(built));
         self.app.update();
     }
 
-    /// Computes weights for the mesh. `progress` is told how much is done, 0 to 1, now and then.
+    /// Computes weights for the mesh. `progress` is called with the finished share, 0 to 1, now and then.
     pub fn skin(
         &mut self,
         settings: WeightSettings,
@@ -222,12 +222,12 @@ impl Workbench {
         self.rig().skin(self.mesh()?.uid).map(Arc::as_ref)
     }
 
-    /// What the rig's commands built, if they did.
+    /// Result of the rig's commands; `None` if the rig is not built.
     pub fn built(&self) -> Option<&BuiltRig> {
         self.app.world().get::<Built>(self.rig).map(|built| &*built.0)
     }
 
-    /// The mesh with the rig's joints (the built ones of a rig that is built) and weights, to be written.
+    /// Mesh with the rig's joints (the built ones if the rig is built) and weights, for export.
     pub fn character(&self) -> Model {
         match self.mesh() {
             Some(mesh) => character(&Character {

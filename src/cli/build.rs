@@ -101,7 +101,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
         report.set("error", error.to_string());
         return Ok(report);
     }
-    // Also without a file: what cannot run, a circle through parents for one, is no rig.
+    // Checked even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
     let locals = bench.posed_locals()?;
     let posed: Vec<Trs> = built.nodes.iter().map(|node| locals.get(&node.uid).copied().unwrap_or(node.base)).collect();
     if let Some(output) = &args.output {
@@ -113,7 +113,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Tells programs about the commands, and returns the same for people, a line each.
+/// Adds the commands to the report for programs, and returns them for people, a line each.
 fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) -> Vec<String> {
     let mut lines = Vec::new();
     let mut list = Vec::new();
@@ -144,7 +144,7 @@ fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) ->
     lines
 }
 
-/// `NAME=off`, `NAME=on` or `NAME=SWITCH`, for the features of that name in all groups.
+/// Applies `NAME=off`, `NAME=on` or `NAME=SWITCH` to the features of that name in all groups.
 fn switch_features(rig: &mut Rig, wishes: &[String]) -> Result<(), Failure> {
     for wish in wishes {
         let (name, value) = pair("--feature", wish)?;
@@ -160,7 +160,7 @@ fn switch_features(rig: &mut Rig, wishes: &[String]) -> Result<(), Failure> {
             let key = &feature.key;
             let edits = match value {
                 "on" | "off" => set_feature(rig, key, value == "on"),
-                // Of a feature without that switch there is nothing to choose.
+                // A feature without that switch offers nothing to choose.
                 _ if feature.switches.iter().all(|switch| switch.name != value) => continue,
                 _ => choose_switch(rig, key, value),
             };
@@ -214,8 +214,8 @@ fn write(
     Ok(store_model(&RealDisk, output, &model, &settings)?)
 }
 
-/// The built skeleton as posed, with a mesh skinned to it if there is one, and how it is written. `posed` holds the place
-/// of each built node relative to its parent.
+/// Built skeleton as posed, with a mesh skinned to it if there is one, and the settings for writing it. `posed` holds
+/// the transform of each built node relative to its parent.
 pub(super) fn character_of(
     rig: &Rig,
     built: &BuiltRig,
@@ -248,7 +248,7 @@ pub(super) fn character_of(
     Ok((model, settings))
 }
 
-/// Moves the nodes of an exported model to where the pose puts them; bind poses stay.
+/// Moves the nodes of an exported model to the pose; bind poses stay.
 fn pose(model: &mut Model, joints: &[Uid], built: &BuiltRig, posed: &[Trs]) {
     let index = built.index();
     for (node, uid) in model.nodes.iter_mut().zip(joints) {

@@ -29,11 +29,11 @@ pub(super) struct CheckArgs {
     files: Vec<PathBuf>,
 }
 
-/// What was found in one file.
+/// Problems of one file.
 #[derive(Default)]
 struct Findings {
     error: Option<String>,
-    /// What is wrong with single commands of a rig, and where in the file.
+    /// Problems of single commands of a rig, each with its place in the file.
     problems: Vec<SourceError>,
     remarks: Vec<String>,
 }
@@ -112,7 +112,7 @@ fn check(path: &Path) -> Result<Findings, Failure> {
 fn problems_of_commands(path: &Path, rig: &Rig) -> Vec<SourceError> {
     let modules = Arc::new(modules::all());
     let problems = review(rig, &modules);
-    // It was read a moment ago; without the text everything is told of its beginning.
+    // The file was readable a moment ago. Without its text, problems are shown at its beginning.
     let bytes = read_capped(&RealDisk, path, template::MAX_BYTES as u64).unwrap_or_default();
     let text = String::from_utf8_lossy(&bytes);
     if problems.is_empty() {
@@ -121,8 +121,8 @@ fn problems_of_commands(path: &Path, rig: &Rig) -> Vec<SourceError> {
     problems.iter().map(|problem| locate(&text, problem)).collect()
 }
 
-/// What keeps a rig whose commands can all be built from moving, such as constraints that wait for each other by way of
-/// a parent; at the first command that it names.
+/// Problem that keeps a fully built rig from moving, such as constraints that wait for each other by way of a parent;
+/// placed at the first command that it names.
 fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, text: &str) -> Option<SourceError> {
     let built = Builder::build(rig, modules).ok()?;
     let problem = RigProgram::compile(&built, &CompileOptions::default()).err()?.to_string();

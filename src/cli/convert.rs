@@ -40,7 +40,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
         (Some(Obj | Gltf | Glb), Some(Obj | Gltf | Glb)) => {
             let model = spinning("reading", || load_model(&RealDisk, &args.input))?;
             report.notes(model.notes.iter().cloned());
-            // What a file left unweighted stays so in the only way glTF knows: bound to the root.
+            // Points without weights in the input stay unmoved in the only way that glTF offers: bound to the root.
             let settings = GltfWriteSettings { bind_unweighted: true, ..args.export.settings() };
             spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?
         }
@@ -84,7 +84,8 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Lists all joints in a skin: readers know joints by the skins that they are in, also where nothing is skinned.
+/// Lists all joints in a skin, because readers recognise joints by the skins that list them, even without skinned
+/// points.
 pub(super) fn mark_joints(model: &mut Model, rig: &Rig) {
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     if model.skins.is_empty() && !joints.is_empty() {

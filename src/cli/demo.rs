@@ -18,7 +18,7 @@ use crate::{
 const MESH: &[u8] = include_bytes!("../../assets/models/biped.obj");
 const GESTURES: &[u8] = include_bytes!("../../assets/gestures/biped.ron");
 
-/// Runs the workflow without a window; `reason` says why there is none.
+/// Runs the workflow without a window; `reason` is the reason why no window opens.
 pub(super) fn run(reason: Option<&str>) -> Result<Report, Failure> {
     let mut report = Report::default();
     if let Some(reason) = reason {
@@ -56,7 +56,8 @@ pub(super) fn run(reason: Option<&str>) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Writes a file that nobody has named, unless there is another that somebody may have worked on. True if it is there now.
+/// Writes a file under a default name, unless a file of that name with other content exists. Returns true if the file
+/// now has this content.
 fn save_new(path: &Path, bytes: &[u8], what: &str, report: &mut Report) -> Result<bool, Failure> {
     let name = path.display();
     match read_capped(&RealDisk, path, 1 << 30) {

@@ -1,6 +1,6 @@
 //! Mesa's selection of a graphics card, which asks the display for one even where there is no display.
 
-/// Starts the command again without Mesa's device selection where there is no display that it could ask.
+/// Restarts the command without Mesa's device selection if there is no display for it to ask.
 ///
 /// The selection tries Wayland in every program that uses Vulkan, and where there is none an error is printed for each
 /// try. Switched off it is by an environment variable, which a running process cannot set for itself without `unsafe`
@@ -20,6 +20,6 @@ pub(super) fn restart_without() {
     }
 }
 
-/// Does nothing: Mesa does not select devices here.
+/// Does nothing on systems other than Unix, where Mesa does not select devices.
 #[cfg(not(unix))]
 pub(super) fn restart_without() {}

@@ -1,4 +1,4 @@
-//! What a command may write over, checked before it does anything.
+//! Outputs of a command: checked against its inputs before the command does anything.
 
 use std::path::Path;
 
@@ -16,8 +16,8 @@ pub(super) struct InPlaceArgs {
 }
 
 impl InPlaceArgs {
-    /// Makes sure that `output` is no input, unless that was asked for, and that each of the `further` outputs, with the
-    /// options that name them, is neither an input nor another output.
+    /// Checks that `output` is no input, unless replacing it was allowed, and that each of the `further` outputs, with
+    /// the options that name them, is neither an input nor another output.
     pub fn check(
         self,
         inputs: &[&Path],

@@ -1,5 +1,5 @@
-//! `rigsmith pose`: the app on the command line. Builds a rig, writes the entities of its controls, and gives what the
-//! entities say.
+//! `rigsmith pose`: the app on the command line. Builds a rig, writes the entities of its controls, and reports or
+//! exports the resulting transforms.
 
 use std::path::{Path, PathBuf};
 
@@ -26,8 +26,8 @@ pub(super) struct PoseSteps {
     /// (@...); may be repeated
     #[arg(long = "set", value_name = "NODE.CHANNEL=VALUE", allow_hyphen_values = true)]
     pub set: Vec<String>,
-    /// Throws a switch before anything is set, without a jump: NAME=ik, fk or the name of a space; NAME is a local group,
-    /// a control or a joint of the limb; may be repeated
+    /// Throws a switch before anything is set, without a jump: NAME=ik, fk or the name of a space; NAME is a local
+    /// group, a control or a joint of the limb; may be repeated
     #[arg(long = "switch", value_name = "NAME=VALUE")]
     pub switches: Vec<String>,
     /// Frames of a sixtieth of a second that pass afterwards, for springs
@@ -36,7 +36,7 @@ pub(super) struct PoseSteps {
 }
 
 impl PoseSteps {
-    /// True if nothing is asked for.
+    /// True if no step is requested.
     pub(super) fn is_empty(&self) -> bool {
         self.set.is_empty() && self.switches.is_empty() && self.frames == 0
     }
@@ -107,12 +107,12 @@ fn is_png(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"))
 }
 
-/// The values of `--set`.
+/// Parsed values of `--set`.
 pub(super) fn parsed(steps: &PoseSteps) -> Result<Vec<ControlWrite>, Failure> {
     steps.set.iter().map(|text| Ok(text.parse::<ControlWrite>()?)).collect()
 }
 
-/// Builds, switches, writes, and lets time pass.
+/// Builds the rig, sets switches, writes values, and simulates frames.
 pub(super) fn run_steps(bench: &mut Workbench, steps: &PoseSteps, writes: &[ControlWrite]) -> Result<(), Failure> {
     if let Some(error) = bench.build(BuildStep::All).error {
         return Err(Failure::Input(Box::new(error)));
@@ -150,7 +150,7 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<Rig, Failure> {
     Ok(rig)
 }
 
-/// Writes the character, or the skeleton, as the entities stand.
+/// Writes the character, or the skeleton, in the pose of the entities.
 fn write(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let locals = bench.posed_locals()?;

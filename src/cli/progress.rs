@@ -16,7 +16,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Starts the work; nothing is shown yet.
+    /// Starts the work; a bar is not shown yet.
     pub fn new(what: &'static str) -> Self {
         Self { what, since: Instant::now(), bar: None, terminal: std::io::stderr().is_terminal() }
     }

@@ -185,7 +185,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Draws a posed rig, with a mesh skinned to what it builds if there is one.
+/// Draws a posed rig, with a mesh skinned to its built joints if there is one.
 pub(super) fn picture_of(
     rig: Rig,
     mesh: Option<&Path>,
@@ -242,7 +242,7 @@ fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
                     continue;
                 }
                 match mesh.shape {
-                    // The notes name it already.
+                    // The notes mention the missing mesh already.
                     MeshState::Missing { .. } => {}
                     MeshState::Open { model, .. } => meshes.push(RigMesh::new(mesh.uid, *model, mesh.nodes.to_vec())),
                 }

@@ -165,7 +165,7 @@ fn show(error: &(dyn std::error::Error + 'static)) {
     }
 }
 
-/// Text of an error and of its causes, as far as they add anything.
+/// Text of an error and of those causes that add something to it.
 fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

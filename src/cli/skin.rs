@@ -151,7 +151,7 @@ fn rigid_parts(args: &SkinArgs, bench: &Workbench) -> Result<Vec<(usize, Uid)>, 
     args.rigid.iter().map(pair).collect()
 }
 
-/// The weights of the bench's mesh, to be saved.
+/// Weights of the workbench's mesh, for a file.
 pub(super) fn skin_file(bench: &Workbench) -> Result<SkinFile, Failure> {
     let (Some(mesh), Some(skin)) = (bench.mesh(), bench.weights()) else {
         return Err(Failure::Input("there are no weights to save; skin the mesh first".into()));
@@ -169,7 +169,7 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
         let by_label = || rig.find_label(&joint.label).filter(|_| !joint.label.is_empty());
         Some(Uid(joint.uid)).filter(|uid| rig.joint(*uid).is_some()).or_else(by_label)
     };
-    // A joint that a command created is not in the document: the joint that it was made for holds its share.
+    // A joint that a command created is not in the document: its weights go to the joint that it was made for.
     let mut subjects = SkinJoint::subjects(file.joints());
     for subject in subjects.values_mut() {
         let joint = file.joints().iter().find(|joint| joint.uid == subject.0);
@@ -232,7 +232,7 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
     Ok(())
 }
 
-/// Says how points got their weights.
+/// Adds the origins of the points' weights to the report.
 pub(super) fn describe_weights(report: &mut Report, weights: &WeightReport) {
     report.line(format!(
         "{} points weighted: {} over the surface, {} through voxels, {} filled, {} by the nearest bone, {} given",

@@ -53,10 +53,10 @@ pub struct EditorOptions {
 /// Error of opening the window, in one line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NoWindow {
-    /// No display is available.
+    /// The system offers no display.
     #[error("there is no display to open a window on ({0})")]
     Display(String),
-    /// No graphics adapter is available.
+    /// The system offers no graphics adapter.
     #[error(
         "there is no graphics adapter, not even a software one; install a Vulkan driver (Debian: mesa-vulkan-drivers)"
     )]
@@ -181,7 +181,7 @@ fn open_first(first: Res<OpenFirst>, mut requests: MessageWriter<OpenRequest>) {
     requests.write(first.0.clone());
 }
 
-/// Sends a notice if a program draws instead of a graphics card.
+/// Sends a notice if a software renderer draws instead of a graphics card.
 fn say_adapter(adapter: Option<Res<RenderAdapterInfo>>, mut notices: MessageWriter<Notice>) {
     let Some(adapter) = adapter else { return };
     if adapter.device_type == wgpu::DeviceType::Cpu {

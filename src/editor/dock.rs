@@ -1,7 +1,7 @@
 //! The window's frame: menu and toolbar above, status line below, panels docked around the viewport.
 //!
-//! One system draws the whole window with read access to the world; the requests of panels are carried out after the
-//! last panel.
+//! A single system draws the whole window with read access to the world; the requests of panels are carried out after
+//! the last panel.
 
 use bevy::{ecs::system::SystemState, prelude::*, window::PrimaryWindow};
 use bevy_egui::{EguiContext, EguiPrimaryContextPass, PrimaryEguiContext, egui};

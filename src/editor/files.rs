@@ -87,9 +87,9 @@ pub enum OpenRequest {
 pub enum Then {
     /// Opens another document.
     Open(OpenRequest),
-    /// Replaces the document by the one that was loaded in the meantime.
+    /// Replaces the document by the one that was loaded in the meantime and is held.
     Land,
-    /// A crashed session's work is recovered from its journal.
+    /// Recovers a crashed session's work from its journal.
     Recover(PathBuf),
     /// Closes the window.
     Quit,
@@ -158,7 +158,7 @@ fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
     }
 }
 
-/// Removes what saves that were cut off left in the folders where the editor saves.
+/// Removes files that interrupted saves left in the folders where the editor saves.
 fn clear_leftovers(settings: Res<EditorSettings>, state: Res<StateFolder>) {
     let recent = settings.recent.iter().filter_map(|path| path.parent());
     let folders: BTreeSet<PathBuf> = recent.map(Path::to_path_buf).chain(state.0.clone()).collect();
@@ -167,7 +167,7 @@ fn clear_leftovers(settings: Res<EditorSettings>, state: Res<StateFolder>) {
             match remove_stale_temps(&RealDisk, &folder) {
                 Ok(0) => {}
                 Ok(count) => info!("removed {count} unfinished files from {}", folder.display()),
-                // A recent folder may be gone.
+                // A recent folder may no longer exist.
                 Err(error) => debug!("{} cannot be looked through: {error}", folder.display()),
             }
         }
@@ -205,7 +205,7 @@ fn request_open(world: &mut World, request: OpenRequest) {
             return;
         }
         if open::is_rig_file(path) && template::has_mesh(world) {
-            // A template is put onto the open mesh, which undo takes back.
+            // A template is put onto the open mesh as one step, which can be undone, so no question is asked.
             open::start(world, request);
             return;
         }
@@ -213,7 +213,7 @@ fn request_open(world: &mut World, request: OpenRequest) {
     after_asking(world, Then::Open(request));
 }
 
-/// Proceeds at once if nothing would be lost, else asks.
+/// Proceeds at once if no unsaved changes would be lost; otherwise asks.
 pub(super) fn after_asking(world: &mut World, then: Then) {
     match active(world).filter(|rig| is_unsaved(world, *rig)) {
         Some(rig) => {

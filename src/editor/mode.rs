@@ -26,7 +26,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// All modes, in the order of the toolbar.
+    /// Every mode, in the order of the toolbar.
     pub const ALL: [Self; 8] =
         [Self::Select, Self::Place, Self::Stroke, Self::Move, Self::Rotate, Self::Scale, Self::Pose, Self::Weights];
 

@@ -20,7 +20,7 @@ pub enum Severity {
 pub struct Notice {
     /// Importance.
     pub severity: Severity,
-    /// One or two sentences.
+    /// Text of the notice, one or two sentences.
     pub text: String,
     /// Keeps the notice out of the toasts if `true`.
     pub quiet: bool,

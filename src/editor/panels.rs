@@ -1,7 +1,7 @@
 //! The panels of the dock, one file each, and the toasts over it.
 //!
-//! Each panel reads the active rig whenever it is drawn and keeps only state that is not part of the rig: folded
-//! entries, text being typed. Long lists draw the visible rows only.
+//! A panel reads the active rig whenever it is drawn and keeps only state that is not part of the rig: folded entries,
+//! text being typed. Long lists draw the visible rows only.
 
 pub mod controls;
 pub mod face;

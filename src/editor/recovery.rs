@@ -1,4 +1,5 @@
-//! Work that a crash left: found when the window opens, or when its project does, and offered back.
+//! Recovery of unsaved work after a crash: found when the window opens, or when its project is opened, and offered to
+//! the user.
 
 use std::path::{Path, PathBuf};
 
@@ -32,10 +33,10 @@ use crate::{
     rig::Rig,
 };
 
-/// Gaps and skipped changes that are told one by one.
+/// Largest number of gaps and skipped changes that are listed one by one.
 const MAX_TOLD: usize = 20;
 
-/// What is known about work that a crash left.
+/// State of the search for unsaved work after a crash.
 #[derive(Resource, Default)]
 pub struct Recovery {
     looking: Option<Task<Vec<PendingJournal>>>,
@@ -43,12 +44,12 @@ pub struct Recovery {
 }
 
 impl Recovery {
-    /// True until it is known whether there is any.
+    /// True while the search for unsaved work is running.
     pub fn is_looking(&self) -> bool {
         self.looking.is_some()
     }
 
-    /// Offers the work in a journal as soon as nothing else is asked.
+    /// Adds the work in a journal to those that are offered once no other question is open.
     pub(super) fn offer(&mut self, pending: PendingJournal) {
         if self.found.iter().all(|known| known.path != pending.path) {
             self.found.push(pending);
@@ -56,7 +57,7 @@ impl Recovery {
     }
 }
 
-/// Looks for journals in the folders where they may lie, and beside the projects that were opened lately.
+/// Starts the search for journals in their usual folders, and beside the projects that were opened lately.
 pub(super) fn look(world: &mut World) {
     let folders = places(world, None).folders();
     let recent = world.get_resource::<EditorSettings>().map(|settings| settings.recent.clone()).unwrap_or_default();
@@ -70,7 +71,7 @@ pub(super) fn look(world: &mut World) {
     world.resource_mut::<Recovery>().looking = Some(task);
 }
 
-/// Offers what was found, when something is open and nothing else is asked.
+/// Offers the found work once a document and no other question is open.
 pub(super) fn poll(world: &mut World) {
     let mut recovery = world.resource_mut::<Recovery>();
     if let Some(found) = recovery.bypass_change_detection().looking.as_mut().and_then(check_ready) {
@@ -91,7 +92,7 @@ pub(super) fn poll(world: &mut World) {
     world.resource_mut::<Dialog>().ask(Question::Recover(found));
 }
 
-/// Does what was answered to the offer; what is left over is offered again.
+/// Carries out the answer to the offer; the remaining work is offered again.
 pub(super) fn answered(world: &mut World, mut list: Vec<PendingJournal>, answer: Answer) {
     match answer {
         Answer::Recover(journal) => {
@@ -112,7 +113,7 @@ pub(super) fn answered(world: &mut World, mut list: Vec<PendingJournal>, answer:
     }
 }
 
-/// One line about work that can be recovered: what it was on, how much it is and what is wrong with it.
+/// Description in one line of work that can be recovered: its document, its number of edits, and its damage.
 pub fn describe(pending: &PendingJournal) -> String {
     let on = match &pending.origin {
         Origin::Bundled(_) => "the bundled character".to_owned(),
@@ -130,18 +131,18 @@ pub fn describe(pending: &PendingJournal) -> String {
     }
 }
 
-/// True if something of the work can be recovered.
+/// True if at least part of the work can be recovered.
 pub fn can_recover(pending: &PendingJournal) -> bool {
     !matches!(pending.condition, Condition::Unreadable(_))
 }
 
-/// Recovers in the background.
+/// Starts the recovery in the background.
 pub(super) fn start(world: &mut World, journal: PathBuf) {
     let task = spawn(move || restore(&journal));
     begin(world, "unsaved work".to_owned(), task);
 }
 
-/// Makes the document again as the journal has it.
+/// Restores the document from its journal.
 fn restore(journal: &Path) -> Result<Landing, String> {
     let bytes = read_capped(&RealDisk, journal, MAX_JOURNAL).map_err(|error| error.to_string())?;
     let mut recovered = recover(&bytes).map_err(|error| format!("`{}`: {error}", journal.display()))?;
@@ -166,7 +167,7 @@ fn restore(journal: &Path) -> Result<Landing, String> {
     Ok(document(opened))
 }
 
-/// Says what of the work is lost.
+/// Adds warnings about lost work.
 fn tell_losses(recovered: &Recovered, restored: &Restored, basis: Basis, opened: &mut Opened) {
     if let Some(reason) = &restored.replayed.refused {
         let total = recovered.changes().len();
@@ -211,7 +212,7 @@ fn tell_losses(recovered: &Recovered, restored: &Restored, basis: Basis, opened:
     }
 }
 
-/// The meshes that were open, as far as they can be opened again.
+/// An empty rig with the meshes that were open, if they can be opened again.
 fn with_meshes(recovered: &Recovered) -> Opened {
     let context: Context = ron::from_str(recovered.context()).unwrap_or_default();
     let name = match (context.name.is_empty(), recovered.origin().path()) {
@@ -227,7 +228,7 @@ fn with_meshes(recovered: &Recovered) -> Opened {
         };
         match model {
             Ok(model) => {
-                // A file that has other nodes by now is not the one whose nodes became joints.
+                // A file with another number of nodes is not the one whose nodes became joints.
                 let nodes = if mesh.nodes.len() == model.nodes.len() { mesh.nodes } else { Vec::new() };
                 opened.meshes.push((RigMesh::new(mesh.uid, model, nodes), mesh.source));
             }

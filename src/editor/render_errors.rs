@@ -1,5 +1,5 @@
-//! Recovery from rendering failures: the work is saved first, then rendering is tried again; the program never just
-//! quits.
+//! Recovery from rendering failures: the work is saved first, then rendering is tried again; the program never quits at
+//! once.
 
 use std::{
     path::PathBuf,

@@ -186,7 +186,7 @@ fn write(
     let Some(path) = file.path.clone().filter(|_| !file.refused && file.saving.is_none()) else { return };
     let keys = (*keys != KeyBindings::default()).then(|| keys.clone());
     let kept = SettingsContent { settings: settings.clone(), keys, layout: layout.map(|layout| layout.clone()) };
-    // Any frame may move panels without an event: a change shows in the text only.
+    // A frame may move panels without any event, so a change is only visible in the text.
     let Ok(text) = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::default()) else { return };
     if file.text.as_ref() == Some(&text) {
         return;

@@ -119,7 +119,7 @@ pub struct ToolPointer {
     pub pointer: ViewportPointer,
 }
 
-/// The tool that has the button: a drag stays with the tool it began with, whatever the mode becomes.
+/// Tool that has the button. A drag stays with the tool that it began with, even if the mode changes.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PointerOwner(pub Option<Tool>);
 

@@ -1,8 +1,9 @@
-//! Saving so that a file is always whole: the old one until the finished one takes its place in a single rename.
+//! Atomic saving: a file is always whole, the old one until the finished one replaces it in a single rename.
 //!
-//! The order is the one that survives power loss: temporary file beside the target, write, sync, read back, rename, sync the
-//! folder. Files that belong together are a [`FileSet`]: every companion has a name with the hash of its content and is in
-//! place before the main file is renamed, so that the main file on the disk only ever refers to whole companions.
+//! The order is the one that survives power loss: temporary file beside the target, write, sync, read back, rename,
+//! sync the folder. Files that belong together are a [`FileSet`]: every companion has a name with the hash of its
+//! content and is in place before the main file is renamed, so that the main file on the disk only ever refers to whole
+//! companions.
 
 mod companion;
 mod error;
@@ -22,18 +23,19 @@ use std::path::Path;
 use super::disk::Disk;
 use target::Target;
 
-/// Saves `bytes` as the file `path`: afterwards it holds what it held before, or all of `bytes`, whatever fails and whenever.
+/// Saves `bytes` as the file `path`. Afterwards the file holds its former content or all of `bytes`, at whatever point
+/// the save fails.
 ///
-/// An existing file keeps its permissions (and owner, as far as allowed); a symbolic link stays a link, and the file it leads
-/// to is replaced; other hard links keep the former content. The folder must exist. On failure the temporary file is removed;
-/// what processes that died left in the folder is removed, too.
-/// Returns after the device has confirmed the content, so a call costs a few milliseconds and up; writes `bytes` once.
+/// An existing file keeps its permissions (and owner, as far as allowed); a symbolic link stays a link, and the file it
+/// leads to is replaced; other hard links keep the former content. The folder must exist. On failure the temporary file
+/// is removed; files that dead processes left in the folder are removed, too. Returns after the device has confirmed
+/// the content, so a call costs a few milliseconds and up; writes `bytes` once.
 ///
 /// # Errors
 /// See [`SaveError`]; the only one after which `path` holds `bytes` is [`SaveError::Unconfirmed`].
 pub fn save_atomic(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
     let target = Target::find(disk, path)?;
-    // Litter is no reason not to save.
+    // Left-over temporary files that cannot be removed are no reason not to save.
     let _ = remove_stale_temps(disk, &target.folder);
     let temp = target.stage(disk, bytes)?;
     target.replace(temp, bytes)?;

@@ -1,4 +1,4 @@
-//! The primitive operations that saving and reading need, and the file system that carries them out.
+//! Primitive operations for saving and reading files, and the real file system that carries them out.
 
 use std::{
     ffi::OsString,
@@ -10,13 +10,13 @@ use std::{
 /// Bytes that are read back at a time.
 const BLOCK: usize = 1 << 16;
 
-/// How often, and how long apart, a folder is tried to be locked: for 30 seconds in all.
+/// Number of attempts to lock a folder, and the pause between them: 30 seconds in all.
 #[cfg(unix)]
 const FOLDER_ATTEMPTS: usize = 3000;
 #[cfg(unix)]
 const FOLDER_PAUSE: std::time::Duration = std::time::Duration::from_millis(10);
 
-/// What a path leads to.
+/// Kind of the entry at a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EntryKind {
     /// A regular file.
@@ -29,14 +29,14 @@ pub enum EntryKind {
     Other,
 }
 
-/// What the file system says about a path.
+/// Properties of the entry at a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Entry {
     /// File, folder, link or something else.
     pub kind: EntryKind,
     /// Length in bytes as claimed; it may change, or lie, by the time the file is read.
     pub len: u64,
-    /// True if nobody may write to it.
+    /// True if the entry is write-protected.
     pub read_only: bool,
     /// Time of the last change, where the file system keeps one.
     pub modified: Option<SystemTime>,
@@ -58,14 +58,14 @@ pub trait DiskFile: Send {
         Ok(())
     }
 
-    /// Tells whether the disk returns exactly `bytes` for the whole file; true where it cannot be read through this handle.
+    /// True if the disk returns exactly `bytes` for the whole file, or if the file cannot be read through this handle.
     fn reads_back(&mut self, bytes: &[u8]) -> io::Result<bool> {
         let _ = bytes;
         Ok(true)
     }
 
-    /// Another handle of the same file, through which it can be synced while this one goes on writing; an error where
-    /// there is none.
+    /// Another handle of the same file, which can sync it while this one goes on writing; an error if the disk offers
+    /// none.
     fn another(&self) -> io::Result<Box<dyn DiskFile>> {
         Err(io::ErrorKind::Unsupported.into())
     }
@@ -74,7 +74,8 @@ pub trait DiskFile: Send {
 /// A lock that lasts until it is dropped.
 pub type Hold = Box<dyn Send>;
 
-/// The operations on files that Rigsmith uses. Each call may fail on its own; none is assumed to be atomic but `rename`.
+/// The operations on files that Rigsmith uses. Each call may fail on its own; none is assumed to be atomic but
+/// `rename`.
 pub trait Disk: Send + Sync {
     /// Describes what is at `path`; symbolic links are followed if `follow` is set.
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry>;
@@ -109,20 +110,21 @@ pub trait Disk: Send + Sync {
     /// Opens a file for reading.
     fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>>;
 
-    /// Tells whether a process that lives has the file at `path` [locked](DiskFile::lock).
+    /// True if a living process has [locked](DiskFile::lock) the file at `path`.
     fn is_locked(&self, path: &Path) -> io::Result<bool> {
         self.entry(path, true).map(|_| false)
     }
 
-    /// Keeps the file at `path` from being [locked](DiskFile::lock), for one who removes what dead processes left; `None`
-    /// while a process that lives has it locked, [`Unsupported`](io::ErrorKind::Unsupported) where files cannot be locked.
+    /// Keeps the file at `path` from being [locked](DiskFile::lock) while left-over files of dead processes are
+    /// removed; `None` while a living process has it locked, [`Unsupported`](io::ErrorKind::Unsupported) where files
+    /// cannot be locked.
     fn hold(&self, path: &Path) -> io::Result<Option<Hold>> {
         let _ = path;
         Err(io::ErrorKind::Unsupported.into())
     }
 
-    /// Waits until no other save that changes companions runs in `folder` and keeps others waiting; `None` where folders
-    /// cannot be locked.
+    /// Waits until no other save that changes companions runs in `folder`, then keeps other saves waiting; `None` where
+    /// folders cannot be locked.
     ///
     /// # Errors
     /// [`WouldBlock`](io::ErrorKind::WouldBlock) if the wait takes longer than any save does.
@@ -171,7 +173,8 @@ impl Disk for RealDisk {
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        // On Windows a virus scanner or an indexer holds a fresh file open for a moment, and renaming is refused meanwhile.
+        // On Windows a virus scanner or an indexer holds a fresh file open for a moment, and renaming is refused
+        // meanwhile.
         let mut attempts = if cfg!(windows) { 20 } else { 1 };
         loop {
             attempts -= 1;
@@ -220,7 +223,7 @@ impl Disk for RealDisk {
     }
 
     fn is_locked(&self, path: &Path) -> io::Result<bool> {
-        // Some file systems know no locks; then nobody can tell.
+        // On file systems without locks, a file counts as unlocked.
         Ok(matches!(fs::File::open(path)?.try_lock_shared(), Err(fs::TryLockError::WouldBlock)))
     }
 
@@ -260,13 +263,14 @@ impl DiskFile for RealFile {
         #[cfg(unix)]
         {
             use std::os::unix::fs::{MetadataExt, fchown};
-            // Only the administrator may give a file away: whoever cannot keeps the group if that is allowed.
+            // Only the administrator may change a file's owner; other users keep at least the group, if that is
+            // allowed.
             let (uid, gid) = (wanted.uid(), wanted.gid());
             if (uid, gid) != (found.uid(), found.gid()) && fchown(&self.0, Some(uid), Some(gid)).is_err() {
                 let _ = fchown(&self.0, None, Some(gid));
             }
         }
-        // Some mounts refuse every change of permissions, even to what they already are.
+        // Mounts may refuse every change of permissions, even to the present ones.
         if wanted.permissions() == found.permissions() {
             return Ok(());
         }
@@ -280,7 +284,7 @@ impl DiskFile for RealFile {
     fn lock(&mut self) -> io::Result<()> {
         match self.0.try_lock() {
             Err(fs::TryLockError::WouldBlock) => Err(io::ErrorKind::WouldBlock.into()),
-            // Some file systems know no locks.
+            // On file systems without locks, the file stays unlocked.
             Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(()),
         }
     }

@@ -1,7 +1,8 @@
 //! A disk that fails on purpose, so that tests can try every operation of a save, one after the other.
 //!
-//! Run the code once on a [`FaultyDisk`] without a plan, ask it for the number of [`operations`](FaultyDisk::operations), then
-//! run it again for each of them with a [`FaultPlan`] that fails just that one.
+//! Run the code once on a [`FaultyDisk`] without a plan, ask it for the number of
+//! [`operations`](FaultyDisk::operations), then run it again for each of them with a [`FaultPlan`] that fails just that
+//! one.
 
 use std::{
     ffi::OsString,
@@ -12,7 +13,7 @@ use std::{
 
 use super::disk::{Disk, DiskFile, Entry, Hold};
 
-/// The manner in which an operation fails.
+/// Kinds of failure of an operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
     /// The disk is full. A write still stores half of its bytes.
@@ -23,14 +24,15 @@ pub enum Fault {
     NoAccess,
     /// A write or a read handles only half of its bytes and says so; other operations succeed.
     Short,
-    /// The process dies: this and all later operations fail, and the files stay as they are. A write stores half of its bytes.
+    /// The process dies: this and all later operations fail, and the files stay as they are. A write stores half of its
+    /// bytes.
     Crash,
     /// Like `Crash`, and files lose what was written to them since they were last synced.
     PowerLoss,
 }
 
 impl Fault {
-    /// Every manner, for loops over all of them.
+    /// Every kind of failure, for loops over all of them.
     pub const ALL: [Self; 6] = [Self::NoSpace, Self::Io, Self::NoAccess, Self::Short, Self::Crash, Self::PowerLoss];
 
     /// True if nothing runs after the fault, so that temporary files may stay behind.
@@ -48,12 +50,12 @@ impl Fault {
     }
 }
 
-/// Which operation fails, and how.
+/// Number of the operation that fails, and the kind of its failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaultPlan {
-    /// The number of the operation, counted from 0.
+    /// Number of the operation, counted from 0.
     pub at: usize,
-    /// How it fails.
+    /// Kind of failure.
     pub fault: Fault,
     /// True if all later operations fail as well, false if only that one does. Crashes last in any case.
     pub lasting: bool,
@@ -77,9 +79,9 @@ struct State {
     lost_power: bool,
 }
 
-/// A file that was created here.
+/// A file that was created on this disk.
 struct Written {
-    /// Its name now.
+    /// Present path of the file.
     path: PathBuf,
     bytes: u64,
     synced: u64,
@@ -91,17 +93,17 @@ impl FaultyDisk {
         Self { inner: Arc::new(Inner { disk: Box::new(disk), plan, state: Mutex::default() }) }
     }
 
-    /// Returns how many operations were asked for so far, the failed ones included.
+    /// Number of operations so far, the failed ones included.
     pub fn operations(&self) -> usize {
         self.inner.state().log.len()
     }
 
-    /// Returns the names of the operations so far, such as `create`, `write`, `rename`.
+    /// Names of the operations so far, such as `create`, `write`, `rename`.
     pub fn log(&self) -> Vec<&'static str> {
         self.inner.state().log.clone()
     }
 
-    /// Returns whether the planned fault has happened.
+    /// True if the planned fault has happened.
     pub fn has_failed(&self) -> bool {
         self.inner.plan.is_some_and(|plan| self.operations() > plan.at)
     }
@@ -112,7 +114,7 @@ impl Inner {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts an operation and returns the fault that befalls it.
+    /// Counts an operation and returns the fault that is planned for it.
     fn step(&self, name: &'static str) -> Option<Fault> {
         let mut state = self.state();
         let number = state.log.len();
@@ -122,7 +124,7 @@ impl Inner {
         (number == plan.at || (lasting && number > plan.at)).then_some(plan.fault)
     }
 
-    /// Empties what was not synced when the power goes.
+    /// Drops the bytes that were not synced when the power fails.
     fn settle(&self, fault: Fault) {
         if fault != Fault::PowerLoss {
             return;
@@ -183,7 +185,7 @@ impl Disk for FaultyDisk {
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         self.inner.run("rename", |disk| disk.rename(from, to))?;
-        // Content that was not synced is as unsafe under its other name; what had that name before is gone.
+        // Unsynced content stays unsafe under its next name; the file that had that name before is gone.
         for file in &mut self.inner.state().written {
             if file.path == to {
                 file.synced = file.bytes;
@@ -231,7 +233,7 @@ impl Disk for FaultyDisk {
 
 struct FaultyFile {
     file: Box<dyn DiskFile>,
-    /// Its place in the list of files created here.
+    /// Index of the file among the files created on this disk.
     number: usize,
     inner: Arc<Inner>,
 }
@@ -249,7 +251,7 @@ impl FaultyFile {
 impl DiskFile for FaultyFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let half = bytes.get(..bytes.len().div_ceil(2)).unwrap_or_default();
-        // Past a crash nothing reaches the disk any more; at the crash itself half of the bytes do.
+        // After a crash no byte reaches the disk; at the crash itself half of the bytes do.
         let crashed =
             self.inner.plan.is_some_and(|plan| plan.fault.is_crash() && self.inner.state().log.len() > plan.at);
         match self.inner.step("write") {

@@ -1,7 +1,7 @@
-//! The folder of a model: finds the files that a model names, and nothing outside.
+//! Folder of a model: finds files that a model refers to, and refuses files outside.
 //!
-//! A model from elsewhere may name `file:///etc/passwd`, `../../secret` or a link that leads out. Only what lies below the
-//! model's own folder, with every link resolved, is ever opened.
+//! A model from elsewhere may name `file:///etc/passwd`, `../../secret` or a link that leads out. Only what lies below
+//! the model's own folder, with every link resolved, is ever opened.
 
 use std::{
     io::ErrorKind,
@@ -16,14 +16,14 @@ use super::{
     read::{OpenFile, ReadError, open, read_capped},
 };
 
-/// Names looked at for one that differs only in case.
+/// Largest number of names that are searched for one that differs only in case.
 const MAX_NAMES: usize = 10_000;
-/// Longer references than any file system takes are refused unread.
+/// Longest reference in bytes; longer ones exceed every file system and are refused unread.
 const MAX_LENGTH: usize = 4096;
-/// How much of a reference a message shows.
+/// Number of characters of a reference that a message shows.
 const SHOWN: usize = 80;
 
-/// Why a file that a model names is not read.
+/// Reason for not reading a file that a model refers to.
 #[derive(Debug, Error)]
 pub enum UriError {
     /// The reference is empty, too long or holds control characters.
@@ -31,7 +31,7 @@ pub enum UriError {
     Unusable {
         /// The reference, shortened.
         uri: String,
-        /// What is wrong with it.
+        /// Defect of the reference, in words.
         reason: &'static str,
     },
     /// The reference is a URL.
@@ -61,7 +61,7 @@ pub enum UriError {
     Read {
         /// The reference, shortened.
         uri: String,
-        /// What is wrong with the file.
+        /// Reason for not reading the file.
         source: ReadError,
     },
 }
@@ -69,7 +69,7 @@ pub enum UriError {
 /// Resolves the references of one model to files below the model's folder.
 pub struct ModelFolder<'d> {
     disk: &'d dyn Disk,
-    /// Canonical, so that prefixes can be compared.
+    /// Canonical path of the folder, so that prefixes can be compared.
     root: PathBuf,
 }
 
@@ -98,8 +98,8 @@ impl<'d> ModelFolder<'d> {
 
     /// Finds the existing file or folder that the relative reference `uri` names (percent escapes already decoded).
     ///
-    /// `\` counts as `/`, and where no name fits exactly one that differs only in case is taken (the first in byte order),
-    /// because files written on Windows are like that. The result is absolute, with links resolved.
+    /// `\` counts as `/`, and where no name fits exactly one that differs only in case is taken (the first in byte
+    /// order), because files written on Windows are like that. The result is absolute, with links resolved.
     ///
     /// # Errors
     /// For anything but a relative reference to something below the folder, and where nothing is there.
@@ -122,7 +122,7 @@ impl<'d> ModelFolder<'d> {
                     return Err(UriError::Read { uri: shown(uri), source });
                 }
             };
-            // Checked at every step, so that nothing outside is so much as listed.
+            // Checked at every step, so that no folder outside is even listed.
             if !path.starts_with(&self.root) {
                 return Err(self.outside(uri));
             }
@@ -163,7 +163,7 @@ impl<'d> ModelFolder<'d> {
             && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
         {
             let uri = shown(uri);
-            // A single letter is a drive of Windows.
+            // A scheme of a single letter is a Windows drive.
             return Err(if scheme.len() == 1 { UriError::Absolute { uri } } else { UriError::Url { uri } });
         }
         if uri_slashed.starts_with('/') {
@@ -190,7 +190,7 @@ impl<'d> ModelFolder<'d> {
         Ok(names)
     }
 
-    /// Finds what `name` is called in `folder` if only the case differs.
+    /// Name in `folder` that differs from `name` only in case.
     fn other_case(&self, folder: &Path, name: &str) -> Option<PathBuf> {
         let wanted = name.to_lowercase();
         let names = self.disk.list(folder, MAX_NAMES).ok()?;
@@ -205,7 +205,7 @@ impl<'d> ModelFolder<'d> {
     fn missing(&self, uri: &str, folder: &Path, rest: &[String]) -> UriError {
         let mut path = folder.to_path_buf();
         path.extend(rest);
-        // Asking for it once more finds the names that are like it.
+        // A second attempt to open the file gives an error that lists similar names.
         let source = match open(self.disk, &path) {
             Err(error) => error,
             Ok(_) => ReadError::Missing { path, hint: "try again".to_owned() },
@@ -213,14 +213,14 @@ impl<'d> ModelFolder<'d> {
         UriError::Read { uri: shown(uri), source }
     }
 
-    /// Tells whether `uri` names an existing regular file below the folder.
+    /// True if `uri` refers to an existing regular file below the folder.
     pub fn has(&self, uri: &str) -> bool {
         self.resolve(uri)
             .is_ok_and(|path| self.disk.entry(&path, true).is_ok_and(|entry| entry.kind == EntryKind::File))
     }
 }
 
-/// A reference as a message shows it: one line, and not the megabytes of an embedded picture.
+/// A reference for messages: one line, shortened, without the megabytes of an embedded picture.
 fn shown(uri: &str) -> String {
     let mut text: String = uri.chars().take(SHOWN).map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect();
     if uri.chars().nth(SHOWN).is_some() {

@@ -1,4 +1,4 @@
-//! Opening any file that Rigsmith reads, by path.
+//! Loader of any file that Rigsmith reads, by path.
 
 use std::path::{Path, PathBuf};
 
@@ -18,38 +18,38 @@ use crate::{
     },
 };
 
-/// Bytes of a glTF file, or of one of its buffers, that are read.
+/// Largest size in bytes of a glTF file, or of one of its buffers, that is read.
 const MAX_GLTF_BYTES: u64 = 4 << 30;
 
-/// Bytes of a `.rig` file that are read.
+/// Largest size in bytes of a `.rig` file that is read.
 const MAX_RIG_BYTES: u64 = 1 << 30;
 
-/// Bytes of a material library that are read.
+/// Largest size in bytes of a material library that is read.
 const MAX_MTL_BYTES: u64 = 64 << 20;
 
-/// The kinds of file, told apart by their names.
+/// Kinds of files, which differ by the endings of their names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
-    /// `.obj`
+    /// Wavefront OBJ mesh, `.obj`.
     Obj,
-    /// `.gltf`
+    /// glTF mesh as JSON, `.gltf`.
     Gltf,
-    /// `.glb`
+    /// glTF mesh in binary form, `.glb`.
     Glb,
-    /// `.rig`
+    /// Skeleton as text, `.rig`.
     RigText,
-    /// `.rig.ron`
+    /// Template of a rig, `.rig.ron`.
     Template,
-    /// `.rigsmith.ron`
+    /// Project, `.rigsmith.ron`.
     Project,
-    /// `.skin`
+    /// Weights of a mesh, `.skin`.
     Skin,
-    /// `.ron` that is neither template nor project: a list of gestures
+    /// List of gestures, `.ron` that is neither template nor project.
     Gestures,
 }
 
 impl FileKind {
-    /// The kind of a file by its name; `None` if Rigsmith does not know it.
+    /// Kind of a file by its name; `None` if the ending is unknown.
     pub fn of(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let endings = [
@@ -66,58 +66,58 @@ impl FileKind {
     }
 }
 
-/// Why a file could not be opened. The text names the file.
+/// Reason for not opening a file. The text names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// It could not be read at all.
+    /// The file could not be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// Its name has no ending that is known here.
+    /// The file's name has no known ending.
     #[error("`{}`: {wanted}", path.display())]
     Kind {
         /// The file.
         path: PathBuf,
-        /// What would do.
+        /// Expected kind of file with its endings, in words.
         wanted: &'static str,
     },
-    /// An OBJ that is wrong.
+    /// The OBJ file is invalid.
     #[error("`{}`: {source}", path.display())]
     Obj {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Error of the reader.
         source: ObjError,
     },
-    /// A glTF that is wrong; its text names the file.
+    /// The glTF file is invalid; the text of the error names the file.
     #[error(transparent)]
     Gltf(#[from] GltfError),
-    /// A `.rig` that is wrong.
+    /// The `.rig` file is invalid.
     #[error("`{}`: {source}", path.display())]
     RigText {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Error of the reader, with its line.
         source: RigTextError,
     },
-    /// A RON file that is wrong.
+    /// The RON file is invalid.
     #[error("`{}`: {source}", path.display())]
     Source {
         /// The file.
         path: PathBuf,
-        /// Its text, for reports that show the place.
+        /// Text of the file, for reports that show the place of the error.
         text: String,
-        /// What is wrong, and where.
+        /// Error of the reader, with its place.
         source: SourceError,
     },
-    /// A `.skin` that is wrong.
+    /// The `.skin` file is invalid.
     #[error("`{}`: {source}", path.display())]
     Skin {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Error of the reader.
         source: SkinFileError,
     },
-    /// The reader broke on the file.
+    /// The reader panicked.
     #[error("`{}`: the file broke the reader; it is damaged in a way that is not foreseen: export it again", path.display())]
     Broken {
         /// The file.
@@ -134,7 +134,7 @@ pub fn load_model(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
     }
 }
 
-/// Runs a reader on a thread of its own, so that a panic in a dependency is an error here.
+/// Runs a reader on a thread of its own, so that a panic in a dependency becomes an error.
 pub(super) fn surviving<T: Send>(
     path: &Path,
     read: impl FnOnce() -> Result<T, LoadError> + Send,
@@ -189,14 +189,14 @@ pub fn load_skin(disk: &dyn Disk, path: &Path) -> Result<SkinFile, LoadError> {
     Ok(load_hashed_skin(disk, path)?.0)
 }
 
-/// Reads weights, and tells the hash of the file.
+/// Reads weights and the hash of their file.
 pub(super) fn load_hashed_skin(disk: &dyn Disk, path: &Path) -> Result<(SkinFile, u64), LoadError> {
     let bytes = read_capped(disk, path, MAX_GLTF_BYTES)?;
     let file = SkinFile::read(&bytes).map_err(|source| LoadError::Skin { path: path.into(), source })?;
     Ok((file, content_hash(&bytes)))
 }
 
-/// Reads a project file alone, without what it names.
+/// Reads a project file alone, without the files that it refers to.
 pub(super) fn load_project_file(disk: &dyn Disk, path: &Path) -> Result<ReadProject, LoadError> {
     let bytes = read_capped(disk, path, project::MAX_BYTES as u64)?;
     read_project(&bytes).map_err(|source| in_source(path, &bytes, source))
@@ -206,7 +206,7 @@ pub(super) fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadE
     LoadError::Source { path: path.into(), text: String::from_utf8_lossy(bytes).into_owned(), source }
 }
 
-/// A file's name without folder and endings.
+/// Name of a file without folder and endings.
 pub fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     for ending in [".rig.ron", ".rigsmith.ron", ".obj", ".gltf", ".glb", ".rig", ".ron", ".skin"] {

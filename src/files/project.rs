@@ -1,4 +1,4 @@
-//! Projects on the disk: the project file, the weights beside it, and the meshes it names.
+//! Projects on the disk: the project file, the weights beside it, and the meshes that it refers to.
 
 mod open;
 mod path;
@@ -21,33 +21,34 @@ use crate::{
     },
 };
 
-/// What [`store_project`] saves. Meshes and weights are shared, so it is cheap to put together and to send to a task.
+/// Content of a project for [`store_project`]. Meshes and weights are shared, so that the value is cheap to make and to
+/// send to a task.
 #[derive(Debug, Clone, Default)]
 pub struct ProjectToSave {
     /// The project's name.
     pub name: String,
-    /// Its rigs, with their weights and poses.
+    /// Rigs of the project, with their weights and poses.
     pub rigs: Vec<Rig>,
-    /// The meshes that they move.
+    /// Meshes that the rigs move.
     pub meshes: Vec<MeshToSave>,
-    /// How it is looked at.
+    /// View of the project: camera, tool and display settings.
     pub view: ProjectView,
-    /// The journal that goes on from here.
+    /// Journal that continues from this save.
     pub journal: Option<JournalReference>,
 }
 
-/// A mesh of a project and its geometry: a [`MeshShape`] to save, or a [`MeshState`] as it was found.
+/// A mesh of a project and its geometry: a [`MeshShape`] to save, or a [`MeshState`] as it was loaded.
 #[derive(Debug, Clone)]
 pub struct ProjectMesh<S> {
-    /// Identity.
+    /// Uid of the mesh.
     pub uid: Uid,
-    /// The rig that moves it.
+    /// Rig that moves the mesh.
     pub rig: Uid,
-    /// Where its file is, or should be.
+    /// Path of the mesh's file, which may be missing.
     pub path: PathBuf,
-    /// The joint that each node of the file became.
+    /// Joint that each node of the file became.
     pub nodes: Arc<[Uid]>,
-    /// Its geometry.
+    /// Geometry of the mesh.
     pub shape: S,
 }
 
@@ -57,21 +58,21 @@ pub type MeshToSave = ProjectMesh<MeshShape>;
 /// A mesh of a project as opened.
 pub type LoadedMesh = ProjectMesh<MeshState>;
 
-/// The geometry of a project's mesh, as far as there is any.
+/// Geometry of a project's mesh, or the data that stand in for a missing mesh.
 #[derive(Debug, Clone)]
 pub enum MeshShape {
     /// The mesh is open.
     Open {
-        /// The mesh where its file's joints hold it at rest.
+        /// The mesh at rest, skinned to the joints of its own file.
         rest: Arc<Model>,
-        /// Triangles over its points.
+        /// Triangles over the mesh's points.
         triangles: Arc<[[u32; 3]]>,
     },
-    /// The mesh was not found; what the project knows about it is kept.
+    /// The mesh was not found; the project's data about it are kept.
     Missing {
-        /// Its hash when it was there.
+        /// Hash of the mesh when it was last open.
         hash: u128,
-        /// Its weights as they were read.
+        /// Weights of the mesh, as they were read.
         skin: Option<Arc<SkinFile>>,
     },
 }
@@ -84,7 +85,7 @@ impl MeshShape {
         }
     }
 
-    /// Points and triangles.
+    /// Points (in the model's space) and triangles, if they are known.
     fn geometry(&self) -> Option<(&[Vec3], &[[u32; 3]])> {
         match self {
             Self::Open { rest, triangles } => Some((&rest.points, triangles)),
@@ -93,38 +94,38 @@ impl MeshShape {
     }
 }
 
-/// A project as opened.
+/// An opened project.
 #[derive(Debug)]
 pub struct LoadedProject {
     /// The project's name.
     pub name: String,
-    /// Its rigs, with their weights and poses.
+    /// Rigs of the project, with their weights and poses.
     pub rigs: Vec<Rig>,
-    /// The meshes that they move.
+    /// Meshes that the rigs move.
     pub meshes: Vec<LoadedMesh>,
-    /// How it was looked at.
+    /// View of the project: camera, tool and display settings.
     pub view: ProjectView,
-    /// The journal that goes on from here.
+    /// Journal that continues from this save.
     pub journal: Option<JournalReference>,
-    /// What was passed over, transferred or missing, a sentence each.
+    /// Notes about ignored, transferred or missing content, a sentence each.
     pub notes: Vec<String>,
 }
 
-/// What became of a project's mesh.
+/// Result of loading a project's mesh.
 #[derive(Debug)]
 pub enum MeshState {
-    /// It was found.
+    /// The mesh was found.
     Open {
         /// The mesh as its file has it.
         model: Box<Model>,
-        /// True if that is another mesh than when the project was saved.
+        /// True if the mesh differs from the one with which the project was saved.
         changed: bool,
     },
-    /// It was not. Its weights are in the rig all the same.
+    /// The mesh was not found. Its weights are in the rig nevertheless.
     Missing {
-        /// Why.
+        /// Reason for not loading the mesh.
         error: LoadError,
-        /// What to save in its place.
+        /// Geometry to save in place of the mesh's own.
         shape: MeshShape,
     },
 }

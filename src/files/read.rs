@@ -1,4 +1,4 @@
-//! Reading with a limit, and with errors that say what to do.
+//! Reading files with a size limit, and with errors that say what to do.
 
 use std::{
     io::{self, ErrorKind, Read},
@@ -12,21 +12,21 @@ use super::{
     disk::{Disk, Entry, EntryKind},
 };
 
-/// The most that is reserved before a single byte has been read, whatever length the file claims.
+/// Largest number of bytes that are reserved before a single byte has been read, whatever length the file claims.
 const FIRST_RESERVE: u64 = 16 << 20;
-/// Names looked at for a hint.
+/// Largest number of names in a folder that are searched for a hint.
 const MAX_NAMES: usize = 4096;
 const MAX_HINTS: usize = 3;
 
-/// Why a file could not be read.
+/// Reason for not reading a file.
 #[derive(Debug, Error)]
 pub enum ReadError {
-    /// Nothing is there.
+    /// The file does not exist.
     #[error("there is no file `{}`; {hint}", path.display())]
     Missing {
         /// The path as given.
         path: PathBuf,
-        /// What to do; names the nearest existing files.
+        /// Remedy; names the nearest existing files.
         hint: String,
     },
     /// The path is a folder.
@@ -52,10 +52,10 @@ pub enum ReadError {
     NoAccess {
         /// The path as given.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The file is longer than what is accepted here.
+    /// The file is longer than the limit.
     #[error("`{}` is too large: more than {limit} bytes are not read here; make it smaller or split it", path.display())]
     TooLarge {
         /// The path as given.
@@ -63,12 +63,12 @@ pub enum ReadError {
         /// The limit in bytes.
         limit: u64,
     },
-    /// Anything else that failed.
+    /// Any other failure.
     #[error("cannot read `{}`: {source}; check the disk or copy the file elsewhere", path.display())]
     Io {
         /// The path as given.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -93,7 +93,7 @@ impl ReadError {
 pub struct OpenFile {
     /// The content.
     pub reader: Box<dyn Read + Send>,
-    /// The length in bytes that the file system claims; more or fewer may come.
+    /// Length in bytes that the file system claims; the reader may deliver more or fewer.
     pub len: u64,
 }
 
@@ -143,12 +143,12 @@ fn regular(disk: &dyn Disk, path: &Path) -> Result<Entry, ReadError> {
     match entry.kind {
         EntryKind::File => Ok(entry),
         EntryKind::Folder => Err(ReadError::IsFolder { path: path.to_path_buf() }),
-        // Opening a pipe that nobody writes to would wait for ever.
+        // Opening a pipe without a writer would wait for ever.
         EntryKind::Link | EntryKind::Other => Err(ReadError::NotAFile { path: path.to_path_buf() }),
     }
 }
 
-/// Says what to do about a missing file: the first folder that is missing, or the names most like the one given.
+/// Remedy for a missing file: names the first missing folder, or the names most like the given one.
 fn hint(disk: &dyn Disk, path: &Path) -> String {
     let folder = folder_of(path);
     match disk.entry(folder, true) {
@@ -179,7 +179,7 @@ fn hint(disk: &dyn Disk, path: &Path) -> String {
     }
 }
 
-/// Levenshtein distance in characters; names are short, and longer ones than 255 do not exist on common file systems.
+/// Levenshtein distance in characters. Names have at most 255 characters on common file systems.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().take(255).collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

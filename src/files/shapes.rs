@@ -1,4 +1,4 @@
-//! Opening the shapes of a face.
+//! Loader of face shapes.
 
 use std::path::{Path, PathBuf};
 
@@ -8,30 +8,30 @@ use crate::mesh::{
     shapes::{ShapeError, Shapes},
 };
 
-/// Bytes of shapes that are read.
+/// Largest size in bytes of shapes that are read.
 const MAX_SHAPE_BYTES: u64 = 4 << 30;
 
-/// Bytes of an index of shapes that are read.
+/// Largest size in bytes of an index of shapes that is read.
 const MAX_INDEX_BYTES: u64 = 16 << 20;
 
-/// Meshes of a folder that are read.
+/// Largest number of meshes in a folder that are read.
 const MAX_SHAPES: usize = 4096;
 
-/// Why shapes could not be opened. The text names the file.
+/// Reason for not opening shapes. The text names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadShapesError {
     /// A file could not be opened.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// A file is wrong, or of another mesh.
+    /// A file is invalid, or holds shapes of another mesh.
     #[error("`{}`: {source}", path.display())]
     Shapes {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Error of the reader.
         source: ShapeError,
     },
-    /// Nothing that holds shapes.
+    /// The file is of a kind that holds no shapes.
     #[error(
         "`{}` holds no shapes; give a .glb or .gltf with morph targets, a folder of meshes, or a .json beside its .f32",
         path.display()

@@ -19,10 +19,10 @@ use crate::{
     },
 };
 
-/// Why a file was not saved. What was there before is still there, whole.
+/// Reason for not saving a file. The former content of the file is unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The disk refused.
+    /// The disk refused the save.
     #[error(transparent)]
     Save(#[from] SaveError),
     /// glTF cannot hold the model.
@@ -30,7 +30,7 @@ pub enum StoreError {
     Gltf {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// Reason for the refusal.
         source: GltfError,
     },
     /// The `.rig` format cannot hold the rig.
@@ -38,10 +38,10 @@ pub enum StoreError {
     RigText {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// Reason for the refusal.
         source: RigTextError,
     },
-    /// The template would be longer than any that is read.
+    /// The template would be longer than the limit of its reader.
     #[error(
         "`{}`: the template would have {mebibytes} MiB, and no more than {} are read; save as .rig, or split the rig",
         path.display(),
@@ -50,10 +50,10 @@ pub enum StoreError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// How long it would be.
+        /// Length in mebibytes that the file would have.
         mebibytes: usize,
     },
-    /// The project would be longer than any that is read.
+    /// The project would be longer than the limit of its reader.
     #[error(
         "`{}`: the project would have {mebibytes} MiB, and no more than {} are read; delete stored poses, or split the rig",
         path.display(),
@@ -62,18 +62,18 @@ pub enum StoreError {
     ProjectTooLarge {
         /// The file.
         path: PathBuf,
-        /// How long it would be.
+        /// Length in mebibytes that the file would have.
         mebibytes: usize,
     },
-    /// Weights that no file can hold.
+    /// The weights are invalid for any file.
     #[error("`{}`: {source}", path.display())]
     Skin {
         /// The file.
         path: PathBuf,
-        /// What is wrong with them.
+        /// Defect of the weights.
         source: SkinError,
     },
-    /// The file would hold nothing.
+    /// The file would have no content.
     #[error("`{}` was not written: {what}; nothing was changed", path.display())]
     Nothing {
         /// The file.
@@ -81,7 +81,7 @@ pub enum StoreError {
         /// The reason, and what to do.
         what: &'static str,
     },
-    /// Our own reader refuses what was about to be written.
+    /// Rigsmith's own reader refuses the bytes that were to be written.
     #[error("`{}` was not written, because it could not be read again ({source}); nothing was changed; save in another format and report this", path.display())]
     Unreadable {
         /// The file.
@@ -89,33 +89,33 @@ pub enum StoreError {
         /// The reader's answer.
         source: Box<LoadError>,
     },
-    /// Our own reader finds less than was about to be written.
+    /// Rigsmith's own reader finds less content than was to be written.
     #[error("`{}` was not written, because only {read} of {written} {what} could be read again; nothing was changed; save in another format and report this", path.display())]
     Lost {
         /// The file.
         path: PathBuf,
-        /// The kind of thing that is counted.
+        /// Kind of the counted things, in words.
         what: &'static str,
-        /// How many the model has.
+        /// Number of things in the model.
         written: usize,
-        /// How many came back.
+        /// Number of things that were read back.
         read: usize,
     },
-    /// Its name has no ending that fits.
+    /// The file's name has no fitting ending.
     #[error("`{}`: {wanted}", path.display())]
     Kind {
         /// The file.
         path: PathBuf,
-        /// What would do.
+        /// Endings that fit, in words.
         wanted: &'static str,
     },
 }
 
-/// Saves a model as `.glb`, `.gltf` (with its buffer and images beside it) or `.obj` (with its materials), after reading back
-/// what is to be written. Returns what the format could not keep, a sentence each.
+/// Saves a model as `.glb`, `.gltf` (with its buffer and images beside it) or `.obj` (with its materials), after
+/// reading back what is to be written. Returns notes about content that the format could not keep, a sentence each.
 ///
 /// # Errors
-/// [`StoreError`]; what was there before is still there. A model that the format would hold nothing of is an error, too.
+/// [`StoreError`]; the former file is unchanged. A model without any content that the format can hold is an error, too.
 pub fn store_model(
     disk: &dyn Disk,
     path: &Path,
@@ -158,7 +158,7 @@ pub fn store_model(
     Ok(notes)
 }
 
-/// What OBJ has no place for, as a note.
+/// Note about the content of a model that OBJ cannot hold; empty if there is none.
 fn lost_in_obj(model: &Model) -> Vec<String> {
     let morphs = model.objects.iter().any(|object| !object.morph_names.is_empty());
     let lost: Vec<&str> = [
@@ -173,7 +173,8 @@ fn lost_in_obj(model: &Model) -> Vec<String> {
     if lost.is_empty() { Vec::new() } else { vec![format!("OBJ cannot hold {}: left out", lost.join(", "))] }
 }
 
-/// Saves a rig as `.rig.ron`, or its skeleton as `.rig`. Returns what the format could not keep, a sentence each.
+/// Saves a rig as `.rig.ron`, or its skeleton as `.rig`. Returns notes about content that the format could not keep, a
+/// sentence each.
 pub fn store_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>, StoreError> {
     match FileKind::of(path) {
         Some(FileKind::Template) => {

@@ -1,6 +1,7 @@
-//! Reading back what is about to be written, with the readers that will have to read it.
+//! Verification before a save: the bytes to be written are read back with the readers of their format.
 //!
-//! Nothing is replaced by a file that cannot be read. What arrives on the disk is compared with these bytes when it is saved.
+//! A file is never replaced by one that cannot be read. The bytes that arrive on the disk are compared with these when
+//! they are saved.
 
 use std::path::Path;
 
@@ -18,7 +19,7 @@ use crate::{
     rig::{project::read_project, skin::SkinFile, template::read_template, text},
 };
 
-/// Reads a model that is to be saved, and counts what came back.
+/// Reads back a model before it is saved, and compares the counts of its content.
 pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
     let path = set.path();
     let is_obj = FileKind::of(path) == Some(FileKind::Obj);
@@ -46,22 +47,22 @@ pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
     same("finite points", back.points.len(), back.points.iter().filter(|point| point.is_finite()).count())
 }
 
-/// Reads a template that is to be saved.
+/// Reads back a template before it is saved.
 pub(super) fn template(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     readable(path, read_template(bytes).map(drop).map_err(|source| in_source(path, bytes, source)))
 }
 
-/// Reads a `.rig` that is to be saved.
+/// Reads back a `.rig` text before it is saved.
 pub(super) fn rig_text(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     readable(path, text::parse(bytes).map(drop).map_err(|source| LoadError::RigText { path: path.into(), source }))
 }
 
-/// Reads weights that are to be saved.
+/// Reads back weights before they are saved.
 pub(super) fn skin(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     readable(path, SkinFile::read(bytes).map(drop).map_err(|source| LoadError::Skin { path: path.into(), source }))
 }
 
-/// Reads a project that is to be saved.
+/// Reads back a project before it is saved.
 pub(super) fn project(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     readable(path, read_project(bytes).map(drop).map_err(|source| in_source(path, bytes, source)))
 }

@@ -1,4 +1,4 @@
-//! Building and posing on a workbench: through the same requests and the same entities as in an app.
+//! Building and posing on a workbench, through the same requests and the same entities as in an app.
 
 use std::{collections::BTreeMap, str::FromStr, sync::Arc, time::Duration};
 
@@ -19,9 +19,8 @@ use crate::{
     rig::{BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::did_you_mean},
 };
 
-/// One value that is written to an entity: `CONTROL.translate=(x,y,z)`, `.rotate=(x,y,z)` in degrees about X, Y and Z in
-/// that order, `.scale=(x,y,z)`, all relative to where the control stands at rest, in its own axes; or
-/// `NODE.ATTRIBUTE=value`.
+/// Value to write to an entity: `CONTROL.translate=(x,y,z)`, `.rotate=(x,y,z)` in degrees about X, Y and Z in that
+/// order, `.scale=(x,y,z)`, all relative to the control's rest pose, in its own axes; or `NODE.ATTRIBUTE=value`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlWrite {
     /// The node: a name, a label, or a reference that begins with `@`.
@@ -33,20 +32,20 @@ pub struct ControlWrite {
 /// The channel that a [`ControlWrite`] sets.
 #[derive(Debug, Clone, PartialEq)]
 pub enum WriteValue {
-    /// Units of the rig.
+    /// Translation in units of the rig, along the control's own axes at rest.
     Translate(Vec3),
-    /// Degrees.
+    /// Rotation in degrees about the X, Y and Z axes, in that order.
     Rotate(Vec3),
-    /// Factors.
+    /// Scale factors along the control's own axes.
     Scale(Vec3),
-    /// An attribute by name.
+    /// Attribute by name, and its value.
     Attribute(String, f32),
 }
 
-/// The reason why a control was not posed.
+/// Reason why a control was not posed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PoseError {
-    /// The text is no write.
+    /// The text does not describe a write.
     #[error("\"{0}\" sets nothing: write CONTROL.translate=(x,y,z), .rotate, .scale, or NODE.ATTRIBUTE=value")]
     Syntax(String),
     /// The rig is not built.
@@ -55,22 +54,22 @@ pub enum PoseError {
     /// The built rig cannot run.
     #[error("the built rig cannot run: {0}")]
     CannotRun(String),
-    /// No node of that name.
+    /// The built rig has no node with that name.
     #[error("no {what} is called \"{name}\"{nearest}")]
     NoNode {
-        /// The kind of node that was looked for.
+        /// Requested kind of node, in words.
         what: &'static str,
-        /// The name.
+        /// Requested name.
         name: String,
-        /// The nearest names, as the rest of a sentence.
+        /// Nearest names, as the rest of a sentence.
         nearest: String,
     },
-    /// Several nodes of that name.
+    /// Several nodes have that name.
     #[error("\"{name}\" may be any of {candidates}; write one of these names")]
     Ambiguous {
-        /// The name.
+        /// Requested name.
         name: String,
-        /// Names of the nodes that it may mean.
+        /// Names of the nodes that the requested name may mean.
         candidates: String,
     },
     /// The node has no such attribute.
@@ -80,13 +79,13 @@ pub enum PoseError {
         node: String,
         /// The attribute.
         attribute: String,
-        /// Those there are, as the rest of a sentence.
+        /// Attributes of the node, as the rest of a sentence.
         known: String,
     },
-    /// A reference that finds nothing.
+    /// A reference finds no node.
     #[error(transparent)]
     Reference(#[from] FindError),
-    /// A switch that is not there.
+    /// A switch could not be set.
     #[error(transparent)]
     Switch(#[from] SwitchError),
     /// See [`WorkbenchError`].
@@ -119,16 +118,16 @@ impl FromStr for ControlWrite {
     }
 }
 
-/// A node as its entity has it and as the program has it, in the rig's space.
+/// A node with its entity's transform and the program's transform, both in the rig's space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PosedNode {
     /// The node.
     pub node: BuiltNode,
-    /// The uid of its parent; `None` below the rig.
+    /// Uid of the node's parent; `None` below the rig.
     pub parent: Option<Uid>,
-    /// The place of the entity.
+    /// Transform of the entity, in the rig's space.
     pub entity: Transform,
-    /// The place that the program gives.
+    /// Transform that the program computes, in the rig's space.
     pub program: Transform,
 }
 
@@ -159,7 +158,7 @@ impl PosedNode {
 }
 
 impl Workbench {
-    /// Builds the rig, steps it or rolls it back, as a [`BuildRequest`] in an app does.
+    /// Builds, steps or rolls back the rig, as a [`BuildRequest`] in an app does.
     pub fn build(&mut self, step: BuildStep) -> RunReport {
         self.app.world_mut().resource_mut::<Messages<BuildDone>>().clear();
         self.app.world_mut().write_message(BuildRequest { rig: self.rig, step });
@@ -168,15 +167,15 @@ impl Workbench {
         done.map(|done| done.report).unwrap_or_default()
     }
 
-    /// The processor of the rig; `None` before the first build.
+    /// Processor of the rig; `None` before the first build.
     pub fn processor(&self) -> Option<&Processor> {
         self.app.world().get::<Processor>(self.rig)
     }
 
-    /// The running program.
+    /// Running program of the rig.
     ///
     /// # Errors
-    /// If the rig is not built, or what is built cannot run.
+    /// If the rig is not built, or the built rig cannot run.
     pub fn runtime(&self) -> Result<&RigRuntime, PoseError> {
         let world = self.app.world();
         if let Some(failure) = world.get::<RunFailure>(self.rig) {
@@ -185,7 +184,7 @@ impl Workbench {
         world.get::<RigRuntime>(self.rig).ok_or(PoseError::NotBuilt)
     }
 
-    /// Writes values to the entities of controls and nodes, and lets the rig follow for one frame.
+    /// Writes values to the entities of controls and nodes, and runs one frame.
     ///
     /// # Errors
     /// See [`PoseError`]; nothing is written then.
@@ -224,10 +223,10 @@ impl Workbench {
         self.runtime().map(drop)
     }
 
-    /// Throws switches by the words of a person, without a jump: see [`find_switches`].
+    /// Sets the switches that `name` matches, without moving the nodes that they match: see [`find_switches`].
     ///
     /// # Errors
-    /// No such switch, no such value, or a rig that is not built.
+    /// The built rig has no such switch or value, or the rig is not built.
     pub fn switch(&mut self, name: &str, value: &str) -> Result<(), PoseError> {
         let built = self.built().ok_or(PoseError::NotBuilt)?;
         for (control, attribute, value) in find_switches(built, self.rig(), name, value)? {
@@ -238,14 +237,14 @@ impl Workbench {
         Ok(())
     }
 
-    /// Lets time pass in frames of a sixtieth of a second, so that springs move.
+    /// Runs `count` frames of a sixtieth of a second each, so that springs move.
     pub fn frames(&mut self, count: u32) {
         let step = TimeUpdateStrategy::ManualDuration(Duration::from_nanos(16_666_667));
         self.app.insert_resource(step);
         (0..count).for_each(|_| self.app.update());
     }
 
-    /// All nodes of the built rig as their entities and as the program have them.
+    /// Nodes of the built rig with the transforms of their entities and of the program.
     ///
     /// # Errors
     /// If the rig is not built or cannot run.
@@ -270,8 +269,8 @@ impl Workbench {
         joint.or_else(|| world.get::<BuiltEntities>(self.rig)?.get(node))
     }
 
-    /// The node that a write means. A name wins over a label; among controls of one label the one that is in effect wins:
-    /// the goal of a limb while it follows inverse kinematics, else the forward control.
+    /// Node that a write refers to. A name wins over a label. Among controls with the same label the one in effect
+    /// wins: the goal of a limb while it follows inverse kinematics, else the forward control.
     fn find_node(&self, name: &str, value: &WriteValue) -> Result<BuiltNode, PoseError> {
         let built = self.built().ok_or(PoseError::NotBuilt)?;
         let state = self.runtime()?.state();
@@ -341,7 +340,7 @@ impl Workbench {
 }
 
 impl Workbench {
-    /// The document with the pose and the attribute values that the entities have now, as somebody would store it.
+    /// Document with the pose and the attribute values that the entities have now, as it would be stored.
     ///
     /// # Errors
     /// If the rig is not built or cannot run.
@@ -368,7 +367,7 @@ impl Workbench {
         Ok(rig)
     }
 
-    /// Where the entities of the built nodes stand relative to their parents, by uid.
+    /// Transforms of the built nodes' entities relative to their parents, by uid.
     ///
     /// # Errors
     /// If the rig is not built or cannot run.

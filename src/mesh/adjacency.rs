@@ -22,7 +22,7 @@ pub fn weld(points: &[Vec3]) -> (Vec<u32>, usize) {
         .iter()
         .map(|point| {
             let next = numbers.len() as u32;
-            // Adding zero turns -0.0 into 0.0 and leaves everything else alone.
+            // Adding zero turns -0.0 into 0.0 and changes no other number.
             *numbers.entry(point.to_array().map(|c| (c + 0.0).to_bits())).or_insert(next)
         })
         .collect();
@@ -48,12 +48,12 @@ impl Hasher for PositionHasher {
     }
 }
 
-/// An edge between two points and how many triangles use it.
+/// Edge between two points, with the number of triangles that use it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Edge {
     /// The two points, the smaller index first.
     pub points: [u32; 2],
-    /// Number of triangles: 1 at a border, 2 inside a manifold, more where the mesh is not one.
+    /// Number of triangles that use the edge: 1 at a border, 2 inside a manifold, more elsewhere.
     pub triangles: u32,
 }
 

@@ -31,10 +31,11 @@ pub use write::{GltfWriteSettings, write_glb, write_gltf};
 use crate::mesh::model::Model;
 use budget::{Budget, Notes};
 
-/// Bytes that all images of one file may take together.
+/// Largest number of bytes of all images of one file together.
 pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
-/// Bytes that reading a file of `input` bytes (with its external buffers) may take: 64 MiB and 16 times the file.
+/// Largest number of bytes of memory for reading a file of `input` bytes (with its external buffers): 64 MiB and 16
+/// times the file.
 pub fn memory_limit(input: u64) -> u64 {
     (64 << 20) + input.saturating_mul(16)
 }

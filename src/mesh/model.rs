@@ -105,7 +105,7 @@ impl Faces {
     }
 }
 
-/// One morph target of a part: displacements for each vertex. Lists are empty where the file has none.
+/// Morph target of a part: displacements for each vertex. Lists are empty where the file has none.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Morph {
     /// Displacements of positions, in the same space as the object's points.
@@ -168,7 +168,7 @@ impl Default for Trs {
 }
 
 impl Trs {
-    /// The transform that changes nothing.
+    /// Identity transform.
     pub const IDENTITY: Self = Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE };
 
     /// The transform as an affine matrix.
@@ -236,12 +236,13 @@ pub struct SkinBinding {
     pub inverse_binds: Vec<Mat4>,
 }
 
-/// Influences of points: point `p` has the entries `starts[p]..starts[p + 1]`, strongest first, summing to one (or none).
+/// Influences of points: point `p` has the entries `starts[p]..starts[p + 1]`, strongest first, summing to one (or
+/// none).
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Weights {
     /// Index of the first influence of each point, and the number of influences at the end.
     pub starts: Vec<u32>,
-    /// The joint of each influence; the owner of the weights says which list it indexes.
+    /// Joint of each influence, as an index into the list of joints that the owner of the weights has.
     pub joints: Vec<u32>,
     /// The weight of each influence, positive.
     pub values: Vec<f32>,

@@ -1,4 +1,4 @@
-//! Models at rest: a file's mesh before anyone moves a joint.
+//! Models at rest: the mesh of a file skinned to its joints' rest transforms.
 //!
 //! A skinned glTF mesh is stored in its bind pose, and its joints may rest in another pose. Users see, and draw a
 //! skeleton into, the mesh at the joints' rest transforms.

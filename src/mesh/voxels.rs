@@ -37,7 +37,7 @@ pub enum VoxelizeError {
         /// The number of points.
         points: usize,
     },
-    /// No triangle with finite corners lies in the box.
+    /// The box contains no triangle with finite corners.
     #[error(
         "there is no triangle with finite corners to make voxels of: check that the mesh has faces near the skeleton"
     )]
@@ -98,7 +98,7 @@ impl Voxels {
     fn layout(low: [f64; 3], high: [f64; 3], resolution: usize) -> Self {
         let extent = [0, 1, 2].map(|a| high[a] - low[a]);
         let longest = extent[0].max(extent[1]).max(extent[2]);
-        // A mesh of no extent still gets one cell; f64 holds the range of f32 without trouble.
+        // A mesh without extent still gets one cell; f64 holds the range of f32 without overflow.
         let longest = if longest > 0.0 { longest } else { 1e-3 };
         let mut resolution = resolution.clamp(1, MAX_RESOLUTION) as f64;
         loop {

@@ -1,7 +1,8 @@
-//! The command processor in an app: rigs that are built, and everything about their commands as components.
+//! The command processor in an app: rigs that are built from their commands, with the state of each command as
+//! components.
 //!
-//! A [`BuildRequest`] builds a rig, steps it or rolls it back; a rig that has been built follows every edit from then on
-//! unless [`BuildStep::Follow`] says otherwise. State, error and time of each command are on the entity of its tag
+//! A [`BuildRequest`] builds a rig, steps it or rolls it back; a rig that has been built follows every edit from then
+//! on unless [`BuildStep::Follow`] says otherwise. State, error and time of each command are on the entity of its tag
 //! ([`CommandReport`]). Created nodes and constraints are entities with [`CreatedBy`]; a node that is rolled back is
 //! parked: it keeps its entity, without its components and disabled, until it comes back.
 
@@ -29,7 +30,7 @@ use crate::{
     rig::{BuiltRig, Rig, RigEdit, Uid, step::Committed},
 };
 
-/// Adds tags as entities, and building.
+/// Plugin that builds rigs: runs the commands of tags and spawns entities for what they create.
 pub struct CommandsPlugin;
 
 impl Plugin for CommandsPlugin {
@@ -72,36 +73,36 @@ impl RegisterRigModule for App {
 pub struct BuildRequest {
     /// The rig.
     pub rig: Entity,
-    /// What to do.
+    /// Step to carry out.
     pub step: BuildStep,
 }
 
-/// What a [`BuildRequest`] does.
+/// Steps of a [`BuildRequest`]. Commands are counted in the order of [`Builder::list`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BuildStep {
-    /// All commands.
+    /// Runs all commands and ignores breakpoints.
     All,
-    /// On to the next breakpoint, or to the end.
+    /// Runs up to the next breakpoint, or to the end.
     Run,
-    /// To a place in the list, forwards or backwards.
+    /// Runs or rolls back to a place in the list: the commands before it are in effect afterwards.
     To(usize),
-    /// The next command.
+    /// Runs the next command.
     Forward,
-    /// Back over the last command.
+    /// Rolls back the last command.
     Back,
-    /// The rest of the commands of the joint whose turn it is.
+    /// Runs the remaining commands of the joint that carries the next command.
     JointForward,
-    /// Back over the commands of the joint that was last.
+    /// Rolls back the commands of the joint that carries the last command.
     JointBack,
-    /// Back over everything.
+    /// Rolls back all commands.
     RollBack,
-    /// Which joints' commands are in the list.
+    /// Restricts the list to the commands of some joints.
     Range(BuildRange),
-    /// A breakpoint on a tag, or no longer.
+    /// Sets (`true`) or removes (`false`) a breakpoint on a tag.
     Breakpoint(Uid, bool),
-    /// Whether edits are followed at once.
+    /// Rebuilds after each edit (`true`) or only on request (`false`).
     Follow(bool),
-    /// From nothing, with the modules that are registered now.
+    /// Discards the build and runs all commands with the modules that are registered at present.
     Restart,
 }
 
@@ -110,42 +111,44 @@ pub enum BuildStep {
 pub struct BuildDone {
     /// The rig.
     pub rig: Entity,
-    /// What ran, and what stopped it.
+    /// Commands that ran, and the error that stopped the run, if any.
     pub report: RunReport,
 }
 
-/// The processor of a rig; there from its first [`BuildRequest`] on. Immutable: a [`BuildRequest`] changes what is built.
+/// Command processor of a rig, inserted by the first [`BuildRequest`]. Other code reads it; a [`BuildRequest`] changes
+/// what is built.
 #[derive(Component)]
 pub struct Processor {
     builder: Builder,
-    /// The place that edits are built up to; `None` for all commands.
+    /// Number of commands that an edit rebuilds up to; `None` for all commands.
     goal: Option<usize>,
     follow: bool,
 }
 
 impl Processor {
-    /// The commands, where they stand, breakpoints: everything that can be asked for.
+    /// The builder, for queries: list of commands, their states, breakpoints.
     pub fn builder(&self) -> &Builder {
         &self.builder
     }
 
-    /// True if edits are followed at once.
+    /// True if each edit of the rig rebuilds it.
     pub fn follows(&self) -> bool {
         self.follow
     }
 }
 
-/// What a rig's commands have built so far; changes whenever that does.
+/// Result of the commands that a rig has run so far (nodes, constraints, switches); replaced only when it differs.
 #[derive(Component, Debug, Clone, Default)]
 #[component(immutable)]
 pub struct Built(pub Arc<BuiltRig>);
 
-/// The error that a rig's build stands at; not there if there is none.
+/// Error that stopped a rig's build; absent if the build has no error.
 #[derive(Component, Debug, Clone, PartialEq)]
 #[component(immutable)]
 pub struct BuildFailure(pub BuildError);
 
-/// Where a command stands, how long it took and why it failed: on the entity of its tag, for rigs that are built.
+/// State of a command, duration of its last run and error, if any; on the entity of the command's tag, for rigs that
+/// are built.
 #[derive(Component, Debug, Clone, PartialEq)]
 #[component(immutable)]
 pub struct CommandReport(pub CommandStatus);
@@ -168,7 +171,7 @@ fn build_rigs(
         match &message.committed {
             Some(Committed::Done(step) | Committed::Redone(step)) => entry.1.extend(step.forward.iter().cloned()),
             Some(Committed::Undone(step)) => entry.1.extend(step.backward.iter().cloned()),
-            // A preview, or the end of one: the document says all.
+            // A preview, or its end, lists no edits: the builder compares the whole document.
             None => entry.2 = false,
         }
     }
@@ -244,14 +247,15 @@ fn carry_out(processor: &mut Processor, rig: &Rig, step: &BuildStep) -> RunRepor
             builder.run_to(processor.goal.unwrap_or(usize::MAX))
         }
     };
-    // A build that was halted goes on as soon as it can; one that was stepped stays where it is.
+    // After an error the goal stays, so that the build continues once it can. A build that was stepped to a place stays
+    // there.
     if report.error.is_none() {
         processor.goal = (report.cursor < builder.len()).then_some(report.cursor);
     }
     report
 }
 
-/// Puts what was built onto the rig, if it is other than before.
+/// Writes the built rig to the rig's entity if it differs from before, updates the error, and reports the run.
 fn finish(
     commands: &mut Commands,
     rig: Entity,
@@ -277,7 +281,7 @@ fn finish(
     done.write(BuildDone { rig, report });
 }
 
-/// Puts state, error and time of each command onto the entity of its tag.
+/// Writes the state, error and duration of each command to the entity of its tag.
 fn report_commands(
     mut commands: Commands,
     mut done: MessageReader<BuildDone>,

@@ -1,4 +1,4 @@
-//! Controls in an app: which of them are visible, and switches that are thrown without a jump.
+//! Controls in an app: their visibility, and switches (inverse and forward kinematics, spaces) that keep the pose.
 //!
 //! A node is visible unless its layer is hidden, or its attribute [`VISIBLE`] is below one half. Commands drive that
 //! attribute like any other, so the controls of inverse kinematics hide while a limb follows the forward ones.
@@ -22,7 +22,7 @@ use crate::{
 
 pub use crate::rig::VISIBLE;
 
-/// Adds visibility of nodes, and switches.
+/// Plugin of node visibility and switches.
 pub struct ControlsPlugin;
 
 impl Plugin for ControlsPlugin {
@@ -37,7 +37,7 @@ impl Plugin for ControlsPlugin {
     }
 }
 
-/// Controls are drawn, and picked before joints, while this is true: people who draw a skeleton turn it off.
+/// True while controls are drawn, and picked before joints; false while a skeleton is drawn.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ControlsInUse(pub bool);
 
@@ -47,14 +47,14 @@ impl Default for ControlsInUse {
     }
 }
 
-/// Whether a node is to be seen and picked; on every control and every node of a layer.
+/// True if a node is shown and can be picked; on every control and every node of a layer.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 #[component(immutable)]
 #[reflect(Component)]
 pub struct NodeVisible(pub bool);
 
-/// Asks to set the attribute of a switch (inverse and forward kinematics, spaces) while what it matches stays where it
-/// is: one step of the history.
+/// Request to set the attribute of a switch (inverse and forward kinematics, spaces) while the nodes that the switch
+/// matches keep their place: one step of the history.
 #[derive(Message, Debug, Clone, PartialEq)]
 pub struct SwitchRequest {
     /// The rig.
@@ -63,21 +63,21 @@ pub struct SwitchRequest {
     pub control: Uid,
     /// The attribute.
     pub attribute: String,
-    /// Its next value.
+    /// Value to set.
     pub value: f32,
 }
 
-/// The reason why a switch was not thrown.
+/// Reason why a switch was not set.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SwitchError {
-    /// No switch of that name.
+    /// The built rig has no switch with that name.
     #[error("there is no switch \"{name}\" in the built rig{nearest}; switches: {known}")]
     NoSwitch {
-        /// The name that was asked for.
+        /// Requested name.
         name: String,
-        /// The nearest name, as the rest of a sentence.
+        /// Nearest name, as the rest of a sentence.
         nearest: String,
-        /// All names.
+        /// Names of all switches.
         known: String,
     },
     /// The switch has no such value.
@@ -85,9 +85,9 @@ pub enum SwitchError {
     NoValue {
         /// The name of the switch.
         name: String,
-        /// The value that was asked for.
+        /// Requested value.
         value: String,
-        /// All values.
+        /// Possible values.
         known: String,
     },
     /// The rig is not built, or cannot run.
@@ -141,17 +141,17 @@ fn names(built: &BuiltRig) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// The name of a switch: that of its control and its attribute.
+/// Name of a switch: the name of its control, a dot, and its attribute.
 fn name_of(built: &BuiltRig, switch: &SwitchData) -> Option<String> {
     built.node(switch.control).map(|node| format!("{}.{}", node.name, switch.attribute))
 }
 
-/// Switches by the words of a person: the name of a local group (`arm_l`), the label or the name of the control that
-/// carries the attribute, the label of a joint that the switch matches, or `CONTROL.ATTRIBUTE`; and the number of a value
-/// in words: `ik`, `fk`, the name of a choice, or a number.
+/// Switches that `name` matches, each as its control, its attribute and the number of `value`. A name is that of a
+/// local group (`arm_l`), the label or the name of the control that carries the attribute, the label of a joint that
+/// the switch matches, or `CONTROL.ATTRIBUTE`. A value is `ik`, `fk`, the name of a choice, or a number.
 ///
 /// # Errors
-/// No such switch, or no such value; with the ones there are.
+/// No switch has the name, or none of them has the value; the error lists the possible ones.
 pub fn find_switches(
     built: &BuiltRig,
     rig: &Rig,
@@ -212,7 +212,7 @@ fn number_of(built: &BuiltRig, switch: &SwitchData, name: &str, value: &str) -> 
     })
 }
 
-/// Works out which nodes are visible, where something changed.
+/// Updates the visibility of nodes whose layer, attributes or control changed.
 fn show_nodes(
     mut commands: Commands,
     nodes: Query<

@@ -5,9 +5,9 @@
 //! pieces on the graphics card as they move [`RigSurface`](super::surface::RigSurface), the surface of ray queries, so
 //! that the picture and picking agree.
 //!
-//! No editor is needed: a game that has [`DefaultPlugins`] and [`RigPlugins`](super::RigPlugins) adds [`DisplayPlugin`]
-//! and gives its camera [`ViewportLights`] or lights of its own. The drawn pieces are children of the mesh's entity,
-//! which becomes a child of its rig; hide and show it with its [`Visibility`].
+//! The editor is not needed: a game that has [`DefaultPlugins`] and [`RigPlugins`](super::RigPlugins) adds
+//! [`DisplayPlugin`] and gives its camera [`ViewportLights`] or lights of its own. The drawn pieces are children of the
+//! mesh's entity, which becomes a child of its rig; hide and show it with its [`Visibility`].
 
 mod build;
 mod colors;
@@ -80,7 +80,7 @@ pub enum Shading {
 /// Weights that are shown as colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum WeightColors {
-    /// None.
+    /// Weights are not shown.
     #[default]
     Off,
     /// Weights of one joint, from dark blue (little) over red to yellow (all); grey for none.

@@ -1,9 +1,9 @@
 //! Rigs as entities, and the one place where they change.
 //!
 //! The [`Rig`] component is the document. Its groups, joints and tags stand in the world as entities of their own
-//! ([`schema`](super::schema)), so that Bevy's transforms, skinning and animation work on them, and so that a game finds
-//! them. An [`EditRequest`] changes the document and the entities follow; writing, spawning or despawning the entities
-//! makes an edit. Both go through [`RigHistory`] in one system, the only one that changes a rig.
+//! ([`schema`](super::schema)), so that Bevy's transforms, skinning and animation work on them, and so that a game
+//! finds them. An [`EditRequest`] changes the document and the entities follow; writing, spawning or despawning the
+//! entities makes an edit. Both go through [`RigHistory`] in one system, the only one that changes a rig.
 
 mod adopt;
 pub(in crate::plugins) mod entities;
@@ -61,73 +61,73 @@ impl Plugin for DocumentPlugin {
     }
 }
 
-/// True to show a rig at rest whatever its pose, which stays in the document: while the rest pose is edited.
+/// True to show a rig at rest while its rest pose is edited. The pose stays in the document.
 #[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ShowRest(pub bool);
 
-/// The plane of live mirroring of a rig; `None` while it is off.
+/// Plane of live mirroring of a rig; `None` while mirroring is off.
 #[derive(Component, Debug, Clone, Copy, PartialEq, Default)]
 pub struct Symmetry(pub Option<MirrorPlane>);
 
-/// Asks for one change of a rig. Requests are carried out in the order they are sent.
+/// Request for one change of a rig. Requests are carried out in the order in which they are sent.
 #[derive(Message, Debug, Clone)]
 pub struct EditRequest {
     /// The rig.
     pub rig: Entity,
-    /// What to do.
+    /// Change to make.
     pub change: Change,
 }
 
-/// What an [`EditRequest`] does.
+/// Changes of an [`EditRequest`].
 #[derive(Debug, Clone)]
 pub enum Change {
-    /// Something new: one step of the history.
+    /// Runs an operation as one new step of the history.
     Do(Operation),
-    /// Takes the last step back.
+    /// Undoes the last step.
     Undo,
-    /// Does the last undone step again.
+    /// Redoes the last undone step.
     Redo,
-    /// Shows what an operation would do, for as long as a drag lasts: in the rig, but in neither history nor journal. The
-    /// next preview starts from the rig as it was before this one; any other change takes it back first.
+    /// Previews an operation while a drag lasts: the rig changes, history and journal do not. The next preview starts
+    /// from the rig as it was before this one; any other change reverts it first.
     Preview(Operation),
-    /// Makes what is previewed one step of the history; does nothing if nothing is.
+    /// Records the preview as one step of the history; does nothing without a preview.
     Commit,
-    /// Takes back what is previewed; does nothing if nothing is.
+    /// Reverts the preview; does nothing without a preview.
     CancelPreview,
 }
 
 impl EditRequest {
-    /// Asks for an operation.
+    /// Request to run an operation.
     pub fn operation(rig: Entity, operation: Operation) -> Self {
         Self { rig, change: Change::Do(operation) }
     }
 }
 
-/// A rig was changed.
+/// Message that a rig was changed.
 #[derive(Message, Debug, Clone)]
 pub struct Edited {
     /// The rig.
     pub rig: Entity,
-    /// What was done, undone or redone, in a few words.
+    /// Short name of the step that was done, undone or redone.
     pub name: Cow<'static, str>,
-    /// The change; `None` if the operation had nothing to do, or is only previewed.
+    /// Committed change; `None` if the operation had nothing to do or is only previewed.
     pub committed: Option<Committed>,
-    /// True if something is only previewed, or was and no longer is.
+    /// True if a preview began, changed or ended.
     pub preview: bool,
-    /// What people should know about it, a sentence each: copied tags that had no place, for example.
+    /// Notes for people, a sentence each: copied tags that found no place, for example.
     pub notes: Vec<String>,
 }
 
-/// A change was refused; the rig is as it was.
+/// Message that a change was refused; the rig stays as it was.
 #[derive(Message, Debug, Clone)]
 pub struct EditRefused {
-    /// The rig that was asked for.
+    /// Requested rig.
     pub rig: Entity,
-    /// Why.
+    /// Reason, a sentence for people.
     pub reason: String,
 }
 
-/// Applies what entities asked for, then requests in the order they came.
+/// Applies the edits that writes to entities made, then requests in the order in which they came.
 fn apply_edits(
     mut requests: MessageReader<EditRequest>,
     mut entity_edits: ResMut<adopt::EntityEdits>,
@@ -151,7 +151,7 @@ fn apply_edits(
         let previewed =
             |name: &'static str| Edited { rig, name: name.into(), committed: None, preview: true, notes: Vec::new() };
         let recorded = |Recorded { name, step, notes }| Edited { notes, ..done(name, step.map(Committed::Done)) };
-        // Whoever writes entities means these entities, and not their partners on the other side.
+        // A write to an entity concerns that entity only; live mirroring does not apply to it.
         let plane = symmetry.0.filter(|_| !is_of_entities);
         let result = match change {
             Change::Do(operation) => history

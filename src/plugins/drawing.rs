@@ -111,7 +111,7 @@ impl Default for RigDrawing {
 /// Choice of the joints whose labels are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LabelChoice {
-    /// No labels.
+    /// Labels are not drawn.
     #[default]
     None,
     /// Labels of selected joints and of the hovered one.

@@ -1,4 +1,4 @@
-//! Undo and redo, one step a gesture, the selection included.
+//! Undo and redo, one step for each gesture; a step restores the selection as well.
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -11,31 +11,31 @@ use crate::rig::{
     step::{Committed, Step, UndoStacks},
 };
 
-/// The steps that were done to a rig.
+/// Steps done to a rig and steps that can be redone, with the preview of a drag.
 #[derive(Component, Default)]
 pub struct RigHistory {
     stacks: UndoStacks,
     preview: Option<Preview>,
 }
 
-/// What a drag under way has done to a rig: in the rig already, not in the record.
+/// Preview of a drag: its edits are applied to the rig but not recorded.
 struct Preview {
     name: &'static str,
     outcome: Outcome,
 }
 
-/// What an operation did.
+/// Outcome of a recorded operation.
 #[derive(Debug, Clone)]
 pub struct Recorded {
-    /// What was done, in a few words.
+    /// Short name of the operation.
     pub name: Cow<'static, str>,
-    /// The step; `None` if nothing changed, which is no step.
+    /// Recorded step; `None` if the operation changed nothing.
     pub step: Option<Arc<Step>>,
-    /// What people should know about it, a sentence each.
+    /// Notes for people, a sentence each.
     pub notes: Vec<String>,
 }
 
-/// True if edits delete a joint. Created nodes stay selected: their commands may build them again.
+/// True if edits delete a joint. Created nodes never count as deleted, since their commands may build them again.
 fn removes(edits: &[RigEdit], joint: crate::rig::Uid) -> bool {
     edits.iter().any(|edit| match edit {
         RigEdit::RemoveJoint(removed) => *removed == joint,
@@ -49,13 +49,13 @@ fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), String> {
 }
 
 impl RigHistory {
-    /// A history that was kept, for a rig in which its steps are in effect already.
+    /// A stored history, for a rig in which its steps are already in effect.
     pub fn restored(stacks: &UndoStacks) -> Self {
         Self { stacks: stacks.clone(), preview: None }
     }
 
-    /// Runs an operation and records it as one step. Joints that the operation deleted leave the selection. A preview is
-    /// taken back before.
+    /// Runs an operation and records it as one step. Joints that the operation deletes leave the selection. A preview
+    /// is reverted first.
     pub fn edit(
         &mut self,
         rig: &mut Rig,
@@ -69,11 +69,11 @@ impl RigHistory {
         Ok(self.record(selection, operation.name(), outcome))
     }
 
-    /// Shows what an operation would do: the rig changes, its history does not. What was previewed before is taken back
-    /// first, so each preview starts from the rig as it was before the first.
+    /// Previews an operation: the rig changes, its history does not. A former preview is reverted first, so that each
+    /// preview starts from the rig without one.
     ///
     /// # Errors
-    /// If the operation is refused; then nothing is previewed any more.
+    /// The operation is refused; then no preview remains.
     pub fn preview(
         &mut self,
         rig: &mut Rig,
@@ -87,13 +87,13 @@ impl RigHistory {
         Ok(name)
     }
 
-    /// Records what is previewed as one step; `None` if nothing is.
+    /// Records the preview as one step; `None` without a preview.
     pub fn commit_preview(&mut self, selection: &mut Selection) -> Option<Recorded> {
         let Preview { name, outcome } = self.preview.take()?;
         Some(self.record(selection, name, outcome))
     }
 
-    /// Takes back what is previewed, to the bit; false if nothing is.
+    /// Reverts the preview exactly, bit by bit; false without a preview.
     pub fn cancel_preview(&mut self, rig: &mut Rig) -> bool {
         let Some(preview) = self.preview.take() else { return false };
         let undone = apply_all(rig, &preview.outcome.inverses);
@@ -101,12 +101,12 @@ impl RigHistory {
         true
     }
 
-    /// True while the rig shows what is not in its history.
+    /// True while the rig shows a preview that its history does not have.
     pub fn is_previewing(&self) -> bool {
         self.preview.is_some()
     }
 
-    /// The rig without what is only previewed: what is saved.
+    /// The rig without the preview, as it is saved.
     pub fn settled<'a>(&self, rig: &'a Rig) -> Cow<'a, Rig> {
         let Some(preview) = &self.preview else { return Cow::Borrowed(rig) };
         let mut rig = rig.clone();
@@ -115,14 +115,14 @@ impl RigHistory {
         Cow::Owned(rig)
     }
 
-    /// Records what has been applied already.
+    /// Records an operation whose edits have already been applied.
     fn record(&mut self, selection: &mut Selection, name: &'static str, outcome: Outcome) -> Recorded {
         let before = selection.0.clone();
         let after = outcome
             .selected
             .unwrap_or_else(|| before.iter().copied().filter(|node| !removes(&outcome.edits, *node)).collect());
         let name = Cow::Borrowed(name);
-        // What changed nothing is no step: undoing it would seem to do nothing.
+        // An operation without effect makes no step: undoing it would seem to do nothing.
         if outcome.edits.is_empty() && after == before {
             return Recorded { name, step: None, notes: outcome.notes };
         }
@@ -133,7 +133,7 @@ impl RigHistory {
         Recorded { name, step: Some(step), notes: outcome.notes }
     }
 
-    /// Takes the last step back and returns it, or `None` if there is none. A preview is taken back before.
+    /// Undoes the last step and returns it; `None` without a step. A preview is reverted first.
     pub fn undo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
         self.cancel_preview(rig);
         let step = self.stacks.done.last()?.clone();
@@ -145,7 +145,7 @@ impl RigHistory {
         Some(Ok(step))
     }
 
-    /// Does the last undone step again and returns it, or `None` if there is none. A preview is taken back before.
+    /// Redoes the last undone step and returns it; `None` without one. A preview is reverted first.
     pub fn redo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
         self.cancel_preview(rig);
         let step = self.stacks.undone.last()?.clone();
@@ -157,7 +157,7 @@ impl RigHistory {
         Some(Ok(step))
     }
 
-    /// True if a step that was undone can be done again.
+    /// True if an undone step can be redone.
     pub fn can_redo(&self) -> bool {
         !self.stacks.undone.is_empty()
     }
@@ -168,7 +168,7 @@ impl RigHistory {
         (done.iter().chain(undone.iter().rev()).map(|step| step.name.as_ref()).collect(), done.len())
     }
 
-    /// The last step in effect; the same one again after undo and redo, and after nothing else.
+    /// Last step in effect. The same step again means that nothing happened in between but its undo and redo.
     pub fn last(&self) -> Option<&Arc<Step>> {
         self.stacks.done.last()
     }

@@ -1,4 +1,4 @@
-//! Results of background jobs: each lands on the document that it was computed for, or not at all.
+//! Results of background jobs: each is committed to the document that it was computed for, or dropped.
 //!
 //! A job (weights, a face) starts from a document that people go on editing. Committing its result is a step of the
 //! history, and a step that is committed after an undo cuts off what could be done again. So a result waits while
@@ -10,7 +10,7 @@ use bevy::prelude::*;
 use super::history::RigHistory;
 use crate::rig::{NodeKind, Rig, Uid};
 
-/// The result of a background job waits, because committing it now would cut off steps that can be redone.
+/// Message that the result of a background job waits, because committing it now would discard steps that can be redone.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct ResultHeld {
     /// The mesh that the job is for.
@@ -19,13 +19,13 @@ pub struct ResultHeld {
     pub reason: String,
 }
 
-/// Hash of everything in a document that a job on one mesh depends on: its joints, where they rest, and, where joints
-/// are locked, the weights that stay.
+/// Hash of everything in a document that a job on one mesh depends on: the joints with their rest poses and, if any
+/// joint is locked, the mesh's present weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct JobBasis(u64);
 
 impl JobBasis {
-    /// The basis that a document gives now.
+    /// Basis of a job that starts from the document as it is now.
     pub(super) fn of(rig: &Rig, mesh: Uid) -> Self {
         // FNV-1a over words; only compared within one process.
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
@@ -57,7 +57,7 @@ pub(super) enum Landing {
     Commit,
     /// The result waits: steps can be redone, or a drag is under way.
     Hold,
-    /// The joints are others for good.
+    /// The joints that the result was computed from have changed, and no undone step can restore them.
     Drop,
 }
 

@@ -69,7 +69,7 @@ pub enum Pick {
         /// Largest distance, in model units, of clicks at the same spot.
         reach: f32,
     },
-    /// All joints in a box between two opposite corners.
+    /// Joints in a box between two opposite corners.
     Box {
         /// The view.
         plane: ViewPlane,
@@ -78,9 +78,9 @@ pub enum Pick {
     },
     /// The listed joints.
     Joints(Vec<Uid>),
-    /// All joints.
+    /// Every joint of the rig.
     All,
-    /// No joint.
+    /// Empty selection.
     None,
 }
 

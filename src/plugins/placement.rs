@@ -52,15 +52,15 @@ pub struct Placed {
 /// Joint that a [`PlaceRequest`] adds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedJoint {
-    /// What the ray meets.
+    /// Hits of the ray, and the position between them.
     pub placement: Placement,
-    /// The joint that it hangs on: the active one of the selection.
+    /// Parent joint: the active joint of the selection.
     pub parent: Option<Uid>,
-    /// Where it rests, in the rig's space; `None` where the ray meets nothing.
+    /// Rest position in the rig's space; `None` where the ray misses the mesh.
     pub rest: Option<Vec3>,
 }
 
-/// Joint that a ray places, without placing it: the request and its preview are the same.
+/// Joint that a ray would place. The request and its preview share this function, so that they agree.
 pub fn joint_at(
     rig: &Rig,
     selection: &Selection,
@@ -71,7 +71,7 @@ pub fn joint_at(
     let hits = surface.map(|surface| surface.hits(ray)).unwrap_or_default();
     let placement = place_hits(ray, &hits, settings);
     let parent = selection.active();
-    // On a posed mesh the joint rests where its parent's pose brings it to what was clicked.
+    // On a posed mesh, the rest position is the point that the parent's pose moves to the clicked point.
     let rest = placement.position().map(|position| rig.rest_from_pose(parent).transform_point3(position));
     PlacedJoint { placement, parent, rest }
 }

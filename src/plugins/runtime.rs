@@ -1,13 +1,14 @@
-//! Rigs that run: programs between Bevy's animation and its propagation of transforms.
+//! Running rigs: programs that are evaluated after Bevy's animation and before its propagation of transforms.
 //!
 //! A [`RigRuntime`] on an entity makes it an instance of a [`RigProgram`]. Each frame, instances whose inputs changed
-//! take the poses of their controls, run (in parallel over instances) and hand out what came of it; others cost nothing.
-//! In the editor every node is an entity with a `Transform`. In a game only joints and exposed controls are, and joints
-//! get their `GlobalTransform` at once, so that a crowd does not propagate what nobody sees: see [`InstanceMode`].
+//! read the poses of their controls, run (in parallel over instances) and write their results; others cost nothing. In
+//! the editor every node is an entity with a `Transform`. In a game only joints and exposed controls are entities, and
+//! joints get their `GlobalTransform` at once, so that a crowd does not propagate transforms of hidden nodes: see
+//! [`InstanceMode`].
 //!
-//! The `Transform` of a node owns its pose: a `Transform` that differs from what the program last wrote was written by a
-//! person, an animation or a game, and becomes the node's pose offset before the program runs. The program then writes
-//! the `Transform`s of all nodes whose place differs. The document's pose is handed over only where the document changes.
+//! The `Transform` of a node owns its pose: a `Transform` that differs from the one the program last wrote was written
+//! by a person, an animation or a game, and becomes the node's pose offset before the program runs. The program then
+//! writes the `Transform`s of all nodes that moved. The document's pose is passed on only where the document changes.
 
 mod spawn;
 mod systems;
@@ -24,7 +25,7 @@ use crate::{
     solve::program::{Memory, RigProgram, RigState},
 };
 
-/// Adds the systems that run rigs.
+/// Plugin that runs rigs.
 pub struct RuntimePlugin;
 
 impl Plugin for RuntimePlugin {
@@ -48,49 +49,50 @@ impl Plugin for RuntimePlugin {
     }
 }
 
-/// How an instance hands out its results.
+/// Output mode of an instance: the entities that its results are written to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum InstanceMode {
     /// Every node is an entity in the same hierarchy as in the rig. Controls are posed by their `Transform`; that of
     /// driven nodes is written before Bevy propagates.
     #[default]
     Hierarchy,
-    /// Only joints and exposed nodes are entities, below none. Exposed nodes are posed by their [`ControlPose`]; the
-    /// `GlobalTransform` of joints is written after Bevy has propagated that of the rig.
+    /// Only joints and exposed nodes are entities, without parents. Exposed nodes are posed by their [`ControlPose`];
+    /// the `GlobalTransform` of joints is written after Bevy has propagated the rig's.
     Direct,
 }
 
-/// A running rig.
+/// Running instance of a [`RigProgram`], on the entity of a rig.
 #[derive(Component, Debug, Clone)]
 pub struct RigRuntime {
     state: RigState,
     mode: InstanceMode,
-    /// The entity of each slot.
+    /// Entity of each slot.
     nodes: Vec<Option<Entity>>,
-    /// Slots that are posed, and by which entity.
+    /// Slots whose poses are read, each with its entity.
     controls: Vec<(u32, Entity)>,
-    /// Slots that are written, and where.
+    /// Slots whose transforms are written, each with its entity.
     written: Vec<(u32, Entity)>,
-    /// The `Transform` that each slot's entity was last given or read with, where every node is an entity.
+    /// Local `Transform` that was last written to or read from the entity of each slot; empty in
+    /// [`InstanceMode::Direct`].
     shown: Vec<Transform>,
-    /// Slots whose `Transform` somebody else wrote: they are looked at after the run even if nothing moved.
+    /// Slots whose `Transform` other code wrote; the next run writes them again even if the node has not moved.
     rewritten: Vec<bool>,
     has_rewritten: bool,
-    /// Slots of attributes whose entity holds them, by that entity.
+    /// Slots of the attributes that each entity holds.
     attributes: BTreeMap<Entity, Vec<u32>>,
-    /// The values that attributes were last shown with.
+    /// Attribute values last written to or read from entities.
     values: Vec<f32>,
-    /// The pose and the values of the document that were last handed over.
+    /// Pose offsets of the document that were last passed on.
     posed: BTreeMap<Uid, PoseOffset>,
     valued: AttributeValues,
-    /// True if a control changed since the last run.
+    /// True if a control has changed since the last run.
     is_due: bool,
-    /// True if all entities are looked at after the next run.
+    /// True if the next run writes all entities.
     all_due: bool,
 }
 
 impl RigRuntime {
-    /// An instance whose nodes have no entities yet; see [`spawn_instance`].
+    /// Instance whose nodes have no entities yet; see [`spawn_instance`].
     ///
     /// An instance in [`InstanceMode::Direct`] remembers only inputs and results.
     pub fn new(program: Arc<RigProgram>, mode: InstanceMode) -> Self {
@@ -118,24 +120,24 @@ impl RigRuntime {
         &self.state
     }
 
-    /// Inputs, to be changed: they are taken up in the same frame. Leave evaluating to the plugin, or evaluate a clone:
-    /// results of an evaluation that the plugin did not make are not handed out.
+    /// Inputs for changes, which take effect in the same frame. Leave the evaluation to the plugin, or evaluate a
+    /// clone: the plugin does not write the results of other evaluations to entities.
     pub fn state_mut(&mut self) -> &mut RigState {
         &mut self.state
     }
 
-    /// How it hands out its results.
+    /// Output mode of the instance.
     pub fn mode(&self) -> InstanceMode {
         self.mode
     }
 
-    /// The entity of a slot.
+    /// Entity of a slot.
     pub fn entity(&self, slot: usize) -> Option<Entity> {
         self.nodes.get(slot).copied().flatten()
     }
 
-    /// Lets an entity stand for a slot: it poses the node, and the program writes it. It has to have [`NodeOf`], and
-    /// [`NodeSlot`] in [`InstanceMode::Direct`], as those of [`spawn_instance`] have.
+    /// Connects a slot with an entity, which poses the slot's node and receives its results. The entity needs
+    /// [`NodeOf`] and, in [`InstanceMode::Direct`], [`NodeSlot`]; entities of [`spawn_instance`] have them.
     pub fn attach(&mut self, slot: usize, entity: Entity) {
         let Some(node) = self.state.program().nodes().get(slot) else { return };
         let is_read = node.is_posable() || self.mode == InstanceMode::Hierarchy;
@@ -148,7 +150,7 @@ impl RigRuntime {
         place(&mut self.controls, is_read);
         place(&mut self.written, true);
         if let Some(shown) = self.shown.get_mut(slot) {
-            // An entity that was never written: whatever it says is no pose.
+            // The program has never written this entity, so its transform is no pose.
             *shown = UNSEEN;
         }
         self.nodes[slot] = Some(entity);
@@ -163,8 +165,8 @@ impl RigRuntime {
         self.all_due = self.mode == InstanceMode::Hierarchy;
     }
 
-    /// Hands over the pose and the attribute values of a document where they differ from those that were last handed
-    /// over; a rest pose if `is_posed` is false.
+    /// Passes on the pose and the attribute values of a document where they differ from the last ones; the rest pose if
+    /// `is_posed` is false.
     pub(super) fn pose_from(&mut self, rig: &Rig, is_posed: bool) {
         let none = BTreeMap::new();
         let pose = if is_posed { rig.pose() } else { &none };
@@ -195,14 +197,14 @@ impl RigRuntime {
         }
     }
 
-    /// Notes the offset of the document that a node stands with already.
+    /// Sets the pose offset of a node that already stands at this offset of the document.
     pub(super) fn note_pose(&mut self, node: Uid, offset: PoseOffset) {
         if offset != PoseOffset::IDENTITY && self.state.set_offset(node, offset).is_ok() {
             self.posed.insert(node, offset);
         }
     }
 
-    /// Lets the motion of the same rig's program before go on in this one.
+    /// Carries the motion of the same rig's previous program over to this one.
     pub(super) fn carry_over(&mut self, before: &Self) {
         self.state.carry_over(&before.state);
         self.posed.clone_from(&before.posed);
@@ -219,16 +221,16 @@ impl RigRuntime {
     }
 }
 
-/// A transform that no entity has.
+/// Marker for a slot whose entity has not been written yet; no entity has this transform.
 const UNSEEN: Transform = Transform { translation: Vec3::NAN, rotation: Quat::IDENTITY, scale: Vec3::ONE };
 
-/// The slot of a program that an entity stands for.
+/// Slot of a program that an entity represents.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 #[component(immutable)]
 #[reflect(Component)]
 pub struct NodeSlot(pub u32);
 
-/// What an exposed node of an instance in [`InstanceMode::Direct`] is posed by: people, code or an animation curve.
+/// Pose of an exposed node of an instance in [`InstanceMode::Direct`], written by people, code or an animation curve.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component)]
 pub struct ControlPose {
@@ -258,21 +260,21 @@ impl From<ControlPose> for PoseOffset {
     }
 }
 
-/// On a mesh: which of its morph targets a running rig drives, and their weights.
+/// Morph targets of a mesh that a running rig drives, with their weights; on the mesh's entity.
 ///
-/// Where Bevy draws (feature `draw`), the weights go on to the mesh's `MeshMorphWeights`.
+/// With the feature `draw`, the weights are copied to the mesh's `MeshMorphWeights`.
 #[derive(Component, Debug, Clone, PartialEq)]
 pub struct DrivenMorphs {
     /// The running rig.
     pub rig: Entity,
-    /// Numbers of the mesh's targets, and slots of the program's.
+    /// Pairs of the target's number in the mesh and its slot in the program.
     pub targets: Vec<(usize, usize)>,
-    /// Weights in the order of `targets`, as the rig last gave them.
+    /// Weights in the order of `targets`, as the rig last set them.
     pub weights: Vec<f32>,
 }
 
 impl DrivenMorphs {
-    /// Connects the targets of a mesh, given by name in order, with those of a program.
+    /// Connects the morph targets of a mesh, given by name in order, with those of a program.
     pub fn new(rig: Entity, program: &RigProgram, names: &[String]) -> Self {
         let slot = |(number, name): (usize, &String)| Some((number, program.morph(name)?));
         let targets: Vec<_> = names.iter().enumerate().filter_map(slot).collect();

@@ -1,8 +1,8 @@
-//! Components and relations that tell a rig: the same in an app, in the editor and in a game.
+//! Components and relations that describe a rig: the same in an app, in the editor and in a game.
 //!
-//! The [`Rig`](crate::rig::Rig) component is the document; everything else here stands on entities that follow it. A
-//! component that tells something of the document may be written, and the write becomes an edit: see the table in
-//! [`plugins`](super). Components that tell results are immutable or are put back.
+//! The [`Rig`](crate::rig::Rig) component is the document; the other components are on entities that follow it.
+//! Components that describe the document may be written, and a write becomes an edit: see the table in
+//! [`plugins`](super). Components that describe results are immutable, or writes to them are reverted.
 //!
 //! | thing | components |
 //! | --- | --- |
@@ -19,8 +19,8 @@ use bevy::prelude::*;
 
 use crate::rig::{ControlData, LayerData, RestTransform, Uid};
 
-/// A joint of the document, or one that a command created. Its [`Transform`] is the pose relative to its parent, its
-/// [`RestTransform`] the rest pose.
+/// Joint of the document, or one that a command created. Its [`Transform`] is the pose and its [`RestTransform`] the
+/// rest pose, both relative to its parent.
 ///
 /// Spawning an entity with this component below a rig or one of its joints adds a joint to the document; its rest pose
 /// is the `RestTransform`, or the `Transform` where that was left out.
@@ -29,24 +29,24 @@ use crate::rig::{ControlData, LayerData, RestTransform, Uid};
 #[require(Transform, RestTransform)]
 pub struct Joint;
 
-/// A node that carries others and never moves the mesh. On a joint of the document: a joint without weights.
+/// Node that carries others and never moves the mesh. On a joint of the document: a joint without weights.
 #[derive(Component, Reflect, Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct Null;
 
-/// The rig that a node belongs to: joints, created nodes, and the nodes of a game's instance.
+/// Rig that a node belongs to: joints, created nodes, and the nodes of a game's instance.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 #[relationship(relationship_target = RigNodes)]
 #[reflect(Component)]
 pub struct NodeOf(pub Entity);
 
-/// The nodes of a rig; they go with it.
+/// Nodes of a rig; despawned together with it.
 #[derive(Component, Reflect, Debug, Default)]
 #[relationship_target(relationship = NodeOf, linked_spawn)]
 #[reflect(Component)]
 pub struct RigNodes(Vec<Entity>);
 
-/// The label of a joint or created node, by which references find it.
+/// Label of a joint or created node, by which references find the node.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct NodeLabel(pub String);
@@ -69,7 +69,7 @@ pub struct LocalGroup {
 #[reflect(Component)]
 pub struct GroupOf(pub Entity);
 
-/// The local groups of a rig, in order; they go with it.
+/// Local groups of a rig, in order; despawned together with it.
 #[derive(Component, Reflect, Debug, Default)]
 #[relationship_target(relationship = GroupOf, linked_spawn)]
 #[reflect(Component)]
@@ -109,7 +109,7 @@ impl Default for Tag {
 #[reflect(Component)]
 pub struct TagOf(pub Entity);
 
-/// The tags of a joint, in order; they go with it.
+/// Tags of a joint, in order; despawned together with it.
 #[derive(Component, Reflect, Debug, Default)]
 #[relationship_target(relationship = TagOf, linked_spawn)]
 #[reflect(Component)]
@@ -168,15 +168,16 @@ pub struct CreatedNodes(Vec<Entity>);
 #[component(immutable)]
 #[reflect(Component)]
 pub struct CreatedRole {
-    /// The role that the module gives it.
+    /// Role that the module gives to the node.
     pub role: String,
-    /// The node that it was made for.
+    /// Node that this node was made for.
     pub subject: Uid,
-    /// Its number among several for the same purpose.
+    /// Number of the node among those with the same role and subject.
     pub number: u32,
 }
 
-/// A node that people and animations move. Its `Transform` is its pose; the channels and limits hold for whoever writes it.
+/// Node that people and animations move. Its `Transform` is its pose; code that writes the pose has to keep to the
+/// channels and limits.
 #[derive(Component, Reflect, Debug, Clone, PartialEq)]
 #[component(immutable)]
 #[reflect(Component)]
@@ -189,19 +190,19 @@ pub struct Control(pub ControlData);
 pub struct NodeLayer(pub LayerData);
 
 /// Values of a node's attributes by name, as they are in effect. Writing a value drives the rig in the same frame, as
-/// writing a control's `Transform` does; an attribute that a constraint drives is put back.
+/// writing a control's `Transform` does; the value of an attribute that a constraint drives is restored.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
 #[reflect(Component)]
 pub struct Attributes(pub BTreeMap<String, f32>);
 
-/// A node that is rolled back. It has no place in the rig until it is built again.
+/// Marks a node that is rolled back: it has no place in the rig until it is built again.
 #[derive(Component, Reflect, Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[component(immutable)]
 #[reflect(Component)]
 pub struct Parked;
 
-/// The node that a constraint drives (the last one of those that it drives). Constraints on one node run in the order
-/// of its [`NodeConstraints`].
+/// Node that a constraint drives (the last one if it drives several). Constraints on one node run in the order of its
+/// [`NodeConstraints`].
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 #[relationship(relationship_target = NodeConstraints)]
 #[reflect(Component)]
@@ -225,11 +226,11 @@ pub struct ConstraintKind(pub &'static str);
 #[reflect(Component)]
 pub struct ConstraintTargets(pub Vec<ConstraintTarget>);
 
-/// One node that a constraint reads.
+/// Node that a constraint reads, with its weight.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq)]
 pub struct ConstraintTarget {
     /// The node.
     pub node: Entity,
-    /// Its weight; `None` where an attribute gives it.
+    /// Weight of the node; `None` where an attribute gives it.
     pub weight: Option<f32>,
 }

@@ -33,7 +33,7 @@ use crate::{
     },
 };
 
-/// Adds automatic skinning.
+/// Plugin of automatic skinning.
 pub struct SkinningPlugin;
 
 impl Plugin for SkinningPlugin {
@@ -46,14 +46,14 @@ impl Plugin for SkinningPlugin {
     }
 }
 
-/// Asks to compute weights for a mesh of a rig.
+/// Request to compute weights for a mesh of a rig.
 #[derive(Message, Debug, Clone)]
 pub struct BindRequest {
     /// The entity with the [`RigMesh`].
     pub mesh: Entity,
-    /// How.
+    /// Settings of the computation.
     pub settings: WeightSettings,
-    /// Objects that move with one joint only: the object's number in the model, and the joint.
+    /// Objects of the mesh that move with one joint only: the object's number in the model, and the joint.
     pub rigid: Vec<(usize, Uid)>,
 }
 
@@ -62,31 +62,31 @@ pub struct BindRequest {
 pub struct Bound {
     /// The mesh.
     pub mesh: Entity,
-    /// How its points got their weights, or why they did not.
+    /// Report of the computation, or the reason why it failed.
     pub result: Result<WeightReport, String>,
 }
 
-/// Skinning under way; remove the component or call [`SkinningJob::cancel`] to stop it.
+/// Running computation of weights; remove the component or call [`SkinningJob::cancel`] to stop it.
 #[derive(Component)]
 pub struct SkinningJob {
     progress: Arc<AtomicU32>,
     cancelled: Arc<AtomicBool>,
     task: Task<Computed>,
-    /// The part of the document that the weights are computed from.
+    /// Hash of the part of the document that the weights are computed from.
     basis: JobBasis,
-    /// Weights that are finished and wait; see [`landing`](super::landing).
+    /// Finished weights that wait to be committed; see [`landing`](super::landing).
     held: Option<Computed>,
 }
 
 type Computed = Result<(Arc<SkinData>, WeightReport), WeightError>;
 
 impl SkinningJob {
-    /// How much is done, 0 to 1.
+    /// Finished share, 0 to 1.
     pub fn progress(&self) -> f32 {
         f32::from_bits(self.progress.load(Ordering::Relaxed))
     }
 
-    /// Stops it; the rig stays as it was.
+    /// Stops the computation; the rig stays as it was.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
@@ -98,25 +98,25 @@ impl Drop for SkinningJob {
     }
 }
 
-/// What weights are computed from: the joints of a [`DeformSkeleton`], in its order.
+/// Input of a computation of weights: the joints of a [`DeformSkeleton`], in its order.
 pub struct SkinningInput {
-    /// The joints.
+    /// Joints of the skeleton.
     pub joints: Vec<WeightJoint>,
-    /// Their uids.
+    /// Uids of `joints`.
     pub uids: Vec<Uid>,
-    /// The nodes that created ones were made for.
+    /// For each created joint, the node that it was made for.
     pub subjects: BTreeMap<Uid, Uid>,
-    /// Which of them are locked.
+    /// Locks of `joints`: locked joints keep their weights.
     pub locked: Vec<bool>,
-    /// The weights there are, over the same joints.
+    /// Present weights of the mesh, over the same joints.
     pub existing: Option<Weights>,
-    /// Points that move with one joint only.
+    /// Ranges of points that move with one joint only, each with the joint's index.
     pub rigid: Vec<(Range<u32>, u32)>,
 }
 
 impl SkinningInput {
-    /// Gathers what a rig, and what its commands built, say about a mesh. Objects that hang on a joint in their file
-    /// are rigid, too; joints that commands created are locked with the node that they were made for.
+    /// Collects the input for a mesh from a rig and its build. Objects that hang on a joint in their file are rigid,
+    /// too; joints that commands created are locked with the node that they were made for.
     pub fn new(rig: &Rig, built: Option<&BuiltRig>, mesh: &RigMesh, rigid: &[(usize, Uid)]) -> Self {
         let skeleton = DeformSkeleton::new(rig, built);
         let joints = skeleton.joints().iter().map(|joint| WeightJoint {

@@ -99,9 +99,9 @@ pub enum StrokeResult {
         /// The joint at the bone's end.
         child: Uid,
     },
-    /// These joints were deleted.
+    /// The listed joints were deleted.
     Erased(Vec<Uid>),
-    /// The stroke had no effect, for this reason.
+    /// The stroke had no effect, for the given reason.
     Nothing(String),
 }
 
@@ -111,7 +111,7 @@ struct WaitingStrokes(Vec<WaitingStroke>);
 
 struct WaitingStroke {
     request: StrokeRequest,
-    /// Number of the state of the surface that it was drawn on.
+    /// Number of the state of the surface on which the stroke was drawn.
     since: Option<u64>,
     /// Task that computes its chain.
     chain: Option<Task<FoundChain>>,
@@ -145,7 +145,7 @@ fn stroke(
     }
     let arrived = requests.read().map(|request| WaitingStroke { request: request.clone(), since: None, chain: None });
     waiting.0.extend(arrived);
-    // One stroke a rig at a time: the next may start on a joint of the last.
+    // Only one stroke of a rig is processed at a time: the next may start on a joint that it adds.
     let mut busy: Vec<Entity> = Vec::new();
     waiting.0.retain_mut(|WaitingStroke { request, since, chain }| {
         let Ok(drawn) = rigs.get(request.rig) else { return false };

@@ -3,9 +3,9 @@
 //! Bevy's own `MeshRayCast` gives one hit a mesh, in the bind pose. Placing needs all hits on the mesh in its current
 //! pose, so a rig has a [`RigSurface`] over all its meshes.
 //!
-//! No work on the main thread is proportional to the mesh. Reading the mesh, skinning its points and building or
-//! refitting the hierarchy run in a background task, one at a time for a rig; while it runs, the latest pose waits and
-//! those between are left out. Until a task ends, rays meet the last finished surface: a fraction of a second behind
+//! The work on the main thread does not grow with the mesh. Reading the mesh, skinning its points and building or
+//! refitting the hierarchy run in a background task, one at a time for a rig; meanwhile only the latest pose waits, and
+//! poses in between are skipped. Until a task ends, rays meet the last finished surface: a fraction of a second behind
 //! for the first one (rays meet nothing until it is ready), some hundredths for a pose. A request that changes a rig by
 //! a ray's hits waits for the surface to catch up with the pose that the user saw ([`RigSurface::shows`]), so that
 //! results never depend on timing; a preview need not wait. Meshes of few points are refreshed within the frame.

@@ -23,7 +23,7 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
         let source = rig.joint(node.uid).map(|joint| &joint.data);
         let joint = JointData {
             uid: node.uid,
-            // A created node bears the label of another joint; its own name says more.
+            // The label of a created node is that of another joint, so the node's own name says more.
             label: if source.is_some() {
                 node.label.as_deref().map(str::to_owned)
             } else {
@@ -41,7 +41,7 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
     }
     edits.extend(rig.skins().map(|(mesh, skin)| RigEdit::SetSkin(mesh, Some(skin.clone()))));
     for edit in edits {
-        // The edit can only be refused for a rotation that is far from a unit quaternion; the joint is left out then.
+        // An edit is refused only for a rotation that is far from a unit quaternion; that joint is then left out.
         let _ = baked.apply(&edit);
     }
     baked

@@ -1,5 +1,4 @@
-//! A built rig as plain data: the result of a document's commands, in the form that the runtime, exporters and readers
-//! of the result take.
+//! A built rig as plain data: the result of a document's commands, for the runtime, exporters and other readers.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -8,18 +7,18 @@ use serde::{Deserialize, Serialize};
 use super::{Constraint, Uid};
 use crate::mesh::model::Trs;
 
-/// The nodes and constraints of a built rig. Everything is in the rig's space or relative to a parent in it.
+/// Nodes, constraints and switches of a built rig. Transforms are in the rig's space or relative to a parent.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct BuiltRig {
     /// Joints of the document and nodes that commands created: parents before children.
     pub nodes: Vec<BuiltNode>,
     /// Constraints that drive the nodes, in the order of creation: constraints on one node run in this order.
     pub constraints: Vec<BuiltConstraint>,
-    /// Switches that can be matched, so that throwing them makes no jump.
+    /// Switches whose nodes can be matched, so that setting a switch moves none of them.
     pub switches: Vec<Arc<SwitchData>>,
 }
 
-/// A switch between two ways of moving the same nodes, with the data that throws it without a jump: see
+/// Switch between two ways of moving the same nodes, with the data that keeps the nodes in place when it is set: see
 /// `solve::matching`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SwitchData {
@@ -33,7 +32,7 @@ pub struct SwitchData {
     pub matching: Matching,
 }
 
-/// Nodes that stay in place while a switch is thrown.
+/// Nodes that stay in place when a switch is set.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Matching {
     /// A limb between forward (0) and inverse (1) kinematics.
@@ -59,7 +58,7 @@ pub enum Matching {
 /// A node of a built rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuiltNode {
-    /// Identity: a joint's own uid, or one that follows from the command, the role and the subject.
+    /// Uid of the node: a joint's own, or one that follows from the command, the role and the subject.
     pub uid: Uid,
     /// The name in files and lists; need not be unique.
     pub name: Arc<str>,
@@ -75,11 +74,11 @@ pub struct BuiltNode {
     pub group: Option<Uid>,
     /// Command that made the node; `None` for joints of the document.
     pub origin: Option<Arc<Origin>>,
-    /// Appearance and free channels, if people move the node.
+    /// Appearance and free channels; `None` if people do not move the node.
     pub control: Option<Arc<ControlData>>,
-    /// The layer it is shown in.
+    /// Layer in which the node is shown.
     pub layer: Option<Arc<LayerData>>,
-    /// Named values, in order.
+    /// Attributes of the node, in order.
     pub attributes: Arc<[Attribute]>,
 }
 
@@ -92,16 +91,16 @@ pub struct Origin {
     pub module: Arc<str>,
     /// Purpose of the node, named by the module.
     pub role: Arc<str>,
-    /// Uid of the node that it was made for.
+    /// Uid of the node for which this node was made.
     pub subject: Uid,
-    /// Number among several nodes for the same purpose.
+    /// Number of the node among those with the same command, role and subject.
     pub number: u32,
 }
 
 /// A constraint with its identity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuiltConstraint {
-    /// Identity.
+    /// Uid of the constraint.
     pub uid: Uid,
     /// Uid of the command tag that made the constraint.
     pub command: Uid,

@@ -91,7 +91,7 @@ pub fn rig_text(rig: &Rig) -> RigText {
 pub struct Character<'a> {
     /// The rig.
     pub rig: &'a Rig,
-    /// What its commands built, if they did: the character then has the built joints.
+    /// Result of the rig's commands, if it is built: the character then has the built joints.
     pub built: Option<&'a BuiltRig>,
     /// The mesh as its file has it.
     pub file: &'a Model,
@@ -152,14 +152,15 @@ pub fn character(parts: &Character) -> Model {
 
 pub(crate) fn inverse_bind(global: &Affine3) -> Mat4 {
     let inverse = Mat4::from(*global).inverse();
-    // The last row of an affine matrix is exact, which the glTF validator insists on; a flat joint has no inverse.
+    // The last row of an affine matrix is set exactly, as the glTF validator requires; a joint that is flat in one
+    // direction has no inverse.
     let mut columns = if inverse.is_finite() { inverse.to_cols_array() } else { Mat4::IDENTITY.to_cols_array() };
     (columns[3], columns[7], columns[11], columns[15]) = (0.0, 0.0, 0.0, 1.0);
     Mat4::from_cols_array(&columns)
 }
 
-/// The file's bind poses over the rig's joints. A joint that was moved at rest after the import does not move the mesh:
-/// its matrix keeps its former effect on the mesh at rest.
+/// Bind poses of the file over the rig's joints. Moving a joint's rest transform after the import does not move the
+/// mesh: the joint's matrix keeps its former effect on the mesh at rest.
 fn rebound(file: &Model, node_of: &[Option<usize>], globals: &[(Uid, Affine3)]) -> Vec<SkinBinding> {
     let file_globals = file.rest_globals();
     let bind = |skin: &SkinBinding| {
@@ -177,8 +178,8 @@ fn rebound(file: &Model, node_of: &[Option<usize>], globals: &[(Uid, Affine3)]) 
     file.skins.iter().map(bind).collect()
 }
 
-/// Weights over the nodes of the exported model. Joints that are not built hand their influences to whoever holds them
-/// meanwhile; those of joints that were deleted since go to the others.
+/// Weights over the nodes of the exported model. Influences of joints that are not built go to the joints that hold
+/// them meanwhile; influences of deleted joints are shared among the others.
 fn remapped(skin: &SkinData, rig: &Rig, skeleton: &DeformSkeleton, place: &HashMap<Uid, usize>) -> Weights {
     let holders = skeleton.holders(rig, skin).into_iter();
     let node_of: Vec<Option<usize>> =

@@ -1,4 +1,4 @@
-//! Constraints as data: movements of nodes other than by their parents and poses.
+//! Constraints as data: movements of nodes that come neither from their parents nor from their poses.
 //!
 //! Several constraints on one node run in the order of their creation; each starts from the result of those before it.
 //! A constraint reads the final transforms of other nodes in the same frame.
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{Limits, Uid};
 use crate::mesh::model::Trs;
 
-/// A number that is fixed or follows an attribute in every frame.
+/// Number that is constant or follows an attribute or a channel in every frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Scalar {
     /// A constant number.
@@ -51,12 +51,12 @@ impl Scalar {
         Self::Attribute { node, name: name.into(), factor: 1.0, add: 0.0 }
     }
 
-    /// One minus the value of an attribute.
+    /// Number that is one minus the value of an attribute.
     pub fn inverse(node: Uid, name: impl Into<Arc<str>>) -> Self {
         Self::Attribute { node, name: name.into(), factor: -1.0, add: 1.0 }
     }
 
-    /// The node that the number depends on, if any.
+    /// Node that the number depends on, if any.
     pub fn node(&self) -> Option<Uid> {
         match self {
             Self::Value(_) => None,
@@ -71,7 +71,7 @@ impl Default for Scalar {
     }
 }
 
-/// One channel of a transform.
+/// Channel of a transform.
 #[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Channel {
     /// Translation along X.
@@ -102,7 +102,7 @@ impl Channel {
     }
 }
 
-/// A node that another node follows.
+/// Target node that another node follows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
     /// Uid of the target.
@@ -150,11 +150,11 @@ pub enum Output {
 /// Interpolation between the keys of a driven key.
 #[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum KeyEase {
-    /// The value of the key before.
+    /// Value of the key before.
     Step,
-    /// Linear.
+    /// Linear interpolation.
     Linear,
-    /// Smooth, without overshoot.
+    /// Smooth interpolation without overshoot.
     #[default]
     Smooth,
 }
@@ -273,7 +273,7 @@ pub enum Constraint {
         /// Weight: 0 leaves the chain unchanged, 1 follows.
         weight: Scalar,
     },
-    /// Gives other nodes shares of the twist of one node about an axis.
+    /// Distributes the twist of one node about an axis over other nodes.
     Twist {
         /// The node whose twist is measured.
         source: Uid,
@@ -284,7 +284,7 @@ pub enum Constraint {
         /// Nodes that turn about the same axis of their own space, with their share of the twist.
         driven: Vec<(Uid, Scalar)>,
     },
-    /// Scales nodes by the distance of two others.
+    /// Scales nodes by the distance between two others.
     Stretch {
         /// First end of the distance.
         start: Uid,
@@ -336,7 +336,7 @@ pub enum Constraint {
         /// Destination of the number.
         output: Output,
     },
-    /// A number that is calculated.
+    /// Calculates a number from others.
     Expression {
         /// Arithmetic over the names of the inputs.
         text: String,
@@ -399,7 +399,8 @@ impl Constraint {
         }
     }
 
-    /// The data that the constraint reads, besides the nodes that it drives and their parents; with repetitions.
+    /// Nodes and attributes that the constraint reads, besides the nodes that it drives and their parents; with
+    /// repetitions.
     pub fn reads(&self) -> Vec<Dependency> {
         let mut reads = Vec::new();
         let scalar = |reads: &mut Vec<Dependency>, scalar: &Scalar| match scalar {
@@ -458,7 +459,7 @@ impl Constraint {
         reads
     }
 
-    /// The nodes and attributes that the constraint changes.
+    /// Nodes and attributes that the constraint changes.
     pub fn drives(&self) -> Vec<Dependency> {
         let nodes = |nodes: &[Uid]| nodes.iter().copied().map(Dependency::Node).collect();
         match self {

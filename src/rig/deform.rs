@@ -1,8 +1,9 @@
-//! Deform joints: the joints that move meshes, where they rest, and who holds weights whose joint is not built.
+//! Deform joints: the joints that move meshes, their rest transforms, and the joints that hold weights of joints that
+//! are not built.
 //!
-//! Weights, the posed surface, the picture and the exported character all ask [`DeformSkeleton`], so that a mesh hangs
-//! on the same joints everywhere. Of a rig that is built these are the joints as they are built, with those that
-//! commands created (twist joints, joints between others); of any other rig the document's joints at rest.
+//! Weights, the posed surface, the picture and the exported character all use [`DeformSkeleton`], so that a mesh
+//! follows the same joints everywhere. For a built rig these are the built joints, including those that commands
+//! created (twist joints, joints between others); for any other rig, the document's joints at rest.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -11,20 +12,20 @@ use bevy::math::{Affine3, Vec3};
 use super::{BuiltRig, Constraint, NodeKind, NodeType, RestTransform, Rig, SkinData, Uid};
 use crate::mesh::model::Weights;
 
-/// One joint or null of a [`DeformSkeleton`].
+/// Joint or null of a [`DeformSkeleton`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeformJoint {
-    /// Identity, by which weights name the joint.
+    /// Uid by which weights refer to the joint.
     pub uid: Uid,
     /// Index of the parent in [`DeformSkeleton::joints`], smaller than the joint's own.
     pub parent: Option<usize>,
     /// Transform from the joint's space to the rig's, at rest.
     pub rest: Affine3,
-    /// False for nulls of the document, which only say where bones end.
+    /// True for joints that move the mesh; false for nulls of the document, which only mark the ends of bones.
     pub deforms: bool,
-    /// The node that a command created the joint for; `None` for joints of the document.
+    /// Node for which a command created the joint; `None` for joints of the document.
     pub subject: Option<Uid>,
-    /// The bone along which the joint takes shares of the twist, if it is a twist joint.
+    /// Bone whose twist the joint shares; `None` if it is no twist joint.
     pub twist: Option<TwistSegment>,
     /// Index of the joint whose bend the joint takes by half, if it is a half joint.
     pub halves: Option<usize>,
@@ -33,12 +34,12 @@ pub struct DeformJoint {
 /// Role of created joints that take half of the bend of the joint they are made for, and of the skin on it.
 pub const HALF: &str = "half";
 
-/// The bone that a twist joint shares with the joint that owns it.
+/// Bone that a twist joint shares with the joint at its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwistSegment {
     /// Index of the joint at the start of the bone.
     pub joint: usize,
-    /// The end of the bone in the rig's space.
+    /// End of the bone, in the rig's space.
     pub end: Vec3,
 }
 
@@ -50,8 +51,8 @@ pub struct DeformSkeleton {
 }
 
 impl DeformSkeleton {
-    /// The joints of a rig; as they are built, if it is. Created nulls and controls are passed over: what hangs on one
-    /// hangs on the nearest joint above it.
+    /// Deform joints of a rig: the built ones if it is built. Created nulls and controls are left out; their children
+    /// become children of the nearest joint above them.
     pub fn new(rig: &Rig, built: Option<&BuiltRig>) -> Self {
         let mut skeleton = Self::default();
         match built {
@@ -61,25 +62,26 @@ impl DeformSkeleton {
         skeleton
     }
 
-    /// All joints.
+    /// Joints and nulls, parents before children.
     pub fn joints(&self) -> &[DeformJoint] {
         &self.joints
     }
 
-    /// The place of a joint in [`DeformSkeleton::joints`].
+    /// Index of a joint in [`DeformSkeleton::joints`].
     pub fn index(&self, joint: Uid) -> Option<usize> {
         self.index.get(&joint).copied()
     }
 
-    /// For each joint that weights name, the joint that holds its share: itself; while it is not built, the node that
-    /// it was created for, or the nearest joint above it. `None` for joints that were deleted.
+    /// For each joint of the weights, the index of the deform joint that holds its influences: the joint itself; while
+    /// it is not built, the nearest joint above it, or the node that it was created for (or the nearest joint above
+    /// that). `None` for deleted joints.
     pub fn holders(&self, rig: &Rig, skin: &SkinData) -> Vec<Option<usize>> {
         skin.joints.iter().map(|joint| self.holder(rig, skin, *joint)).collect()
     }
 
     fn holder(&self, rig: &Rig, skin: &SkinData, joint: Uid) -> Option<usize> {
         let mut joint = joint;
-        // A subject may itself be created; a damaged file may name subjects in a circle.
+        // A subject may itself be created; in a damaged file, subjects may form a cycle.
         for _ in 0..=skin.subjects.len() {
             let above = || rig.ancestors(joint).find_map(|ancestor| self.index(ancestor.data.uid));
             if let Some(found) = self.index(joint).or_else(above) {
@@ -90,7 +92,7 @@ impl DeformSkeleton {
         None
     }
 
-    /// The nodes that created joints were made for, for [`SkinData::subjects`].
+    /// Subjects of created joints (the nodes that they were made for), for [`SkinData::subjects`].
     pub fn subjects(&self) -> BTreeMap<Uid, Uid> {
         self.joints.iter().filter_map(|joint| Some((joint.uid, joint.subject?))).collect()
     }
@@ -116,7 +118,7 @@ impl DeformSkeleton {
 
     fn add_built(&mut self, built: &BuiltRig) {
         let mut globals: Vec<Affine3> = Vec::with_capacity(built.nodes.len());
-        // The nearest joint of the skeleton at or above each node.
+        // Index of the nearest joint of the skeleton at or above each node.
         let mut places: Vec<Option<usize>> = Vec::with_capacity(built.nodes.len());
         for node in &built.nodes {
             let above = node.parent.and_then(|parent| Some((globals.get(parent)?, places.get(parent)?)));
@@ -143,8 +145,8 @@ impl DeformSkeleton {
         }
     }
 
-    /// Notes the bone of the joints that share one twist. Joints that other bones begin at are no twist joints: they
-    /// are bones of the limb themselves.
+    /// Sets the bone of joints that share one twist. A driven joint with descendants outside of this set is no twist
+    /// joint but a bone of the limb itself.
     fn note_twist(&mut self, driven: &[usize]) {
         let set: HashSet<usize> = driven.iter().copied().collect();
         let mut carries = HashSet::new();
@@ -167,10 +169,10 @@ impl DeformSkeleton {
         }
     }
 
-    /// The end of the bone of `owner` on which twist joints lie: the joint after them on the same line, or the place
-    /// where the next of equally spaced joints would be. `None` if nothing gives the bone a length.
+    /// End (in the rig's space) of the bone of `owner` on which twist joints lie: the joint after them on the same
+    /// line, or the position where the next of equally spaced joints would be. `None` if the bone has no length.
     fn bone_end(&self, owner: usize, twists: &[usize]) -> Option<Vec3> {
-        /// The least cosine between the bone and the line of its twist joints.
+        /// Least cosine of the angle between the bone and the line of its twist joints.
         const ALONG: f32 = 0.98;
         let place = |joint: usize| self.joints[joint].rest.translation;
         let start = place(owner);
@@ -194,8 +196,8 @@ impl DeformSkeleton {
     }
 }
 
-/// Weights over other joints: `place` gives the index of each. Shares of joints that become one add up, and those of
-/// joints without a place are left out.
+/// Weights over other joints: `place` gives the next index of each joint. Influences of joints with the same index add
+/// up; influences of joints without one are left out.
 pub fn replaced_joints(weights: &Weights, place: &[Option<usize>]) -> Weights {
     if place.iter().enumerate().all(|(number, place)| *place == Some(number)) {
         return weights.clone();

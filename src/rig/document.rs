@@ -12,7 +12,7 @@ use crate::{
     rig::{AttributeValues, GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, TagData, Uid},
 };
 
-/// A rig (= global group). Reading is free; [`Rig::apply`](crate::rig::edit) alone changes it.
+/// A rig (= global group). All data can be read; only [`Rig::apply`](crate::rig::edit) changes them.
 #[derive(Component, Debug, Clone, PartialEq, Default)]
 pub struct Rig {
     pub(super) uid: Uid,

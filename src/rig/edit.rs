@@ -77,8 +77,8 @@ pub enum RigEdit {
     SetAbout(Box<RigAbout>),
     /// Binds a mesh with weights, replaces them, or unbinds the mesh.
     SetSkin(Uid, #[serde(with = "shared")] Option<Arc<SkinData>>),
-    /// Poses a joint or a created node by an offset on top of its rest transform or built base; `None` resets it. The
-    /// node need not be built at the moment: its pose waits for it.
+    /// Poses a joint or a created node by an offset on top of its rest transform or built base; `None` resets it. A
+    /// node that is not built at the moment keeps its offset.
     SetOffset(Uid, Option<PoseOffset>),
     /// Sets an attribute of a joint or created node; `None` resets it to the default of its command. The node need not
     /// be built at the moment.
@@ -146,7 +146,7 @@ pub enum EditError {
 }
 
 impl Rig {
-    /// Applies an edit and returns the one that takes it back exactly, order of siblings included.
+    /// Applies an edit and returns its exact inverse, order of siblings included.
     pub fn apply(&mut self, edit: &RigEdit) -> Result<RigEdit, EditError> {
         Ok(match edit {
             RigEdit::AddJoint { joint, parent, index } => self.add_joint(joint, *parent, *index)?,
@@ -298,7 +298,8 @@ impl Rig {
         let data = JointData { tags, ..data.clone() };
         let uid = data.uid;
         self.joints.insert(uid, RigJoint { data, parent, children: Vec::new() });
-        // A joint leaves with its part of the pose; a pose that waits for the uid keeps waiting then.
+        // `RemoveJoint` also removes the joint's offset from the pose; the inverse restores an offset that the uid
+        // already had.
         Ok(match self.pose.get(&uid) {
             Some(offset) => RigEdit::Batch(vec![RigEdit::RemoveJoint(uid), RigEdit::SetOffset(uid, Some(*offset))]),
             None => RigEdit::RemoveJoint(uid),
@@ -382,6 +383,6 @@ fn is_whole(weights: &Weights) -> bool {
     rising
         && ends == weights.joints.len()
         && ends == weights.values.len()
-        // Counting is several times as fast as searching, and there may be millions.
+        // Counting is several times as fast as searching, and there may be millions of weights.
         && weights.values.iter().filter(|w| !w.is_finite()).count() == 0
 }

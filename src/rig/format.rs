@@ -1,4 +1,4 @@
-//! File formats of rigs: text and bytes on one side, plain data on the other. Nothing here opens a file.
+//! File formats of rigs: text and bytes on one side, plain data on the other. No code here opens a file.
 //!
 //! Templates (`.rig.ron`), projects (`.rigsmith.ron`), skeleton text (`.rig`) and weights (`.skin`).
 

@@ -11,7 +11,7 @@ pub fn mirrored_label(label: &str) -> Option<String> {
 /// Side that a label names: `-1` right, `1` left, `0` none.
 pub fn label_side(label: &str) -> i32 {
     let Some(other) = mirrored_label(label) else { return 0 };
-    // The first difference of the two labels is at the side.
+    // The first character at which the two labels differ belongs to the side.
     let differing = label.chars().zip(other.chars()).find(|(a, b)| a != b);
     match differing.map(|(a, _)| a.to_ascii_lowercase()) {
         Some('l') => 1,

@@ -9,7 +9,7 @@ use std::{collections::BTreeMap, f32::consts::TAU, sync::LazyLock};
 use bevy::math::ops::{cos, sin};
 use glam::Vec3;
 
-/// Lines of a shape: each a run of points, closed where the last is the first.
+/// Polylines of a shape; a polyline is closed if its last point equals the first.
 pub type Lines = Vec<Vec<Vec3>>;
 
 static LIBRARY: LazyLock<BTreeMap<&'static str, Lines>> = LazyLock::new(library);

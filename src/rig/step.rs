@@ -11,7 +11,7 @@ pub struct Step {
     pub name: Cow<'static, str>,
     /// The edits, in the order they were applied.
     pub forward: Vec<RigEdit>,
-    /// The edits that take them back, in the order to apply them.
+    /// Edits that undo the step, in the order in which to apply them.
     pub backward: Vec<RigEdit>,
     /// Selection before the step.
     pub before: Vec<Uid>,
@@ -121,7 +121,8 @@ pub struct Replayed {
     pub stacks: UndoStacks,
     /// Number of changes in the document.
     pub applied: usize,
-    /// Error of the first change that could not be made; it and all later ones are missing.
+    /// Error of the first change that could not be applied; this change and all later ones are missing from the
+    /// document.
     pub refused: Option<EditError>,
 }
 
@@ -133,7 +134,7 @@ pub fn replay(mut rig: Rig, changes: &[Committed], contained: usize) -> Replayed
     for (number, committed) in changes.iter().enumerate() {
         let (edits, selection) = committed.effect();
         if number >= contained {
-            // The edits are applied as one, so that a refusal leaves nothing half done.
+            // A single edit, so that a refusal applies no part of it.
             if let Err(error) = rig.apply(&RigEdit::Batch(edits.to_vec())) {
                 replayed.refused = Some(error);
                 break;

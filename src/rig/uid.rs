@@ -1,4 +1,4 @@
-//! Identity that survives renaming, reparenting and new versions.
+//! Uids: identities that survive renaming, reparenting and later versions.
 
 use std::{fmt, str::FromStr};
 
@@ -17,7 +17,7 @@ impl fmt::Display for Uid {
     }
 }
 
-/// A text that is not a [`Uid`].
+/// Error for a text that is not a [`Uid`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is no uid: write 16 hexadecimal digits, such as 00c0ffee00c0ffee")]
 pub struct UidError(pub String);

@@ -45,7 +45,7 @@ impl OpenDocument {
 pub(super) enum SavedAt {
     /// The state after this step; before the first for `None`.
     Step(Option<Arc<Step>>),
-    /// No file holds any state.
+    /// The state is in no file.
     Nowhere,
 }
 
@@ -161,7 +161,7 @@ pub(super) fn watch_places(world: &mut World) {
     }
 }
 
-/// Ends the journal of the open document, so that nothing of it is recovered later. With `wait`, it ends before the
+/// Ends the journal of the open document, so that no recovery of it is offered later. With `wait`, it ends before the
 /// function returns.
 pub(super) fn close_journal(world: &World, wait: bool) {
     let Some(document) = active(world).and_then(|rig| world.get::<OpenDocument>(rig)) else { return };

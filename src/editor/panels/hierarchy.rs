@@ -1,6 +1,7 @@
 //! Hierarchy panel: the tree of joints.
 //!
-//! It shows the rig's own selection and changes it with pick requests, so the viewport and the tree never differ.
+//! The panel shows the rig's own selection and changes it with pick requests, so the viewport and the tree never
+//! differ.
 
 mod keys;
 mod menu;
@@ -268,7 +269,7 @@ fn obstacle(joints: &[Uid], parent: Option<Uid>, shown: &DisplayedRig) -> Option
 /// Moves joints below another, or sends a notice with the reason. Joints already there stay.
 fn reparent(joints: &[Uid], parent: Option<Uid>, shown: &DisplayedRig, requests: &mut Requests) {
     if joints == [parent.unwrap_or_default()] {
-        // Dropped on the joint that was dragged.
+        // The joint was dropped on itself.
         return;
     }
     if let Some(obstacle) = obstacle(joints, parent, shown) {

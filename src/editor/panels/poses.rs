@@ -1,4 +1,4 @@
-//! Poses panel: the pose and stored poses. It never changes the rest pose.
+//! Poses panel: the pose of the rig and its stored poses. The rest pose never changes here.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align, Button, Key, Layout, Rect, Sense, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType};

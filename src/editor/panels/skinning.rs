@@ -139,7 +139,7 @@ fn tell_results(
     }
 }
 
-/// Says that a finished result waits, so that no undone step is lost to it.
+/// Sends a notice that a finished result waits, so that committing it discards no undone step.
 fn tell_held(mut held: MessageReader<ResultHeld>, mut notices: MessageWriter<Notice>) {
     for ResultHeld { reason, .. } in held.read() {
         let mut letters = reason.chars();

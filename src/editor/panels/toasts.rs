@@ -1,6 +1,6 @@
 //! Toasts: recent notices, in the viewport's lower right corner.
 //!
-//! They are areas of their own, so a click on one never reaches the viewport below it, and they cost a frame only when
+//! Toasts are areas of their own, so a click on one never reaches the viewport below, and they cost a frame only when
 //! one of them expires: the window sleeps until then.
 
 use std::time::Duration;

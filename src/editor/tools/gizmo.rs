@@ -195,7 +195,7 @@ impl GizmoFrame {
         Some(HandleShape { handle: Handle::MovePlane(axis), lines: vec![area_or_line(points?, true)], reach: 2.0 })
     }
 
-    /// Both ends of an arrow, unless it points at the viewer.
+    /// Start and end of an arrow in pixels; `None` if the arrow points at the viewer.
     fn arrow(&self, axis: usize, length: f32, unit: f32, sight: &Sight, middle: Vec2) -> Option<[Vec2; 2]> {
         let place = |pixels: f32| sight.project(self.origin + self.axes[axis] * (pixels * unit));
         let (start, end) = (place(GAP)?, place(length)?);

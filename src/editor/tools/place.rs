@@ -93,16 +93,16 @@ pub struct PlaceGhost {
 /// Reason why a click places nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PlaceObstacle {
-    /// No rig.
+    /// The window has no open rig.
     #[error("no rig is open; open a mesh first (Ctrl+O)")]
     NoRig,
-    /// No mesh.
+    /// The rig has no mesh.
     #[error("the rig has no mesh to place joints in; open one first (Ctrl+O)")]
     NoMesh,
-    /// A surface that is still being built.
+    /// The surface is still being built.
     #[error("the mesh is still being prepared; a click waits for it")]
     Preparing,
-    /// A ray that misses the mesh.
+    /// The ray misses the mesh.
     #[error("the pointer is beside the mesh; move it over the mesh")]
     Beside,
 }

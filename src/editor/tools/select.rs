@@ -86,7 +86,7 @@ pub(super) fn select(
         pointers.clear();
         return;
     };
-    // Only the box is shown; the pointer's position does not count as a change.
+    // The box is all that is shown; the pointer's position does not count as a change.
     let band = shown.band;
     let tool = shown.bypass_change_detection();
     for ToolPointer { tool: who, pointer } in pointers.read() {
@@ -116,7 +116,7 @@ pub(super) fn select(
     let at = tool.pointer.or(resting).filter(|_| tool.press.is_none());
     let asked = at.map(|at| (rig.entity, sight, at));
     if asked != tool.asked {
-        // No request is repeated while another tool has the pointer: that tool may have sent one.
+        // The request is not repeated while another tool has the pointer, because that tool may have sent one.
         tool.asked = asked;
         let what = at.and_then(|at| match click(&scene, &rig, &sight, at) {
             Some(Pick::Click { plane, point, reach }) => Some((plane, point, reach)),

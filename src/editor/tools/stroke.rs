@@ -87,7 +87,7 @@ impl StrokeTool {
 /// Stage of a stroke.
 #[derive(Debug, Default)]
 pub enum StrokeState {
-    /// No stroke.
+    /// The user draws no stroke.
     #[default]
     Idle,
     /// A stroke under the pressed button.
@@ -300,7 +300,7 @@ fn take(tool: &mut ResMut<StrokeTool>, strokes: &mut MessageWriter<StrokeRequest
         return;
     }
     let StrokeState::Preview(preview) = std::mem::take(&mut tool.state) else { return };
-    // If the stroke is still being followed, the engine waits for the same result.
+    // The chain is left out while the stroke is still being followed: the engine then waits for the same result.
     let chain = preview.chain().filter(|_| !preview.is_followed()).cloned();
     strokes.write(StrokeRequest { chain, ..preview.request });
 }

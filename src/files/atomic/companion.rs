@@ -1,8 +1,8 @@
 //! Companions: files that a main file refers to, such as the buffer and the images of a `.gltf`.
 //!
-//! Their names hold the hash of their content (`wood.0123456789abcdef.png`), which makes three things safe: a name never
-//! stands for two contents, so that nothing is replaced; a file whose hash fits was written by this program; and a file that
-//! refers to a companion can be found by looking for the hash.
+//! Names of companions hold the hash of their content (`wood.0123456789abcdef.png`), which makes three things safe: a
+//! name never stands for two contents, so that nothing is replaced; a file whose hash fits was written by this program;
+//! and a file that refers to a companion can be found by looking for the hash.
 
 use std::{
     collections::BTreeSet,
@@ -18,21 +18,21 @@ use crate::{
 
 /// Digits of a hash in a name.
 const DIGITS: usize = 16;
-/// Bytes of a name that are kept of what the file would be called.
+/// Largest number of bytes of a plain name that are kept in a companion's name.
 const MAX_STEM: usize = 100;
-/// Names of a folder that are looked through; in a larger one companions stay.
+/// Largest number of names in a folder that are searched; in a larger folder, unused companions stay.
 const MAX_NAMES: usize = 20_000;
-/// Bytes of text that are searched for references; where there is more, companions stay.
+/// Largest amount of text, in bytes, that is searched for references; beyond it, unused companions stay.
 const MAX_TEXT: u64 = 256 << 20;
 /// Bytes at the beginning of a file that hold its references where the rest is geometry.
 const HEAD: u64 = 1 << 20;
 
-/// The name of a companion that would be called `plain` and has this content; `copy` counts the names that were taken by
-/// other files.
+/// Name of a companion with the plain name `plain` and this content; `copy` counts the names that other files already
+/// have.
 pub(super) fn name(plain: &str, hash: u64, copy: u32) -> String {
     let plain = plain.rsplit(['/', '\\']).next().unwrap_or_default();
     let (mut stem, ending) = plain.rsplit_once('.').unwrap_or((plain, "bin"));
-    // Models that were read and are written again should not collect hashes.
+    // Hashes of an earlier save are dropped, so that names do not grow each time a model is read and written.
     while let Some((shorter, _)) = stem.rsplit_once('.').filter(|(_, digits)| parse(digits).is_some()) {
         stem = shorter;
     }
@@ -118,8 +118,8 @@ pub(super) fn referred(disk: &dyn Disk, folder: &Path, main: &Path) -> io::Resul
     Ok(names.into_iter().filter(|(_, mark)| marks.contains(mark)).map(|(name, _)| name).collect())
 }
 
-/// Removes those of the companions `names` in `folder` that no other file there refers to. A file whose content is not that
-/// of its name is somebody else's and stays.
+/// Removes those of the companions `names` in `folder` that no other file there refers to. A file whose content does
+/// not fit the hash in its name was written by another program and stays.
 ///
 /// # Errors
 /// When something could not be read or removed: it may be tried again. Nothing is removed before all has been read.
@@ -141,7 +141,7 @@ pub(super) fn remove_unmentioned(disk: &dyn Disk, folder: &Path, names: &[String
             continue;
         }
         let entry = match disk.entry(&path, true) {
-            // A link to nowhere, or a file that was removed in the meantime.
+            // The entry is a link to nowhere, or was removed in the meantime.
             Err(error) if error.kind() == ErrorKind::NotFound => continue,
             entry => entry?,
         };

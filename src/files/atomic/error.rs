@@ -1,4 +1,4 @@
-//! Why a file was not saved, and what to do about it.
+//! Reasons for not saving a file, and what to do about them.
 
 use std::{
     io::{self, ErrorKind},
@@ -7,20 +7,20 @@ use std::{
 
 use thiserror::Error;
 
-/// Where in saving something failed.
+/// Step of a save, for error messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SaveStep {
-    /// Looking at what is at the path now.
+    /// Inspecting the entry at the path.
     Inspect,
     /// Creating the temporary file.
     Create,
-    /// Taking over the permissions of the file there.
+    /// Copying the permissions of the replaced file.
     Permissions,
     /// Writing the content.
     Write,
     /// Waiting until the content has reached the device.
     Sync,
-    /// Comparing what the disk returns with what was written.
+    /// Comparing the bytes that the disk returns with the bytes that were written.
     Verify,
     /// Putting the finished file in place.
     Replace,
@@ -40,7 +40,7 @@ impl std::fmt::Display for SaveStep {
     }
 }
 
-/// Why a file was not saved. But for [`SaveError::Unconfirmed`], what was there before is unchanged.
+/// Reason for not saving a file. The former content of the file is unchanged, except after [`SaveError::Unconfirmed`].
 #[derive(Debug, Error)]
 pub enum SaveError {
     /// The path ends in no file name.
@@ -81,7 +81,7 @@ pub enum SaveError {
         /// The path as given.
         path: PathBuf,
     },
-    /// Something appeared under the name of a companion while the set was being saved.
+    /// Another program created a file under the name of a companion while the set was being saved.
     #[error("cannot save `{}`: another program has just put a file there; save again", path.display())]
     Occupied {
         /// The companion.
@@ -94,7 +94,7 @@ pub enum SaveError {
         path: PathBuf,
         /// Size of the content in bytes.
         bytes: u64,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The folder may not be written to.
@@ -104,17 +104,17 @@ pub enum SaveError {
         path: PathBuf,
         /// The folder that refused.
         folder: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Anything else that failed.
+    /// Any other failure.
     #[error("cannot save `{}`: {step} failed ({source}); what was there is unchanged; try again or choose another disk", path.display())]
     Io {
         /// The path as given.
         path: PathBuf,
-        /// What was being done.
+        /// Failed step.
         step: SaveStep,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The file is complete and in place, but the device did not confirm it.
@@ -122,7 +122,7 @@ pub enum SaveError {
     Unconfirmed {
         /// The path as given.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }

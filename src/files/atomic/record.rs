@@ -1,8 +1,8 @@
-//! The record of a set that is being saved: companions that may be left over if the process dies.
+//! Record of a set that is being saved: its companions, which may be left over if the process dies.
 //!
-//! The anchor of a set's save names the companions that are about to be put in place and those that the former main file
-//! refers to. Whoever finds the record of a dead process removes the ones that no file refers to; which these are depends
-//! on how far the save got, and need not be known.
+//! The anchor of a set's save lists the companions that are about to be put in place and those that the former main
+//! file refers to. A later save that finds the record of a dead process removes the companions that no file refers to,
+//! without knowing how far the save got.
 
 use std::{
     io::{self, ErrorKind, Read},
@@ -12,7 +12,7 @@ use std::{
 use crate::files::disk::Disk;
 
 const HEADER: &str = "rigsmith set 1\n";
-/// Bytes of a record that are read.
+/// Largest size in bytes of a record that is read.
 const MAX_BYTES: u64 = 16 << 20;
 
 /// The content of a record.
@@ -25,7 +25,7 @@ pub(super) fn text<'a>(names: impl Iterator<Item = &'a str>) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The companions that the record in an anchor names; none for the anchor of anything but a set.
+/// Companions that the record in an anchor file lists; empty if the anchor does not belong to a set.
 pub(super) fn read(disk: &dyn Disk, anchor: &Path) -> io::Result<Vec<String>> {
     let mut reader = match disk.open(anchor) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
@@ -38,6 +38,6 @@ pub(super) fn read(disk: &dyn Disk, anchor: &Path) -> io::Result<Vec<String>> {
     }
     bytes.clear();
     reader.take(MAX_BYTES).read_to_end(&mut bytes)?;
-    // A record that was cut off while it was written belongs to a save that has put nothing in place.
+    // A record that was cut off while it was written belongs to a save that has put no file in place.
     Ok(String::from_utf8_lossy(&bytes).lines().map(str::to_owned).collect())
 }

@@ -12,14 +12,14 @@ use super::{
 };
 use crate::{files::disk::Disk, rig::skin::content_hash};
 
-/// Names that are tried for a companion; a disk that answers nothing takes none of them.
+/// Largest number of names that are tried for a companion, so that a disk that refuses every name ends the search.
 const MAX_COPIES: u32 = 100;
 
 /// A main file and its companions: the files beside it that it refers to by name, such as the buffer of a `.gltf`, the
 /// materials of an `.obj` or the weights of a project.
 ///
-/// [`add`](Self::add) chooses the name of a companion, which holds the hash of its content; the main file, which holds those
-/// names, is [finished](Self::finish) last.
+/// [`add`](Self::add) chooses the name of a companion, which holds the hash of its content; the main file, which holds
+/// those names, is [finished](Self::finish) last.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FileSet {
     path: PathBuf,
@@ -61,43 +61,44 @@ impl FileSet {
         self.bytes = bytes;
     }
 
-    /// Where the main file goes.
+    /// Path of the main file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The content of the main file.
+    /// Content of the main file.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// The content of the companion of that name.
+    /// Content of the companion with this name.
     pub fn companion(&self, name: &str) -> Option<&[u8]> {
         self.companions.iter().find(|(known, _)| known == name).map(|(_, bytes)| bytes.as_slice())
     }
 
-    /// The names of the companions.
+    /// Names of the companions.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.companions.iter().map(|(name, _)| name.as_str())
     }
 }
 
-/// Saves a set: afterwards the old main file is there with its companions, or the finished one with its own, whatever fails
-/// and whenever.
+/// Saves a set. Afterwards either the old main file or the finished one is in place, each with its companions, at
+/// whatever point the save fails.
 ///
-/// Companions are put in place first, unless they are there already; a file is never replaced by one. Then the main file is
-/// renamed, as [`save_atomic`](super::save_atomic) does. Then the companions that only the former main file referred to are
-/// removed: those whose names hold the hash of their content and that no file of the folder mentions, so that a copy of the
-/// main file under another name keeps its own. Costs what `save_atomic` costs for each file that is not there yet.
+/// Companions are put in place first, unless they are there already; a file is never replaced by one. Then the main
+/// file is renamed, as [`save_atomic`](super::save_atomic) does. Then the companions that only the former main file
+/// referred to are removed: those whose names hold the hash of their content and that no file of the folder mentions,
+/// so that a copy of the main file under another name keeps its own. Costs what `save_atomic` costs for each file that
+/// is not there yet.
 ///
 /// # Errors
 /// See [`SaveError`]; the only one after which the set is in place is [`SaveError::Unconfirmed`].
 pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
     let target = Target::find(disk, &set.path)?;
     let folder = folder_of(&set.path);
-    // Where folders cannot be locked, two saves at the same instant may be in each other's way; one at a time never is.
+    // On file systems without folder locks, two saves at the same instant may conflict; consecutive saves never do.
     let _turn = disk.lock_folder(folder).ok().flatten();
-    // Litter is no reason not to save.
+    // Left-over temporary files that cannot be removed are no reason not to save.
     let _ = remove_stale_in_turn(disk, folder);
     if target.folder != folder {
         let _ = remove_stale_in_turn(disk, &target.folder);
@@ -127,12 +128,12 @@ pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
     let mut placed = Vec::new();
     if let Err(error) = put_in_place(disk, set, &target, &record, &missing, &mut placed) {
         if placed.iter().rev().any(|path| disk.remove(path).is_err()) {
-            // The next save finds the record.
+            // The next save finds the record and clears up.
             record.leave();
         }
         return Err(error);
     }
-    // Until the new main file is sure to stay, the old one may come back.
+    // The old main file may come back until the disk confirms the rename, so its companions stay until then.
     let done = target.confirm(disk);
     if done.is_err() || companion::remove_unmentioned(disk, folder, &former).is_err() {
         record.leave();
@@ -140,7 +141,8 @@ pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
     done
 }
 
-/// Puts the missing companions in place, then the main file; notes in `placed` what would have to be taken back.
+/// Puts the missing companions in place, then the main file; lists in `placed` the companions to remove after a
+/// failure.
 fn put_in_place(
     disk: &dyn Disk,
     set: &FileSet,
@@ -156,7 +158,7 @@ fn put_in_place(
         let path = folder.join(name);
         let failed = |step, error| SaveError::new(&path, folder, bytes.len(), step, error);
         let mut temp = Temp::member(record, number).map_err(|error| failed(SaveStep::Create, error))?;
-        // Who may read the one may read the other.
+        // Companions get the permissions of the main file, so that the same people may read both.
         let like = target.exists.then_some(target.file.as_path());
         temp.fill(bytes, like).map_err(|(step, error)| failed(step, error))?;
         temp.close();
@@ -172,7 +174,7 @@ fn put_in_place(
             Err(error) => return Err(SaveError::new(&path, folder, bytes.len(), SaveStep::Replace, error)),
         }
     }
-    // The main file must not reach the device before the names it refers to.
+    // The names that the main file refers to must reach the device before it.
     if !missing.is_empty() {
         disk.sync_folder(folder)
             .map_err(|error| SaveError::new(&set.path, folder, set.bytes.len(), SaveStep::Sync, error))?;

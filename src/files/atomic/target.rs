@@ -1,4 +1,4 @@
-//! The place that a save really goes to: links followed, and nothing replaced that should not be.
+//! Target of a save: the file that is really replaced, with links followed and special files protected.
 
 use std::{
     io::ErrorKind,
@@ -8,18 +8,18 @@ use std::{
 use super::{SaveError, SaveStep, folder_of, temp::Temp};
 use crate::files::disk::{Disk, EntryKind};
 
-/// As many links in a row as Linux follows.
+/// Largest number of links in a row, the same as on Linux.
 const MAX_LINKS: usize = 40;
 
-/// Place that the bytes for a path really go to.
+/// File that the bytes for a path are really written to.
 pub(super) struct Target {
-    /// As the caller gave it, for messages.
+    /// Path as the caller gave it, for messages.
     pub path: PathBuf,
-    /// With links followed.
+    /// Path with links followed.
     pub file: PathBuf,
-    /// The folder of that file.
+    /// Folder of `file`.
     pub folder: PathBuf,
-    /// True if something is there that is replaced.
+    /// True if `file` exists and is replaced.
     pub exists: bool,
 }
 
@@ -48,7 +48,7 @@ impl Target {
             match entry.kind {
                 EntryKind::Folder => return Err(SaveError::IsFolder { path }),
                 EntryKind::Other => return Err(SaveError::NotAFile { path }),
-                // Renaming would replace a protected file without asking.
+                // A rename would replace a write-protected file without asking.
                 EntryKind::File if entry.read_only => return Err(SaveError::WriteProtected { path }),
                 EntryKind::File => {
                     return Ok(Self { path, file, folder, exists: true });
@@ -87,7 +87,7 @@ impl Target {
     }
 }
 
-/// `Path` drops a trailing separator, but whoever writes one means a folder.
+/// True if the path ends in a separator, which `Path` drops: the caller means a folder.
 fn ends_in_separator(path: &Path) -> bool {
     path.as_os_str().as_encoded_bytes().last().is_some_and(|&byte| std::path::is_separator(char::from(byte)))
 }

@@ -1,8 +1,8 @@
-//! Temporary files: their names, which process they belong to, and clearing up after processes that died.
+//! Temporary files: their names, the process that they belong to, and their removal after that process died.
 //!
 //! A name is `.rigsmith-` + 8 hexadecimal digits of a save + 8 of a file of that save + `.tmp`. File 0 of a save is its
-//! anchor. It is created first, removed last, and locked in between, so that a save is known to be over when its anchor is not
-//! locked: the system unlocks the files of a process that dies.
+//! anchor. It is created first, removed last, and locked in between, so that a save is known to be over when its anchor
+//! is not locked: the system unlocks the files of a process that dies.
 
 use std::{
     collections::BTreeMap,
@@ -19,7 +19,7 @@ use crate::files::disk::{Disk, DiskFile, EntryKind};
 const PREFIX: &str = ".rigsmith-";
 const SUFFIX: &str = ".tmp";
 const DIGITS: usize = 16;
-/// Age of temporary files that are taken for left behind where files cannot be locked.
+/// Least age of temporary files that are removed as left over, on file systems without locks.
 const OLD: Duration = Duration::from_secs(3600);
 
 /// Tells whether a file name is that of one of our temporary files (`.rigsmith-` + 16 hexadecimal digits + `.tmp`).
@@ -37,7 +37,8 @@ fn name(save: u32, file: u32) -> String {
     format!("{PREFIX}{save:08x}{file:08x}{SUFFIX}")
 }
 
-/// A name for a file that is locked as long as it has this name, and that no other process or thread uses at the same time.
+/// A name for a file that is locked as long as it has this name, and that no other process or thread uses at the same
+/// time.
 pub(in crate::files) fn temp_name() -> String {
     name(random(), 0)
 }
@@ -51,13 +52,13 @@ fn random() -> u32 {
     hasher.finish() as u32
 }
 
-/// A temporary file, removed when this is dropped.
+/// A temporary file; dropping the value removes the file.
 pub(super) struct Temp<'d> {
     disk: &'d dyn Disk,
     path: PathBuf,
     save: u32,
     file: Option<Box<dyn DiskFile>>,
-    /// True if the file has another name by now, or is to stay.
+    /// True if the file was renamed or is to stay.
     stays: bool,
 }
 
@@ -80,14 +81,14 @@ impl<'d> Temp<'d> {
             };
             attempts -= 1;
             let again = matches!(error.kind(), ErrorKind::AlreadyExists | ErrorKind::WouldBlock | ErrorKind::NotFound);
-            // A missing folder is missing at the next attempt, too.
+            // A missing folder would be missing at the next attempt, too.
             if attempts == 0 || !again || disk.entry(folder, true).is_err() {
                 return Err(error);
             }
         }
     }
 
-    /// Locks the file, and makes sure that nobody took it for left behind before it was locked.
+    /// Locks the file, and checks that no other process removed it as left over before it was locked.
     fn lock(&mut self) -> io::Result<()> {
         if let Some(file) = &mut self.file {
             file.lock()?;
@@ -128,24 +129,24 @@ impl<'d> Temp<'d> {
         }
     }
 
-    /// Closes the file; sets of many files would else have them all open.
+    /// Closes the file, so that a set of many files does not keep them all open.
     pub fn close(&mut self) {
         self.file = None;
     }
 
-    /// Gives the file its final name, replacing what is there. It stays locked until then.
+    /// Renames the file to its final name, replacing a file of that name. The file stays locked until then.
     pub fn rename_to(mut self, path: &Path) -> io::Result<()> {
         self.disk.rename(&self.path, path)?;
         self.stays = true;
         Ok(())
     }
 
-    /// Gives the file its final name, where nothing may be yet: [`ErrorKind::AlreadyExists`] otherwise.
+    /// Gives the file its final name, which must not exist yet: [`ErrorKind::AlreadyExists`] otherwise.
     pub fn link_to(mut self, path: &Path) -> io::Result<()> {
         match self.disk.hard_link(&self.path, path) {
             Ok(()) => return Ok(()),
             Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(error),
-            // Not every file system has hard links (exFAT has none).
+            // File systems such as exFAT have no hard links.
             Err(_) => {}
         }
         match self.disk.entry(path, false) {
@@ -159,7 +160,7 @@ impl<'d> Temp<'d> {
         }
     }
 
-    /// Leaves the file where it is, for whoever clears up later.
+    /// Leaves the file where it is, for a later save to remove.
     pub fn leave(mut self) {
         self.stays = true;
     }
@@ -168,16 +169,16 @@ impl<'d> Temp<'d> {
 impl Drop for Temp<'_> {
     fn drop(&mut self) {
         if !self.stays {
-            // Windows removes only closed files at once.
+            // Windows removes a file at once only if it is closed.
             self.file = None;
-            // A failure that passes should leave no litter.
+            // A second attempt, so that a passing failure leaves no file behind.
             let _ = self.disk.remove(&self.path).or_else(|_| self.disk.remove(&self.path));
         }
     }
 }
 
-/// Removes what processes that died in the middle of a save left in `folder`: their temporary files, and companions that no
-/// file of the folder refers to. Returns how many temporary files there were.
+/// Removes files that processes left in `folder` when they died in the middle of a save: their temporary files, and
+/// companions that no file of the folder refers to. Returns how many temporary files there were.
 ///
 /// Files of living processes stay. Where files cannot be locked, temporary files count as left behind after an hour.
 ///
@@ -187,12 +188,12 @@ pub fn remove_stale_temps(disk: &dyn Disk, folder: &Path) -> io::Result<usize> {
     Ok(remove_saves(disk, folder, &saves(disk, folder)?, false))
 }
 
-/// As [`remove_stale_temps`], for those who have locked the folder.
+/// Removes stale files like [`remove_stale_temps`], for callers that have locked the folder.
 pub(super) fn remove_stale_in_turn(disk: &dyn Disk, folder: &Path) -> io::Result<usize> {
     Ok(remove_saves(disk, folder, &saves(disk, folder)?, true))
 }
 
-/// The temporary files of a folder by save.
+/// Temporary files of a folder, grouped by save.
 fn saves(disk: &dyn Disk, folder: &Path) -> io::Result<BTreeMap<String, Vec<PathBuf>>> {
     let mut saves: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for name in disk.list(folder, usize::MAX)? {
@@ -207,16 +208,16 @@ fn remove_saves(disk: &dyn Disk, folder: &Path, saves: &BTreeMap<String, Vec<Pat
     let mut removed = 0;
     for (save, files) in saves {
         let anchor = folder.join(format!("{PREFIX}{save}00000000{SUFFIX}"));
-        // Held until the files are gone: whoever creates a file of the same name finds it taken.
+        // The lock is held until the files are gone, so that no process can reuse the name meanwhile.
         let _held = match disk.hold(&anchor) {
             Ok(None) => continue,
             Ok(held) => held,
-            // Anchors are removed last.
+            // A missing anchor belongs to a save whose other files were removed before: anchors are removed last.
             Err(error) if error.kind() == ErrorKind::NotFound => None,
             Err(_) if files.iter().all(|file| is_old(disk, file)) => None,
             Err(_) => continue,
         };
-        // The record of what has to be removed is the last to go.
+        // The record lists what has to be removed, so it is removed last.
         if remove_recorded(disk, folder, &anchor, in_turn).is_err() {
             continue;
         }
@@ -237,7 +238,7 @@ fn remove_recorded(disk: &dyn Disk, folder: &Path, anchor: &Path, in_turn: bool)
     if names.is_empty() {
         return Ok(());
     }
-    // Another process may be about to refer to a companion that nothing refers to yet.
+    // The folder is locked, because another process may be about to refer to a companion that no file refers to yet.
     let _turn = if in_turn { None } else { disk.lock_folder(folder)? };
     companion::remove_unmentioned(disk, folder, &names)
 }

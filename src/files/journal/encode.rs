@@ -1,4 +1,4 @@
-//! Changes to frames.
+//! Encoding of changes as frames.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use super::{
 };
 use crate::rig::step::{Committed, UndoStacks};
 
-/// The header's payload.
+/// Payload of the header record.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Header {
     pub generation: u64,
@@ -19,17 +19,17 @@ pub(super) struct Header {
     pub first: u64,
 }
 
-/// Turns what happens into the bytes to append to one file.
+/// Encoder of changes to the bytes that are appended to one file.
 pub(super) struct Encoder {
     session: u64,
     number: u64,
-    /// As a reader will have it, so that steps it knows need not be written again.
+    /// History as a reader of the file will have it, so that steps it has need not be written again.
     stacks: UndoStacks,
     skins: SkinsOut,
 }
 
 impl Encoder {
-    /// The bytes of a whole file, and what appends to it.
+    /// Bytes of a whole file with this content, and the encoder that appends to it.
     pub(super) fn begin(session: u64, content: &Content) -> Result<(Self, Vec<u8>), String> {
         let mut encoder = Self { session, number: 0, stacks: UndoStacks::default(), skins: SkinsOut::default() };
         let mut out = Vec::new();
@@ -46,7 +46,8 @@ impl Encoder {
         if let Some(rig) = &content.base {
             let text = rig_text(rig, &mut encoder.skins)?;
             encoder.put_with_skins(&mut out, RecordKind::Base, &text)?;
-            // All else stands on it and nothing else tells it. Readers take either copy.
+            // A second copy, because every change depends on this rig and no other record holds it. Readers take either
+            // copy.
             encoder.put(&mut out, RecordKind::Base, text.as_bytes())?;
         }
         for committed in &content.changes {
@@ -58,7 +59,8 @@ impl Encoder {
         Ok((encoder, out))
     }
 
-    /// Appends a change. On failure `out` is as before, and this change and all later ones cannot be in this file.
+    /// Appends a change. On failure `out` is unchanged, and neither this change nor a later one can be added to this
+    /// file.
     pub(super) fn change(&mut self, out: &mut Vec<u8>, committed: &Committed) -> Result<(), String> {
         let (kind, whole) = match committed {
             Committed::Done(_) => (RecordKind::Done, true),
@@ -73,7 +75,7 @@ impl Encoder {
         Ok(())
     }
 
-    /// Appends a note that the project is about to be saved.
+    /// Appends a mark that the project is about to be saved.
     pub(super) fn mark(&mut self, out: &mut Vec<u8>, mark: &SaveMark) -> Result<(), String> {
         self.put(out, RecordKind::Mark, value_text(mark)?.as_bytes())
     }
@@ -83,7 +85,7 @@ impl Encoder {
         self.put(out, RecordKind::Context, context.as_bytes())
     }
 
-    /// Appends the word that nothing is to be recovered.
+    /// Appends the record that ends the journal: nothing is to be recovered.
     pub(super) fn end(&mut self, out: &mut Vec<u8>) -> Result<(), String> {
         self.put(out, RecordKind::End, &[])
     }

@@ -1,13 +1,14 @@
-//! Frames: how records lie in the file, and how a reader notices that one is torn or damaged.
+//! Frames: the layout of records in the file, and the detection of torn or damaged ones.
 
 use super::Damage;
 use crate::rig::skin::content_hash;
 
 /// First bytes of every journal.
 pub(super) const MAGIC: [u8; 8] = *b"RIGJRNL\0";
-/// The format this version writes, and the highest it reads.
+/// Format that this version writes, and the highest one that it reads.
 ///
-/// A later format has to mix its number into the checksums, so that they tell the format where the prelude is damaged.
+/// A later format has to mix its number into the checksums, so that they reveal the format where the prelude is
+/// damaged.
 pub const JOURNAL_FORMAT: u32 = 1;
 /// Bytes before the first frame: magic, format, session.
 pub(super) const PRELUDE: usize = 8 + 4 + 8;
@@ -15,26 +16,26 @@ pub(super) const PRELUDE: usize = 8 + 4 + 8;
 pub(super) const HEAD: usize = 4 + 1 + 8;
 /// Bytes of the checksum after the payload.
 pub(super) const TAIL: usize = 8;
-/// Bytes of the payload of one record, at most.
+/// Largest number of bytes in the payload of one record.
 pub const MAX_RECORD: usize = 1 << 30;
 
 /// Kind of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum RecordKind {
-    /// Where the work started.
+    /// Start of the work.
     Header = 1,
-    /// The rig it started with.
+    /// Rig at the start of the work.
     Base = 2,
     /// A step that was done.
     Done = 3,
     /// The last step in effect was undone.
     Undone = 4,
-    /// The last step undone was done again.
+    /// The last undone step was redone.
     Redone = 5,
     /// A step from before the journal was undone.
     UndoneOlder = 6,
-    /// A step from before the journal was done again.
+    /// A step from before the journal was redone.
     RedoneOlder = 7,
     /// Weights that later frames name by their hash.
     Skin = 8,
@@ -42,12 +43,12 @@ pub enum RecordKind {
     Mark = 9,
     /// The caller's text.
     Context = 10,
-    /// The work was given up or saved; nothing is to be recovered.
+    /// The work was discarded or saved; nothing is to be recovered.
     End = 11,
 }
 
 impl RecordKind {
-    /// All kinds, by number.
+    /// Kinds of records, by number.
     pub(super) const ALL: [Self; 11] = [
         Self::Header,
         Self::Base,
@@ -62,7 +63,7 @@ impl RecordKind {
         Self::End,
     ];
 
-    /// The kind with this number.
+    /// Kind with this number.
     pub(super) fn of(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| *kind as u8 == number)
     }
@@ -73,14 +74,14 @@ impl RecordKind {
     }
 }
 
-/// The bytes before the first frame.
+/// Appends the bytes before the first frame.
 pub(super) fn put_prelude(out: &mut Vec<u8>, session: u64) {
     out.extend(MAGIC);
     out.extend(JOURNAL_FORMAT.to_le_bytes());
     out.extend(session.to_le_bytes());
 }
 
-/// Appends a frame; false if the payload is too long for one.
+/// Appends a frame; returns false if the payload is too long for one.
 #[must_use]
 pub(super) fn put_frame(out: &mut Vec<u8>, session: u64, number: u64, kind: RecordKind, payload: &[u8]) -> bool {
     if payload.len() > MAX_RECORD {
@@ -97,7 +98,7 @@ pub(super) fn put_frame(out: &mut Vec<u8>, session: u64, number: u64, kind: Reco
     true
 }
 
-/// Beginning of a frame, as its bytes have it.
+/// Head of a frame, as stored.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Head {
     pub length: usize,
@@ -115,7 +116,7 @@ impl Head {
         Some(Self { length, kind: *kind, number: u64::from_le_bytes(*number) })
     }
 
-    /// End of a frame that begins at `at` with this head; `None` where no file is that long.
+    /// End of a frame that begins at `at` with this head; `None` if the end exceeds any file.
     pub(super) fn end(&self, at: usize) -> Option<usize> {
         at.checked_add(HEAD)?.checked_add(self.length)?.checked_add(TAIL)
     }
@@ -126,13 +127,13 @@ impl Head {
 pub(super) struct Frame<'a> {
     pub at: usize,
     pub number: u64,
-    /// `None` for a kind that this version does not know.
+    /// Kind of the record; `None` for a kind that this version does not have.
     pub kind: Option<RecordKind>,
     pub payload: &'a [u8],
 }
 
 impl Frame<'_> {
-    /// Where the next frame begins.
+    /// Position of the next frame, in bytes from the start of the file.
     pub(super) fn end(&self) -> usize {
         self.at + HEAD + self.payload.len() + TAIL
     }

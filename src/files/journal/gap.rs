@@ -7,7 +7,7 @@ use super::RecordKind;
 /// Reason why a record cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Damage {
-    /// Magic, format or session at the start of the file is damaged; the checksums of the records tell them.
+    /// The magic, format or session at the start of the file is damaged; they were found from the records' checksums.
     #[error("the first bytes of the file are damaged")]
     Prelude,
     /// The file ends within the record, as after a power cut.
@@ -22,22 +22,22 @@ pub enum Damage {
     /// Sound records follow directly on each other, but their numbers do not.
     #[error("records are missing")]
     Missing,
-    /// A sound record stands where it does not belong, such as a second copy of it.
+    /// A sound record is out of place, such as a second copy of it.
     #[error("the record stands in the wrong place")]
     Misplaced,
-    /// Only fields that follow from the records around it are damaged, so that the record is used all the same.
+    /// The frame is damaged, but its fields follow from the records around it, so that the record is used all the same.
     #[error("the frame around the record is damaged, its content is whole")]
     Frame,
-    /// The record is of a kind that this version does not know.
+    /// The record is of a kind that this version does not have.
     #[error("the record is of a kind that this version does not know: update to recover it")]
     UnknownKind,
-    /// The checksum fits, but the content makes no sense here.
+    /// The checksum fits, but the content is invalid at this place.
     #[error("the content of the record makes no sense")]
     Content,
-    /// The record names weights whose own record is lost.
+    /// The record refers to weights whose own record is lost.
     #[error("the weights that it names are lost")]
     Weights,
-    /// The record takes back or repeats a step that is lost.
+    /// The record undoes or redoes a step that is lost.
     #[error("the step that it takes back or repeats is lost")]
     UnknownStep,
 }
@@ -47,14 +47,14 @@ pub enum Damage {
 pub struct RecordCount {
     /// Records whose checksum fits.
     pub sound: u64,
-    /// Records that are damaged or missing, as far as the numbers of the others tell.
+    /// Records that are damaged or missing, as far as the numbers of the other records show.
     pub lost: u64,
-    /// True if the end of the file is damaged, so that nobody knows how many more there were.
+    /// True if the end of the file is damaged, so that more records may have been lost than are counted.
     pub may_be_more: bool,
 }
 
 impl RecordCount {
-    /// Counts the records of a gap.
+    /// Adds the records of a gap.
     pub(super) fn lose(&mut self, gap: &Gap) {
         self.lost += gap.records.unwrap_or(1);
         self.may_be_more |= gap.records.is_none();
@@ -71,37 +71,37 @@ impl fmt::Display for RecordCount {
 /// A place of a journal where records cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Gap {
-    /// Begin, in bytes from the start of the file.
+    /// Start of the gap, in bytes from the start of the file.
     pub at: usize,
-    /// Bytes from there to the next sound record.
+    /// Number of bytes from the start of the gap to the next sound record.
     pub bytes: usize,
-    /// Number of records that are lost; `None` at the end of the file, where nothing tells. 0 where bytes are damaged but
-    /// no record is lost.
+    /// Number of lost records; `None` at the end of the file, where it is unknown; 0 where bytes are damaged but no
+    /// record is lost.
     pub records: Option<u64>,
-    /// Kind of the record, if it is one whose head can be read.
+    /// Kind of the record, if the gap is one record whose head can be read.
     pub kind: Option<RecordKind>,
-    /// Reason.
+    /// Damage that makes the gap.
     pub damage: Damage,
-    /// Number of [`Recovered::changes`](super::Recovered::changes) before it.
+    /// Number of [`Recovered::changes`](super::Recovered::changes) before the gap.
     pub changes: usize,
 }
 
 impl Gap {
-    /// A journal that begins with something else than its header.
+    /// Gap at the start of a journal whose first record is not its header.
     pub(super) const NO_HEADER: Self =
         Self { at: 0, bytes: 0, records: Some(0), kind: Some(RecordKind::Header), damage: Damage::Missing, changes: 0 };
 
-    /// True if a replay cannot go on as if the gap were not there.
+    /// True if a replay cannot ignore the gap.
     pub(super) fn loses(&self) -> bool {
         self.records != Some(0) || self.damage == Damage::Weights
     }
 
-    /// True if steps may have been done or undone here without a trace.
+    /// True if an unknown number of steps may have been done or undone in the gap.
     pub(super) fn is_unclear(&self) -> bool {
         use RecordKind::{Context, Done, Mark, Skin};
         match (self.records, self.kind) {
             (Some(0), _) => false,
-            // A record whose kind alone is damaged is mended, so here it can be believed.
+            // The kind can be trusted: a record whose kind alone is damaged is repaired and makes no gap.
             (Some(1), Some(Done | Skin | Mark | Context)) => false,
             _ => true,
         }

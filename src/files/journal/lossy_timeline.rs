@@ -1,11 +1,11 @@
-//! The history that the records of a damaged journal tell: steps that are lost keep their place in it as far as possible.
+//! History from the records of a damaged journal; lost steps keep their place in it as far as possible.
 
 use std::sync::Arc;
 
 use super::{Gap, RecordKind};
 use crate::rig::step::Step;
 
-/// Steps in effect and steps undone; `None` stands for a step that is lost.
+/// Steps in effect and undone steps; `None` stands for a lost step.
 ///
 /// An undo does not say which step it takes back: it is the last one in effect. After a gap that may hide steps, undos
 /// and redos, that is known only of steps that were done since.
@@ -13,14 +13,14 @@ use crate::rig::step::Step;
 pub(super) struct LossyTimeline {
     done: Vec<Option<Arc<Step>>>,
     undone: Vec<Option<Arc<Step>>>,
-    /// From this index on, `done` is sure.
+    /// Index in `done` from which on the steps are certain.
     done_sure: usize,
-    /// From this index on, `undone` is sure.
+    /// Index in `undone` from which on the steps are certain.
     undone_sure: usize,
 }
 
 impl LossyTimeline {
-    /// Records are lost.
+    /// Follows a gap in which records are lost.
     pub(super) fn lose(&mut self, gap: &Gap) {
         if gap.is_unclear() {
             self.done_sure = self.done.len();
@@ -30,33 +30,33 @@ impl LossyTimeline {
         }
     }
 
-    /// A step was done.
+    /// Follows a step that was done.
     pub(super) fn done(&mut self, step: Option<Arc<Step>>) {
         self.undone.clear();
         self.undone_sure = 0;
         self.done.push(step);
     }
 
-    /// The last step was undone; `None` if nobody knows it.
+    /// Follows an undo of the last step, and returns that step; `None` if it is lost.
     pub(super) fn undo(&mut self) -> Option<Arc<Step>> {
         let step = if self.done.len() > self.done_sure { self.done.pop().flatten() } else { None };
         self.undone.push(step.clone());
         step
     }
 
-    /// The last step undone was done again; `None` if nobody knows it.
+    /// Follows a redo of the last undone step, and returns that step; `None` if it is lost.
     pub(super) fn redo(&mut self) -> Option<Arc<Step>> {
         let step = if self.undone.len() > self.undone_sure { self.undone.pop().flatten() } else { None };
         self.done.push(step.clone());
         step
     }
 
-    /// A step from before the journal was undone.
+    /// Follows an undo of a step from before the journal.
     pub(super) fn undo_older(&mut self, step: Option<Arc<Step>>) {
         self.undone.push(step);
     }
 
-    /// A step from before the journal was done again.
+    /// Follows a redo of a step from before the journal.
     pub(super) fn redo_older(&mut self, step: Option<Arc<Step>>) {
         self.done.push(step);
     }

@@ -1,4 +1,4 @@
-//! Where journals lie, and which of them hold work that nobody has any more.
+//! Places of journals, and the search for journals with unsaved work of dead processes.
 
 use std::{
     ffi::OsStr,
@@ -14,31 +14,31 @@ use super::{
 };
 use crate::files::{Disk, EntryKind, ReadError, atomic::folder_of, read_capped};
 
-/// Names of a folder that are looked through, at most.
+/// Largest number of names in a folder that are searched.
 const MAX_NAMES: usize = 10_000;
-/// Bytes of a project file that are hashed, at most.
+/// Largest size in bytes of a project file that is hashed.
 const MAX_PROJECT: u64 = 1 << 30;
 /// Ending of journals beside a project.
 const BESIDE: &str = ".rigsmith.journal";
 /// Beginning and ending of journals elsewhere; the session stands between them.
 const APART: (&str, &str) = ("rigsmith-", ".journal");
 
-/// The folders that a journal may lie in; the first that can be written is taken.
+/// Candidate folders of a journal; the first that can be written is used.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct JournalPlaces {
-    /// The project file, if there is one: the journal lies beside it.
+    /// Project file, if there is one: the journal is put beside it.
     pub project: Option<PathBuf>,
-    /// The program's folder for such things; created when it is missing.
+    /// Folder of the program for its state; created if it is missing.
     pub state: Option<PathBuf>,
 }
 
 impl JournalPlaces {
-    /// The folders, without that of the project, in which journals of whatever project may have been left.
+    /// Folders other than the project's, in which journals of any project may have been left.
     pub fn folders(&self) -> Vec<PathBuf> {
         self.state.iter().cloned().chain([std::env::temp_dir()]).collect()
     }
 
-    /// The files to try, in order.
+    /// Files to try, in order.
     pub(super) fn candidates(&self, session: u64) -> Vec<PathBuf> {
         let name = format!("{}{session:016x}{}", APART.0, APART.1);
         let beside = self.project.as_deref().map(journal_beside);
@@ -46,22 +46,22 @@ impl JournalPlaces {
     }
 }
 
-/// The journal of a project file: `NAME.rigsmith.ron` has `NAME.rigsmith.journal` beside it.
+/// Path of the journal of a project file: `NAME.rigsmith.ron` has `NAME.rigsmith.journal` beside it.
 pub fn journal_beside(project: &Path) -> PathBuf {
     let name = project.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let stem = [".rigsmith.ron", ".ron"].iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(&name);
     project.with_file_name(format!("{stem}{BESIDE}"))
 }
 
-/// The project file that a journal with such a name lies beside; `None` for journals elsewhere.
+/// Project file that a journal with such a name is beside; `None` for journals in other places.
 pub fn project_beside(journal: &Path) -> Option<PathBuf> {
     let stem = journal.file_name()?.to_str()?.strip_suffix(BESIDE)?;
     Some(journal.with_file_name(format!("{stem}.rigsmith.ron")))
 }
 
-/// Gives a file a further ending under which nothing looks for journals, and a number if that name is taken. Where the
-/// file system allows, `old` stays as a second name, so that the file can be found until another one takes that name.
-/// Returns the name, and whether `old` is there still.
+/// Adds an ending to a file's name, so that no search for journals finds the file, and a number if that name is taken.
+/// Where the file system allows, `old` stays as a second name, so that the file can be found until another one takes
+/// that name. Returns the name, and whether `old` still exists.
 pub(super) fn set_aside(disk: &dyn Disk, old: &Path, ending: &str) -> io::Result<(PathBuf, bool)> {
     for number in 1..=MAX_NAMES {
         let mut name = old.as_os_str().to_owned();
@@ -90,11 +90,11 @@ pub(super) fn set_aside(disk: &dyn Disk, old: &Path, ending: &str) -> io::Result
 /// State of a journal that was left behind.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Condition {
-    /// As it was written.
+    /// The file is complete and undamaged.
     Whole,
-    /// Some of it is damaged; the rest can be recovered.
+    /// Parts of the file are damaged; the rest can be recovered.
     Damaged(RecordCount),
-    /// Nothing can be recovered by this version.
+    /// The file holds nothing that this version can recover.
     Unreadable(JournalError),
 }
 
@@ -108,31 +108,31 @@ impl fmt::Display for Condition {
     }
 }
 
-/// Work that a process left behind.
+/// Unsaved work that a dead process left behind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PendingJournal {
-    /// The journal.
+    /// Path of the journal.
     pub path: PathBuf,
-    /// What the work started from.
+    /// Start of the work.
     pub origin: Origin,
-    /// When it started, in seconds since 1970.
+    /// Time at which the work started, in seconds since 1970.
     pub started: u64,
-    /// When the last change was written.
+    /// Time at which the last change was written.
     pub modified: Option<SystemTime>,
-    /// How many changes are in no saved file.
+    /// Number of changes that no saved file holds.
     pub changes: usize,
-    /// True if the project file was changed by someone else since, or is gone.
+    /// True if another program has changed the project file since, or the file is gone.
     pub project_changed: bool,
     /// Ending of the file.
     pub ending: Ending,
-    /// Whether all of it can be read.
+    /// State of the file: undamaged, damaged or unreadable.
     pub condition: Condition,
 }
 
-/// The work left behind in a folder, latest first. Journals that a living process writes are not listed. Those that are
-/// whole and hold nothing that is not saved are removed; no other is, however little of it can be read.
+/// Unsaved work in the journals of a folder, latest first. Journals of living processes are not listed. Undamaged
+/// journals without unsaved changes are removed; all others stay, however little of them can be read.
 ///
-/// Reads the journals and hashes the projects they belong to; a folder that cannot be read holds none.
+/// Reads the journals and hashes the projects they belong to; a folder that cannot be read counts as empty.
 pub fn pending_journals(disk: &dyn Disk, folder: &Path) -> Vec<PendingJournal> {
     let names = disk.list(folder, MAX_NAMES).unwrap_or_default();
     let journals = names.iter().filter(|name| is_journal_name(name));
@@ -141,10 +141,10 @@ pub fn pending_journals(disk: &dyn Disk, folder: &Path) -> Vec<PendingJournal> {
     pending
 }
 
-/// The work left behind in one journal, such as [`journal_beside`] a project that is opened; see [`pending_journals`].
+/// Unsaved work in one journal, such as [`journal_beside`] a project that is opened; see [`pending_journals`].
 pub fn pending_journal(disk: &dyn Disk, path: &Path) -> Option<PendingJournal> {
     let entry = disk.entry(path, false).ok().filter(|entry| entry.kind == EntryKind::File)?;
-    // Where nobody can tell, offering work that is not lost is better than hiding work that is.
+    // If the lock cannot be tested, the journal is offered: offering saved work is better than hiding unsaved work.
     if disk.is_locked(path).unwrap_or(false) {
         return None;
     }
@@ -160,7 +160,7 @@ pub fn pending_journal(disk: &dyn Disk, path: &Path) -> Option<PendingJournal> {
     };
     let read = match read_capped(disk, path, MAX_JOURNAL) {
         Ok(bytes) => summarise(&bytes),
-        // Somebody else's, or gone meanwhile.
+        // The journal belongs to another user, or has just been removed.
         Err(ReadError::NoAccess { .. } | ReadError::Missing { .. }) => return None,
         Err(ReadError::Empty { .. }) => Err(JournalError::NothingSound),
         Err(error) => Err(JournalError::Read(error.to_string())),
@@ -180,7 +180,7 @@ pub fn pending_journal(disk: &dyn Disk, path: &Path) -> Option<PendingJournal> {
     Some(PendingJournal { origin, started, changes, project_changed, ending, ..pending(condition) })
 }
 
-/// How many changes are in no saved file, and whether the project is another one by now.
+/// Number of changes that no saved file holds, and whether the project file has changed since.
 fn unsaved(disk: &dyn Disk, summary: &Summary) -> (usize, bool) {
     let is = |path: &Path, hash: u64| file_hash_at(disk, path) == Some(hash);
     let all = summary.tally.changes();
@@ -195,12 +195,12 @@ fn unsaved(disk: &dyn Disk, summary: &Summary) -> (usize, bool) {
     (all, changed)
 }
 
-/// The [`file_hash`] of a file as it is now; `None` if it cannot be read. For [`Recovered::basis`](super::Recovered::basis).
+/// Present [`file_hash`] of a file; `None` if it cannot be read. For [`Recovered::basis`](super::Recovered::basis).
 pub fn file_hash_at(disk: &dyn Disk, path: &Path) -> Option<u64> {
     read_capped(disk, path, MAX_PROJECT).ok().map(|bytes| file_hash(&bytes))
 }
 
-/// True if the same session went on in the journal beside the project that it saved, which is whole.
+/// True if an undamaged journal beside a project that the session saved continues the same session.
 fn is_superseded(disk: &dyn Disk, path: &Path, summary: &Summary) -> bool {
     summary.marks.iter().any(|mark| {
         let later = journal_beside(&mark.path);

@@ -1,4 +1,4 @@
-//! Reading a journal from bytes that may be anything.
+//! Reader of journals. The bytes may be anything: torn, damaged, or no journal at all.
 
 use std::sync::Arc;
 
@@ -16,24 +16,24 @@ use crate::rig::{
     step::{Committed, Step},
 };
 
-/// Bytes of a journal that are read.
+/// Largest size in bytes of a journal that is read.
 pub const MAX_JOURNAL: u64 = 8 << 30;
 
-/// Reason why nothing of a journal can be read.
+/// Reason for reading nothing from a journal.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum JournalError {
     /// The file does not begin like a journal, and has no records of one.
     #[error("this is not a journal: it does not begin with RIGJRNL, and holds no records")]
     NotAJournal,
-    /// Written by a later version.
+    /// The journal was written by a later version.
     #[error("the journal has format {found}, this version reads up to {known}: update to recover the work in it")]
     Newer {
-        /// The file's format.
+        /// Format of the file.
         found: u32,
-        /// The highest format known.
+        /// Highest format that this version reads.
         known: u32,
     },
-    /// No record is sound.
+    /// The file holds no sound record.
     #[error("the journal is damaged, and none of its records can be read; open the last saved file")]
     NothingSound,
     /// The file cannot be read.
@@ -41,23 +41,23 @@ pub enum JournalError {
     Read(String),
 }
 
-/// Ending of a journal.
+/// End of a journal's file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// With a whole record: the process ended, or is still at work.
+    /// A whole record, but not the one that ends a journal: the process died, or is still at work.
     Open,
-    /// With the word that nothing is to be recovered.
+    /// The record that ends a journal: nothing is to be recovered.
     Closed,
-    /// With something that is no record: the last of the [gaps](Recovered::gaps).
+    /// Bytes that are no record: the last of the [gaps](Recovered::gaps).
     Torn,
 }
 
 /// Content of a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recovered {
-    /// The session that wrote it.
+    /// Session that wrote the journal.
     pub session: u64,
-    /// The process that wrote it; 0 if that is lost.
+    /// Id of the process that wrote the journal; 0 if it is lost.
     pub process: u32,
     /// Ending of the file.
     pub ending: Ending,
@@ -65,22 +65,22 @@ pub struct Recovered {
     pub(super) gaps: Vec<Gap>,
     count: RecordCount,
     tally: Tally,
-    /// Steps with edits in one direction only, because those in the other one name weights that are lost.
+    /// Steps with edits in one direction only, because those in the other direction refer to lost weights.
     pub(super) one_way: Vec<Arc<Step>>,
 }
 
-/// What to replay a journal on.
+/// Rig on which a journal is replayed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
     /// The rig that the journal holds.
     Journal,
-    /// The rig of the project file at [`Recovered::project`], which holds this many of the changes already.
+    /// The rig of the project file at [`Recovered::project`], which already holds the first `contained` changes.
     Project {
-        /// How many of [`Recovered::changes`].
+        /// Number of [`Recovered::changes`] that the project file holds.
         contained: usize,
     },
-    /// The project file was changed by someone else since, or is gone. Replaying all changes on what it holds now is a
-    /// guess that people should confirm.
+    /// The project file was changed by another program since, or is gone. Replaying all changes on its present content
+    /// is a guess that people should confirm.
     Changed,
 }
 
@@ -90,27 +90,27 @@ impl Recovered {
         &self.gaps
     }
 
-    /// True if the file is not as it was written, even if nothing is lost.
+    /// True if the file differs from the written one, even if nothing is lost.
     pub fn is_damaged(&self) -> bool {
         !self.gaps.is_empty()
     }
 
-    /// Number of records that are there and that are lost.
+    /// Numbers of sound and of lost records.
     pub fn records(&self) -> RecordCount {
         self.count
     }
 
-    /// What the work started from.
+    /// Start of the work.
     pub fn origin(&self) -> &Origin {
         &self.content.origin
     }
 
-    /// When the work started, in seconds since 1970.
+    /// Time at which the work started, in seconds since 1970.
     pub fn started(&self) -> u64 {
         self.content.started
     }
 
-    /// The rig that the work started with; `None` if that is what the project file holds, or if it is lost.
+    /// Rig at the start of the work; `None` if the project file holds it, or if it is lost.
     pub fn base(&self) -> Option<&Rig> {
         self.content.base.as_deref()
     }
@@ -139,15 +139,16 @@ impl Recovered {
         self.content.marks.last().map(|mark| mark.path.as_path()).or(opened)
     }
 
-    /// Takes the project that the journal lies beside for what the work started from, where the journal does not tell that
-    /// any more. What is replayed on it is a guess: [`Basis::Changed`].
+    /// Assumes that the work started from `project`, which the journal is beside, if the journal's own record of its
+    /// start is lost. A replay on it is a guess: [`Basis::Changed`].
     pub fn assume_project(&mut self, project: &std::path::Path) {
         if self.content.origin == Origin::Unknown && self.content.base.is_none() {
             self.content.origin = Origin::Project { path: project.to_owned(), hash: 0 };
         }
     }
 
-    /// What to replay on. `hash` gives the hash of the file at a path as it is now, or `None` if it cannot be read.
+    /// Rig to replay the changes on. `hash` gives the present hash of the file at a path, or `None` if it cannot be
+    /// read.
     pub fn basis(&self, mut hash: impl FnMut(&std::path::Path) -> Option<u64>) -> Basis {
         if let Some((index, mark)) = self.saved(&mut hash) {
             let contained = self.tally.contained(index, mark, self.content.first);
@@ -161,14 +162,14 @@ impl Recovered {
         }
     }
 
-    /// The latest save whose content is in the project file now, and its index.
+    /// Latest save whose content the project file has now, with its index.
     pub(super) fn saved(&self, hash: &mut impl FnMut(&std::path::Path) -> Option<u64>) -> Option<(usize, &SaveMark)> {
         self.content.marks.iter().enumerate().rev().find(|(_, mark)| hash(&mark.path) == Some(mark.hash))
     }
 }
 
-/// Reads every record of a journal that is sound, whatever lies between them. Memory stays within a small multiple of the
-/// file's length.
+/// Reads every sound record of a journal, whatever is between them. Memory stays within a small multiple of the file's
+/// length.
 ///
 /// # Errors
 /// [`JournalError`] if there is no sound record. Damage is no error: see [`Recovered::gaps`].
@@ -240,7 +241,7 @@ impl Reader {
         recovered.gaps.push(Gap { changes: recovered.content.changes.len(), ..gap });
     }
 
-    /// Takes one change; else tells what is wrong with it, and how many records that loses.
+    /// Adds a change; on failure returns the damage and the number of records that it loses.
     fn take_change(&mut self, kind: RecordKind, payload: &[u8], place: Gap) -> Result<(), (Damage, u64)> {
         let has_step = !matches!(kind, RecordKind::Undone | RecordKind::Redone);
         let read = if has_step { read_step(payload, &self.skins) } else { None };
@@ -281,7 +282,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Takes a record that is no change; as [`Self::take_change`].
+    /// Adds a record that is no change; returns failures like [`Self::take_change`].
     fn take_other(&mut self, kind: RecordKind, payload: &[u8]) -> Result<(), (Damage, u64)> {
         let content = &mut self.recovered.content;
         let senseless = (Damage::Content, 1);
@@ -293,7 +294,7 @@ impl Reader {
                 self.recovered.process = header.process;
                 self.recovered.tally.begin(header.first);
             }
-            // Written twice.
+            // The second copy of the rig.
             RecordKind::Base if content.base.is_some() => {}
             RecordKind::Base if content.changes.is_empty() => {
                 let (rig, is_whole) = read_rig(payload, &self.skins).ok_or(senseless)?;

@@ -1,8 +1,8 @@
-//! Making the rig of a journal again, across the gaps of a damaged one too.
+//! Restoring the rig of a journal, across the gaps of a damaged one too.
 //!
-//! A whole journal is replayed as it is. After a gap, each change is made if the rig still takes it; a step is taken as a
-//! whole or not at all, and whatever takes back or repeats a step that could not be made is left out with it. From the gap
-//! on, the edits that take a step back are those that really do, so that every undo leads to a state that was there.
+//! A whole journal is replayed as it is. After a gap, each change is made if the rig still accepts it. A step is
+//! applied as a whole or not at all, and an undo or redo of a step that was left out is left out, too. From the gap on,
+//! the edits that undo a step are computed from the restored rig, so that every undo leads to a state that existed.
 
 use std::{borrow::Cow, collections::HashMap, sync::Arc};
 
@@ -12,54 +12,55 @@ use crate::rig::{
     step::{Committed, Replayed, Step, UndoStacks, replay},
 };
 
-/// A change that is sound but could not be made again.
+/// A sound change that could not be applied.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skipped {
-    /// Its index in [`Recovered::changes`].
+    /// Index of the change in [`Recovered::changes`].
     pub change: usize,
-    /// The name of its step.
+    /// Name of the change's step.
     pub name: Cow<'static, str>,
-    /// Reason.
+    /// Reason for leaving the change out.
     pub why: SkipReason,
 }
 
-/// Reason why a change was left out.
+/// Reason for leaving a change out.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SkipReason {
-    /// The rig refuses one of its edits, because what they need is lost.
+    /// The rig refuses an edit of the step, because its requirements are lost.
     #[error(transparent)]
     Refused(#[from] EditError),
-    /// The weights that it would put back are lost.
+    /// The weights that the step would restore are lost.
     #[error("the weights that it puts back are lost")]
     Weights,
 }
 
-/// A journal made into a rig again, and what [`Journal::resume`](super::Journal::resume) needs to go on with it.
+/// Rig restored from a journal, with the data that [`Journal::resume`](super::Journal::resume) needs to continue the
+/// journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Restored {
-    /// The rig, what was selected, and its history.
+    /// Rig, selection and history.
     pub replayed: Replayed,
     /// Changes that were left out, all after a gap.
     pub skipped: Vec<Skipped>,
     /// Content of the next journal.
     pub(super) content: Content,
-    /// Number of those changes that the project holds.
+    /// Number of the changes in `content` that the project holds.
     pub(super) contained: Contained,
 }
 
 /// Number of changes of a restored journal that its project holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Contained {
-    /// As many as the marks of the journal say.
+    /// The number that the marks of the journal give.
     Marked,
-    /// This many.
+    /// The given number.
     Counted(usize),
-    /// None: the journal does not stand on a saved project.
+    /// Zero: the journal does not start from a saved project.
     Nothing,
 }
 
 impl Recovered {
-    /// Makes the rig as it was: on the journal's own rig (an empty one if it has none) for [`Basis::Journal`], else on
+    /// Restores the rig: on the journal's own rig (an empty one if it has none) for [`Basis::Journal`], else on
     /// `project`, the rig that the project file holds now.
     pub fn restore(&self, basis: Basis, project: Option<Rig>) -> Restored {
         let (rig, contained) = match basis {
@@ -80,11 +81,11 @@ impl Recovered {
         if basis == Basis::Journal {
             content.base = Some(Arc::new(rig.clone()));
         }
-        // Positions are counted anew.
+        // Positions are counted again from the start.
         content.marks.clear();
         let mut salvage = Salvage::new(self, rig);
         let (former, later) = self.changes().split_at(contained);
-        // What the project holds is history only as far as it is sure.
+        // The history includes the project's changes only if all of them are certain.
         for committed in former.iter().filter(|_| contained <= exact) {
             salvage.follow(committed);
         }
@@ -112,23 +113,23 @@ impl Recovered {
     }
 }
 
-/// State of a step that the journal names.
+/// State of a step of the journal.
 enum State {
-    /// In effect, as this step.
+    /// The step is in effect, in the given form.
     Done(Arc<Step>),
-    /// Taken back, as this step.
+    /// The step is undone, in the given form.
     Undone(Arc<Step>),
-    /// Not made, or not taken back: whatever repeats or takes it back is left out.
+    /// The step was not applied, or could not be undone; later undos and redos of it are left out.
     Skipped,
 }
 
-/// A rig while it is made again.
+/// Rig during restoration.
 struct Salvage<'a> {
     recovered: &'a Recovered,
     rig: Rig,
     selection: Option<Vec<Uid>>,
     stacks: UndoStacks,
-    /// By the address of the journal's step.
+    /// States of steps, by the address of the journal's step.
     states: HashMap<*const Step, State>,
     made: Vec<Committed>,
     skipped: Vec<Skipped>,
@@ -147,7 +148,7 @@ impl<'a> Salvage<'a> {
         }
     }
 
-    /// A change that the rig holds already.
+    /// Follows a change that the rig already holds.
     fn follow(&mut self, committed: &Committed) {
         let (_, selection) = committed.effect();
         self.selection = Some(selection.to_vec());
@@ -158,7 +159,7 @@ impl<'a> Salvage<'a> {
         self.states.insert(Arc::as_ptr(committed.step()), state);
     }
 
-    /// Makes a change, or lists it as skipped.
+    /// Applies a change, or lists it as skipped.
     fn make(&mut self, number: usize, committed: &Committed, is_exact: bool) {
         let step = committed.step();
         let key = Arc::as_ptr(step);
@@ -172,7 +173,7 @@ impl<'a> Salvage<'a> {
         let source = as_made.as_ref().unwrap_or(step);
         let edits = if is_undo { &source.backward } else { &source.forward };
         let is_lost = edits.is_empty() && self.recovered.one_way.iter().any(|one| Arc::ptr_eq(one, source));
-        // As one edit, so that a refusal leaves nothing half done.
+        // A single edit, so that a refusal applies no part of it.
         let applied = match is_lost {
             true => Err(SkipReason::Weights),
             false => self.rig.apply(&RigEdit::Batch(edits.clone())).map_err(SkipReason::Refused),
@@ -199,8 +200,8 @@ impl<'a> Salvage<'a> {
         self.made.push(next);
     }
 
-    /// Entry of the history, and the state of the step. Where an undo or redo is not that of the last step any more,
-    /// it becomes a step of its own, so that each step stands on those before it.
+    /// Entry of the history for a change, and the state of its step. An undo or redo of a step that is no longer the
+    /// last one becomes a step of its own, so that each step builds on the ones before it.
     fn entry(&self, committed: &Committed, made: Arc<Step>, inverse: RigEdit) -> (Committed, State) {
         let UndoStacks { done, undone } = &self.stacks;
         let is_known = self.states.contains_key(&Arc::as_ptr(committed.step()));

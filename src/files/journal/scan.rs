@@ -1,9 +1,9 @@
-//! Scanning a journal: every record that is sound, and the gaps between them.
+//! Scanner of a journal: every sound record, and the gaps between them.
 //!
-//! After a damaged record the scan goes to where the length of the record says the next one begins. If no record stands
-//! there, it searches byte by byte for a head with a known kind, a length that fits the file and a number that can come
-//! next, and only then computes a checksum. Checksums computed in vain are bounded by a multiple of the file's length, so
-//! that files made for it cannot hold up a reader; a head that another one follows has a budget of its own.
+//! After a damaged record the scan continues at the end that the record's length gives. If no record stands there, it
+//! searches byte by byte for a head with a known kind, a length that fits the file and a number that can come next, and
+//! only then computes a checksum. The bytes of failed checksums are bounded by a multiple of the file's length, so that
+//! a crafted file cannot stall a reader; a head that another one follows has a budget of its own.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -13,22 +13,22 @@ use super::{
 };
 use crate::rig::skin::content_hash;
 
-/// Records that one gap can hold, at most; what claims more is no head.
+/// Largest number of records in one gap; a head that implies more is no head.
 const MAX_LOST: u64 = 1 << 24;
-/// Formats above this are no later ones but damage.
+/// Highest format number of a later version; a greater number is damage.
 const MAX_FORMAT: u32 = 1 << 10;
-/// Bytes of a record whose damaged frame is mended, at most.
+/// Largest size in bytes of a record whose damaged frame is repaired.
 const MAX_MENDED: usize = 16 << 20;
-/// Number of times that the length of the file may be hashed in vain.
+/// Budget of failed checksums, as a multiple of the file's length.
 const HASHED: usize = 8;
-/// Bytes that may be hashed in vain in any file.
+/// Budget of failed checksums in bytes for files of any length.
 const HASHED_ANYWAY: usize = 1 << 20;
 
 /// Part of a journal.
 pub(super) enum Item<'a> {
-    /// A record whose checksum fits, or that was mended, and where it begins.
+    /// A record whose checksum fits or that was repaired: position in bytes, kind, payload.
     Record(usize, RecordKind, &'a [u8]),
-    /// Bytes that hold none; how many changes come before is not filled in.
+    /// Bytes without a usable record; the number of changes before the gap is left at 0.
     Gap(Gap),
 }
 
@@ -37,17 +37,18 @@ pub(super) struct Scan<'a> {
     bytes: &'a [u8],
     session: u64,
     at: usize,
-    /// Number of the record that should come next.
+    /// Number of the next record if none is missing.
     next: u64,
-    /// Place where a search begins if the first record is not in its place.
+    /// Position in bytes where a search begins if the first record is not in its place.
     first: usize,
-    /// Bytes that may still be hashed in vain at heads that another head follows, and at others.
+    /// Remaining budgets of failed checksums in bytes: for heads that another head follows, and for other heads.
     budget: [usize; 2],
     ready: VecDeque<Item<'a>>,
 }
 
 impl<'a> Scan<'a> {
-    /// Begins to scan, with a session from the prelude or, if that is damaged, from the records themselves.
+    /// Starts a scan. The session is that of the prelude or, if that is damaged, the one that the records' checksums
+    /// agree on.
     pub(super) fn new(bytes: &'a [u8]) -> Result<Self, JournalError> {
         let has_magic = bytes.starts_with(&MAGIC);
         let prelude = bytes.get(MAGIC.len()..PRELUDE).and_then(|rest| rest.split_first_chunk::<4>());
@@ -85,12 +86,12 @@ impl<'a> Scan<'a> {
         Ok(scan)
     }
 
-    /// The session that all checksums depend on.
+    /// Session that all checksums depend on.
     pub(super) fn session(&self) -> u64 {
         self.session
     }
 
-    /// Reads the frame at `at`, unless too much has been hashed in vain.
+    /// Reads the frame at `at`, unless the budget of failed checksums is spent.
     fn read(&mut self, at: usize) -> Result<Frame<'a>, Damage> {
         let head = Head::at(self.bytes, at).ok_or(Damage::Cut)?;
         if head.length > MAX_RECORD {
@@ -106,7 +107,7 @@ impl<'a> Scan<'a> {
         frame
     }
 
-    /// Takes a sound frame that is in its turn.
+    /// Adds the next sound frame.
     fn take(&mut self, frame: Frame<'a>) {
         self.at = frame.end();
         self.next = frame.number.saturating_add(1);
@@ -118,7 +119,7 @@ impl<'a> Scan<'a> {
         });
     }
 
-    /// Reads on from a place where no sound record stands that could come next.
+    /// Continues after a position where the next record is not sound.
     fn resume(&mut self, damage: Damage) {
         let (at, next) = (self.at, self.next);
         let head = Head::at(self.bytes, at).filter(|head| head.number == next && RecordKind::of(head.kind).is_some());
@@ -153,7 +154,7 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// The next sound record with a number that can come next, from `from` on.
+    /// Next sound record from `from` on with a number that can come next.
     fn search(&mut self, from: usize) -> Option<Frame<'a>> {
         for at in from..self.bytes.len().saturating_sub(HEAD + TAIL - 1) {
             if plausible(self.bytes, at, self.next).is_some()
@@ -165,8 +166,8 @@ impl<'a> Scan<'a> {
         None
     }
 
-    /// The one record between two places, if only its head or one bit of its checksum is damaged: length and number
-    /// follow from the records around it, and the checksum tells the kind.
+    /// The single record between two positions, if only its head or one bit of its checksum is damaged: length and
+    /// number follow from the records around it, and the checksum gives the kind.
     fn mended(&self, at: usize, end: usize) -> Option<(RecordKind, &'a [u8])> {
         let (whole, checksum) = self.bytes.get(at..end)?.split_last_chunk::<TAIL>()?;
         let payload = whole.get(HEAD..).filter(|payload| payload.len() <= MAX_MENDED.min(MAX_RECORD))?;
@@ -206,7 +207,7 @@ impl<'a> Iterator for Scan<'a> {
     }
 }
 
-/// The head at `at` and the end of its frame, if all in it can be true of a record with a number from `next` on.
+/// Head at `at` and the end of its frame, if its values are possible for a record with a number from `next` on.
 fn plausible(bytes: &[u8], at: usize, next: u64) -> Option<(Head, usize)> {
     RecordKind::of(*bytes.get(at + 4)?)?;
     let head = Head::at(bytes, at)?;
@@ -217,14 +218,14 @@ fn plausible(bytes: &[u8], at: usize, next: u64) -> Option<(Head, usize)> {
     Some((head, end))
 }
 
-/// True if the file ends at `end`, or what may be the record after `number` begins there.
+/// True if the file ends at `end`, or a possible record after `number` begins there.
 fn is_followed(bytes: &[u8], end: usize, number: u64) -> bool {
     let next = number.saturating_add(1);
     end == bytes.len() || plausible(bytes, end, next).is_some_and(|(head, _)| head.number == next)
 }
 
-/// The session that the records themselves tell, because a checksum is the hash of its record mixed with the session: the
-/// first that two records agree on, or that one record shares with the prelude.
+/// Session from the records themselves, because a checksum is the hash of its record mixed with the session: the first
+/// session that two records agree on, or that one record shares with the prelude.
 fn vote(bytes: &[u8], stored: u64) -> Option<u64> {
     let mut votes = BTreeMap::<u64, u32>::new();
     let mut budget = bytes.len().saturating_mul(HASHED).saturating_add(HASHED_ANYWAY);
@@ -243,7 +244,7 @@ fn vote(bytes: &[u8], stored: u64) -> Option<u64> {
         if session == stored || *count == 2 {
             return Some(session);
         }
-        // Were it no record, the search would go on within the next ones, which vote in their turn.
+        // If this is no record, the search continues within the next ones, which vote in their turn.
         at = end;
     }
     None

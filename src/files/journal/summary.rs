@@ -1,4 +1,4 @@
-//! Summary of a journal: its records counted, without reading what is in them.
+//! Summary of a journal: counts of its records, without reading their content.
 
 use super::{
     Ending, Gap, JournalError, Origin, RecordCount, RecordKind, SaveMark,
@@ -65,7 +65,7 @@ impl Summary {
     }
 }
 
-/// Counts what a journal holds.
+/// Summarises a journal from its records.
 pub(super) fn summarise(bytes: &[u8]) -> Result<Summary, JournalError> {
     let scan = Scan::new(bytes)?;
     let mut summary = Summary {

@@ -1,4 +1,4 @@
-//! Syncing beside writing: a slow disk must not keep changes from the kernel.
+//! Syncing on a thread of its own, so that a slow disk does not keep changes from the kernel.
 
 use std::{
     sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel},
@@ -8,10 +8,10 @@ use std::{
 
 use crate::files::DiskFile;
 
-/// Changes that come within this time share a sync, unless someone waits for it.
+/// Longest time for which changes wait to share a sync, unless a caller waits for it.
 const GROUP: Duration = Duration::from_millis(50);
 
-/// What a sync came to: `Err` with the reason.
+/// Result of a sync: `Err` with the reason for a failure.
 pub(super) type Synced = Result<(), String>;
 
 /// A thread that syncs one file.
@@ -21,7 +21,7 @@ pub(super) struct Syncer {
 }
 
 impl Syncer {
-    /// Starts on a handle of the file; `failed` is told the reason when a sync fails, which ends the thread.
+    /// Starts the thread on a handle of the file. A failed sync ends the thread and calls `failed` with the reason.
     pub(super) fn start(file: Box<dyn DiskFile>, failed: impl FnOnce(String) + Send + 'static) -> Option<Self> {
         let (orders, inbox) = channel();
         let work = move || run(file, &inbox, failed);
@@ -35,12 +35,12 @@ impl Syncer {
         let _ = self.thread.join();
     }
 
-    /// Something was written: sync soon.
+    /// Requests a sync soon, after a write.
     pub(super) fn soon(&self) {
         let _ = self.orders.send(None);
     }
 
-    /// Sync now and answer.
+    /// Requests a sync at once, and its result through `answer`.
     pub(super) fn now(&self, answer: Sender<Synced>) {
         if let Err(refused) = self.orders.send(Some(answer))
             && let Some(answer) = refused.0

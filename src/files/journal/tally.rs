@@ -1,41 +1,41 @@
-//! Counting changes, lost ones included: how many of those in a journal a saved project holds.
+//! Tally of changes, lost ones included: it gives the number of a journal's changes that a saved project holds.
 
 use super::{Gap, SaveMark};
 
-/// Counts the changes of a journal in the order of its file.
+/// Tally of the changes of a journal in the order of its file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Tally {
-    /// Changes that are there.
+    /// Number of changes that can be read.
     changes: usize,
     /// Position of the next change among all that were recorded.
     next: u64,
-    /// False while nobody knows how many changes were lost, or how many came before the journal.
+    /// False if the number of lost changes, or of changes before the journal, is unknown.
     is_sure: bool,
     /// Positions of changes that are lost.
     lost: Vec<u64>,
-    /// For each mark how many changes come before it, and whether their positions are sure.
+    /// For each mark the number of changes before it, and whether their positions are certain.
     marks: Vec<(usize, bool)>,
 }
 
 impl Tally {
-    /// The header says that the first change has the position `first`.
+    /// Starts at the position `first` of the first change, which the header gives.
     pub(super) fn begin(&mut self, first: u64) {
         self.next = first;
         self.is_sure = true;
     }
 
-    /// A change is there.
+    /// Counts a change.
     pub(super) fn change(&mut self) {
         self.changes += 1;
         self.next = self.next.saturating_add(1);
     }
 
-    /// A mark is there.
+    /// Counts a mark.
     pub(super) fn mark(&mut self) {
         self.marks.push((self.changes, self.is_sure));
     }
 
-    /// Records are lost.
+    /// Counts the lost records of a gap.
     pub(super) fn lose(&mut self, gap: &Gap) {
         match (gap.records, gap.kind) {
             (Some(0), _) => {}
@@ -48,15 +48,15 @@ impl Tally {
         }
     }
 
-    /// Changes that are there.
+    /// Number of changes that can be read.
     pub(super) fn changes(&self) -> usize {
         self.changes
     }
 
-    /// Number of the changes that are there and in the project that was saved at the mark with this index; `first` is the
+    /// Number of the journal's changes that the project saved at the mark with this index holds; `first` is the
     /// position of the first change.
     ///
-    /// If positions are not sure, all before the mark count: it is written at once when a save begins.
+    /// With uncertain positions, all changes before the mark count: a mark is written at once when a save begins.
     pub(super) fn contained(&self, index: usize, mark: &SaveMark, first: u64) -> usize {
         let Some(&(before, is_sure)) = self.marks.get(index) else { return 0 };
         if !is_sure {

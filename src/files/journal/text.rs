@@ -61,17 +61,17 @@ struct RigText {
     edits: Vec<EditText>,
 }
 
-/// The hashes of weights that a journal holds, and the weights that are still to be written.
+/// Hashes of the weights that a journal holds, and weights that are still to be written.
 #[derive(Default)]
 pub(super) struct SkinsOut {
     known: HashSet<u64>,
-    /// By address, which the weak reference keeps from being used again.
+    /// Hashes by address of the weights; the weak reference keeps the address from being used again.
     seen: HashMap<usize, (Weak<SkinData>, u64)>,
     fresh: Vec<(u64, Vec<u8>)>,
 }
 
 impl SkinsOut {
-    /// Weights that have been named but not written yet: hash and bytes.
+    /// Removes and returns the weights that records refer to but that are not written yet: hash and bytes.
     pub(super) fn take_fresh(&mut self) -> Vec<(u64, Vec<u8>)> {
         std::mem::take(&mut self.fresh)
     }
@@ -128,7 +128,7 @@ pub(super) fn value_text(value: &impl Serialize) -> Result<String, String> {
     written(value)
 }
 
-/// The weights that a journal held so far, by hash.
+/// Weights of a journal up to the present record, by hash.
 pub(super) type SkinsIn = HashMap<u64, Arc<SkinData>>;
 
 fn parsed<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Option<T> {
@@ -136,16 +136,16 @@ fn parsed<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Option<T> {
     ron::from_str(text).ok()
 }
 
-/// A step as a journal holds it.
+/// A step as read from a journal.
 pub(super) struct StepIn {
     pub step: Step,
-    /// False if the edits name weights that are not there; then the step has none.
+    /// False if the edits refer to lost weights; the step then has no forward edits.
     pub has_forward: bool,
-    /// As `has_forward`, for the edits that take the step back.
+    /// False if the edits that undo the step refer to lost weights.
     pub has_backward: bool,
 }
 
-/// Reads a step; `None` if it is none.
+/// Reads a step; `None` if the payload is invalid.
 pub(super) fn read_step(payload: &[u8], skins: &SkinsIn) -> Option<StepIn> {
     let StepText { name, forward, backward, before, after } = parsed(payload)?;
     let (forward, backward) = (edits(forward, skins), edits(backward, skins));
@@ -154,7 +154,7 @@ pub(super) fn read_step(payload: &[u8], skins: &SkinsIn) -> Option<StepIn> {
     Some(StepIn { step: Step { name: Cow::Owned(name), forward, backward, before, after }, has_forward, has_backward })
 }
 
-/// Reads a rig, without the weights that are not there, and whether all are; `None` if it is no rig.
+/// Reads a rig without its lost weights, and whether all weights were found; `None` if the payload is invalid.
 pub(super) fn read_rig(payload: &[u8], skins: &SkinsIn) -> Option<(Rig, bool)> {
     let RigText { uid, edits: list } = parsed(payload)?;
     let (mut rig, mut is_whole) = (Rig::new(uid, ""), true);
@@ -172,7 +172,7 @@ pub(super) fn read_value<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Option<T>
     parsed(payload)
 }
 
-/// The edits; `None` if they name weights that are not there.
+/// Edits from their text form; `None` if they refer to lost weights.
 fn edits(list: Vec<EditText>, skins: &SkinsIn) -> Option<Vec<RigEdit>> {
     list.into_iter().map(|text| edit(text, skins)).collect()
 }

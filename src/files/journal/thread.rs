@@ -1,4 +1,4 @@
-//! The thread that owns the file.
+//! Thread that owns the file of a journal.
 
 use std::{
     path::{Path, PathBuf},
@@ -20,29 +20,29 @@ use crate::files::{
     atomic::{folder_of, temp_name},
 };
 
-/// How long to leave a disk alone that refused.
+/// Pause before the next attempt after a disk has refused.
 const RETRY: Duration = Duration::from_secs(2);
-/// Bytes that are gathered before they are written while more changes wait.
+/// Number of bytes that are collected before a write while more changes wait.
 const BLOCK: usize = 1 << 20;
 
-/// What the thread works with.
+/// Data of the thread.
 pub(super) struct Writer {
     pub disk: Arc<dyn Disk>,
     pub shared: Arc<Shared>,
-    /// Its own inbox, for what the syncing thread has to say.
+    /// Sender to this thread's own inbox, for messages of the syncing thread.
     pub orders: Sender<Order>,
     pub session: u64,
     pub places: JournalPlaces,
     pub content: Content,
-    /// A journal that this one takes the place of.
+    /// Path of the former journal that this one replaces.
     pub replaces: Option<PathBuf>,
 }
 
-/// A journal that is being written.
+/// Open file of a journal.
 struct Open {
     path: PathBuf,
     file: Box<dyn DiskFile>,
-    /// `None` where there is no second handle: then every write is synced by itself.
+    /// Syncing thread; `None` if the file offers no second handle, so that every write is synced by itself.
     syncer: Option<Syncer>,
     encoder: Encoder,
 }
@@ -57,16 +57,16 @@ impl Open {
     }
 }
 
-/// A writer and its file.
+/// The thread's data and its open file.
 struct Work {
     writer: Writer,
     open: Option<Open>,
-    /// When to try again after a failure.
+    /// Earliest time of the next attempt after a failure.
     retry: Instant,
 }
 
 impl Writer {
-    /// Works until told to end.
+    /// Carries out orders until one ends the thread.
     pub(super) fn run(self, inbox: &Receiver<Order>) {
         let mut work = Work { writer: self, open: None, retry: Instant::now() };
         work.reopen();
@@ -85,7 +85,7 @@ impl Writer {
 }
 
 impl Work {
-    /// Carries out an order; false to end. What is to be appended is gathered in `block`.
+    /// Carries out an order; returns false to end the thread. Bytes to append are collected in `block`.
     fn take(&mut self, order: Order, block: &mut Vec<u8>) -> bool {
         match order {
             Order::Change(committed) => {
@@ -116,7 +116,7 @@ impl Work {
             Order::SyncFailed(path, reason) => {
                 self.write(block);
                 if self.open.as_ref().is_some_and(|open| open.path == path) {
-                    // What a failed sync left on the disk is anyone's guess, so all is written again.
+                    // The content of the disk after a failed sync is unknown, so all is written again.
                     self.open = None;
                     self.report(&path, &reason);
                     self.reopen();
@@ -140,11 +140,11 @@ impl Work {
         true
     }
 
-    /// Encodes for the open file; what its encoder refuses ends it.
+    /// Encodes a record for the open file; a record that its encoder refuses ends the file.
     fn append(&mut self, block: &mut Vec<u8>, put: impl FnOnce(&mut Encoder, &mut Vec<u8>) -> Result<(), String>) {
         let Some(open) = &mut self.open else { return };
         if let Err(reason) = put(&mut open.encoder, block) {
-            // Everything up to here is still worth having.
+            // The records before the refused one are still worth writing.
             self.write(block);
             if let Some(open) = self.open.take() {
                 self.report(&open.path, &reason);
@@ -152,7 +152,7 @@ impl Work {
         }
     }
 
-    /// Writes a block; after a failure, everything to the next place that takes it.
+    /// Writes a block; after a failure, writes the whole journal to the next place that accepts it.
     fn write(&mut self, block: &mut Vec<u8>) {
         let Some(open) = &mut self.open else {
             block.clear();
@@ -194,7 +194,7 @@ impl Work {
         }
     }
 
-    /// Writes everything into a file of its own, in the first place that takes it.
+    /// Writes the whole journal to a new file, in the first place that accepts it.
     fn reopen(&mut self) {
         let writer = &mut self.writer;
         writer.content.generation += 1;
@@ -208,7 +208,8 @@ impl Work {
         }
     }
 
-    /// Starts again on a saved project, or goes on as before if that cannot be written: the mark in the file says all.
+    /// Starts a new file on a saved project. If that cannot be written, the present file goes on, since its mark
+    /// identifies the save.
     fn rebase(&mut self, mark: &SaveMark, places: JournalPlaces) {
         let writer = &mut self.writer;
         let mut content = writer.content.clone();
@@ -226,11 +227,11 @@ impl Work {
         }
     }
 
-    /// Goes on with a file that holds everything, and removes the one before it.
+    /// Switches to a file that holds the whole journal, and removes the former one.
     fn adopt(&mut self, mut open: Open) {
         let writer = &mut self.writer;
         let former = writer.shared.settle(Some(open.path.clone()));
-        // Windows removes only closed files.
+        // Windows removes a file at once only if it is closed.
         self.open = None;
         for old in former.into_iter().chain(writer.replaces.take()).filter(|old| *old != open.path) {
             let _ = writer.disk.remove(&old);
@@ -244,14 +245,14 @@ impl Work {
         self.open = Some(open);
     }
 
-    /// Ends cleanly: nothing is to be recovered.
+    /// Ends the journal: nothing is to be recovered.
     fn close(&mut self) -> Synced {
         let open = self.open.take();
         let path = self.writer.shared.settle(None);
         let Some(path) = path else { return Ok(()) };
         if let Some(mut open) = open {
             let mut out = Vec::new();
-            // Counts where the file cannot be removed.
+            // The end record matters if the file cannot be removed.
             if open.encoder.end(&mut out).is_ok() {
                 let _ = write_all(open.file.as_mut(), &out);
             }
@@ -271,7 +272,8 @@ impl Work {
     }
 }
 
-/// Creates the journal in the first place that takes it; else says what was wrong with the first one.
+/// Creates the journal in the first place that accepts it; otherwise returns the first place with the reason for its
+/// refusal.
 fn create_somewhere(
     writer: &Writer,
     content: &Content,
@@ -281,7 +283,7 @@ fn create_somewhere(
     let mut first = None;
     for (number, path) in places.candidates(writer.session).into_iter().enumerate() {
         let folder = folder_of(&path);
-        // The project's own folder exists, or the project could not be there.
+        // The project's own folder is never created: the project could not be there without it.
         if number > 0 || places.project.is_none() {
             let _ = writer.disk.create_folder(folder);
         }
@@ -289,7 +291,7 @@ fn create_somewhere(
         let replaced = writer.replaces.as_ref() == Some(&path) && !writer.disk.is_locked(&path).unwrap_or(false);
         let taken = !own && !replaced && writer.disk.entry(&path, false).is_ok();
         let created = if taken {
-            // Another window works on this project, or its work waits to be recovered.
+            // Another window works on this project, or unsaved work waits to be recovered.
             Err("another journal lies there".to_owned())
         } else {
             create(writer.disk.as_ref(), &path, writer.session, content)
@@ -302,7 +304,7 @@ fn create_somewhere(
     Err(first.unwrap_or_else(|| (PathBuf::new(), "there is no place for it".to_owned())))
 }
 
-/// Writes a whole journal beside its place, then puts it there.
+/// Writes a whole journal to a temporary file in the same folder, then renames it.
 fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Result<Open, String> {
     let (encoder, bytes) = Encoder::begin(session, content)?;
     let temp = folder_of(path).join(temp_name());
@@ -318,7 +320,7 @@ fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Resu
         let _ = disk.remove(&temp);
         return Err(reason);
     }
-    // Without this a power cut may bring the former file back, which tells the same story less far.
+    // Without this, a power cut may bring the former file back, which ends earlier.
     let _ = disk.sync_folder(folder_of(path));
     Ok(Open { path: path.to_owned(), file, syncer: None, encoder })
 }

@@ -1,4 +1,4 @@
-//! The journal as its caller holds it.
+//! Handle of a journal for its callers.
 
 use std::{
     hash::{BuildHasher, RandomState},
@@ -27,38 +27,39 @@ use crate::{
     },
 };
 
-/// How long the last handle waits for what is still to be written.
+/// Longest time that the last handle waits for pending writes.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// A journal that is being written; handles are cheap to clone and work from any thread. When the last one goes
+/// A journal that is being written; handles are cheap to clone and work from any thread. If the last handle is dropped
 /// without [`Journal::close`], the file stays, as after a crash.
 #[derive(Clone)]
 pub struct Journal {
     inner: Arc<Inner>,
 }
 
-/// What a journal starts from.
+/// Start of a journal.
 #[derive(Debug, Clone, Default)]
 pub struct JournalStart {
-    /// Where it may lie.
+    /// Places to try for the file.
     pub places: JournalPlaces,
-    /// What was opened.
+    /// Document that was opened.
     pub origin: Origin,
-    /// The rig as it stands now; `None` if a project file holds exactly that, or it is empty and has no uid.
+    /// Present rig; `None` if a project file holds exactly this rig, or the rig is empty and has no uid.
     pub rig: Option<Rig>,
-    /// Whatever else the caller needs to go on after a crash, such as the meshes that are open; given back as it is.
+    /// Text with anything else that the caller needs after a crash, such as the meshes that are open; returned
+    /// unchanged.
     pub context: String,
 }
 
-/// A journal that goes on with recovered work.
+/// A journal that continues recovered work.
 pub struct Resumed {
     /// The journal.
     pub journal: Journal,
-    /// Place where the former file is kept, because it was damaged or not all of it could be made again.
+    /// Path where the former file is kept, because it was damaged or some of its changes could not be applied.
     pub kept: Option<PathBuf>,
 }
 
-/// What the thread is asked for.
+/// Orders to the thread.
 pub(super) enum Order {
     Change(Committed),
     Context(String),
@@ -70,7 +71,7 @@ pub(super) enum Order {
     Close(Sender<Synced>),
 }
 
-/// What the thread tells.
+/// State that the thread publishes.
 #[derive(Default)]
 pub(super) struct Shared {
     state: Mutex<State>,
@@ -93,11 +94,11 @@ impl Shared {
     }
 
     pub(super) fn trouble(&self) -> Option<Arc<str>> {
-        // Asked in every frame.
+        // The atomic flag avoids the lock, since this is called in every frame.
         if self.troubled.load(Ordering::Acquire) { self.state().trouble.clone() } else { None }
     }
 
-    /// All is well at `path`; returns where it was before.
+    /// Records that the journal is written at `path` without trouble; returns the former path.
     pub(super) fn settle(&self, path: Option<PathBuf>) -> Option<PathBuf> {
         let mut state = self.state();
         state.trouble = None;
@@ -119,7 +120,7 @@ struct Inner {
 }
 
 impl Journal {
-    /// Begins a journal. What goes wrong is told by [`Journal::trouble`].
+    /// Starts a journal. [`Journal::trouble`] gives its errors.
     pub fn start(disk: Arc<dyn Disk>, start: JournalStart) -> Self {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let content = Content {
@@ -133,11 +134,11 @@ impl Journal {
         Self::begin(disk, session, start.places, content, None)
     }
 
-    /// Goes on with what was recovered from the file `old` and [restored](Recovered::restore). Everything not saved is in
-    /// the journal from the start; when that is on the disk, `old` is removed.
+    /// Continues with the work that was recovered from the file `old` and [restored](Recovered::restore). The journal
+    /// holds all unsaved changes from its start; once it is on the disk, `old` is removed.
     ///
-    /// A damaged journal is kept under the ending `.damaged`, and one whose changes could not all be made again under the
-    /// ending `.kept`. Nothing looks for those again, and nothing removes them.
+    /// A damaged journal is kept under the ending `.damaged`, and one whose changes could not all be applied under the
+    /// ending `.kept`. No search finds those files, and the program never removes them.
     pub fn resume(
         disk: Arc<dyn Disk>,
         places: JournalPlaces,
@@ -149,7 +150,7 @@ impl Journal {
             true => Some(".damaged"),
             false => restored.replayed.refused.is_some().then_some(".kept"),
         };
-        // What cannot be set aside stays in its place, which the next journal leaves alone.
+        // A file that cannot be renamed stays in its place, which the next journal then leaves alone.
         let (kept, replaces) = match ending.map(|ending| set_aside(disk.as_ref(), old, ending)) {
             None => (None, Some(old.to_owned())),
             Some(Ok((aside, old_is_there))) => (Some(aside), old_is_there.then(|| old.to_owned())),
@@ -162,7 +163,7 @@ impl Journal {
             (Some(mark), Contained::Counted(contained)) => content.rebase_after(&mark, contained),
             (_, Contained::Nothing) | (None, _) => {}
         }
-        // Under the same session the file has the same name, and takes the place of the old one in one step.
+        // The same session gives the same file name, so that the file replaces the old one in one step.
         Resumed { journal: Self::begin(disk, recovered.session, places, content, replaces), kept }
     }
 
@@ -185,31 +186,33 @@ impl Journal {
         Self { inner: Arc::new(Inner { orders, shared, position, closed: AtomicBool::new(false) }) }
     }
 
-    /// Takes one change. Returns at once; large weights are encoded by the journal's own thread.
+    /// Records one change. Returns at once; large weights are encoded by the journal's own thread.
     pub fn record(&self, committed: Committed) {
         self.inner.position.fetch_add(1, Ordering::AcqRel);
         self.order(Order::Change(committed));
     }
 
-    /// The reason why changes cannot be kept at the moment and what to do, for people; `None` while they are.
+    /// Reason why changes cannot be stored at the moment, and what to do, for people; `None` while they are stored.
     pub fn trouble(&self) -> Option<Arc<str>> {
         self.inner.shared.trouble()
     }
 
-    /// Waits until all changes so far are on the disk, at most for `limit`. Where they are not, tries again at once.
+    /// Waits until all changes so far are on the disk, at most for `limit`; after an earlier failure, tries again at
+    /// once.
     ///
     /// # Errors
-    /// Why they are not there, for people.
+    /// The reason why the changes are not on the disk, for people.
     pub fn flush(&self, limit: Duration) -> Result<(), String> {
         self.ask(Order::Flush, limit)
     }
 
-    /// How many changes were recorded since the work started: what is in the document now, for [`SaveMark::position`].
+    /// Number of changes recorded since the work started, which is the state of the document for
+    /// [`SaveMark::position`].
     pub fn position(&self) -> u64 {
         self.inner.position.load(Ordering::Acquire)
     }
 
-    /// Where the journal lies; `None` before it is created, and when no place takes it.
+    /// Path of the journal; `None` before it is created, and if no place accepts it.
     pub fn path(&self) -> Option<PathBuf> {
         self.inner.shared.path()
     }
@@ -219,24 +222,25 @@ impl Journal {
         self.order(Order::Context(context.into()));
     }
 
-    /// Notes that the project file is about to get the content with that hash, and waits until the note is on the disk.
-    /// Call it before the file is written; if that then fails, nothing needs to be done.
+    /// Records that the project file is about to get the content with that hash, and waits until the mark is on the
+    /// disk. Call this before writing the file; if the write then fails, nothing needs to be done.
     ///
     /// # Errors
-    /// Why the note is not on the disk. The project can be saved nevertheless.
+    /// The reason why the mark is not on the disk. The project can be saved nevertheless.
     pub fn saving(&self, mark: SaveMark, limit: Duration) -> Result<(), String> {
         self.ask(|answer| Order::Saving(mark, answer), limit)
     }
 
-    /// The file is in place: the journal starts again on it, with what was changed meanwhile. Returns at once.
+    /// Starts the journal again from the saved project file, with the changes since that save. Returns at once.
     pub fn saved(&self, mark: SaveMark, places: JournalPlaces) {
         self.order(Order::Saved(mark, places));
     }
 
-    /// Ends the journal and removes its file: everything is saved, or not wanted. Changes recorded later are dropped.
+    /// Ends the journal and removes its file, since all changes are saved or discarded. Changes recorded later are
+    /// dropped.
     ///
     /// # Errors
-    /// Why the file could not be removed; it says inside that it holds nothing.
+    /// The reason why the file could not be removed; the file itself records that it holds nothing to recover.
     pub fn close(&self, limit: Duration) -> Result<(), String> {
         if self.inner.closed.swap(true, Ordering::AcqRel) {
             return Ok(());
@@ -245,7 +249,7 @@ impl Journal {
     }
 
     fn order(&self, order: Order) {
-        // Fails only after the thread has ended, which its caller asked for or was told.
+        // Sending fails only after the thread has ended, which was requested or reported.
         let _ = self.inner.orders.send(order);
     }
 

@@ -1,4 +1,4 @@
-//! Opening projects.
+//! Loader of projects.
 
 use std::{path::Path, sync::Arc};
 
@@ -23,11 +23,11 @@ use crate::{
 
 /// Opens a project with its meshes and weights.
 ///
-/// A mesh or weights that are missing, changed or damaged are no error: the rest opens, and the notes say what happened
-/// and what to do. Weights of a mesh that has changed are transferred to it.
+/// A mesh or weights that are missing, changed or damaged are no error: the rest opens, and the notes describe each of
+/// them and its remedy. Weights of a mesh that has changed are transferred to it.
 ///
 /// # Errors
-/// [`LoadError`] for what is wrong in the project file itself.
+/// [`LoadError`] for errors in the project file itself.
 pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadError> {
     let read = load_project_file(disk, path)?;
     let Project { name, meshes: references, rigs: entries, view, journal } = read.project;
@@ -36,7 +36,7 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
         entries.into_iter().map(|entry| (entry.rig, entry.skins)).unzip();
     let mut meshes = Vec::with_capacity(references.len());
     for reference in references {
-        // The reader has made sure that there is such a rig.
+        // The reader has checked that this rig exists.
         let Some(number) = rigs.iter().position(|rig| rig.uid() == reference.rig) else { continue };
         let skin = skins[number].iter().find(|skin| skin.mesh == reference.uid);
         let skin = skin.and_then(|skin| Some((read_skin(disk, path, skin, &mut notes)?, skin.at_rest)));
@@ -51,7 +51,7 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
     Ok(LoadedProject { name, rigs, meshes, view, journal, notes })
 }
 
-/// The file with a mesh's weights, if it can be read.
+/// Weights of a mesh from their file; `None`, with a note, if it cannot be read.
 fn read_skin(disk: &dyn Disk, project: &Path, skin: &SkinReference, notes: &mut Vec<String>) -> Option<SkinFile> {
     let Some(path) = below(project, &skin.path) else {
         notes.push(format!("the weights `{}` are not below the project's folder: put them there", skin.path));
@@ -105,7 +105,7 @@ fn open_mesh(
             let bound = skin.and_then(|(file, at_rest)| {
                 let target = TransferMesh { points: &rest.points, triangles: &triangles };
                 let weights = fitting(&file, target, &path, notes)?;
-                // A mesh that has lost its bind pose is held as it stands.
+                // A mesh whose file no longer has a bind pose is bound in its present state.
                 Some(data(&file, weights, at_rest || model.weights.is_none()))
             });
             (MeshState::Open { model: Box::new(model), changed }, bound)
@@ -114,7 +114,7 @@ fn open_mesh(
     (LoadedMesh { uid, rig: rig_uid, path, nodes: nodes.into(), shape: state }, bound)
 }
 
-/// The weights for a mesh: as they are if it is the one they were made for, else transferred.
+/// Weights for a mesh: unchanged if the mesh is the one they were made for, else transferred.
 fn fitting(file: &SkinFile, target: TransferMesh, path: &Path, notes: &mut Vec<String>) -> Option<Weights> {
     if file.fits(target.points, target.triangles) {
         return Some(file.weights().clone());
@@ -140,8 +140,8 @@ fn fitting(file: &SkinFile, target: TransferMesh, path: &Path, notes: &mut Vec<S
     }
 }
 
-/// The joints that the nodes of a mesh became. A file that has other nodes by now is matched by names; a node without
-/// a joint is given a uid that no joint has.
+/// Joints that the nodes of a mesh became. If the file has other nodes now, they are matched by names; a node without a
+/// joint gets a uid that no joint has.
 fn known_nodes(nodes: Vec<Uid>, model: &Model, rig: &Rig) -> Vec<Uid> {
     if nodes.is_empty() || nodes.len() == model.nodes.len() {
         return nodes;

@@ -1,17 +1,17 @@
-//! How a project names other files.
+//! References of a project to other files.
 
 use std::path::{Component, Path, PathBuf};
 
 use crate::files::{Disk, atomic::folder_of};
 
-/// The text by which a project names a file: relative to the project's folder, with `/` between names, so that both
-/// can be moved together; absolute where they have no folder in common.
+/// Text by which a project refers to a file: relative to the project's folder, with `/` between names, so that both can
+/// be moved together; absolute if they have no folder in common.
 pub(super) fn reference(disk: &dyn Disk, project: &Path, file: &Path, notes: &mut Vec<String>) -> String {
     let (folder, target) = (whole(folder_of(project)), whole(file));
     let found = if target.starts_with(&folder) {
         relative(&folder, &target)
     } else {
-        // A way up is only right where links are resolved.
+        // A relative path that goes up is only right where links are resolved.
         match (disk.canonical(&folder), disk.canonical(&target)) {
             (Ok(folder), Ok(target)) => relative(&folder, &target),
             _ => relative(&folder, &target),
@@ -32,12 +32,12 @@ pub(super) fn reference(disk: &dyn Disk, project: &Path, file: &Path, notes: &mu
     text
 }
 
-/// Where the file is that a project names.
+/// Path of a file from a project's reference `text`.
 pub(super) fn located(project: &Path, text: &str) -> PathBuf {
     folder_of(project).join(text)
 }
 
-/// Where the file is that a project names, if that is below the project's folder by its name.
+/// Path of a file from a project's reference `text`; `None` if the reference leads out of the project's folder.
 pub(super) fn below(project: &Path, text: &str) -> Option<PathBuf> {
     let plain = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
     let path = Path::new(text);
@@ -60,7 +60,7 @@ fn whole(path: &Path) -> PathBuf {
     out
 }
 
-/// The way from a folder to a file; `None` if they have no folder in common.
+/// Relative path from a folder to a file; `None` if they have no folder in common.
 fn relative(folder: &Path, file: &Path) -> Option<PathBuf> {
     let common = folder.components().zip(file.components()).take_while(|(a, b)| a == b);
     let (mut shared, mut named) = (0, false);

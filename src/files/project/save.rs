@@ -1,4 +1,4 @@
-//! Saving projects.
+//! Writer of projects.
 
 use std::path::Path;
 
@@ -15,37 +15,37 @@ use crate::{
 /// The files of a project, ready to be saved together by [`save_set`].
 #[derive(Debug, Clone, Default)]
 pub struct ProjectFiles {
-    /// The project itself, and the weights as its companions.
+    /// Project file, with the weights as its companions.
     pub set: FileSet,
-    /// What could not be kept, a sentence each.
+    /// Notes about content that could not be kept, a sentence each.
     pub notes: Vec<String>,
 }
 
 impl ProjectFiles {
-    /// The [`content_hash`] of the project itself, by which a [journal](crate::files::journal::SaveMark) knows it.
+    /// The [`content_hash`] of the project file, by which a [journal](crate::files::journal::SaveMark) identifies it.
     pub fn hash(&self) -> u64 {
         content_hash(self.set.bytes())
     }
 }
 
-/// Saves a project with the weights of its meshes beside it, whole or not at all. Returns what could not be kept, a
-/// sentence each.
+/// Saves a project with the weights of its meshes beside it, whole or not at all. Returns notes about content that
+/// could not be kept, a sentence each.
 ///
 /// # Errors
-/// [`StoreError`]; what was there before is still there.
+/// [`StoreError`]; the former files are unchanged.
 pub fn store_project(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> Result<Vec<String>, StoreError> {
     let ProjectFiles { set, notes } = project_files(disk, path, project)?;
     save_set(disk, &set)?;
     Ok(notes)
 }
 
-/// Makes the files of a project that is to be saved at `path`, reads them back, and writes nothing: for those who note what they are
-/// about to save before they do.
+/// Makes the files of a project that is to be saved at `path`, and reads them back without writing them: for callers
+/// that record the save in a journal first.
 ///
 /// Meshes are named relative to the project's folder; where they have no folder in common, by their absolute path.
 ///
 /// # Errors
-/// [`StoreError`] if a file cannot hold what it should.
+/// [`StoreError`] if a file cannot hold its content.
 pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> Result<ProjectFiles, StoreError> {
     let mut notes = Vec::new();
     let mut set = FileSet::new(path);
@@ -86,7 +86,8 @@ pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
     Ok(ProjectFiles { set, notes })
 }
 
-/// The bytes of the file with a mesh's weights; `None` if nothing is known about the mesh.
+/// Content of the file with a mesh's weights; `None` if neither the mesh's geometry nor its former weight file is
+/// known.
 fn skin_file(rig: &Rig, mesh: &MeshToSave, skin: &SkinData) -> Result<Option<Vec<u8>>, SkinError> {
     if let Some((points, triangles)) = mesh.shape.geometry() {
         return Ok(Some(

@@ -18,7 +18,7 @@ impl<'a> Decoder<'a> {
         Self { source, notes, cache: RefCell::default() }
     }
 
-    /// All elements of an accessor, flat.
+    /// Elements of an accessor as a flat list, `width` numbers each.
     pub(super) fn all(&self, accessor: usize, width: usize) -> Result<Rc<Vec<f32>>, GltfError> {
         if let Some(known) = self.cache.borrow().get(&accessor)
             && self.source.document.accessors[accessor].width == width
@@ -30,7 +30,7 @@ impl<'a> Decoder<'a> {
         Ok(floats)
     }
 
-    /// The elements of an accessor at the indices `pick`, or all.
+    /// Elements of an accessor at the indices `pick`; the whole accessor for `None`.
     pub(super) fn pick<const N: usize, T>(
         &self,
         accessor: usize,

@@ -6,7 +6,8 @@ use super::{GltfError, memory_limit};
 
 /// Counter of the memory that reading a file takes; memory is charged before it is allocated.
 ///
-/// Nothing is ever given back: that bounds the time as well, since all work here is linear in the memory it charges.
+/// Memory is never returned to the budget. This bounds the time as well, since all work here is linear in the memory it
+/// charges.
 pub(super) struct Budget {
     input: Cell<u64>,
     used: Cell<u64>,

@@ -118,7 +118,7 @@ fn tree_size(json: &[u8]) -> usize {
                 }
                 total += length + 32;
             }
-            // The parser gives up at 128 levels.
+            // The parser refuses text deeper than 128 levels.
             b'[' if open.len() < 256 => open.push((size_of::<Value>(), 0)),
             b'{' if open.len() < 256 => open.push((ENTRY, 0)),
             b',' => {

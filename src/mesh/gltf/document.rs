@@ -54,7 +54,7 @@ pub(super) struct AnimationEntry<'a> {
     pub(super) channels: Vec<ChannelEntry<'a>>,
 }
 
-/// The checked document.
+/// Document whose references and ranges of bytes have been checked.
 pub(super) struct Document<'a> {
     pub(super) root: At<'a>,
     buffers: Vec<BufferEntry<'a>>,

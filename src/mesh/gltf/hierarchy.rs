@@ -17,7 +17,7 @@ use crate::mesh::model::{Node, Trs};
 /// Properties of each node of the file.
 pub(super) struct Hierarchy {
     parents: Vec<Option<usize>>,
-    /// All nodes, parents first.
+    /// Indices of the nodes, parents first.
     order: Vec<usize>,
     /// Marks nodes of the scene that is read.
     pub(super) visible: Vec<bool>,

@@ -56,18 +56,18 @@ pub(super) struct Bake {
     normal: DMat3,
     /// Marks a transform that mirrors, so that triangles have to be reversed.
     pub(super) flip: bool,
-    /// Marks the identity: nothing has to be done.
+    /// Marks the identity, which changes no geometry.
     pub(super) identity: bool,
 }
 
 impl Bake {
-    /// The bake that changes nothing.
+    /// Identity, which changes no geometry.
     pub(super) fn none() -> Self {
         Self { world: DAffine3::IDENTITY, normal: DMat3::IDENTITY, flip: false, identity: true }
     }
 
-    /// A bake for points up to `extent` from the origin; a transform that is the identity to within rounding does
-    /// nothing.
+    /// Transform for points up to `extent` from the origin; one that is the identity to within rounding changes no
+    /// geometry.
     pub(super) fn new(world: DAffine3, extent: f64) -> Self {
         if is_identity(&world, extent) {
             return Self::none();

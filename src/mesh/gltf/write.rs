@@ -89,7 +89,7 @@ fn to_bytes(root: &Map<String, Value>, pretty: bool) -> Result<Vec<u8>, GltfErro
     bytes.map_err(|error| GltfError::model(error.to_string()))
 }
 
-/// The whole document and its buffer; given a stem and somebody who takes companions, buffer and images go there.
+/// Document and buffer of a model. With `outside` (a stem and a sink of companions), buffer and images go to the sink.
 fn document(
     model: &Model,
     settings: &GltfWriteSettings,
@@ -118,7 +118,7 @@ fn document(
     root.insert("asset".to_owned(), asset.into());
     insert_list(&mut root, "extensionsUsed", written.extensions_used);
     insert_list(&mut root, "extensionsRequired", written.extensions_required);
-    // Some readers refuse a scene without nodes.
+    // The scene is left out if it has no nodes, because some readers refuse an empty one.
     if scene.contains_key("nodes") {
         root.insert("scene".to_owned(), 0.into());
         root.insert("scenes".to_owned(), vec![Value::from(scene)].into());

@@ -1,4 +1,4 @@
-//! One block of whole lines, parsed on its own into lists of its own.
+//! Block of whole lines of an OBJ file, parsed into lists of its own.
 //!
 //! Plain lines (`v x y z`, `vt`, `vn`, `f` with positive indices) are read here without looking for their end first.
 //! Any other line goes to [`super::statement`], which is slower and handles every statement. Indices that count

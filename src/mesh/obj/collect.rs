@@ -91,7 +91,8 @@ impl<'a> Collector<'a> {
 
     /// The error of an index that counts back to before the first element.
     fn before_line(&self, parsed: &Parsed, face: usize, list: usize, resolved: i64) -> ObjError {
-        // The number of elements at that line is not kept; the distance before the first element is.
+        // The error gives the distance before the first element, because the number of elements at that line is not
+        // stored.
         let line = self.line(parsed.face_lines.get(face).copied().unwrap_or(parsed.lines));
         ObjError::Line {
             line,

@@ -6,8 +6,8 @@ use super::NONE;
 
 /// Names by number, in the order of their first use.
 ///
-/// One text and one table for all of them, so that a million names cost little more than their letters and reading
-/// into the same arrays again allocates nothing.
+/// A single text and a single table hold all names, so that a million names cost little more than their letters and
+/// reading into the same arrays again allocates nothing.
 #[derive(Debug, Clone, Default)]
 pub struct ObjNames {
     text: String,

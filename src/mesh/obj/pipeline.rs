@@ -94,7 +94,7 @@ fn read_with(
     };
     thread::scope(|scope| {
         for _ in 1..threads {
-            // Without another thread the read is slower, not wrong.
+            // If no thread can be started, the read is only slower.
             let _ = thread::Builder::new().name("obj".into()).spawn_scoped(scope, || work.run(None));
         }
         work.run(Some((0, block)));
@@ -211,7 +211,7 @@ struct Order {
 impl<R: Read> Work<'_, R> {
     /// Takes, parses and hands in blocks until there are none. `first` is a block already taken.
     fn run(&self, mut first: Option<(u64, Block)>) {
-        // If the caller's reader panics in one thread, the others must not wait for its block.
+        // Stops the other threads if the caller's reader panics in this one, so that they do not wait for its block.
         let _guard = StopOnUnwind { order: &self.order, change: &self.change };
         while let Some((number, mut block)) = first.take().or_else(|| self.take()) {
             block.parse();
@@ -269,7 +269,7 @@ impl<R: Read> Work<'_, R> {
     }
 }
 
-/// Locks a mutex, poisoned or not: a state that a panic left half done is not used afterwards.
+/// Locks a mutex, poisoned or not: the state that a panic left is not used afterwards.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

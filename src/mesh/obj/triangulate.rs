@@ -240,7 +240,7 @@ impl Grid {
     fn build(&mut self, points: &[DVec2], wanted: &[bool]) {
         let inside = || points.iter().zip(wanted).filter(|(_, wanted)| **wanted).map(|(point, _)| *point);
         let count = inside().count();
-        // One or two points a cell, in a row of at least one cell.
+        // The number of cells in a row doubles until a cell holds four points or fewer on average (at most 1024 cells).
         self.side = 1;
         while self.side * self.side * 4 < count && self.side < 1024 {
             self.side *= 2;

@@ -28,7 +28,7 @@ const MOST: usize = 2 * LANES;
 /// Primitives in a unit of parallel work.
 const CHUNK: usize = 1 << 14;
 
-/// One triangle, or two in sequence that fill one box well (mostly the halves of a quad).
+/// Single triangle, or two in sequence that fill one box well (mostly the halves of a quad).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Primitive {
     /// Lower bounds; the last is the upper half of the triangle's index.
@@ -284,7 +284,7 @@ pub(super) fn primitives(points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Primit
     (out, count)
 }
 
-/// One part of all primitives, not a leaf.
+/// Part with all primitives, not a leaf.
 pub(super) fn whole(primitives: &[Primitive]) -> Part {
     Part::new(0, primitives)
 }
@@ -293,7 +293,7 @@ pub(super) fn whole(primitives: &[Primitive]) -> Part {
 pub(super) fn children(primitives: &mut [Primitive], part: &Part, triangles: &[[u32; 3]], level: usize) -> Vec<Part> {
     let mut parts = Vec::with_capacity(WIDTH);
     let offset = part.range.start;
-    // Only the root can fit a leaf itself.
+    // No part but the root can fit a leaf at this point.
     parts.push(part.clone().settle(primitives, triangles));
     // Parts too large for a leaf are split first, then parts too large for a packet.
     for packets in [0, 2] {

@@ -28,7 +28,7 @@ pub(super) struct Node {
     /// Lower and upper bounds along each axis, in steps from `base`. A word holds the bound of child `i` in its lower
     /// half and that of child `i + 4` in its upper half.
     planes: [[[u32; 4]; 3]; 2],
-    /// The lower corner of everything in the node.
+    /// Lower corner of the boxes of all children.
     base: [f32; 3],
     /// Binary exponents of the steps, as in an `f32`.
     exponents: [u8; 3],

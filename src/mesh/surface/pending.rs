@@ -63,7 +63,7 @@ impl PendingSurface {
 
     /// Sets a hierarchy that was made elsewhere (refitted from another pose). A hierarchy that is already set stays.
     pub fn set(&self, surface: Surface) {
-        // An error means that another hierarchy over the same points is set: just as good.
+        // An error means that another hierarchy over the same points is set, which serves as well.
         let _ = self.ready.set(surface);
     }
 

@@ -21,7 +21,7 @@ pub(super) struct Tree {
     pub packets: Vec<Packet>,
     /// The points of each packet.
     sources: Vec<[u32; 8]>,
-    /// The box around everything.
+    /// Box around all triangles.
     pub bounds: Bounds,
 }
 

@@ -1,4 +1,4 @@
-//! Constraints as entities: the node that each drives, the nodes that it reads, in the order in which they run.
+//! Constraints as entities: the node that each drives, the nodes that it reads, and their order of evaluation.
 
 use bevy::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::{
     rig::{Constraint, Dependency, Scalar, Uid},
 };
 
-/// Makes the entities of constraints equal to the build.
+/// Spawns, updates and despawns the entities of constraints so that they match the build.
 pub(super) fn follow_constraints(
     mut commands: Commands,
     mut rigs: Query<(Entity, &Built, &JointEntities, &TagEntities, &mut BuiltEntities), Changed<Built>>,
@@ -64,7 +64,8 @@ pub(super) fn follow_constraints(
                     mirrored.entity
                 }
                 None => {
-                    // Later constraints are put in again after it, so that those of a node stay in their order.
+                    // Later constraints are inserted again after this one, so that the constraints of a node keep their
+                    // order.
                     is_reordered = true;
                     let named = (constraint.uid, Name::new(constraint.constraint.kind()), ChildOf(rig_entity));
                     let entity = commands.spawn((named, bundle)).id();
@@ -84,7 +85,8 @@ pub(super) fn follow_constraints(
     }
 }
 
-/// Weights of the targets that have some, in the order of [`Constraint::reads`]; `None` where an attribute gives it.
+/// Weights of the targets, in the order of [`Constraint::reads`]; `None` where an attribute gives the weight. Empty for
+/// kinds of constraints without weights.
 fn weights(constraint: &Constraint) -> Vec<Option<f32>> {
     match constraint {
         Constraint::Transform { targets, .. } | Constraint::Aim { targets, .. } => targets

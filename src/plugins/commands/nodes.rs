@@ -33,8 +33,8 @@ type Followed<'a> = (
     Has<RigRuntime>,
 );
 
-/// Makes the entities of created nodes equal to the build (spawns, parks, brings back, describes them), and puts every
-/// node below its parent: below the built one, or, for joints that are not built, below the authored one.
+/// Spawns, parks, restores and updates the entities of created nodes so that they match the build, and puts every node
+/// below its parent: the built parent, or, for joints that are not built, the parent in the document.
 pub(super) fn follow_nodes(
     mut commands: Commands,
     mut rigs: Query<Followed, Or<(Changed<Built>, Changed<Rig>)>>,
@@ -94,7 +94,7 @@ pub(super) fn follow_nodes(
             {
                 let _ = before;
                 base.set_if_neq(rest);
-                // A rig that runs gives the places of all its nodes itself.
+                // The program of a running rig writes the transforms of all its nodes.
                 if !is_running {
                     transform.set_if_neq(pose);
                 }
@@ -111,7 +111,7 @@ pub(super) fn follow_nodes(
     }
 }
 
-/// Takes nodes that are no longer built out of the rig; they keep their entity.
+/// Removes nodes that are no longer built from the rig; their entities stay, disabled.
 fn park(commands: &mut Commands, known: &mut BuiltEntities, nodes: &[BuiltNode]) {
     let alive: HashSet<Uid> = nodes.iter().filter(|node| node.origin.is_some()).map(|node| node.uid).collect();
     for (_, mirrored) in known.nodes.iter_mut().filter(|(uid, mirrored)| !mirrored.is_parked && !alive.contains(*uid)) {
@@ -149,7 +149,7 @@ impl Writer<'_, '_, '_> {
         }
     }
 
-    /// Writes the components of a created node that differ from before; all if there is no before.
+    /// Writes the components of a created node that differ from `before`; all of them without `before`.
     fn describe(&mut self, entity: Entity, rig: &Rig, node: &BuiltNode, before: Option<&BuiltNode>) {
         let differs = |of: fn(&BuiltNode, &BuiltNode) -> bool| before.is_none_or(|before| !of(before, node));
         let mut target = self.commands.entity(entity);
@@ -196,7 +196,8 @@ impl Writer<'_, '_, '_> {
         self.describe_any(entity, rig, node, before);
     }
 
-    /// Writes what joints of the document get from a build, too: layer and attributes.
+    /// Writes the components that a build gives both to created nodes and to joints of the document: layer and
+    /// attributes.
     fn describe_any(&mut self, entity: Entity, rig: &Rig, node: &BuiltNode, before: Option<&BuiltNode>) {
         let mut target = self.commands.entity(entity);
         if before.and_then(|before| before.layer.as_ref()) != node.layer.as_ref() {

@@ -1,4 +1,4 @@
-//! The program of a built rig, over the entities of its joints and created nodes.
+//! Program of a built rig: its compilation, and its connection to the entities of joints and created nodes.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use crate::{
     solve::program::{CompileOptions, ProgramCache},
 };
 
-/// Programs of built rigs; equal ones are shared.
+/// Compiled programs of built rigs; rigs with equal programs share one.
 #[derive(Resource, Default)]
 pub struct Programs(pub ProgramCache);
 
-/// The reason why what was built cannot run. The rig stands still, as it was built.
+/// Reason why the built rig cannot run. The rig then stands still in its built pose.
 #[derive(Component, Debug, Clone, PartialEq, Eq)]
 #[component(immutable)]
 pub struct RunFailure(pub String);
@@ -34,11 +34,11 @@ type BuiltRigs<'a> = (
     Option<&'a Suspended>,
 );
 
-/// The last program of a rig that ran, kept while what is built cannot run, so that its motion can go on afterwards.
+/// Last runtime of a rig, kept while the built rig cannot run, so that its motion continues afterwards.
 #[derive(Component)]
 pub(super) struct Suspended(RigRuntime);
 
-/// Compiles what was built, lets the motion of the program before go on in it, and hands it the pose and the attribute
+/// Compiles the built rig, carries the motion of the previous program over, and passes on the pose and the attribute
 /// values of the document where those have changed.
 pub(super) fn run_built(
     mut commands: Commands,
@@ -49,7 +49,7 @@ pub(super) fn run_built(
     for (entity, rig, built, joints, nodes, show_rest, runtime, suspended) in &mut rigs {
         let is_posed = !show_rest.is_some_and(|show_rest| show_rest.0);
         let mut runtime = match runtime {
-            // The document changed, the build did not.
+            // The document changed, but the build is the same.
             Some(mut runtime) if !built.is_changed() => {
                 let target = runtime.bypass_change_detection();
                 attach(target, joints, nodes);
@@ -91,7 +91,7 @@ pub(super) fn run_built(
     }
 }
 
-/// Lets the entities of joints and created nodes stand for the slots of the program.
+/// Connects the program's slots to the entities of joints and created nodes.
 fn attach(runtime: &mut RigRuntime, joints: &JointEntities, nodes: &BuiltEntities) {
     let program = Arc::clone(runtime.state().program());
     for (slot, node) in program.nodes().iter().enumerate() {
@@ -102,7 +102,7 @@ fn attach(runtime: &mut RigRuntime, joints: &JointEntities, nodes: &BuiltEntitie
     }
 }
 
-/// Motion that an animation or a game gave the joints of a rig that did not run before goes on.
+/// Takes over the motion that an animation or a game gave to the joints before the rig ran for the first time.
 fn take_motion(runtime: &mut RigRuntime, rig: &Rig, joints: &JointEntities, transforms: &Query<&Transform>) {
     for joint in rig.walk() {
         let data = &joint.data;
@@ -114,7 +114,7 @@ fn take_motion(runtime: &mut RigRuntime, rig: &Rig, joints: &JointEntities, tran
         } else {
             let live = PoseOffset::between(rest, transform);
             runtime.note_pose(data.uid, posed);
-            // Offsets that are not finite are not taken.
+            // Offsets with infinite or undefined numbers are refused.
             let _ = runtime.state_mut().set_offset(data.uid, live);
         }
     }

@@ -1,4 +1,4 @@
-//! Outlines of visible controls in the rig's space: what is drawn of them and what a click can hit.
+//! Outlines of visible controls in the rig's space: drawn over the mesh, and hit by clicks.
 
 use bevy::{ecs::system::SystemParam, math::Affine3A, prelude::*};
 
@@ -12,13 +12,13 @@ use crate::{
 /// A visible control.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlOutline {
-    /// Identity.
+    /// Uid of the control.
     pub uid: Uid,
-    /// Lines of its shape in the rig's space.
+    /// Polylines of the control's shape, in the rig's space.
     pub lines: Vec<Vec<Vec3>>,
-    /// sRGB colour, 0 to 1 each: that of its layer, or its own.
+    /// sRGB colour, 0 to 1 each: the colour of the control's layer, or its own.
     pub color: [f32; 3],
-    /// How its layer shows it.
+    /// Display mode of the control's layer.
     pub display: LayerDisplay,
 }
 
@@ -37,7 +37,7 @@ type Node = (
 );
 
 impl ControlNodes<'_, '_> {
-    /// The visible controls of a rig, in the order of its nodes. `to_rig` takes the world to the rig's space.
+    /// Visible controls of a rig, in the order of its nodes. `to_rig` transforms world space to rig space.
     pub fn visible(&self, nodes: Option<&RigNodes>, to_rig: Affine3A) -> Vec<ControlOutline> {
         let controls = nodes.into_iter().flat_map(|nodes| nodes.iter()).filter_map(|node| self.nodes.get(node).ok());
         let visible = controls.filter(|(_, _, _, visible, _)| visible.is_none_or(|visible| visible.0));
@@ -52,7 +52,8 @@ impl ControlNodes<'_, '_> {
     }
 }
 
-/// The lines of a control's shape, where the control stands at `place`. A shape that is not in the library is a circle.
+/// Polylines of a control's shape, transformed by the control's `place`. A shape that is not in the library is a
+/// circle.
 pub fn lines_of(control: &ControlData, place: Affine3A) -> Vec<Vec<Vec3>> {
     let place = place * control.offset.affine();
     let lines = shape(&control.shape).or_else(|| shape("circle")).unwrap_or_default();

@@ -46,7 +46,7 @@ pub fn joint_color(joint: usize) -> Color {
 pub(super) enum Painter {
     /// Weights of the joint with that number, if the skin has it.
     Joint(Option<u32>),
-    /// All joints, each with its colour.
+    /// Linear colours of all joints, by their place in [`SkinData::joints`].
     All(Vec<LinearRgba>),
 }
 

@@ -284,7 +284,7 @@ pub(super) fn follow_skins(
             continue;
         }
         let skeleton = DeformSkeleton::new(&rig, built.as_ref().map(|built| &*built.0));
-        // Whoever does not move anything is held by the rig.
+        // Pieces of joints without an entity or with a singular rest transform follow the rig itself.
         let held = skeleton.joints().iter().map(|joint| {
             let found = joints.get(joint.uid).or_else(|| created.as_ref()?.get(joint.uid));
             let bind = Mat4::from(bevy::math::Affine3A::from(joint.rest).inverse());
@@ -299,12 +299,12 @@ pub(super) fn follow_skins(
     }
 }
 
-/// The joints that can hold pieces.
+/// Joints that move pieces of the mesh.
 struct Held<'a> {
     rig_entity: Entity,
     rig: &'a Rig,
     skeleton: &'a DeformSkeleton,
-    /// The entity of each joint of the skeleton, and how the mesh stands to it at rest.
+    /// For each joint of the skeleton: its entity, and the transform from the rig's space to the joint at rest.
     joints: &'a [(Entity, Mat4)],
 }
 
@@ -315,7 +315,7 @@ fn follow_skin(
     bind_assets: &mut Assets<SkinnedMeshInverseBindposes>,
 ) {
     let (Some(palette), Some(skin)) = (&shown.palette, &shown.key.skin) else { return };
-    // Points without influences, and those of joints that are gone, stay where the rig is: there is no pose for them.
+    // Points without influences, and points of removed joints, follow the rig itself: no joint poses them.
     let free = (held.rig_entity, Mat4::IDENTITY);
     let holders = held.skeleton.holders(held.rig, skin);
     let hold = |joint: &u32| {

@@ -1,9 +1,10 @@
-//! Writes of other people to a rig's entities become edits.
+//! Adoption of entity writes: changes that a game, an animation tool or the editor makes to a rig's entities become
+//! edits.
 //!
-//! Each frame, before requested edits: an entity that says otherwise than what was last written to it was written by
-//! somebody else, one without a place in the index was spawned, one in the index that is gone was despawned. Every write
-//! is tried on the document by itself; those that the document takes become one step of the history, the others are put
-//! back and told once.
+//! Adoption runs each frame, before requested edits. A value that differs from the one this plugin last wrote was
+//! written by other code; an entity without a place in the index was spawned; an indexed entity that no longer exists
+//! was despawned. Each write is tried on the document by itself. Writes that the document accepts become one step of
+//! the history; the others are reverted on the entities, with one message each.
 
 mod despawned;
 mod groups;
@@ -36,11 +37,11 @@ use crate::{
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
 };
 
-/// Edits that entities asked for, a list a rig; carried out before what is requested in the same frame.
+/// Edits that writes to entities made, one list for each rig; carried out before the requests of the same frame.
 #[derive(Resource, Debug, Default)]
 pub(super) struct EntityEdits(pub Vec<(Entity, Vec<RigEdit>)>);
 
-/// Everything that an entity may tell of a document.
+/// Components of an entity from which the document is read.
 #[derive(QueryData)]
 pub(super) struct View {
     joint: Has<Joint>,
@@ -75,7 +76,7 @@ type JointWritten = Or<(
 type TagWritten =
     Or<(Changed<Tag>, Changed<CommandTag>, Changed<FeatureTag>, Changed<TagOf>, Changed<InFeature>, Changed<Uid>)>;
 
-/// Entities that were written since the last frame, by this plugin or by others.
+/// Entities that were written since the last frame, by this plugin or by other code.
 #[derive(SystemParam)]
 pub(super) struct Written<'w, 's> {
     nodes: Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>)>, JointWritten, Allow<Disabled>)>,
@@ -100,7 +101,7 @@ pub(super) struct Written<'w, 's> {
     rigs: RemovedComponents<'w, 's, Rig>,
 }
 
-/// Touched entities, by what they are or seem to be; sorted, so that the same writes give the same edits.
+/// Written entities by their kind of part; sorted, so that the same writes give the same edits.
 #[derive(Default)]
 struct Touched {
     joints: BTreeSet<Entity>,
@@ -141,7 +142,7 @@ pub(super) type RigParts = (
     Option<&'static mut BuiltEntities>,
 );
 
-/// Takes up what was written to entities.
+/// Turns the writes to entities of all rigs into edits.
 pub(super) fn adopt_writes(
     mut commands: Commands,
     mut written: Written,
@@ -160,7 +161,7 @@ pub(super) fn adopt_writes(
     if touched.joints.is_empty() && touched.tags.is_empty() && touched.groups.is_empty() && touched.uids.is_empty() {
         return;
     }
-    // Mostly this plugin itself wrote, and nothing differs.
+    // Usually only this plugin has written, so that nothing differs.
     let by_rig = sorting::sort_by_rig(&touched, &views, &index, |entity| rigs.contains(entity));
     for (rig_entity, writes) in by_rig {
         let Ok((mut rig, mut joints, mut tags, mut groups, mut built)) = rigs.get_mut(rig_entity) else { continue };
@@ -196,7 +197,7 @@ pub(super) fn adopt_writes(
     }
 }
 
-/// One rig's writes on their way into a document.
+/// State of the adoption of one rig's writes.
 struct Adoption<'a, 'b, 'w, 's, 'v, 'q> {
     pub commands: &'a mut Commands<'w, 's>,
     pub views: &'a Views<'v, 'q>,
@@ -217,7 +218,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         self.index.uid_of(entity, self.trial.rig_entity, part)
     }
 
-    /// Puts back a uid that was removed or replaced.
+    /// Restores the uid of an entity whose uid was removed or replaced.
     pub(super) fn hold_uid(&mut self, entity: Entity, uid: Uid, told: Option<Uid>) {
         if told != Some(uid) {
             self.commands.entity(entity).try_insert(uid);

@@ -1,8 +1,8 @@
-//! Entities that stand for the parts of a document and of what is built, found both ways: from uid to entity on each
-//! rig, and from entity to uid in one index.
+//! Maps between entities and the parts of a document or a build: from uid to entity on each rig, and from entity to uid
+//! in one index.
 //!
-//! Beside each entity stands the value that was last written to it. What an entity says otherwise was written by
-//! somebody else; what the document says otherwise has still to be written.
+//! Each entity is stored with the value that this plugin last wrote to it. A different value on the entity was written
+//! by other code; a different value in the document still has to be written to the entity.
 
 use std::{
     collections::{BTreeMap, HashMap, HashSet},
@@ -28,7 +28,7 @@ pub(in crate::plugins) enum Part {
     Constraint,
 }
 
-/// The meaning of an entity.
+/// Part of a rig that an entity represents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::plugins) struct Indexed {
     /// The rig.
@@ -39,32 +39,32 @@ pub(in crate::plugins) struct Indexed {
     pub part: Part,
 }
 
-/// All entities that stand for a part of some rig.
+/// Index from entities to the parts of rigs that they represent.
 #[derive(Resource, Debug, Default)]
 pub(in crate::plugins) struct EntityIndex(EntityHashMap<Indexed>);
 
 impl EntityIndex {
-    /// The meaning of an entity; `None` for one that stands for nothing.
+    /// Part that an entity represents; `None` if it represents no part of a rig.
     pub fn get(&self, entity: Entity) -> Option<Indexed> {
         self.0.get(&entity).copied()
     }
 
-    /// The uid of an entity that stands for such a part of this rig.
+    /// Uid of an entity that represents a part of this kind of this rig.
     pub fn uid_of(&self, entity: Entity, rig: Entity, part: Part) -> Option<Uid> {
         self.get(entity).filter(|indexed| indexed.rig == rig && indexed.part == part).map(|indexed| indexed.uid)
     }
 
-    /// Notes what an entity stands for.
+    /// Adds an entity with the part that it represents.
     pub fn insert(&mut self, entity: Entity, rig: Entity, uid: Uid, part: Part) {
         self.0.insert(entity, Indexed { rig, uid, part });
     }
 
-    /// Forgets an entity.
+    /// Removes an entity.
     pub fn remove(&mut self, entity: Entity) -> Option<Indexed> {
         self.0.remove(&entity)
     }
 
-    /// Forgets all entities of rigs that are gone.
+    /// Removes all entities of rigs that no longer exist.
     pub fn forget_rigs(&mut self, gone: &HashSet<Entity>) {
         self.0.retain(|_, indexed| !gone.contains(&indexed.rig));
     }
@@ -74,20 +74,20 @@ impl EntityIndex {
 #[derive(Component, Debug, Default)]
 pub struct JointEntities {
     pub(super) joints: HashMap<Uid, MirroredJoint>,
-    /// The offsets of the document that the joints' transforms were last set to.
+    /// Pose offsets of the document that the joints' transforms were last set to.
     pub(super) posed: BTreeMap<Uid, PoseOffset>,
 }
 
-/// A joint's entity and the values that it was last given.
+/// Entity of a joint and the values last written to it.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::plugins) struct MirroredJoint {
     pub entity: Entity,
     pub label: Option<String>,
     pub group: Option<Uid>,
     pub rest: RestTransform,
-    /// The entity that it hangs below; `None` until it was placed.
+    /// Parent entity; `None` until the joint has been placed.
     pub parent: Option<Entity>,
-    /// Its tags in order.
+    /// Uids of the joint's tags, in order.
     pub tags: Vec<Uid>,
 }
 
@@ -101,7 +101,7 @@ impl JointEntities {
         self.joints.get_mut(&joint)
     }
 
-    /// The offset of the document that a joint was last posed by.
+    /// Pose offset of the document that a joint's transform was last set to.
     pub(in crate::plugins) fn posed(&self, joint: Uid) -> Option<&PoseOffset> {
         self.posed.get(&joint)
     }
@@ -120,7 +120,7 @@ pub struct TagEntities {
     pub(super) tags: HashMap<Uid, MirroredTag>,
 }
 
-/// A tag's entity and the values that it was last given.
+/// Entity of a tag and the values last written to it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MirroredTag {
     pub entity: Entity,
@@ -153,11 +153,11 @@ impl GroupEntities {
 pub struct BuiltEntities {
     pub(in crate::plugins) nodes: BTreeMap<Uid, MirroredNode>,
     pub(in crate::plugins) constraints: BTreeMap<Uid, MirroredConstraint>,
-    /// Joints of the document with the values that the build last gave them.
+    /// Entities of the document's joints with the built values last written to them.
     pub(in crate::plugins) joints: HashMap<Uid, (Entity, BuiltNode)>,
 }
 
-/// A created node's entity and the values that it was last given.
+/// Entity of a created node and the values last written to it.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::plugins) struct MirroredNode {
     pub entity: Entity,
@@ -166,12 +166,12 @@ pub(in crate::plugins) struct MirroredNode {
     pub parent: Option<Entity>,
 }
 
-/// A constraint's entity and the values that it was last given.
+/// Entity of a constraint and the values last written to it.
 #[derive(Debug, Clone)]
 pub(in crate::plugins) struct MirroredConstraint {
     pub entity: Entity,
     pub constraint: Arc<crate::rig::Constraint>,
-    /// Entities of the nodes that it names, as they were.
+    /// Entities of the driven node and of the nodes that it reads, when they were last written.
     pub nodes: Vec<Option<Entity>>,
 }
 
@@ -193,7 +193,7 @@ impl BuiltEntities {
         self.nodes.get(&node).map(|mirrored| mirrored.entity)
     }
 
-    /// All created nodes that are part of the rig at present, by uid.
+    /// Created nodes that are part of the rig at present (not parked), by uid.
     pub fn iter(&self) -> impl Iterator<Item = (Uid, Entity)> {
         self.nodes.iter().filter(|(_, mirrored)| !mirrored.is_parked).map(|(uid, mirrored)| (*uid, mirrored.entity))
     }

@@ -1,4 +1,4 @@
-//! Entities of joints, groups and tags follow the document: one component is written where one value changed.
+//! Entities of joints, groups and tags follow the document: a component is written only where its value changed.
 
 use std::collections::HashSet;
 
@@ -29,8 +29,8 @@ type Followed<'a> = (
     Option<&'a Uid>,
 );
 
-/// Makes the entities of groups and joints equal to the document. The place of a joint in the hierarchy is set after the
-/// build, which may put it below a created node.
+/// Spawns, updates and despawns the entities of groups and joints so that they match the document. The parent of a
+/// joint is set after the build, which may put the joint below a created node.
 pub(in crate::plugins) fn follow_rigs(
     mut commands: Commands,
     mut rigs: Query<Followed, Or<(Changed<Rig>, Changed<ShowRest>)>>,
@@ -56,7 +56,8 @@ pub(in crate::plugins) fn follow_rigs(
         for (uid, entity) in gone {
             index.remove(entity);
             if let Ok(mut entity) = commands.get_entity(entity) {
-                // Children that stay get another parent after the build; they must not go along.
+                // Remaining children get another parent after the build, so they must not be despawned with this
+                // entity.
                 entity.detach_all_children().try_despawn();
             }
             known.joints.remove(&uid);
@@ -106,10 +107,11 @@ pub(in crate::plugins) fn follow_rigs(
             }
             let Ok((mut pose, mut rest)) = places.get_mut(entity) else { continue };
             rest.set_if_neq(data.rest);
-            // A rig that runs gives the places of all its nodes itself.
+            // The program of a running rig writes the transforms of all its nodes.
             if !is_running {
                 let before = known.posed.get(&data.uid).copied().unwrap_or_default();
-                // What an animation or a game put on top of the rest pose stays there, unless the document poses anew.
+                // Motion that an animation or a game has put on the joint stays on it, unless the document sets a new
+                // pose.
                 let offset_now = match offset {
                     _ if !is_posed_otherwise && *pose != before.on(&old_rest) => PoseOffset::between(&old_rest, &pose),
                     offset => offset.copied().unwrap_or_default(),
@@ -124,7 +126,7 @@ pub(in crate::plugins) fn follow_rigs(
     }
 }
 
-/// Writes label, name and group where they are others than before.
+/// Writes label, name and group where they differ from the last written values.
 fn describe(
     commands: &mut Commands,
     mirrored: &mut MirroredJoint,
@@ -189,7 +191,7 @@ fn follow_groups(
     }
 }
 
-/// Makes the tag entities equal to the document.
+/// Spawns, updates and despawns the entities of tags so that they match the document.
 pub(in crate::plugins) fn follow_tags(
     mut commands: Commands,
     mut rigs: Query<(Entity, &Rig, &mut JointEntities, &mut TagEntities), Changed<Rig>>,
@@ -205,7 +207,7 @@ pub(in crate::plugins) fn follow_tags(
                 commands.entity(mirrored.entity).try_despawn();
             }
         }
-        // All entities first: commands point at features that may come later.
+        // Entities of all tags are spawned first, because a command may refer to a feature further down.
         let mut fresh: HashSet<Uid> = HashSet::new();
         for joint in rig.walk() {
             for tag in &joint.data.tags {
@@ -232,7 +234,7 @@ pub(in crate::plugins) fn follow_tags(
                 let entity = before.entity;
                 if !is_ordered || before.joint != data.uid {
                     before.joint = data.uid;
-                    // Taken out and put in again, each in turn: the last comes last.
+                    // Removing and inserting each tag in turn puts the tags into the document's order.
                     commands.entity(entity).try_remove::<TagOf>().try_insert(TagOf(bearer));
                 }
                 if !is_fresh && before.data == *tag {
@@ -245,7 +247,7 @@ pub(in crate::plugins) fn follow_tags(
     }
 }
 
-/// Writes the components of a tag that are others than before; all for a tag without a value before.
+/// Writes the components of a tag that differ from `old`; all of them without `old`.
 pub(super) fn write_tag(
     commands: &mut Commands,
     entity: Entity,
@@ -291,7 +293,8 @@ impl TagEntities {
     }
 }
 
-/// The rest pose of a joint that somebody spawned: the rest transform, or the transform where that was left out.
+/// Rest pose, relative to the parent, of a joint that other code spawned: its rest transform, or its transform if the
+/// rest transform was left out.
 pub(super) fn rest_of(rest: Option<&RestTransform>, transform: Option<&Transform>) -> RestTransform {
     match (rest, transform) {
         (Some(rest), _) if *rest != RestTransform::default() => *rest,

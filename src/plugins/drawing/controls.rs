@@ -16,7 +16,7 @@ use crate::{
 /// Grey of a layer that is shown as a template.
 const TEMPLATE: Tint = [128, 130, 136, 255];
 
-/// Draws controls into `ink`: those that are selected or hovered wider.
+/// Draws controls into `ink`; selected and hovered controls are drawn wider.
 pub fn draw_controls(
     controls: &[ControlOutline],
     selection: &Selection,

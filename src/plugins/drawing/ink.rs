@@ -1,7 +1,7 @@
 //! Triangles for pictures over the mesh: lines, discs and faces with sizes in pixels.
 //!
-//! Everything is built on the processor for one view. That keeps sizes in pixels where tests can measure them, and one
-//! mesh a rig is all that the renderer sees.
+//! All geometry is built on the processor for one view. That keeps sizes in pixels where tests can measure them, and
+//! one mesh a rig is all that the renderer sees.
 
 use std::f32::consts::TAU;
 

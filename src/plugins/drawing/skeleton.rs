@@ -20,7 +20,7 @@ use crate::{
 /// Emphasis of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Emphasis {
-    /// No emphasis.
+    /// Normal: neither selected nor active.
     #[default]
     None,
     /// A selected joint.
@@ -343,7 +343,7 @@ impl Artist<'_> {
         let axes = [joint.axes.x_axis, joint.axes.y_axis, joint.axes.z_axis];
         for (axis, tint) in axes.into_iter().zip(self.theme.axes) {
             let ends = [joint.position + axis * start, joint.position + axis * end];
-            // One of the axes usually runs inside the bone.
+            // A fixed depth in front of the bone, because one of the axes usually runs inside it.
             self.pen.layer = Layer::Fixed(0.999_86);
             self.pen.line(ends, 4.0, 0.0, self.theme.outline);
             self.pen.layer = Layer::Fixed(0.999_88);

@@ -148,7 +148,7 @@ fn mesh_of(ink: &mut Ink) -> Mesh {
         .with_inserted_indices(Indices::U32(ink.indices))
 }
 
-/// Access to the view of the camera that counts.
+/// Access to the view of the active viewport camera.
 #[derive(SystemParam)]
 pub(super) struct Views<'w, 's> {
     cameras: Query<

@@ -7,8 +7,8 @@ use bevy::prelude::*;
 use super::{ControlPose, InstanceMode, NodeOf, NodeSlot, RigRuntime};
 use crate::{mesh::model::Trs, rig::NodeType, solve::program::RigProgram};
 
-/// Makes an entity (that has, or gets, a `Transform`) an instance of a program: spawns what it needs of its nodes, and
-/// puts a [`RigRuntime`] on it.
+/// Makes an entity an instance of a program: spawns the entities of its nodes that the mode needs, and inserts a
+/// [`RigRuntime`] and, if it is missing, a `Transform`.
 pub fn spawn_instance(world: &mut World, rig: Entity, program: &Arc<RigProgram>, mode: InstanceMode) {
     let mut runtime = RigRuntime::new(Arc::clone(program), mode);
     for (slot, node) in program.nodes().iter().enumerate() {
@@ -41,7 +41,7 @@ pub fn spawn_instance(world: &mut World, rig: Entity, program: &Arc<RigProgram>,
     world.entity_mut(rig).insert_if_new(Transform::IDENTITY).insert(runtime);
 }
 
-/// As Bevy has it.
+/// Converts a transform to Bevy's type.
 pub(super) fn transform(trs: &Trs) -> Transform {
     Transform { translation: trs.translation, rotation: trs.rotation, scale: trs.scale }
 }

@@ -1,4 +1,4 @@
-//! The systems that run rigs, in their order.
+//! Systems that run rigs, in their order.
 
 use bevy::{math::Affine3A, prelude::*};
 use rayon::prelude::*;
@@ -10,24 +10,26 @@ use crate::{
     solve::program::{LANES, RigState},
 };
 
-/// More instances than are handed to the threads at once hand out their joints on all threads, too.
+/// Least number of instances whose joints are written on all threads.
 const CROWD: usize = BATCH + 1;
 
-/// Instances that are handed to the threads at once. A list of fixed size needs no memory of its own each frame.
+/// Largest number of instances that are distributed over the threads at once. A list of fixed size needs no allocation
+/// in a frame.
 const BATCH: usize = 256;
 
-/// The same of joints, and how many of them a thread takes.
+/// Largest number of joints that are distributed over the threads at once. A thread takes [`JOINT_RUN`] of them at a
+/// time.
 const JOINTS: usize = 2048;
 const JOINT_RUN: usize = 256;
 
-/// Notes which instances have a control that changed.
+/// Marks the instances that have a changed control or attribute.
 pub(super) fn note_controls(
     changed: Query<&NodeOf, Or<(Changed<Transform>, Changed<ControlPose>, Changed<Attributes>)>>,
     mut rigs: Query<&mut RigRuntime>,
 ) {
     let mut last = Entity::PLACEHOLDER;
     for NodeOf(rig) in &changed {
-        // Nodes of one rig mostly follow one another.
+        // Nodes of one rig mostly follow one another in the query.
         if *rig != last {
             last = *rig;
             if let Ok(mut runtime) = rigs.get_mut(*rig) {
@@ -37,7 +39,7 @@ pub(super) fn note_controls(
     }
 }
 
-/// Takes the poses of controls and runs the programs of all instances that have something to do.
+/// Reads the poses of controls and evaluates the programs of all instances with changed inputs.
 pub(super) fn solve(
     mut rigs: Query<&mut RigRuntime>,
     transforms: Query<&Transform>,
@@ -56,7 +58,7 @@ pub(super) fn solve(
         let mut states = runtimes.iter_mut().flatten().map(|runtime| &mut runtime.bypass_change_detection().state);
         let ran = RigState::evaluate_together(std::array::from_fn(|_| states.next()), dt);
         for (runtime, ran) in runtimes.iter_mut().flatten().zip(ran) {
-            // Places that somebody else wrote are looked at even where nothing had to run.
+            // Transforms that other code wrote have to be checked even if the program did not run.
             if ran || runtime.all_due || runtime.has_rewritten {
                 runtime.set_changed();
             }
@@ -66,8 +68,8 @@ pub(super) fn solve(
     in_batches::<BATCH, _>(due, LANES, run);
 }
 
-/// Runs a function on runs of `run` items, on all threads if there are more. Bevy's own parallel iteration would leave one
-/// of two processors to other tasks.
+/// Calls a function on slices of `run` items, on all threads if there are more. Bevy's own parallel iteration would
+/// leave one of two processors to other tasks.
 fn in_batches<const SIZE: usize, T: Send>(
     mut items: impl Iterator<Item = T>,
     run: usize,
@@ -92,7 +94,7 @@ fn in_batches<const SIZE: usize, T: Send>(
     }
 }
 
-/// Takes the poses and attribute values of an instance's nodes from their entities.
+/// Reads the poses and attribute values of an instance's nodes from their entities.
 fn gather(
     runtime: &mut RigRuntime,
     transforms: &Query<&Transform>,
@@ -111,7 +113,7 @@ fn gather(
             }
             InstanceMode::Hierarchy => {
                 let Ok(posed) = transforms.get(*entity) else { continue };
-                // What the rig itself wrote is no pose.
+                // A transform that the rig itself wrote is no pose.
                 if *posed == shown[at] {
                     continue;
                 }
@@ -133,14 +135,14 @@ fn gather(
             let value = told.get(&*state.program().attributes()[slot].name).copied();
             if let Some(value) = value.filter(|value| !values[slot].is_nan() && *value != values[slot]) {
                 state.set_attribute_at(slot, value);
-                // Shown again after the run, in case the value is another one then.
+                // Written again after the run if the program changes the value.
                 values[slot] = value;
             }
         }
     }
 }
 
-/// True if two transforms differ by rounding only.
+/// True if two transforms differ only by rounding.
 fn is_near(a: &Transform, b: &Transform) -> bool {
     let size = a.translation.abs().max_element().max(1e-3);
     (a.translation - b.translation).abs().max_element() <= 1e-6 * size
@@ -149,8 +151,8 @@ fn is_near(a: &Transform, b: &Transform) -> bool {
         && (a.rotation - b.rotation).length_squared() <= 1e-12
 }
 
-/// Writes the transforms of nodes where every node is an entity: of those that moved, whose parent moved, or that
-/// somebody else wrote.
+/// Writes the local transforms of nodes in [`InstanceMode::Hierarchy`]: of nodes that moved, whose parent moved, or
+/// that other code wrote.
 pub(super) fn scatter_locals(
     mut rigs: Query<&mut RigRuntime, Changed<RigRuntime>>,
     mut transforms: Query<&mut Transform>,
@@ -182,7 +184,7 @@ pub(super) fn scatter_locals(
     }
 }
 
-/// Writes values of attributes to the entities that hold them.
+/// Writes attribute values to the entities that hold them.
 pub(super) fn scatter_attributes(
     mut rigs: Query<&mut RigRuntime, Changed<RigRuntime>>,
     mut holders: Query<&mut Attributes>,
@@ -204,7 +206,7 @@ pub(super) fn scatter_attributes(
     }
 }
 
-/// Hands out the weights of morph targets.
+/// Writes the weights of morph targets to the meshes that a running rig drives.
 pub(super) fn scatter_morphs(rigs: Query<&RigRuntime, Changed<RigRuntime>>, mut meshes: Query<&mut DrivenMorphs>) {
     if rigs.is_empty() {
         return;
@@ -228,7 +230,7 @@ pub(super) fn scatter_morphs(rigs: Query<&RigRuntime, Changed<RigRuntime>>, mut 
     }
 }
 
-/// Lets meshes be drawn with the weights of their morph targets.
+/// Copies the weights of morph targets to the renderer.
 #[cfg(feature = "draw")]
 pub(super) fn show_morphs(
     mut meshes: Query<(&DrivenMorphs, &mut bevy::mesh::morph::MeshMorphWeights), Changed<DrivenMorphs>>,
@@ -243,8 +245,8 @@ pub(super) fn show_morphs(
     }
 }
 
-/// Puts nodes where the program has them, where propagation has them elsewhere: below an unevenly scaled node Bevy
-/// multiplies matrices, which shear, while programs never do.
+/// Corrects the world transforms of nodes where Bevy's propagation differs from the program: below an unevenly scaled
+/// node Bevy multiplies matrices, which shear, while programs never do.
 pub(super) fn correct_globals(
     rigs: Query<(&RigRuntime, &GlobalTransform), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
     mut nodes: Query<&mut GlobalTransform, Without<RigRuntime>>,
@@ -265,7 +267,7 @@ pub(super) fn correct_globals(
     }
 }
 
-/// Writes where joints are in the world, where only they are entities.
+/// Writes the world transforms of joints in [`InstanceMode::Direct`].
 pub(super) fn scatter_globals(
     rigs: Query<(&RigRuntime, &GlobalTransform), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
     mut joints: Query<(&NodeSlot, &NodeOf, &mut GlobalTransform), Without<RigRuntime>>,
@@ -284,7 +286,7 @@ pub(super) fn scatter_globals(
         }
         return;
     }
-    // All joints there are, in the order of memory and on all threads; those of one rig mostly follow one another.
+    // Joints of all rigs in the order of memory, on all threads; joints of one rig mostly follow one another.
     let hand_out = |joints: &mut [Option<(&NodeSlot, &NodeOf, Mut<GlobalTransform>)>]| {
         let (mut last, mut rig) = (Entity::PLACEHOLDER, None);
         for (NodeSlot(slot), NodeOf(of), joint) in joints.iter_mut().flatten() {
@@ -297,6 +299,7 @@ pub(super) fn scatter_globals(
             }
         }
     };
-    // From within the pool: every batch that reached it from outside would wear its queue.
+    // The batches start within the thread pool: each batch that entered it from outside would go through the pool's
+    // queue.
     rayon::join(|| in_batches::<JOINTS, _>(joints.iter_mut(), JOINT_RUN, hand_out), || ());
 }

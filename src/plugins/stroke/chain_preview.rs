@@ -17,7 +17,7 @@ use crate::{
     rig::operations::MirrorPlane,
 };
 
-/// A stroke and the surface it was drawn on, as that stood then.
+/// A stroke with the surface it was drawn on, in the state of that moment.
 ///
 /// ```no_run
 /// # use bevy::{prelude::*, tasks::{AsyncComputeTaskPool, Task}};
@@ -44,8 +44,9 @@ pub struct FollowedStroke {
 const BLOCKED: f32 = 0.25;
 
 impl FollowedStroke {
-    /// Follows `points` on `plane` through `surface` ([`RigSurface::shared`](crate::plugins::surface::RigSurface::shared)):
-    /// milliseconds on a large mesh, so call it in a task.
+    /// Follows `points` on `plane` through `surface`
+    /// ([`RigSurface::shared`](crate::plugins::surface::RigSurface::shared)): milliseconds on a large mesh, so call it
+    /// in a task.
     ///
     /// # Errors
     /// As [`StrokeSamples::new`].

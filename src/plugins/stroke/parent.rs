@@ -31,13 +31,13 @@ pub enum StrokeParent {
 /// Reason for the parent of a chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParentReason {
-    /// The stroke starts on that joint.
+    /// The stroke starts on the joint.
     StartsOn,
     /// The joint is selected, or was requested.
     Selected,
     /// The chain starts beside that joint's bone.
     Nearest,
-    /// There is no joint to attach to: the chain is a root.
+    /// The chain is a root, since no joint was found to attach it to.
     Root,
 }
 

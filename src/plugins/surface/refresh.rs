@@ -50,8 +50,7 @@ pub(super) fn are_same(a: &[PosedMesh], b: &[PosedMesh]) -> bool {
 /// Weights and matrices of a mesh, if one of the joints of its weights has moved. `moves` holds the matrices from rest
 /// to pose of the moved joints.
 ///
-/// Weights that came with the file hold its bind pose; as long as nobody moves a joint that is the mesh at rest, and
-/// from there on the rest mesh follows its joints.
+/// The matrices move points of the rest mesh, also for weights that came with the file and belong to its bind pose.
 pub(super) fn bend(skin: &Arc<SkinData>, moves: &[Option<Affine3A>]) -> Option<(Arc<SkinData>, Vec<Affine3A>)> {
     let list = || moves.iter().map(|matrix| matrix.unwrap_or(Affine3A::IDENTITY)).collect();
     moves.iter().any(|matrix| matrix.is_some()).then(|| (skin.clone(), list()))

@@ -60,7 +60,7 @@ fn is_posed(offset: &PoseOffset) -> bool {
     *offset != PoseOffset::IDENTITY
 }
 
-/// The pose in its stored form: without offsets at rest.
+/// Pose in its stored form: without offsets that equal the rest pose.
 fn checked(pose: &StoredPose) -> Result<StoredPose, EditError> {
     if let Some((joint, _)) = pose.offsets.iter().find(|(_, offset)| !offset.is_valid()) {
         return Err(EditError::BadTransform(*joint));

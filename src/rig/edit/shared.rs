@@ -1,4 +1,4 @@
-//! Serialisation of shared weights in an edit as plain data: files do not show that they are shared in memory.
+//! Serialisation of shared weights in an edit as plain data: files do not record which weights are shared in memory.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Projects, the `*.rigsmith.ron` files: what the editor saves.
+//! Projects, the `*.rigsmith.ron` files that the editor saves.
 //!
 //! A project names meshes and weights by path and content hash, holds the rigs inline, each as its template would be
 //! with the poses beside it, and remembers the view. As with templates, one field group is a line, reading checks
@@ -17,49 +17,49 @@ pub use write::write_project;
 
 use crate::rig::{Rig, Uid};
 
-/// The highest format that this version reads, and writes where it is needed.
+/// Highest format that this version reads; written only for content that needs it.
 ///
-/// Format 2 adds values of attributes, and poses of nodes that are no joints. Projects without them are written in format
-/// 1.
+/// Format 2 adds values of attributes, and poses of nodes that are not joints. Projects without them are written in
+/// format 1.
 pub const FORMAT: u32 = 2;
 
-/// The longest project that is read, in bytes.
+/// Largest size in bytes of a project that is read.
 pub const MAX_BYTES: usize = 64 << 20;
 
-/// What a project file holds.
+/// Content of a project file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Project {
     /// The project's name.
     pub name: String,
-    /// Its meshes.
+    /// Meshes of the project.
     pub meshes: Vec<MeshReference>,
-    /// Its rigs.
+    /// Rigs of the project.
     pub rigs: Vec<ProjectRig>,
-    /// How it was looked at.
+    /// View of the project: camera, tool and display settings.
     pub view: ProjectView,
-    /// The journal that goes on from here.
+    /// Journal that continues from this file.
     pub journal: Option<JournalReference>,
 }
 
-/// A mesh of a project: a file somewhere else.
+/// Reference of a project to a mesh in a file of its own.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshReference {
-    /// Identity, by which rigs name the mesh's weights.
+    /// Uid by which rigs refer to the mesh's weights.
     pub uid: Uid,
-    /// The rig that moves it.
+    /// Uid of the rig that moves the mesh.
     pub rig: Uid,
-    /// Where it is: relative to the project's folder with `/` between names, or absolute.
+    /// Path of the mesh's file: relative to the project's folder with `/` between names, or absolute.
     pub path: String,
-    /// [`mesh_hash`](crate::rig::skin::mesh_hash) of its points and triangles at rest.
+    /// [`mesh_hash`](crate::rig::skin::mesh_hash) of the mesh's points and triangles at rest.
     #[serde(deserialize_with = "read::mesh_hash")]
     pub hash: u128,
-    /// The joint that each node of the file became; empty if its skeleton was left aside.
+    /// Joint that each node of the file became; empty if the file's skeleton was not imported.
     #[serde(default)]
     pub nodes: Vec<Uid>,
 }
 
-/// A rig of a project and where its weights are.
+/// Rig of a project, with references to its weights.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProjectRig {
     /// The rig with its poses. Its weights are in files of their own.
@@ -68,35 +68,35 @@ pub struct ProjectRig {
     pub skins: Vec<SkinReference>,
 }
 
-/// The weights of a mesh: a `.skin` file beside the project.
+/// Reference to the weights of a mesh: a `.skin` file beside the project.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SkinReference {
     /// The mesh.
     pub mesh: Uid,
-    /// Where the weights are, relative to the project's folder.
+    /// Path of the weights, relative to the project's folder.
     pub path: String,
     /// [`content_hash`](crate::rig::skin::content_hash) of that file.
     #[serde(deserialize_with = "read::content_hash")]
     pub hash: u64,
-    /// True if the weights hold the mesh as it stands at rest; see [`SkinData`](crate::rig::SkinData).
+    /// True if the weights bind the mesh in its state at rest; see [`SkinData`](crate::rig::SkinData).
     pub at_rest: bool,
 }
 
-/// How a project was looked at. Names are the editor's own; one that it does not know is as if there were none.
+/// View of a project in the editor. Names are the editor's own; an unknown name is ignored.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProjectView {
-    /// Where the camera stood.
+    /// Position of the camera.
     #[serde(default)]
     pub camera: Option<ProjectCamera>,
-    /// What the pointer did.
+    /// Name of the pointer's mode.
     #[serde(default)]
     pub mode: String,
-    /// How the mesh was shown.
+    /// Name of the mesh's shading.
     #[serde(default)]
     pub shading: String,
-    /// What was shown, and what was not.
+    /// Display switches by name, `true` for what is shown.
     #[serde(default)]
     pub switches: BTreeMap<String, bool>,
 }
@@ -111,7 +111,7 @@ pub struct ProjectCamera {
     pub pitch: f32,
     /// Distance from the focus (perspective), or half the height that is seen (orthographic).
     pub distance: f32,
-    /// What it looks at.
+    /// Point that the camera looks at and orbits, in world space.
     #[serde(deserialize_with = "read::vector")]
     pub focus: Vec3,
     /// True for a view without perspective.
@@ -129,9 +129,9 @@ impl ProjectCamera {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JournalReference {
-    /// Its file name, beside the project.
+    /// Name of the journal's file, beside the project.
     pub file: String,
-    /// The number of the last edit that the project contains.
+    /// Number of the last edit that the project contains.
     pub last: u64,
 }
 
@@ -140,6 +140,6 @@ pub struct JournalReference {
 pub struct ReadProject {
     /// The project.
     pub project: Project,
-    /// What the reader passed over, a sentence each.
+    /// Notes about content that the reader ignored, a sentence each.
     pub notes: Vec<String>,
 }

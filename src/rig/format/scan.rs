@@ -1,23 +1,23 @@
-//! Where things stand in a RON text, whatever they mean.
+//! Scanner for the places of fields and list elements in a RON text, independent of their meaning.
 //!
-//! The RON reader says what is wrong with a text but not where each value came from. One pass over the text finds every
-//! `name: value` pair, so that errors name the line of a value that only makes no sense together with others.
+//! The RON reader reports errors of a text but not the place of each value. One pass over the text finds every `name:
+//! value` pair, so that an error about a value that is only invalid together with others names its line.
 
 /// A `name: value` pair of a RON text.
 pub(crate) struct Field<'a> {
     /// The name.
     pub name: &'a str,
-    /// How many brackets are open around it.
+    /// Number of open brackets around the field.
     pub depth: usize,
-    /// Which bracket it stands in; fields of one struct have the same.
+    /// Number of the innermost bracket around the field; fields of one struct have the same.
     pub bracket: usize,
-    /// The index of the field whose value it stands in.
+    /// Index of the field whose value contains this one.
     pub parent: Option<usize>,
-    /// Where the name starts, in bytes.
+    /// Start of the name, in bytes.
     pub start: usize,
-    /// Where the value starts.
+    /// Start of the value, in bytes.
     pub value: usize,
-    /// Where the value ends, with the comma after it, if any; the end of the text if it is cut short.
+    /// End of the value in bytes, with the comma after it, if any; the end of the text if it is cut short.
     pub end: usize,
 }
 
@@ -27,7 +27,7 @@ struct Open {
     current: Option<usize>,
 }
 
-/// All fields of a text in the order of their names. Time is linear, and no depth of nesting is too deep.
+/// Fields of a text in the order of their names. Time is linear, and the depth of nesting is unlimited.
 pub(crate) fn fields(text: &str) -> Vec<Field<'_>> {
     let mut fields: Vec<Field> = Vec::new();
     let mut outer: Vec<Open> = Vec::new();
@@ -75,7 +75,7 @@ fn end_at(fields: &mut [Field], field: Option<usize>, end: usize) {
     }
 }
 
-/// Where the elements of the outermost list start, in bytes.
+/// Starts of the elements of the outermost list, in bytes.
 pub(crate) fn elements(text: &str) -> Vec<usize> {
     let mut starts = Vec::new();
     let (mut depth, mut expected) = (0_usize, false);
@@ -109,7 +109,7 @@ impl Token<'_> {
     }
 }
 
-/// Strings, characters, words and single punctuation marks; comments are passed over.
+/// Strings, characters, words and single punctuation marks of a text; comments are skipped.
 pub(in crate::rig) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
     let bytes = text.as_bytes();
     let mut at = 0;
@@ -147,7 +147,7 @@ pub(in crate::rig) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
     })
 }
 
-/// What RON takes for white space.
+/// True for characters that RON treats as white space.
 fn is_blank(c: char) -> bool {
     matches!(c, ' ' | '\t'..='\r' | '\u{85}' | '\u{200E}' | '\u{200F}' | '\u{2028}' | '\u{2029}')
 }
@@ -156,7 +156,7 @@ fn is_word(c: u8) -> bool {
     c.is_ascii_alphanumeric() || c == b'_' || c >= 0x80
 }
 
-/// Comments of RON nest.
+/// End of a comment; comments of RON nest.
 fn comment_end(bytes: &[u8], mut at: usize) -> usize {
     let mut depth = 1;
     while at < bytes.len() && depth > 0 {

@@ -1,9 +1,9 @@
 //! The `*.skin` file: the weights of one mesh, by joint uid, with the hash of that mesh.
 //!
 //! Little endian: magic `RIGSKIN\0`, format version, flags, length of the file, hash of the mesh, counts; then joints
-//! (uid, label, in format 2 the subject of a created joint), influences, optionally a copy of the mesh; then a checksum of all before it. Counts are variable in
-//! length (7 bits a byte), weights are `f32` as they are, and a weight of exactly one is implied, which keeps the file
-//! small and exact.
+//! (uid, label, in format 2 the subject of a created joint), influences, optionally a copy of the mesh; then a checksum
+//! of all before it. Counts are variable in length (7 bits a byte), weights are `f32` as they are, and a weight of
+//! exactly one is implied, which keeps the file small and exact.
 
 mod bytes;
 mod data;
@@ -25,9 +25,10 @@ pub use reader::SkinFileError;
 
 /// First bytes of every skin file.
 const MAGIC: [u8; 8] = *b"RIGSKIN\0";
-/// The highest format this version reads, which it writes where joints were created by commands; others are format 1.
+/// Highest format that this version reads; written for weights of joints that commands created. Other weights are
+/// written in format 1.
 pub const SKIN_FORMAT: u32 = 2;
-/// The format of weights that name joints of the document only.
+/// Format of weights that refer to joints of the document only.
 const PLAIN_FORMAT: u32 = 1;
 /// Bytes before the joints: magic, format, flags, length, mesh hash, four counts.
 const HEADER: usize = 8 + 4 + 4 + 8 + 16 + 4 * 4;
@@ -39,11 +40,11 @@ const HAS_SUBJECTS: u32 = 2;
 /// A joint that weights refer to.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SkinJoint {
-    /// The joint's uid, which is what counts.
+    /// Uid of the joint, which identifies it.
     pub uid: u64,
-    /// Its label when the file was written, for people and for rigs that lost the uid.
+    /// Label of the joint when the file was written, for people and for rigs with other uids.
     pub label: String,
-    /// The uid of the node that a command created the joint for; `None` for joints of the document.
+    /// Uid of the node for which a command created the joint; `None` for joints of the document.
     pub subject: Option<u64>,
 }
 
@@ -67,13 +68,13 @@ impl SkinJoint {
 /// The mesh that weights were made for, so that they can be transferred to a changed one.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SkinMesh {
-    /// Positions, one a weighted point.
+    /// Positions of the weighted points.
     pub points: Vec<Vec3>,
-    /// Corners over `points`.
+    /// Triangles, as indices into `points`.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Weights of a mesh that are known to be whole: every index in range, every weight positive and finite.
+/// Checked weights of a mesh: every index in range, every weight positive and finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkinFile {
     mesh_hash: u128,
@@ -82,7 +83,7 @@ pub struct SkinFile {
     mesh: Option<SkinMesh>,
 }
 
-/// Why weights cannot become a skin file.
+/// Reason why weights cannot become a skin file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SkinError {
     /// The mesh has other points than the weights.
@@ -162,7 +163,7 @@ impl SkinFile {
         reader::read(bytes)
     }
 
-    /// The file's bytes; reading them gives the same skin, and writing that the same bytes.
+    /// Bytes of the file. Reading them gives the same skin, and writing that skin gives the same bytes.
     pub fn write(&self) -> Vec<u8> {
         let mut out = Vec::with_capacity(HEADER + self.weights.values.len() * 5 + self.joints.len() * 24);
         out.extend(MAGIC);
@@ -174,7 +175,7 @@ impl SkinFile {
         out.extend(self.mesh_hash.to_le_bytes());
         let triangles = self.mesh.as_ref().map_or(0, |m| m.triangles.len());
         for count in [self.joints.len(), self.weights.len(), self.weights.values.len(), triangles] {
-            // Lists indexed by u32 cannot be longer.
+            // Lists whose indices are `u32` cannot be longer.
             out.extend((count as u32).to_le_bytes());
         }
         for joint in &self.joints {
@@ -240,13 +241,13 @@ impl SkinFile {
         self.mesh.as_ref()
     }
 
-    /// The joints and weights, to take away.
+    /// Joints, weights and mesh by value.
     pub fn into_parts(self) -> (Vec<SkinJoint>, Weights, Option<SkinMesh>) {
         (self.joints, self.weights, self.mesh)
     }
 }
 
-/// No point at all is written as one start, so that equal skins have equal lists.
+/// Weights in canonical form: an empty list of starts becomes a single start, so that equal skins have equal lists.
 fn canonical(mut weights: Weights) -> Weights {
     if weights.starts.is_empty() {
         weights.starts.push(0);

@@ -1,9 +1,9 @@
-//! RON texts and the places of what is wrong in them.
+//! RON texts, and errors with their place in the text.
 
 use ron::{Options, extensions::Extensions};
 use serde::de::DeserializeOwned;
 
-/// Something wrong in a text file, and where.
+/// Error in a text file, with its place.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("line {line}, column {column}: {message}")]
 pub struct SourceError {
@@ -13,7 +13,7 @@ pub struct SourceError {
     pub column: usize,
     /// Byte offset, for reports that show the source.
     pub offset: usize,
-    /// What is wrong and what to do.
+    /// Description of the error and its remedy.
     pub message: String,
 }
 
@@ -31,7 +31,7 @@ impl SourceError {
         }
     }
 
-    /// An error of the RON reader, with what to do about it.
+    /// An error of the RON reader, with its remedy.
     pub(crate) fn from_ron(text: &str, error: &ron::error::SpannedError) -> Self {
         let hint = match &error.code {
             ron::Error::NoSuchStructField { .. } | ron::Error::NoSuchEnumVariant { .. } => {
@@ -46,12 +46,13 @@ impl SourceError {
     }
 }
 
-/// How all our RON files are read: `Some(...)` need not be written.
+/// Options for reading all RON files of Rigsmith: `Some(...)` need not be written.
 pub(crate) fn ron_options() -> Options {
     Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 
-/// The text of a file that must be UTF-8, not empty and not longer than `limit` bytes; `what` names it in errors.
+/// The text of a file that must be UTF-8, not empty and not longer than `limit` bytes; `what` names the kind of file in
+/// errors.
 pub(crate) fn utf8<'a>(bytes: &'a [u8], limit: usize, what: &str) -> Result<&'a str, SourceError> {
     if bytes.len() > limit {
         let message = format!(
@@ -77,7 +78,7 @@ pub(crate) fn parse_ron<T: DeserializeOwned>(text: &str) -> Result<T, SourceErro
     ron_options().from_str(text).map_err(|error| SourceError::from_ron(text, &error))
 }
 
-/// The byte offset of a place that the RON reader names by line and column.
+/// Byte offset of a line and column that the RON reader reports.
 fn byte_offset(text: &str, place: ron::error::Position) -> usize {
     let line_start: usize = text.split_inclusive('\n').take(place.line.saturating_sub(1)).map(str::len).sum();
     let line = text[line_start.min(text.len())..].chars();

@@ -20,34 +20,34 @@ use crate::rig::{Rig, Uid};
 /// The format that this version writes.
 pub const FORMAT: u32 = 1;
 
-/// The longest template that is read, in bytes.
+/// Largest size in bytes of a template that is read.
 pub const MAX_BYTES: usize = 16 << 20;
 
-/// What a template tells before its joints.
+/// Header of a template: the fields before its groups and joints.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TemplateHeader {
-    /// The file format.
+    /// Format of the file.
     pub format: u32,
-    /// The rig's identity.
+    /// Uid of the rig.
     pub uid: Uid,
-    /// The rig's name.
+    /// Name of the rig.
     pub name: String,
-    /// The version of its content.
+    /// Version of the content, chosen by the author.
     #[serde(default)]
     pub version: String,
-    /// For example `character`.
+    /// Kind of the rig, for example `character`.
     #[serde(default)]
     pub kind: String,
-    /// Who made it.
+    /// Author of the rig.
     #[serde(default)]
     pub author: String,
-    /// A few sentences.
+    /// Description in a few sentences.
     #[serde(default)]
     pub description: String,
     /// File name of a picture beside the template.
     #[serde(default)]
     pub preview: Option<String>,
-    /// The number of joints, for listings.
+    /// Number of joints, for listings.
     #[serde(default, deserialize_with = "count")]
     pub joint_count: usize,
     /// Named features and their switches, for listings.
@@ -55,7 +55,7 @@ pub struct TemplateHeader {
     pub features: Vec<FeatureSummary>,
 }
 
-/// A count that may also be written as none.
+/// Reads a count; a file may also have `None`, which counts as 0.
 fn count<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
     Ok(Option::<usize>::deserialize(deserializer)?.unwrap_or_default())
 }
@@ -63,11 +63,11 @@ fn count<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<usize, D::
 /// A named feature in a template's header.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct FeatureSummary {
-    /// Its kind.
+    /// Kind of the feature.
     pub kind: String,
-    /// Its name.
+    /// Name of the feature.
     pub name: String,
-    /// Its switches.
+    /// Switches of the feature.
     #[serde(default)]
     pub switches: Vec<String>,
 }
@@ -77,6 +77,6 @@ pub struct FeatureSummary {
 pub struct Template {
     /// The rig.
     pub rig: Rig,
-    /// What the reader passed over: fields of a newer format, a wrong joint count. A sentence each.
+    /// Notes about content that the reader ignored (fields of a newer format, a wrong joint count), a sentence each.
     pub notes: Vec<String>,
 }

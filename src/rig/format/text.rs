@@ -8,8 +8,8 @@
 //! ```
 //!
 //! - The first line that is neither blank nor a comment is `rig` and the version of the format.
-//! - Every other line is a joint: its own number, its parent's (`-1` for a root; several roots are fine), its position in
-//!   model units, and optionally its label. Joints and parents stand in any order.
+//! - Every other line is a joint: its own number, its parent's (`-1` for a root; several roots are allowed), its
+//!   position in model units, and optionally its label. Joints and parents may come in any order.
 //! - Numbers are unique and may leave gaps; joints are taken in ascending order and renumbered from 0.
 //! - Fields are separated by any white space; lines end in `\n`, `\r\n` or `\r`; a byte order mark is skipped.
 //! - `#` at the start of a field begins a comment; inside a field it is an ordinary character (`arm#2` is a label).
@@ -25,20 +25,20 @@ use glam::Vec3;
 
 use error::quoted;
 
-/// The version of the format that is written, and the highest that is read.
+/// Version of the format that is written, and the highest one that is read.
 pub const VERSION: u32 = 1;
 
-/// A skeleton as a `.rig` file holds it.
+/// Skeleton in the form of a `.rig` file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RigText {
     /// The joints in ascending order of their numbers.
     pub joints: Vec<RigTextJoint>,
 }
 
-/// One joint of a [`RigText`].
+/// Joint of a [`RigText`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigTextJoint {
-    /// The position of the parent in [`RigText::joints`], before or after this one; `None` for a root.
+    /// Index of the parent in [`RigText::joints`], before or after this joint; `None` for a root.
     pub parent: Option<usize>,
     /// Position in rig space, in model units; finite.
     pub position: Vec3,
@@ -46,8 +46,8 @@ pub struct RigTextJoint {
     pub label: Option<String>,
 }
 
-/// Reads the content of a `.rig` file. Time is linear in the size (`n log n` if the numbers are out of order), and memory is at
-/// most about eight times the size.
+/// Reads the content of a `.rig` file. Time is linear in the size (`n log n` if the numbers are out of order), and
+/// memory is at most about eight times the size.
 ///
 /// # Errors
 /// See [`RigTextError`]; the first error found is returned, line errors before those of the whole.
@@ -172,7 +172,7 @@ fn connect(mut rows: Vec<Row>) -> Result<RigText, RigTextError> {
     if !rows.is_sorted_by_key(|row| row.index) {
         rows.sort_by_key(|row| row.index);
     }
-    // Rows of equal number keep the order of their lines, so the second of a pair is the one to name.
+    // Rows of equal number keep the order of their lines, so the error names the second of a pair.
     let twice = rows.windows(2).filter(|pair| pair[0].index == pair[1].index).min_by_key(|pair| pair[1].line);
     if let Some([first, second]) = twice {
         return Err(RigTextError::Duplicate { line: second.line, index: second.index, first: first.line });
@@ -214,7 +214,7 @@ fn connect(mut rows: Vec<Row>) -> Result<RigText, RigTextError> {
 
 /// Returns the joints of a cycle, each followed by its parent, or `None` if there is none. Time is linear.
 fn find_cycle(parents: &[Option<usize>]) -> Option<Vec<usize>> {
-    /// The walk, by its start, on which a joint was seen.
+    /// Marker of a joint that no walk has reached; other values are the start of the walk that has.
     const UNSEEN: usize = usize::MAX;
     let mut seen_from = vec![UNSEEN; parents.len()];
     for start in 0..parents.len() {

@@ -1,25 +1,26 @@
-//! Format numbers: a file of a newer version opens as far as it is understood, and what is not understood is named.
+//! Format numbers: a file of a newer format opens without the fields that this version does not have, and each of those
+//! is reported.
 
 use std::borrow::Cow;
 
 use super::{scan::Field, source::SourceError};
 
-/// The names that a field may have where it stands; `None` where anything may stand.
+/// Names that are allowed for a field at its place; `None` where any name is allowed.
 pub(super) type KnownNames = fn(&[Field], &Field) -> Option<&'static [&'static str]>;
 
-/// One kind of file.
+/// Kind of file with a format number.
 pub(super) struct Format {
-    /// What it is called.
+    /// Name of the kind of file, for messages.
     pub what: &'static str,
-    /// The number that is written.
+    /// Format number that is written.
     pub number: u32,
-    /// Its fields.
+    /// Allowed names of fields.
     pub known: KnownNames,
 }
 
 impl Format {
-    /// The text as it can be read here. In a file of a newer format, fields that are not known are blanks, so that all
-    /// places stay, and are named in `notes`; `first_line` is the number of the text's first line.
+    /// Text that this version can read. In a file of a newer format, unknown fields are replaced by blanks, so that all
+    /// places stay, and each is reported in `notes`; `first_line` is the number of the text's first line.
     pub fn readable<'a>(
         &self,
         text: &'a str,
@@ -54,14 +55,14 @@ impl Format {
         Ok(Cow::Owned(blanked(text, &unknown)))
     }
 
-    /// The fields that are not known.
+    /// Fields whose names are not allowed at their place.
     pub fn unknown<'f, 'a>(&self, fields: &'f [Field<'a>]) -> Vec<&'f Field<'a>> {
         let is_unknown = |field: &&Field| (self.known)(fields, field).is_some_and(|known| !known.contains(&field.name));
         fields.iter().filter(is_unknown).collect()
     }
 }
 
-/// The text without these fields: blanks in their place, so that lines and columns stay.
+/// Text with blanks in place of the given fields, so that lines and columns stay.
 pub(super) fn blanked(text: &str, without: &[&Field]) -> String {
     let mut out = String::with_capacity(text.len());
     let mut at = 0;

@@ -105,7 +105,7 @@ fn branches(tree: &Dendrogram, analysis: &FaceAnalysis) -> Vec<Branch> {
             open.push(cluster);
         }
     }
-    // Any point of a cluster gives its position: clusters in depth do not overlap.
+    // A single point of a cluster gives the cluster's position: clusters in depth do not overlap.
     let point = |mut cluster: usize| {
         while let Some(merge) = merge(cluster) {
             cluster = merge.first as usize;

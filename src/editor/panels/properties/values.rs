@@ -33,7 +33,7 @@ pub(super) struct Values {
     typed: Typed,
 }
 
-/// One of a joint's vectors.
+/// Vector of a joint that the panel shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     /// Rest position in the rig's space.
@@ -64,7 +64,7 @@ impl Part {
     ];
 }
 
-/// Angles as they were typed last: of the many triples for one rotation, the ones that people expect to see.
+/// Angles in degrees as they were last typed: of the many triples for one rotation, the ones that people expect to see.
 #[derive(Debug, Clone, Default)]
 struct Typed {
     rest: Vec<(Uid, Vec3)>,

@@ -29,8 +29,8 @@ pub(super) struct Written {
     pub(super) extensions_required: Vec<String>,
 }
 
-/// Writes material_set; images go into the buffer, or to whoever takes companions. Images without bytes are left out: their textures stay, which glTF
-/// allows, so that materials need not change.
+/// Writes materials and their textures; images go into the buffer, or to the sink of companions. Images without bytes
+/// are left out: their textures stay, which glTF allows, so that materials need not change.
 pub(super) fn write(
     material_set: &MaterialSet,
     mut outside: Option<&mut (&str, &mut CompanionSink)>,

@@ -225,7 +225,7 @@ fn morphs(part: &Part, used: &[u32], normals: &[Vec3], bake: &Bake, bin: &mut Bi
     for morph in &part.morphs {
         let mut target = Map::new();
         let mut positions: Vec<Vec3> = pick(&morph.positions, used).map(|offset| bake.vector(offset)).collect();
-        // Some programs refuse a target without positions.
+        // The target gets zero positions if it has none, because some programs refuse a target without positions.
         positions.resize(used.len(), Vec3::ZERO);
         target.insert("POSITION".to_owned(), bin.positions(&positions).into());
         if !morph.normals.is_empty() && !normals.is_empty() {

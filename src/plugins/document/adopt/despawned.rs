@@ -1,4 +1,4 @@
-//! Entities that were despawned: deletions, and nodes that come back.
+//! Despawned entities: deletions, and entities that are spawned again.
 
 use std::collections::{HashMap, HashSet};
 
@@ -12,7 +12,8 @@ use super::{
 use crate::rig::{RigEdit, Uid, operations::Operation};
 
 impl Adoption<'_, '_, '_, '_, '_, '_> {
-    /// Deletes what was despawned, or lets it come back where its entity went along with a created node.
+    /// Deletes the parts whose entities were despawned. A joint whose entity was despawned together with a created node
+    /// above it stays in the document and gets a new entity.
     pub fn despawned(&mut self, writes: &RigWrites) {
         let dead: HashMap<Entity, Indexed> = writes.dead.iter().copied().collect();
         let is_joint = |indexed: &Indexed| indexed.part == Part::Joint;
@@ -54,7 +55,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             match indexed.part {
                 Part::Tag => {
                     let bearer = self.rig().find_tag(uid).map(|(joint, _)| joint.data.uid);
-                    // The tags of a joint that comes back come back with it.
+                    // Tags of a joint that gets a new entity stay in the document.
                     if let Some(joint) = bearer.filter(|joint| self.joints.get(*joint).is_some()) {
                         self.trial.edit("a despawned tag", vec![RigEdit::RemoveTag(joint, uid)]);
                     }
@@ -81,7 +82,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         }
     }
 
-    /// True if a joint's entity went with a created node above it, and not by itself or with another joint.
+    /// True if a joint's entity was despawned because of a created node above it, not by itself or because of another
+    /// joint.
     fn went_along(&self, joint: Uid, dead: &HashMap<Entity, Indexed>) -> bool {
         let mut above = self.joints.joints.get(&joint).and_then(|mirrored| mirrored.parent);
         let mut is_created = false;

@@ -1,4 +1,4 @@
-//! Local groups as their entities tell them.
+//! Writes to the entities of local groups.
 
 use bevy::prelude::*;
 
@@ -25,7 +25,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 self.index.insert(entity, self.trial.rig_entity, uid, Part::Group);
                 self.groups.groups.insert(uid, (entity, data));
             } else {
-                // The entity stays, without a rig.
+                // The refused entity stays, but belongs to no rig.
                 self.commands.entity(entity).try_remove::<GroupOf>();
             }
         }

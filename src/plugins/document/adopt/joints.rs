@@ -1,4 +1,4 @@
-//! Joints and created nodes as their entities tell them.
+//! Writes to the entities of joints and created nodes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,7 +18,7 @@ use crate::{
 };
 
 impl Adoption<'_, '_, '_, '_, '_, '_> {
-    /// Adds spawned joints, those above before those below.
+    /// Adds spawned joints to the document, parents before children.
     pub fn joints_spawned(&mut self, writes: &RigWrites) {
         let mut open: BTreeSet<Entity> = writes.spawned_joints.iter().copied().collect();
         loop {
@@ -60,7 +60,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let data = JointData { uid, label: label.clone(), group, kind, rest, ..JointData::default() };
         let added = RigEdit::AddJoint { joint: Box::new(data), parent, index: usize::MAX };
         if !self.trial.edit("a spawned joint", vec![added]) {
-            // The entity stays, outside of the rig.
+            // The refused entity stays, outside of the rig.
             self.commands.entity(entity).try_remove::<ChildOf>();
             return;
         }
@@ -96,7 +96,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 if self.trial.edit("a write to a label", vec![RigEdit::SetLabel(uid, label.clone())]) {
                     next.label.clone_from(&label);
                 }
-                // The name goes along, and an empty label is none.
+                // The `Name` follows the label; an empty label counts as none.
                 match &label {
                     Some(label) if next.label == Some(label.clone()) => {
                         self.commands.entity(entity).try_insert(Name::new(label.clone()));
@@ -127,7 +127,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             if rest != Some(mirrored.rest) {
                 let set = rest.map(|rest| RigEdit::SetRest(uid, rest));
                 if set.is_some_and(|set| self.trial.edit("a write to a rest pose", vec![set])) {
-                    // The transform follows the document, which still says what was written last.
+                    // The transform is written when the entity follows the document, which still holds the former rest
+                    // pose.
                 } else {
                     self.commands.entity(entity).try_insert(mirrored.rest);
                 }
@@ -162,14 +163,15 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 self.trial.edit("a write to a parent", vec![set])
             }
         };
-        // Where the edit puts it is written after the build; until then it hangs where it hung, if that is still there.
+        // An accepted parent is set after the build. A refused one is replaced by the former parent, if that still
+        // exists.
         if let Some(before) = mirrored.parent.filter(|before| !is_taken && self.views.contains(*before)) {
             self.commands.entity(entity).try_insert(ChildOf(before));
         }
         self.trial.respawn |= !is_taken;
     }
 
-    /// Created nodes follow their command: what somebody else writes to them is put back.
+    /// Reverts writes of other code to a created node, which follows its command only.
     fn node_written(&mut self, entity: Entity, uid: Uid) {
         let Some(mirrored) = self.built.as_ref().and_then(|built| built.nodes.get(&uid)).cloned() else { return };
         let (Some(node), Ok(view)) =

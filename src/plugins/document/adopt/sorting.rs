@@ -1,4 +1,4 @@
-//! Touched entities, handed to the rigs that they belong to or ask to belong to.
+//! Assignment of written entities to the rigs that they belong to or ask to belong to.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{plugins::schema::GroupOf, rig::Uid};
 
-/// Touched entities of one rig.
+/// Written entities of one rig, by kind of part.
 #[derive(Default)]
 pub(super) struct RigWrites {
     pub joints: Vec<(Entity, Uid)>,
@@ -23,10 +23,10 @@ pub(super) struct RigWrites {
     pub dead: Vec<(Entity, Indexed)>,
 }
 
-/// Joints one below the other, at most; a longer chain of parents is a circle.
+/// Largest depth of a hierarchy; a longer chain of parents is a cycle.
 const MAX_DEPTH: usize = 1 << 20;
 
-/// Hands touched entities to the rigs that they belong to or ask to belong to.
+/// Assigns written entities to the rigs that they belong to or ask to belong to.
 pub(super) fn sort_by_rig(
     touched: &Touched,
     views: &Views,
@@ -34,7 +34,7 @@ pub(super) fn sort_by_rig(
     is_rig: impl Fn(Entity) -> bool,
 ) -> BTreeMap<Entity, RigWrites> {
     let mut rigs: BTreeMap<Entity, RigWrites> = BTreeMap::new();
-    // The rig above a joint that is not known yet.
+    // Rig of the nearest ancestor that is a rig or in the index; the entity itself counts as one.
     let rig_above = |joint: Entity| {
         let mut at = joint;
         for _ in 0..MAX_DEPTH {

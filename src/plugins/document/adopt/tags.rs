@@ -1,4 +1,4 @@
-//! Tags, their joints and their order as their entities tell them.
+//! Writes to the entities of tags: their content, their joints and their order.
 
 use bevy::prelude::*;
 
@@ -17,7 +17,7 @@ use crate::{
 
 impl Adoption<'_, '_, '_, '_, '_, '_> {
     pub fn tags_written(&mut self, writes: &RigWrites) {
-        // Features first: commands of the same frame may be in them.
+        // Features come first, because commands of the same frame may be in them.
         let is_feature = |entity: &Entity| self.views.get(*entity).is_ok_and(|view| view.command.is_none());
         let (features, commands): (Vec<Entity>, Vec<Entity>) = writes.spawned_tags.iter().partition(|e| is_feature(e));
         for entity in features.into_iter().chain(commands) {
@@ -28,7 +28,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         }
     }
 
-    /// The tag that an entity tells; `None` if it has neither a command nor a feature, or is in no feature of this rig.
+    /// Tag data from the components of an entity; `None` if the entity has neither a command nor a feature, or its
+    /// command is in a feature that does not belong to this rig.
     fn told_tag(&self, entity: Entity, uid: Uid) -> Option<TagData> {
         let view = self.views.get(entity).ok()?;
         let (enabled, comment) = view.tag.map_or((true, String::new()), |tag| (tag.enabled, tag.comment.clone()));
@@ -63,7 +64,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             let reason = "a spawned tag is in a feature of another rig; put it into one of its own rig".to_owned();
             return self.tag_refused(entity, Some(reason));
         };
-        // Its place among the tags of the joint that the document knows.
+        // Index of the tag among the tags of the joint that the document has.
         let before = self.views.get(bearer).ok().and_then(|view| view.tags).map_or(usize::MAX, |tags| {
             tags.iter()
                 .take_while(|other| *other != entity)
@@ -82,7 +83,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         }
     }
 
-    /// Takes a spawned tag that the document does not take off its joint; the entity stays.
+    /// Removes a spawned tag that the document refuses from its joint; the entity stays.
     fn tag_refused(&mut self, entity: Entity, reason: Option<String>) {
         self.commands.entity(entity).try_remove::<TagOf>();
         if let Some(reason) = reason {
@@ -137,7 +138,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         };
         if let (false, Some(known)) = (is_taken, known) {
             self.commands.entity(entity).try_insert(TagOf(known));
-            // The order is written anew, too.
+            // Clearing the list makes the follow system write the order of the tags again.
             if let Some(joint) = self.joints.joints.get_mut(&mirrored.joint) {
                 joint.tags.clear();
             }
@@ -145,7 +146,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         }
     }
 
-    /// Takes over the order of tags that somebody changed in a joint's `Tags`.
+    /// Adopts the order of tags where other code changed a joint's `Tags`.
     pub fn orders_written(&mut self, writes: &RigWrites) {
         for &(entity, uid) in &writes.joints {
             let Some(mirrored) = self.joints.joints.get(&uid).filter(|mirrored| mirrored.entity == entity) else {

@@ -1,4 +1,4 @@
-//! A document on which writes are tried one by one, and which is as it was afterwards.
+//! Trial of writes on a document, one by one; the document is restored afterwards.
 
 use bevy::prelude::*;
 
@@ -12,15 +12,15 @@ pub(super) struct Trial<'a> {
     edits: Vec<RigEdit>,
     inverses: Vec<RigEdit>,
     refused: Vec<String>,
-    /// True if entities have to be made again though the document stays.
+    /// True if entities have to be spawned or written again although the document stays the same.
     pub respawn: bool,
 }
 
 /// The result of a [`Trial`].
 pub(super) struct Tried {
-    /// Edits that the document takes, in order.
+    /// Edits that the document accepts, in order.
     pub edits: Vec<RigEdit>,
-    /// Reasons why it does not take the others.
+    /// Reasons for refusing the other edits.
     pub refused: Vec<String>,
     pub respawn: bool,
 }
@@ -30,12 +30,12 @@ impl<'a> Trial<'a> {
         Self { rig_entity, rig, uids, edits: Vec::new(), inverses: Vec::new(), refused: Vec::new(), respawn: false }
     }
 
-    /// The document with all edits so far.
+    /// Document with all edits so far.
     pub fn rig(&self) -> &Rig {
         self.rig
     }
 
-    /// A uid that nothing in the rig has: the one that somebody asks for, if it is free.
+    /// Uid that nothing in the rig has: `asked` if it is free, else the next one of the source.
     pub fn free_uid(&mut self, asked: Option<Uid>) -> Uid {
         match asked.filter(|uid| uid.0 != 0 && !self.rig.is_taken(*uid) && *uid != self.rig.uid()) {
             Some(uid) => uid,
@@ -43,17 +43,17 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Tries edits, all or none; false if the document refuses them.
+    /// Tries edits, all or none; returns false if the document refuses them.
     pub fn edit(&mut self, what: &str, edits: Vec<RigEdit>) -> bool {
         self.operate(what, &Operation::Edits(edits))
     }
 
-    /// Tries an operation.
+    /// Tries an operation; returns false if the document refuses it.
     pub fn operate(&mut self, what: &str, operation: &Operation) -> bool {
         match operation.run(self.rig, self.uids, None) {
             Ok(outcome) => {
                 self.edits.extend(outcome.edits);
-                // The inverses of one operation stand in the order in which they are applied.
+                // Inverses of one operation are listed in the order in which they are applied.
                 self.inverses.splice(0..0, outcome.inverses);
                 true
             }
@@ -64,12 +64,12 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Notes a write that cannot be an edit.
+    /// Records the reason for refusing a write that cannot be an edit.
     pub fn refuse(&mut self, reason: String) {
         self.refused.push(reason);
     }
 
-    /// Takes everything back.
+    /// Reverts all tried edits and returns them.
     pub fn finish(self) -> Tried {
         for inverse in &self.inverses {
             let undone = self.rig.apply(inverse);

@@ -1,4 +1,4 @@
-//! Reading projects, strictly and with places.
+//! Reader of projects: strict, with the place of each error.
 
 use std::{
     borrow::Cow,
@@ -38,7 +38,7 @@ struct ProjectFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RigFile {
-    /// Read as a template, from the text.
+    /// The rig is read separately, as a template from the text.
     #[serde(rename = "rig")]
     _rig: IgnoredAny,
     #[serde(default)]
@@ -124,7 +124,7 @@ fn is_hexadecimal(text: &str, digits: usize) -> bool {
 
 const PROJECT: Format = Format { what: "project", number: FORMAT, known: known_names };
 
-/// Reads a project. Nothing is returned unless all of it is right, but for the view, which is no reason to refuse one.
+/// Reads a project. An error anywhere refuses the whole project, except in the view, whose errors are ignored.
 pub fn read_project(bytes: &[u8]) -> Result<ReadProject, SourceError> {
     let text = utf8(bytes, MAX_BYTES, "project")?;
     let fields = scan::fields(text);
@@ -260,12 +260,12 @@ fn twice(joint: Uid) -> String {
     format!("joint {joint} is in the pose twice; keep one of the two")
 }
 
-/// The field that an edit's error is about.
+/// Name of the field that an edit's error refers to.
 fn named(error: &EditError) -> &'static str {
     if matches!(error, EditError::BadTransform(_)) { "rotation" } else { "joint" }
 }
 
-/// The names that a field may have where it stands; `None` where anything may stand, and in rigs, which are templates.
+/// Names that are allowed for a field at its place; `None` where any name is allowed, and in rigs, which are templates.
 fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
     let above = |field: &Field| field.parent.map(|parent| &fields[parent]);
     let mut path = [""; 3];
@@ -293,13 +293,13 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
     }
 }
 
-/// Finds the places where things are declared. Structs are known by their bracket.
+/// Finds the places of declarations in the text. Structs are identified by their bracket.
 struct Places<'a> {
     text: &'a str,
     fields: &'a [Field<'a>],
-    /// The fields of each struct.
+    /// Fields of each struct.
     structs: HashMap<usize, Vec<usize>>,
-    /// The structs of each list, by the field whose value the list is.
+    /// Structs of each list, by the field that has the list as its value.
     lists: HashMap<usize, Vec<usize>>,
 }
 
@@ -329,7 +329,7 @@ impl<'a> Places<'a> {
         self.structs.get(&bracket?)?.iter().copied().find(|field| self.fields[*field].name == name)
     }
 
-    /// The structs in the list that is a field's value, then `None` for ever.
+    /// Structs in the list that is a field's value, followed by `None` without end.
     fn elements(&self, list: Option<usize>) -> impl Iterator<Item = Option<usize>> {
         let brackets = list.and_then(|list| self.lists.get(&list)).map_or(&[] as &[usize], Vec::as_slice);
         brackets.iter().copied().map(Some).chain(std::iter::repeat(None))
@@ -343,7 +343,7 @@ impl<'a> Places<'a> {
     }
 }
 
-/// Reads the templates that stand in a text, in its order.
+/// Reader of the templates inside a text, in the order of the text.
 struct Templates<'a> {
     text: &'a str,
     line: usize,

@@ -1,4 +1,4 @@
-//! Writing projects.
+//! Writer of projects.
 
 use std::fmt::Write;
 
@@ -76,14 +76,14 @@ fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
     writeln!(out, "            ],\n        ),")
 }
 
-/// True if the rig's poses say something that format 1 has no place for.
+/// True if the rig's poses have content that format 1 cannot hold.
 fn needs_values(rig: &Rig) -> bool {
     !rig.attribute_values().is_empty()
         || rig.stored_poses().iter().any(|pose| !pose.values.is_empty())
         || rig.pose().keys().any(|node| rig.joint(*node).is_none())
 }
 
-/// A list of values, if there are any.
+/// Writes a list of attribute values, unless there are none.
 fn write_values(out: &mut String, values: &AttributeValues, indent: &str) -> std::fmt::Result {
     if values.is_empty() {
         return Ok(());
@@ -97,8 +97,8 @@ fn write_values(out: &mut String, values: &AttributeValues, indent: &str) -> std
     writeln!(out, "{indent}],")
 }
 
-/// The text of a template further to the right. What stands in parameters of modules stays as it is: a line break
-/// there may be part of a text.
+/// Writes the text of a template with indentation. Parameters of modules stay unchanged, because a line break in them
+/// may be part of a string.
 fn write_indented(out: &mut String, text: &str, indent: &str) {
     let text = text.trim_end();
     let fields = scan::fields(text);

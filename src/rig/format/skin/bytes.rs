@@ -14,7 +14,7 @@ pub(super) fn put_signed(out: &mut Vec<u8>, number: i64) {
     put_varint(out, (number << 1 ^ number >> 63) as u64);
 }
 
-/// Takes bytes from the front of a slice and knows where it is.
+/// Cursor that takes bytes from the front of a slice and counts them.
 pub(super) struct Bytes<'a> {
     all: &'a [u8],
     at: usize,
@@ -25,12 +25,12 @@ impl<'a> Bytes<'a> {
         Self { all, at: at.min(all.len()) }
     }
 
-    /// Bytes taken so far, counted from the start of the file.
+    /// Position in bytes from the start of the file.
     pub(super) fn offset(&self) -> usize {
         self.at
     }
 
-    /// Bytes left.
+    /// Number of bytes left.
     pub(super) fn left(&self) -> usize {
         self.all.len() - self.at
     }
@@ -49,7 +49,7 @@ impl<'a> Bytes<'a> {
         self.array().map(f32::from_le_bytes)
     }
 
-    /// A number of variable length in its only form: no superfluous bytes, nothing beyond 64 bits.
+    /// Number of variable length in its only valid form: without superfluous bytes or bits beyond 64.
     pub(super) fn varint(&mut self) -> Option<u64> {
         let mut number = 0u64;
         for shift in (0..64).step_by(7) {

@@ -1,8 +1,8 @@
 //! Weights as compact bytes without a mesh: for files that hold weights among other things.
 //!
-//! Little endian: flags, counts (7 bits a byte), uids of the joints, subjects of created joints where there are any, and
-//! the influences as in a `*.skin` file. The same weights give the same bytes, and reading gives exactly the same weights. There is no checksum: whatever holds the
-//! bytes has one.
+//! Little endian: flags, counts (7 bits a byte), uids of the joints, subjects of created joints where there are any,
+//! and the influences as in a `*.skin` file. The same weights give the same bytes, and reading gives exactly the same
+//! weights. There is no checksum: whatever holds the bytes has one.
 
 use super::{
     bytes::{Bytes, put_varint},
@@ -13,9 +13,9 @@ use crate::{
     rig::{SkinData, Uid},
 };
 
-/// Flag: the weights hold the mesh as it stands at rest.
+/// Flag: the weights bind the mesh in its state at rest.
 const AT_REST: u8 = 1;
-/// Flag: the list of starts is empty, which means the same as no points but is not equal to it.
+/// Flag: the list of starts is empty, which means no points like a single start does, but is not equal to it.
 const NO_STARTS: u8 = 2;
 /// Flag: pairs of created joints and their subjects follow the joints.
 const SUBJECTS: u8 = 4;
@@ -61,13 +61,14 @@ pub fn skin_data_bytes(skin: &SkinData) -> Option<Vec<u8>> {
     Some(out)
 }
 
-/// Reads what [`skin_data_bytes`] wrote; `None` for anything else. Memory stays below eight times the bytes.
+/// Reads bytes from [`skin_data_bytes`]; `None` for any other bytes. Memory stays below eight times their number.
 pub fn read_skin_data(all: &[u8]) -> Option<SkinData> {
     let mut bytes = Bytes::new(all, 0);
     let [flags] = bytes.array()?;
     let mut count = || usize::try_from(bytes.varint()?).ok();
     let (joints, points, influences) = (count()?, count()?, count()?);
-    // Everything takes some bytes, so counts beyond what there is are lies; nothing is reserved for them.
+    // Each entry takes at least one byte, so counts beyond the remaining bytes are invalid, and no memory is reserved
+    // for them.
     let least = joints.checked_mul(8)?.checked_add(points)?.checked_add(influences)?;
     let no_starts = flags & NO_STARTS != 0;
     if flags & !(AT_REST | NO_STARTS | SUBJECTS) != 0 || least > bytes.left() || (no_starts && points != 0) {
@@ -94,7 +95,7 @@ pub fn read_skin_data(all: &[u8]) -> Option<SkinData> {
     (weights.joints.len() == influences && bytes.left() == 0).then_some(skin)
 }
 
-/// Reads pairs in rising order, at least one: equal weights have equal bytes.
+/// Reads at least one pair, in rising order, so that equal weights have equal bytes.
 fn read_subjects(bytes: &mut Bytes, skin: &mut SkinData) -> Option<()> {
     let count = bytes.varint().filter(|count| (1..=bytes.left() as u64 / 16).contains(count))?;
     for _ in 0..count {

@@ -1,5 +1,5 @@
-//! Stable hashes of content: the same on every machine and in every version, for telling meshes and files apart and
-//! for noticing damage, not for defence against forgery.
+//! Stable hashes of content, the same on every machine and in every version. They distinguish meshes and files and
+//! reveal damage, but do not protect against forgery.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! Reading a skin file from bytes that may be anything.
+//! Reader of skin files. The bytes may be anything.
 
 use glam::Vec3;
 
@@ -8,40 +8,40 @@ use super::{
 };
 use crate::mesh::model::Weights;
 
-/// Why bytes are not a skin.
+/// Reason why bytes are no skin file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SkinFileError {
-    /// The file does not begin like a skin.
+    /// The file does not begin with the magic of a skin file.
     #[error("this is not a skin file: it does not begin with RIGSKIN")]
     NotASkin,
-    /// Written by a later version.
+    /// The file was written by a later version.
     #[error("the skin file has format {found}, this version reads up to {known}: update to open it")]
     Newer {
-        /// The file's format.
+        /// Format of the file.
         found: u32,
-        /// The highest format known.
+        /// Highest format that this version reads.
         known: u32,
     },
-    /// The file ends early, or goes on after its end.
+    /// The file is shorter or longer than its header says.
     #[error("the skin file should have {expected} bytes but has {found}: copy or save it again")]
     Length {
-        /// Bytes according to its header (or of the header itself).
+        /// Length in bytes according to the header, or length of the header itself.
         expected: u64,
-        /// Bytes there are.
+        /// Length of the file in bytes.
         found: u64,
     },
-    /// The checksum does not fit: some byte changed.
+    /// The checksum does not fit the content.
     #[error("the skin file is damaged: its checksum does not fit its content; copy it again or bind the mesh again")]
     Checksum,
-    /// Something that no writer writes.
+    /// The file holds a value that Rigsmith never writes.
     #[error("the skin file is damaged at byte {offset}: {what}; bind the mesh again")]
     Damaged {
-        /// Where, from the start of the file.
+        /// Position of the value in bytes from the start of the file.
         offset: usize,
-        /// What is wrong there.
+        /// Description of the error.
         what: String,
     },
-    /// Parts that are sound by themselves but do not fit together.
+    /// The parts of the file are valid by themselves but do not fit together.
     #[error("the skin file contradicts itself: {0}")]
     Content(#[from] SkinError),
 }
@@ -84,7 +84,8 @@ pub(super) fn read(all: &[u8]) -> Result<SkinFile, SkinFileError> {
     }
     let [joint_count, point_count, influence_count, triangle_count] = counts;
     let has_mesh = flags & HAS_MESH != 0;
-    // Everything takes some bytes, so counts beyond what the file can hold are lies; nothing is reserved for them.
+    // Each entry takes at least one byte, so counts beyond the file's length are invalid, and no memory is reserved for
+    // them.
     let mesh_bytes = if has_mesh { point_count as u64 * 12 + triangle_count as u64 * 3 } else { 0 };
     let has_subjects = flags & HAS_SUBJECTS != 0;
     let joint_bytes = if has_subjects { 17 } else { 9 };
@@ -143,7 +144,7 @@ fn read_weights(bytes: &mut Bytes, points: usize, influences: usize) -> Result<W
         for _ in 0..count {
             let joint = bytes.varint().and_then(|j| u32::try_from(j).ok()).ok_or_else(damaged)?;
             let value = if rigid { 1.0 } else { bytes.float().ok_or_else(damaged)? };
-            // A lone weight of one has a shorter form, the only one that is written.
+            // A single weight of one has a shorter form, which the writer always uses.
             if !rigid && count == 1 && value.to_bits() == 1.0f32.to_bits() {
                 return Err(damaged());
             }

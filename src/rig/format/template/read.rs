@@ -1,4 +1,4 @@
-//! Reading templates, strictly and with places.
+//! Reader of templates: strict, with the place of each error.
 
 use std::collections::{HashMap, HashSet};
 
@@ -118,12 +118,12 @@ fn no_scale() -> (f32, f32, f32) {
 
 const TEMPLATE: Format = Format { what: "template", number: FORMAT, known: known_names };
 
-/// Reads a template. Nothing is returned unless all of it is right.
+/// Reads a template. An error anywhere refuses the whole template.
 pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
     read_text(utf8(bytes, MAX_BYTES, "template")?, 1)
 }
 
-/// Reads a template that stands in another file, where its first line has the number `first_line`.
+/// Reads a template inside another file, in which its first line has the number `first_line`.
 pub(in crate::rig) fn read_text(text: &str, first_line: usize) -> Result<Template, SourceError> {
     let mut notes = Vec::new();
     let fields = scan::fields(text);
@@ -133,7 +133,7 @@ pub(in crate::rig) fn read_text(text: &str, first_line: usize) -> Result<Templat
     Ok(Template { rig, notes })
 }
 
-/// Reads the header alone; what follows may be missing or wrong. `bytes` may be the first part of a file.
+/// Reads the header alone; the rest may be missing or invalid. `bytes` may be the first part of a file.
 pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let text = match std::str::from_utf8(bytes) {
@@ -147,11 +147,11 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
     passed_over.sort_unstable_by_key(|field| field.start);
     let whole = parse_ron(&blanked(text, &passed_over));
     let Some(first) = fields.iter().find(is_list) else { return whole };
-    // Where the lists are cut short or wrong, what stands before them is enough.
+    // If the lists are cut short or invalid, the text before them is enough for the header.
     whole.or_else(|_| parse_ron(&format!("{})", &text[..first.start])))
 }
 
-/// The names that a field may have where it stands; `None` where anything may stand (parameters of modules).
+/// Names that are allowed for a field at its place; `None` where any name is allowed (parameters of modules).
 fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
     let parent = field.parent.map(|parent| &fields[parent]);
     let above = parent.and_then(|parent| parent.parent).map(|above| fields[above].name);
@@ -232,7 +232,7 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result
     Ok(rig)
 }
 
-/// Puts uids beside names that stand alone in references, as people write them, and current names beside uids.
+/// Adds uids to references that people wrote as names alone, and updates the names beside uids.
 fn bind_references(rig: &mut Rig, notes: &mut Vec<String>) {
     let mut edits = Vec::new();
     for joint in rig.walk() {
@@ -385,14 +385,14 @@ fn tag_from(tag: TagFile) -> TagData {
     }
 }
 
-/// Finds the places where things are declared.
+/// Finds the places of declarations in the text.
 struct Places<'a> {
     text: &'a str,
     fields: &'a [Field<'a>],
 }
 
 impl Places<'_> {
-    /// An error at the field `name` of the `nth` thing that is declared with that uid (or of the first).
+    /// An error at the field `name` of the `nth` declaration with that uid (or of the first).
     fn error(&self, uid: Uid, nth: usize, name: &str, message: String) -> SourceError {
         let digits = uid.to_string();
         let declares = |field: &&Field| {

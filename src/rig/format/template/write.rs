@@ -1,4 +1,4 @@
-//! Writing templates.
+//! Writer of templates.
 
 use std::{
     collections::{BTreeMap, HashSet},
@@ -10,8 +10,8 @@ use bevy::math::{Quat, Vec3};
 use super::{FORMAT, FeatureSummary};
 use crate::rig::{NodeKind, Rig, RigJoint, TagData, TagKind, Uid, reference::refresh_names};
 
-/// The text of a rig's template. The same rig gives the same bytes. References in parameters are written with the current
-/// names beside the uids.
+/// The text of a rig's template. The same rig gives the same bytes. References in parameters are written with the
+/// current names beside the uids.
 pub fn write_template(rig: &Rig) -> String {
     let mut out = String::new();
     write_into(&mut out, rig).unwrap_or_default();
@@ -90,7 +90,7 @@ fn feature_uid(tag: &TagData) -> Option<Uid> {
     matches!(tag.kind, TagKind::Feature { .. }).then_some(tag.uid)
 }
 
-/// References to things that have been deleted are left out: they mean nothing, and readers refuse them.
+/// Writes a joint. References to deleted parts of the rig are left out, because readers refuse them.
 fn write_joint(out: &mut String, rig: &Rig, joint: &RigJoint, features: &HashSet<Uid>) -> std::fmt::Result {
     let data = &joint.data;
     write!(out, "        (\n            uid: \"{}\",", data.uid)?;

@@ -1,12 +1,12 @@
-//! What can be wrong with a `.rig` file, and where.
+//! Errors in a `.rig` file, with their lines.
 
 use std::fmt;
 
 use thiserror::Error;
 
-/// How much of a field a message shows.
+/// Number of characters of a field that a message shows.
 const SHOWN: usize = 40;
-/// How many joints of a cycle a message lists.
+/// Number of joints of a cycle that a message lists.
 const LISTED: usize = 8;
 
 /// The fields of a `joint` line.
@@ -36,10 +36,10 @@ impl fmt::Display for JointField {
     }
 }
 
-/// Why a `.rig` text cannot be read, or a skeleton cannot be written as one. Lines count from 1.
+/// Reason why a `.rig` text cannot be read, or a skeleton cannot be written as one. Lines count from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum RigTextError {
-    /// Nothing but blank lines and comments.
+    /// The text has only blank lines and comments.
     #[error("the file is empty; a rig begins with the line `rig 1`")]
     Empty,
     /// Bytes that are not UTF-8.
@@ -56,7 +56,7 @@ pub enum RigTextError {
     NoHeader {
         /// The line.
         line: usize,
-        /// What stands there.
+        /// Text at that place.
         found: String,
     },
     /// A second header.
@@ -70,15 +70,15 @@ pub enum RigTextError {
     BadVersion {
         /// The line.
         line: usize,
-        /// What stands there.
+        /// Text at that place.
         found: String,
     },
-    /// A version from the future.
+    /// A version that is newer than this program.
     #[error("line {line}: the file has format version {found}, and this program reads up to {supported}; update it, or save the rig as version {supported}", supported = super::VERSION)]
     NewerVersion {
         /// The line.
         line: usize,
-        /// The version found.
+        /// Version in the file.
         found: u64,
     },
     /// More than a version in the header.
@@ -86,7 +86,7 @@ pub enum RigTextError {
     ExtraInHeader {
         /// The line.
         line: usize,
-        /// What stands there.
+        /// Text at that place.
         found: String,
     },
     /// A line that is neither a header nor a joint.
@@ -96,7 +96,7 @@ pub enum RigTextError {
     UnknownKeyword {
         /// The line.
         line: usize,
-        /// What stands there.
+        /// Text at that place.
         found: String,
     },
     /// A joint line that ends too early.
@@ -112,7 +112,7 @@ pub enum RigTextError {
     ExtraField {
         /// The line.
         line: usize,
-        /// What stands there.
+        /// Text at that place.
         found: String,
     },
     /// A number that must be whole.
@@ -122,7 +122,7 @@ pub enum RigTextError {
         line: usize,
         /// The field.
         field: JointField,
-        /// What stands there.
+        /// Text at that place.
         found: String,
     },
     /// A coordinate that is no number.
@@ -132,7 +132,7 @@ pub enum RigTextError {
         line: usize,
         /// The field.
         field: JointField,
-        /// What stands there.
+        /// Text at that place.
         found: String,
     },
     /// A coordinate that is infinite, not a number, or too large for 32 bits.
@@ -142,7 +142,7 @@ pub enum RigTextError {
         line: usize,
         /// The field.
         field: JointField,
-        /// What stands there.
+        /// Text at that place.
         found: String,
     },
     /// A label with control characters.
@@ -172,7 +172,7 @@ pub enum RigTextError {
         line: usize,
         /// The joint.
         index: u64,
-        /// The parent it names.
+        /// Number of the parent in the joint's line.
         parent: u64,
     },
     /// Joints that are their own ancestors.
@@ -188,7 +188,7 @@ pub enum RigTextError {
     WriteParent {
         /// The joint, by its position in the list.
         joint: usize,
-        /// The parent it names.
+        /// Index of the parent that the joint has.
         parent: usize,
     },
     /// A skeleton to be written has joints that are their own ancestors.
@@ -206,7 +206,7 @@ pub enum RigTextError {
 }
 
 impl RigTextError {
-    /// Returns the line, counted from 1, that the error is about, if it is about one.
+    /// Line of the error, counted from 1; `None` if the error has no line.
     pub fn line(&self) -> Option<usize> {
         match *self {
             Self::Empty | Self::WriteParent { .. } | Self::WriteCycle { .. } | Self::WriteNotFinite { .. } => None,
@@ -231,7 +231,7 @@ impl RigTextError {
     }
 }
 
-/// A field as a message shows it: short, and without anything that would move a terminal's cursor.
+/// A field for messages: short, and without characters that would move a terminal's cursor.
 pub(super) fn quoted(field: &str) -> String {
     let mut text: String = field.chars().take(SHOWN).map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect();
     if field.chars().nth(SHOWN).is_some() {
@@ -240,7 +240,7 @@ pub(super) fn quoted(field: &str) -> String {
     text
 }
 
-/// A cycle as a message shows it: `3 -> 5 -> 3`.
+/// A cycle for messages: `3 -> 5 -> 3`.
 pub(super) fn chain<T: fmt::Display>(joints: &[T]) -> String {
     let mut text: String = joints.iter().take(LISTED).map(|joint| format!("{joint} -> ")).collect();
     match joints.first() {

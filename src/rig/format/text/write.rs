@@ -1,4 +1,4 @@
-//! Writing `.rig` text.
+//! Writer of `.rig` text.
 
 use std::fmt::{self, Write as _};
 
@@ -13,7 +13,7 @@ use super::{
 pub struct Written {
     /// The content of the file.
     pub text: String,
-    /// The labels that the format cannot hold, and what stands in their place.
+    /// Labels that the format cannot hold, and the labels written instead.
     pub relabelled: Vec<Relabelled>,
 }
 
@@ -22,7 +22,7 @@ pub struct Written {
 pub struct Relabelled {
     /// The joint, by its position in [`RigText::joints`].
     pub joint: usize,
-    /// The label as it is.
+    /// Label of the joint.
     pub from: String,
     /// The label as written; empty if the joint was written without one.
     pub to: String,
@@ -38,14 +38,15 @@ impl fmt::Display for Relabelled {
     }
 }
 
-/// Writes a skeleton as `.rig` text that [`parse`](super::parse) reads back as the same, bit for bit in its positions.
+/// Writes a skeleton as `.rig` text; [`parse`](super::parse) reads it back as the same skeleton, with identical bits in
+/// its positions.
 ///
-/// White space and control characters in labels, and a `#` at the start, become `_`; empty labels are left out. Both are
-/// reported. Time is linear.
+/// White space and control characters in labels, and a `#` at the start, become `_`; empty labels are left out. Both
+/// are reported. Time is linear.
 ///
 /// # Errors
-/// [`RigTextError::WriteParent`], [`RigTextError::WriteCycle`] and [`RigTextError::WriteNotFinite`], for what could not be read
-/// back.
+/// [`RigTextError::WriteParent`], [`RigTextError::WriteCycle`] and [`RigTextError::WriteNotFinite`], for skeletons that
+/// could not be read back.
 pub fn write(rig: &RigText) -> Result<Written, RigTextError> {
     for (i, joint) in rig.joints.iter().enumerate() {
         if let Some(parent) = joint.parent.filter(|&parent| parent >= rig.joints.len()) {
