@@ -99,7 +99,7 @@ pub enum Then {
 pub(super) mod loading {
     pub(in crate::editor) use super::{
         document::{Context, MeshSource, places},
-        open::{Landing, Opened, Work, begin, bundled_model, document, hash_of, project, spawn},
+        open::{LoadedDocument, LoadedFile, Work, begin, bundled_model, document, hash_of, project, spawn},
         save::{place_bundled, snapshot},
     };
 }

@@ -14,7 +14,8 @@ use super::{
         Loading, Then, after_asking,
         dialog::{Answer, Dialog, Question},
         loading::{
-            Context, Landing, MeshSource, Opened, Work, begin, bundled_model, document, hash_of, places, project, spawn,
+            Context, LoadedDocument, LoadedFile, MeshSource, Work, begin, bundled_model, document, hash_of, places,
+            project, spawn,
         },
     },
     notice::Notice,
@@ -143,7 +144,7 @@ pub(super) fn start(world: &mut World, journal: PathBuf) {
 }
 
 /// Restores the document from its journal.
-fn restore(journal: &Path) -> Result<Landing, String> {
+fn restore(journal: &Path) -> Result<LoadedFile, String> {
     let bytes = read_capped(&RealDisk, journal, MAX_JOURNAL).map_err(|error| error.to_string())?;
     let mut recovered = recover(&bytes).map_err(|error| format!("`{}`: {error}", journal.display()))?;
     if let Some(project) = project_beside(journal).filter(|project| project.is_file()) {
@@ -168,7 +169,7 @@ fn restore(journal: &Path) -> Result<Landing, String> {
 }
 
 /// Adds warnings about lost work.
-fn tell_losses(recovered: &Recovered, restored: &Restored, basis: Basis, opened: &mut Opened) {
+fn tell_losses(recovered: &Recovered, restored: &Restored, basis: Basis, opened: &mut LoadedDocument) {
     if let Some(reason) = &restored.replayed.refused {
         let total = recovered.changes().len();
         opened.warnings.push(format!(
@@ -213,14 +214,14 @@ fn tell_losses(recovered: &Recovered, restored: &Restored, basis: Basis, opened:
 }
 
 /// An empty rig with the meshes that were open, if they can be opened again.
-fn with_meshes(recovered: &Recovered) -> Opened {
+fn with_meshes(recovered: &Recovered) -> LoadedDocument {
     let context: Context = ron::from_str(recovered.context()).unwrap_or_default();
     let name = match (context.name.is_empty(), recovered.origin().path()) {
         (false, _) => context.name,
         (true, Some(path)) => stem(path),
         (true, None) => "recovered".to_owned(),
     };
-    let mut opened = Opened::named(name, Rig::default());
+    let mut opened = LoadedDocument::named(name, Rig::default());
     for mesh in context.meshes {
         let model = match &mesh.source {
             MeshSource::Bundled => bundled_model(),

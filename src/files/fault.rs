@@ -75,12 +75,12 @@ struct Inner {
 #[derive(Default)]
 struct State {
     log: Vec<&'static str>,
-    written: Vec<Written>,
+    written: Vec<WrittenFile>,
     lost_power: bool,
 }
 
 /// A file that was created on this disk.
-struct Written {
+struct WrittenFile {
     /// Present path of the file.
     path: PathBuf,
     bytes: u64,
@@ -179,7 +179,7 @@ impl Disk for FaultyDisk {
         let file = self.inner.run("create", |disk| disk.create(path))?;
         let mut state = self.inner.state();
         let number = state.written.len();
-        state.written.push(Written { path: path.to_path_buf(), bytes: 0, synced: 0 });
+        state.written.push(WrittenFile { path: path.to_path_buf(), bytes: 0, synced: 0 });
         Ok(Box::new(FaultyFile { file, number, inner: Arc::clone(&self.inner) }))
     }
 

@@ -52,7 +52,7 @@ impl JobBasis {
 
 /// The decision about a finished job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Landing {
+pub(super) enum JobOutcome {
     /// The result is committed.
     Commit,
     /// The result waits: steps can be redone, or a drag is under way.
@@ -62,12 +62,12 @@ pub(super) enum Landing {
 }
 
 /// Decides about the result of a job that started from `basis`.
-pub(super) fn landing(basis: JobBasis, rig: &Rig, mesh: Uid, history: &RigHistory) -> Landing {
+pub(super) fn landing(basis: JobBasis, rig: &Rig, mesh: Uid, history: &RigHistory) -> JobOutcome {
     if history.is_previewing() || history.can_redo() {
-        Landing::Hold
+        JobOutcome::Hold
     } else if JobBasis::of(rig, mesh) == basis {
-        Landing::Commit
+        JobOutcome::Commit
     } else {
-        Landing::Drop
+        JobOutcome::Drop
     }
 }

@@ -20,7 +20,7 @@ use super::{
     configure_sets,
     document::EditRequest,
     history::RigHistory,
-    landing::{JobBasis, Landing, ResultHeld, landing},
+    landing::{JobBasis, JobOutcome, ResultHeld, landing},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
@@ -219,7 +219,7 @@ fn land_skinning(
             (Err(error), _) => Err(error.to_string()),
             (Ok(_), Err(_)) => Err("the rig was closed meanwhile".to_owned()),
             (Ok((skin, report)), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
-                Landing::Hold => {
+                JobOutcome::Hold => {
                     job.held = Some(Ok((skin, report)));
                     if !was_held && history.can_redo() {
                         let reason = "the weights are ready, but binding them now would lose the steps that were \
@@ -228,10 +228,10 @@ fn land_skinning(
                     }
                     continue;
                 }
-                Landing::Drop => Err("the joints were changed while the weights were computed; the weights were \
+                JobOutcome::Drop => Err("the joints were changed while the weights were computed; the weights were \
                                       dropped: skin the mesh again"
                     .to_owned()),
-                Landing::Commit => {
+                JobOutcome::Commit => {
                     let edit = RigEdit::SetSkin(mesh.uid, Some(skin));
                     edits.write(EditRequest::operation(of.0, Operation::Edits(vec![edit])));
                     Ok(report)

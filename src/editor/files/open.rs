@@ -57,12 +57,12 @@ const MAX_HASHED: u64 = 1 << 30;
 pub struct Loading {
     job: Option<Job>,
     /// Loaded document that waits for an answer about changes that were made while it loaded.
-    held: Option<(String, Box<Opened>)>,
+    held: Option<(String, Box<LoadedDocument>)>,
 }
 
 struct Job {
     name: String,
-    task: Task<Result<Landing, String>>,
+    task: Task<Result<LoadedFile, String>>,
     /// Last step of the open document when its loss was accepted.
     confirmed: Option<Arc<Step>>,
 }
@@ -75,15 +75,15 @@ impl Loading {
 }
 
 /// Result of opening a file.
-pub(in crate::editor) enum Landing {
+pub(in crate::editor) enum LoadedFile {
     /// A document that replaces the open one.
-    Document(Box<Opened>),
+    Document(Box<LoadedDocument>),
     /// A rig: for the open mesh, or a document of its own.
-    Template(Box<Opened>),
+    Template(Box<LoadedDocument>),
 }
 
 /// A loaded document.
-pub(in crate::editor) struct Opened {
+pub(in crate::editor) struct LoadedDocument {
     pub name: String,
     pub rig: Rig,
     pub meshes: Vec<(RigMesh, MeshSource)>,
@@ -107,7 +107,7 @@ pub(in crate::editor) struct Work {
     pub journal: std::path::PathBuf,
 }
 
-impl Opened {
+impl LoadedDocument {
     pub fn named(name: impl Into<String>, rig: Rig) -> Self {
         Self {
             name: name.into(),
@@ -170,7 +170,7 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
     let (name, task) = match request {
         OpenRequest::Bundled => ("the bundled character".to_owned(), spawn(move || bundled(&mut uids))),
         OpenRequest::Empty => {
-            let open = move || Ok(document(Opened::named("untitled", Rig::new(uids.next_uid(), "untitled"))));
+            let open = move || Ok(document(LoadedDocument::named("untitled", Rig::new(uids.next_uid(), "untitled"))));
             ("an empty rig".to_owned(), spawn(open))
         }
         OpenRequest::File(path) => {
@@ -182,7 +182,7 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
 }
 
 /// Registers `task` as the document that is being opened.
-pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<Landing, String>>) {
+pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<LoadedFile, String>>) {
     let confirmed = active(world).and_then(|rig| last_step(world, rig));
     let mut loading = world.resource_mut::<Loading>();
     loading.job = Some(Job { name, task, confirmed });
@@ -194,8 +194,8 @@ pub(in crate::editor) fn spawn<T: Send + 'static>(work: impl FnOnce() -> T + Sen
     AsyncComputeTaskPool::get().spawn(async move { work() })
 }
 
-pub(in crate::editor) fn document(opened: Opened) -> Landing {
-    Landing::Document(Box::new(opened))
+pub(in crate::editor) fn document(opened: LoadedDocument) -> LoadedFile {
+    LoadedFile::Document(Box::new(opened))
 }
 
 /// Reads the bundled character.
@@ -203,9 +203,9 @@ pub(in crate::editor) fn bundled_model() -> Result<Model, String> {
     read_model(BUNDLED, "biped", &ObjSettings::default(), &mut |_| None).map_err(|error| error.to_string())
 }
 
-fn bundled(uids: &mut UidSource) -> Result<Landing, String> {
+fn bundled(uids: &mut UidSource) -> Result<LoadedFile, String> {
     let origin = Origin::Bundled("biped".to_owned());
-    Ok(document(Opened::model(bundled_model()?, MeshSource::Bundled, origin, uids)))
+    Ok(document(LoadedDocument::model(bundled_model()?, MeshSource::Bundled, origin, uids)))
 }
 
 /// Hash of a file's bytes; `None` if it cannot be read.
@@ -213,39 +213,39 @@ pub(in crate::editor) fn hash_of(path: &Path) -> Option<u64> {
     read_capped(&RealDisk, path, MAX_HASHED).ok().map(|bytes| file_hash(&bytes))
 }
 
-fn file(path: &Path, uids: &mut UidSource) -> Result<Landing, String> {
+fn file(path: &Path, uids: &mut UidSource) -> Result<LoadedFile, String> {
     let origin_of = |path: &Path| (path.to_owned(), hash_of(path).unwrap_or_default());
     match FileKind::of(path) {
         Some(FileKind::Project) => Ok(document(project(path)?)),
         Some(FileKind::Template) => {
             let template = load_template(&RealDisk, path).map_err(|error| error.to_string())?;
             let (path, hash) = origin_of(path);
-            let mut opened = Opened::named(stem(&path), template.rig);
+            let mut opened = LoadedDocument::named(stem(&path), template.rig);
             opened.notes = template.notes;
             opened.origin = Origin::Template { path, hash };
-            Ok(Landing::Template(Box::new(opened)))
+            Ok(LoadedFile::Template(Box::new(opened)))
         }
         Some(FileKind::RigText) => {
             let text = load_rig_text(&RealDisk, path).map_err(|error| error.to_string())?;
             let (path, hash) = origin_of(path);
-            let mut opened = Opened::named(stem(&path), Rig::new(uids.next_uid(), stem(&path)));
+            let mut opened = LoadedDocument::named(stem(&path), Rig::new(uids.next_uid(), stem(&path)));
             for edit in &import_rig_text(&text, uids).0 {
                 opened.rig.apply(edit).map_err(|error| error.to_string())?;
             }
             opened.origin = Origin::Template { path, hash };
-            Ok(Landing::Template(Box::new(opened)))
+            Ok(LoadedFile::Template(Box::new(opened)))
         }
         _ => {
             let model = load_model(&RealDisk, path).map_err(|error| error.to_string())?;
             let (path, hash) = origin_of(path);
             let source = MeshSource::File(path.clone());
-            Ok(document(Opened::model(model, source, Origin::Mesh { path, hash }, uids)))
+            Ok(document(LoadedDocument::model(model, source, Origin::Mesh { path, hash }, uids)))
         }
     }
 }
 
 /// Opens a project; if it has several rigs, the first.
-pub(in crate::editor) fn project(path: &Path) -> Result<Opened, String> {
+pub(in crate::editor) fn project(path: &Path) -> Result<LoadedDocument, String> {
     let hash = hash_of(path).unwrap_or_default();
     let loaded = load_project(&RealDisk, path).map_err(|error| error.to_string())?;
     let mut notes = loaded.notes;
@@ -257,7 +257,7 @@ pub(in crate::editor) fn project(path: &Path) -> Result<Opened, String> {
             path.display()
         ));
     }
-    let mut opened = Opened::named(stem(path), rig);
+    let mut opened = LoadedDocument::named(stem(path), rig);
     for LoadedMesh { uid, rig, path, nodes, shape } in loaded.meshes {
         match shape {
             MeshState::Open { model, .. } => {
@@ -291,8 +291,8 @@ pub(super) fn poll(world: &mut World) {
                 start(world, OpenRequest::Empty);
             }
         }
-        Ok(Landing::Template(opened)) if template::has_mesh(world) => template::consider(world, *opened),
-        Ok(Landing::Document(opened) | Landing::Template(opened)) => {
+        Ok(LoadedFile::Template(opened)) if template::has_mesh(world) => template::consider(world, *opened),
+        Ok(LoadedFile::Document(opened) | LoadedFile::Template(opened)) => {
             let changed = active(world)
                 .filter(|rig| is_unsaved(world, *rig) && !is_same(&last_step(world, *rig), &confirmed))
                 .and_then(|rig| world.get::<OpenDocument>(rig));
@@ -319,9 +319,20 @@ pub(super) fn drop_held(world: &mut World) {
     world.resource_mut::<Loading>().held = None;
 }
 
-fn land(world: &mut World, name: &str, opened: Opened) {
-    let Opened { name: title, rig, meshes, missing, view: kept, project, origin, notes, mut warnings, work, pending } =
-        opened;
+fn land(world: &mut World, name: &str, opened: LoadedDocument) {
+    let LoadedDocument {
+        name: title,
+        rig,
+        meshes,
+        missing,
+        view: kept,
+        project,
+        origin,
+        notes,
+        mut warnings,
+        work,
+        pending,
+    } = opened;
     if let Some(old) = world.get_resource::<ActiveRig>().map(|rig| rig.0) {
         // The next journal may be at the same place.
         let same = project.is_some() && world.get::<OpenDocument>(old).is_some_and(|old| old.project == project);
@@ -367,7 +378,7 @@ fn land(world: &mut World, name: &str, opened: Opened) {
     world.resource_mut::<FrameWhenReady>().0 = !restored;
     world.write_message(match is_recovered {
         true => Notice::done(format!("Recovered {title}; save it to keep it")),
-        false => Notice::done(format!("Opened {name}")),
+        false => Notice::done(format!("LoadedDocument {name}")),
     });
     for warning in warnings {
         world.write_message(Notice::warning(warning));

@@ -8,7 +8,7 @@ use super::{
     active,
     dialog::{Dialog, Question},
     document::meshes,
-    open::Opened,
+    open::LoadedDocument,
 };
 use crate::{
     editor::notice::Notice,
@@ -44,7 +44,7 @@ pub(super) fn has_mesh(world: &World) -> bool {
 }
 
 /// Puts a template onto the mesh, or asks about their sizes.
-pub(super) fn consider(world: &mut World, opened: Opened) {
+pub(super) fn consider(world: &mut World, opened: LoadedDocument) {
     let Some(active) = active(world) else { return };
     for note in &opened.notes {
         world.write_message(Notice::info(note.clone()).quiet());

@@ -45,12 +45,12 @@ pub struct Restored {
     /// Content of the next journal.
     pub(super) content: Content,
     /// Number of the changes in `content` that the project holds.
-    pub(super) contained: Contained,
+    pub(super) contained: SavedSteps,
 }
 
 /// Number of changes of a restored journal that its project holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Contained {
+pub(super) enum SavedSteps {
     /// The number that the marks of the journal give.
     Marked,
     /// The given number.
@@ -76,14 +76,14 @@ impl Recovered {
         if exact >= self.changes().len() {
             let replayed = replay(rig, self.changes(), contained);
             content.changes.truncate(replayed.applied);
-            return Restored { replayed, skipped: Vec::new(), content, contained: Contained::Marked };
+            return Restored { replayed, skipped: Vec::new(), content, contained: SavedSteps::Marked };
         }
         if basis == Basis::Journal {
             content.base = Some(Arc::new(rig.clone()));
         }
         // Positions are counted again from the start.
         content.marks.clear();
-        let mut salvage = Salvage::new(self, rig);
+        let mut salvage = Restoration::new(self, rig);
         let (former, later) = self.changes().split_at(contained);
         // The history includes the project's changes only if all of them are certain.
         for committed in former.iter().filter(|_| contained <= exact) {
@@ -103,7 +103,7 @@ impl Recovered {
             rig: salvage.rig,
         };
         let contained =
-            if matches!(basis, Basis::Project { .. }) { Contained::Counted(former) } else { Contained::Nothing };
+            if matches!(basis, Basis::Project { .. }) { SavedSteps::Counted(former) } else { SavedSteps::Nothing };
         Restored { replayed, skipped: salvage.skipped, content, contained }
     }
 
@@ -124,7 +124,7 @@ enum State {
 }
 
 /// Rig during restoration.
-struct Salvage<'a> {
+struct Restoration<'a> {
     recovered: &'a Recovered,
     rig: Rig,
     selection: Option<Vec<Uid>>,
@@ -135,7 +135,7 @@ struct Salvage<'a> {
     skipped: Vec<Skipped>,
 }
 
-impl<'a> Salvage<'a> {
+impl<'a> Restoration<'a> {
     fn new(recovered: &'a Recovered, rig: Rig) -> Self {
         Self {
             recovered,

@@ -15,7 +15,7 @@ use std::{
 use super::{
     Content, JournalPlaces, Origin, Recovered, Restored, SaveMark,
     place::{file_hash_at, set_aside},
-    restore::Contained,
+    restore::SavedSteps,
     sync::Synced,
     thread::Writer,
 };
@@ -159,9 +159,9 @@ impl Journal {
         let mut content = restored.content.clone();
         let saved = recovered.saved(&mut |path| file_hash_at(disk.as_ref(), path)).map(|(_, mark)| mark.clone());
         match (saved, restored.contained) {
-            (Some(mark), Contained::Marked) => content.rebase(&mark),
-            (Some(mark), Contained::Counted(contained)) => content.rebase_after(&mark, contained),
-            (_, Contained::Nothing) | (None, _) => {}
+            (Some(mark), SavedSteps::Marked) => content.rebase(&mark),
+            (Some(mark), SavedSteps::Counted(contained)) => content.rebase_after(&mark, contained),
+            (_, SavedSteps::Nothing) | (None, _) => {}
         }
         // The same session gives the same file name, so that the file replaces the old one in one step.
         Resumed { journal: Self::begin(disk, recovered.session, places, content, replaces), kept }

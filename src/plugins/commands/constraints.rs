@@ -7,7 +7,7 @@ use crate::{
     plugins::{
         document::{
             JointEntities, TagEntities,
-            entities::{BuiltEntities, EntityIndex, MirroredConstraint, Part},
+            entities::{BuiltEntities, EntityIndex, EntityPart, MirroredConstraint},
         },
         schema::{Constrains, ConstraintKind, ConstraintTarget, ConstraintTargets, CreatedBy},
     },
@@ -69,7 +69,7 @@ pub(super) fn follow_constraints(
                     is_reordered = true;
                     let named = (constraint.uid, Name::new(constraint.constraint.kind()), ChildOf(rig_entity));
                     let entity = commands.spawn((named, bundle)).id();
-                    index.insert(entity, rig_entity, constraint.uid, Part::Constraint);
+                    index.insert(entity, rig_entity, constraint.uid, EntityPart::Constraint);
                     entity
                 }
             };

@@ -12,7 +12,7 @@ use crate::{
     plugins::{
         document::{
             GroupEntities, JointEntities, TagEntities,
-            entities::{BuiltEntities, EntityIndex, MirroredNode, Part},
+            entities::{BuiltEntities, EntityIndex, EntityPart, MirroredNode},
         },
         runtime::RigRuntime,
         schema::{
@@ -22,7 +22,7 @@ use crate::{
     rig::{BuiltNode, NodeType, RestTransform, Rig, Uid},
 };
 
-type Followed<'a> = (
+type FollowedNodes<'a> = (
     Entity,
     &'a Rig,
     Option<&'a Built>,
@@ -37,7 +37,7 @@ type Followed<'a> = (
 /// below its parent: the built parent, or, for joints that are not built, the parent in the document.
 pub(super) fn follow_nodes(
     mut commands: Commands,
-    mut rigs: Query<Followed, Or<(Changed<Built>, Changed<Rig>)>>,
+    mut rigs: Query<FollowedNodes, Or<(Changed<Built>, Changed<Rig>)>>,
     parents: Query<&ChildOf, Allow<Disabled>>,
     mut places: Query<(&mut Transform, &mut RestTransform), Allow<Disabled>>,
     mut index: ResMut<EntityIndex>,
@@ -69,7 +69,7 @@ pub(super) fn follow_nodes(
             let pose = rig.offset(node.uid).copied().unwrap_or_default().on(&rest);
             let Some(mirrored) = known.nodes.get_mut(&node.uid) else {
                 let entity = writer.commands.spawn((node.uid, rest, pose, NodeOf(rig_entity), ChildOf(parent))).id();
-                index.insert(entity, rig_entity, node.uid, Part::Node);
+                index.insert(entity, rig_entity, node.uid, EntityPart::Node);
                 writer.describe(entity, rig, node, None);
                 let mirrored =
                     MirroredNode { entity, is_parked: false, node: Some(node.clone()), parent: Some(parent) };

@@ -31,12 +31,12 @@ type BuiltRigs<'a> = (
     &'a BuiltEntities,
     Option<&'a ShowRest>,
     Option<&'a mut RigRuntime>,
-    Option<&'a Suspended>,
+    Option<&'a SuspendedRuntime>,
 );
 
 /// Last runtime of a rig, kept while the built rig cannot run, so that its motion continues afterwards.
 #[derive(Component)]
-pub(super) struct Suspended(RigRuntime);
+pub(super) struct SuspendedRuntime(RigRuntime);
 
 /// Compiles the built rig, carries the motion of the previous program over, and passes on the pose and the attribute
 /// values of the document where those have changed.
@@ -64,7 +64,7 @@ pub(super) fn run_built(
                 let mut entity = commands.entity(entity);
                 entity.try_insert(RunFailure(error.to_string()));
                 if let Some(runtime) = runtime {
-                    entity.try_remove::<RigRuntime>().try_insert(Suspended(runtime.clone()));
+                    entity.try_remove::<RigRuntime>().try_insert(SuspendedRuntime(runtime.clone()));
                 }
                 continue;
             }
@@ -86,7 +86,7 @@ pub(super) fn run_built(
         target.pose_from(rig, is_posed);
         if let Some(fresh) = fresh {
             commands.entity(entity).try_insert(fresh);
-            commands.entity(entity).try_remove::<(RunFailure, Suspended)>();
+            commands.entity(entity).try_remove::<(RunFailure, SuspendedRuntime)>();
         }
     }
 }

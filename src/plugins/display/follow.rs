@@ -291,7 +291,7 @@ pub(super) fn follow_skins(
             found.filter(|_| bind.is_finite()).map_or((entity, Mat4::IDENTITY), |joint| (joint, bind))
         });
         let held: Vec<(Entity, Mat4)> = held.collect();
-        let held = Held { rig_entity: entity, rig: &rig, skeleton: &skeleton, joints: &held };
+        let held = BindTargets { rig_entity: entity, rig: &rig, skeleton: &skeleton, joints: &held };
         let displayed = displayed.bypass_change_detection();
         for shown in displayed.surface.pieces.iter_mut().chain(&mut displayed.edges.pieces) {
             follow_skin(shown, &held, &mut commands, &mut bind_assets);
@@ -300,7 +300,7 @@ pub(super) fn follow_skins(
 }
 
 /// Joints that move pieces of the mesh.
-struct Held<'a> {
+struct BindTargets<'a> {
     rig_entity: Entity,
     rig: &'a Rig,
     skeleton: &'a DeformSkeleton,
@@ -310,7 +310,7 @@ struct Held<'a> {
 
 fn follow_skin(
     shown: &mut ShownPiece,
-    held: &Held,
+    held: &BindTargets,
     commands: &mut Commands,
     bind_assets: &mut Assets<SkinnedMeshInverseBindposes>,
 ) {

@@ -27,7 +27,7 @@ use bevy::{
 use self::trial::Trial;
 use super::{
     EditRefused,
-    entities::{BuiltEntities, EntityIndex, GroupEntities, JointEntities, Part, TagEntities},
+    entities::{BuiltEntities, EntityIndex, EntityPart, GroupEntities, JointEntities, TagEntities},
 };
 use crate::{
     plugins::schema::{
@@ -78,7 +78,7 @@ type TagWritten =
 
 /// Entities that were written since the last frame, by this plugin or by other code.
 #[derive(SystemParam)]
-pub(super) struct Written<'w, 's> {
+pub(super) struct WrittenEntities<'w, 's> {
     nodes: Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>)>, JointWritten, Allow<Disabled>)>,
     tags: Query<'w, 's, Entity, (TagWritten, Allow<Disabled>)>,
     groups: Query<'w, 's, Entity, (Or<(Changed<LocalGroup>, Changed<GroupOf>)>, Allow<Disabled>)>,
@@ -103,16 +103,16 @@ pub(super) struct Written<'w, 's> {
 
 /// Written entities by their kind of part; sorted, so that the same writes give the same edits.
 #[derive(Default)]
-struct Touched {
+struct WrittenByKind {
     joints: BTreeSet<Entity>,
     tags: BTreeSet<Entity>,
     groups: BTreeSet<Entity>,
     uids: BTreeSet<Entity>,
 }
 
-impl Written<'_, '_> {
-    fn take(&mut self) -> Touched {
-        let mut touched = Touched::default();
+impl WrittenEntities<'_, '_> {
+    fn take(&mut self) -> WrittenByKind {
+        let mut touched = WrittenByKind::default();
         touched.joints.extend(self.nodes.iter());
         touched.tags.extend(self.tags.iter());
         touched.groups.extend(self.groups.iter());
@@ -145,7 +145,7 @@ pub(super) type RigParts = (
 /// Turns the writes to entities of all rigs into edits.
 pub(super) fn adopt_writes(
     mut commands: Commands,
-    mut written: Written,
+    mut written: WrittenEntities,
     views: Views,
     mut rigs: Query<RigParts>,
     mut uids: ResMut<UidSource>,
@@ -214,7 +214,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         self.trial.rig()
     }
 
-    pub(super) fn uid_of(&self, entity: Entity, part: Part) -> Option<Uid> {
+    pub(super) fn uid_of(&self, entity: Entity, part: EntityPart) -> Option<Uid> {
         self.index.uid_of(entity, self.trial.rig_entity, part)
     }
 

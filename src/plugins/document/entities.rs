@@ -15,7 +15,7 @@ use crate::rig::{BuiltConstraint, BuiltNode, GroupData, PoseOffset, RestTransfor
 
 /// The parts of a rig that have entities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::plugins) enum Part {
+pub(in crate::plugins) enum EntityPart {
     /// A joint of the document.
     Joint,
     /// A tag.
@@ -30,37 +30,37 @@ pub(in crate::plugins) enum Part {
 
 /// Part of a rig that an entity represents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::plugins) struct Indexed {
+pub(in crate::plugins) struct IndexedEntity {
     /// The rig.
     pub rig: Entity,
     /// The uid of the part.
     pub uid: Uid,
     /// The kind of part.
-    pub part: Part,
+    pub part: EntityPart,
 }
 
 /// Index from entities to the parts of rigs that they represent.
 #[derive(Resource, Debug, Default)]
-pub(in crate::plugins) struct EntityIndex(EntityHashMap<Indexed>);
+pub(in crate::plugins) struct EntityIndex(EntityHashMap<IndexedEntity>);
 
 impl EntityIndex {
     /// Part that an entity represents; `None` if it represents no part of a rig.
-    pub fn get(&self, entity: Entity) -> Option<Indexed> {
+    pub fn get(&self, entity: Entity) -> Option<IndexedEntity> {
         self.0.get(&entity).copied()
     }
 
     /// Uid of an entity that represents a part of this kind of this rig.
-    pub fn uid_of(&self, entity: Entity, rig: Entity, part: Part) -> Option<Uid> {
+    pub fn uid_of(&self, entity: Entity, rig: Entity, part: EntityPart) -> Option<Uid> {
         self.get(entity).filter(|indexed| indexed.rig == rig && indexed.part == part).map(|indexed| indexed.uid)
     }
 
     /// Adds an entity with the part that it represents.
-    pub fn insert(&mut self, entity: Entity, rig: Entity, uid: Uid, part: Part) {
-        self.0.insert(entity, Indexed { rig, uid, part });
+    pub fn insert(&mut self, entity: Entity, rig: Entity, uid: Uid, part: EntityPart) {
+        self.0.insert(entity, IndexedEntity { rig, uid, part });
     }
 
     /// Removes an entity.
-    pub fn remove(&mut self, entity: Entity) -> Option<Indexed> {
+    pub fn remove(&mut self, entity: Entity) -> Option<IndexedEntity> {
         self.0.remove(&entity)
     }
 

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::{
     ShowRest,
-    entities::{EntityIndex, GroupEntities, JointEntities, MirroredJoint, MirroredTag, Part, TagEntities},
+    entities::{EntityIndex, EntityPart, GroupEntities, JointEntities, MirroredJoint, MirroredTag, TagEntities},
 };
 use crate::{
     plugins::{
@@ -18,7 +18,7 @@ use crate::{
     rig::{NodeKind, PoseOffset, RestTransform, Rig, TagKind, Uid},
 };
 
-type Followed<'a> = (
+type FollowedRig<'a> = (
     Entity,
     Ref<'a, Rig>,
     &'a mut JointEntities,
@@ -33,7 +33,7 @@ type Followed<'a> = (
 /// joint is set after the build, which may put the joint below a created node.
 pub(in crate::plugins) fn follow_rigs(
     mut commands: Commands,
-    mut rigs: Query<Followed, Or<(Changed<Rig>, Changed<ShowRest>)>>,
+    mut rigs: Query<FollowedRig, Or<(Changed<Rig>, Changed<ShowRest>)>>,
     mut places: Query<(&mut Transform, &mut RestTransform), With<Joint>>,
     mut index: ResMut<EntityIndex>,
 ) {
@@ -92,7 +92,7 @@ pub(in crate::plugins) fn follow_rigs(
                     data.group,
                     groups.bypass_change_detection(),
                 );
-                index.insert(entity, rig_entity, data.uid, Part::Joint);
+                index.insert(entity, rig_entity, data.uid, EntityPart::Joint);
                 known.joints.insert(data.uid, mirrored);
                 known.set_posed(data.uid, offset);
                 is_other = true;
@@ -184,7 +184,7 @@ fn follow_groups(
             None => {
                 let bundle = (told, group.uid, GroupOf(rig_entity), Name::new(group.name.clone()));
                 let entity = commands.spawn(bundle).id();
-                index.insert(entity, rig_entity, group.uid, Part::Group);
+                index.insert(entity, rig_entity, group.uid, EntityPart::Group);
                 known.groups.insert(group.uid, (entity, group.clone()));
             }
         }
@@ -215,7 +215,7 @@ pub(in crate::plugins) fn follow_tags(
                     continue;
                 }
                 let entity = commands.spawn(tag.uid).id();
-                index.insert(entity, rig_entity, tag.uid, Part::Tag);
+                index.insert(entity, rig_entity, tag.uid, EntityPart::Tag);
                 known.insert_fresh(joint.data.uid, tag, entity);
                 fresh.insert(tag.uid);
             }

@@ -31,7 +31,7 @@ use crate::{
     plugins::{
         document::EditRequest,
         history::RigHistory,
-        landing::{JobBasis, Landing, ResultHeld, landing},
+        landing::{JobBasis, JobOutcome, ResultHeld, landing},
         surface::{RigMesh, SkinOf},
     },
     rig::{PoseOffset, Rig, RigEdit, StoredPose, Uid, UidSource, operations::Operation},
@@ -250,9 +250,9 @@ pub(super) fn land(
         let Some(finished) = finished else { continue };
         let result = match (finished, rigs.get(of.0)) {
             (Ok(done), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
-                Landing::Commit => Ok(done),
-                Landing::Drop => Err("the joints were changed while the face was placed; place it again".to_owned()),
-                Landing::Hold => {
+                JobOutcome::Commit => Ok(done),
+                JobOutcome::Drop => Err("the joints were changed while the face was placed; place it again".to_owned()),
+                JobOutcome::Hold => {
                     job.held = Some(done);
                     if !was_held && history.can_redo() {
                         let reason = "the face is ready, but placing it now would lose the steps that were undone; \

@@ -19,7 +19,7 @@ mod error;
 mod write;
 
 pub use error::{JointField, RigTextError};
-pub use write::{Relabelled, Written, write};
+pub use write::{LabelChange, RigTextOutput, write};
 
 use glam::Vec3;
 

@@ -30,7 +30,7 @@ pub(super) struct Values {
     pub lengths: Vec<f32>,
     /// The size of the skeleton, for the speed of drags.
     extent: f32,
-    typed: Typed,
+    typed: TypedAngles,
 }
 
 /// Vector of a joint that the panel shows.
@@ -66,7 +66,7 @@ impl Part {
 
 /// Angles in degrees as they were last typed: of the many triples for one rotation, the ones that people expect to see.
 #[derive(Debug, Clone, Default)]
-struct Typed {
+struct TypedAngles {
     rest: Vec<(Uid, Vec3)>,
     pose: Vec<(Uid, Vec3)>,
 }
@@ -83,7 +83,7 @@ impl Values {
         self.made_from = Some(key);
     }
 
-    fn of(rig: &Rig, selected: &[Uid], typed: Typed) -> Option<Self> {
+    fn of(rig: &Rig, selected: &[Uid], typed: TypedAngles) -> Option<Self> {
         let known: Vec<_> = selected.iter().filter_map(|uid| rig.joint(*uid)).collect();
         let data = || known.iter().map(|joint| &joint.data);
         let places: HashMap<Uid, Vec3> =
@@ -180,7 +180,7 @@ impl Values {
 }
 
 /// A vector of one joint, relative to its parent.
-fn vector(rig: &Rig, joint: &JointData, part: Part, typed: &Typed) -> Vec3 {
+fn vector(rig: &Rig, joint: &JointData, part: Part, typed: &TypedAngles) -> Vec3 {
     let offset = rig.offset(joint.uid).copied().unwrap_or(PoseOffset::IDENTITY);
     match part {
         Part::Position | Part::Local => joint.rest.translation,

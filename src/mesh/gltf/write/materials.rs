@@ -20,7 +20,7 @@ use crate::mesh::{
 };
 
 /// Lists of the document that come from materials.
-pub(super) struct Written {
+pub(super) struct WrittenMaterials {
     pub(super) materials: Vec<Value>,
     pub(super) textures: Vec<Value>,
     pub(super) samplers: Vec<Value>,
@@ -35,7 +35,7 @@ pub(super) fn write(
     material_set: &MaterialSet,
     mut outside: Option<&mut (&str, &mut CompanionSink)>,
     bin: &mut Bin,
-) -> Written {
+) -> WrittenMaterials {
     let mut images = Vec::new();
     let mut names = BTreeSet::new();
     let mut image_of = vec![None; material_set.images.len()];
@@ -85,7 +85,7 @@ pub(super) fn write(
     }
     let (extensions_used, extensions_required) =
         declare(found, &material_set.extensions_used, &material_set.extensions_required);
-    Written {
+    WrittenMaterials {
         materials: material_set.materials.clone(),
         samplers: material_set.samplers.clone(),
         textures,

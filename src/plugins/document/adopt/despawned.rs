@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
 use super::{
-    super::entities::{Indexed, Part},
+    super::entities::{EntityPart, IndexedEntity},
     Adoption,
     sorting::RigWrites,
 };
@@ -15,8 +15,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
     /// Deletes the parts whose entities were despawned. A joint whose entity was despawned together with a created node
     /// above it stays in the document and gets a new entity.
     pub fn despawned(&mut self, writes: &RigWrites) {
-        let dead: HashMap<Entity, Indexed> = writes.dead.iter().copied().collect();
-        let is_joint = |indexed: &Indexed| indexed.part == Part::Joint;
+        let dead: HashMap<Entity, IndexedEntity> = writes.dead.iter().copied().collect();
+        let is_joint = |indexed: &IndexedEntity| indexed.part == EntityPart::Joint;
         let joints = writes.dead.iter().map(|(_, indexed)| *indexed).filter(is_joint);
         let along: HashSet<Uid> =
             joints.map(|joint| joint.uid).filter(|joint| self.went_along(*joint, &dead)).collect();
@@ -24,21 +24,21 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         for (entity, indexed) in &writes.dead {
             self.index.remove(*entity);
             match indexed.part {
-                Part::Joint if along.contains(&indexed.uid) => self.forget_joint(indexed.uid),
-                Part::Joint => deleted.push(indexed.uid),
-                Part::Node | Part::Constraint => {
+                EntityPart::Joint if along.contains(&indexed.uid) => self.forget_joint(indexed.uid),
+                EntityPart::Joint => deleted.push(indexed.uid),
+                EntityPart::Node | EntityPart::Constraint => {
                     if let Some(built) = &mut self.built {
                         built.nodes.remove(&indexed.uid);
                         built.constraints.remove(&indexed.uid);
                     }
                     self.trial.respawn = true;
-                    if indexed.part == Part::Node {
+                    if indexed.part == EntityPart::Node {
                         let reason =
                             "a created node was despawned and comes back; switch off or delete its command instead";
                         self.trial.refuse(reason.to_owned());
                     }
                 }
-                Part::Tag | Part::Group => {}
+                EntityPart::Tag | EntityPart::Group => {}
             }
         }
         deleted.retain(|joint| self.rig().joint(*joint).is_some());
@@ -53,7 +53,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         for (_, indexed) in &writes.dead {
             let uid = indexed.uid;
             match indexed.part {
-                Part::Tag => {
+                EntityPart::Tag => {
                     let bearer = self.rig().find_tag(uid).map(|(joint, _)| joint.data.uid);
                     // Tags of a joint that gets a new entity stay in the document.
                     if let Some(joint) = bearer.filter(|joint| self.joints.get(*joint).is_some()) {
@@ -64,7 +64,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                         mirrored.tags.retain(|tag| *tag != uid);
                     }
                 }
-                Part::Group => {
+                EntityPart::Group => {
                     self.groups.groups.remove(&uid);
                     let members =
                         self.rig().walk().filter(|joint| joint.data.group == Some(uid)).map(|joint| joint.data.uid);
@@ -77,20 +77,20 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                         mirrored.group = None;
                     }
                 }
-                Part::Joint | Part::Node | Part::Constraint => {}
+                EntityPart::Joint | EntityPart::Node | EntityPart::Constraint => {}
             }
         }
     }
 
     /// True if a joint's entity was despawned because of a created node above it, not by itself or because of another
     /// joint.
-    fn went_along(&self, joint: Uid, dead: &HashMap<Entity, Indexed>) -> bool {
+    fn went_along(&self, joint: Uid, dead: &HashMap<Entity, IndexedEntity>) -> bool {
         let mut above = self.joints.joints.get(&joint).and_then(|mirrored| mirrored.parent);
         let mut is_created = false;
         while let Some(indexed) = above.and_then(|above| dead.get(&above)) {
-            is_created = indexed.part == Part::Node;
+            is_created = indexed.part == EntityPart::Node;
             above = match indexed.part {
-                Part::Joint => self.joints.joints.get(&indexed.uid).and_then(|mirrored| mirrored.parent),
+                EntityPart::Joint => self.joints.joints.get(&indexed.uid).and_then(|mirrored| mirrored.parent),
                 _ => self.built.as_ref().and_then(|built| built.nodes.get(&indexed.uid)).and_then(|node| node.parent),
             };
         }

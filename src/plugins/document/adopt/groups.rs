@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::{super::entities::Part, Adoption, sorting::RigWrites};
+use super::{super::entities::EntityPart, Adoption, sorting::RigWrites};
 use crate::{
     plugins::schema::{GroupOf, LocalGroup},
     rig::{GroupData, RigEdit},
@@ -22,7 +22,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             let added = RigEdit::AddLocalGroup(data.clone(), usize::MAX);
             if self.trial.edit("a spawned local group", vec![added]) {
                 self.commands.entity(entity).try_insert((uid, Name::new(data.name.clone())));
-                self.index.insert(entity, self.trial.rig_entity, uid, Part::Group);
+                self.index.insert(entity, self.trial.rig_entity, uid, EntityPart::Group);
                 self.groups.groups.insert(uid, (entity, data));
             } else {
                 // The refused entity stays, but belongs to no rig.

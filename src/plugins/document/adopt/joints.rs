@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::{
     super::{
-        entities::{MirroredJoint, Part},
+        entities::{EntityPart, MirroredJoint},
         follow::{rest_of, write_group, write_label},
     },
     Adoption,
@@ -43,7 +43,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let rig_entity = self.trial.rig_entity;
         let Ok(view) = self.views.get(entity) else { return };
         let Some(above) = view.child_of.map(ChildOf::parent) else { return };
-        let parent = if above == rig_entity { None } else { self.uid_of(above, Part::Joint) };
+        let parent = if above == rig_entity { None } else { self.uid_of(above, EntityPart::Joint) };
         if parent.is_none() && above != rig_entity {
             let reason = "a joint was spawned below an entity that is no joint of the document; spawn it below a joint or \
                           the rig";
@@ -53,7 +53,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let group_entity = view.in_group.map(|group| group.0);
         let rest = rest_of(view.rest, view.transform);
         let label = view.label.map(|label| label.0.clone()).filter(|label| !label.is_empty());
-        let group = group_entity.and_then(|group| self.uid_of(group, Part::Group));
+        let group = group_entity.and_then(|group| self.uid_of(group, EntityPart::Group));
         let kind = if view.null { NodeKind::Null } else { NodeKind::Joint };
         let asked = view.uid.copied();
         let uid = self.trial.free_uid(asked);
@@ -69,7 +69,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         if group_entity.is_some() && group.is_none() {
             write_group(self.commands, entity, None);
         }
-        self.index.insert(entity, rig_entity, uid, Part::Joint);
+        self.index.insert(entity, rig_entity, uid, EntityPart::Joint);
         self.joints
             .joints
             .insert(uid, MirroredJoint { entity, label, group, rest, parent: Some(above), tags: Vec::new() });
@@ -104,7 +104,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                     _ => write_label(self.commands, entity, next.label.as_deref()),
                 }
             }
-            let told_group = view.in_group.map(|group| self.uid_of(group.0, Part::Group));
+            let told_group = view.in_group.map(|group| self.uid_of(group.0, EntityPart::Group));
             if told_group != mirrored.group.map(Some) {
                 let is_taken = match told_group {
                     Some(None) => {
@@ -149,7 +149,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let parent = match above {
             None => Some(None),
             Some(above) if above == rig_entity => Some(None),
-            Some(above) => self.uid_of(above, Part::Joint).map(Some),
+            Some(above) => self.uid_of(above, EntityPart::Joint).map(Some),
         };
         let is_taken = match parent {
             None => {

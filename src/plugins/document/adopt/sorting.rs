@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use bevy::prelude::*;
 
 use super::{
-    super::entities::{EntityIndex, Indexed, Part},
-    Touched, Views,
+    super::entities::{EntityIndex, EntityPart, IndexedEntity},
+    Views, WrittenByKind,
 };
 use crate::{plugins::schema::GroupOf, rig::Uid};
 
@@ -20,7 +20,7 @@ pub(super) struct RigWrites {
     pub spawned_tags: Vec<Entity>,
     pub groups: Vec<(Entity, Uid)>,
     pub spawned_groups: Vec<Entity>,
-    pub dead: Vec<(Entity, Indexed)>,
+    pub dead: Vec<(Entity, IndexedEntity)>,
 }
 
 /// Largest depth of a hierarchy; a longer chain of parents is a cycle.
@@ -28,7 +28,7 @@ const MAX_DEPTH: usize = 1 << 20;
 
 /// Assigns written entities to the rigs that they belong to or ask to belong to.
 pub(super) fn sort_by_rig(
-    touched: &Touched,
+    touched: &WrittenByKind,
     views: &Views,
     index: &EntityIndex,
     is_rig: impl Fn(Entity) -> bool,
@@ -53,16 +53,20 @@ pub(super) fn sort_by_rig(
         let writes = rigs.entry(indexed.rig).or_default();
         match (views.contains(*entity), indexed.part) {
             (false, _) => writes.dead.push((*entity, indexed)),
-            (true, Part::Joint) => writes.joints.push((*entity, indexed.uid)),
-            (true, Part::Tag) => writes.tags.push((*entity, indexed.uid)),
-            (true, Part::Group) => writes.groups.push((*entity, indexed.uid)),
-            (true, Part::Node | Part::Constraint) => writes.nodes.push((*entity, indexed.uid)),
+            (true, EntityPart::Joint) => writes.joints.push((*entity, indexed.uid)),
+            (true, EntityPart::Tag) => writes.tags.push((*entity, indexed.uid)),
+            (true, EntityPart::Group) => writes.groups.push((*entity, indexed.uid)),
+            (true, EntityPart::Node | EntityPart::Constraint) => writes.nodes.push((*entity, indexed.uid)),
         }
     }
     for entity in touched.joints.iter().filter(|entity| views.contains(**entity)) {
         match index.get(*entity) {
-            Some(Indexed { rig, uid, part: Part::Joint }) => rigs.entry(rig).or_default().joints.push((*entity, uid)),
-            Some(Indexed { rig, uid, part: Part::Node }) => rigs.entry(rig).or_default().nodes.push((*entity, uid)),
+            Some(IndexedEntity { rig, uid, part: EntityPart::Joint }) => {
+                rigs.entry(rig).or_default().joints.push((*entity, uid))
+            }
+            Some(IndexedEntity { rig, uid, part: EntityPart::Node }) => {
+                rigs.entry(rig).or_default().nodes.push((*entity, uid))
+            }
             Some(_) => {}
             None => {
                 let is_joint = views.get(*entity).is_ok_and(|view| view.joint && !view.created);
@@ -74,7 +78,9 @@ pub(super) fn sort_by_rig(
     }
     for entity in touched.tags.iter().filter(|entity| views.contains(**entity)) {
         match index.get(*entity) {
-            Some(Indexed { rig, uid, part: Part::Tag }) => rigs.entry(rig).or_default().tags.push((*entity, uid)),
+            Some(IndexedEntity { rig, uid, part: EntityPart::Tag }) => {
+                rigs.entry(rig).or_default().tags.push((*entity, uid))
+            }
             Some(_) => {}
             None => {
                 let Ok(view) = views.get(*entity) else { continue };
@@ -88,7 +94,9 @@ pub(super) fn sort_by_rig(
     }
     for entity in touched.groups.iter().filter(|entity| views.contains(**entity)) {
         match index.get(*entity) {
-            Some(Indexed { rig, uid, part: Part::Group }) => rigs.entry(rig).or_default().groups.push((*entity, uid)),
+            Some(IndexedEntity { rig, uid, part: EntityPart::Group }) => {
+                rigs.entry(rig).or_default().groups.push((*entity, uid))
+            }
             Some(_) => {}
             None => {
                 let Ok(view) = views.get(*entity) else { continue };

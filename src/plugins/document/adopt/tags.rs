@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use super::{
     super::{
-        entities::{MirroredTag, Part},
+        entities::{EntityPart, MirroredTag},
         follow::write_tag,
     },
     Adoption,
@@ -36,7 +36,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let kind = match (view.command, view.feature) {
             (Some(command), _) => {
                 let feature = match view.in_feature {
-                    Some(feature) => Some(self.uid_of(feature.0, Part::Tag)?),
+                    Some(feature) => Some(self.uid_of(feature.0, EntityPart::Tag)?),
                     None => None,
                 };
                 TagKind::Command { module: command.module.clone(), params: command.params.clone(), feature }
@@ -54,7 +54,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
     fn tag_spawned(&mut self, entity: Entity) {
         let Ok(view) = self.views.get(entity) else { return };
         let Some(bearer) = view.tag_of.map(|of| of.0) else { return };
-        let Some(joint) = self.uid_of(bearer, Part::Joint) else {
+        let Some(joint) = self.uid_of(bearer, EntityPart::Joint) else {
             let reason =
                 "a tag was spawned on an entity that is no joint of the document; put it on a joint".to_owned();
             return self.tag_refused(entity, Some(reason));
@@ -68,7 +68,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let before = self.views.get(bearer).ok().and_then(|view| view.tags).map_or(usize::MAX, |tags| {
             tags.iter()
                 .take_while(|other| *other != entity)
-                .filter(|other| self.uid_of(*other, Part::Tag).is_some())
+                .filter(|other| self.uid_of(*other, EntityPart::Tag).is_some())
                 .count()
         });
         let added = RigEdit::AddTag { joint, tag: Box::new(data.clone()), index: before };
@@ -76,7 +76,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             return self.tag_refused(entity, None);
         }
         self.commands.entity(entity).try_insert(uid);
-        self.index.insert(entity, self.trial.rig_entity, uid, Part::Tag);
+        self.index.insert(entity, self.trial.rig_entity, uid, EntityPart::Tag);
         self.tags.tags.insert(uid, MirroredTag { entity, joint, data });
         if let Some(mirrored) = self.joints.joints.get_mut(&joint) {
             mirrored.tags.insert(before.min(mirrored.tags.len()), uid);
@@ -124,7 +124,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         if above == known {
             return;
         }
-        let target = above.and_then(|above| self.uid_of(above, Part::Joint));
+        let target = above.and_then(|above| self.uid_of(above, EntityPart::Joint));
         let data = self.rig().find_tag(uid).map(|(_, tag)| tag.clone());
         let is_taken = match (target, data) {
             (Some(target), Some(data)) if self.rig().joint(target).is_some() => {
@@ -155,7 +155,10 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             let Some(joint) = self.rig().joint(uid) else { continue };
             let known: Vec<Uid> = joint.data.tags.iter().map(|tag| tag.uid).collect();
             let told: Vec<Uid> = self.views.get(entity).ok().and_then(|view| view.tags).map_or_else(Vec::new, |tags| {
-                tags.iter().filter_map(|tag| self.uid_of(tag, Part::Tag)).filter(|tag| known.contains(tag)).collect()
+                tags.iter()
+                    .filter_map(|tag| self.uid_of(tag, EntityPart::Tag))
+                    .filter(|tag| known.contains(tag))
+                    .collect()
             });
             let is_same_set = told.len() == known.len();
             if !is_same_set || told == known || told == mirrored.tags {

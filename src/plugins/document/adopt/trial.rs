@@ -17,7 +17,7 @@ pub(super) struct Trial<'a> {
 }
 
 /// The result of a [`Trial`].
-pub(super) struct Tried {
+pub(super) struct TrialResult {
     /// Edits that the document accepts, in order.
     pub edits: Vec<RigEdit>,
     /// Reasons for refusing the other edits.
@@ -70,11 +70,11 @@ impl<'a> Trial<'a> {
     }
 
     /// Reverts all tried edits and returns them.
-    pub fn finish(self) -> Tried {
+    pub fn finish(self) -> TrialResult {
         for inverse in &self.inverses {
             let undone = self.rig.apply(inverse);
             debug_assert!(undone.is_ok(), "an inverse was refused: {undone:?}");
         }
-        Tried { edits: self.edits, refused: self.refused, respawn: self.respawn }
+        TrialResult { edits: self.edits, refused: self.refused, respawn: self.respawn }
     }
 }

@@ -10,16 +10,16 @@ use super::{
 
 /// A written skeleton.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Written {
+pub struct RigTextOutput {
     /// The content of the file.
     pub text: String,
     /// Labels that the format cannot hold, and the labels written instead.
-    pub relabelled: Vec<Relabelled>,
+    pub relabelled: Vec<LabelChange>,
 }
 
 /// A label that was written differently.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Relabelled {
+pub struct LabelChange {
     /// The joint, by its position in [`RigText::joints`].
     pub joint: usize,
     /// Label of the joint.
@@ -28,7 +28,7 @@ pub struct Relabelled {
     pub to: String,
 }
 
-impl fmt::Display for Relabelled {
+impl fmt::Display for LabelChange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { joint, from, to } = self;
         match to.as_str() {
@@ -47,7 +47,7 @@ impl fmt::Display for Relabelled {
 /// # Errors
 /// [`RigTextError::WriteParent`], [`RigTextError::WriteCycle`] and [`RigTextError::WriteNotFinite`], for skeletons that
 /// could not be read back.
-pub fn write(rig: &RigText) -> Result<Written, RigTextError> {
+pub fn write(rig: &RigText) -> Result<RigTextOutput, RigTextError> {
     for (i, joint) in rig.joints.iter().enumerate() {
         if let Some(parent) = joint.parent.filter(|&parent| parent >= rig.joints.len()) {
             return Err(RigTextError::WriteParent { joint: i, parent });
@@ -83,12 +83,12 @@ pub fn write(rig: &RigText) -> Result<Written, RigTextError> {
                 text.push_str(&safe);
             }
             if safe != *label || label.is_empty() {
-                relabelled.push(Relabelled { joint: i, from: label.clone(), to: safe });
+                relabelled.push(LabelChange { joint: i, from: label.clone(), to: safe });
             }
         }
         text.push('\n');
     }
-    Ok(Written { text, relabelled })
+    Ok(RigTextOutput { text, relabelled })
 }
 
 fn writable(label: &str) -> String {
