@@ -383,3 +383,73 @@ fn controls_without_effect_are_hidden() {
         }
     }
 }
+
+/// Entities of the rig with a component that was written after a tick, with the components' names.
+fn written_since(stage: &Stage, tick: bevy::ecs::change_detection::Tick) -> Vec<(Entity, String)> {
+    let world = stage.app.world();
+    let now = world.read_change_tick();
+    let mut found = Vec::new();
+    for entity in world.iter_entities() {
+        let is_of_rig = entity.contains::<rigsmith::plugins::schema::NodeOf>()
+            || entity.contains::<rigsmith::plugins::schema::TagOf>()
+            || entity.contains::<rigsmith::plugins::schema::GroupOf>()
+            || entity.contains::<rigsmith::plugins::schema::Constrains>();
+        if !is_of_rig {
+            continue;
+        }
+        for component in entity.archetype().components() {
+            let ticks = entity.get_change_ticks_by_id(*component);
+            if ticks.is_some_and(|ticks| ticks.is_changed(tick, now)) {
+                let name = world.components().get_name(*component).map(|name| name.to_string()).unwrap_or_default();
+                found.push((entity.id(), name));
+            }
+        }
+    }
+    found
+}
+
+/// An edit of one tag writes the components of that tag and of what it made, and no other.
+#[test]
+fn an_edit_of_one_tag_touches_only_what_changed() {
+    let mut stage = biped();
+    (0..3).for_each(|_| stage.app.update());
+    let tag = stage.document().walk().flat_map(|joint| joint.data.tags.clone()).find(|tag| {
+        matches!(&tag.kind, rigsmith::rig::TagKind::Command { module, params, .. }
+            if module == "control" && params.starts_with("()") | params.contains("shape_scale"))
+    });
+    let mut tag = tag.expect("a control with a scaled shape");
+    let joint = stage.document().find_tag(tag.uid).unwrap().0.data.uid;
+    let rigsmith::rig::TagKind::Command { params, .. } = &mut tag.kind else { unreachable!() };
+    let start = params.find("shape_scale").unwrap();
+    let end = start + params[start..].find(')').unwrap();
+    params.replace_range(start..=end, "shape_scale: (1.5, 1.25, 1.75)");
+    let uid = tag.uid;
+    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+    let of_tag = |node: Uid| {
+        let origin = built.node(node).and_then(|node| node.origin.clone());
+        origin.is_some_and(|origin| origin.command == uid)
+    };
+    let tick = stage.app.world().read_change_tick();
+    stage.edit(vec![RigEdit::SetTag(joint, Box::new(tag))]);
+    let written = written_since(&stage, tick);
+    let controls = written.iter().filter(|(_, name)| name.ends_with("schema::Control")).count();
+    assert!(controls > 0, "the control's shape is written: {written:?}");
+    for (entity, name) in &written {
+        let node = *stage.get::<Uid>(*entity).unwrap();
+        assert!(node == uid || of_tag(node), "{name} of {node}, which the tag did not make");
+        assert!(!name.contains("Transform"), "{name} of {node}: nothing moved");
+    }
+
+    // A pose moves what hangs on it and touches nothing else.
+    let (_, control) = hand_and_control(&stage);
+    stage.app.update();
+    let tick = stage.app.world().read_change_tick();
+    stage.app.world_mut().get_mut::<Transform>(control).unwrap().translation.y += 0.01;
+    stage.app.update();
+    let written = written_since(&stage, tick);
+    for (entity, name) in &written {
+        assert!(name.contains("Transform"), "a pose writes {name} of {entity}");
+    }
+    let entities: std::collections::BTreeSet<Entity> = written.iter().map(|(entity, _)| *entity).collect();
+    assert!(entities.len() < built.nodes.len() / 2, "{} of {} nodes", entities.len(), built.nodes.len());
+}
