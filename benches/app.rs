@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             if let TagKind::Command { params, .. } = &mut tag.kind
                 && round % 2 == 0
             {
-                *params = changed(module, params).into();
+                *params = changed(module, params);
             }
             let edit = RigEdit::SetTag(joint, Box::new(tag));
             app.world_mut().write_message(EditRequest::operation(rig, Operation::Edits(vec![edit])));
