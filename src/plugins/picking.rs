@@ -333,7 +333,7 @@ fn hover(
 fn under(
     spot: &HoverSpot,
     entity: Entity,
-    (rig, entities, place, surface, meshes, _): PickItem,
+    (rig, entities, place, surface, meshes, ..): PickItem,
     joints: &Query<&GlobalTransform>,
     last: &LastClick,
 ) -> Option<Option<Uid>> {
