@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 the input is at fault, 2 the command was used wrongly. With `--json` the result is one JSON
 //! object on standard output, errors included.
 
+mod argument;
 mod build;
 mod check;
 mod convert;
@@ -29,6 +30,7 @@ use crate::{
     algo::weights::{Method, WeightSettings},
     mesh::gltf::GltfWriteSettings,
 };
+use argument::ArgumentError;
 use outputs::InPlaceArgs;
 use report::{Failure, Report};
 
@@ -133,10 +135,10 @@ impl ExportArgs {
     }
 }
 
-fn positive(text: &str) -> Result<f32, String> {
+fn positive(text: &str) -> Result<f32, ArgumentError> {
     match text.parse::<f32>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
-        _ => Err("write a number above zero".to_owned()),
+        _ => Err(ArgumentError::NotPositive),
     }
 }
 
@@ -146,9 +148,19 @@ const SEED: u64 = 0x5249_4753_4D49_5448;
 /// A file to write.
 type Output = PathBuf;
 
-/// Function that opens the window on a file, or on the bundled character, and returns when it is closed; its error is a
-/// line with the reason.
-pub type OpenWindow<'a> = &'a dyn Fn(Option<PathBuf>) -> Result<ExitCode, String>;
+/// Reason why no window opens, in a line.
+#[derive(Debug, thiserror::Error)]
+pub enum WindowError {
+    /// The program was built without the window.
+    #[error("this build has no editor; build with the feature `editor`")]
+    NoEditor,
+    /// The window cannot be opened.
+    #[error(transparent)]
+    Window(Box<dyn std::error::Error + Send + Sync>),
+}
+
+/// Function that opens the window on a file, or on the bundled character, and returns when it is closed.
+pub type OpenWindow<'a> = &'a dyn Fn(Option<PathBuf>) -> Result<ExitCode, WindowError>;
 
 /// Runs the command line of this process. `window` opens the editor, which this module does not depend on.
 pub fn main(window: OpenWindow) -> ExitCode {

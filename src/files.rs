@@ -18,6 +18,7 @@
 
 mod atomic;
 mod disk;
+mod disk_error;
 mod fault;
 mod folder;
 mod identity;
@@ -31,12 +32,13 @@ mod verify;
 
 pub use atomic::{FileSet, SaveError, SaveStep, is_temp_name, remove_stale_temps, save_atomic, save_set};
 pub use disk::{Disk, DiskFile, Entry, EntryKind, Hold, RealDisk};
+pub use disk_error::DiskError;
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
 pub use load::{FileKind, LoadError, load_gestures, load_model, load_rig_text, load_skin, load_template, stem};
 pub use project::{
-    LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectToSave,
+    LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote, ProjectToSave,
     load_project, project_files, store_project,
 };
 pub use read::{OpenFile, ReadError, open, read_capped};

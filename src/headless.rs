@@ -18,10 +18,12 @@ use crate::{
     plugins::{
         RigPlugins,
         commands::Built,
-        document::{EditRefused, EditRequest},
-        face::{ExpressRequest, Expressed, Face, FaceJob, FacePlaced, FaceReport, FaceRequest},
+        document::{ChangeError, EditRefused, EditRequest},
+        face::{
+            ExpressError, ExpressRequest, Expressed, Face, FaceJob, FacePlaced, FaceReport, FaceRequest, PlaceFaceError,
+        },
         gesture::{Gesture, GestureAnswer, GestureScript},
-        skinning::{BindRequest, Bound, SkinningJob},
+        skinning::{BindRequest, Bound, SkinningError, SkinningJob},
         surface::{RigMesh, SkinOf},
         task_pools,
     },
@@ -50,9 +52,18 @@ pub struct Workbench {
 /// Error of the workbench.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WorkbenchError {
-    /// An edit was refused.
-    #[error("{0}")]
-    Refused(String),
+    /// A change was refused.
+    #[error(transparent)]
+    Refused(#[from] ChangeError),
+    /// The mesh was not bound.
+    #[error(transparent)]
+    Skinning(#[from] SkinningError),
+    /// The face was not placed.
+    #[error(transparent)]
+    Face(#[from] PlaceFaceError),
+    /// The face shows no expression.
+    #[error(transparent)]
+    Expression(#[from] ExpressError),
     /// The workbench has no mesh.
     #[error("no mesh is open; open one first")]
     NoMesh,
@@ -142,7 +153,7 @@ impl Workbench {
                 return match (bound.result, refused) {
                     (Ok(_), Some(refused)) => Err(WorkbenchError::Refused(refused.reason)),
                     (Ok(report), None) => Ok(report),
-                    (Err(reason), _) => Err(WorkbenchError::Refused(reason)),
+                    (Err(error), _) => Err(error.into()),
                 };
             }
             if let Some(job) = self.app.world().get::<SkinningJob>(mesh) {
@@ -168,7 +179,7 @@ impl Workbench {
             if let Some(placed) = placed {
                 // The edit that makes the face is applied in the next frame.
                 self.app.update();
-                let report = placed.result.map_err(WorkbenchError::Refused)?;
+                let report = placed.result?;
                 return self.refused().map_or(Ok(report), Err);
             }
             if let Some(job) = self.app.world().get::<FaceJob>(mesh)
@@ -186,7 +197,7 @@ impl Workbench {
         self.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
         self.app.update();
         let told = self.app.world_mut().resource_mut::<Messages<Expressed>>().drain().last();
-        told.map_or(Ok(()), |told| told.result.map_err(WorkbenchError::Refused))?;
+        told.map_or(Ok(()), |told| told.result)?;
         self.refused().map_or(Ok(()), Err)
     }
 

@@ -92,7 +92,7 @@ fn check(path: &Path) -> Result<Findings, Failure> {
             Ok(())
         }
         Some(FileKind::Project) => load_project(&RealDisk, path).map(|project| {
-            found.remarks = project.notes;
+            found.remarks = project.notes.iter().map(ToString::to_string).collect();
             found.remarks.extend(project.rigs.iter().flat_map(remarks_on_rig));
         }),
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),

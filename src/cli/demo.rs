@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Failure, Report, SEED, sketch::skin};
+use super::{Failure, Report, SEED, WindowError, sketch::skin};
 use crate::{
     algo::weights::WeightSettings,
     files::{ReadError, RealDisk, read_capped, save_atomic},
@@ -19,7 +19,7 @@ const MESH: &[u8] = include_bytes!("../../assets/models/biped.obj");
 const GESTURES: &[u8] = include_bytes!("../../assets/gestures/biped.ron");
 
 /// Runs the workflow without a window; `reason` is the reason why no window opens.
-pub(super) fn run(reason: Option<&str>) -> Result<Report, Failure> {
+pub(super) fn run(reason: Option<&WindowError>) -> Result<Report, Failure> {
     let mut report = Report::default();
     if let Some(reason) = reason {
         report.line(format!("No window: {reason}. Doing the job without one."));

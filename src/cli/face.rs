@@ -11,7 +11,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED,
+    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, SEED,
     progress::{Progress, spinning},
 };
 use crate::{
@@ -68,7 +68,7 @@ pub(super) struct FaceArgs {
     in_place: InPlaceArgs,
 }
 
-fn axis(text: &str) -> Result<Vec3, String> {
+fn axis(text: &str) -> Result<Vec3, ArgumentError> {
     let (sign, letter) = match text.strip_prefix('-') {
         Some(letter) => (-1.0, letter),
         None => (1.0, text.strip_prefix('+').unwrap_or(text)),
@@ -77,17 +77,16 @@ fn axis(text: &str) -> Result<Vec3, String> {
         "x" => Ok(Vec3::X * sign),
         "y" => Ok(Vec3::Y * sign),
         "z" => Ok(Vec3::Z * sign),
-        _ => Err("write x, y or z, or -x, -y or -z".to_owned()),
+        _ => Err(ArgumentError::NoAxis),
     }
 }
 
-fn strength(text: &str) -> Result<(String, f32), String> {
-    let output_kind = || "write NAME=STRENGTH, such as happiness=0.8".to_owned();
-    let (name, strength) = text.split_once('=').ok_or_else(output_kind)?;
+fn strength(text: &str) -> Result<(String, f32), ArgumentError> {
+    let (name, strength) = text.split_once('=').ok_or(ArgumentError::NoStrength)?;
     match strength.trim().parse::<f32>() {
         Ok(number) if (0.0..=1.0).contains(&number) => Ok((name.trim().to_owned(), number)),
-        Ok(number) if number.is_finite() => Err(format!("{number} is not from 0 to 1")),
-        _ => Err(output_kind()),
+        Ok(number) if number.is_finite() => Err(ArgumentError::Strength(number)),
+        _ => Err(ArgumentError::NoStrength),
     }
 }
 

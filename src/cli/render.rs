@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::{
-    Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, device_selection,
+    ArgumentError, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, device_selection,
     pose::{self, PoseSteps},
     progress::{Progress, spinning},
     skin,
@@ -94,17 +94,17 @@ enum ViewArg {
     Bottom,
 }
 
-fn orbit(text: &str) -> Result<(f32, f32), String> {
-    let wanted = || "write yaw and pitch in degrees, such as 30,15".to_owned();
-    let (yaw, pitch) = text.split_once(',').ok_or_else(wanted)?;
-    let number = |text: &str| text.trim().parse::<f32>().ok().filter(|number| number.is_finite()).ok_or_else(wanted);
+fn orbit(text: &str) -> Result<(f32, f32), ArgumentError> {
+    let wanted = ArgumentError::NoOrbit;
+    let (yaw, pitch) = text.split_once(',').ok_or(wanted)?;
+    let number = |text: &str| text.trim().parse::<f32>().ok().filter(|number| number.is_finite()).ok_or(wanted);
     Ok((number(yaw)?, number(pitch)?.clamp(-90.0, 90.0)))
 }
 
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let wanted = || "write width and height in pixels, such as 1280x720".to_owned();
-    let (width, height) = text.split_once('x').ok_or_else(wanted)?;
-    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wanted());
+fn size(text: &str) -> Result<(u32, u32), ArgumentError> {
+    let wanted = ArgumentError::NoSize;
+    let (width, height) = text.split_once('x').ok_or(wanted)?;
+    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wanted);
     Ok((number(width)?, number(height)?))
 }
 

@@ -37,8 +37,8 @@ impl Report {
     }
 
     /// Adds warnings.
-    pub fn notes(&mut self, notes: impl IntoIterator<Item = String>) {
-        self.notes.extend(notes);
+    pub fn notes(&mut self, notes: impl IntoIterator<Item = impl ToString>) {
+        self.notes.extend(notes.into_iter().map(|note| note.to_string()));
     }
 }
 

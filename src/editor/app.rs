@@ -29,6 +29,7 @@ use super::{
     mode::Mode,
     notice::{Notice, StatusLine},
     pointer::PointerPlugin,
+    probe::DisplayError,
     report::ReportPlugin,
     screen::ScreenPlugin,
     settings::SettingsPlugin,
@@ -55,7 +56,7 @@ pub struct EditorOptions {
 pub enum NoWindow {
     /// The system offers no display.
     #[error("there is no display to open a window on ({0})")]
-    Display(String),
+    Display(#[from] DisplayError),
     /// The system offers no graphics adapter.
     #[error(
         "there is no graphics adapter, not even a software one; install a Vulkan driver (Debian: mesa-vulkan-drivers)"
@@ -71,7 +72,7 @@ pub enum NoWindow {
 /// # Errors
 /// If there is no display or no adapter; nothing has been changed then, and the work can be done without a window.
 pub fn run(options: EditorOptions) -> Result<AppExit, NoWindow> {
-    super::probe::display().map_err(NoWindow::Display)?;
+    super::probe::display()?;
     if crate::render::adapter().is_none() {
         return Err(NoWindow::Adapter);
     }

@@ -7,6 +7,7 @@
 pub mod dialog;
 mod dialog_view;
 mod document;
+mod error;
 mod open;
 mod save;
 mod template;
@@ -99,6 +100,7 @@ pub enum Then {
 pub(super) mod loading {
     pub(in crate::editor) use super::{
         document::{Context, MeshSource, places},
+        error::{OpenError, WriteError},
         open::{LoadedDocument, LoadedFile, Work, begin, bundled_model, document, hash_of, project, spawn},
         save::{place_bundled, snapshot},
     };
@@ -200,8 +202,8 @@ fn act(world: &mut World, action: Action) {
 /// Opens a document; asks about unsaved changes first if it would replace the open one.
 fn request_open(world: &mut World, request: OpenRequest) {
     if let OpenRequest::File(path) = &request {
-        if let Err(reason) = open::recognise(path) {
-            world.write_message(Notice::error(reason));
+        if let Err(error) = open::recognise(path) {
+            world.write_message(Notice::error(error.to_string()));
             return;
         }
         if open::is_rig_file(path) && template::has_mesh(world) {

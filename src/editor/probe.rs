@@ -1,10 +1,21 @@
 //! Probe for a display, before Bevy needs one and would panic without it.
 
+/// Reason why there is no display.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DisplayError {
+    /// The environment names no display.
+    #[error("DISPLAY is not set")]
+    NotSet,
+    /// No display answers under the name in the environment.
+    #[error("nothing answers at DISPLAY={0}")]
+    NoAnswer(String),
+}
+
 /// Probes for a display to open a window on.
 ///
 /// # Errors
-/// A short text about the missing display.
-pub fn display() -> Result<(), String> {
+/// See [`DisplayError`].
+pub fn display() -> Result<(), DisplayError> {
     if cfg!(not(all(unix, not(target_os = "macos")))) {
         return Ok(());
     }
@@ -12,8 +23,8 @@ pub fn display() -> Result<(), String> {
     if cfg!(feature = "wayland") && set("WAYLAND_DISPLAY").is_some() {
         return Ok(());
     }
-    let Some(name) = set("DISPLAY") else { return Err("DISPLAY is not set".to_owned()) };
-    if answers(&name) { Ok(()) } else { Err(format!("nothing answers at DISPLAY={name}")) }
+    let Some(name) = set("DISPLAY") else { return Err(DisplayError::NotSet) };
+    if answers(&name) { Ok(()) } else { Err(DisplayError::NoAnswer(name)) }
 }
 
 /// Returns `true` if an X display of that name accepts connections.

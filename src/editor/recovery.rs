@@ -14,8 +14,8 @@ use super::{
         Loading, Then, after_asking,
         dialog::{Answer, Dialog, Question},
         loading::{
-            Context, LoadedDocument, LoadedFile, MeshSource, Work, begin, bundled_model, document, hash_of, places,
-            project, spawn,
+            Context, LoadedDocument, LoadedFile, MeshSource, OpenError, Work, begin, bundled_model, document, hash_of,
+            places, project, spawn,
         },
     },
     notice::Notice,
@@ -144,9 +144,9 @@ pub(super) fn start(world: &mut World, journal: PathBuf) {
 }
 
 /// Restores the document from its journal.
-fn restore(journal: &Path) -> Result<LoadedFile, String> {
-    let bytes = read_capped(&RealDisk, journal, MAX_JOURNAL).map_err(|error| error.to_string())?;
-    let mut recovered = recover(&bytes).map_err(|error| format!("`{}`: {error}", journal.display()))?;
+fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
+    let bytes = read_capped(&RealDisk, journal, MAX_JOURNAL)?;
+    let mut recovered = recover(&bytes).map_err(|source| OpenError::Journal { path: journal.to_owned(), source })?;
     if let Some(project) = project_beside(journal).filter(|project| project.is_file()) {
         recovered.assume_project(&project);
     }
@@ -224,8 +224,8 @@ fn with_meshes(recovered: &Recovered) -> LoadedDocument {
     let mut opened = LoadedDocument::named(name, Rig::default());
     for mesh in context.meshes {
         let model = match &mesh.source {
-            MeshSource::Bundled => bundled_model(),
-            MeshSource::File(path) => load_model(&RealDisk, path).map_err(|error| error.to_string()),
+            MeshSource::Bundled => bundled_model().map_err(OpenError::from),
+            MeshSource::File(path) => load_model(&RealDisk, path).map_err(OpenError::from),
         };
         match model {
             Ok(model) => {
@@ -233,9 +233,9 @@ fn with_meshes(recovered: &Recovered) -> LoadedDocument {
                 let nodes = if mesh.nodes.len() == model.nodes.len() { mesh.nodes } else { Vec::new() };
                 opened.meshes.push((RigMesh::new(mesh.uid, model, nodes), mesh.source));
             }
-            Err(reason) => opened
+            Err(error) => opened
                 .warnings
-                .push(format!("a mesh of the project is not there: {reason}; the rig was recovered without it")),
+                .push(format!("a mesh of the project is not there: {error}; the rig was recovered without it")),
         }
     }
     opened

@@ -17,13 +17,16 @@ use bevy::{
 
 use super::{
     ActiveRig,
-    files::{OpenDocument, has_unsaved_changes, loading},
+    files::{
+        OpenDocument, has_unsaved_changes,
+        loading::{self, WriteError},
+    },
     notice::Notice,
 };
 use crate::{
     files::{RealDisk, journal::Journal, store_project},
     plugins::journal::RigJournal,
-    rig::step::{Committed, StepSink},
+    rig::step::{Committed, SinkError, StepSink},
 };
 
 /// Plugin that saves the work when the renderer or the program fails.
@@ -105,9 +108,9 @@ fn make_safe(world: &mut World) -> String {
 }
 
 /// Writes a copy of the project beside the journal.
-fn rescue(world: &mut World, rig: Entity) -> Result<PathBuf, String> {
-    let (mut snapshot, is_bundled) = loading::snapshot(world, rig).ok_or("nothing is open")?;
-    let document = world.get::<OpenDocument>(rig).ok_or("nothing is open")?;
+fn rescue(world: &mut World, rig: Entity) -> Result<PathBuf, WriteError> {
+    let (mut snapshot, is_bundled) = loading::snapshot(world, rig).ok_or(WriteError::NothingOpen)?;
+    let document = world.get::<OpenDocument>(rig).ok_or(WriteError::NothingOpen)?;
     let journal = document.journal().path();
     let folder = journal.as_deref().and_then(std::path::Path::parent).map(std::path::Path::to_path_buf);
     let folder = folder.unwrap_or_else(std::env::temp_dir);
@@ -118,7 +121,7 @@ fn rescue(world: &mut World, rig: Entity) -> Result<PathBuf, String> {
             mesh.path.clone_from(&bundled);
         }
     }
-    store_project(&RealDisk, &path, &snapshot).map_err(|error| error.to_string())?;
+    store_project(&RealDisk, &path, &snapshot)?;
     Ok(path)
 }
 
@@ -133,12 +136,12 @@ impl StepSink for Watched {
         self.0.record(committed);
     }
 
-    fn trouble(&self) -> Option<Arc<str>> {
-        self.0.trouble()
+    fn trouble(&self) -> Option<SinkError> {
+        StepSink::trouble(&*self.0)
     }
 
-    fn flush(&self, limit: Duration) -> Result<(), String> {
-        self.0.flush(limit)
+    fn flush(&self, limit: Duration) -> Result<(), SinkError> {
+        StepSink::flush(&*self.0, limit)
     }
 }
 

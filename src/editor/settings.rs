@@ -15,7 +15,7 @@ use super::{
     notice::Notice,
     panel::Panels,
 };
-use crate::files::{RealDisk, read_capped, save_atomic};
+use crate::files::{RealDisk, SaveError, read_capped, save_atomic};
 
 /// Plugin of the settings, their switches, and their file.
 pub struct SettingsPlugin;
@@ -92,7 +92,23 @@ pub struct SettingsFile {
     /// Text that was last saved, or found at the start.
     text: Option<String>,
     looked: Duration,
-    saving: Option<Task<Result<(), String>>>,
+    saving: Option<Task<Result<(), SettingsError>>>,
+}
+
+/// Reason why the settings are not saved.
+#[derive(Debug, thiserror::Error)]
+enum SettingsError {
+    /// The folder cannot be created.
+    #[error("{}: {source}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The file cannot be saved.
+    #[error(transparent)]
+    Save(#[from] SaveError),
 }
 
 /// The content of the file.
@@ -195,11 +211,12 @@ fn write(
     if first && !closing {
         return;
     }
-    let save = move || {
+    let save = move || -> Result<(), SettingsError> {
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+            std::fs::create_dir_all(folder)
+                .map_err(|source| SettingsError::Folder { folder: folder.to_owned(), source })?;
         }
-        save_atomic(&RealDisk, &path, text.as_bytes()).map_err(|error| error.to_string())
+        Ok(save_atomic(&RealDisk, &path, text.as_bytes())?)
     };
     if closing {
         if let Err(reason) = save() {

@@ -26,6 +26,7 @@
 //! work is stored twice.
 
 mod encode;
+mod error;
 mod frame;
 mod gap;
 mod lossy_timeline;
@@ -44,6 +45,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+pub use error::JournalWriteError;
 pub use frame::{JOURNAL_FORMAT, MAX_RECORD, RecordKind};
 pub use gap::{Damage, Gap, RecordCount};
 pub use place::{

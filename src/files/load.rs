@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Disk, ModelFolder, ReadError, open, read_capped};
 use crate::{
     mesh::{
-        gltf::{self, GltfError, read_gltf},
+        gltf::{self, ExternalError, GltfError, read_gltf},
         model::Model,
         obj::{self, ObjError, ObjSettings},
     },
@@ -143,7 +143,7 @@ pub(super) fn surviving<T: Send>(
         let worker = std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, read);
         match worker {
             Ok(worker) => worker.join().unwrap_or_else(|_| Err(LoadError::Broken { path: path.into() })),
-            Err(source) => Err(ReadError::Io { path: path.into(), source }.into()),
+            Err(error) => Err(ReadError::Io { path: path.into(), source: error.into() }.into()),
         }
     })
 }
@@ -162,7 +162,7 @@ fn load_obj(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
 fn load_gltf(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
     let bytes = read_capped(disk, path, MAX_GLTF_BYTES)?;
     let folder = ModelFolder::of(disk, path)?;
-    let mut external = |uri: &str| folder.read(uri, MAX_GLTF_BYTES).map_err(|error| error.to_string());
+    let mut external = |uri: &str| folder.read(uri, MAX_GLTF_BYTES).map_err(ExternalError::new);
     Ok(read_gltf(&bytes, &path.display().to_string(), &mut external)?)
 }
 

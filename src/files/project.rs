@@ -1,5 +1,6 @@
 //! Projects on the disk: the project file, the weights beside it, and the meshes that it refers to.
 
+mod note;
 mod open;
 mod path;
 mod save;
@@ -8,6 +9,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::Vec3;
 
+pub use note::ProjectNote;
 pub use open::load_project;
 pub use save::{ProjectFiles, project_files, store_project};
 
@@ -107,8 +109,8 @@ pub struct LoadedProject {
     pub view: ProjectView,
     /// Journal that continues from this save.
     pub journal: Option<JournalReference>,
-    /// Notes about ignored, transferred or missing content, a sentence each.
-    pub notes: Vec<String>,
+    /// Notes about ignored, transferred or missing content.
+    pub notes: Vec<ProjectNote>,
 }
 
 /// Result of loading a project's mesh.
@@ -124,7 +126,7 @@ pub enum MeshState {
     /// The mesh was not found. Its weights are in the rig nevertheless.
     Missing {
         /// Reason for not loading the mesh.
-        error: LoadError,
+        error: Arc<LoadError>,
         /// Geometry to save in place of the mesh's own.
         shape: MeshShape,
     },

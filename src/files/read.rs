@@ -10,6 +10,7 @@ use thiserror::Error;
 use super::{
     atomic::{folder_of, is_temp_name},
     disk::{Disk, Entry, EntryKind},
+    disk_error::DiskError,
 };
 
 /// Largest number of bytes that are reserved before a single byte has been read, whatever length the file claims.
@@ -19,7 +20,7 @@ const MAX_NAMES: usize = 4096;
 const MAX_HINTS: usize = 3;
 
 /// Reason for not reading a file.
-#[derive(Debug, Error)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ReadError {
     /// The file does not exist.
     #[error("there is no file `{}`; {hint}", path.display())]
@@ -53,7 +54,7 @@ pub enum ReadError {
         /// The path as given.
         path: PathBuf,
         /// Error of the operating system.
-        source: io::Error,
+        source: DiskError,
     },
     /// The file is longer than the limit.
     #[error("`{}` is too large: more than {limit} bytes are not read here; make it smaller or split it", path.display())]
@@ -69,7 +70,7 @@ pub enum ReadError {
         /// The path as given.
         path: PathBuf,
         /// Error of the operating system.
-        source: io::Error,
+        source: DiskError,
     },
 }
 
@@ -82,9 +83,9 @@ impl ReadError {
         let path = path.to_path_buf();
         match (source.kind(), hint) {
             (_, Some(hint)) => Self::Missing { path, hint },
-            (ErrorKind::PermissionDenied, _) => Self::NoAccess { path, source },
+            (ErrorKind::PermissionDenied, _) => Self::NoAccess { path, source: source.into() },
             (ErrorKind::IsADirectory, _) => Self::IsFolder { path },
-            _ => Self::Io { path, source },
+            _ => Self::Io { path, source: source.into() },
         }
     }
 }

@@ -50,7 +50,7 @@ pub fn load_shapes(disk: &dyn Disk, path: &Path, rest: &Model) -> Result<Shapes,
         move |source| LoadShapesError::Shapes { path, source }
     };
     if disk.entry(path, true).is_ok_and(|entry| entry.kind == EntryKind::Folder) {
-        let io = |source| LoadError::from(ReadError::Io { path: path.into(), source });
+        let io = |error: std::io::Error| LoadError::from(ReadError::Io { path: path.into(), source: error.into() });
         let mut shapes = Shapes::default();
         for name in disk.list(path, MAX_SHAPES).map_err(io)? {
             let file = path.join(name);

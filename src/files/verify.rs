@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     mesh::{
-        gltf::read_gltf,
+        gltf::{ExternalError, read_gltf},
         model::Model,
         obj::{self, ObjSettings},
     },
@@ -29,7 +29,7 @@ pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
             obj::read_model(set.bytes(), &stem(path), &ObjSettings::default(), &mut sidecar)
                 .map_err(|source| LoadError::Obj { path: path.into(), source })
         } else {
-            let none = || "it is not among the companions".to_owned();
+            let none = || ExternalError::new("it is not among the companions");
             let mut external = |name: &str| set.companion(name).map(<[u8]>::to_vec).ok_or_else(none);
             Ok(read_gltf(set.bytes(), &path.display().to_string(), &mut external)?)
         }

@@ -17,6 +17,7 @@ use crate::{
     },
     processor::{FindError, RunReport},
     rig::{BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::did_you_mean},
+    solve::program::ProgramError,
 };
 
 /// Value to write to an entity: `CONTROL.translate=(x,y,z)`, `.rotate=(x,y,z)` in degrees about X, Y and Z in that
@@ -53,7 +54,7 @@ pub enum PoseError {
     NotBuilt,
     /// The built rig cannot run.
     #[error("the built rig cannot run: {0}")]
-    CannotRun(String),
+    CannotRun(ProgramError),
     /// The built rig has no node with that name.
     #[error("no {what} is called \"{name}\"{nearest}")]
     NoNode {
@@ -363,7 +364,7 @@ impl Workbench {
             }
         }
         let edits = RigEdit::Batch(edits);
-        rig.apply(&edits).map_err(|error| WorkbenchError::Refused(error.to_string()))?;
+        rig.apply(&edits).map_err(|error| WorkbenchError::Refused(error.into()))?;
         Ok(rig)
     }
 

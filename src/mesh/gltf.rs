@@ -26,6 +26,7 @@ mod skin;
 mod uri;
 mod write;
 
+pub use uri::{ExternalError, GltfUriError};
 pub use write::{GltfWriteSettings, write_glb, write_gltf};
 
 use crate::mesh::model::Model;
@@ -86,7 +87,7 @@ pub enum GltfError {
         name: String,
     },
     /// A buffer or image outside the file could not be loaded.
-    #[error("{file}: {place}: \"{uri}\": {what}")]
+    #[error("{file}: {place}: \"{uri}\": {fault}")]
     External {
         /// The file's name as given to the reader.
         file: String,
@@ -94,8 +95,9 @@ pub enum GltfError {
         place: String,
         /// The URI, shortened.
         uri: String,
-        /// Reason of the failure.
-        what: String,
+        /// Fault of the URI, or reason for not loading its file.
+        #[source]
+        fault: GltfUriError,
     },
     /// Reading would take more memory than the file's size justifies.
     #[error("{file}: {place}: takes more than the {limit} bytes of memory that a file of its size may take")]
@@ -175,7 +177,7 @@ impl GltfError {
 pub fn read_gltf(
     bytes: &[u8],
     name: &str,
-    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
 ) -> Result<Model, GltfError> {
     read(bytes, name, external).map_err(|error| error.in_file(name))
 }
@@ -183,7 +185,7 @@ pub fn read_gltf(
 fn read(
     bytes: &[u8],
     name: &str,
-    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
 ) -> Result<Model, GltfError> {
     let budget = Budget::new(bytes.len() as u64);
     let notes = Notes::default();

@@ -109,7 +109,7 @@ fn throw_switches(
                 commands.write_message(EditRequest::operation(*rig, operation));
             }
             Err(error) => {
-                commands.write_message(EditRefused { rig: *rig, reason: error.to_string() });
+                commands.write_message(EditRefused { rig: *rig, reason: error.into() });
             }
         }
     }

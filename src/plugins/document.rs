@@ -7,13 +7,17 @@
 
 mod adopt;
 pub(in crate::plugins) mod entities;
+mod error;
 pub(in crate::plugins) mod follow;
 
 use std::borrow::Cow;
 
 use bevy::prelude::*;
 
-pub use self::entities::{GroupEntities, JointEntities, TagEntities};
+pub use self::{
+    entities::{GroupEntities, JointEntities, TagEntities},
+    error::{ChangeError, EntityWrite, EntityWriteError},
+};
 use super::{
     RigSystems, configure_sets,
     history::{Recorded, RigHistory},
@@ -123,8 +127,8 @@ pub struct Edited {
 pub struct EditRefused {
     /// Requested rig.
     pub rig: Entity,
-    /// Reason, a sentence for people.
-    pub reason: String,
+    /// Reason for the refusal.
+    pub reason: ChangeError,
 }
 
 /// Applies the edits that writes to entities made, then requests in the order in which they came.
@@ -144,7 +148,7 @@ fn apply_edits(
         let EditRequest { rig, change } = &request;
         let rig = *rig;
         let Ok((mut document, mut selection, mut history, symmetry)) = rigs.get_mut(rig) else {
-            refused.write(EditRefused { rig, reason: format!("entity {rig} is no rig; it may have been closed") });
+            refused.write(EditRefused { rig, reason: ChangeError::NoRig(rig) });
             continue;
         };
         let done = |name, committed| Edited { rig, name, committed, preview: false, notes: Vec::new() };
@@ -157,19 +161,21 @@ fn apply_edits(
             Change::Do(operation) => history
                 .edit(&mut document, &mut selection, &mut uids, plane, operation)
                 .map(recorded)
-                .map_err(|error| error.to_string()),
+                .map_err(ChangeError::from),
             Change::Undo => history
                 .undo(&mut document, &mut selection)
-                .unwrap_or_else(|| Err("there is nothing to undo".to_owned()))
+                .ok_or(ChangeError::NothingToUndo)
+                .and_then(|undone| Ok(undone?))
                 .map(|step| done(step.name.clone(), Some(Committed::Undone(step)))),
             Change::Redo => history
                 .redo(&mut document, &mut selection)
-                .unwrap_or_else(|| Err("there is nothing to redo".to_owned()))
+                .ok_or(ChangeError::NothingToRedo)
+                .and_then(|redone| Ok(redone?))
                 .map(|step| done(step.name.clone(), Some(Committed::Redone(step)))),
             Change::Preview(operation) => history
                 .preview(&mut document, &mut uids, symmetry.0, operation)
                 .map(previewed)
-                .map_err(|error| error.to_string()),
+                .map_err(ChangeError::from),
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
             Change::Commit => {
                 let Some(step) = history.commit_preview(&mut selection) else { continue };

@@ -4,6 +4,7 @@
 //! be undone. Manual changes stay when another density is requested. An [`ExpressRequest`] poses the facial joints.
 
 mod edits;
+mod error;
 mod job;
 mod placed_bones;
 mod pose;
@@ -22,6 +23,7 @@ use crate::{
     mesh::{model::Model, shapes::Shapes},
 };
 
+pub use error::{ExpressError, PlaceFaceError};
 pub use job::FaceJob;
 pub use placed_bones::{FaceRig, PlacedBone};
 pub use pose::{expressed_points, mixed};
@@ -75,7 +77,7 @@ pub struct FacePlaced {
     /// The mesh.
     pub mesh: Entity,
     /// Report of the placed face, or the reason why none was placed.
-    pub result: Result<FaceReport, String>,
+    pub result: Result<FaceReport, PlaceFaceError>,
 }
 
 /// Report of a [`FaceRequest`].
@@ -148,7 +150,7 @@ pub struct Expressed {
     /// The mesh.
     pub mesh: Entity,
     /// Success, or the reason why nothing is shown.
-    pub result: Result<(), String>,
+    pub result: Result<(), ExpressError>,
 }
 
 /// Current strengths of a face by name; beside the mesh.

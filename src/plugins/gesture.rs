@@ -3,6 +3,7 @@
 //! A [`GestureScript`] on a rig drives the same requests that a window sends, one gesture a frame, and keeps an answer
 //! for each. The command line, tests and tutorials use it; a script can do nothing that a person could not.
 
+mod error;
 mod script;
 
 use bevy::prelude::*;

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::selection::Selection;
 use crate::rig::{
-    Rig, RigEdit, UidSource,
+    EditError, Rig, RigEdit, UidSource,
     operations::{MirrorPlane, Operation, OperationError, Outcome},
     step::{Committed, Step, UndoStacks},
 };
@@ -44,8 +44,8 @@ fn removes(edits: &[RigEdit], joint: crate::rig::Uid) -> bool {
     })
 }
 
-fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), String> {
-    edits.iter().try_for_each(|edit| rig.apply(edit).map(drop)).map_err(|error| error.to_string())
+fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), EditError> {
+    edits.iter().try_for_each(|edit| rig.apply(edit).map(drop))
 }
 
 impl RigHistory {
@@ -134,7 +134,7 @@ impl RigHistory {
     }
 
     /// Undoes the last step and returns it; `None` without a step. A preview is reverted first.
-    pub fn undo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
+    pub fn undo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, EditError>> {
         self.cancel_preview(rig);
         let step = self.stacks.done.last()?.clone();
         if let Err(error) = apply_all(rig, &step.backward) {
@@ -146,7 +146,7 @@ impl RigHistory {
     }
 
     /// Redoes the last undone step and returns it; `None` without one. A preview is reverted first.
-    pub fn redo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, String>> {
+    pub fn redo(&mut self, rig: &mut Rig, selection: &mut Selection) -> Option<Result<Arc<Step>, EditError>> {
         self.cancel_preview(rig);
         let step = self.stacks.undone.last()?.clone();
         if let Err(error) = apply_all(rig, &step.forward) {

@@ -14,7 +14,7 @@ use bevy::prelude::*;
 use super::{RigSystems, configure_sets, document::Edited, history::RigHistory, selection::Selection};
 use crate::rig::{
     Rig,
-    step::{Committed, Replayed, StepSink},
+    step::{Committed, Replayed, SinkError, StepSink},
 };
 
 /// Plugin of journals; does nothing for rigs without a [`RigJournal`].
@@ -37,7 +37,7 @@ impl Plugin for JournalPlugin {
 #[derive(Component, Clone)]
 pub struct RigJournal {
     sink: Arc<dyn StepSink>,
-    reported: Arc<Mutex<Option<Arc<str>>>>,
+    reported: Arc<Mutex<Option<SinkError>>>,
 }
 
 impl RigJournal {
@@ -55,12 +55,12 @@ impl RigJournal {
     ///
     /// # Errors
     /// The reason why changes are not stored, in words for people.
-    pub fn flush(&self, limit: Duration) -> Result<(), String> {
+    pub fn flush(&self, limit: Duration) -> Result<(), SinkError> {
         self.sink.flush(limit)
     }
 
     /// The reason why changes cannot be stored at the moment; `None` while they can.
-    pub fn trouble(&self) -> Option<Arc<str>> {
+    pub fn trouble(&self) -> Option<SinkError> {
         self.sink.trouble()
     }
 }
@@ -71,7 +71,7 @@ pub struct JournalTrouble {
     /// The rig.
     pub rig: Entity,
     /// Description of the problem with a hint; `None` once all changes, the earlier ones included, are stored again.
-    pub reason: Option<Arc<str>>,
+    pub reason: Option<SinkError>,
 }
 
 fn record_edits(mut edited: MessageReader<Edited>, journals: Query<&RigJournal>) {

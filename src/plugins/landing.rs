@@ -15,8 +15,25 @@ use crate::rig::{NodeKind, Rig, Uid};
 pub struct ResultHeld {
     /// The mesh that the job is for.
     pub mesh: Entity,
-    /// The reason and the way out, for people.
-    pub reason: String,
+    /// The reason and the way out.
+    pub reason: HeldResult,
+}
+
+/// Result of a background job that waits; its text is the reason and the way out, a sentence without its full stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum HeldResult {
+    /// Weights of a mesh.
+    #[error(
+        "the weights are ready, but binding them now would lose the steps that were undone; redo them, or go on \
+         editing, and the weights follow if they still fit"
+    )]
+    Weights,
+    /// A face.
+    #[error(
+        "the face is ready, but placing it now would lose the steps that were undone; redo them, or go on editing, and \
+         the face follows if it still fits"
+    )]
+    Face,
 }
 
 /// Hash of everything in a document that a job on one mesh depends on: the joints with their rest poses and, if any

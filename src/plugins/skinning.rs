@@ -20,7 +20,7 @@ use super::{
     configure_sets,
     document::EditRequest,
     history::RigHistory,
-    landing::{JobBasis, JobOutcome, ResultHeld, landing},
+    landing::{HeldResult, JobBasis, JobOutcome, ResultHeld, landing},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
@@ -63,7 +63,24 @@ pub struct Bound {
     /// The mesh.
     pub mesh: Entity,
     /// Report of the computation, or the reason why it failed.
-    pub result: Result<WeightReport, String>,
+    pub result: Result<WeightReport, SkinningError>,
+}
+
+/// Reason why a mesh was not bound; a sentence for people without its full stop.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SkinningError {
+    /// The entity of the request has no mesh, or its mesh no rig.
+    #[error("the mesh belongs to no rig; it may have been closed")]
+    NoRig,
+    /// The rig was closed during the computation.
+    #[error("the rig was closed meanwhile")]
+    Closed,
+    /// The joints were changed during the computation.
+    #[error("the joints were changed while the weights were computed; the weights were dropped: skin the mesh again")]
+    Changed,
+    /// The computation failed or was cancelled.
+    #[error(transparent)]
+    Weights(#[from] WeightError),
 }
 
 /// Running computation of weights; remove the component or call [`SkinningJob::cancel`] to stop it.
@@ -181,8 +198,7 @@ fn start_skinning(
     for request in requests.read() {
         let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
         let Some((mesh, (rig, built))) = found else {
-            let result = Err("the mesh belongs to no rig; it may have been closed".to_owned());
-            bound.write(Bound { mesh: request.mesh, result });
+            bound.write(Bound { mesh: request.mesh, result: Err(SkinningError::NoRig) });
             continue;
         };
         let basis = JobBasis::of(rig, mesh.uid);
@@ -216,21 +232,17 @@ fn land_skinning(
         let finished = if was_held { job.held.take() } else { check_ready(&mut job.task) };
         let Some(result) = finished else { continue };
         let result = match (result, rigs.get(of.0)) {
-            (Err(error), _) => Err(error.to_string()),
-            (Ok(_), Err(_)) => Err("the rig was closed meanwhile".to_owned()),
+            (Err(error), _) => Err(error.into()),
+            (Ok(_), Err(_)) => Err(SkinningError::Closed),
             (Ok((skin, report)), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
                 JobOutcome::Hold => {
                     job.held = Some(Ok((skin, report)));
                     if !was_held && history.can_redo() {
-                        let reason = "the weights are ready, but binding them now would lose the steps that were \
-                                      undone; redo them, or go on editing, and the weights follow if they still fit";
-                        held.write(ResultHeld { mesh: entity, reason: reason.to_owned() });
+                        held.write(ResultHeld { mesh: entity, reason: HeldResult::Weights });
                     }
                     continue;
                 }
-                JobOutcome::Drop => Err("the joints were changed while the weights were computed; the weights were \
-                                      dropped: skin the mesh again"
-                    .to_owned()),
+                JobOutcome::Drop => Err(SkinningError::Changed),
                 JobOutcome::Commit => {
                     let edit = RigEdit::SetSkin(mesh.uid, Some(skin));
                     edits.write(EditRequest::operation(of.0, Operation::Edits(vec![edit])));

@@ -102,7 +102,27 @@ pub enum StrokeResult {
     /// The listed joints were deleted.
     Erased(Vec<Uid>),
     /// The stroke had no effect, for the given reason.
-    Nothing(String),
+    Nothing(NothingDrawn),
+}
+
+/// Reason why a stroke had no effect; a sentence for people without its full stop.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NothingDrawn {
+    /// The rig has no mesh.
+    #[error("the rig has no mesh to draw on; open one first")]
+    NoMesh,
+    /// The stroke was to insert a joint, but crosses no bone.
+    #[error("the stroke crosses no bone")]
+    NoBone,
+    /// The stroke was to become a chain, but was not followed.
+    #[error("the stroke became no chain")]
+    NoChain,
+    /// The stroke starts and ends on the same joint.
+    #[error("the stroke ends where it starts; draw it further")]
+    TooShort,
+    /// The stroke cannot be followed through the mesh.
+    #[error(transparent)]
+    Stroke(#[from] StrokeError),
 }
 
 /// Strokes without an answer yet, in the order of their requests.
@@ -166,9 +186,7 @@ fn stroke(
         };
         let result = match answer(since, meshes.is_some(), surface) {
             Answer::Wait => None,
-            Answer::Now(None) => {
-                Some(StrokeResult::Nothing("the rig has no mesh to draw on; open one first".to_owned()))
-            }
+            Answer::Now(None) => Some(StrokeResult::Nothing(NothingDrawn::NoMesh)),
             Answer::Now(Some(surface)) => {
                 let posed = posed_joints(rig, entities, place, &joints);
                 let scene = StrokeScene { rig, selection, symmetry, tips, surface, posed: &posed };
@@ -213,7 +231,7 @@ fn act(
             edits.write_batch(operation.map(|operation| EditRequest::operation(request.rig, *operation)));
             StrokeOutcome::Done(result)
         }
-        StrokePlan::NeedsChain => StrokeOutcome::Done(StrokeResult::Nothing("the stroke became no chain".to_owned())),
+        StrokePlan::NeedsChain => StrokeOutcome::Done(StrokeResult::Nothing(NothingDrawn::NoChain)),
     }
 }
 

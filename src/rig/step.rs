@@ -1,6 +1,6 @@
 //! Steps: the changes of one gesture, which can be undone, redone, stored in a file and replayed.
 
-use std::{borrow::Cow, fmt, sync::Arc, time::Duration};
+use std::{borrow::Cow, error::Error, fmt, sync::Arc, time::Duration};
 
 use crate::rig::{EditError, Rig, RigEdit, Uid};
 
@@ -60,12 +60,39 @@ pub trait StepSink: Send + Sync {
     /// Takes one change.
     fn record(&self, committed: Committed);
 
-    /// The reason why changes cannot be stored at the moment; `None` while they can.
-    fn trouble(&self) -> Option<Arc<str>>;
+    /// The reason why changes cannot be stored at the moment, the same one for as long as it lasts; `None` while they
+    /// can.
+    fn trouble(&self) -> Option<SinkError>;
 
     /// Waits until all recorded changes are stored, at most for `limit`; returns the reason if they are not.
-    fn flush(&self, limit: Duration) -> Result<(), String>;
+    fn flush(&self, limit: Duration) -> Result<(), SinkError>;
 }
+
+/// Reason why a sink does not store changes: an error of the sink's own type. Two are equal if they are the same
+/// occurrence.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{0}")]
+pub struct SinkError(Arc<dyn Error + Send + Sync>);
+
+impl SinkError {
+    /// Wraps an error of a sink.
+    pub fn new(error: Arc<impl Error + Send + Sync + 'static>) -> Self {
+        Self(error)
+    }
+
+    /// The error of the sink, to be downcast to the sink's own type.
+    pub fn get(&self) -> &(dyn Error + Send + Sync + 'static) {
+        self.0.as_ref()
+    }
+}
+
+impl PartialEq for SinkError {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl Eq for SinkError {}
 
 /// The steps of a history.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -17,7 +17,7 @@ use rigsmith::{
     mesh::{model::Model, shapes::Shapes},
     plugins::{
         document::{Change, EditRequest},
-        face::{FaceJob, FacePlaced, FaceRequest, FaceRig},
+        face::{FaceJob, FacePlaced, FaceRequest, FaceRig, PlaceFaceError},
     },
     rig::{NodeKind, Rig, Uid, operations::Operation},
 };
@@ -320,7 +320,7 @@ fn placing_can_be_cancelled() {
     app.world().get::<FaceJob>(mesh).expect("the job is under way").cancel();
     wait(app, "an answer", App::update, |app| !app.world().resource::<Messages<FacePlaced>>().is_empty());
     let result = app.world_mut().resource_mut::<Messages<FacePlaced>>().drain().last().unwrap().result;
-    assert_eq!(result.unwrap_err(), FaceError::Cancelled.to_string());
+    assert_eq!(result.unwrap_err(), PlaceFaceError::Face(FaceError::Cancelled));
     assert_eq!(*bench.rig(), before);
 }
 

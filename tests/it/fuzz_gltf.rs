@@ -8,7 +8,7 @@ use super::{
 };
 use glam::Vec3;
 use rigsmith::mesh::{
-    gltf::{GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
+    gltf::{ExternalError, GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
     model::{ChannelTarget, Interpolation, Model},
 };
 
@@ -95,8 +95,9 @@ fn check_promises(model: &Model) {
 fn check(bytes: &[u8], bins: &[Vec<u8>]) {
     // JSON refers to the binary part of a seed by number, so that bent JSON still finds bytes.
     let mut load = |uri: &str| {
-        let number: usize = uri.trim_end_matches(".bin").parse().map_err(|_| format!("there is no {uri}"))?;
-        bins.get(number).cloned().ok_or_else(|| format!("there is no {uri}"))
+        let missing = || ExternalError::new(format!("there is no {uri}"));
+        let number: usize = uri.trim_end_matches(".bin").parse().map_err(|_| missing())?;
+        bins.get(number).cloned().ok_or_else(missing)
     };
     match read_gltf(bytes, "fuzz.glb", &mut load) {
         Err(error) => assert!(error.to_string().starts_with("fuzz.glb: "), "{error}"),
@@ -110,7 +111,7 @@ fn check(bytes: &[u8], bins: &[Vec<u8>]) {
                     Err(GltfError::Model { .. } | GltfError::Unweighted { .. }) => {}
                     Err(error) => panic!("{error}"),
                     Ok(glb) => {
-                        let mut none = |uri: &str| Err(format!("{uri} is outside"));
+                        let mut none = |uri: &str| Err(ExternalError::new(format!("{uri} is outside")));
                         match read_gltf(&glb, "again.glb", &mut none) {
                             Ok(again) => check_promises(&again),
                             Err(GltfError::TooLarge { limit, .. }) => assert_eq!(limit, memory_limit(glb.len() as u64)),

@@ -32,7 +32,7 @@ use rigsmith::{
     rig::{
         Matching, PoseOffset,
         operations::MirrorPlane,
-        step::{Committed, StepSink},
+        step::{Committed, SinkError, StepSink},
     },
     test_app::strict_app,
 };
@@ -60,10 +60,10 @@ impl StepSink for Sink {
     fn record(&self, committed: Committed) {
         self.0.lock().unwrap().push(committed);
     }
-    fn trouble(&self) -> Option<Arc<str>> {
+    fn trouble(&self) -> Option<SinkError> {
         None
     }
-    fn flush(&self, _: std::time::Duration) -> Result<(), String> {
+    fn flush(&self, _: std::time::Duration) -> Result<(), SinkError> {
         Ok(())
     }
 }

@@ -8,7 +8,7 @@ mod writing;
 use compose::{Composed, PNG, character, triangle};
 use glam::{Vec2, Vec3, Vec4};
 use rigsmith::mesh::{
-    gltf::{GltfWriteSettings, read_gltf, write_glb, write_gltf},
+    gltf::{ExternalError, GltfWriteSettings, read_gltf, write_glb, write_gltf},
     model::{ChannelTarget, Image, Interpolation, Model},
 };
 use serde_json::{Value, json};
@@ -360,12 +360,13 @@ fn outside_buffers_and_images() {
     assert_eq!(model.material_set.images[0].bytes, PNG);
 
     // A missing image is a pity, a missing buffer an error.
-    let mut load = |uri: &str| if uri.ends_with(".bin") { Ok(file.bin.clone()) } else { Err("not found".into()) };
+    let mut load =
+        |uri: &str| if uri.ends_with(".bin") { Ok(file.bin.clone()) } else { Err(ExternalError::new("not found")) };
     let model = read_gltf(&bytes, "test.gltf", &mut load).unwrap();
     assert!(has_note(&model, "(not found)"), "{:?}", model.notes);
     let again = compose::read(&write_glb(&model, &GltfWriteSettings::default()).unwrap()).unwrap();
     assert_eq!((again.material_set.images.len(), again.material_set.textures[0].clone()), (0, json!({"sampler": 0})));
-    let error = read_gltf(&bytes, "test.gltf", &mut |_| Err("not found".into())).unwrap_err().to_string();
+    let error = read_gltf(&bytes, "test.gltf", &mut |_| Err(ExternalError::new("not found"))).unwrap_err().to_string();
     assert_eq!(error, "test.gltf: /buffers/0/uri: \"./a b.bin\": not found");
 }
 
@@ -410,7 +411,7 @@ fn several_files() {
     let mut load = |uri: &str| match uri {
         "1 my character.bin" => Ok(files[1].1.clone()),
         "1 skin.png" => Ok(PNG.to_vec()),
-        _ => Err(format!("asked for {uri}")),
+        _ => Err(ExternalError::new(format!("asked for {uri}"))),
     };
     let again = read_gltf(&json, "test.glb", &mut load).unwrap();
     assert_eq!(again, compose::read(&write_glb(&model, &settings).unwrap()).unwrap());

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use rigsmith::mesh::{
-    gltf::{GltfError, GltfWriteSettings, read_gltf, write_glb},
+    gltf::{ExternalError, GltfError, GltfWriteSettings, read_gltf, write_glb},
     model::Model,
 };
 use serde_json::{Value, json};
@@ -35,7 +35,7 @@ fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
 fn read(path: &Path) -> Result<Model, String> {
     let folder = path.parent().unwrap();
     let name = path.file_name().unwrap().to_str().unwrap();
-    let mut load = |uri: &str| std::fs::read(folder.join(uri)).map_err(|error| error.to_string());
+    let mut load = |uri: &str| std::fs::read(folder.join(uri)).map_err(ExternalError::new);
     match read_gltf(&std::fs::read(path).unwrap(), name, &mut load) {
         Ok(model) => Ok(model),
         Err(error) => {
@@ -63,7 +63,7 @@ fn check_model(path: &Path, model: &Model) {
     std::fs::create_dir_all(&folder).unwrap();
     let name = path.file_name().unwrap().to_string_lossy().replace('.', "_");
     std::fs::write(folder.join(format!("torture_{name}.glb")), &glb).unwrap();
-    let again = read_gltf(&glb, "again.glb", &mut |_| Err("there is nothing outside".to_owned()));
+    let again = read_gltf(&glb, "again.glb", &mut |_| Err(ExternalError::new("there is nothing outside")));
     let again = again.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     assert_eq!(again.parts.len(), model.parts.len(), "{}", path.display());
     let corners = |model: &Model| {
@@ -133,7 +133,7 @@ fn use_meshes(path: &Path) {
     };
     json["nodes"] = (0..meshes.len()).map(|mesh| json!({"mesh": mesh})).collect();
     let name = path.file_name().unwrap().to_str().unwrap();
-    let mut load = |uri: &str| std::fs::read(path.with_file_name(uri)).map_err(|error| error.to_string());
+    let mut load = |uri: &str| std::fs::read(path.with_file_name(uri)).map_err(ExternalError::new);
     match read_gltf(json.to_string().as_bytes(), name, &mut load) {
         Ok(model) => check_model(path, &model),
         Err(error) => assert!(error.to_string().starts_with(&format!("{name}: /")), "{error}"),

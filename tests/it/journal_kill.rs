@@ -28,7 +28,7 @@ use rigsmith::{
     prelude::{Change, EditRequest, Operation},
     rig::{
         PoseOffset, Rig, RigEdit, SkinData, Uid,
-        step::{Committed, StepSink},
+        step::{Committed, SinkError, StepSink},
         template::{read_template, write_template},
     },
 };
@@ -114,11 +114,11 @@ impl StepSink for Counter {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
-    fn trouble(&self) -> Option<Arc<str>> {
+    fn trouble(&self) -> Option<SinkError> {
         None
     }
 
-    fn flush(&self, _limit: Duration) -> Result<(), String> {
+    fn flush(&self, _limit: Duration) -> Result<(), SinkError> {
         Ok(())
     }
 }

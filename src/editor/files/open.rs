@@ -14,6 +14,7 @@ use super::{
         Context, ContextMesh, MeshSource, OpenDocument, SavedAt, close_journal, disk, is_same, is_unsaved, last_step,
         places,
     },
+    error::OpenError,
     file_name, template, view,
 };
 use crate::{
@@ -22,7 +23,7 @@ use crate::{
         settings::EditorSettings,
     },
     files::{
-        Disk, FileKind, LoadedMesh, MeshState, MeshToSave, RealDisk,
+        Disk, FileKind, LoadedMesh, MeshState, MeshToSave, ProjectNote, RealDisk,
         journal::{
             Journal, JournalStart, Origin, PendingJournal, Recovered, Restored, Resumed, file_hash, journal_beside,
             pending_journal,
@@ -31,7 +32,7 @@ use crate::{
     },
     mesh::{
         model::Model,
-        obj::{ObjSettings, read_model},
+        obj::{ObjError, ObjSettings, read_model},
     },
     plugins::{
         history::RigHistory,
@@ -62,7 +63,7 @@ pub struct Loading {
 
 struct Job {
     name: String,
-    task: Task<Result<LoadedFile, String>>,
+    task: Task<Result<LoadedFile, OpenError>>,
     /// Last step of the open document when its loss was accepted.
     confirmed: Option<Arc<Step>>,
 }
@@ -132,7 +133,7 @@ impl LoadedDocument {
         let mut opened = Self::named(&model.name, Rig::new(uids.next_uid(), &model.name));
         opened.notes.clone_from(&model.notes);
         for edit in &edits {
-            opened.notes.extend(opened.rig.apply(edit).err().map(|error| error.to_string()));
+            opened.warnings.extend(opened.rig.apply(edit).err().map(|error| error.to_string()));
         }
         opened.meshes.push((RigMesh::new(uid, model, skeleton.nodes), source));
         Self { origin, ..opened }
@@ -140,22 +141,15 @@ impl LoadedDocument {
 }
 
 /// Returns an error if a file's name already shows that it cannot be opened.
-pub(super) fn recognise(path: &Path) -> Result<(), String> {
+pub(super) fn recognise(path: &Path) -> Result<(), OpenError> {
+    let name = || file_name(path);
     match FileKind::of(path) {
         Some(
             FileKind::Obj | FileKind::Gltf | FileKind::Glb | FileKind::RigText | FileKind::Template | FileKind::Project,
         ) => Ok(()),
-        Some(FileKind::Skin) => {
-            Err(format!("{} has only weights; open the project or the .glb that they belong to", file_name(path)))
-        }
-        Some(FileKind::Gestures) => {
-            Err(format!("{} is neither template nor project; those end in .rig.ron and .rigsmith.ron", file_name(path)))
-        }
-        None => Err(format!(
-            "{} is nothing that can be opened; a mesh ends in .obj, .gltf or .glb, a template in .rig.ron or .rig, \
-             a project in .rigsmith.ron",
-            file_name(path)
-        )),
+        Some(FileKind::Skin) => Err(OpenError::WeightsAlone { name: name() }),
+        Some(FileKind::Gestures) => Err(OpenError::Gestures { name: name() }),
+        None => Err(OpenError::Unknown { name: name() }),
     }
 }
 
@@ -182,7 +176,7 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
 }
 
 /// Registers `task` as the document that is being opened.
-pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<LoadedFile, String>>) {
+pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<LoadedFile, OpenError>>) {
     let confirmed = active(world).and_then(|rig| last_step(world, rig));
     let mut loading = world.resource_mut::<Loading>();
     loading.job = Some(Job { name, task, confirmed });
@@ -199,11 +193,11 @@ pub(in crate::editor) fn document(opened: LoadedDocument) -> LoadedFile {
 }
 
 /// Reads the bundled character.
-pub(in crate::editor) fn bundled_model() -> Result<Model, String> {
-    read_model(BUNDLED, "biped", &ObjSettings::default(), &mut |_| None).map_err(|error| error.to_string())
+pub(in crate::editor) fn bundled_model() -> Result<Model, ObjError> {
+    read_model(BUNDLED, "biped", &ObjSettings::default(), &mut |_| None)
 }
 
-fn bundled(uids: &mut UidSource) -> Result<LoadedFile, String> {
+fn bundled(uids: &mut UidSource) -> Result<LoadedFile, OpenError> {
     let origin = Origin::Bundled("biped".to_owned());
     Ok(document(LoadedDocument::model(bundled_model()?, MeshSource::Bundled, origin, uids)))
 }
@@ -213,12 +207,12 @@ pub(in crate::editor) fn hash_of(path: &Path) -> Option<u64> {
     read_capped(&RealDisk, path, MAX_HASHED).ok().map(|bytes| file_hash(&bytes))
 }
 
-fn file(path: &Path, uids: &mut UidSource) -> Result<LoadedFile, String> {
+fn file(path: &Path, uids: &mut UidSource) -> Result<LoadedFile, OpenError> {
     let origin_of = |path: &Path| (path.to_owned(), hash_of(path).unwrap_or_default());
     match FileKind::of(path) {
         Some(FileKind::Project) => Ok(document(project(path)?)),
         Some(FileKind::Template) => {
-            let template = load_template(&RealDisk, path).map_err(|error| error.to_string())?;
+            let template = load_template(&RealDisk, path)?;
             let (path, hash) = origin_of(path);
             let mut opened = LoadedDocument::named(stem(&path), template.rig);
             opened.notes = template.notes;
@@ -226,17 +220,17 @@ fn file(path: &Path, uids: &mut UidSource) -> Result<LoadedFile, String> {
             Ok(LoadedFile::Template(Box::new(opened)))
         }
         Some(FileKind::RigText) => {
-            let text = load_rig_text(&RealDisk, path).map_err(|error| error.to_string())?;
+            let text = load_rig_text(&RealDisk, path)?;
             let (path, hash) = origin_of(path);
             let mut opened = LoadedDocument::named(stem(&path), Rig::new(uids.next_uid(), stem(&path)));
             for edit in &import_rig_text(&text, uids).0 {
-                opened.rig.apply(edit).map_err(|error| error.to_string())?;
+                opened.rig.apply(edit)?;
             }
             opened.origin = Origin::Template { path, hash };
             Ok(LoadedFile::Template(Box::new(opened)))
         }
         _ => {
-            let model = load_model(&RealDisk, path).map_err(|error| error.to_string())?;
+            let model = load_model(&RealDisk, path)?;
             let (path, hash) = origin_of(path);
             let source = MeshSource::File(path.clone());
             Ok(document(LoadedDocument::model(model, source, Origin::Mesh { path, hash }, uids)))
@@ -245,17 +239,14 @@ fn file(path: &Path, uids: &mut UidSource) -> Result<LoadedFile, String> {
 }
 
 /// Opens a project; if it has several rigs, the first.
-pub(in crate::editor) fn project(path: &Path) -> Result<LoadedDocument, String> {
+pub(in crate::editor) fn project(path: &Path) -> Result<LoadedDocument, OpenError> {
     let hash = hash_of(path).unwrap_or_default();
-    let loaded = load_project(&RealDisk, path).map_err(|error| error.to_string())?;
-    let mut notes = loaded.notes;
+    let loaded = load_project(&RealDisk, path)?;
+    let (serious, notes): (Vec<_>, Vec<_>) = loaded.notes.into_iter().partition(ProjectNote::is_serious);
     let mut rigs = loaded.rigs.into_iter();
-    let rig = rigs.next().ok_or_else(|| format!("`{}` has no rig; open its mesh instead", path.display()))?;
+    let rig = rigs.next().ok_or_else(|| OpenError::NoRig(path.to_owned()))?;
     if rigs.next().is_some() {
-        return Err(format!(
-            "`{}` has several rigs, and the window edits one; split it into one project a rig",
-            path.display()
-        ));
+        return Err(OpenError::SeveralRigs(path.to_owned()));
     }
     let mut opened = LoadedDocument::named(stem(path), rig);
     for LoadedMesh { uid, rig, path, nodes, shape } in loaded.meshes {
@@ -266,7 +257,8 @@ pub(in crate::editor) fn project(path: &Path) -> Result<LoadedDocument, String> 
             MeshState::Missing { shape, .. } => opened.missing.push(MeshToSave { uid, rig, path, nodes, shape }),
         }
     }
-    opened.notes.append(&mut notes);
+    opened.notes = notes.iter().map(ToString::to_string).collect();
+    opened.warnings = serious.iter().map(ToString::to_string).collect();
     opened.view = Some(loaded.view);
     opened.project = Some(path.to_owned());
     opened.origin = Origin::Project { path: path.to_owned(), hash };
@@ -285,8 +277,8 @@ pub(super) fn poll(world: &mut World) {
     let Some(result) = check_ready(&mut job.task) else { return };
     let Some(Job { name, confirmed, .. }) = loading.job.take() else { return };
     match result {
-        Err(reason) => {
-            world.write_message(Notice::error(format!("Could not open {name}: {reason}")));
+        Err(error) => {
+            world.write_message(Notice::error(format!("Could not open {name}: {error}")));
             if active(world).is_none() {
                 start(world, OpenRequest::Empty);
             }
@@ -378,14 +370,13 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     world.resource_mut::<FrameWhenReady>().0 = !restored;
     world.write_message(match is_recovered {
         true => Notice::done(format!("Recovered {title}; save it to keep it")),
-        false => Notice::done(format!("LoadedDocument {name}")),
+        false => Notice::done(format!("Opened {name}")),
     });
     for warning in warnings {
         world.write_message(Notice::warning(warning));
     }
     for note in notes {
-        let is_serious = note.starts_with("a mesh of the project is not there") || note.starts_with("the weights");
-        world.write_message(if is_serious { Notice::warning(note) } else { Notice::info(note).quiet() });
+        world.write_message(Notice::info(note).quiet());
     }
     if let Some(pending) = pending {
         world.resource_mut::<Recovery>().offer(pending);

@@ -16,6 +16,7 @@ use super::{
     Then, active, after_asking,
     dialog::Purpose,
     document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
+    error::WriteError,
     file_name,
     open::{BUNDLED, spawn},
     view,
@@ -66,7 +67,7 @@ struct Job {
     rig: Entity,
     /// Last step in the snapshot.
     step: Option<Arc<Step>>,
-    task: Task<Result<SavedContent, String>>,
+    task: Task<Result<SavedContent, WriteError>>,
     then: Option<Then>,
 }
 
@@ -174,24 +175,24 @@ fn store(
     path: PathBuf,
     journal: &Journal,
     position: u64,
-) -> Result<SavedContent, String> {
+) -> Result<SavedContent, WriteError> {
     let bundled = if is_bundled { Some(place_bundled(&path)?) } else { None };
     if let Some(bundled) = &bundled {
         for mesh in project.meshes.iter_mut().filter(|mesh| mesh.path.as_os_str().is_empty()) {
             mesh.path.clone_from(bundled);
         }
     }
-    let files = project_files(&RealDisk, &path, &project).map_err(|error| error.to_string())?;
+    let files = project_files(&RealDisk, &path, &project)?;
     let mark = SaveMark { path, hash: files.hash(), position };
     if let Err(reason) = journal.saving(mark.clone(), Duration::from_secs(2)) {
         debug!("the save is not noted in the journal: {reason}");
     }
-    save_set(&RealDisk, &files.set).map_err(|error| error.to_string())?;
+    save_set(&RealDisk, &files.set)?;
     Ok(SavedContent::Project { mark, notes: files.notes, bundled })
 }
 
 /// Copies the bundled character beside a project, so that the project can refer to its mesh.
-pub(in crate::editor) fn place_bundled(project: &Path) -> Result<PathBuf, String> {
+pub(in crate::editor) fn place_bundled(project: &Path) -> Result<PathBuf, WriteError> {
     let names = ["biped.obj".to_owned(), format!("{}.biped.obj", stem(project))];
     let limit = BUNDLED.len() as u64 + 1;
     for name in &names {
@@ -199,14 +200,14 @@ pub(in crate::editor) fn place_bundled(project: &Path) -> Result<PathBuf, String
         let disk: &dyn Disk = &RealDisk;
         match disk.entry(&path, true) {
             Err(_) => {
-                save_atomic(disk, &path, BUNDLED).map_err(|error| error.to_string())?;
+                save_atomic(disk, &path, BUNDLED)?;
                 return Ok(path);
             }
             Ok(_) if read_capped(disk, &path, limit).is_ok_and(|bytes| bytes == BUNDLED) => return Ok(path),
             Ok(_) => {}
         }
     }
-    Err(format!("there is another {} in that folder already; choose another name or folder", names.join(" and ")))
+    Err(WriteError::Occupied { names: names.join(" and ") })
 }
 
 /// Exports the format given by the path's extension.
@@ -232,7 +233,12 @@ fn export(world: &mut World, path: PathBuf) {
     world.resource_mut::<Saving>().job = Some(Job { name, rig, step, task, then: None });
 }
 
-fn export_to(path: &Path, rig: &Rig, built: Option<&BuiltRig>, mesh: Option<&RigMesh>) -> Result<Vec<String>, String> {
+fn export_to(
+    path: &Path,
+    rig: &Rig,
+    built: Option<&BuiltRig>,
+    mesh: Option<&RigMesh>,
+) -> Result<Vec<String>, WriteError> {
     match FileKind::of(path) {
         Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
             let empty = Model { name: rig.about().name.clone(), ..default() };
@@ -247,23 +253,19 @@ fn export_to(path: &Path, rig: &Rig, built: Option<&BuiltRig>, mesh: Option<&Rig
             });
             // Without weights no joint deforms, and none would be written.
             let settings = GltfWriteSettings { all_joints: skin.is_none(), ..default() };
-            store_model(&RealDisk, path, &model, &settings).map_err(|error| error.to_string())
+            Ok(store_model(&RealDisk, path, &model, &settings)?)
         }
-        Some(FileKind::Template | FileKind::RigText) => {
-            store_rig(&RealDisk, path, rig).map_err(|error| error.to_string())
-        }
+        Some(FileKind::Template | FileKind::RigText) => Ok(store_rig(&RealDisk, path, rig)?),
         Some(FileKind::Skin) => {
             let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
-            let (mesh, skin) = both.ok_or("there are no weights to export; skin the mesh first")?;
+            let (mesh, skin) = both.ok_or(WriteError::NoWeights)?;
             let joints = SkinJoint::list(rig, skin);
             let file = SkinFile::new(joints, skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true);
-            let file = file.map_err(|error| error.to_string())?;
-            store_skin(&RealDisk, path, &file).map_err(|error| error.to_string())?;
+            let file = file?;
+            store_skin(&RealDisk, path, &file)?;
             Ok(Vec::new())
         }
-        _ => Err("a character is exported as .glb, .gltf or .obj, a rig as .rig.ron or .rig, weights as .skin; \
-                  choose one of these endings"
-            .to_owned()),
+        _ => Err(WriteError::Ending),
     }
 }
 
@@ -285,8 +287,8 @@ pub(super) fn poll(world: &mut World) {
             world.write_message(Notice::done(format!("Exported {name}")));
             tell(world, notes);
         }
-        Err(reason) => {
-            world.write_message(Notice::error(format!("Could not write {name}: {reason}")));
+        Err(error) => {
+            world.write_message(Notice::error(format!("Could not write {name}: {error}")));
         }
     }
     if let Some((purpose, path, then)) = next {

@@ -78,7 +78,7 @@ fn build_state(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut 
         }
     });
     let failure = world.get::<BuildFailure>(shown.entity).map(|failure| failure.0.to_string());
-    if let Some(text) = failure.or(world.get::<RunFailure>(shown.entity).map(|failure| failure.0.clone())) {
+    if let Some(text) = failure.or(world.get::<RunFailure>(shown.entity).map(|failure| failure.0.to_string())) {
         ui.colored_label(ui.visuals().error_fg_color, text);
     }
 }

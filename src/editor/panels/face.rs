@@ -26,7 +26,9 @@ use crate::{
     mesh::shapes::Shapes,
     plugins::{
         RigSystems,
-        face::{Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig},
+        face::{
+            Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig, PlaceFaceError,
+        },
         picking::{Pick, PickRequest},
         surface::{RigMesh, RigMeshes},
     },
@@ -90,17 +92,17 @@ fn tell_results(
                 results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
                 results.0.push((*mesh, report.clone()));
             }
-            Err(reason) if *reason == FaceError::Cancelled.to_string() => {
+            Err(PlaceFaceError::Face(FaceError::Cancelled)) => {
                 commands.write_message(Notice::info("Placing the face was cancelled. The rig is as it was."));
             }
-            Err(reason) => {
-                commands.write_message(Notice::error(format!("No face was placed: {reason}.")));
+            Err(error) => {
+                commands.write_message(Notice::error(format!("No face was placed: {error}.")));
             }
         }
     }
     for Expressed { result, .. } in expressed.read() {
-        if let Err(reason) = result {
-            commands.write_message(Notice::error(format!("The face shows nothing: {reason}.")));
+        if let Err(error) = result {
+            commands.write_message(Notice::error(format!("The face shows nothing: {error}.")));
         }
     }
 }

@@ -96,7 +96,7 @@ impl LogEntry {
 
 fn tell_refusals(mut refused: MessageReader<EditRefused>, mut notices: MessageWriter<Notice>) {
     for refused in refused.read() {
-        notices.write(Notice::error(sentence(&refused.reason)));
+        notices.write(Notice::error(sentence(&refused.reason.to_string())));
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
     log::LogSystems,
 };
 use crate::{
-    algo::weights::{Method, WeightReport, WeightSettings},
+    algo::weights::{Method, WeightError, WeightReport, WeightSettings},
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
@@ -21,7 +21,7 @@ use crate::{
     plugins::{
         RigSystems,
         landing::ResultHeld,
-        skinning::{BindRequest, Bound, SkinningJob},
+        skinning::{BindRequest, Bound, SkinningError, SkinningJob},
         surface::{RigMesh, RigMeshes},
     },
     rig::{NodeKind, Rig, SkinData, Uid},
@@ -50,11 +50,11 @@ pub struct SkinningSettings(pub WeightSettings);
 
 /// Result of the last computation of each mesh.
 #[derive(Resource, Debug, Default)]
-pub struct SkinningResults(Vec<(Entity, Result<WeightReport, String>)>);
+pub struct SkinningResults(Vec<(Entity, Result<WeightReport, SkinningError>)>);
 
 impl SkinningResults {
     /// The last result for a mesh.
-    pub fn get(&self, mesh: Entity) -> Option<&Result<WeightReport, String>> {
+    pub fn get(&self, mesh: Entity) -> Option<&Result<WeightReport, SkinningError>> {
         self.0.iter().find(|(known, _)| *known == mesh).map(|(_, result)| result)
     }
 }
@@ -129,10 +129,8 @@ fn tell_results(
                 let told = format!("{name} is skinned: {}.", covered(report.points, unweighted(report)));
                 if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told) }
             }
-            Err(reason) if is_cancelled(reason) => {
-                Notice::info("Skinning was cancelled. The weights are as they were.")
-            }
-            Err(reason) => Notice::error(format!("{name} was not skinned: {reason}.")),
+            Err(error) if is_cancelled(error) => Notice::info("Skinning was cancelled. The weights are as they were."),
+            Err(error) => Notice::error(format!("{name} was not skinned: {error}.")),
         });
         results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
         results.0.push((*mesh, result.clone()));
@@ -142,14 +140,15 @@ fn tell_results(
 /// Sends a notice that a finished result waits, so that committing it discards no undone step.
 fn tell_held(mut held: MessageReader<ResultHeld>, mut notices: MessageWriter<Notice>) {
     for ResultHeld { reason, .. } in held.read() {
+        let reason = reason.to_string();
         let mut letters = reason.chars();
         let first = letters.next().map(char::to_uppercase).into_iter().flatten();
         notices.write(Notice::warning(format!("{}{}.", first.collect::<String>(), letters.as_str())));
     }
 }
 
-fn is_cancelled(reason: &str) -> bool {
-    reason == crate::algo::weights::WeightError::Cancelled.to_string()
+fn is_cancelled(error: &SkinningError) -> bool {
+    *error == SkinningError::Weights(WeightError::Cancelled)
 }
 
 fn mesh_name(mesh: &RigMesh) -> &str {
@@ -300,8 +299,8 @@ impl SkinningPanel {
 
     fn failure(&self, ui: &mut Ui, world: &World, mesh: Entity) {
         let result = world.get_resource::<SkinningResults>().and_then(|results| results.get(mesh));
-        if let Some(Err(reason)) = result.filter(|result| !result.as_ref().is_err_and(|reason| is_cancelled(reason))) {
-            ui.colored_label(ui.visuals().error_fg_color, reason);
+        if let Some(Err(error)) = result.filter(|result| !result.as_ref().is_err_and(is_cancelled)) {
+            ui.colored_label(ui.visuals().error_fg_color, error.to_string());
         }
     }
 

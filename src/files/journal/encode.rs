@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Content, Origin, SaveMark,
+    Content, JournalWriteError, Origin, SaveMark,
     frame::{RecordKind, put_frame, put_prelude},
     text::{SkinsOut, rig_text, step_text, value_text},
 };
@@ -30,7 +30,7 @@ pub(super) struct Encoder {
 
 impl Encoder {
     /// Bytes of a whole file with this content, and the encoder that appends to it.
-    pub(super) fn begin(session: u64, content: &Content) -> Result<(Self, Vec<u8>), String> {
+    pub(super) fn begin(session: u64, content: &Content) -> Result<(Self, Vec<u8>), JournalWriteError> {
         let mut encoder = Self { session, number: 0, stacks: UndoStacks::default(), skins: SkinsOut::default() };
         let mut out = Vec::new();
         put_prelude(&mut out, session);
@@ -61,7 +61,7 @@ impl Encoder {
 
     /// Appends a change. On failure `out` is unchanged, and neither this change nor a later one can be added to this
     /// file.
-    pub(super) fn change(&mut self, out: &mut Vec<u8>, committed: &Committed) -> Result<(), String> {
+    pub(super) fn change(&mut self, out: &mut Vec<u8>, committed: &Committed) -> Result<(), JournalWriteError> {
         let (kind, whole) = match committed {
             Committed::Done(_) => (RecordKind::Done, true),
             Committed::Undone(step) if self.stacks.undoes(step) => (RecordKind::Undone, false),
@@ -76,21 +76,21 @@ impl Encoder {
     }
 
     /// Appends a mark that the project is about to be saved.
-    pub(super) fn mark(&mut self, out: &mut Vec<u8>, mark: &SaveMark) -> Result<(), String> {
+    pub(super) fn mark(&mut self, out: &mut Vec<u8>, mark: &SaveMark) -> Result<(), JournalWriteError> {
         self.put(out, RecordKind::Mark, value_text(mark)?.as_bytes())
     }
 
     /// Appends the caller's text.
-    pub(super) fn context(&mut self, out: &mut Vec<u8>, context: &str) -> Result<(), String> {
+    pub(super) fn context(&mut self, out: &mut Vec<u8>, context: &str) -> Result<(), JournalWriteError> {
         self.put(out, RecordKind::Context, context.as_bytes())
     }
 
     /// Appends the record that ends the journal: nothing is to be recovered.
-    pub(super) fn end(&mut self, out: &mut Vec<u8>) -> Result<(), String> {
+    pub(super) fn end(&mut self, out: &mut Vec<u8>) -> Result<(), JournalWriteError> {
         self.put(out, RecordKind::End, &[])
     }
 
-    fn put_with_skins(&mut self, out: &mut Vec<u8>, kind: RecordKind, text: &str) -> Result<(), String> {
+    fn put_with_skins(&mut self, out: &mut Vec<u8>, kind: RecordKind, text: &str) -> Result<(), JournalWriteError> {
         let (start, number) = (out.len(), self.number);
         let mut put = || {
             for (hash, bytes) in self.skins.take_fresh() {
@@ -107,9 +107,9 @@ impl Encoder {
         result
     }
 
-    fn put(&mut self, out: &mut Vec<u8>, kind: RecordKind, payload: &[u8]) -> Result<(), String> {
+    fn put(&mut self, out: &mut Vec<u8>, kind: RecordKind, payload: &[u8]) -> Result<(), JournalWriteError> {
         if !put_frame(out, self.session, self.number, kind, payload) {
-            return Err(format!("{} MiB are more than a record holds", payload.len() >> 20));
+            return Err(JournalWriteError::LargeRecord { mebibytes: payload.len() >> 20 });
         }
         self.number += 1;
         Ok(())

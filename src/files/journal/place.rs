@@ -163,7 +163,7 @@ pub fn pending_journal(disk: &dyn Disk, path: &Path) -> Option<PendingJournal> {
         // The journal belongs to another user, or has just been removed.
         Err(ReadError::NoAccess { .. } | ReadError::Missing { .. }) => return None,
         Err(ReadError::Empty { .. }) => Err(JournalError::NothingSound),
-        Err(error) => Err(JournalError::Read(error.to_string())),
+        Err(error) => Err(JournalError::Read(error)),
     };
     let summary = match read {
         Ok(summary) => summary,

@@ -10,10 +10,13 @@ use super::{
     tally::Tally,
     text::{SkinsIn, StepIn, read_rig, read_step, read_value},
 };
-use crate::rig::{
-    Rig,
-    skin::read_skin_data,
-    step::{Committed, Step},
+use crate::{
+    files::ReadError,
+    rig::{
+        Rig,
+        skin::read_skin_data,
+        step::{Committed, Step},
+    },
 };
 
 /// Largest size in bytes of a journal that is read.
@@ -38,7 +41,7 @@ pub enum JournalError {
     NothingSound,
     /// The file cannot be read.
     #[error("the journal cannot be read: {0}")]
-    Read(String),
+    Read(#[source] ReadError),
 }
 
 /// End of a journal's file.

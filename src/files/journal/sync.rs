@@ -6,13 +6,14 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::JournalWriteError;
 use crate::files::DiskFile;
 
 /// Longest time for which changes wait to share a sync, unless a caller waits for it.
 const GROUP: Duration = Duration::from_millis(50);
 
 /// Result of a sync: `Err` with the reason for a failure.
-pub(super) type Synced = Result<(), String>;
+pub(super) type Synced = Result<(), JournalWriteError>;
 
 /// A thread that syncs one file.
 pub(super) struct Syncer {
@@ -22,7 +23,10 @@ pub(super) struct Syncer {
 
 impl Syncer {
     /// Starts the thread on a handle of the file. A failed sync ends the thread and calls `failed` with the reason.
-    pub(super) fn start(file: Box<dyn DiskFile>, failed: impl FnOnce(String) + Send + 'static) -> Option<Self> {
+    pub(super) fn start(
+        file: Box<dyn DiskFile>,
+        failed: impl FnOnce(JournalWriteError) + Send + 'static,
+    ) -> Option<Self> {
         let (orders, inbox) = channel();
         let work = move || run(file, &inbox, failed);
         let thread = thread::Builder::new().name("journal sync".to_owned()).spawn(work).ok()?;
@@ -45,12 +49,12 @@ impl Syncer {
         if let Err(refused) = self.orders.send(Some(answer))
             && let Some(answer) = refused.0
         {
-            let _ = answer.send(Err("the disk did not take earlier changes".to_owned()));
+            let _ = answer.send(Err(JournalWriteError::Earlier));
         }
     }
 }
 
-fn run(mut file: Box<dyn DiskFile>, inbox: &Receiver<Option<Sender<Synced>>>, failed: impl FnOnce(String)) {
+fn run(mut file: Box<dyn DiskFile>, inbox: &Receiver<Option<Sender<Synced>>>, failed: impl FnOnce(JournalWriteError)) {
     let mut next = Instant::now();
     while let Ok(order) = inbox.recv() {
         let mut waiting: Vec<Sender<Synced>> = order.into_iter().collect();
@@ -61,7 +65,7 @@ fn run(mut file: Box<dyn DiskFile>, inbox: &Receiver<Option<Sender<Synced>>>, fa
             }
         }
         waiting.extend(inbox.try_iter().flatten());
-        let result = file.sync().map_err(|error| error.to_string());
+        let result = file.sync().map_err(JournalWriteError::from);
         next = Instant::now() + GROUP;
         for answer in waiting {
             let _ = answer.send(result.clone());

@@ -8,6 +8,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
+use super::JournalWriteError;
 use crate::rig::{
     Rig, RigEdit, SkinData, Uid,
     skin::{content_hash, skin_data_bytes},
@@ -76,12 +77,12 @@ impl SkinsOut {
         std::mem::take(&mut self.fresh)
     }
 
-    fn name(&mut self, skin: &Arc<SkinData>) -> Result<u64, String> {
+    fn name(&mut self, skin: &Arc<SkinData>) -> Result<u64, JournalWriteError> {
         let address = Arc::as_ptr(skin) as usize;
         if let Some((_, hash)) = self.seen.get(&address) {
             return Ok(*hash);
         }
-        let bytes = skin_data_bytes(skin).ok_or("the lists of the weights do not fit together")?;
+        let bytes = skin_data_bytes(skin).ok_or(JournalWriteError::Weights)?;
         let hash = content_hash(&bytes);
         self.seen.insert(address, (Arc::downgrade(skin), hash));
         if self.known.insert(hash) {
@@ -90,11 +91,11 @@ impl SkinsOut {
         Ok(hash)
     }
 
-    fn edits<'a>(&mut self, edits: &'a [RigEdit]) -> Result<Vec<EditRef<'a>>, String> {
+    fn edits<'a>(&mut self, edits: &'a [RigEdit]) -> Result<Vec<EditRef<'a>>, JournalWriteError> {
         edits.iter().map(|edit| self.edit(edit)).collect()
     }
 
-    fn edit<'a>(&mut self, edit: &'a RigEdit) -> Result<EditRef<'a>, String> {
+    fn edit<'a>(&mut self, edit: &'a RigEdit) -> Result<EditRef<'a>, JournalWriteError> {
         Ok(match edit {
             RigEdit::SetSkin(mesh, Some(skin)) => EditRef::Skin(*mesh, self.name(skin)?),
             RigEdit::Batch(edits) => EditRef::Batch(self.edits(edits)?),
@@ -103,28 +104,28 @@ impl SkinsOut {
     }
 }
 
-fn written(value: &impl Serialize) -> Result<String, String> {
-    let text = ron::to_string(value).map_err(|error| error.to_string())?;
+fn written(value: &impl Serialize) -> Result<String, JournalWriteError> {
+    let text = ron::to_string(value)?;
     if text.len() > MAX_TEXT {
-        return Err(format!("{} MiB of text are more than a record holds", text.len() >> 20));
+        return Err(JournalWriteError::LargeText { mebibytes: text.len() >> 20 });
     }
     Ok(text)
 }
 
 /// A step as text.
-pub(super) fn step_text(step: &Step, skins: &mut SkinsOut) -> Result<String, String> {
+pub(super) fn step_text(step: &Step, skins: &mut SkinsOut) -> Result<String, JournalWriteError> {
     let (forward, backward) = (skins.edits(&step.forward)?, skins.edits(&step.backward)?);
     written(&StepRef { name: &step.name, forward, backward, before: &step.before, after: &step.after })
 }
 
 /// A whole rig as text.
-pub(super) fn rig_text(rig: &Rig, skins: &mut SkinsOut) -> Result<String, String> {
+pub(super) fn rig_text(rig: &Rig, skins: &mut SkinsOut) -> Result<String, JournalWriteError> {
     let edits = edits_from_empty(rig);
     written(&RigRef { uid: rig.uid(), edits: skins.edits(&edits)? })
 }
 
 /// A caller's value as text.
-pub(super) fn value_text(value: &impl Serialize) -> Result<String, String> {
+pub(super) fn value_text(value: &impl Serialize) -> Result<String, JournalWriteError> {
     written(value)
 }
 

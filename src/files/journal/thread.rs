@@ -10,7 +10,7 @@ use std::{
 };
 
 use super::{
-    Content, JournalPlaces, SaveMark,
+    Content, JournalPlaces, JournalWriteError, SaveMark,
     encode::Encoder,
     sync::{Synced, Syncer},
     writer::{Order, Shared},
@@ -53,7 +53,7 @@ impl Open {
         if let Some(syncer) = self.syncer.take() {
             syncer.end();
         }
-        self.file.sync().map_err(|error| error.to_string())
+        self.file.sync().map_err(JournalWriteError::from)
     }
 }
 
@@ -118,7 +118,7 @@ impl Work {
                 if self.open.as_ref().is_some_and(|open| open.path == path) {
                     // The content of the disk after a failed sync is unknown, so all is written again.
                     self.open = None;
-                    self.report(&path, &reason);
+                    self.report(path, reason);
                     self.reopen();
                 }
             }
@@ -126,7 +126,7 @@ impl Work {
                 self.write(block);
                 let result = match self.open.take() {
                     Some(open) => open.close(),
-                    None => Err("no journal is open".to_owned()),
+                    None => Err(JournalWriteError::NotOpen),
                 };
                 let _ = answer.send(result);
                 return false;
@@ -141,13 +141,17 @@ impl Work {
     }
 
     /// Encodes a record for the open file; a record that its encoder refuses ends the file.
-    fn append(&mut self, block: &mut Vec<u8>, put: impl FnOnce(&mut Encoder, &mut Vec<u8>) -> Result<(), String>) {
+    fn append(
+        &mut self,
+        block: &mut Vec<u8>,
+        put: impl FnOnce(&mut Encoder, &mut Vec<u8>) -> Result<(), JournalWriteError>,
+    ) {
         let Some(open) = &mut self.open else { return };
         if let Err(reason) = put(&mut open.encoder, block) {
             // The records before the refused one are still worth writing.
             self.write(block);
             if let Some(open) = self.open.take() {
-                self.report(&open.path, &reason);
+                self.report(open.path, reason);
             }
         }
     }
@@ -169,13 +173,13 @@ impl Work {
         if result.is_ok() {
             match &open.syncer {
                 Some(syncer) => syncer.soon(),
-                None => result = open.file.sync().map_err(|error| error.to_string()),
+                None => result = open.file.sync().map_err(JournalWriteError::from),
             }
         }
         if let Err(reason) = result {
             let path = open.path.clone();
             self.open = None;
-            self.report(&path, &reason);
+            self.report(path, reason);
             self.reopen();
         }
     }
@@ -183,13 +187,13 @@ impl Work {
     fn sync(&mut self, answer: Sender<Synced>) {
         let Some(open) = &mut self.open else {
             let trouble = self.writer.shared.trouble();
-            let _ = answer.send(Err(trouble.map_or_else(|| "no journal is open".to_owned(), |t| t.to_string())));
+            let _ = answer.send(Err(trouble.map_or(JournalWriteError::NotOpen, |trouble| (*trouble).clone())));
             return;
         };
         match &open.syncer {
             Some(syncer) => syncer.now(answer),
             None => {
-                let _ = answer.send(open.file.sync().map_err(|error| error.to_string()));
+                let _ = answer.send(open.file.sync().map_err(JournalWriteError::from));
             }
         }
     }
@@ -203,7 +207,7 @@ impl Work {
             Ok(open) => self.adopt(open),
             Err((path, reason)) => {
                 self.retry = Instant::now() + RETRY;
-                self.report(&path, &reason);
+                self.report(path, reason);
             }
         }
     }
@@ -222,7 +226,7 @@ impl Work {
                 writer.places = places;
                 self.adopt(open);
             }
-            Err((path, reason)) if self.open.is_none() => self.report(&path, &reason),
+            Err((path, reason)) if self.open.is_none() => self.report(path, reason),
             Err(_) => {}
         }
     }
@@ -259,16 +263,15 @@ impl Work {
             let _ = open.close();
         }
         match self.writer.disk.remove(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(format!("`{}`: {error}", path.display())),
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(JournalWriteError::Remove { path, source: error.into() })
+            }
             _ => Ok(()),
         }
     }
 
-    fn report(&self, path: &Path, reason: &str) {
-        self.writer.shared.fail(format!(
-            "changes cannot be kept for recovery in `{}`: {reason}; save soon, and free space or allow writing there",
-            path.display()
-        ));
+    fn report(&self, path: PathBuf, source: JournalWriteError) {
+        self.writer.shared.fail(JournalWriteError::Place { path, source: source.into() });
     }
 }
 
@@ -279,7 +282,7 @@ fn create_somewhere(
     content: &Content,
     places: &JournalPlaces,
     former: Option<&Path>,
-) -> Result<Open, (PathBuf, String)> {
+) -> Result<Open, (PathBuf, JournalWriteError)> {
     let mut first = None;
     for (number, path) in places.candidates(writer.session).into_iter().enumerate() {
         let folder = folder_of(&path);
@@ -292,7 +295,7 @@ fn create_somewhere(
         let taken = !own && !replaced && writer.disk.entry(&path, false).is_ok();
         let created = if taken {
             // Another window works on this project, or unsaved work waits to be recovered.
-            Err("another journal lies there".to_owned())
+            Err(JournalWriteError::Taken)
         } else {
             create(writer.disk.as_ref(), &path, writer.session, content)
         };
@@ -301,19 +304,19 @@ fn create_somewhere(
             Err(reason) => first = first.or(Some((path, reason))),
         }
     }
-    Err(first.unwrap_or_else(|| (PathBuf::new(), "there is no place for it".to_owned())))
+    Err(first.unwrap_or_else(|| (PathBuf::new(), JournalWriteError::NoPlace)))
 }
 
 /// Writes a whole journal to a temporary file in the same folder, then renames it.
-fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Result<Open, String> {
+fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Result<Open, JournalWriteError> {
     let (encoder, bytes) = Encoder::begin(session, content)?;
     let temp = folder_of(path).join(temp_name());
-    let mut file = disk.create(&temp).map_err(|error| error.to_string())?;
+    let mut file = disk.create(&temp).map_err(JournalWriteError::from)?;
     let mut fill = || {
-        file.lock().map_err(|error| error.to_string())?;
+        file.lock().map_err(JournalWriteError::from)?;
         write_all(file.as_mut(), &bytes)?;
-        file.sync().map_err(|error| error.to_string())?;
-        disk.rename(&temp, path).map_err(|error| error.to_string())
+        file.sync().map_err(JournalWriteError::from)?;
+        disk.rename(&temp, path).map_err(JournalWriteError::from)
     };
     if let Err(reason) = fill() {
         drop(file);
@@ -325,13 +328,13 @@ fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Resu
     Ok(Open { path: path.to_owned(), file, syncer: None, encoder })
 }
 
-fn write_all(file: &mut dyn DiskFile, mut bytes: &[u8]) -> Result<(), String> {
+fn write_all(file: &mut dyn DiskFile, mut bytes: &[u8]) -> Result<(), JournalWriteError> {
     while !bytes.is_empty() {
         match file.write(bytes) {
-            Ok(0) => return Err("the disk takes nothing more".to_owned()),
+            Ok(0) => return Err(JournalWriteError::Full),
             Ok(count) => bytes = bytes.get(count..).unwrap_or_default(),
             Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error.to_string()),
+            Err(error) => return Err(error.into()),
         }
     }
     Ok(())

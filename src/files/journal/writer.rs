@@ -13,7 +13,7 @@ use std::{
 };
 
 use super::{
-    Content, JournalPlaces, Origin, Recovered, Restored, SaveMark,
+    Content, JournalPlaces, JournalWriteError, Origin, Recovered, Restored, SaveMark,
     place::{file_hash_at, set_aside},
     restore::SavedSteps,
     sync::Synced,
@@ -23,7 +23,7 @@ use crate::{
     files::Disk,
     rig::{
         Rig,
-        step::{Committed, StepSink},
+        step::{Committed, SinkError, StepSink},
     },
 };
 
@@ -66,7 +66,7 @@ pub(super) enum Order {
     Saving(SaveMark, Sender<Synced>),
     Saved(SaveMark, JournalPlaces),
     Flush(Sender<Synced>),
-    SyncFailed(PathBuf, String),
+    SyncFailed(PathBuf, JournalWriteError),
     Finish(Sender<Synced>),
     Close(Sender<Synced>),
 }
@@ -81,7 +81,7 @@ pub(super) struct Shared {
 #[derive(Default)]
 struct State {
     path: Option<PathBuf>,
-    trouble: Option<Arc<str>>,
+    trouble: Option<Arc<JournalWriteError>>,
 }
 
 impl Shared {
@@ -93,7 +93,7 @@ impl Shared {
         self.state().path.clone()
     }
 
-    pub(super) fn trouble(&self) -> Option<Arc<str>> {
+    pub(super) fn trouble(&self) -> Option<Arc<JournalWriteError>> {
         // The atomic flag avoids the lock, since this is called in every frame.
         if self.troubled.load(Ordering::Acquire) { self.state().trouble.clone() } else { None }
     }
@@ -106,8 +106,12 @@ impl Shared {
         std::mem::replace(&mut state.path, path)
     }
 
-    pub(super) fn fail(&self, reason: String) {
-        self.state().trouble = Some(reason.into());
+    /// Records a reason for trouble. The former one stays if it is equal, so that it counts as one occurrence.
+    pub(super) fn fail(&self, reason: JournalWriteError) {
+        let mut state = self.state();
+        if state.trouble.as_deref() != Some(&reason) {
+            state.trouble = Some(reason.into());
+        }
         self.troubled.store(true, Ordering::Release);
     }
 }
@@ -181,7 +185,7 @@ impl Journal {
             Writer { disk, shared: shared.clone(), orders: orders.clone(), session, places, content, replaces };
         let spawned = thread::Builder::new().name("journal".to_owned()).spawn(move || writer.run(&inbox));
         if let Err(error) = spawned {
-            shared.fail(format!("changes cannot be kept for recovery: {error}; save often, and restart the program"));
+            shared.fail(JournalWriteError::Thread(error.into()));
         }
         Self { inner: Arc::new(Inner { orders, shared, position, closed: AtomicBool::new(false) }) }
     }
@@ -193,7 +197,7 @@ impl Journal {
     }
 
     /// Reason why changes cannot be stored at the moment, and what to do, for people; `None` while they are stored.
-    pub fn trouble(&self) -> Option<Arc<str>> {
+    pub fn trouble(&self) -> Option<Arc<JournalWriteError>> {
         self.inner.shared.trouble()
     }
 
@@ -202,7 +206,7 @@ impl Journal {
     ///
     /// # Errors
     /// The reason why the changes are not on the disk, for people.
-    pub fn flush(&self, limit: Duration) -> Result<(), String> {
+    pub fn flush(&self, limit: Duration) -> Result<(), JournalWriteError> {
         self.ask(Order::Flush, limit)
     }
 
@@ -227,7 +231,7 @@ impl Journal {
     ///
     /// # Errors
     /// The reason why the mark is not on the disk. The project can be saved nevertheless.
-    pub fn saving(&self, mark: SaveMark, limit: Duration) -> Result<(), String> {
+    pub fn saving(&self, mark: SaveMark, limit: Duration) -> Result<(), JournalWriteError> {
         self.ask(|answer| Order::Saving(mark, answer), limit)
     }
 
@@ -241,7 +245,7 @@ impl Journal {
     ///
     /// # Errors
     /// The reason why the file could not be removed; the file itself records that it holds nothing to recover.
-    pub fn close(&self, limit: Duration) -> Result<(), String> {
+    pub fn close(&self, limit: Duration) -> Result<(), JournalWriteError> {
         if self.inner.closed.swap(true, Ordering::AcqRel) {
             return Ok(());
         }
@@ -253,21 +257,21 @@ impl Journal {
         let _ = self.inner.orders.send(order);
     }
 
-    fn ask(&self, order: impl FnOnce(Sender<Synced>) -> Order, limit: Duration) -> Result<(), String> {
+    fn ask(&self, order: impl FnOnce(Sender<Synced>) -> Order, limit: Duration) -> Result<(), JournalWriteError> {
         self.inner.ask(order, limit)
     }
 }
 
 impl Inner {
-    fn ask(&self, order: impl FnOnce(Sender<Synced>) -> Order, limit: Duration) -> Result<(), String> {
+    fn ask(&self, order: impl FnOnce(Sender<Synced>) -> Order, limit: Duration) -> Result<(), JournalWriteError> {
         let (answer, inbox) = channel();
-        let ended = || Err("the journal has been closed".to_owned());
+        let ended = || Err(JournalWriteError::Closed);
         if self.orders.send(order(answer)).is_err() {
             return ended();
         }
         match inbox.recv_timeout(limit) {
             Ok(result) => result,
-            Err(RecvTimeoutError::Timeout) => Err(format!("the disk has not answered within {limit:?}")),
+            Err(RecvTimeoutError::Timeout) => Err(JournalWriteError::Late(limit)),
             Err(RecvTimeoutError::Disconnected) => ended(),
         }
     }
@@ -286,11 +290,11 @@ impl StepSink for Journal {
         Journal::record(self, committed);
     }
 
-    fn trouble(&self) -> Option<Arc<str>> {
-        Journal::trouble(self)
+    fn trouble(&self) -> Option<SinkError> {
+        Journal::trouble(self).map(SinkError::new)
     }
 
-    fn flush(&self, limit: Duration) -> Result<(), String> {
-        Journal::flush(self, limit)
+    fn flush(&self, limit: Duration) -> Result<(), SinkError> {
+        Journal::flush(self, limit).map_err(|error| SinkError::new(Arc::new(error)))
     }
 }

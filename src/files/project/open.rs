@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use super::{
-    LoadedMesh, LoadedProject, MeshShape, MeshState,
+    LoadedMesh, LoadedProject, MeshShape, MeshState, ProjectNote,
     path::{below, located},
 };
 use crate::{
@@ -31,7 +31,7 @@ use crate::{
 pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadError> {
     let read = load_project_file(disk, path)?;
     let Project { name, meshes: references, rigs: entries, view, journal } = read.project;
-    let mut notes = read.notes;
+    let mut notes: Vec<ProjectNote> = read.notes.into_iter().map(ProjectNote::File).collect();
     let (mut rigs, skins): (Vec<Rig>, Vec<Vec<SkinReference>>) =
         entries.into_iter().map(|entry| (entry.rig, entry.skins)).unzip();
     let mut meshes = Vec::with_capacity(references.len());
@@ -44,7 +44,7 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
         if let Some(bound) = bound
             && let Err(error) = rigs[number].apply(&RigEdit::SetSkin(mesh.uid, Some(Arc::new(bound))))
         {
-            notes.push(format!("the weights of `{}` were left out: {error}", mesh.path.display()));
+            notes.push(ProjectNote::WeightsRefused { mesh: mesh.path.clone(), error });
         }
         meshes.push(mesh);
     }
@@ -52,21 +52,20 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
 }
 
 /// Weights of a mesh from their file; `None`, with a note, if it cannot be read.
-fn read_skin(disk: &dyn Disk, project: &Path, skin: &SkinReference, notes: &mut Vec<String>) -> Option<SkinFile> {
+fn read_skin(disk: &dyn Disk, project: &Path, skin: &SkinReference, notes: &mut Vec<ProjectNote>) -> Option<SkinFile> {
     let Some(path) = below(project, &skin.path) else {
-        notes.push(format!("the weights `{}` are not below the project's folder: put them there", skin.path));
+        notes.push(ProjectNote::WeightsOutside(skin.path.clone()));
         return None;
     };
     match load_hashed_skin(disk, &path) {
         Ok((file, hash)) => {
             if hash != skin.hash {
-                let name = path.display();
-                notes.push(format!("the weights `{name}` were saved at another time than the project; they are used"));
+                notes.push(ProjectNote::WeightsOfAnotherTime(path));
             }
             Some(file)
         }
         Err(error) => {
-            notes.push(format!("{error}; without its weights the mesh has to be skinned again"));
+            notes.push(ProjectNote::WeightsUnreadable(Arc::new(error)));
             None
         }
     }
@@ -78,7 +77,7 @@ fn open_mesh(
     reference: MeshReference,
     skin: Option<(SkinFile, bool)>,
     rig: &Rig,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<ProjectNote>,
 ) -> (LoadedMesh, Option<SkinData>) {
     let MeshReference { uid, rig: rig_uid, path, hash, mut nodes } = reference;
     let path = located(project, &path);
@@ -88,9 +87,8 @@ fn open_mesh(
     };
     let (state, bound) = match load_model(disk, &path) {
         Err(error) => {
-            notes.push(format!(
-                "a mesh of the project is not there: {error}; put it back and open the project again, its weights are kept"
-            ));
+            let error = Arc::new(error);
+            notes.push(ProjectNote::MeshMissing(error.clone()));
             let bound = skin.as_ref().map(|(file, at_rest)| data(file, file.weights().clone(), *at_rest));
             let shape = MeshShape::Missing { hash, skin: skin.map(|(file, _)| Arc::new(file)) };
             (MeshState::Missing { error, shape }, bound)
@@ -99,7 +97,7 @@ fn open_mesh(
             let (rest, triangles) = (model.at_rest(), model.point_triangles());
             let changed = mesh_hash(&rest.points, &triangles) != hash;
             if changed {
-                notes.push(format!("the mesh `{}` has changed since the project was saved", path.display()));
+                notes.push(ProjectNote::MeshChanged(path.clone()));
             }
             nodes = known_nodes(nodes, &model, rig);
             let bound = skin.and_then(|(file, at_rest)| {
@@ -115,26 +113,23 @@ fn open_mesh(
 }
 
 /// Weights for a mesh: unchanged if the mesh is the one they were made for, else transferred.
-fn fitting(file: &SkinFile, target: TransferMesh, path: &Path, notes: &mut Vec<String>) -> Option<Weights> {
+fn fitting(file: &SkinFile, target: TransferMesh, path: &Path, notes: &mut Vec<ProjectNote>) -> Option<Weights> {
     if file.fits(target.points, target.triangles) {
         return Some(file.weights().clone());
     }
-    let name = path.display();
+    let mesh = path.to_path_buf();
     let Some(copy) = file.mesh() else {
-        notes.push(format!("the weights of `{name}` are of another mesh and cannot be transferred; skin it again"));
+        notes.push(ProjectNote::WeightsOfAnotherMesh(mesh));
         return None;
     };
     let source = TransferMesh { points: &copy.points, triangles: &copy.triangles };
     match transfer_weights(source, file.weights(), target, &TransferSettings::default()) {
-        Ok((weights, told)) => {
-            notes.push(format!(
-                "the weights were transferred to `{name}`: {} points copied, {} matched, {} filled in, {} by the nearest",
-                told.copied, told.matched, told.inpainted, told.nearest
-            ));
+        Ok((weights, report)) => {
+            notes.push(ProjectNote::WeightsTransferred { mesh, report });
             Some(weights)
         }
         Err(error) => {
-            notes.push(format!("the weights of `{name}` cannot be transferred to the changed mesh: {error}"));
+            notes.push(ProjectNote::WeightsNotTransferred { mesh, error });
             None
         }
     }

@@ -5,7 +5,7 @@ use std::{borrow::Cow, mem::size_of};
 use serde_json::Value;
 
 use super::{
-    GltfError,
+    ExternalError, GltfError,
     accessor::{Accessor, View},
     budget::{Budget, Notes},
     json::At,
@@ -160,7 +160,7 @@ impl<'a> Document<'a> {
         &self,
         bin: Option<&'b [u8]>,
         budget: &Budget,
-        external: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+        external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
     ) -> Result<Vec<Option<Cow<'b, [u8]>>>, GltfError> {
         let mut loaded = Vec::with_capacity(self.buffers.len());
         for (i, buffer) in self.buffers.iter().enumerate() {
@@ -177,7 +177,7 @@ impl<'a> Document<'a> {
                     match uri::resolve(text, &place)? {
                         uri::Resolved::Data { bytes, .. } => Cow::Owned(bytes),
                         uri::Resolved::File(path) => {
-                            let bytes = external(&path).map_err(|what| uri::fault(&place, text, what))?;
+                            let bytes = external(&path).map_err(|error| uri::fault(&place, text, error))?;
                             budget.add_input(bytes.len() as u64);
                             Cow::Owned(bytes)
                         }

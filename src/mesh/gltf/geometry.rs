@@ -198,7 +198,7 @@ impl<'a> ObjectReader<'a> {
             let mut list = Vec::new();
             for vertex in 0..positions.len() {
                 let settled = influences.of(vertex, joints, &mut negative, &mut list);
-                settled.map_err(|what| GltfError::at(&*primitive.place, what))?;
+                settled.map_err(|error| GltfError::at(&*primitive.place, error.to_string()))?;
                 bare += usize::from(list.is_empty());
                 source.budget.take(list.len(), 2 * size_of::<u32>(), &primitive.place)?;
                 self.weights.push(list.iter().copied());

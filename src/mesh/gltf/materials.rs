@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::{Map, Value};
 
 use super::{
-    GltfError, MAX_IMAGE_BYTES,
+    ExternalError, GltfError, MAX_IMAGE_BYTES,
     accessor::Source,
     budget::{Budget, Notes},
     json::{At, copy, whole},
@@ -19,7 +19,7 @@ pub(super) const OWN_FIELDS: [&str; 4] = ["name", "uri", "mimeType", "bufferView
 /// Reads materials, textures, samplers and images.
 pub(super) fn read(
     source: &Source,
-    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
     notes: &Notes,
 ) -> Result<MaterialSet, GltfError> {
     let document = source.document;
@@ -127,7 +127,7 @@ fn find_extension_names<'a>(extensions: Option<&'a Value>, found: &mut BTreeSet<
 
 fn images(
     source: &Source,
-    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
     notes: &Notes,
 ) -> Result<Vec<Image>, GltfError> {
     let mut images = Vec::new();
@@ -154,8 +154,8 @@ fn images(
                         image.bytes = bytes;
                         image.name = if image.name.is_empty() { file.to_owned() } else { image.name };
                     }
-                    Err(what) => {
-                        notes.add(format!("The image \"{path}\" could not be loaded ({what}) and is left out"));
+                    Err(error) => {
+                        notes.add(format!("The image \"{path}\" could not be loaded ({error}) and is left out"));
                         image.rest.insert("uri".to_owned(), Value::String(text.to_owned()));
                     }
                 },

@@ -16,6 +16,20 @@ use crate::mesh::model::SkinBinding;
 /// Largest number of sets of four influences read; later sets are too weak to show.
 const MAX_SETS: usize = 32;
 
+/// Influence of a joint that the skin does not have.
+#[derive(Debug, thiserror::Error)]
+#[error("JOINTS_{set} of vertex {vertex} refers to joint {joint}, but the skin has {joints}")]
+pub(super) struct NoSkinJoint {
+    /// Number of the set of influences.
+    set: usize,
+    /// Vertex of the primitive.
+    vertex: usize,
+    /// Position in the skin that the influence names.
+    joint: usize,
+    /// Number of joints of the skin.
+    joints: usize,
+}
+
 /// The bind pose of every skin.
 pub(super) fn read_bindings(
     source: &Source,
@@ -74,17 +88,14 @@ impl Influences {
         joints: &[usize],
         negative: &mut usize,
         out: &mut Vec<(u32, f32)>,
-    ) -> Result<(), String> {
+    ) -> Result<(), NoSkinJoint> {
         out.clear();
         for (set, (indices, weights)) in self.sets.iter().enumerate() {
             for i in vertex * 4..vertex * 4 + 4 {
                 if weights[i] > 0.0 {
                     let Some(&node) = joints.get(indices[i] as usize) else {
-                        return Err(format!(
-                            "JOINTS_{set} of vertex {vertex} refers to joint {}, but the skin has {}",
-                            indices[i],
-                            joints.len()
-                        ));
+                        let (joint, joints) = (indices[i] as usize, joints.len());
+                        return Err(NoSkinJoint { set, vertex, joint, joints });
                     };
                     out.push((node as u32, weights[i]));
                 } else if weights[i] < 0.0 {

@@ -1,5 +1,7 @@
 //! URIs of buffers and images: data in the URI itself, or a file below the model's folder and nowhere else.
 
+use std::{error::Error, sync::Arc};
+
 use super::GltfError;
 
 /// Content or file that a URI refers to.
@@ -15,52 +17,116 @@ pub(super) enum Resolved {
     File(String),
 }
 
+/// Fault of a URI in a glTF file.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum GltfUriError {
+    /// A data URI has no comma before its data.
+    #[error("a data URI without a comma")]
+    NoComma,
+    /// The data of a data URI is no base64.
+    #[error("the base64 data is damaged")]
+    Base64,
+    /// A percent sign begins no escape.
+    #[error("% must be followed by two hexadecimal digits")]
+    Percent,
+    /// The decoded URI is no text.
+    #[error("is not UTF-8 once decoded")]
+    Utf8,
+    /// The URI holds a control character.
+    #[error("contains a control character")]
+    Control,
+    /// The URI is an absolute path.
+    #[error("is an absolute path; only files below the model's folder are read")]
+    Absolute,
+    /// The URI has a scheme or a drive.
+    #[error("has a scheme or a drive; only files below the model's folder are read")]
+    Scheme,
+    /// The URI holds a backslash.
+    #[error("contains a backslash; write / between folders")]
+    Backslash,
+    /// The URI leads out of the model's folder.
+    #[error("leads out of the model's folder; only files below it are read")]
+    Outside,
+    /// The URI names no file.
+    #[error("names no file")]
+    NoFile,
+    /// The file cannot be loaded.
+    #[error(transparent)]
+    External(#[from] ExternalError),
+}
+
+/// Reason why a file that a glTF file refers to cannot be loaded: an error of the caller's own type. Two are equal if
+/// they are the same occurrence.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{0}")]
+pub struct ExternalError(Arc<dyn Error + Send + Sync>);
+
+impl ExternalError {
+    /// Wraps an error of the caller.
+    pub fn new(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self(error.into().into())
+    }
+
+    /// The error of the caller, to be downcast to the caller's own type.
+    pub fn get(&self) -> &(dyn Error + Send + Sync + 'static) {
+        self.0.as_ref()
+    }
+}
+
+impl PartialEq for ExternalError {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl Eq for ExternalError {}
+
 /// An error about a URI, which is quoted shortened.
-pub(super) fn fault(place: &str, uri: &str, what: impl Into<String>) -> GltfError {
+pub(super) fn fault(place: &str, uri: &str, fault: impl Into<GltfUriError>) -> GltfError {
     let mut short: String = uri.chars().take(80).collect();
     if short.len() < uri.len() {
         short.push_str("...");
     }
-    GltfError::External { file: String::new(), place: place.to_owned(), uri: short, what: what.into() }
+    GltfError::External { file: String::new(), place: place.to_owned(), uri: short, fault: fault.into() }
 }
 
 /// Decodes a URI and checks that it stays below the model's folder.
 pub(super) fn resolve(uri: &str, place: &str) -> Result<Resolved, GltfError> {
-    let fail = |what: &str| fault(place, uri, what);
+    let fail = |what: GltfUriError| fault(place, uri, what);
     if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
-        let (header, data) = uri[5..].split_once(',').ok_or_else(|| fail("a data URI without a comma"))?;
+        let (header, data) = uri[5..].split_once(',').ok_or_else(|| fail(GltfUriError::NoComma))?;
         let mime = header.split(';').next().unwrap_or_default().to_ascii_lowercase();
         let bytes = if header.to_ascii_lowercase().ends_with(";base64") {
-            base64(data).ok_or_else(|| fail("the base64 data is damaged"))?
+            base64(data).ok_or_else(|| fail(GltfUriError::Base64))?
         } else {
-            percent_decode(data).ok_or_else(|| fail("% must be followed by two hexadecimal digits"))?
+            percent_decode(data).ok_or_else(|| fail(GltfUriError::Percent))?
         };
         return Ok(Resolved::Data { mime, bytes });
     }
-    let decoded = percent_decode(uri).ok_or_else(|| fail("% must be followed by two hexadecimal digits"))?;
-    let path = String::from_utf8(decoded).map_err(|_| fail("is not UTF-8 once decoded"))?;
+    let decoded = percent_decode(uri).ok_or_else(|| fail(GltfUriError::Percent))?;
+    let path = String::from_utf8(decoded).map_err(|_| fail(GltfUriError::Utf8))?;
     if path.contains(|c: char| c.is_control()) {
-        return Err(fail("contains a control character"));
+        return Err(fail(GltfUriError::Control));
     }
     if path.starts_with(['/', '\\']) {
-        return Err(fail("is an absolute path; only files below the model's folder are read"));
+        return Err(fail(GltfUriError::Absolute));
     }
     if path.contains(':') {
-        return Err(fail("has a scheme or a drive; only files below the model's folder are read"));
+        return Err(fail(GltfUriError::Scheme));
     }
     if path.contains('\\') {
-        return Err(fail("contains a backslash; write / between folders"));
+        return Err(fail(GltfUriError::Backslash));
     }
     let mut parts = Vec::new();
     for part in path.split('/') {
         match part {
             "" | "." => {}
-            ".." => return Err(fail("leads out of the model's folder; only files below it are read")),
+            ".." => return Err(fail(GltfUriError::Outside)),
             part => parts.push(part),
         }
     }
     if parts.is_empty() || path.ends_with('/') {
-        return Err(fail("names no file"));
+        return Err(fail(GltfUriError::NoFile));
     }
     Ok(Resolved::File(parts.join("/")))
 }

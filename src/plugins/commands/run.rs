@@ -11,7 +11,7 @@ use crate::{
         runtime::{InstanceMode, RigRuntime},
     },
     rig::{PoseOffset, RestTransform, Rig},
-    solve::program::{CompileOptions, ProgramCache},
+    solve::program::{CompileOptions, ProgramCache, ProgramError},
 };
 
 /// Compiled programs of built rigs; rigs with equal programs share one.
@@ -19,9 +19,9 @@ use crate::{
 pub struct Programs(pub ProgramCache);
 
 /// Reason why the built rig cannot run. The rig then stands still in its built pose.
-#[derive(Component, Debug, Clone, PartialEq, Eq)]
+#[derive(Component, Debug, Clone, PartialEq)]
 #[component(immutable)]
-pub struct RunFailure(pub String);
+pub struct RunFailure(pub ProgramError);
 
 type BuiltRigs<'a> = (
     Entity,
@@ -62,7 +62,7 @@ pub(super) fn run_built(
             Ok(program) => program,
             Err(error) => {
                 let mut entity = commands.entity(entity);
-                entity.try_insert(RunFailure(error.to_string()));
+                entity.try_insert(RunFailure(error));
                 if let Some(runtime) = runtime {
                     entity.try_remove::<RigRuntime>().try_insert(SuspendedRuntime(runtime.clone()));
                 }

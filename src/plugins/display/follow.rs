@@ -17,6 +17,7 @@ use super::{
     build::RIG,
     layer::{Layer, LayerKey, Plans, ShownPiece},
     materials::{self, Materials},
+    textures::TextureError,
     wire::WireMaterial,
 };
 use crate::{
@@ -60,7 +61,7 @@ enum Look {
 /// Images that are being decoded.
 struct TextureJob {
     task: Task<()>,
-    queue: Arc<Mutex<Vec<(Handle<Image>, Result<Image, String>)>>>,
+    queue: Arc<Mutex<Vec<(Handle<Image>, Result<Image, TextureError>)>>>,
     /// Materials with their textures, used once all textures are decoded.
     materials: Vec<StandardMaterial>,
     total: usize,
@@ -249,9 +250,9 @@ impl Displayed {
             match image.map(|image| images.insert(id, image)) {
                 Ok(Ok(())) => {}
                 Ok(Err(_)) => job.missing.push(id),
-                Err(text) => {
-                    warn!("{text}");
-                    note(text);
+                Err(error) => {
+                    warn!("{error}");
+                    note(error.to_string());
                     job.missing.push(id);
                 }
             }

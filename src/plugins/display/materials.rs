@@ -16,7 +16,7 @@ use bevy::{
 };
 use serde_json::{Map, Value};
 
-use super::textures::{TextureBudget, decode};
+use super::textures::{TextureBudget, TextureError, decode};
 use crate::mesh::model::MaterialSet;
 
 /// Largest opacity of see-through surfaces.
@@ -83,11 +83,11 @@ pub(super) fn translate(material_set: &MaterialSet, images: &AssetHandleProvider
     Materials { materials, textures: translation.textures }
 }
 
-/// Decodes the images of a model one after the other; an error is a sentence about the image that cannot be shown.
+/// Decodes the images of a model one after the other.
 pub(super) fn decode_textures(
     material_set: &MaterialSet,
     textures: &[(TextureUse, Handle<Image>)],
-) -> impl Iterator<Item = (Handle<Image>, Result<Image, String>)> {
+) -> impl Iterator<Item = (Handle<Image>, Result<Image, TextureError>)> {
     let mut budget = TextureBudget::default();
     textures.iter().filter_map(move |(texture, handle)| {
         let source = material_set.images.get(texture.image)?;

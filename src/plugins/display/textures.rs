@@ -24,25 +24,68 @@ impl Default for TextureBudget {
     }
 }
 
-/// Decodes a PNG or JPEG file. `srgb` is `true` for colours and `false` for numbers. The error is a sentence for
-/// people.
+/// Reason why an image is not shown; a sentence for people without its full stop.
+#[derive(Debug, thiserror::Error)]
+#[error("The image \"{name}\" is not shown: {fault}")]
+pub(super) struct TextureError {
+    /// Name of the image.
+    name: String,
+    /// Fault of the image.
+    #[source]
+    fault: TextureFault,
+}
+
+/// Fault of an image.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum TextureFault {
+    /// The image has no content.
+    #[error("its file was not found")]
+    NoFile,
+    /// The content has an unknown format.
+    #[error("it is neither PNG nor JPEG, or damaged")]
+    Format,
+    /// The image takes more memory than is left for the model.
+    #[error("{width} by {height} pixels are more than the 256 MiB that a model's images may take")]
+    TooLarge {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+    /// The content cannot be decoded.
+    #[error(transparent)]
+    Decode(#[from] bevy::image::TextureError),
+    /// The decoded pixels have an unknown format.
+    #[error("its pixels have an unknown format")]
+    Pixels,
+}
+
+/// Decodes a PNG or JPEG file. `srgb` is `true` for colours and `false` for numbers.
 pub(super) fn decode(
     source: &model::Image,
     srgb: bool,
     sampler: ImageSamplerDescriptor,
     budget: &mut TextureBudget,
-) -> Result<Image, String> {
-    let name = if source.name.is_empty() { "without a name" } else { &source.name };
-    let fail = |why: &str| Err(format!("The image \"{name}\" is not shown: {why}"));
+) -> Result<Image, TextureError> {
+    decode_image(source, srgb, sampler, budget).map_err(|fault| {
+        let name = if source.name.is_empty() { "without a name" } else { &source.name };
+        TextureError { name: name.to_owned(), fault }
+    })
+}
+
+fn decode_image(
+    source: &model::Image,
+    srgb: bool,
+    sampler: ImageSamplerDescriptor,
+    budget: &mut TextureBudget,
+) -> Result<Image, TextureFault> {
     if source.bytes.is_empty() {
-        return fail("its file was not found");
+        return Err(TextureFault::NoFile);
     }
-    let Some((kind, width, height, sample)) = header(&source.bytes) else {
-        return fail("it is neither PNG nor JPEG, or damaged");
-    };
+    let (kind, width, height, sample) = header(&source.bytes).ok_or(TextureFault::Format)?;
     let bytes = u64::from(width) * u64::from(height) * 4 * u64::from(sample);
     if bytes > budget.bytes {
-        return fail(&format!("{width} by {height} pixels are more than the 256 MiB that a model's images may take"));
+        return Err(TextureFault::TooLarge { width, height });
     }
     let image = Image::from_buffer(
         &source.bytes,
@@ -51,12 +94,8 @@ pub(super) fn decode(
         srgb,
         ImageSampler::Descriptor(sampler),
         RenderAssetUsages::RENDER_WORLD,
-    );
-    let image = match image {
-        Ok(image) => image,
-        Err(error) => return fail(&error.to_string()),
-    };
-    let Some((mut pixels, mut size)) = rgba8(&image) else { return fail("its pixels have an unknown format") };
+    )?;
+    let (mut pixels, mut size) = rgba8(&image).ok_or(TextureFault::Pixels)?;
     while size[0].max(size[1]) > MOST_SIDE {
         (pixels, size) = halve(&pixels, size);
     }

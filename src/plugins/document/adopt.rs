@@ -28,6 +28,7 @@ use self::trial::Trial;
 use super::{
     EditRefused,
     entities::{BuiltEntities, EntityIndex, EntityPart, GroupEntities, JointEntities, TagEntities},
+    error::{EntityWrite, EntityWriteError},
 };
 use crate::{
     plugins::schema::{
@@ -185,7 +186,7 @@ pub(super) fn adopt_writes(
         let outcome = trial.finish();
         for reason in outcome.refused {
             warn!("{reason}");
-            refused.write(EditRefused { rig: rig_entity, reason });
+            refused.write(EditRefused { rig: rig_entity, reason: reason.into() });
         }
         if outcome.respawn {
             rig.set_changed();
@@ -222,7 +223,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
     pub(super) fn hold_uid(&mut self, entity: Entity, uid: Uid, told: Option<Uid>) {
         if told != Some(uid) {
             self.commands.entity(entity).try_insert(uid);
-            self.trial.refuse(format!("the uid of entity {entity} stays {uid}: an identity never changes"));
+            self.trial.refuse(EntityWriteError::Uid { entity, uid });
         }
     }
 }

@@ -15,7 +15,7 @@ use bevy::{
 };
 
 use super::{
-    Face, FaceExpressions, FacePlaced, FaceReport, FaceRequest,
+    Face, FaceExpressions, FacePlaced, FaceReport, FaceRequest, PlaceFaceError,
     edits::{FaceEdits, NewFace, face_edits},
     placed_bones::{FaceRig, PlacedBone},
     pose,
@@ -31,7 +31,7 @@ use crate::{
     plugins::{
         document::EditRequest,
         history::RigHistory,
-        landing::{JobBasis, JobOutcome, ResultHeld, landing},
+        landing::{HeldResult, JobBasis, JobOutcome, ResultHeld, landing},
         surface::{RigMesh, SkinOf},
     },
     rig::{PoseOffset, Rig, RigEdit, StoredPose, Uid, UidSource, operations::Operation},
@@ -43,7 +43,7 @@ pub struct FaceJob {
     progress: Arc<Progress>,
     /// Names of the shapes to fit.
     shapes: Option<Arc<Shapes>>,
-    task: Task<Result<JobResult, String>>,
+    task: Task<Result<JobResult, FaceError>>,
     /// The part of the document that the face is placed into.
     basis: JobBasis,
     /// A face that is finished and waits; see [`landing`](crate::plugins::landing).
@@ -131,8 +131,7 @@ pub(super) fn start(
     for FaceRequest { mesh: entity, settings, fit } in requests.read() {
         let found = meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, rigs.get(of.0).ok()?, face)));
         let Some((mesh, rig, face)) = found else {
-            let result = Err("the mesh belongs to no rig; it may have been closed".to_owned());
-            placed.write(FacePlaced { mesh: *entity, result });
+            placed.write(FacePlaced { mesh: *entity, result: Err(PlaceFaceError::NoRig) });
             continue;
         };
         let basis = JobBasis::of(rig, mesh.uid);
@@ -163,16 +162,12 @@ struct JobInput {
 }
 
 impl JobInput {
-    fn run(self, progress: &Progress) -> Result<JobResult, String> {
+    fn run(self, progress: &Progress) -> Result<JobResult, FaceError> {
         let Self { rig, mesh, settings, shapes, expressions, ready } = self;
         let told = |step: FaceStep, part: f32| progress.told(step, part);
-        let text = |error: FaceError| error.to_string();
         let analysis = match ready {
             Some(analysis) => analysis,
-            None => {
-                let found = FaceAnalysis::new(&mesh.rest.points, &mesh.triangles, &settings, &told);
-                Arc::new(found.map_err(text)?)
-            }
+            None => Arc::new(FaceAnalysis::new(&mesh.rest.points, &mesh.triangles, &settings, &told)?),
         };
         let known = FaceRig::read(&rig);
         let turn = analysis.axes.rotation();
@@ -187,7 +182,7 @@ impl JobInput {
             _ => settings.bones,
         };
         let how = AutoSettings { bones, ..settings.clone() };
-        let mut face = analysis.rig(&fixed, &how, &expressions, &told).map_err(text)?;
+        let mut face = analysis.rig(&fixed, &how, &expressions, &told)?;
         let fit = match &shapes {
             None => None,
             Some(shapes) => {
@@ -196,7 +191,7 @@ impl JobInput {
                     joint.is_some_and(|joint| joint.data.locked)
                 };
                 let locked: Vec<bool> = face.bones.iter().map(locked).collect();
-                let fit = analysis.refit(&face, &shapes.displacements, &locked, &told).map_err(text)?;
+                let fit = analysis.refit(&face, &shapes.displacements, &locked, &told)?;
                 face = fit.face.clone();
                 Some(fit)
             }
@@ -251,25 +246,23 @@ pub(super) fn land(
         let result = match (finished, rigs.get(of.0)) {
             (Ok(done), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
                 JobOutcome::Commit => Ok(done),
-                JobOutcome::Drop => Err("the joints were changed while the face was placed; place it again".to_owned()),
+                JobOutcome::Drop => Err(PlaceFaceError::Changed),
                 JobOutcome::Hold => {
                     job.held = Some(done);
                     if !was_held && history.can_redo() {
-                        let reason = "the face is ready, but placing it now would lose the steps that were undone; \
-                                      redo them, or go on editing, and the face follows if it still fits";
-                        commands.write_message(ResultHeld { mesh: entity, reason: reason.to_owned() });
+                        commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Face });
                     }
                     continue;
                 }
             },
-            (result, _) => result,
+            (result, _) => result.map_err(PlaceFaceError::from),
         };
         let shapes = job.shapes.clone();
         commands.entity(entity).remove::<FaceJob>();
         let result = result.and_then(|done| {
-            let (rig, _) = rigs.get(of.0).map_err(|_| "the rig was closed meanwhile".to_owned())?;
+            let (rig, _) = rigs.get(of.0).map_err(|_| PlaceFaceError::Closed)?;
             if done.kept.iter().any(|bone| rig.joint(bone.uid).is_none()) {
-                return Err("facial bones were deleted meanwhile; place the face again".to_owned());
+                return Err(PlaceFaceError::Deleted);
             }
             let (edits, report) = done.edits(rig, mesh, shapes.as_deref(), &mut uids);
             commands.entity(entity).insert(Face {

@@ -4,7 +4,7 @@ use std::{borrow::Cow, collections::BTreeMap};
 
 use bevy::prelude::*;
 
-use super::{ExpressRequest, Expressed, Expressions, Face, FaceExpressions, placed_bones::FaceRig};
+use super::{ExpressError, ExpressRequest, Expressed, Expressions, Face, FaceExpressions, placed_bones::FaceRig};
 use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis, FaceError},
@@ -76,8 +76,7 @@ pub(super) fn express(
         let found =
             meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, of.0, rigs.get(of.0).ok()?, face)));
         let Some((mesh, rig_entity, (rig, history), face)) = found else {
-            let result = Err("the mesh belongs to no rig; it may have been closed".to_owned());
-            told.write(Expressed { mesh: *entity, result });
+            told.write(Expressed { mesh: *entity, result: Err(ExpressError::NoRig) });
             continue;
         };
         let analysed = match face {
@@ -85,7 +84,7 @@ pub(super) fn express(
             // An opened file has the positions of the bones, but not of the features.
             _ => analyse(mesh),
         };
-        let result = analysed.map_err(|error| error.to_string()).and_then(|face| {
+        let result = analysed.map_err(ExpressError::from).and_then(|face| {
             // A preview is undone before the next preview or edit.
             let settled = history.map_or(Cow::Borrowed(rig), |history| history.settled(rig));
             let edits = expression_edits(&settled, mesh, &face.analysis, &set.0, strengths)?;
@@ -116,19 +115,19 @@ struct Posed {
     poses: Vec<BonePose>,
 }
 
-/// Poses of the facial bones for strengths. The error is a sentence without its full stop.
+/// Poses of the facial bones for strengths.
 fn posed(
     rig: &Rig,
     mesh: &RigMesh,
     analysis: &FaceAnalysis,
     set: &ExpressionSet,
     strengths: &BTreeMap<String, f32>,
-) -> Result<Posed, String> {
+) -> Result<Posed, ExpressError> {
     let known = FaceRig::read(rig);
     if known.bones.is_empty() {
-        return Err("the rig has no facial bones; place a face first".to_owned());
+        return Err(ExpressError::NoBones);
     }
-    let skin = rig.skin(mesh.uid).ok_or_else(|| "the mesh is not skinned; place a face first".to_owned())?;
+    let skin = rig.skin(mesh.uid).ok_or(ExpressError::NotSkinned)?;
     let mix = mixed(set, strengths)?;
     let weights = analysed_weights(skin, &known, analysis);
     let bones = known.face_bones(analysis);
@@ -139,16 +138,16 @@ fn posed(
 /// A blend of expressions and units by name; a unit's name may end in `_l` or `_r` for one side.
 ///
 /// # Errors
-/// A sentence without its full stop: an unknown name, a strength that is not a number.
-pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<Mix, String> {
+/// [`ExpressError::Unknown`] and [`ExpressError::Strength`].
+pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<Mix, ExpressError> {
     let mut wanted = Vec::new();
     for (name, strength) in strengths {
         if !strength.is_finite() {
-            return Err(format!("the strength of \"{name}\" is not a number; write one from 0 to 1"));
+            return Err(ExpressError::Strength { name: name.clone() });
         }
         let expression = set.find(name).ok_or_else(|| {
             let nearest = did_you_mean(name, set.names());
-            format!("there is no expression \"{name}\"{nearest}")
+            ExpressError::Unknown { name: name.clone(), nearest }
         })?;
         wanted.push((expression, strength.clamp(0.0, 1.0)));
     }
@@ -163,7 +162,7 @@ fn expression_edits(
     analysis: &FaceAnalysis,
     set: &ExpressionSet,
     strengths: &BTreeMap<String, f32>,
-) -> Result<Vec<RigEdit>, String> {
+) -> Result<Vec<RigEdit>, ExpressError> {
     let Posed { known, poses, .. } = posed(rig, mesh, analysis, set, strengths)?;
     let edits = known.bones.iter().zip(&poses).filter_map(|(bone, pose)| {
         let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
@@ -177,14 +176,14 @@ fn expression_edits(
 /// 0 to 1.
 ///
 /// # Errors
-/// A sentence without its full stop: no facial bones, no weights, no such expression.
+/// See [`ExpressError`]: no facial bones, no weights, no such expression.
 pub fn expressed_points(
     rig: &Rig,
     mesh: &RigMesh,
     analysis: &FaceAnalysis,
     set: &ExpressionSet,
     strengths: &BTreeMap<String, f32>,
-) -> Result<Vec<Vec3>, String> {
+) -> Result<Vec<Vec3>, ExpressError> {
     let Posed { bones, weights, poses, .. } = posed(rig, mesh, analysis, set, strengths)?;
     Ok(apply(&analysis.points, &weights, &bones, &poses))
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use bevy::{ecs::system::SystemParam, prelude::*};
 
-use super::Gesture;
+use super::{Gesture, error::GestureError};
 use crate::{
     algo::{
         placement::{PlaceSettings, Placement},
@@ -120,16 +120,16 @@ pub(super) fn run_scripts(mut scripts: Query<Scripted>, mut requests: Requests, 
         let mut act = GestureRun { entity, rig, selection, bounds, state: &mut script.state, symmetry: &mut symmetry };
         match act.make(gesture, &mut requests) {
             Ok(pending) => script.pending = pending,
-            Err(message) => script.fail(message),
+            Err(error) => script.fail(&error),
         }
     }
 }
 
 impl GestureScript {
-    fn fail(&mut self, message: String) {
+    fn fail(&mut self, error: &GestureError) {
         if let Some(answer) = self.answers.last_mut() {
             answer.done = false;
-            answer.message = message;
+            answer.message = error.to_string();
         }
     }
 
@@ -146,7 +146,7 @@ impl Answers<'_, '_> {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             match joints.as_slice() {
                 _ if !script.pending => continue,
-                [] => script.fail("there is no joint to pick".to_owned()),
+                [] => script.fail(&GestureError::NothingToPick),
                 [joint] => script.say(format!("selected {}", name_of(rig, *joint))),
                 joints => script.say(format!("selected {} joints", joints.len())),
             }
@@ -156,7 +156,7 @@ impl Answers<'_, '_> {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             script.note_added(rig);
             match placement {
-                Placement::Nothing => script.fail("the ray meets nothing there: no joint was placed".to_owned()),
+                Placement::Nothing => script.fail(&GestureError::NothingThere),
                 Placement::Single { position } => {
                     script.say(format!("placed a joint on the surface at {}", point(*position)));
                 }
@@ -175,7 +175,7 @@ impl Answers<'_, '_> {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             script.note_added(rig);
             match result {
-                StrokeResult::Nothing(why) => script.fail(why.clone()),
+                StrokeResult::Nothing(why) => script.fail(&why.clone().into()),
                 StrokeResult::Inserted { child } => {
                     script.say(format!("put a joint into the bone that ends at {}", name_of(rig, *child)));
                 }
@@ -198,7 +198,7 @@ impl Answers<'_, '_> {
         }
         for EditRefused { rig: entity, reason } in self.refused.read() {
             let Ok((_, mut script, ..)) = scripts.get_mut(*entity) else { continue };
-            script.fail(reason.clone());
+            script.fail(&reason.clone().into());
             script.pending = false;
         }
     }
@@ -245,16 +245,16 @@ impl GestureRun<'_, '_> {
         self.state.reach.unwrap_or(0.005 * self.size())
     }
 
-    fn active(&self) -> Result<Uid, String> {
-        self.selection.active().ok_or_else(|| "no joint is selected; select one first".to_owned())
+    fn active(&self) -> Result<Uid, GestureError> {
+        self.selection.active().ok_or(GestureError::NoSelection)
     }
 
-    fn selected(&self) -> Result<Vec<Uid>, String> {
+    fn selected(&self) -> Result<Vec<Uid>, GestureError> {
         self.active().map(|_| self.selection.0.clone())
     }
 
     /// Sends the requests of a gesture; returns `true` if it has to wait for an answer.
-    fn make(&mut self, gesture: Gesture, requests: &mut Requests) -> Result<bool, String> {
+    fn make(&mut self, gesture: Gesture, requests: &mut Requests) -> Result<bool, GestureError> {
         let rig = self.entity;
         let mut operation = None;
         let mut pick = None;
@@ -283,7 +283,7 @@ impl GestureRun<'_, '_> {
                 pick = Some((Pick::Box { plane: self.plane(), corners: [a.into(), b.into()] }, false));
             }
             Gesture::SelectLabel(label) => {
-                let joint = self.rig.find_label(&label).ok_or_else(|| format!("no joint has the label \"{label}\""))?;
+                let joint = self.rig.find_label(&label).ok_or(GestureError::NoLabel(label))?;
                 pick = Some((Pick::Joints(vec![joint]), false));
             }
             Gesture::SelectAll => pick = Some((Pick::All, false)),
@@ -335,7 +335,7 @@ impl GestureRun<'_, '_> {
     }
 
     /// The operation of a gesture on the selected joints.
-    fn operation(&self, gesture: Gesture) -> Result<Operation, String> {
+    fn operation(&self, gesture: Gesture) -> Result<Operation, GestureError> {
         let plane = self.plane();
         let active = self.active()?;
         let joints = self.selected()?;
@@ -354,7 +354,7 @@ impl GestureRun<'_, '_> {
                     .take(labels.len())
                     .collect();
                 if chain.len() < labels.len() {
-                    return Err(format!("there are {} names for a chain of {} joints", labels.len(), chain.len()));
+                    return Err(GestureError::LongChain { names: labels.len(), joints: chain.len() });
                 }
                 Operation::Labels(chain.into_iter().rev().zip(labels).collect())
             }
@@ -387,7 +387,7 @@ impl GestureRun<'_, '_> {
             Gesture::MirrorSelected => Operation::Mirror { joints },
             Gesture::Group(name, color) => Operation::Group { joints, name, color: color.map(<[f32; 3]>::from) },
             Gesture::Lock(locked) => Operation::Lock(joints, locked),
-            _ => return Err("this gesture changes no joint".to_owned()),
+            _ => return Err(GestureError::NoOperation),
         })
     }
 }

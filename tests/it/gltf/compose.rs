@@ -1,7 +1,7 @@
 //! glTF files made in the test, so that every field can be bent.
 
 use rigsmith::mesh::{
-    gltf::{GltfError, read_gltf},
+    gltf::{ExternalError, GltfError, read_gltf},
     model::Model,
 };
 use serde_json::{Value, json};
@@ -117,7 +117,7 @@ pub fn glb(json: &[u8], bin: &[u8]) -> Vec<u8> {
 
 /// Reads a file that refers to nothing outside.
 pub fn read(bytes: &[u8]) -> Result<Model, GltfError> {
-    read_gltf(bytes, "folder/test.glb", &mut |uri| Err(format!("there is no {uri}")))
+    read_gltf(bytes, "folder/test.glb", &mut |uri| Err(ExternalError::new(format!("there is no {uri}"))))
 }
 
 /// The smallest picture: what readers look at is its first bytes.

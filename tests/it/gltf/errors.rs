@@ -1,7 +1,7 @@
 //! What is wrong with a file is said with the file's name and the place, before anything is built on it.
 
 use super::compose::{Composed, character, glb, read, triangle};
-use rigsmith::mesh::gltf::{MAX_IMAGE_BYTES, memory_limit, read_gltf};
+use rigsmith::mesh::gltf::{ExternalError, MAX_IMAGE_BYTES, memory_limit, read_gltf};
 use serde_json::{Value, json};
 
 fn error(bytes: &[u8]) -> String {
@@ -199,8 +199,9 @@ fn uris() {
 
     let check = |uri: &str, path: &str| {
         let file = triangle();
-        let mut load =
-            |asked: &str| if asked == path { Ok(file.bin.clone()) } else { Err(format!("{asked} was opened")) };
+        let mut load = |asked: &str| {
+            if asked == path { Ok(file.bin.clone()) } else { Err(ExternalError::new(format!("{asked} was opened"))) }
+        };
         let model = read_gltf(&file.gltf(uri), "m.gltf", &mut load);
         assert!(model.is_ok(), "{uri}: {model:?}");
     };

@@ -6,7 +6,7 @@ use super::{
 };
 use glam::{Mat4, Vec2, Vec3};
 use rigsmith::mesh::{
-    gltf::{GltfError, GltfWriteSettings, read_gltf, write_glb},
+    gltf::{ExternalError, GltfError, GltfWriteSettings, read_gltf, write_glb},
     model::{ChannelTarget, Model, Node, Object, Part, SkinBinding, Trs, Weights},
 };
 use serde_json::{Value, json};
@@ -24,9 +24,9 @@ pub fn there_and_back(name: &str, model: &Model, settings: &GltfWriteSettings) -
     assert_eq!(first.len() % 4, 0);
     let other_reader = ::gltf::Gltf::from_slice(&first);
     assert!(other_reader.is_ok(), "{name}: {other_reader:?}");
-    let again = read_gltf(&first, name, &mut |uri| Err(format!("there is no {uri}"))).unwrap();
+    let again = read_gltf(&first, name, &mut |uri| Err(ExternalError::new(format!("there is no {uri}")))).unwrap();
     let second = write_glb(&again, settings).unwrap();
-    let third = read_gltf(&second, name, &mut |uri| Err(format!("there is no {uri}"))).unwrap();
+    let third = read_gltf(&second, name, &mut |uri| Err(ExternalError::new(format!("there is no {uri}")))).unwrap();
     assert!(again == third, "{name} changes when written again");
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("gltf");
     std::fs::create_dir_all(&folder).unwrap();

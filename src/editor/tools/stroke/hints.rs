@@ -70,7 +70,7 @@ fn describe_preview(preview: &StrokePreview, rig: &EditedRig) -> (String, Option
             let notes: String = chain.notes.iter().map(|note| format!(" {}", heard(note))).collect();
             (format!("{}; the chain {}.{notes} {keys}", joints(count), why.describe(&parent)), None)
         }
-        StrokeResult::Nothing(why) => (keys.to_owned(), Some(why.clone())),
+        StrokeResult::Nothing(why) => (keys.to_owned(), Some(why.to_string())),
         StrokeResult::Inserted { child } => {
             (format!("Enter puts a joint into the bone above {}.", rig.name(*child)), None)
         }

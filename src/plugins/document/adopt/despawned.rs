@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::{
     super::entities::{EntityPart, IndexedEntity},
-    Adoption,
+    Adoption, EntityWrite, EntityWriteError,
     sorting::RigWrites,
 };
 use crate::rig::{RigEdit, Uid, operations::Operation};
@@ -33,9 +33,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                     }
                     self.trial.respawn = true;
                     if indexed.part == EntityPart::Node {
-                        let reason =
-                            "a created node was despawned and comes back; switch off or delete its command instead";
-                        self.trial.refuse(reason.to_owned());
+                        self.trial.refuse(EntityWriteError::CreatedNode);
                     }
                 }
                 EntityPart::Tag | EntityPart::Group => {}
@@ -48,7 +46,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 self.forget_joint(*joint);
             }
             let delete = Operation::Delete { joints: deleted, keep_children: false };
-            self.trial.operate("a despawned joint", &delete);
+            self.trial.operate(EntityWrite::DespawnedJoint, &delete);
         }
         for (_, indexed) in &writes.dead {
             let uid = indexed.uid;
@@ -57,7 +55,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                     let bearer = self.rig().find_tag(uid).map(|(joint, _)| joint.data.uid);
                     // Tags of a joint that gets a new entity stay in the document.
                     if let Some(joint) = bearer.filter(|joint| self.joints.get(*joint).is_some()) {
-                        self.trial.edit("a despawned tag", vec![RigEdit::RemoveTag(joint, uid)]);
+                        self.trial.edit(EntityWrite::DespawnedTag, vec![RigEdit::RemoveTag(joint, uid)]);
                     }
                     self.tags.tags.remove(&uid);
                     for mirrored in self.joints.joints.values_mut() {
@@ -71,7 +69,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                     let mut edits: Vec<RigEdit> = members.map(|joint| RigEdit::SetGroup(joint, None)).collect();
                     edits.push(RigEdit::RemoveLocalGroup(uid));
                     if self.rig().group(uid).is_some() {
-                        self.trial.edit("a despawned local group", edits);
+                        self.trial.edit(EntityWrite::DespawnedLocalGroup, edits);
                     }
                     for mirrored in self.joints.joints.values_mut().filter(|mirrored| mirrored.group == Some(uid)) {
                         mirrored.group = None;

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::{super::entities::EntityPart, Adoption, sorting::RigWrites};
+use super::{super::entities::EntityPart, Adoption, EntityWrite, EntityWriteError, sorting::RigWrites};
 use crate::{
     plugins::schema::{GroupOf, LocalGroup},
     rig::{GroupData, RigEdit},
@@ -20,7 +20,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             let uid = self.trial.free_uid(asked);
             let data = GroupData { uid, name: group.name, color: group.color, enabled: group.enabled };
             let added = RigEdit::AddLocalGroup(data.clone(), usize::MAX);
-            if self.trial.edit("a spawned local group", vec![added]) {
+            if self.trial.edit(EntityWrite::SpawnedLocalGroup, vec![added]) {
                 self.commands.entity(entity).try_insert((uid, Name::new(data.name.clone())));
                 self.index.insert(entity, self.trial.rig_entity, uid, EntityPart::Group);
                 self.groups.groups.insert(uid, (entity, data));
@@ -35,8 +35,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             self.hold_uid(entity, uid, view.uid.copied());
             if view.group_of != Some(&GroupOf(self.trial.rig_entity)) {
                 self.commands.entity(entity).try_insert(GroupOf(self.trial.rig_entity));
-                self.trial
-                    .refuse(format!("local group \"{}\" stays with its rig; add one to the other rig", data.name));
+                self.trial.refuse(EntityWriteError::GroupRig { name: data.name.clone() });
             }
             let told = view.group.map(|group| GroupData {
                 uid,
@@ -46,10 +45,9 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             });
             let is_taken = match &told {
                 Some(told) if *told == data => continue,
-                Some(told) => self.trial.edit("a write to a local group", vec![RigEdit::SetLocalGroup(told.clone())]),
+                Some(told) => self.trial.edit(EntityWrite::LocalGroup, vec![RigEdit::SetLocalGroup(told.clone())]),
                 None => {
-                    self.trial
-                        .refuse(format!("local group \"{}\" cannot lose its `LocalGroup`; despawn it", data.name));
+                    self.trial.refuse(EntityWriteError::GroupContent { name: data.name.clone() });
                     false
                 }
             };

@@ -9,7 +9,7 @@ use super::{
         entities::{EntityPart, MirroredJoint},
         follow::{rest_of, write_group, write_label},
     },
-    Adoption,
+    Adoption, EntityWrite, EntityWriteError,
     sorting::RigWrites,
 };
 use crate::{
@@ -45,10 +45,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let Some(above) = view.child_of.map(ChildOf::parent) else { return };
         let parent = if above == rig_entity { None } else { self.uid_of(above, EntityPart::Joint) };
         if parent.is_none() && above != rig_entity {
-            let reason = "a joint was spawned below an entity that is no joint of the document; spawn it below a joint or \
-                          the rig";
             self.commands.entity(entity).try_remove::<ChildOf>();
-            return self.trial.refuse(reason.to_owned());
+            return self.trial.refuse(EntityWriteError::JointParent);
         }
         let group_entity = view.in_group.map(|group| group.0);
         let rest = rest_of(view.rest, view.transform);
@@ -59,7 +57,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let uid = self.trial.free_uid(asked);
         let data = JointData { uid, label: label.clone(), group, kind, rest, ..JointData::default() };
         let added = RigEdit::AddJoint { joint: Box::new(data), parent, index: usize::MAX };
-        if !self.trial.edit("a spawned joint", vec![added]) {
+        if !self.trial.edit(EntityWrite::SpawnedJoint, vec![added]) {
             // The refused entity stays, outside of the rig.
             self.commands.entity(entity).try_remove::<ChildOf>();
             return;
@@ -88,12 +86,12 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             self.hold_uid(entity, uid, view.uid.copied());
             if !view.joint {
                 self.commands.entity(entity).try_insert(Joint);
-                self.trial.refuse(format!("joint {uid} cannot lose its `Joint`; despawn its entity to delete it"));
+                self.trial.refuse(EntityWriteError::JointMarker(uid));
             }
             let mut next = mirrored.clone();
             let label = view.label.map(|label| label.0.clone()).filter(|label| !label.is_empty());
             if label != mirrored.label {
-                if self.trial.edit("a write to a label", vec![RigEdit::SetLabel(uid, label.clone())]) {
+                if self.trial.edit(EntityWrite::Label, vec![RigEdit::SetLabel(uid, label.clone())]) {
                     next.label.clone_from(&label);
                 }
                 // The `Name` follows the label; an empty label counts as none.
@@ -108,13 +106,12 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             if told_group != mirrored.group.map(Some) {
                 let is_taken = match told_group {
                     Some(None) => {
-                        self.trial
-                            .refuse(format!("joint {uid} cannot be in a group of another rig; add one to this rig"));
+                        self.trial.refuse(EntityWriteError::ForeignGroup(uid));
                         false
                     }
                     told => {
                         let group = told.flatten();
-                        self.trial.edit("a write to a group", vec![RigEdit::SetGroup(uid, group)])
+                        self.trial.edit(EntityWrite::Group, vec![RigEdit::SetGroup(uid, group)])
                     }
                 };
                 if is_taken {
@@ -126,7 +123,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             let rest = view.rest.copied();
             if rest != Some(mirrored.rest) {
                 let set = rest.map(|rest| RigEdit::SetRest(uid, rest));
-                if set.is_some_and(|set| self.trial.edit("a write to a rest pose", vec![set])) {
+                if set.is_some_and(|set| self.trial.edit(EntityWrite::Rest, vec![set])) {
                     // The transform is written when the entity follows the document, which still holds the former rest
                     // pose.
                 } else {
@@ -153,14 +150,13 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         };
         let is_taken = match parent {
             None => {
-                let reason = format!("joint {uid} can only hang below joints of its own rig that are in the document");
-                self.trial.refuse(reason);
+                self.trial.refuse(EntityWriteError::ForeignParent(uid));
                 false
             }
             Some(parent) if self.rig().joint(uid).is_some_and(|joint| joint.parent == parent) => false,
             Some(parent) => {
                 let set = RigEdit::SetParent { joint: uid, parent, index: usize::MAX };
-                self.trial.edit("a write to a parent", vec![set])
+                self.trial.edit(EntityWrite::Parent, vec![set])
             }
         };
         // An accepted parent is set after the build. A refused one is replaced by the former parent, if that still
@@ -197,9 +193,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             if let Some(parent) = mirrored.parent {
                 self.commands.entity(entity).try_insert(ChildOf(parent));
             }
-            let reason =
-                format!("\"{}\" was created by a command and stays as that says; change the command", node.name);
-            self.trial.refuse(reason);
+            self.trial.refuse(EntityWriteError::CreatedContent { name: node.name.to_string() });
         }
     }
 }

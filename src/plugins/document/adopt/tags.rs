@@ -7,7 +7,7 @@ use super::{
         entities::{EntityPart, MirroredTag},
         follow::write_tag,
     },
-    Adoption,
+    Adoption, EntityWrite, EntityWriteError,
     sorting::RigWrites,
 };
 use crate::{
@@ -55,14 +55,11 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let Ok(view) = self.views.get(entity) else { return };
         let Some(bearer) = view.tag_of.map(|of| of.0) else { return };
         let Some(joint) = self.uid_of(bearer, EntityPart::Joint) else {
-            let reason =
-                "a tag was spawned on an entity that is no joint of the document; put it on a joint".to_owned();
-            return self.tag_refused(entity, Some(reason));
+            return self.tag_refused(entity, Some(EntityWriteError::TagBearer));
         };
         let uid = self.trial.free_uid(view.uid.copied());
         let Some(data) = self.told_tag(entity, uid) else {
-            let reason = "a spawned tag is in a feature of another rig; put it into one of its own rig".to_owned();
-            return self.tag_refused(entity, Some(reason));
+            return self.tag_refused(entity, Some(EntityWriteError::ForeignFeature));
         };
         // Index of the tag among the tags of the joint that the document has.
         let before = self.views.get(bearer).ok().and_then(|view| view.tags).map_or(usize::MAX, |tags| {
@@ -72,7 +69,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 .count()
         });
         let added = RigEdit::AddTag { joint, tag: Box::new(data.clone()), index: before };
-        if !self.trial.edit("a spawned tag", vec![added]) {
+        if !self.trial.edit(EntityWrite::SpawnedTag, vec![added]) {
             return self.tag_refused(entity, None);
         }
         self.commands.entity(entity).try_insert(uid);
@@ -84,7 +81,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
     }
 
     /// Removes a spawned tag that the document refuses from its joint; the entity stays.
-    fn tag_refused(&mut self, entity: Entity, reason: Option<String>) {
+    fn tag_refused(&mut self, entity: Entity, reason: Option<EntityWriteError>) {
         self.commands.entity(entity).try_remove::<TagOf>();
         if let Some(reason) = reason {
             self.trial.refuse(reason);
@@ -102,11 +99,9 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let told = self.told_tag(entity, uid);
         if told.as_ref() != Some(&mirrored.data) {
             let is_taken = match &told {
-                Some(told) => self.trial.edit("a write to a tag", vec![RigEdit::SetTag(joint, Box::new(told.clone()))]),
+                Some(told) => self.trial.edit(EntityWrite::Tag, vec![RigEdit::SetTag(joint, Box::new(told.clone()))]),
                 None => {
-                    let reason =
-                        format!("tag {uid} needs a command or a feature of its own rig; despawn it to delete it");
-                    self.trial.refuse(reason);
+                    self.trial.refuse(EntityWriteError::TagContent(uid));
                     false
                 }
             };
@@ -129,10 +124,10 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let is_taken = match (target, data) {
             (Some(target), Some(data)) if self.rig().joint(target).is_some() => {
                 let add = RigEdit::AddTag { joint: target, tag: Box::new(data), index: usize::MAX };
-                self.trial.edit("a tag on another joint", vec![RigEdit::RemoveTag(joint, uid), add])
+                self.trial.edit(EntityWrite::TagJoint, vec![RigEdit::RemoveTag(joint, uid), add])
             }
             _ => {
-                self.trial.refuse(format!("tag {uid} can only be on a joint of its own rig; despawn it to delete it"));
+                self.trial.refuse(EntityWriteError::TagJoint(uid));
                 false
             }
         };
@@ -173,7 +168,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 now.retain(|other| other != tag);
                 now.insert(at, *tag);
             }
-            if self.trial.edit("an order of tags", edits)
+            if self.trial.edit(EntityWrite::TagOrder, edits)
                 && let Some(mirrored) = self.joints.joints.get_mut(&uid)
             {
                 mirrored.tags = told;

@@ -2,6 +2,7 @@
 
 use bevy::prelude::*;
 
+use super::super::error::{EntityWrite, EntityWriteError};
 use crate::rig::{Rig, RigEdit, Uid, UidSource, operations::Operation};
 
 /// Writes of one frame, tried on a document.
@@ -11,7 +12,7 @@ pub(super) struct Trial<'a> {
     uids: &'a mut UidSource,
     edits: Vec<RigEdit>,
     inverses: Vec<RigEdit>,
-    refused: Vec<String>,
+    refused: Vec<EntityWriteError>,
     /// True if entities have to be spawned or written again although the document stays the same.
     pub respawn: bool,
 }
@@ -21,7 +22,7 @@ pub(super) struct TrialResult {
     /// Edits that the document accepts, in order.
     pub edits: Vec<RigEdit>,
     /// Reasons for refusing the other edits.
-    pub refused: Vec<String>,
+    pub refused: Vec<EntityWriteError>,
     pub respawn: bool,
 }
 
@@ -44,12 +45,12 @@ impl<'a> Trial<'a> {
     }
 
     /// Tries edits, all or none; returns false if the document refuses them.
-    pub fn edit(&mut self, what: &str, edits: Vec<RigEdit>) -> bool {
-        self.operate(what, &Operation::Edits(edits))
+    pub fn edit(&mut self, write: EntityWrite, edits: Vec<RigEdit>) -> bool {
+        self.operate(write, &Operation::Edits(edits))
     }
 
     /// Tries an operation; returns false if the document refuses it.
-    pub fn operate(&mut self, what: &str, operation: &Operation) -> bool {
+    pub fn operate(&mut self, write: EntityWrite, operation: &Operation) -> bool {
         match operation.run(self.rig, self.uids, None) {
             Ok(outcome) => {
                 self.edits.extend(outcome.edits);
@@ -57,15 +58,15 @@ impl<'a> Trial<'a> {
                 self.inverses.splice(0..0, outcome.inverses);
                 true
             }
-            Err(error) => {
-                self.refuse(format!("{what} was not taken over: {error}"));
+            Err(source) => {
+                self.refuse(EntityWriteError::Refused { write, source });
                 false
             }
         }
     }
 
     /// Records the reason for refusing a write that cannot be an edit.
-    pub fn refuse(&mut self, reason: String) {
+    pub fn refuse(&mut self, reason: EntityWriteError) {
         self.refused.push(reason);
     }
 

@@ -1,0 +1,26 @@
+//! Reasons why the value of an argument is refused.
+
+/// Reason why the value of an argument is refused.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub(super) enum ArgumentError {
+    /// The value has to be a positive number.
+    #[error("write a number above zero")]
+    NotPositive,
+    /// The value has to name an axis.
+    #[error("write x, y or z, or -x, -y or -z")]
+    NoAxis,
+    /// The value has to name an expression and its strength.
+    #[error("write NAME=STRENGTH, such as happiness=0.8")]
+    NoStrength,
+    /// The strength of an expression is out of its range.
+    #[error("{0} is not from 0 to 1")]
+    Strength(f32),
+    /// The value has to be two angles.
+    #[cfg(feature = "render")]
+    #[error("write yaw and pitch in degrees, such as 30,15")]
+    NoOrbit,
+    /// The value has to be the size of a picture.
+    #[cfg(feature = "render")]
+    #[error("write width and height in pixels, such as 1280x720")]
+    NoSize,
+}

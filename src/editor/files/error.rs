@@ -1,0 +1,93 @@
+//! Reasons why a document is not opened or not written.
+
+use std::path::PathBuf;
+
+use crate::{
+    files::{LoadError, ReadError, SaveError, StoreError, journal::JournalError},
+    mesh::obj::ObjError,
+    rig::{EditError, skin::SkinError},
+};
+
+/// Reason why a document is not opened.
+#[derive(Debug, thiserror::Error)]
+pub(in crate::editor) enum OpenError {
+    /// The file has weights, which are no document.
+    #[error("{name} has only weights; open the project or the .glb that they belong to")]
+    WeightsAlone {
+        /// Name of the file.
+        name: String,
+    },
+    /// The file's name ends in `.ron`, like a list of gestures.
+    #[error("{name} is neither template nor project; those end in .rig.ron and .rigsmith.ron")]
+    Gestures {
+        /// Name of the file.
+        name: String,
+    },
+    /// The file's name has no known ending.
+    #[error(
+        "{name} is nothing that can be opened; a mesh ends in .obj, .gltf or .glb, a template in .rig.ron or .rig, a \
+         project in .rigsmith.ron"
+    )]
+    Unknown {
+        /// Name of the file.
+        name: String,
+    },
+    /// The project has no rig.
+    #[error("`{}` has no rig; open its mesh instead", .0.display())]
+    NoRig(PathBuf),
+    /// The project has several rigs.
+    #[error("`{}` has several rigs, and the window edits one; split it into one project a rig", .0.display())]
+    SeveralRigs(PathBuf),
+    /// The file cannot be loaded.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The file of a journal cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The journal holds nothing to recover.
+    #[error("`{}`: {source}", path.display())]
+    Journal {
+        /// The journal.
+        path: PathBuf,
+        /// Error of the reader.
+        source: JournalError,
+    },
+    /// The bundled character is invalid.
+    #[error(transparent)]
+    Bundled(#[from] ObjError),
+    /// The rig refuses a joint of the file.
+    #[error(transparent)]
+    Edit(#[from] EditError),
+}
+
+/// Reason why a document is not written.
+#[derive(Debug, thiserror::Error)]
+pub(in crate::editor) enum WriteError {
+    /// No document is open.
+    #[error("nothing is open")]
+    NothingOpen,
+    /// The format of the file cannot hold the document, or the disk refuses it.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The disk refuses the file.
+    #[error(transparent)]
+    Save(#[from] SaveError),
+    /// The weights are invalid.
+    #[error(transparent)]
+    Skin(#[from] SkinError),
+    /// The mesh has no weights.
+    #[error("there are no weights to export; skin the mesh first")]
+    NoWeights,
+    /// The file's name has no fitting ending.
+    #[error(
+        "a character is exported as .glb, .gltf or .obj, a rig as .rig.ron or .rig, weights as .skin; choose one of \
+         these endings"
+    )]
+    Ending,
+    /// The folder has other files under the names that the bundled character would get.
+    #[error("there is another {names} in that folder already; choose another name or folder")]
+    Occupied {
+        /// The names, in words.
+        names: String,
+    },
+}

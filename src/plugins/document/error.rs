@@ -1,0 +1,147 @@
+//! Reasons why changes are refused.
+
+use bevy::prelude::*;
+
+use crate::{
+    plugins::controls::SwitchError,
+    rig::{EditError, Uid, operations::OperationError},
+};
+
+/// Reason why a change was refused; a sentence for people without its full stop.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ChangeError {
+    /// The entity of the request has no [`Rig`](crate::rig::Rig).
+    #[error("entity {0} is no rig; it may have been closed")]
+    NoRig(Entity),
+    /// The history has no step in effect.
+    #[error("there is nothing to undo")]
+    NothingToUndo,
+    /// The history has no undone step.
+    #[error("there is nothing to redo")]
+    NothingToRedo,
+    /// The rig refuses the operation.
+    #[error(transparent)]
+    Operation(#[from] OperationError),
+    /// The rig refuses an edit, of a step that is undone or redone for example.
+    #[error(transparent)]
+    Edit(#[from] EditError),
+    /// A write to an entity cannot be taken over into the document.
+    #[error(transparent)]
+    Entity(#[from] EntityWriteError),
+    /// A switch cannot be set.
+    #[error(transparent)]
+    Switch(#[from] SwitchError),
+}
+
+/// Reason why a write to an entity is not taken over into the document.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EntityWriteError {
+    /// The rig refuses the edit that the write would be.
+    #[error("{write} was not taken over: {source}")]
+    Refused {
+        /// Kind of the write.
+        write: EntityWrite,
+        /// Answer of the rig.
+        source: OperationError,
+    },
+    /// The uid of a part was removed or replaced.
+    #[error("the uid of entity {entity} stays {uid}: an identity never changes")]
+    Uid {
+        /// The entity of the part.
+        entity: Entity,
+        /// The uid that the part keeps.
+        uid: Uid,
+    },
+    /// A created node was despawned.
+    #[error("a created node was despawned and comes back; switch off or delete its command instead")]
+    CreatedNode,
+    /// A created node was written.
+    #[error("\"{name}\" was created by a command and stays as that says; change the command")]
+    CreatedContent {
+        /// Name of the node.
+        name: String,
+    },
+    /// A joint was spawned outside of the document.
+    #[error("a joint was spawned below an entity that is no joint of the document; spawn it below a joint or the rig")]
+    JointParent,
+    /// A joint lost its marker component.
+    #[error("joint {0} cannot lose its `Joint`; despawn its entity to delete it")]
+    JointMarker(Uid),
+    /// A joint was put into a group of another rig.
+    #[error("joint {0} cannot be in a group of another rig; add one to this rig")]
+    ForeignGroup(Uid),
+    /// A joint was moved below something that is no joint of its rig.
+    #[error("joint {0} can only hang below joints of its own rig that are in the document")]
+    ForeignParent(Uid),
+    /// A tag was spawned outside of the document.
+    #[error("a tag was spawned on an entity that is no joint of the document; put it on a joint")]
+    TagBearer,
+    /// A spawned tag names a feature of another rig.
+    #[error("a spawned tag is in a feature of another rig; put it into one of its own rig")]
+    ForeignFeature,
+    /// A tag lost its content, or names a feature of another rig.
+    #[error("tag {0} needs a command or a feature of its own rig; despawn it to delete it")]
+    TagContent(Uid),
+    /// A tag was put onto something that is no joint of its rig.
+    #[error("tag {0} can only be on a joint of its own rig; despawn it to delete it")]
+    TagJoint(Uid),
+    /// A local group was moved to another rig.
+    #[error("local group \"{name}\" stays with its rig; add one to the other rig")]
+    GroupRig {
+        /// Name of the group.
+        name: String,
+    },
+    /// A local group lost its content.
+    #[error("local group \"{name}\" cannot lose its `LocalGroup`; despawn it")]
+    GroupContent {
+        /// Name of the group.
+        name: String,
+    },
+}
+
+/// Kind of a write to an entity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum EntityWrite {
+    /// A joint was spawned.
+    #[error("a spawned joint")]
+    SpawnedJoint,
+    /// Joints were despawned.
+    #[error("a despawned joint")]
+    DespawnedJoint,
+    /// The label of a joint was written.
+    #[error("a write to a label")]
+    Label,
+    /// The group of a joint was written.
+    #[error("a write to a group")]
+    Group,
+    /// The rest transform of a joint was written.
+    #[error("a write to a rest pose")]
+    Rest,
+    /// The parent of a joint was written.
+    #[error("a write to a parent")]
+    Parent,
+    /// A tag was spawned.
+    #[error("a spawned tag")]
+    SpawnedTag,
+    /// A tag was despawned.
+    #[error("a despawned tag")]
+    DespawnedTag,
+    /// The content of a tag was written.
+    #[error("a write to a tag")]
+    Tag,
+    /// A tag was put onto another joint.
+    #[error("a tag on another joint")]
+    TagJoint,
+    /// The order of the tags of a joint was written.
+    #[error("an order of tags")]
+    TagOrder,
+    /// A local group was spawned.
+    #[error("a spawned local group")]
+    SpawnedLocalGroup,
+    /// A local group was despawned.
+    #[error("a despawned local group")]
+    DespawnedLocalGroup,
+    /// The content of a local group was written.
+    #[error("a write to a local group")]
+    LocalGroup,
+}

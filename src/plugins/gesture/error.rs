@@ -1,0 +1,37 @@
+//! Reasons why gestures have no effect.
+
+use crate::plugins::{document::ChangeError, stroke::NothingDrawn};
+
+/// Reason why a gesture had no effect; a sentence for people without its full stop.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum GestureError {
+    /// A click met no joint.
+    #[error("there is no joint to pick")]
+    NothingToPick,
+    /// A click met no mesh.
+    #[error("the ray meets nothing there: no joint was placed")]
+    NothingThere,
+    /// The gesture needs a selected joint.
+    #[error("no joint is selected; select one first")]
+    NoSelection,
+    /// No joint has the label.
+    #[error("no joint has the label \"{0}\"")]
+    NoLabel(String),
+    /// The list of labels is longer than the chain.
+    #[error("there are {names} names for a chain of {joints} joints")]
+    LongChain {
+        /// Number of names.
+        names: usize,
+        /// Number of joints.
+        joints: usize,
+    },
+    /// The gesture is no operation on joints.
+    #[error("this gesture changes no joint")]
+    NoOperation,
+    /// The stroke had no effect.
+    #[error(transparent)]
+    Stroke(#[from] NothingDrawn),
+    /// The change was refused.
+    #[error(transparent)]
+    Change(#[from] ChangeError),
+}
