@@ -39,7 +39,7 @@ pub(crate) use format::{
     source::{parse_ron, ron_options, utf8},
 };
 pub use group::GroupData;
-pub use joint::{JointData, NodeKind, RestTransform, RigJoint};
+pub use joint::{FaceBonePart, FacePlacement, JointData, NodeKind, RestTransform, RigJoint};
 pub use pose::{AttributeValues, PoseOffset, StoredPose};
 pub use reference::{NodeRef, NodeRefs};
 pub use tag::{TagData, TagKind};

@@ -35,6 +35,7 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
             mirror: source.and_then(|source| source.mirror),
             locked: source.is_some_and(|source| source.locked),
             tags: Vec::new(),
+            face: None,
         };
         let parent = built.nodes[at].parent.map(|parent| built.nodes[parent].uid);
         edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX });

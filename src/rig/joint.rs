@@ -89,6 +89,28 @@ pub enum NodeKind {
     Null,
 }
 
+/// Kind of a facial bone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FaceBonePart {
+    /// A bone of the skin.
+    Skin,
+    /// The bone of the jaw.
+    Jaw,
+    /// The bone of an eye.
+    Eye,
+}
+
+/// Record of the placement of a facial bone. Whatever differs from it was changed by a person later.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FacePlacement {
+    /// Kind of the bone.
+    pub part: FaceBonePart,
+    /// Label that the bone got.
+    pub label: String,
+    /// Position at which the bone was placed, in the rig's space.
+    pub position: Vec3,
+}
+
 /// Data of a joint, without its place in the hierarchy.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct JointData {
@@ -108,6 +130,9 @@ pub struct JointData {
     pub locked: bool,
     /// Tags in order.
     pub tags: Vec<TagData>,
+    /// Record of the placement as a facial bone; `None` for all other joints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub face: Option<FacePlacement>,
 }
 
 /// A joint in a [`crate::rig::Rig`]: its data and its place.

@@ -3,8 +3,9 @@
 use proptest::prelude::*;
 use rigsmith::{
     mesh::model::Weights,
+    plugins::face::FaceRig,
     rig::{
-        NodeKind, Rig, RigEdit, TagKind, Uid,
+        FaceBonePart, NodeKind, Rig, RigEdit, TagKind, Uid,
         template::{MAX_BYTES, read_header, read_template, write_template},
     },
 };
@@ -12,6 +13,9 @@ use rigsmith::{
 use crate::edits::{command, random_rig, steps};
 
 const FROZEN: &str = include_str!("../frozen/format-1.rig.ron");
+
+/// A face as format 2 stores it.
+const FROZEN_FACE: &str = include_str!("../frozen/format-2.rig.ron");
 
 fn frozen() -> Rig {
     read_template(FROZEN.as_bytes()).unwrap().rig
@@ -93,6 +97,42 @@ fn the_frozen_file_of_format_1_opens() {
     assert_eq!(*feature, Some(Uid(0x20)));
     assert_eq!(rig.joint(Uid(4)).unwrap().data.kind, NodeKind::Null);
     assert!(!rig.groups()[1].enabled);
+}
+
+#[test]
+fn the_frozen_face_of_format_2_opens() {
+    let template = read_template(FROZEN_FACE.as_bytes()).unwrap();
+    assert_eq!(template.notes, Vec::<String>::new());
+    assert_eq!(write_template(&template.rig), FROZEN_FACE);
+    let placed = |uid: u64| template.rig.joint(Uid(uid)).unwrap().data.face.clone();
+    assert_eq!(placed(1), None);
+    let jaw = placed(3).unwrap();
+    assert_eq!((jaw.part, jaw.label.as_str()), (FaceBonePart::Jaw, "jaw"));
+    // The face is known by what was placed, whatever its group is called.
+    let face = FaceRig::read(&template.rig);
+    assert_eq!((face.head, face.group, face.feature), (Some(Uid(1)), Some(Uid(0x10)), Some(Uid(0x20))));
+    assert_eq!(face.bones.iter().map(|bone| bone.touched).collect::<Vec<_>>(), [false, true]);
+    let wrong = FROZEN_FACE.replacen("at: (0.02, 1.55, 0.1)", "at: (inf, 1.55, 0.1)", 1);
+    assert_eq!(read_template(wrong.as_bytes()).unwrap_err().line, place(&wrong, "face: (").0);
+}
+
+#[test]
+fn comments_of_format_1_become_placements() {
+    let comment = |text: &str| {
+        text.replacen("comment: \"face bone lip_l\"", "comment: \"face bone lip_l, placed at 0.02 1.55 0.1\"", 1)
+    };
+    let old = FROZEN_FACE
+        .replacen("format: 2", "format: 1", 1)
+        .replacen("            face: (part: Skin, label: \"lip_l\", at: (0.02, 1.55, 0.1)),\n", "", 1)
+        .replacen("            face: (part: Jaw, label: \"jaw\", at: (0.0, 1.48, 0.08)),\n", "", 1);
+    let joint = |text: &str| read_template(text.as_bytes()).unwrap().rig.joint(Uid(2)).unwrap().data.clone();
+    let read = joint(&comment(&old));
+    assert_eq!(read, joint(FROZEN_FACE));
+    assert_eq!(read.tags[0].comment, "face bone lip_l");
+    // In a file of format 2 a comment is a note for people.
+    let noted = joint(&comment(FROZEN_FACE));
+    assert_eq!((noted.face, noted.tags[0].comment.as_str()), (read.face, "face bone lip_l, placed at 0.02 1.55 0.1"));
+    assert_eq!(joint(&old).face, None);
 }
 
 #[test]
@@ -238,7 +278,7 @@ fn files_that_are_none_are_refused() {
     let error = read_template(&vec![b' '; 17 << 20]).unwrap_err();
     assert!(error.message.contains("17 MiB"), "{error}");
     for deep in ["(", "[", "{", "(a:", "[(", "Some("] {
-        for head in ["", "(format: 1, joints: ", "(format: 2, x: "] {
+        for head in ["", "(format: 1, joints: ", "(format: 3, x: "] {
             assert!(read_template(format!("{head}{}", deep.repeat(10_000)).as_bytes()).is_err());
             assert!(read_header(format!("{head}{}", deep.repeat(10_000)).as_bytes()).is_err());
         }
@@ -249,7 +289,7 @@ fn files_that_are_none_are_refused() {
 fn large_nonsense_is_refused_quickly() {
     let started = std::time::Instant::now();
     for piece in ["a:", "a:(", "/*", "\"", "r#\"", "'", "),", "uid:\"0000000000000001\","] {
-        let text = format!("(format: 2, joints: [{}", piece.repeat((4 << 20) / piece.len()));
+        let text = format!("(format: 3, joints: [{}", piece.repeat((4 << 20) / piece.len()));
         assert!(text.len() < MAX_BYTES);
         assert!(read_template(text.as_bytes()).is_err());
     }
@@ -259,7 +299,7 @@ fn large_nonsense_is_refused_quickly() {
 #[test]
 fn fields_of_a_newer_format_are_named_before_they_are_lost() {
     let text = FROZEN
-        .replacen("format: 1,", "format: 2, /* a /* nested */ \" comment */ licence: (name: \"(\\\"\", uid: \"1\"),", 1)
+        .replacen("format: 1,", "format: 3, /* a /* nested */ \" comment */ licence: (name: \"(\\\"\", uid: \"1\"),", 1)
         .replacen(
             "            label: \"arm_r\",",
             "            // mood: 1,\n            mood: {'\"': [r#\"a \" ) b\"#]},\n            label: \"arm_r\",",
@@ -269,7 +309,7 @@ fn fields_of_a_newer_format_are_named_before_they_are_lost() {
         .replacen("color: (0.9, 0.62, 0.0)", "color: (0.9, 0.62, 0.0), shape: Round", 1);
     let template = read_template(text.as_bytes()).unwrap();
     assert_eq!(template.rig, frozen());
-    assert!(template.notes[0].contains("format 2"), "{:?}", template.notes);
+    assert!(template.notes[0].contains("format 3"), "{:?}", template.notes);
     let mut named = Vec::new();
     for (field, at) in [("licence", "licence:"), ("shape", "shape:"), ("weight", "weight:"), ("mood", "mood: {")] {
         named.push(format!("line {}: the field `{field}` is of a newer format and is not kept", place(&text, at).0));
@@ -281,7 +321,7 @@ fn fields_of_a_newer_format_are_named_before_they_are_lost() {
     assert_eq!(error.line, place(&wrong, "locked: 3").0);
     assert_eq!(wrong[..error.offset].matches('\n').count() + 1, error.line);
     // In a file of our own format the same fields are mistakes.
-    assert!(read_template(text.replacen("format: 2", "format: 1", 1).as_bytes()).is_err());
+    assert!(read_template(text.replacen("format: 3", "format: 1", 1).as_bytes()).is_err());
     // Many of them take no longer than few.
     let joint = |i: usize| format!("(uid: \"{i:016x}\", translation: (0, 0, 0), extra: [{i}], more: (a: ({i}))),\n");
     let many =

@@ -4,16 +4,17 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use glam::{Affine3A, Quat, Vec3};
 
-use super::placed_bones::{FACE_GROUP, FaceRig, PlacedBone, PlacementRecord};
+use super::placed_bones::{FACE, FaceRig, PlacedBone, placement};
 use crate::{
     algo::face::{
         auto::{AutoFace, FaceAnalysis},
         bones::{FaceBone, FaceBoneKind, Region},
     },
     mesh::{influences::keep_strongest, model::Weights},
+    modules::control::{ControlModule, ShapeAxes},
     rig::{
-        GroupData, JointData, NodeKind, RestTransform, Rig, RigEdit, RigJoint, SkinData, TagData, TagKind, Uid,
-        UidSource,
+        GroupData, JointData, Limits, NodeKind, RestTransform, Rig, RigEdit, RigJoint, SkinData, TagData, TagKind, Uid,
+        UidSource, fields, ron_options,
     },
 };
 
@@ -43,7 +44,7 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
     let mut edits = Vec::new();
     let to_rig = analysis.to_mesh();
     let group = known.group.unwrap_or_else(|| {
-        let group = GroupData { uid: uids.next_uid(), name: FACE_GROUP.to_owned(), color: FACE_COLOR, enabled: true };
+        let group = GroupData { uid: uids.next_uid(), name: FACE.to_owned(), color: FACE_COLOR, enabled: true };
         let uid = group.uid;
         edits.push(RigEdit::AddLocalGroup(group, rig.groups().len()));
         uid
@@ -54,7 +55,7 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
         None => skull(rig, analysis, uids, &mut edits),
     };
     let feature = known.feature.unwrap_or_else(|| {
-        let kind = TagKind::Feature { kind: FACE_GROUP.to_owned(), name: "Face".to_owned(), switch: String::new() };
+        let kind = TagKind::Feature { kind: FACE.to_owned(), name: "Face".to_owned(), switch: String::new() };
         let tag = TagData { uid: uids.next_uid(), enabled: true, comment: "controls of the face".to_owned(), kind };
         let uid = tag.uid;
         edits.push(RigEdit::AddTag { joint: head, tag: Box::new(tag), index: usize::MAX });
@@ -72,16 +73,19 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
         }
         let position = to_rig * bone.position;
         let global = Affine3A::from_rotation_translation(to_rig, position);
-        let placed = PlacementRecord { kind: bone.kind, label: bone.label.clone(), position };
-        let kind =
-            TagKind::Command { module: "control".to_owned(), params: control(bone, eye), feature: Some(feature) };
-        let tag = TagData { uid: uids.next_uid(), enabled: true, comment: placed.comment(), kind };
+        let kind = TagKind::Command {
+            module: "control".to_owned(),
+            params: control_params(&control(bone, eye)),
+            feature: Some(feature),
+        };
+        let tag = TagData { uid: uids.next_uid(), enabled: true, comment: comment(bone), kind };
         let joint = JointData {
             uid: *uid,
             label: Some(bone.label.clone()),
             group: Some(group),
             rest: local(&head_global, &global),
             tags: vec![tag],
+            face: Some(placement(bone, position)),
             ..JointData::default()
         };
         edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent: Some(head), index: usize::MAX });
@@ -159,29 +163,57 @@ fn pairs(rig: &Rig, face: &AutoFace, joints: &[Uid], edits: &mut Vec<RigEdit>) {
     }
 }
 
-/// Parameters of a bone's control: its shape, and limits within which skin moves as on a face.
-fn control(bone: &FaceBone, eye: f32) -> String {
+/// Note for people on a bone's control.
+fn comment(bone: &FaceBone) -> String {
+    let part = match bone.kind {
+        FaceBoneKind::Skin => "face",
+        FaceBoneKind::Jaw => "jaw",
+        FaceBoneKind::Eye => "eye",
+    };
+    format!("{part} bone {}", bone.label)
+}
+
+/// A bone's control: its shape, and limits within which skin moves as on a face.
+fn control(bone: &FaceBone, eye: f32) -> ControlModule {
     let (shape, size) = match bone.kind {
         FaceBoneKind::Skin => ("sphere", 0.035),
         FaceBoneKind::Jaw => ("half_circle", 0.3),
         FaceBoneKind::Eye => ("eye", 0.12),
     };
-    let range = |(low, high): (f32, f32), unit: f32| format!("({}, {})", decimal(low * unit), decimal(high * unit));
-    let three = |ranges: [(f32, f32); 3], unit: f32| ranges.map(|ends| range(ends, unit)).join(", ");
+    let range = |(low, high): (f32, f32), unit: f32| (Some(rounded(low * unit)), Some(rounded(high * unit)));
     let (translate, rotate) = limits(bone);
-    format!(
-        "(shape: \"{shape}\", size: {}, shape_axes: control, offset_group: false, keep_pose: true, \
-         limits: (translate: ({}), rotate: ({})))",
-        decimal(size * eye),
-        three(translate, eye),
-        three(rotate, 1.0),
-    )
+    ControlModule {
+        shape: shape.to_owned(),
+        size: Some(rounded(size * eye)),
+        shape_axes: ShapeAxes::Control,
+        offset_group: false,
+        keep_pose: true,
+        limits: Limits {
+            translate: translate.map(|ends| range(ends, eye)),
+            rotate: rotate.map(|ends| range(ends, 1.0)),
+            ..Limits::default()
+        },
+        ..ControlModule::default()
+    }
 }
 
-/// The number with four significant digits, always with a point.
-fn decimal(number: f32) -> String {
-    let rounded: f32 = format!("{number:.3e}").parse().unwrap_or(number);
-    format!("{rounded:?}")
+/// The parameters of a control as RON, without those that have their default value.
+fn control_params(control: &ControlModule) -> String {
+    // Serialisation never fails for the types that parameters have.
+    let written = |control: &ControlModule| ron_options().to_string(control).unwrap_or_default();
+    let (own, default) = (written(control), written(&ControlModule::default()));
+    let params = |text: &str| -> Vec<String> {
+        let own = fields(text).into_iter().filter(|field| field.depth == 1);
+        own.map(|field| text[field.start..field.end].trim_end_matches([',', ' ']).to_owned()).collect()
+    };
+    let default = params(&default);
+    let differing: Vec<String> = params(&own).into_iter().filter(|param| !default.contains(param)).collect();
+    format!("({})", differing.join(", "))
+}
+
+/// The number with four significant digits.
+fn rounded(number: f32) -> f32 {
+    format!("{number:.3e}").parse().unwrap_or(number)
 }
 
 /// Lowest and highest translation, as a share of the distance of the eyes' outer corners, and rotation in degrees.

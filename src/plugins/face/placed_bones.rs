@@ -7,11 +7,11 @@ use crate::{
         auto::FaceAnalysis,
         bones::{FaceBone, FaceBoneKind, region_of, side_of},
     },
-    rig::{Rig, RigJoint, TagKind, Uid},
+    rig::{FaceBonePart, FacePlacement, Rig, RigJoint, TagKind, Uid},
 };
 
-/// Name of the local group of facial joints.
-pub const FACE_GROUP: &str = "face";
+/// Name of a new local group of facial joints, and kind of its feature.
+pub(super) const FACE: &str = "face";
 
 /// The existing face of a rig.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,63 +43,56 @@ pub struct PlacedBone {
     pub touched: bool,
 }
 
-/// Content of the comment of a facial bone's control tag: the bone's label and its placed position, from which later
-/// manual changes are recognised.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct PlacementRecord {
-    pub kind: FaceBoneKind,
-    pub label: String,
-    pub position: Vec3,
+/// The record of a bone's placement, from which later manual changes are recognised.
+pub(super) fn placement(bone: &FaceBone, position: Vec3) -> FacePlacement {
+    let part = match bone.kind {
+        FaceBoneKind::Skin => FaceBonePart::Skin,
+        FaceBoneKind::Jaw => FaceBonePart::Jaw,
+        FaceBoneKind::Eye => FaceBonePart::Eye,
+    };
+    FacePlacement { part, label: bone.label.clone(), position }
 }
 
-impl PlacementRecord {
-    pub fn comment(&self) -> String {
-        let Vec3 { x, y, z } = self.position;
-        format!("{} {}, placed at {x} {y} {z}", kind_words(self.kind), self.label)
-    }
-
-    pub fn read(comment: &str) -> Option<Self> {
-        let (named, place) = comment.split_once(", placed at ")?;
-        let kinds = [FaceBoneKind::Skin, FaceBoneKind::Jaw, FaceBoneKind::Eye];
-        let (kind, label) = kinds
-            .into_iter()
-            .find_map(|kind| Some((kind, named.strip_prefix(kind_words(kind))?.strip_prefix(' ')?.to_owned())))?;
-        let mut numbers = place.split(' ').map(|number| number.parse::<f32>().ok());
-        let mut next = || numbers.next().flatten();
-        Some(Self { kind, label, position: Vec3::new(next()?, next()?, next()?) })
+fn kind_of(part: FaceBonePart) -> FaceBoneKind {
+    match part {
+        FaceBonePart::Skin => FaceBoneKind::Skin,
+        FaceBonePart::Jaw => FaceBoneKind::Jaw,
+        FaceBonePart::Eye => FaceBoneKind::Eye,
     }
 }
 
-fn kind_words(kind: FaceBoneKind) -> &'static str {
-    match kind {
-        FaceBoneKind::Skin => "face bone",
-        FaceBoneKind::Jaw => "jaw bone",
-        FaceBoneKind::Eye => "eye bone",
+/// The most frequent uid; the first of several.
+fn most_frequent(uids: impl Iterator<Item = Uid>) -> Option<Uid> {
+    let mut counts: Vec<(Uid, usize)> = Vec::new();
+    for uid in uids {
+        match counts.iter_mut().find(|(known, _)| *known == uid) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((uid, 1)),
+        }
     }
+    counts.into_iter().rev().max_by_key(|(_, count)| *count).map(|(uid, _)| uid)
 }
 
 impl FaceRig {
     /// Reads the face of a rig. A rig without a face may have a head that one can be attached to.
     pub fn read(rig: &Rig) -> Self {
-        let group = rig.groups().iter().find(|group| group.name == FACE_GROUP).map(|group| group.uid);
-        let feature = rig.walk().flat_map(|joint| &joint.data.tags).find_map(|tag| match &tag.kind {
-            TagKind::Feature { kind, .. } if kind == FACE_GROUP => Some(tag.uid),
-            _ => None,
-        });
-        let by_feature = feature.and_then(|tag| rig.find_tag(tag)).map(|(joint, _)| joint.data.uid);
-        let head = by_feature.or_else(|| named(rig, "head"));
+        let placed = || rig.walk().filter(|joint| joint.data.face.is_some());
+        let group = most_frequent(placed().filter_map(|joint| joint.data.group));
+        let feature = most_frequent(placed().flat_map(|joint| &joint.data.tags).filter_map(|tag| match &tag.kind {
+            TagKind::Command { feature, .. } => *feature,
+            TagKind::Feature { .. } => None,
+        }));
+        let head = most_frequent(placed().filter_map(|joint| joint.parent)).or_else(|| named(rig, "head"));
         let above = head.and_then(|head| rig.joint(head)).and_then(|joint| joint.parent);
         let neck = above.filter(|above| rig.joint(*above).is_some_and(|joint| is_named(joint, "neck")));
-        let bones = match (head, group) {
-            (Some(head), Some(_)) => rig
-                .children(Some(head))
-                .iter()
-                .filter_map(|uid| rig.joint(*uid))
-                .filter(|joint| joint.data.group == group)
-                .map(|joint| known(rig, joint))
-                .collect(),
-            _ => Vec::new(),
+        // Joints that a person puts into the group are facial bones, too.
+        let is_facial = |joint: &&RigJoint| match group {
+            Some(_) => joint.data.group == group,
+            None => joint.data.face.is_some(),
         };
+        let around = head.map(|head| rig.children(Some(head))).unwrap_or_default();
+        let joints = around.iter().filter_map(|uid| rig.joint(*uid));
+        let bones = joints.filter(is_facial).map(|joint| known(rig, joint)).collect();
         Self { head, neck, group, feature, bones }
     }
 
@@ -128,15 +121,15 @@ fn known(rig: &Rig, joint: &RigJoint) -> PlacedBone {
     let data = &joint.data;
     let label = data.label.clone().unwrap_or_default();
     let position = rig.position(data.uid);
-    let placed = data.tags.iter().find_map(|tag| PlacementRecord::read(&tag.comment).map(|placed| (tag, placed)));
-    let (kind, touched) = match placed {
+    let (kind, touched) = match &data.face {
         None => (FaceBoneKind::Skin, true),
-        Some((tag, placed)) => {
+        Some(placed) => {
             // Joints store their position relative to the joint above, which costs some bits of precision.
             let slack = 1e-5 * (position.abs().max_element() + placed.position.abs().max_element());
             let moved = (position - placed.position).abs().max_element() > slack;
-            let as_made = data.tags.len() == 1 && tag.enabled && joint.children.is_empty() && !data.locked;
-            (placed.kind, moved || !as_made || placed.label != label)
+            let is_tagged_as_made = data.tags.len() == 1 && data.tags.iter().all(|tag| tag.enabled);
+            let as_made = is_tagged_as_made && joint.children.is_empty() && !data.locked;
+            (kind_of(placed.part), moved || !as_made || placed.label != label)
         }
     };
     PlacedBone { uid: data.uid, position, kind, label, touched }

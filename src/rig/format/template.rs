@@ -5,6 +5,7 @@
 //! it returns, so that a scene never sees half a rig; loading what was saved gives the same rig, and saving that the
 //! same bytes.
 
+mod comment_placement;
 mod read;
 mod write;
 
@@ -17,8 +18,8 @@ pub(in crate::rig) use write::{quoted, vector};
 
 use crate::rig::{Rig, Uid};
 
-/// The format that this version writes.
-pub const FORMAT: u32 = 1;
+/// The newest format, which this version writes for rigs with a face; all others are written as format 1.
+pub const FORMAT: u32 = 2;
 
 /// Largest size in bytes of a template that is read.
 pub const MAX_BYTES: usize = 16 << 20;

@@ -133,6 +133,7 @@ pub(super) fn mirror(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationE
                     mirror: Some(joint),
                     locked: source.data.locked,
                     tags: Vec::new(),
+                    face: None,
                 };
                 draft.apply(RigEdit::AddJoint { joint: Box::new(data), parent, index: usize::MAX })?;
                 draft.apply(RigEdit::SetMirror(joint, Some(uid)))?;

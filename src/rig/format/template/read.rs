@@ -6,9 +6,13 @@ use bevy::math::{Quat, Vec3};
 use ron::value::RawValue;
 use serde::Deserialize;
 
-use super::{FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader, write::feature_summaries};
+use super::{
+    FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader, comment_placement::take_placement,
+    write::feature_summaries,
+};
 use crate::rig::{
-    GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError, TagData, TagKind, Uid,
+    FaceBonePart, FacePlacement, GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError,
+    TagData, TagKind, Uid,
     format::scan::{self, Field},
     format::source::{parse_ron, ron_options, utf8},
     format::version::{Format, blanked},
@@ -18,8 +22,7 @@ use crate::rig::{
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TemplateFile {
-    #[serde(rename = "format")]
-    _format: u32,
+    format: u32,
     uid: Uid,
     name: String,
     #[serde(default)]
@@ -74,7 +77,17 @@ struct JointFile {
     #[serde(default = "no_scale")]
     scale: (f32, f32, f32),
     #[serde(default)]
+    face: Option<FaceFile>,
+    #[serde(default)]
     tags: Vec<TagFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FaceFile {
+    part: FaceBonePart,
+    label: String,
+    at: (f32, f32, f32),
 }
 
 #[derive(Deserialize)]
@@ -183,8 +196,10 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
             "translation",
             "rotation",
             "scale",
+            "face",
             "tags",
         ]),
+        (4, Some("face")) if above == Some("joints") => Some(&["part", "label", "at"]),
         (5, Some("tags")) if above == Some("joints") => {
             Some(&["uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch"])
         }
@@ -220,11 +235,12 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result
         }
         rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
+    let format = file.format;
     let count = file.joints.len();
     if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count) {
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
-    add_joints(&mut rig, file.joints, places, unique)?;
+    add_joints(&mut rig, format, file.joints, places, unique)?;
     bind_references(&mut rig, notes);
     if feature_summaries(&rig) != sorted(file.features) {
         notes.push("the header lists other features than the tags; saving corrects it".to_owned());
@@ -262,6 +278,7 @@ fn sorted(mut features: Vec<FeatureSummary>) -> Vec<FeatureSummary> {
 
 fn add_joints(
     rig: &mut Rig,
+    format: u32,
     joints: Vec<JointFile>,
     places: &Places,
     mut unique: impl FnMut(Uid) -> Result<(), SourceError>,
@@ -325,6 +342,15 @@ fn add_joints(
             }
             tags.push(tag);
         }
+        let placed = joint.face.map(|FaceFile { part, label, at }| {
+            let position = Vec3::from(<[f32; 3]>::from(at));
+            FacePlacement { part, label, position }
+        });
+        if placed.as_ref().is_some_and(|placed| !placed.position.is_finite()) {
+            let message = format!("joint {uid} was placed at a position that is not finite; correct the numbers");
+            return Err(places.error(uid, 0, "face", message));
+        }
+        let face = placed.or_else(|| take_placement(format, &mut tags));
         order.push(uid);
         children.entry(joint.parent).or_default().push(uid);
         data.insert(
@@ -338,6 +364,7 @@ fn add_joints(
                 mirror: joint.mirror,
                 locked: joint.locked,
                 tags,
+                face,
             },
         );
     }

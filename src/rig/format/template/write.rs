@@ -8,7 +8,7 @@ use std::{
 use bevy::math::{Quat, Vec3};
 
 use super::{FORMAT, FeatureSummary};
-use crate::rig::{NodeKind, Rig, RigJoint, TagData, TagKind, Uid, reference::refresh_names};
+use crate::rig::{FacePlacement, NodeKind, Rig, RigJoint, TagData, TagKind, Uid, reference::refresh_names};
 
 /// The text of a rig's template. The same rig gives the same bytes. References in parameters are written with the
 /// current names beside the uids.
@@ -20,7 +20,8 @@ pub fn write_template(rig: &Rig) -> String {
 
 fn write_into(out: &mut String, rig: &Rig) -> std::fmt::Result {
     let about = rig.about();
-    writeln!(out, "(\n    format: {FORMAT},\n    uid: \"{}\",", rig.uid())?;
+    let format = if rig.walk().any(|joint| joint.data.face.is_some()) { FORMAT } else { 1 };
+    writeln!(out, "(\n    format: {format},\n    uid: \"{}\",", rig.uid())?;
     writeln!(out, "    name: {},\n    version: {},", quoted(&about.name), quoted(&about.version))?;
     writeln!(out, "    kind: {},\n    author: {},", quoted(&about.kind), quoted(&about.author))?;
     writeln!(out, "    description: {},", quoted(&about.description))?;
@@ -114,6 +115,10 @@ fn write_joint(out: &mut String, rig: &Rig, joint: &RigJoint, features: &HashSet
     }
     if rest.scale != Vec3::ONE {
         write!(out, "\n            scale: {},", vector(rest.scale))?;
+    }
+    if let Some(FacePlacement { part, label, position }) = &data.face {
+        let (label, position) = (quoted(label), vector(*position));
+        write!(out, "\n            face: (part: {part:?}, label: {label}, at: {position}),")?;
     }
     if !data.tags.is_empty() {
         writeln!(out, "\n            tags: [")?;
