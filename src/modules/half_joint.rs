@@ -73,7 +73,7 @@ impl RigModule for HalfJoint {
                 weight: Scalar::Value(1.0),
                 keep_pose: false,
             };
-            scope.constrain("half", joint, 0, constraint)?;
+            scope.constrain("turn", joint, 0, constraint)?;
         }
         Ok(())
     }

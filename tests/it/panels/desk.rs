@@ -112,6 +112,11 @@ impl Desk {
         self.seen.iter().find(|seen| seen.label == label)
     }
 
+    /// True if some text of the last frame is this one.
+    pub fn says(&self, text: &str) -> bool {
+        self.seen.iter().any(|seen| seen.label == text || seen.value == text)
+    }
+
     #[track_caller]
     pub fn find(&self, label: &str) -> Seen {
         let labels: Vec<&str> = self.seen.iter().map(|seen| seen.label.as_str()).collect();
