@@ -26,7 +26,7 @@ impl Plugin for BuildingPlugin {
         app.init_resource::<ControlsInUse>().add_message::<ActionRequest>().add_message::<Notice>().add_systems(
             Update,
             (
-                (build_open_rig, carry_out).chain().before(RigSystems::Build),
+                (build_open_rig, carry_out).chain().after(RigSystems::Edits).before(RigSystems::Build),
                 use_controls.before(RigSystems::Pick),
                 report_failures.after(RigSystems::Build),
             ),

@@ -44,7 +44,7 @@ impl RigModule for HalfJoint {
     const DOC: &'static str =
         "Makes joints that turn by half of a bend: skin on knees, elbows, hips and shoulders keeps its volume.";
     const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("at", "The joints that bend, such as a shin; each needs a parent."),
+        ("at", "The joints that bend, such as a shin; those without a parent are passed over."),
         ("share", "Share of the bend, 0 (the parent's side) to 1."),
         ("creation", "Name, groups and label of the joints that are made; by default those of each joint."),
     ];
@@ -54,10 +54,8 @@ impl RigModule for HalfJoint {
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         scope.in_range("share", self.share, 0.0..=1.0)?;
         for (joint, number) in scope.resolve_some("at", &self.at)?.into_iter().zip(0..) {
-            let Some(parent) = scope.parent(joint) else {
-                let problem = format!("{} has no parent, so nothing bends there; leave it out", scope.name(joint));
-                return Err(ModuleError::reference("at", &self.at, problem));
-            };
+            // Nothing bends at a root: a limb that is not connected yet builds, too.
+            let Some(parent) = scope.parent(joint) else { continue };
             let creation = scope.creation_for(&self.creation, joint, number);
             let half = scope.spawn(NodeType::Joint, HALF, joint, 0, Some(joint), Trs::IDENTITY, &creation)?;
             let target = |node: Trs, uid, weight| Target { node: uid, weight: Scalar::Value(weight), offset: node };

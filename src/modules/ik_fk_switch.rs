@@ -217,8 +217,9 @@ impl RigModule for IkFkSwitch {
 }
 
 impl IkFkSwitch {
-    /// Drives the attribute [`VISIBLE`] of both kinds of controls by the switch. Between its ends all are visible. Left out
-    /// are nodes that are no controls, the one that carries the switch, and those whose visibility is driven already.
+    /// Drives the attribute [`VISIBLE`] of both kinds of controls by the switch. Between its ends all are visible. A goal
+    /// that is no control stands for the nearest control that carries it. Left out are the control that carries the switch
+    /// and those whose visibility is driven already.
     fn hide_idle(
         &self,
         scope: &mut BuildScope<'_>,
@@ -227,7 +228,8 @@ impl IkFkSwitch {
         inverse: [Option<NodeId>; 2],
     ) -> Result<(), ModuleError> {
         let forward = fk.iter().map(|node| (*node, [(0.0, 1.0), (1.0, 0.0)]));
-        let inverse = inverse.into_iter().flatten().map(|node| (node, [(0.0, 0.0), (1e-3, 1.0)]));
+        let inverse = inverse.into_iter().flatten().map(|node| (carrier(scope, node), [(0.0, 0.0), (1e-3, 1.0)]));
+        let inverse: Vec<_> = inverse.collect();
         let nodes: Vec<_> = forward.chain(inverse).collect();
         for (node, keys) in nodes {
             let is_taken = scope.attributes(node).iter().any(|known| *known.name == *VISIBLE);
@@ -246,4 +248,16 @@ impl IkFkSwitch {
         }
         Ok(())
     }
+}
+
+/// The node, or the nearest node above it that is a control.
+fn carrier(scope: &mut BuildScope<'_>, node: NodeId) -> NodeId {
+    let mut at = Some(node);
+    while let Some(above) = at {
+        if scope.kind(above) == Some(NodeType::Control) {
+            return above;
+        }
+        at = scope.parent(above);
+    }
+    node
 }

@@ -544,6 +544,8 @@ fn the_controls_panel_poses_resets_and_switches() {
     let before = state(&desk);
     let is_ik = before.attribute(switch.control, &switch.attribute).unwrap() >= 0.5;
     assert!(desk.says("Switches"));
+    // All of it in sight, so that a click meets it.
+    desk.resize(320.0, 2400.0);
     desk.click(if is_ik { "FK" } else { "IK" });
     desk.frames(2);
     let after = state(&desk);

@@ -70,7 +70,7 @@ fn twist_joints_lie_on_their_bone() {
 /// Twist joints take their shares from the joint of their bone and from nobody else, linearly between one and the next.
 #[test]
 fn twist_joints_share_the_flesh_of_their_bone() {
-    for figure in figures() {
+    for figure in figures().map(|figure| figure.without("volume")) {
         let plain = figure.skinned(None);
         for bone in ["thigh_l", "shin_l", "upper_arm_l", "forearm_l"] {
             let owner = figure.joint(bone);
@@ -103,7 +103,7 @@ fn weights_wait_for_joints_that_are_not_built() {
     let plain = DeformSkeleton::new(&figure.rig, None);
     let built = DeformSkeleton::new(&figure.rig, Some(&figure.built));
     let created: BTreeSet<Uid> = figure.skin.subjects.keys().copied().collect();
-    assert_eq!(created.len(), 32);
+    assert_eq!(created.len(), 40, "32 twist joints and 8 half joints");
     let holders = plain.holders(&figure.rig, &figure.skin);
     for (joint, holder) in figure.skin.joints.iter().zip(holders) {
         let holder = plain.joints()[holder.unwrap()].uid;
@@ -127,7 +127,7 @@ fn weights_wait_for_joints_that_are_not_built() {
     // With it: all joints are there.
     bench.set_built(figure.built.clone());
     assert_eq!(bench.character().weights.unwrap().len(), weights.len());
-    assert!(bench.character().nodes.len() >= figure.rig.len() + 32);
+    assert!(bench.character().nodes.len() >= figure.rig.len() + 40);
     assert_eq!(bench.weights(), Some(&figure.skin));
 }
 

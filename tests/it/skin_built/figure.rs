@@ -18,7 +18,10 @@ use rigsmith::{
     modules,
     processor::Builder,
     rig::{
-        BuiltRig, NodeType, PoseOffset, Rig, RigEdit, SkinData, Uid, deform::DeformSkeleton, template::read_template,
+        BuiltRig, NodeType, PoseOffset, Rig, RigEdit, SkinData, Uid,
+        deform::DeformSkeleton,
+        feature::{features_named, set_feature},
+        template::read_template,
     },
     solve::program::{CompileOptions, RigProgram, RigState},
 };
@@ -90,6 +93,17 @@ impl Figure {
         let mut figure = Self { name: name.to_owned(), rig, built, model, triangles, skin: SkinData::default() };
         figure.skin = figure.skinned(Some(&figure.built));
         figure
+    }
+
+    /// The same with the features of a name off.
+    pub fn without(self, feature: &str) -> Self {
+        let mut rig = self.rig;
+        for feature in features_named(&rig, feature).unwrap() {
+            for edit in set_feature(&rig, &feature.key, false).unwrap() {
+                rig.apply(&edit).unwrap();
+            }
+        }
+        Self::new(&self.name, rig, self.model)
     }
 
     /// A workbench with the rig and the mesh.
