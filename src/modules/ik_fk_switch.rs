@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule},
+    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule, mirrored_direction},
     rig::{
         AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
         reference::{NodeRef, NodeRefs},
@@ -124,6 +124,7 @@ impl RigModule for IkFkSwitch {
         ),
         ("creation", "Name, group and label of the nulls that stand on the forward controls for the joints."),
     ];
+    const SIDED: &'static [&'static str] = &["twist", "prefer"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.svg"));
 
@@ -131,7 +132,7 @@ impl RigModule for IkFkSwitch {
         let start = scope.resolve_one("start", &self.start)?;
         let end = scope.resolve_one("end", &self.end)?;
         let chain = scope.chain(start, end)?;
-        let fk = scope.resolve_some("fk", &self.fk)?;
+        let fk = scope.resolve_all("fk", &self.fk)?;
         if fk.len() != chain.len() {
             let problem = format!(
                 "finds {} controls for the {} joints from {} to {}; give one for each joint, in that order",
@@ -205,6 +206,7 @@ impl RigModule for IkFkSwitch {
     }
 
     fn mirror(&mut self) {
-        self.prefer = self.prefer.map(|prefer| prefer * Vec3::new(-1.0, 1.0, 1.0));
+        self.twist = self.twist.opposite();
+        self.prefer = self.prefer.map(mirrored_direction);
     }
 }

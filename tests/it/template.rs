@@ -259,7 +259,7 @@ fn large_nonsense_is_refused_quickly() {
 #[test]
 fn fields_of_a_newer_format_are_named_before_they_are_lost() {
     let text = FROZEN
-        .replacen("format: 1,", "format: 2, /* a /* nested */ \" comment */ licence: (name: \"(\\\"\", uid: \"1\"),", 1)
+        .replacen("format: 1,", "format: 3, /* a /* nested */ \" comment */ licence: (name: \"(\\\"\", uid: \"1\"),", 1)
         .replacen(
             "            label: \"arm_r\",",
             "            // mood: 1,\n            mood: {'\"': [r#\"a \" ) b\"#]},\n            label: \"arm_r\",",
@@ -269,7 +269,7 @@ fn fields_of_a_newer_format_are_named_before_they_are_lost() {
         .replacen("color: (0.9, 0.62, 0.0)", "color: (0.9, 0.62, 0.0), shape: Round", 1);
     let template = read_template(text.as_bytes()).unwrap();
     assert_eq!(template.rig, frozen());
-    assert!(template.notes[0].contains("format 2"), "{:?}", template.notes);
+    assert!(template.notes[0].contains("format 3"), "{:?}", template.notes);
     let mut named = Vec::new();
     for (field, at) in [("licence", "licence:"), ("shape", "shape:"), ("weight", "weight:"), ("mood", "mood: {")] {
         named.push(format!("line {}: the field `{field}` is of a newer format and is not kept", place(&text, at).0));
@@ -281,7 +281,7 @@ fn fields_of_a_newer_format_are_named_before_they_are_lost() {
     assert_eq!(error.line, place(&wrong, "locked: 3").0);
     assert_eq!(wrong[..error.offset].matches('\n').count() + 1, error.line);
     // In a file of our own format the same fields are mistakes.
-    assert!(read_template(text.replacen("format: 2", "format: 1", 1).as_bytes()).is_err());
+    assert!(read_template(text.replacen("format: 3", "format: 1", 1).as_bytes()).is_err());
     // Many of them take no longer than few.
     let joint = |i: usize| format!("(uid: \"{i:016x}\", translation: (0, 0, 0), extra: [{i}], more: (a: ({i}))),\n");
     let many =

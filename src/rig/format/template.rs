@@ -11,14 +11,15 @@ mod write;
 use serde::{Deserialize, Serialize};
 
 pub(in crate::rig) use read::read_text;
-pub use read::{read_header, read_template};
+pub use read::{read_header, read_template, survey_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{quoted, vector};
 
 use crate::rig::{Rig, Uid};
 
-/// The format that this version writes.
-pub const FORMAT: u32 = 1;
+/// The newest format that is read and written. A file says the oldest format that holds what is in it: format 2 where a
+/// part says its needs or a feature has a choice, else 1.
+pub const FORMAT: u32 = 2;
 
 /// The longest template that is read, in bytes.
 pub const MAX_BYTES: usize = 16 << 20;
@@ -53,6 +54,19 @@ pub struct TemplateHeader {
     /// Named features and their switches, for listings.
     #[serde(default)]
     pub features: Vec<FeatureSummary>,
+    /// What a part needs of the rig that it is dropped into; `None` for other templates.
+    #[serde(default)]
+    pub needs: Option<NeedsSummary>,
+}
+
+/// What a part needs of its host, in a template's header: see [`PartNeeds`](crate::rig::part::PartNeeds).
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct NeedsSummary {
+    /// Labels of the joints that make it whole, in their order.
+    pub joints: Vec<String>,
+    /// Places of the host that it is connected to.
+    #[serde(default)]
+    pub sockets: Vec<String>,
 }
 
 /// A count that may also be written as none.
