@@ -21,6 +21,7 @@ mod render;
 mod report;
 mod sketch;
 mod skin;
+mod switches;
 
 use std::{path::PathBuf, process::ExitCode};
 

@@ -16,6 +16,7 @@ mod joint;
 pub mod label;
 pub mod nearest;
 pub mod operations;
+pub mod part;
 mod pose;
 pub mod reference;
 pub mod shapes;
@@ -35,7 +36,7 @@ pub use edit::{EditError, RigEdit};
 pub use format::source::SourceError;
 pub use format::{project, skin, template, text};
 pub(crate) use format::{
-    scan::{elements, fields},
+    scan::{Field, elements, fields, same_place},
     source::{parse_ron, ron_options, utf8},
 };
 pub use group::GroupData;

@@ -44,10 +44,10 @@ pub struct Around {
 }
 
 impl Around {
-    /// What a part makes for itself on its first joint: a null that stands still, and one that goes with the joint's
-    /// parent.
+    /// What a part makes for itself on its first joint: a null that goes with the control that carries the rig, or
+    /// stands still where there is none, and one that goes with the joint's parent.
     pub fn make(writer: &mut Writer, joint: &str, body: &'static str) -> Self {
-        writer.command(joint, "world", "null", "(world: true, orient: false, creation: (name: \"world\"))");
+        writer.command(joint, "world", "null", "(parent: \"@root\", orient: false, creation: (name: \"world\"))");
         writer.command(joint, "body", "null", format!("(creation: (name: \"{body}\"))"));
         let (world, body_node) = ("@command world".to_owned(), "@command body".to_owned());
         Self { root: world.clone(), spaces: vec![("world", world), (body, body_node)] }

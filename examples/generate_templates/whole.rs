@@ -93,11 +93,12 @@ fn hand() -> Result<Writer, Failure> {
     let others: Vec<String> = writer.rig().walk().skip(2).filter_map(|joint| joint.data.label.clone()).collect();
     writer.members("hand_l", [0.0, 0.62, 0.45], &others);
     parts::hand::orient(&mut writer, "_l");
-    writer.command("forearm_l", "wrist", "control", "(at: \"@joint forearm_l + @joint hand_l\")");
     writer.part("hand", |writer| {
         let around = Around::make(writer, "forearm_l", "arm");
         parts::hand::tags(writer, &around.root);
     });
+    // After what stands still: this is the control that carries what is dropped onto the hand.
+    writer.command("forearm_l", "wrist", "control", "(at: \"@joint forearm_l + @joint hand_l\")");
     Ok(writer)
 }
 

@@ -167,7 +167,8 @@ impl Writer {
     /// Adds a feature tag with a switch; commands join it as `NAME:SWITCH`.
     pub fn switch(&mut self, joint: &str, kind: &str, name: &str, switch: &str) -> &mut Self {
         let alias = if switch.is_empty() { format!("feature {name}") } else { format!("feature {name}:{switch}") };
-        let feature = TagKind::Feature { kind: kind.to_owned(), name: name.to_owned(), switch: switch.to_owned() };
+        let (name, switch) = (name.to_owned(), switch.to_owned());
+        let feature = TagKind::Feature { kind: kind.to_owned(), name, switch, choice: String::new() };
         self.tag(joint, &alias, feature);
         self
     }
@@ -208,12 +209,7 @@ impl Writer {
             Ok(copied) => copied,
             Err(error) => return self.fail(error.to_string()),
         };
-        let copied = copied.map_params(|module, params| {
-            let module = modules.get(module)?;
-            let mirrored = module.mirrored(params).ok()?;
-            // What has no side stays as it is written, without the defaults of all parameters.
-            (module.mirrored(&mirrored).ok()? != mirrored).then_some(mirrored)
-        });
+        let copied = copied.map_params(|module, params| modules.get(module)?.mirrored(params).ok());
         let paste = TagOperation::Paste { clipboard: copied.into(), what: PasteWhat::Both, to: PasteTo::Mirror };
         self.operation(&Operation::Tags(paste));
         self

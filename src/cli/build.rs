@@ -1,7 +1,6 @@
 //! `rigsmith build`: carries out the commands of a rig.
 
 use std::{
-    collections::BTreeSet,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -11,6 +10,7 @@ use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, convert::mark_joints, progress::Progress, skin,
+    switches::SwitchArgs,
 };
 use crate::{
     files::{FileKind, RealDisk, load_model, store_model, store_rig},
@@ -21,11 +21,7 @@ use crate::{
     },
     plugins::commands::BuildStep,
     processor::{Builder, CommandState},
-    rig::{
-        BuiltRig, Rig, RigEdit, Uid,
-        bake::baked,
-        feature::{FeatureError, choose_switch, features_named, set_feature},
-    },
+    rig::{BuiltRig, Rig, Uid, bake::baked},
 };
 
 /// Arguments of `rigsmith build`.
@@ -36,12 +32,8 @@ pub(super) struct BuildArgs {
     /// A mesh to bind to what is built
     #[arg(long)]
     mesh: Option<PathBuf>,
-    /// Turns a feature on or off, or chooses one of its switches; may be repeated
-    #[arg(long, value_name = "NAME=on|off|SWITCH")]
-    feature: Vec<String>,
-    /// Turns a local group on or off; may be repeated
-    #[arg(long, value_name = "NAME=on|off")]
-    group: Vec<String>,
+    #[command(flatten)]
+    switches: SwitchArgs,
     /// Stops after so many commands
     #[arg(long, value_name = "N")]
     until: Option<usize>,
@@ -73,8 +65,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let mut report = Report::default();
     let mut rig = skin::load_rig(&args.rig, &mut report)?;
-    switch_features(&mut rig, &args.feature)?;
-    switch_groups(&mut rig, &args.group)?;
+    args.switches.apply(&mut rig)?;
     let mut bench = Workbench::with_rig(SEED, rig);
     let outcome = bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
     let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
@@ -127,8 +118,10 @@ fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) ->
         };
         let label = rig.joint(entry.joint).and_then(|joint| joint.data.label.clone());
         let error = status.error.as_ref().map(ToString::to_string);
+        let skipped = status.skipped.as_ref().map(ToString::to_string);
         let name = label.clone().unwrap_or_else(|| entry.joint.to_string());
-        lines.push(format!("{state:>8} {:>9.1} µs  {name}  {}", status.micros, entry.module));
+        let reason = skipped.as_ref().map_or_else(String::new, |reason| format!("  ({reason})"));
+        lines.push(format!("{state:>8} {:>9.1} µs  {name}  {}{reason}", status.micros, entry.module));
         list.push(json!({
             "uid": entry.command.to_string(),
             "joint": entry.joint.to_string(),
@@ -138,65 +131,11 @@ fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) ->
             "micros": status.micros,
             "executed": executed.contains(&entry.command),
             "error": error,
+            "skipped": skipped,
         }));
     }
     report.set("commands", Value::Array(list));
     lines
-}
-
-/// Applies `NAME=off`, `NAME=on` or `NAME=SWITCH` to the features of that name in all groups.
-fn switch_features(rig: &mut Rig, wishes: &[String]) -> Result<(), Failure> {
-    for wish in wishes {
-        let (name, value) = pair("--feature", wish)?;
-        let wrong = |error: FeatureError| Failure::Usage(format!("--feature {wish}: {error}"));
-        let features = features_named(rig, name).map_err(wrong)?;
-        let switches: BTreeSet<String> =
-            features.iter().flat_map(|feature| &feature.switches).map(|switch| switch.name.clone()).collect();
-        if !["on", "off"].contains(&value) && !switches.contains(value) {
-            let known: String = switches.iter().map(|switch| format!(", or {switch}")).collect();
-            return Err(Failure::Usage(format!("--feature {wish}: write {name}=on or {name}=off{known}")));
-        }
-        for feature in features {
-            let key = &feature.key;
-            let edits = match value {
-                "on" | "off" => set_feature(rig, key, value == "on"),
-                // A feature without that switch offers nothing to choose.
-                _ if feature.switches.iter().all(|switch| switch.name != value) => continue,
-                _ => choose_switch(rig, key, value),
-            };
-            for edit in edits.map_err(wrong)? {
-                rig.apply(&edit).map_err(|error| Failure::Input(Box::new(error)))?;
-            }
-        }
-    }
-    Ok(())
-}
-
-fn switch_groups(rig: &mut Rig, wishes: &[String]) -> Result<(), Failure> {
-    for wish in wishes {
-        let (name, value) = pair("--group", wish)?;
-        let groups: Vec<_> = rig.groups().iter().filter(|group| group.name == name).cloned().collect();
-        let enabled = match value {
-            "on" => true,
-            "off" => false,
-            _ => return Err(Failure::Usage(format!("--group {wish}: write {name}=on or {name}=off"))),
-        };
-        if groups.is_empty() {
-            let names: Vec<&str> = rig.groups().iter().map(|group| group.name.as_str()).collect();
-            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            return Err(Failure::Usage(format!("--group {wish}: there is no such group; the rig has: {names}")));
-        }
-        for mut group in groups {
-            group.enabled = enabled;
-            rig.apply(&RigEdit::SetLocalGroup(group)).map_err(|error| Failure::Input(Box::new(error)))?;
-        }
-    }
-    Ok(())
-}
-
-fn pair<'a>(option: &str, text: &'a str) -> Result<(&'a str, &'a str), Failure> {
-    let wrong = || Failure::Usage(format!("{option} {text}: write NAME=VALUE, for example {text}=off"));
-    text.rsplit_once('=').ok_or_else(wrong)
 }
 
 fn write(

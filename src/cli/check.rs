@@ -16,8 +16,12 @@ use crate::{
         model::Model,
     },
     modules,
-    processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, locate, review},
-    rig::{Rig, SourceError, TagData, TagKind, Uid, template},
+    processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, locate, locate_declared, review},
+    rig::{
+        Rig, SourceError, TagData, TagKind, Uid,
+        feature::{FeatureKinds, undecided_choices},
+        template,
+    },
     solve::program::{CompileOptions, RigProgram},
 };
 
@@ -73,18 +77,16 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb) => {
             load_model(&RealDisk, path).map(|model| found.remarks = remarks_on_model(&model))
         }
-        Some(FileKind::Template | FileKind::RigText) => {
+        Some(FileKind::Template) => {
+            check_template(path, &mut found)?;
+            Ok(())
+        }
+        Some(FileKind::RigText) => {
             let mut told = Report::default();
             match load_rig(path, &mut told) {
                 Ok(rig) => {
                     found.remarks = told.notes;
                     found.remarks.extend(remarks_on_rig(&rig));
-                    found.problems = problems_of_commands(path, &rig);
-                    found.error = match found.problems.len() {
-                        0 => None,
-                        1 => Some("1 command cannot be built".to_owned()),
-                        count => Some(format!("{count} commands cannot be built")),
-                    };
                 }
                 Err(Failure::Input(error)) => found.error = Some(error.to_string()),
                 Err(usage) => return Err(usage),
@@ -109,16 +111,72 @@ fn check(path: &Path) -> Result<Findings, Failure> {
     Ok(found)
 }
 
-fn problems_of_commands(path: &Path, rig: &Rig) -> Vec<SourceError> {
+/// Tells all that is wrong with a template: its structure, kinds of features that nobody registered, and its commands.
+fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
+    let bytes = match read_capped(&RealDisk, path, template::MAX_BYTES as u64) {
+        Ok(bytes) => bytes,
+        Err(error) => {
+            found.error = Some(error.to_string());
+            return Ok(());
+        }
+    };
+    let (template, faults) = match template::survey_template(&bytes) {
+        Ok(surveyed) => surveyed,
+        Err(faults) => {
+            found.error = Some(format!("{} is no template that can be read: {}", path.display(), counted(&faults)));
+            found.problems = faults;
+            return Ok(());
+        }
+    };
+    let rig = template.rig;
+    let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes));
+    let commands = problems_of_commands(&rig, &text);
+    let kinds: Vec<SourceError> = FeatureKinds::default()
+        .unknown_in(&rig)
+        .into_iter()
+        .map(|kind| locate_declared(&text, kind.tag, "kind", kind.to_string()))
+        .collect();
+    let choices: Vec<SourceError> = undecided_choices(&rig)
+        .into_iter()
+        .map(|(feature, choice, tag)| {
+            let feature = feature.name;
+            let message = format!(
+                "not exactly one switch of the choice \"{choice}\" of the feature \"{feature}\" is on; choose one"
+            );
+            locate_declared(&text, tag, "choice", message)
+        })
+        .collect();
+    let told = [
+        (choices.len(), "choice is not decided", "choices are not decided"),
+        (faults.len(), "fault of the structure", "faults of the structure"),
+        (kinds.len(), "kind of feature is not registered", "kinds of features are not registered"),
+        (commands.len(), "command cannot be built", "commands cannot be built"),
+    ];
+    let told = told.into_iter().filter(|(count, ..)| *count > 0);
+    let told: Vec<String> =
+        told.map(|(count, one, many)| format!("{count} {}", if count == 1 { one } else { many })).collect();
+    found.error = (!told.is_empty()).then(|| told.join(", "));
+    found.remarks = template.notes;
+    found.remarks.extend(remarks_on_rig(&rig));
+    found.problems = faults.into_iter().chain(kinds).chain(choices).chain(commands).collect();
+    found.problems.sort_by_key(|problem| problem.offset);
+    Ok(())
+}
+
+fn counted(faults: &[SourceError]) -> String {
+    match faults.len() {
+        1 => "1 fault".to_owned(),
+        count => format!("{count} faults"),
+    }
+}
+
+fn problems_of_commands(rig: &Rig, text: &str) -> Vec<SourceError> {
     let modules = Arc::new(modules::all());
     let problems = review(rig, &modules);
-    // The file was readable a moment ago. Without its text, problems are shown at its beginning.
-    let bytes = read_capped(&RealDisk, path, template::MAX_BYTES as u64).unwrap_or_default();
-    let text = String::from_utf8_lossy(&bytes);
     if problems.is_empty() {
-        return problem_of_program(rig, &modules, &text).into_iter().collect();
+        return problem_of_program(rig, &modules, text).into_iter().collect();
     }
-    problems.iter().map(|problem| locate(&text, problem)).collect()
+    problems.iter().map(|problem| locate(text, rig, problem)).collect()
 }
 
 /// Problem that keeps a fully built rig from moving, such as constraints that wait for each other by way of a parent;
@@ -138,7 +196,7 @@ fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, text: &str) -> Option<S
         module: module.as_str().into(),
         problem: BuildProblem::Module(ModuleError::other(problem)),
     };
-    Some(locate(text, &error))
+    Some(locate(text, rig, &error))
 }
 
 fn remarks_on_model(model: &Model) -> Vec<String> {

@@ -21,7 +21,8 @@ pub(super) fn run(args: &ModulesArgs) -> Report {
     for module in chosen {
         report.line(format!("{}: {}", module.name, module.doc));
         for parameter in &module.parameters {
-            report.line(format!("    {} = {}    {}", parameter.name, parameter.default, parameter.doc));
+            let sided = if parameter.sided { " Has a side: mirrored." } else { "" };
+            report.line(format!("    {} = {}    {}{sided}", parameter.name, parameter.default, parameter.doc));
         }
         list.push(json!({ "name": module.name, "doc": module.doc, "parameters": module.parameters }));
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 
-use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, build, skin};
+use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, build, skin, switches::SwitchArgs};
 use crate::{
     files::{FileKind, RealDisk, load_project, store_model, store_rig},
     headless::{
@@ -33,12 +33,14 @@ pub(super) struct PoseSteps {
     /// Frames of a sixtieth of a second that pass afterwards, for springs
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub frames: u32,
+    #[command(flatten)]
+    pub parts: SwitchArgs,
 }
 
 impl PoseSteps {
     /// True if no step is requested.
     pub(super) fn is_empty(&self) -> bool {
-        self.set.is_empty() && self.switches.is_empty() && self.frames == 0
+        self.set.is_empty() && self.switches.is_empty() && self.frames == 0 && self.parts.is_empty()
     }
 }
 
@@ -83,7 +85,8 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     }
     let writes = parsed(&args.steps)?;
     let mut report = Report::default();
-    let rig = read(args, &mut report)?;
+    let mut rig = read(args, &mut report)?;
+    args.steps.parts.apply(&mut rig)?;
     let mut bench = Workbench::with_rig(SEED, rig);
     run_steps(&mut bench, &args.steps, &writes)?;
     let nodes = bench.nodes()?;

@@ -128,6 +128,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     let is_built = args.build || !args.steps.is_empty();
     if is_built {
         let writes = pose::parsed(&args.steps)?;
+        args.steps.parts.apply(&mut scene.rig)?;
         let mut bench = Workbench::with_rig(SEED, scene.rig);
         pose::run_steps(&mut bench, &args.steps, &writes)?;
         scene.rig = bench.posed_document()?;

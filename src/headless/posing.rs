@@ -15,7 +15,7 @@ use crate::{
         runtime::RigRuntime,
         schema::Attributes,
     },
-    processor::{FindError, RunReport},
+    processor::{FindError, Off, RunReport},
     rig::{BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::did_you_mean},
     solve::program::ProgramError,
 };
@@ -64,6 +64,14 @@ pub enum PoseError {
         name: String,
         /// Nearest names, as the rest of a sentence.
         nearest: String,
+    },
+    /// The node is not built, because something is off.
+    #[error("\"{name}\" is not built: {off}; turn it on")]
+    Off {
+        /// Requested name.
+        name: String,
+        /// Switch that is off.
+        off: Off,
     },
     /// Several nodes have that name.
     #[error("\"{name}\" may be any of {candidates}; write one of these names")]
@@ -327,6 +335,9 @@ impl Workbench {
         match found[..] {
             [node] => Ok(node.clone()),
             [] => {
+                if let Some(off) = self.processor().and_then(|processor| processor.builder().off_named(name)) {
+                    return Err(PoseError::Off { name: name.to_owned(), off });
+                }
                 let names =
                     of_kind().flat_map(|node| [Some(node.name.to_string()), node.label.as_deref().map(str::to_owned)]);
                 let nearest = did_you_mean(name, names.flatten());

@@ -5,7 +5,9 @@ use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    processor::{Amount, Axis, BuildScope, ModuleError, NodeId, RigModule, TargetParams, check_finite},
+    processor::{
+        Amount, Axis, BuildScope, ModuleError, NodeId, RigModule, TargetParams, check_finite, mirrored_direction,
+    },
     rig::{
         AimUp, Constraint, Scalar,
         reference::{NodeRef, NodeRefs},
@@ -95,6 +97,7 @@ impl RigModule for AimModule {
         ("keep_offset", "True: the nodes stay turned as they are, and only what the targets do counts."),
         ("weight", "How much the nodes turn, a number from 0 to 1 or the name of an attribute of the control."),
     ];
+    const SIDED: &'static [&'static str] = &["aim", "up_axis", "direction"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/aim.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/aim.svg"));
 
@@ -142,7 +145,7 @@ impl RigModule for AimModule {
     fn mirror(&mut self) {
         self.aim = self.aim.mirrored();
         self.up_axis = self.up_axis.mirrored();
-        self.direction.x = -self.direction.x;
+        self.direction = mirrored_direction(self.direction);
     }
 }
 

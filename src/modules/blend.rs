@@ -85,8 +85,8 @@ impl RigModule for BlendModule {
         if [self.translate, self.rotate, self.scale] == [[false; 3]; 3] {
             return Err(ModuleError::other("no axis follows; switch on at least one, or disable the tag"));
         }
-        let nodes = scope.resolve_some("nodes", &self.nodes)?;
-        let (a, b) = (scope.resolve_some("a", &self.a)?, scope.resolve_some("b", &self.b)?);
+        let nodes = scope.resolve_all("nodes", &self.nodes)?;
+        let (a, b) = (scope.resolve_all("a", &self.a)?, scope.resolve_all("b", &self.b)?);
         for (parameter, references, list) in [("a", &self.a, &a), ("b", &self.b, &b)] {
             if list.len() != nodes.len() {
                 let (found, needed) = (list.len(), nodes.len());

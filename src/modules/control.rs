@@ -6,7 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, degrees},
+    processor::{
+        BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, degrees,
+        mirrored_angles, mirrored_direction,
+    },
     rig::{
         Channels, Constraint, ControlData, Limits, NodeType, Scalar, Target,
         nearest::did_you_mean,
@@ -146,19 +149,20 @@ impl RigModule for ControlModule {
         ("limits", "Lowest and highest values of these; rotation in degrees."),
         ("creation", "Name, groups and label; by default those of the node."),
     ];
+    const SIDED: &'static [&'static str] = &["shape_translate", "shape_rotate", "limits", "color"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/control.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/control.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         self.check(scope)?;
         let nodes = scope.resolve_some("at", &self.at)?;
-        let parent = scope.resolve_maybe("parent", &self.parent)?;
+        let parent = scope.resolve_parent("parent", &self.parent)?;
         let mut controls: Vec<NodeId> = Vec::with_capacity(nodes.len());
         for (index, node) in nodes.iter().copied().enumerate() {
             let upper = if self.hierarchy { scope.upper_in(node, &nodes[..index]) } else { None };
             let above = match (upper, parent) {
                 (Some(upper), _) => Some(controls[upper]),
-                (None, Some(parent)) => Some(parent),
+                (None, Some(parent)) => parent,
                 (None, None) => scope.parent(node),
             };
             // The control of the node right above, whose space is that of the node's own parent.
@@ -171,9 +175,8 @@ impl RigModule for ControlModule {
     }
 
     fn mirror(&mut self) {
-        let turned = Vec3::new(1.0, -1.0, -1.0);
-        self.shape_translate.x = -self.shape_translate.x;
-        self.shape_rotate *= turned;
+        self.shape_translate = mirrored_direction(self.shape_translate);
+        self.shape_rotate = mirrored_angles(self.shape_rotate);
         self.limits = self.limits.mirrored();
         if let Some(color) = &mut self.color {
             let [left, right, _] = SIDE_COLORS;

@@ -4,9 +4,10 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    processor::{BuildScope, ModuleError, RigModule},
+    processor::{BuildScope, ModuleError, RigModule, opposite},
     rig::{
         Channel, Constraint, KeyEase,
+        label::mirror_label,
         reference::{NodeRef, NodeRefs},
     },
 };
@@ -77,6 +78,7 @@ impl RigModule for DrivenKey {
         ("output_channel", "Or the channel that is driven, on top of how they were built."),
         ("morph", "Or the name of the morph target whose weight is driven, on every mesh of the rig."),
     ];
+    const SIDED: &'static [&'static str] = &["driver_attribute", "keys", "output_attribute", "morph"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/driven_key.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/driven_key.svg"));
 
@@ -96,12 +98,13 @@ impl RigModule for DrivenKey {
 
     fn mirror(&mut self) {
         if self.output_channel.is_some_and(Channel::is_turned_over) {
-            self.keys.iter_mut().for_each(|(_, value)| *value = -*value);
+            self.keys.iter_mut().for_each(|(_, value)| *value = opposite(*value));
         }
         if self.driver_channel.is_some_and(Channel::is_turned_over) {
-            self.keys.iter_mut().for_each(|(driver, _)| *driver = -*driver);
+            self.keys.iter_mut().for_each(|(driver, _)| *driver = opposite(*driver));
             self.keys.reverse();
         }
+        [&mut self.driver_attribute, &mut self.output_attribute, &mut self.morph].into_iter().for_each(mirror_label);
     }
 }
 

@@ -71,7 +71,7 @@ impl RigModule for DuplicateChainModule {
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let nodes = scope.resolve_some("joints", &self.joints)?;
-        let parent = scope.resolve_maybe("parent", &self.parent)?;
+        let parent = scope.resolve_parent("parent", &self.parent)?;
         let kind = match self.kind {
             CopyKind::Null => NodeType::Null,
             CopyKind::Joint => NodeType::Joint,
@@ -80,7 +80,7 @@ impl RigModule for DuplicateChainModule {
         for (index, node) in nodes.iter().copied().enumerate() {
             let above = match (scope.upper_in(node, &nodes[..index]), parent) {
                 (Some(upper), _) => Some(copies[upper]),
-                (None, Some(parent)) => Some(parent),
+                (None, Some(parent)) => parent,
                 (None, None) => scope.parent(node),
             };
             let mut creation = scope.creation_for(&self.creation, node, index);

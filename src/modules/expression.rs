@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     processor::{BuildScope, ModuleError, RigModule},
-    rig::{Channel, Constraint, reference::NodeRefs},
+    rig::{Channel, Constraint, label::mirror_label, reference::NodeRefs},
     solve::expression::Expression as Compiled,
 };
 
@@ -69,6 +69,7 @@ impl RigModule for Expression {
         ("output_channel", "Or the channel that is driven, on top of how they were built."),
         ("morph", "Or the name of the morph target whose weight is driven, on every mesh of the rig."),
     ];
+    const SIDED: &'static [&'static str] = &["text", "inputs", "output_attribute", "morph"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/expression.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/expression.svg"));
 
@@ -106,10 +107,48 @@ impl RigModule for Expression {
         Ok(())
     }
 
-    /// What is driven is turned over where the other side needs it; channels that are read are left to the text.
     fn mirror(&mut self) {
-        if self.output_channel.is_some_and(Channel::is_turned_over) {
-            self.text = format!("-({})", self.text);
+        for input in self.inputs.iter().filter(|input| input.channel.is_some_and(Channel::is_turned_over)) {
+            self.text = opposite_input(&self.text, &input.name);
         }
+        if self.output_channel.is_some_and(Channel::is_turned_over) {
+            self.text = opposite_text(&self.text);
+        }
+        self.inputs.iter_mut().for_each(|input| mirror_label(&mut input.attribute));
+        [&mut self.output_attribute, &mut self.morph].into_iter().for_each(mirror_label);
     }
+}
+
+/// The text with the opposite value: `-(text)`, or what is within if it is that already.
+fn opposite_text(text: &str) -> String {
+    let inner = text.strip_prefix("-(").and_then(|rest| rest.strip_suffix(')'));
+    let is_whole = |inner: &&str| {
+        let mut depth = 0_i32;
+        inner.chars().all(|c| {
+            depth += i32::from(c == '(') - i32::from(c == ')');
+            depth >= 0
+        })
+    };
+    inner.filter(is_whole).map_or_else(|| format!("-({text})"), str::to_owned)
+}
+
+/// The text with `(-name)` in the place of an input, or the input in the place of that.
+fn opposite_input(text: &str, name: &str) -> String {
+    let turned = format!("(-{name})");
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while !rest.is_empty() {
+        if let Some(after) = rest.strip_prefix(turned.as_str()) {
+            out.push_str(name);
+            rest = after;
+            continue;
+        }
+        let word = rest.len() - rest.trim_start_matches(is_part).len();
+        let length = if word > 0 { word } else { rest.chars().next().map_or(0, char::len_utf8) };
+        let (piece, after) = rest.split_at(length);
+        out.push_str(if piece == name { &turned } else { piece });
+        rest = after;
+    }
+    out
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, NodeId, RigModule},
+    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, NodeId, RigModule, mirrored_direction},
     rig::{
         Attribute, AttributeKind, Constraint, KeyEase, Matching, NodeType, Output, Scalar, SwitchData, Target, VISIBLE,
         reference::{NodeRef, NodeRefs},
@@ -128,6 +128,7 @@ impl RigModule for IkFkSwitch {
         ("hide", "Controls of the kinematics that has no effect are hidden: their attribute \"visible\" is driven."),
         ("creation", "Name, group and label of the nulls that stand on the forward controls for the joints."),
     ];
+    const SIDED: &'static [&'static str] = &["twist", "prefer"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.svg"));
 
@@ -135,7 +136,7 @@ impl RigModule for IkFkSwitch {
         let start = scope.resolve_one("start", &self.start)?;
         let end = scope.resolve_one("end", &self.end)?;
         let chain = scope.chain(start, end)?;
-        let fk = scope.resolve_some("fk", &self.fk)?;
+        let fk = scope.resolve_all("fk", &self.fk)?;
         if fk.len() != chain.len() {
             let problem = format!(
                 "finds {} controls for the {} joints from {} to {}; give one for each joint, in that order",
@@ -212,7 +213,8 @@ impl RigModule for IkFkSwitch {
     }
 
     fn mirror(&mut self) {
-        self.prefer = self.prefer.map(|prefer| prefer * Vec3::new(-1.0, 1.0, 1.0));
+        self.twist = self.twist.opposite();
+        self.prefer = self.prefer.map(mirrored_direction);
     }
 }
 

@@ -5,7 +5,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    processor::{Amount, BuildScope, Ik, IkSolver, JointAngles, ModuleError, RigModule},
+    processor::{
+        Amount, BuildScope, Ik, IkSolver, JointAngles, ModuleError, RigModule, mirrored_direction, mirrored_limits,
+    },
     rig::reference::{NodeRef, NodeRefs},
 };
 
@@ -107,6 +109,7 @@ impl RigModule for IkHandle {
         ("iterations", "For fabrik and ccd: rounds at most, 1 to 1000."),
         ("tolerance", "For fabrik and ccd: distance from the goal that is near enough, as a share of the length."),
     ];
+    const SIDED: &'static [&'static str] = &["twist", "prefer", "limits"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_handle.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/ik_handle.svg"));
 
@@ -138,6 +141,8 @@ impl RigModule for IkHandle {
     }
 
     fn mirror(&mut self) {
-        self.prefer = self.prefer.map(|prefer| prefer * Vec3::new(-1.0, 1.0, 1.0));
+        self.twist = self.twist.opposite();
+        self.prefer = self.prefer.map(mirrored_direction);
+        self.limits.iter_mut().for_each(|limits| *limits = mirrored_limits(*limits));
     }
 }

@@ -40,6 +40,7 @@ impl RigModule for LimitModule {
         ("nodes", "The nodes."),
         ("limits", "Lowest and highest values against how they were built; rotation in degrees; None where open."),
     ];
+    const SIDED: &'static [&'static str] = &["limits"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/limit.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/limit.svg"));
 

@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{BuildScope, Creation, ModuleError, NodeId, RigModule, check_finite},
+    processor::{
+        BuildScope, Creation, ModuleError, NodeId, RigModule, check_finite, mirrored_direction, mirrored_line,
+    },
     rig::{
         NodeType,
         label::mirrored_label,
@@ -69,6 +71,7 @@ impl RigModule for MirrorJointsModule {
         ),
         ("creation", "Name, groups and label; by default each joint's label with the other side in it."),
     ];
+    const SIDED: &'static [&'static str] = &["point", "normal"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/mirror_joints.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/mirror_joints.svg"));
 
@@ -80,12 +83,12 @@ impl RigModule for MirrorJointsModule {
         };
         let plane = MirrorPlane { point: self.point, normal, tolerance: 0.0 };
         let joints = scope.resolve_some("joints", &self.joints)?;
-        let parent = scope.resolve_maybe("parent", &self.parent)?;
+        let parent = scope.resolve_parent("parent", &self.parent)?;
         let mut copies: Vec<NodeId> = Vec::with_capacity(joints.len());
         for (index, joint) in joints.iter().copied().enumerate() {
             let above = match (scope.upper_in(joint, &joints[..index]), parent) {
                 (Some(upper), _) => Some(copies[upper]),
-                (None, Some(parent)) => Some(parent),
+                (None, Some(parent)) => parent,
                 (None, None) => scope.parent(joint),
             };
             let label = scope.label(joint);
@@ -106,8 +109,8 @@ impl RigModule for MirrorJointsModule {
     }
 
     fn mirror(&mut self) {
-        self.point.x = -self.point.x;
-        self.normal.x = -self.normal.x;
+        self.point = mirrored_direction(self.point);
+        self.normal = mirrored_line(self.normal);
     }
 }
 

@@ -8,6 +8,7 @@ use crate::{
     processor::{BuildScope, ModuleError, RigModule},
     rig::{
         AttributeKind, Constraint, KeyEase, Output,
+        label::mirror_label,
         reference::{NodeRef, NodeRefs},
     },
 };
@@ -59,6 +60,7 @@ impl RigModule for Morph {
         ("keys", "Pairs of attribute and weight, attribute increasing; flat before the first and after the last."),
         ("ease", "The run between keys: Step, Linear or Smooth, without overshoot."),
     ];
+    const SIDED: &'static [&'static str] = &["morph", "attribute"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/morph.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/morph.svg"));
 
@@ -75,5 +77,9 @@ impl RigModule for Morph {
         let constraint = Constraint::DrivenKey { driver, keys: self.keys.clone(), ease: self.ease, output };
         scope.constrain("morph", control, 0, constraint)?;
         Ok(())
+    }
+
+    fn mirror(&mut self) {
+        [&mut self.morph, &mut self.attribute].into_iter().for_each(mirror_label);
     }
 }

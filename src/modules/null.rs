@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{BuildScope, Creation, ModuleError, RigModule, check_finite, degrees},
+    processor::{
+        BuildScope, Creation, ModuleError, RigModule, check_finite, degrees, mirrored_angles, mirrored_direction,
+    },
     rig::{
         NodeType,
         reference::{NodeRef, NodeRefs},
@@ -69,6 +71,7 @@ impl RigModule for NullModule {
         ("rotate", "Turn against the node about X, Y and Z, in degrees."),
         ("creation", "Name, groups and label; by default those of the node."),
     ];
+    const SIDED: &'static [&'static str] = &["translate", "rotate"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/null.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/null.svg"));
 
@@ -76,13 +79,17 @@ impl RigModule for NullModule {
         check_finite("translate", &self.translate.to_array())?;
         check_finite("rotate", &self.rotate.to_array())?;
         let nodes = scope.resolve_some("at", &self.at)?;
-        let parent = scope.resolve_maybe("parent", &self.parent)?;
+        let parent = match self.insert && !self.parent.is_empty() {
+            // What takes a node's place decides how it moves: without its parent the node stays as it is.
+            true => Some(Some(scope.resolve_one("parent", &self.parent)?)),
+            false => scope.resolve_parent("parent", &self.parent)?,
+        };
         if parent.is_some() && self.world {
             return Err(ModuleError::parameter("world", "is true, but there is a parent; leave one of the two out"));
         }
         for (index, node) in nodes.into_iter().enumerate() {
             let above = match parent {
-                Some(parent) => Some(parent),
+                Some(parent) => parent,
                 None if self.world => None,
                 None => scope.parent(node),
             };
@@ -102,7 +109,7 @@ impl RigModule for NullModule {
     }
 
     fn mirror(&mut self) {
-        self.translate.x = -self.translate.x;
-        self.rotate *= Vec3::new(1.0, -1.0, -1.0);
+        self.translate = mirrored_direction(self.translate);
+        self.rotate = mirrored_angles(self.rotate);
     }
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{Axis, BuildScope, ModuleError, NodeId, RigModule, check_finite},
+    processor::{Axis, BuildScope, ModuleError, NodeId, RigModule, check_finite, mirrored_direction},
     rig::{
         NodeType,
         reference::{NodeRefs, Source, Top},
@@ -98,6 +98,7 @@ impl RigModule for OrientJointsModule {
             "Joints at the end of a chain: parent: turned like the one above; rig: along the rig's axes; keep: as they are.",
         ),
     ];
+    const SIDED: &'static [&'static str] = &["along", "up_axis", "direction"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/orient_joints.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/orient_joints.svg"));
 
@@ -138,7 +139,7 @@ impl RigModule for OrientJointsModule {
     fn mirror(&mut self) {
         self.along = self.along.mirrored();
         self.up_axis = self.up_axis.mirrored();
-        self.direction.x = -self.direction.x;
+        self.direction = mirrored_direction(self.direction);
     }
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{Amount, BuildScope, Creation, ModuleError, RigModule, TargetParams, check_finite},
+    processor::{Amount, BuildScope, Creation, ModuleError, RigModule, TargetParams, check_finite, mirrored_direction},
     rig::{Constraint, NodeType, reference::NodeRefs},
 };
 
@@ -78,6 +78,7 @@ impl RigModule for PoleVectorModule {
         ("weight", "How much the pole follows, a number from 0 to 1 or the name of an attribute of the control."),
         ("creation", "Name, groups and label of a null that is made."),
     ];
+    const SIDED: &'static [&'static str] = &["prefer"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/pole_vector.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/pole_vector.svg"));
 
@@ -96,7 +97,7 @@ impl RigModule for PoleVectorModule {
                 holder
             }
             None => {
-                let parent = scope.resolve_maybe("parent", &self.parent)?;
+                let parent = scope.resolve_parent("parent", &self.parent)?.flatten();
                 let global = Trs { translation: position, ..Trs::IDENTITY };
                 scope.spawn_at(NodeType::Null, "pole", chain[0], 0, parent, global, &self.creation)?
             }
@@ -105,7 +106,11 @@ impl RigModule for PoleVectorModule {
             return Ok(());
         }
         let params = TargetParams { targets: &self.targets, weights: &self.weights, control: &self.control };
-        let nodes = scope.weighted_nodes(&params)?;
+        let nodes = match scope.weighted_nodes(&params) {
+            // What it follows is off: it stays where its parent takes it.
+            Err(ModuleError::Off { .. }) => return Ok(()),
+            nodes => nodes?,
+        };
         let control = scope.resolve_maybe("control", &self.control)?;
         let weight = scope.amount("weight", &self.weight, control, 0.0..=1.0, 1.0)?;
         let constraint = Constraint::Transform {
@@ -122,6 +127,6 @@ impl RigModule for PoleVectorModule {
     }
 
     fn mirror(&mut self) {
-        self.prefer.x = -self.prefer.x;
+        self.prefer = mirrored_direction(self.prefer);
     }
 }

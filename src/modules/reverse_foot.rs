@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{Amount, BuildScope, Creation, ModuleError, NodeId, RigModule},
+    processor::{Amount, BuildScope, Creation, ModuleError, NodeId, RigModule, mirrored_direction},
     rig::{
         AttributeKind, Channel, Constraint, KeyEase, NodeType, Output, Scalar, Target,
         reference::{NodeRef, NodeRefs},
@@ -122,6 +122,7 @@ impl RigModule for ReverseFoot {
         ("weight_control", "The control that carries that attribute; the foot's if left out."),
         ("creation", "Name, group and label of the pivots."),
     ];
+    const SIDED: &'static [&'static str] = &["up"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/reverse_foot.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/reverse_foot.svg"));
 
@@ -197,7 +198,7 @@ impl RigModule for ReverseFoot {
     }
 
     fn mirror(&mut self) {
-        self.up.x = -self.up.x;
+        self.up = mirrored_direction(self.up);
     }
 }
 

@@ -7,6 +7,7 @@ use crate::{
     processor::{BuildScope, Creation, ModuleError, RigModule},
     rig::{
         AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
+        label::mirror_label,
         reference::{NodeRef, NodeRefs},
     },
 };
@@ -83,14 +84,18 @@ impl RigModule for SpaceSwitch {
         ("scale", "The scale follows the space."),
         ("creation", "Name, group and label of the null."),
     ];
+    const SIDED: &'static [&'static str] = &["names"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/space_switch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/space_switch.svg"));
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         let control = scope.resolve_one("control", &self.control)?;
-        let spaces = scope.resolve_some("spaces", &self.spaces)?;
+        // A space that is off keeps its number, which values and keys hold: chosen, it is the control's parent.
+        let spaces = scope.resolve_each("spaces", &self.spaces)?;
         let names: Vec<String> = match self.names.len() {
-            0 => spaces.iter().map(|space| scope.name_to_keep(*space)).collect(),
+            0 => {
+                spaces.iter().map(|space| space.map_or_else(|| "off".to_owned(), |it| scope.name_to_keep(it))).collect()
+            }
             count if count == spaces.len() => self.names.clone(),
             count => {
                 return Err(ModuleError::parameter(
@@ -120,15 +125,16 @@ impl RigModule for SpaceSwitch {
         };
         scope.add_attribute(carrier, attribute)?;
         let mut targets = Vec::with_capacity(spaces.len());
-        for (number, space) in spaces.iter().enumerate() {
+        let built = spaces.iter().enumerate().filter_map(|(number, space)| Some((number, (*space)?)));
+        for (number, space) in built {
             targets.push(Target {
-                node: scope.uid(*space),
+                node: scope.uid(space),
                 weight: Scalar::Choice {
                     node: scope.uid(carrier),
                     name: self.attribute.as_str().into(),
                     value: number as f32,
                 },
-                offset: scope.kept_offset(null, *space),
+                offset: scope.kept_offset(null, space),
             });
         }
         let constraint = Constraint::Transform {
@@ -148,5 +154,9 @@ impl RigModule for SpaceSwitch {
             matching: Matching::Space { control: scope.uid(control) },
         };
         scope.switch("switch", control, switch)
+    }
+
+    fn mirror(&mut self) {
+        self.names.iter_mut().for_each(mirror_label);
     }
 }

@@ -74,6 +74,7 @@ impl RigModule for SplineIk {
         ),
         ("weight", "0 leaves the chain as it is, 1 follows the curve; a number or an attribute's name."),
     ];
+    const SIDED: &'static [&'static str] = &["twist"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/spline_ik.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/spline_ik.svg"));
 
@@ -84,7 +85,7 @@ impl RigModule for SplineIk {
         if chain.len() < 2 {
             return Err(ModuleError::parameter("end", "is the same joint as start; choose one further down the chain"));
         }
-        let points = scope.resolve_some("points", &self.points)?;
+        let points = scope.resolve_all("points", &self.points)?;
         if points.len() < 2 {
             return Err(ModuleError::reference("points", &self.points, "finds one node; a curve needs two or more"));
         }
@@ -102,5 +103,9 @@ impl RigModule for SplineIk {
         };
         scope.constrain("spline", start, 0, constraint)?;
         Ok(())
+    }
+
+    fn mirror(&mut self) {
+        self.twist = self.twist.opposite();
     }
 }

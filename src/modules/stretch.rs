@@ -5,7 +5,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    processor::{Amount, BuildScope, ModuleError, RigModule},
+    processor::{Amount, BuildScope, ModuleError, RigModule, mirrored_line},
     rig::{
         Constraint,
         reference::{NodeRef, NodeRefs},
@@ -80,6 +80,7 @@ impl RigModule for Stretch {
         ("weight", "0 is no stretch, 1 all of it; a number or an attribute's name."),
         ("control", "The control whose attributes the numbers may name; the end if left out."),
     ];
+    const SIDED: &'static [&'static str] = &["axis"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/stretch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/stretch.svg"));
 
@@ -117,6 +118,10 @@ impl RigModule for Stretch {
             scope.constrain("stretch", node, 0, constraint)?;
         }
         Ok(())
+    }
+
+    fn mirror(&mut self) {
+        self.axis = self.axis.map(mirrored_line);
     }
 }
 

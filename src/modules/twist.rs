@@ -92,7 +92,7 @@ impl RigModule for Twist {
         let otherwise = if self.counter { start } else { end };
         let source = scope.resolve_maybe("source", &self.source)?.unwrap_or(otherwise);
         let reference = scope.resolve_maybe("reference", &self.reference)?;
-        let driven = if self.driven.is_empty() { Vec::new() } else { scope.resolve_some("driven", &self.driven)? };
+        let driven = if self.driven.is_empty() { Vec::new() } else { scope.resolve_all("driven", &self.driven)? };
         let count = if driven.is_empty() { self.count } else { driven.len() as u32 };
         if count == 0 || count > MOST {
             return Err(ModuleError::parameter("count", format!("is {count}; write a number from 1 to {MOST}")));

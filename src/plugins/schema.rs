@@ -137,6 +137,8 @@ pub struct FeatureTag {
     pub name: String,
     /// The part of the combined feature.
     pub switch: String,
+    /// The choice that the switch is one of; empty if it stands for itself.
+    pub choice: String,
 }
 
 /// The feature tag that a command is in.

@@ -45,7 +45,8 @@ impl BuildScope<'_> {
     /// added, within `range` (open where that is infinite) and with the value `default`.
     ///
     /// # Errors
-    /// A number that is not finite or outside of the range; an attribute without a control to carry it.
+    /// A number that is not finite or outside of the range; an attribute without a control to carry it;
+    /// [`ModuleError::Off`] if that control is off.
     pub fn amount(
         &mut self,
         parameter: &str,
@@ -64,10 +65,15 @@ impl BuildScope<'_> {
                 let kind = AttributeKind::Number { min: end(*range.start()), max: end(*range.end()) };
                 self.ensure_attribute(control, name, kind, default)
             }
-            (Amount::Attribute(name), None) => Err(ModuleError::parameter(
-                parameter,
-                format!("\"{name}\" is an attribute of a control: say which one with \"control\", or write a number"),
-            )),
+            (Amount::Attribute(name), None) => Err(match self.trace.optional_off.clone() {
+                Some((parameter, off)) if parameter == "control" => ModuleError::Off { parameter, off },
+                _ => ModuleError::parameter(
+                    parameter,
+                    format!(
+                        "\"{name}\" is an attribute of a control: say which one with \"control\", or write a number"
+                    ),
+                ),
+            }),
         }
     }
 

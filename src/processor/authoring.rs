@@ -97,7 +97,7 @@ impl BuildScope<'_> {
         references: &NodeRefs,
         least: usize,
     ) -> Result<Vec<NodeId>, ModuleError> {
-        let nodes = self.resolve_some(parameter, references)?;
+        let nodes = self.resolve_all(parameter, references)?;
         if nodes.len() < least {
             let problem = format!("finds {} where a chain of at least {least} nodes is needed", nodes.len());
             return Err(ModuleError::reference(parameter, references, problem));

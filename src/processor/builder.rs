@@ -3,6 +3,7 @@
 mod find;
 mod follow;
 mod loops;
+mod status;
 
 use std::{
     cmp::Reverse,
@@ -12,42 +13,17 @@ use std::{
 };
 
 pub use find::FindError;
+pub use status::{CommandState, CommandStatus};
 
 use super::{
     BuildError, BuildProblem, BuildRange, BuildScope, DynModule, ListEntry, ModuleError, Modules, error_references,
+    off::{OffCommand, SkipReason},
     resolve::Asker,
     scope::Trace,
     snapshot,
     world::{Aspect, NOWHERE, NodeId, Value, World, same},
 };
 use crate::rig::{BuiltRig, Rig, Uid};
-
-/// Where a command stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CommandState {
-    /// Not carried out yet, or rolled back.
-    Pending,
-    /// Carried out.
-    Done,
-    /// Passed over: its tag, its feature or its joint's group is off.
-    Skipped,
-    /// It failed and the build stands before it.
-    Failed,
-}
-
-/// What is known about a command.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CommandStatus {
-    /// Where it stands.
-    pub state: CommandState,
-    /// How long it took when it ran last, in microseconds.
-    pub micros: f32,
-    /// How often it ran since the builder was made.
-    pub runs: u32,
-    /// Why it failed, if it did.
-    pub error: Option<BuildProblem>,
-}
 
 /// What a run did.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -220,22 +196,6 @@ impl Builder {
         self.due.iter().filter_map(waiting).min().map_or(self.cursor, |due| due.min(self.cursor)) as usize
     }
 
-    /// What is known about a command; `None` if it is not in the list.
-    pub fn status(&self, tag: Uid) -> Option<CommandStatus> {
-        let number = self.world.creator_of(tag)?;
-        let place = Some(self.world.places[number as usize]).filter(|place| *place != NOWHERE)?;
-        let command = &self.commands[number as usize];
-        let cursor = self.cursor() as u32;
-        let state = match () {
-            () if self.failed == Some(number) && place == cursor => CommandState::Failed,
-            () if place >= cursor => CommandState::Pending,
-            () if !command.active => CommandState::Skipped,
-            () => CommandState::Done,
-        };
-        let error = command.error.clone().filter(|_| state == CommandState::Failed);
-        Some(CommandStatus { state, micros: command.micros, runs: command.runs, error })
-    }
-
     /// A run with [`Builder::run`] stops before commands with a breakpoint.
     pub fn set_breakpoint(&mut self, tag: Uid, on: bool) {
         if on {
@@ -372,12 +332,29 @@ impl Builder {
         let before = self.take_back(number, &old);
         let mut trace = Trace::default();
         let started = Instant::now();
-        let result = if self.commands[number as usize].active { self.construct(number, &mut trace) } else { Ok(()) };
-        if result.is_err() {
+        let active = self.commands[number as usize].active;
+        let outcome = if active { self.construct(number, &mut trace) } else { Ok(()) };
+        let above = trace.above;
+        if outcome.is_err() {
             let reads = std::mem::take(&mut trace.reads);
             self.take_back(number, &trace);
             trace = Trace { reads, ..Trace::default() };
         }
+        let result = match outcome {
+            Err(BuildProblem::Module(ModuleError::Off { parameter, off })) => {
+                let module = self.commands[number as usize].module.clone();
+                let reason = SkipReason::Reference { parameter: parameter.into(), off };
+                self.set_command_off(number, Some(OffCommand { module, reason, above }));
+                Ok(())
+            }
+            outcome => {
+                if active {
+                    self.set_command_off(number, None);
+                }
+                outcome
+            }
+        };
+        self.set_partial(number, trace.partial.clone());
         // Early cut-off: only what is not as before concerns others.
         for (node, aspect) in &trace.writes {
             let was = before.binary_search_by_key(&(*node, *aspect), |(node, aspect, _)| (*node, *aspect));

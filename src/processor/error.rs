@@ -1,5 +1,6 @@
 //! What goes wrong in a build: which tag, what, and what to do.
 
+use super::off::Off;
 use crate::rig::{SourceError, Uid, reference::NodeRefs};
 
 /// Why a module could not do its work.
@@ -22,6 +23,15 @@ pub enum ModuleError {
         parameter: String,
         /// What is wrong and what to write.
         problem: String,
+    },
+    /// A reference that the command cannot do without means something that is off: no failure, the build passes the
+    /// command over.
+    #[error("{parameter}: {off}")]
+    Off {
+        /// The parameter.
+        parameter: String,
+        /// What is off.
+        off: Off,
     },
     /// Anything else.
     #[error("{0}")]

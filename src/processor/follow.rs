@@ -39,12 +39,13 @@ pub struct FollowParams<'a> {
 }
 
 impl BuildScope<'_> {
-    /// Nodes to follow with their shares. Attributes that the control does not have are added, from 0 to 1.
+    /// Nodes to follow with their shares. Attributes that the control does not have are added, from 0 to 1. Targets
+    /// that are off are left out with their shares.
     ///
     /// # Errors
     /// See [`BuildScope::resolve_some`] and [`BuildScope::amount`]; a list of another length, shares that are all 0.
     pub fn weighted_nodes(&mut self, params: &TargetParams) -> Result<Vec<(NodeId, Scalar)>, ModuleError> {
-        let nodes = self.resolve_some("targets", params.targets)?;
+        let nodes = self.resolve_each("targets", params.targets)?;
         let (count, given) = (nodes.len(), params.weights.len());
         if given != 0 && given != count {
             let problem = format!("has {given} for {count} targets; write one for each target, or none");
@@ -52,7 +53,8 @@ impl BuildScope<'_> {
         }
         let control = self.resolve_maybe("control", params.control)?;
         let mut list = Vec::with_capacity(count);
-        for (place, node) in nodes.into_iter().enumerate() {
+        let built = nodes.into_iter().enumerate().filter_map(|(place, node)| Some((place, node?)));
+        for (place, node) in built {
             let weight = match params.weights.get(place) {
                 Some(amount @ Amount::Value(_)) => self.amount("weights", amount, control, 0.0..=f32::INFINITY, 1.0)?,
                 // Without anybody's doing, the first is followed.
@@ -62,6 +64,8 @@ impl BuildScope<'_> {
             list.push((node, weight));
         }
         if list.iter().all(|(_, weight)| *weight == Scalar::Value(0.0)) {
+            // Where only targets without a share are left, what is off decides.
+            self.resolve_all("targets", params.targets)?;
             return Err(ModuleError::parameter("weights", "are all 0; give at least one target a share above 0"));
         }
         Ok(list)

@@ -1,11 +1,11 @@
 //! The build list: which commands, in which order.
 
-use std::{
-    collections::{BTreeMap, HashSet},
-    sync::Arc,
-};
+use std::{collections::HashSet, sync::Arc};
 
-use crate::rig::{Rig, TagData, TagKind, Uid};
+use bevy::platform::collections::HashMap;
+
+use super::off::Off;
+use crate::rig::{JointData, Rig, TagData, TagKind, Uid};
 
 /// Which joints' commands are built.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -32,24 +32,57 @@ pub struct ListEntry {
     pub active: bool,
 }
 
-/// Feature tags that are on or off, by uid.
-pub(super) fn features(rig: &Rig) -> BTreeMap<Uid, bool> {
-    let tags = rig.walk().flat_map(|joint| &joint.data.tags);
-    tags.filter(|tag| matches!(tag.kind, TagKind::Feature { .. })).map(|tag| (tag.uid, tag.enabled)).collect()
+/// What the document switches off.
+pub(super) struct Switches {
+    /// Feature tags that are off, with their names.
+    features: HashMap<Uid, Arc<str>>,
+    /// Local groups that are off, with their names.
+    pub groups: HashMap<Uid, Arc<str>>,
 }
 
-/// True if a tag's own switch and its feature are on.
-pub(super) fn is_on(tag: &TagData, features: &BTreeMap<Uid, bool>) -> bool {
-    let feature = match &tag.kind {
-        TagKind::Command { feature, .. } => *feature,
-        TagKind::Feature { .. } => None,
-    };
-    tag.enabled && feature.is_none_or(|feature| features.get(&feature).copied().unwrap_or(true))
+impl Switches {
+    pub fn of(rig: &Rig) -> Self {
+        let tags = rig.walk().flat_map(|joint| &joint.data.tags).filter(|tag| !tag.enabled);
+        let features = tags.filter_map(|tag| Some((tag.uid, feature_name(tag)?)));
+        let groups = rig.groups().iter().filter(|group| !group.enabled);
+        Self {
+            features: features.collect(),
+            groups: groups.map(|group| (group.uid, group.name.as_str().into())).collect(),
+        }
+    }
+
+    /// The group of a joint, if it is off.
+    pub fn joint(&self, joint: &JointData) -> Option<Off> {
+        let group = self.groups.get(&joint.group?)?.clone();
+        Some(Off::Joint { joint: joint_name(joint).into(), group })
+    }
+
+    /// What keeps a command of a joint from being carried out: the joint's group, its feature or its own switch.
+    pub fn command(&self, joint: &JointData, tag: &TagData) -> Option<Off> {
+        let TagKind::Command { module, feature, .. } = &tag.kind else { return None };
+        let command = || Arc::from(format!("{module}/{}", joint_name(joint)));
+        let feature = feature.and_then(|feature| self.features.get(&feature));
+        match (self.joint(joint), feature) {
+            (Some(off), _) => Some(off),
+            (None, _) if !tag.enabled => Some(Off::Tag(command())),
+            (None, Some(feature)) => Some(Off::Feature { command: command(), feature: feature.clone() }),
+            (None, None) => None,
+        }
+    }
 }
 
-/// Groups that are off.
-pub(super) fn groups_off(rig: &Rig) -> HashSet<Uid> {
-    rig.groups().iter().filter(|group| !group.enabled).map(|group| group.uid).collect()
+fn joint_name(joint: &JointData) -> String {
+    joint.label.clone().unwrap_or_else(|| joint.uid.to_string())
+}
+
+/// How a feature tag is called in messages; `None` for a command.
+fn feature_name(tag: &TagData) -> Option<Arc<str>> {
+    match &tag.kind {
+        TagKind::Feature { name, switch, .. } if switch.is_empty() && !name.is_empty() => Some(name.as_str().into()),
+        TagKind::Feature { name, switch, .. } if !switch.is_empty() => Some(format!("{name}:{switch}").into()),
+        TagKind::Feature { .. } => Some(tag.uid.to_string().into()),
+        TagKind::Command { .. } => None,
+    }
 }
 
 /// Joints in the range, in the document's order.

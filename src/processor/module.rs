@@ -5,7 +5,7 @@ use std::{any::TypeId, collections::BTreeMap, sync::Arc};
 use bevy::reflect::{Reflect, TypeInfo, Typed};
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::{BuildProblem, BuildScope, ModuleError};
+use super::{BuildProblem, BuildScope, ModuleError, mirror};
 use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_options};
 
 /// What a command does: its fields are the parameters of the tag, [`RigModule::construct`] is the work.
@@ -19,6 +19,8 @@ pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + 
     const DOC: &'static str;
     /// A line about each parameter: (name, what it is, with its unit and range).
     const PARAMETERS: &'static [(&'static str, &'static str)];
+    /// Names of the parameters whose values have a side, see [`RigModule::mirror`].
+    const SIDED: &'static [&'static str] = &[];
     /// The form that edits its parameters, as text: see [`Form`](super::form::Form). Without one, a form is made
     /// from the parameters' types.
     const FORM: Option<&'static str> = None;
@@ -32,7 +34,8 @@ pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError>;
 
     /// Turns values that have a side (axes, colours by side) into those of the other side of the character, for tags
-    /// that are pasted mirrored. References are mirrored already.
+    /// that are pasted mirrored: those of [`RigModule::SIDED`] and no others. Twice gives the first values back.
+    /// References are mirrored already.
     fn mirror(&mut self) {}
 }
 
@@ -62,6 +65,8 @@ pub struct Parameter {
     pub doc: &'static str,
     /// The value where a tag leaves it out, as RON.
     pub default: String,
+    /// True if its value has a side, and is another one on the other side of the character.
+    pub sided: bool,
 }
 
 type Parse = fn(&str) -> Result<Arc<dyn DynModule>, SourceError>;
@@ -97,7 +102,8 @@ impl ModuleInfo {
         (self.parse)(params)
     }
 
-    /// The parameters for the other side of the character, as RON. References are left as they are.
+    /// The parameters for the other side of the character: as they are written, with other values where those have a
+    /// side. References are left as they are.
     ///
     /// # Errors
     /// [`SourceError`] with line and column in the text.
@@ -130,9 +136,10 @@ impl Modules {
             type_info: M::type_info(),
             parse: |text| Ok(Arc::new(read::<M>(text)?)),
             mirror: |text| {
+                let before = written(&read::<M>(text)?);
                 let mut module = read::<M>(text)?;
                 module.mirror();
-                Ok(written(&module))
+                Ok(mirror::with_changes(text, &before, &written(&module)))
             },
         };
         self.by_name.insert(M::NAME, info);
@@ -177,7 +184,8 @@ fn parameters<M: RigModule>() -> Vec<Parameter> {
     let parameter = |field: &bevy::reflect::NamedField| {
         let doc = M::PARAMETERS.iter().find(|(name, _)| *name == field.name()).map_or("", |(_, doc)| doc);
         let kind = field.type_path_table().short_path().to_owned();
-        Parameter { name: field.name(), kind, doc, default: default_text(&default, field.name()) }
+        let default = default_text(&default, field.name());
+        Parameter { name: field.name(), kind, doc, default, sided: M::SIDED.contains(&field.name()) }
     };
     info.iter().map(parameter).collect()
 }

@@ -2,11 +2,14 @@
 
 use std::collections::HashSet;
 
-use super::world::{Birth, NodeId, World};
+use super::{
+    off::{Gap, Off},
+    world::{Birth, NodeId, World},
+};
 use crate::rig::{
     NodeType, Uid,
     nearest::did_you_mean,
-    reference::{GroupScope, NodeRef, NodeRefs, NodeTypes, RigScope, Source, Top},
+    reference::{GroupScope, NodeRef, NodeRefs, NodeTypes, Pick, PickAt, RigScope, Source, Top},
 };
 
 /// Who asks: whose joint `this` is, and which rig is its own.
@@ -21,26 +24,58 @@ pub(super) struct Asker {
 /// Why a reference has no meaning, as the rest of a sentence.
 pub(super) type Refusal = String;
 
-pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Result<Vec<NodeId>, Refusal> {
-    let mut nodes: Vec<NodeId> = Vec::new();
-    for reference in references {
-        for node in resolve_one(world, asker, reference)? {
-            if !nodes.contains(&node) {
-                nodes.push(node);
-            }
-        }
-    }
-    Ok(nodes)
+/// What references stand for.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Resolution {
+    pub nodes: Vec<NodeId>,
+    /// What they mean besides, which is off.
+    pub gaps: Vec<Gap>,
 }
 
-fn resolve_one(world: &World, asker: Asker, reference: &NodeRef) -> Result<Vec<NodeId>, Refusal> {
+/// Why a reference finds nothing.
+enum Missing {
+    Off(Box<Gap>),
+    Wrong(Refusal),
+}
+
+impl From<Gap> for Missing {
+    fn from(gap: Gap) -> Self {
+        Self::Off(Box::new(gap))
+    }
+}
+
+pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Result<Resolution, Refusal> {
+    let mut all = Resolution::default();
+    for reference in references {
+        let mut gaps = Vec::new();
+        let found = match resolve_one(world, asker, reference, &mut gaps) {
+            Ok(found) => found,
+            Err(Missing::Wrong(refusal)) => return Err(refusal),
+            Err(Missing::Off(gap)) => {
+                gaps = vec![*gap];
+                Vec::new()
+            }
+        };
+        for node in found {
+            if !all.nodes.contains(&node) {
+                all.nodes.push(node);
+            }
+        }
+        let at = all.nodes.len();
+        all.gaps.extend(gaps.into_iter().map(|gap| Gap { at, ..gap }));
+    }
+    Ok(all)
+}
+
+/// The nodes of one reference; `gaps` gets what is off of a list that is not all off.
+fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<Gap>) -> Result<Vec<NodeId>, Missing> {
     if let RigScope::Rig(rig) = reference.rig
         && rig != asker.rig
     {
-        return Err(format!(
+        return Err(Missing::Wrong(format!(
             "rig {rig} is another rig than that of the tag; a command works on one rig: merge the two, or declare the \
              node as an input of this one"
-        ));
+        )));
     }
     let place = asker.place;
     let label = reference.label.map(|bearer| label_of(world, bearer, place)).transpose()?;
@@ -56,9 +91,12 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef) -> Result<Vec<N
             && reference.role.as_ref().is_none_or(|role| birth.origin.as_ref().is_some_and(|o| *o.role == **role))
     };
     let alive = |node: &NodeId| world.birth(*node, place).is_some_and(|birth| keeps(*node, birth));
+    let before = |command: u32| world.places[command as usize] < place;
+    let mut incomplete: Option<Gap> = None;
     let mut found: Vec<NodeId> = match &reference.source {
         Source::Any => (0..world.slots.len() as u32).map(NodeId).filter(alive).collect(),
         Source::This => Some(asker.joint).into_iter().filter(alive).collect(),
+        Source::Root => root_control(world, asker).into_iter().filter(alive).collect(),
         Source::Joints => world.joints.iter().copied().filter(alive).collect(),
         Source::Joint(uid) => vec![joint(world, *uid, place)?].into_iter().filter(alive).collect(),
         Source::Hierarchy(top) => {
@@ -66,15 +104,25 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef) -> Result<Vec<N
                 Top::This => asker.joint,
                 Top::Joint(uid) => joint(world, *uid, place)?,
             };
+            let mut off: Vec<_> = world.off.joints.iter().collect();
+            off.retain(|(_, joint)| joint.above.is_some_and(|above| is_below(world, above, top, place)));
+            off.sort_unstable_by_key(|(uid, _)| **uid);
+            gaps.extend(off.into_iter().filter_map(|(uid, _)| world.off.joint(*uid)));
+            incomplete = gaps.first().cloned();
             let below = |node: &NodeId| is_below(world, *node, top, place);
             let joints = |node: &NodeId| world.birth(*node, place).is_some_and(|b| b.kind == NodeType::Joint);
             (0..world.slots.len() as u32).map(NodeId).filter(alive).filter(joints).filter(below).collect()
         }
         Source::Command(uid) => {
-            let before = |command: &u32| world.places[*command as usize] < place;
-            let command = world.creator_of(*uid).filter(before).ok_or_else(|| {
-                format!("no command has the uid {uid} and has run before this one; move it up, or refer to another")
+            let command = world.creator_of(*uid).filter(|command| before(*command)).ok_or_else(|| {
+                Missing::Wrong(format!(
+                    "no command has the uid {uid} and has run before this one; move it up, or refer to another"
+                ))
             })?;
+            if let Some(gap) = world.off.command(command) {
+                return Err(gap.into());
+            }
+            incomplete = world.off.partial.get(&command).cloned();
             world.created[command as usize].iter().copied().filter(alive).collect()
         }
         Source::Module(name) => {
@@ -82,12 +130,59 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef) -> Result<Vec<N
                 let birth = world.birth(*node, place);
                 birth.and_then(|birth| birth.origin.as_ref()).is_some_and(|origin| *origin.module == **name)
             };
+            let off = world.off.commands.iter().filter(|(number, off)| *off.module == **name && before(**number));
+            incomplete = off.min_by_key(|(number, _)| world.places[**number as usize]).map(|(_, off)| off.gap());
             (0..world.slots.len() as u32).map(NodeId).filter(of_module).filter(alive).collect()
         }
     };
+    if let (true, GroupScope::Group(group)) = (found.is_empty(), reference.group)
+        && let Some(name) = world.off.groups.get(&group)
+    {
+        incomplete.get_or_insert(Gap { at: 0, off: Off::Group(name.clone()), above: None });
+    }
+    if let Some(gap) = incomplete
+        && (found.is_empty() || picks_numbers(&reference.pick))
+    {
+        return Err(gap.into());
+    }
     sort(world, &mut found, place);
-    let picked = reference.pick.indices(found.len()).map_err(|error| error.to_string())?;
+    let picked = reference.pick.indices(found.len()).map_err(|error| Missing::Wrong(error.to_string()))?;
+    if reference.pick != Pick::All {
+        // Of the first or the last of a list nothing is missing.
+        gaps.clear();
+    }
     Ok(picked.into_iter().map(|index| found[index]).collect())
+}
+
+/// True if places of a list are counted, which are others where something of the list is missing.
+fn picks_numbers(pick: &Pick) -> bool {
+    matches!(pick, Pick::List(places) if places.iter().any(|place| matches!(place, PickAt::Number(_))))
+}
+
+/// The control that carries the rig of the asker: of the controls that commands of its root joint have made so far, the
+/// first that stands below no other. Without one, that of another root joint, if only one has such controls.
+pub(super) fn root_control(world: &World, asker: Asker) -> Option<NodeId> {
+    let place = asker.place;
+    let is_joint = |node: NodeId| world.slots[node.0 as usize].creator.is_none();
+    let above = |node: NodeId| std::iter::successors(Some(node), |node| world.parent(*node, place));
+    let root_of = |node: NodeId| above(node).filter(|node| is_joint(*node)).last();
+    let is_control = |node: NodeId| world.birth(node, place).is_some_and(|birth| birth.kind == NodeType::Control);
+    let mut controls: Vec<(NodeId, NodeId)> = Vec::new();
+    for node in (0..world.slots.len() as u32).map(NodeId).filter(|node| is_control(*node)) {
+        let Some(creator) = world.slots[node.0 as usize].creator else { continue };
+        let Some(bearer) = world.id(world.bearers[creator as usize]) else { continue };
+        if root_of(bearer) == Some(bearer) && !above(node).skip(1).any(is_control) {
+            controls.push((bearer, node));
+        }
+    }
+    let own = root_of(asker.joint);
+    let mut of_root: Vec<NodeId> =
+        controls.iter().filter(|(root, _)| Some(*root) == own).map(|(_, node)| *node).collect();
+    if of_root.is_empty() && controls.iter().all(|(root, _)| *root == controls[0].0) {
+        of_root = controls.into_iter().map(|(_, node)| node).collect();
+    }
+    sort(world, &mut of_root, place);
+    of_root.first().copied()
 }
 
 fn type_of(kind: NodeType) -> NodeTypes {
@@ -98,23 +193,39 @@ fn type_of(kind: NodeType) -> NodeTypes {
     }
 }
 
-fn joint(world: &World, uid: Uid, place: u32) -> Result<NodeId, Refusal> {
-    let node = world.id(uid).filter(|node| world.exists(*node, place));
-    node.ok_or_else(|| format!("there is no joint {uid} in the built rig; it was deleted, or its group is disabled"))
+fn joint(world: &World, uid: Uid, place: u32) -> Result<NodeId, Missing> {
+    match (world.id(uid).filter(|node| world.exists(*node, place)), world.off.joint(uid)) {
+        (Some(node), _) => Ok(node),
+        (None, Some(gap)) => Err(gap.into()),
+        (None, None) => {
+            Err(Missing::Wrong(format!("there is no joint {uid} in the rig; it was deleted: refer to another")))
+        }
+    }
 }
 
 /// The text of a label that is known by who bears it.
-fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, Refusal> {
-    let bare = || format!("the joint or command {bearer}, whose label is meant, has no label; give it one");
+fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, Missing> {
+    let bare =
+        || Missing::Wrong(format!("the joint or command {bearer}, whose label is meant, has no label; give it one"));
     let before = |command: &u32| world.places[*command as usize] < place;
     if let Some(command) = world.creator_of(bearer).filter(before) {
+        if let Some(gap) = world.off.command(command) {
+            return Err(gap.into());
+        }
         let nodes = world.created[command as usize].iter();
         let label = nodes.filter(|node| world.exists(**node, place)).find_map(|node| world.label(*node, place));
         return label.map(|label| label.to_string()).ok_or_else(bare);
     }
     match world.id(bearer).filter(|node| world.exists(*node, place)) {
         Some(node) => world.label(node, place).map(|label| label.to_string()).ok_or_else(bare),
-        None => Err(format!("the joint or command {bearer}, whose label is meant, is not there; refer to another")),
+        None => Err(world.off.joint(bearer).map_or_else(
+            || {
+                Missing::Wrong(format!(
+                    "the joint or command {bearer}, whose label is meant, is not there; refer to another"
+                ))
+            },
+            Missing::from,
+        )),
     }
 }
 

@@ -2,15 +2,19 @@
 
 use std::sync::Arc;
 
-use super::{BuildError, BuildProblem, Builder, Modules};
-use crate::rig::{Rig, RigEdit, SourceError, TagData, TagKind, Uid};
+use super::{BuildError, BuildProblem, Builder, ModuleError, Modules};
+use crate::rig::{
+    Field, Rig, RigEdit, SourceError, TagData, TagKind, Uid, fields,
+    reference::{GroupScope, references_in},
+    same_place,
+};
 
 /// How many failing commands are looked for.
 const MOST: usize = 200;
 
 /// The problems of all commands of a rig, in the order of the build list: those whose module or parameters are wrong,
-/// switched off or not, and those that fail when they run. A command that fails is left out for the rest, so what only
-/// fails because of it is told, too.
+/// switched off or not, and those that fail when they run. A command that fails is left out for the rest, and those that
+/// cannot do without it are passed over: each fault is told once.
 pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
     let mut problems = Vec::new();
     let mut rig = rig.clone();
@@ -18,7 +22,8 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
     for joint in rig.walk() {
         for tag in &joint.data.tags {
             let TagKind::Command { module, params, .. } = &tag.kind else { continue };
-            if let Err(problem) = modules.load(module, params) {
+            let loaded = modules.load(module, params).map(drop);
+            if let Err(problem) = loaded.and_then(|()| Ok(known_groups(&rig, params)?)) {
                 problems.push(BuildError {
                     command: tag.uid,
                     joint: joint.data.uid,
@@ -45,26 +50,83 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
     problems
 }
 
+/// Refuses local groups that the rig does not have: in references, and as the group of what is made.
+fn known_groups(rig: &Rig, params: &str) -> Result<(), ModuleError> {
+    let fields = fields(params);
+    let is_unknown = |uid: &Uid| rig.group(*uid).is_none();
+    for found in references_in(params) {
+        let Ok(references) = found.references else { continue };
+        let groups = references.iter().filter_map(|reference| match reference.group {
+            GroupScope::Group(uid) => Some(uid),
+            _ => None,
+        });
+        if let Some(group) = groups.into_iter().find(is_unknown) {
+            let field = fields.iter().rfind(|field| field.value <= found.range.start && found.range.end <= field.end);
+            let parameter = field.map_or("params", |field| field.name);
+            let problem = format!("the rig has no local group {group}; refer to another, or add it under `groups`");
+            return Err(ModuleError::reference(parameter, &references, problem));
+        }
+    }
+    for field in fields.iter().filter(|field| field.name == "local_group") {
+        let value = params[field.value..field.end].split('"').nth(1);
+        if let Some(group) = value.and_then(|text| text.parse().ok()).filter(is_unknown) {
+            let problem = format!("the rig has no local group {group}; choose another, or leave it out");
+            return Err(ModuleError::parameter("local_group", problem));
+        }
+    }
+    Ok(())
+}
+
 fn switch_off(rig: &mut Rig, joint: Uid, tag: TagData) {
     // The tag was just there: nothing can be refused.
     let _ = rig.apply(&RigEdit::SetTag(joint, Box::new(TagData { enabled: false, ..tag })));
 }
 
-/// Where the problem of a command is in the text of its template: in its parameters if they cannot be read, else at its
-/// tag. The beginning of the text if the tag is not in it.
-pub fn locate(text: &str, error: &BuildError) -> SourceError {
-    let tag = tag_offset(text, error.command).unwrap_or(0);
+/// The place of a command's problem in the text of its template: in the parameter that is wrong, else at the tag. The
+/// beginning of the text if the tag is not in it. `rig` is the rig as it was read, whose parameters have uids beside the
+/// names that people write alone.
+pub fn locate(text: &str, rig: &Rig, error: &BuildError) -> SourceError {
+    let found = fields(text);
     let message = format!("{}: {}", error.module, error.problem);
-    let BuildProblem::Parameters(inner) = &error.problem else { return SourceError::at(text, tag, message) };
-    let params = text[tag..].find("params:").map_or(tag, |at| tag + at + "params:".len());
-    let params = params + text[params..].len() - text[params..].trim_start().len();
-    SourceError::at(text, params + inner.offset, format!("{}: {}", error.module, inner.message))
+    let Some(tag) = declaration(text, &found, error.command) else { return SourceError::at(text, 0, message) };
+    let at_tag = tag.end - text[tag.value..tag.end].trim_start().len();
+    let params = found.iter().find(|field| field.bracket == tag.bracket && field.name == "params");
+    let Some(params) = params else { return SourceError::at(text, at_tag, message) };
+    let start = params.end - text[params.value..params.end].trim_start().len();
+    let written = &text[start..params.end];
+    match &error.problem {
+        BuildProblem::Parameters(inner) => {
+            let read = rig.find_tag(error.command).and_then(|(_, tag)| match &tag.kind {
+                TagKind::Command { params, .. } => Some(params.as_str()),
+                TagKind::Feature { .. } => None,
+            });
+            let offset = read.map_or(inner.offset, |read| same_place(read, written, inner.offset));
+            SourceError::at(text, start + offset, format!("{}: {}", error.module, inner.message))
+        }
+        BuildProblem::Module(ModuleError::Reference { parameter, .. } | ModuleError::Parameter { parameter, .. }) => {
+            let first = parameter.split([',', ' ', '[', '.']).next().unwrap_or_default();
+            let field = fields(written).into_iter().find(|field| field.name == first).map(|field| start + field.start);
+            SourceError::at(text, field.unwrap_or(at_tag), message)
+        }
+        _ => SourceError::at(text, at_tag, message),
+    }
 }
 
-/// The place of the uid by which a tag introduces itself.
-fn tag_offset(text: &str, tag: Uid) -> Option<usize> {
-    let quoted = format!("\"{tag}\"");
-    let introduces =
-        |at: usize| text[..at].trim_end().strip_suffix(':').is_some_and(|before| before.trim_end().ends_with("uid"));
-    text.match_indices(&quoted).map(|(at, _)| at).find(|at| introduces(*at))
+/// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.
+pub fn locate_declared(text: &str, uid: Uid, field: &str, message: String) -> SourceError {
+    let found = fields(text);
+    let Some(declared) = declaration(text, &found, uid) else { return SourceError::at(text, 0, message) };
+    let named = found.iter().find(|other| other.bracket == declared.bracket && other.name == field);
+    SourceError::at(text, named.unwrap_or(declared).start, message)
+}
+
+/// The field by which something introduces itself.
+fn declaration<'f, 'a>(text: &str, fields: &'f [Field<'a>], uid: Uid) -> Option<&'f Field<'a>> {
+    let digits = uid.to_string();
+    fields.iter().find(|field| {
+        let value = text[field.value..field.end].trim_start().trim_start_matches('"');
+        field.depth > 1
+            && field.name == "uid"
+            && value.get(..digits.len()).is_some_and(|value| value.eq_ignore_ascii_case(&digits))
+    })
 }

@@ -1,5 +1,6 @@
 //! What a module may do: the only way it touches the built world.
 
+mod references;
 mod trace;
 mod writing;
 
@@ -10,15 +11,12 @@ use trace::{created_uid, world_children};
 
 use super::{
     Creation, ModuleError,
-    resolve::{self, Asker},
+    resolve::Asker,
     world::{Aspect, Birth, NodeId, Value, World},
 };
 use crate::{
     mesh::model::Trs,
-    rig::{
-        Attribute, Constraint, ControlData, Dependency, LayerData, NodeType, Origin, SwitchData, Uid,
-        reference::NodeRefs,
-    },
+    rig::{Attribute, Constraint, ControlData, Dependency, LayerData, NodeType, Origin, SwitchData, Uid},
 };
 
 /// The side of the body that a node is on.
@@ -69,62 +67,6 @@ impl BuildScope<'_> {
     /// The node with that uid, if the builder has ever seen one.
     pub fn id(&self, uid: Uid) -> Option<NodeId> {
         self.world.id(uid)
-    }
-
-    /// Nodes that references stand for, in order, each once. May be none.
-    ///
-    /// # Errors
-    /// A reference to another rig, to a joint that is not there, or to a place past the end of a list.
-    pub fn resolve(&mut self, parameter: &str, references: &NodeRefs) -> Result<Vec<NodeId>, ModuleError> {
-        let found = resolve::resolve(self.world, self.asker, references);
-        self.trace.reads.push(Read::References(references.clone(), found.clone().ok()));
-        found.map_err(|problem| ModuleError::reference(parameter, references, problem))
-    }
-
-    /// Like [`BuildScope::resolve`], but at least one node.
-    ///
-    /// # Errors
-    /// See [`BuildScope::resolve`]; and nothing found, with the nearest matches.
-    pub fn resolve_some(&mut self, parameter: &str, references: &NodeRefs) -> Result<Vec<NodeId>, ModuleError> {
-        let nodes = self.resolve(parameter, references)?;
-        if nodes.is_empty() {
-            let nearest = resolve::nearest(self.world, self.asker, references);
-            let problem = if references.is_empty() {
-                "is needed; refer to a node, such as @this".to_owned()
-            } else {
-                format!("finds nothing{nearest}; refer to something that exists when this command runs")
-            };
-            return Err(ModuleError::reference(parameter, references, problem));
-        }
-        Ok(nodes)
-    }
-
-    /// The one node that references stand for.
-    ///
-    /// # Errors
-    /// See [`BuildScope::resolve_some`]; and more than one.
-    pub fn resolve_one(&mut self, parameter: &str, references: &NodeRefs) -> Result<NodeId, ModuleError> {
-        match self.resolve_some(parameter, references)?[..] {
-            [node] => Ok(node),
-            ref nodes => {
-                let names: Vec<String> = nodes.iter().take(4).map(|node| self.name(*node)).collect();
-                let more = if nodes.len() > 4 { ", ..." } else { "" };
-                let problem = format!(
-                    "finds {} nodes ({}{more}) where one is needed; narrow it down, for example with pick:START",
-                    nodes.len(),
-                    names.join(", ")
-                );
-                Err(ModuleError::reference(parameter, references, problem))
-            }
-        }
-    }
-
-    /// Like [`BuildScope::resolve_one`], but `None` for an empty parameter.
-    ///
-    /// # Errors
-    /// See [`BuildScope::resolve_one`].
-    pub fn resolve_maybe(&mut self, parameter: &str, references: &NodeRefs) -> Result<Option<NodeId>, ModuleError> {
-        if references.is_empty() { Ok(None) } else { self.resolve_one(parameter, references).map(Some) }
     }
 
     /// The name of a node, for messages only: a command does not run again when it changes.

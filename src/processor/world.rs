@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bevy::platform::collections::HashMap;
 
+use super::off::OffParts;
 use crate::{
     mesh::model::Trs,
     rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, SwitchData, Uid},
@@ -152,8 +153,12 @@ pub(super) struct World {
     pub places: Vec<u32>,
     /// Nodes that each command can create, in the order in which it first did.
     pub created: Vec<Vec<NodeId>>,
+    /// The joint that carries each command.
+    pub bearers: Vec<Uid>,
     /// The document's joints, in its order.
     pub joints: Vec<NodeId>,
+    /// What is off.
+    pub off: OffParts,
 }
 
 impl World {
@@ -187,6 +192,7 @@ impl World {
             self.commands.push(uid);
             self.places.push(NOWHERE);
             self.created.push(Vec::new());
+            self.bearers.push(Uid::default());
         }
         command
     }

@@ -178,7 +178,7 @@ impl Limits {
     /// negated ends.
     pub fn mirrored(mut self) -> Self {
         let over = |ends: &mut (Option<f32>, Option<f32>)| {
-            *ends = (ends.1.map(|end| -end), ends.0.map(|end| -end));
+            *ends = (ends.1.map(|end| 0.0 - end), ends.0.map(|end| 0.0 - end));
         };
         over(&mut self.translate[0]);
         over(&mut self.rotate[1]);

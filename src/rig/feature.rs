@@ -3,15 +3,19 @@
 //! A command is active if it is enabled itself, its joint's local group is enabled and its feature, if it has one, is.
 //! Features of one kind and name within one local group act as one, a [`CombinedFeature`]; a switch is a secondary name
 //! that turns a part of it on and off, or chooses one part of several. A feature without a name only organises: it
-//! turns its commands on and off, but is never part of a combined feature and never listed.
+//! turns its commands on and off, but is never part of a combined feature and never listed. Switches of one choice
+//! exclude each other (one solver or another): while the feature is on, exactly one of them is.
 
 mod kinds;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde::{Deserialize, Serialize};
 
-use crate::rig::{JointData, Rig, RigEdit, TagData, TagKind, Uid, nearest::did_you_mean};
+use crate::rig::{
+    JointData, Rig, RigEdit, TagData, TagKind, Uid,
+    nearest::{did_you_mean, listed},
+};
 
 pub use kinds::{FeatureKind, FeatureKinds, UnknownKind};
 
@@ -44,6 +48,8 @@ pub struct CombinedFeature {
 pub struct FeatureSwitch {
     /// The secondary name.
     pub name: String,
+    /// The choice that it is one of; empty if it stands for itself.
+    pub choice: String,
     /// State of the part's tags.
     pub state: FeatureState,
     /// The part's tags.
@@ -73,6 +79,16 @@ pub enum FeatureError {
     /// No such switch.
     #[error("the feature \"{0}\" has no switch \"{1}\"{2}")]
     NoSwitch(String, String, String),
+    /// A switch of a choice, which another one turns off.
+    #[error("\"{switch}\" is one of a choice of the feature \"{feature}\": turn on {others} instead")]
+    Chosen {
+        /// Name of the feature.
+        feature: String,
+        /// The switch.
+        switch: String,
+        /// The others of the choice.
+        others: String,
+    },
 }
 
 /// Returns `true` if a build runs the command (or counts the feature): it is enabled, and so are its joint's local
@@ -99,11 +115,11 @@ pub fn commands_of(rig: &Rig, feature: Uid) -> impl Iterator<Item = (Uid, &TagDa
 /// The combined features of a rig: groups in the rig's order (joints without one first), then as they come first in
 /// the document. Features without a name are not among them.
 pub fn combined_features(rig: &Rig) -> Vec<CombinedFeature> {
-    let mut found: Vec<(CombinedFeature, Vec<(&str, bool)>)> = Vec::new();
+    let mut found: Vec<(CombinedFeature, Vec<FeaturePart>)> = Vec::new();
     let mut known: HashMap<(Option<Uid>, &str, &str), usize> = HashMap::new();
     for joint in rig.walk() {
         for tag in &joint.data.tags {
-            let TagKind::Feature { kind, name, switch } = &tag.kind else { continue };
+            let TagKind::Feature { kind, name, switch, choice } = &tag.kind else { continue };
             if name.is_empty() {
                 continue;
             }
@@ -115,7 +131,7 @@ pub fn combined_features(rig: &Rig) -> Vec<CombinedFeature> {
             });
             let (feature, parts) = &mut found[number];
             feature.tags.push(tag.uid);
-            parts.push((switch, tag.enabled));
+            parts.push(FeaturePart { switch, choice, enabled: tag.enabled });
         }
     }
     let place = |group: Option<Uid>| group.and_then(|uid| rig.groups().iter().position(|group| group.uid == uid));
@@ -137,23 +153,65 @@ pub fn features_named(rig: &Rig, name: &str) -> Result<Vec<CombinedFeature>, Fea
     }
 }
 
-/// The edits that turn a combined feature on or off, all its parts with it.
+/// The edits that turn a combined feature on or off, all its parts with it. Of each choice one part is turned on: the
+/// first that is on, or the first of all.
 ///
 /// # Errors
 /// [`FeatureError::NoFeature`].
 pub fn set_feature(rig: &Rig, key: &FeatureKey, on: bool) -> Result<Vec<RigEdit>, FeatureError> {
     let feature = find(rig, key)?;
-    Ok(enabling(rig, feature.tags.into_iter().map(|tag| (tag, on))))
+    let unchosen = if on { feature.unchosen() } else { BTreeSet::new() };
+    Ok(enabling(rig, feature.tags.iter().map(|tag| (*tag, on && !unchosen.contains(tag)))))
 }
 
-/// The edits that turn one part of a combined feature on or off and leave the others.
+/// The edits that turn one part of a combined feature on or off and leave the others, but those of the same choice,
+/// which are turned off.
 ///
 /// # Errors
-/// [`FeatureError::NoFeature`] and [`FeatureError::NoSwitch`].
+/// [`FeatureError::NoFeature`] and [`FeatureError::NoSwitch`]; [`FeatureError::Chosen`] for one of a choice that would be
+/// turned off.
 pub fn set_switch(rig: &Rig, key: &FeatureKey, switch: &str, on: bool) -> Result<Vec<RigEdit>, FeatureError> {
     let feature = find(rig, key)?;
     let part = part(&feature, switch)?;
-    Ok(enabling(rig, part.tags.iter().map(|tag| (*tag, on))))
+    let rivals: Vec<&FeatureSwitch> =
+        feature.others(switch).filter(|other| !part.choice.is_empty() && other.choice == part.choice).collect();
+    if !on && !rivals.is_empty() && part.state != FeatureState::Off {
+        let names: Vec<&str> = rivals.iter().map(|other| other.name.as_str()).collect();
+        let (feature, others) = (feature.key.name.clone(), listed(&names, "or"));
+        return Err(FeatureError::Chosen { feature, switch: switch.to_owned(), others });
+    }
+    let off = rivals.iter().flat_map(|other| &other.tags).filter(|_| on).map(|tag| (*tag, false));
+    Ok(enabling(rig, part.tags.iter().map(|tag| (*tag, on)).chain(off)))
+}
+
+/// The edits after which of each choice that has one of these tags exactly one switch is on.
+pub(in crate::rig) fn settled_choices(rig: &Rig, tags: &[Uid]) -> Vec<RigEdit> {
+    let features = combined_features(rig);
+    let changed = features
+        .iter()
+        .filter(|feature| feature.state != FeatureState::Off && feature.tags.iter().any(|tag| tags.contains(tag)));
+    let settled = changed.flat_map(|feature| {
+        let unchosen = feature.unchosen();
+        let in_choice = feature.switches.iter().filter(|part| !part.choice.is_empty()).flat_map(|part| &part.tags);
+        in_choice.map(move |tag| (*tag, !unchosen.contains(tag)))
+    });
+    enabling(rig, settled)
+}
+
+/// Choices of which not exactly one switch is on, though their feature is: the feature, the choice, and a tag of it.
+pub fn undecided_choices(rig: &Rig) -> Vec<(FeatureKey, String, Uid)> {
+    let mut found = Vec::new();
+    for feature in combined_features(rig).into_iter().filter(|feature| feature.state != FeatureState::Off) {
+        for (choice, parts) in feature.choices() {
+            let is_decided = parts.iter().filter(|part| part.state == FeatureState::On).count() == 1
+                && parts.iter().all(|part| part.state != FeatureState::Mixed);
+            let tag = parts.iter().flat_map(|part| &part.tags).next();
+            if let (false, Some(tag)) = (is_decided, tag) {
+                found.push((feature.key.clone(), choice.to_owned(), *tag));
+            }
+        }
+    }
+    found
 }
 
 /// The edits that turn one part of a combined feature on and all other parts with a switch off; tags without a switch
@@ -177,19 +235,50 @@ impl CombinedFeature {
     fn others(&self, switch: &str) -> impl Iterator<Item = &FeatureSwitch> {
         self.switches.iter().filter(move |part| part.name != switch)
     }
+
+    /// The parts of each choice.
+    fn choices(&self) -> BTreeMap<&str, Vec<&FeatureSwitch>> {
+        let mut choices: BTreeMap<&str, Vec<&FeatureSwitch>> = BTreeMap::new();
+        for part in self.switches.iter().filter(|part| !part.choice.is_empty()) {
+            choices.entry(&part.choice).or_default().push(part);
+        }
+        choices
+    }
+
+    /// Tags of parts that stay off while the feature is on, because another part of their choice is on.
+    fn unchosen(&self) -> BTreeSet<Uid> {
+        let mut tags = BTreeSet::new();
+        for parts in self.choices().into_values() {
+            let on = parts.iter().position(|part| part.state != FeatureState::Off).unwrap_or(0);
+            let others = parts.iter().enumerate().filter(|(place, _)| *place != on);
+            tags.extend(others.flat_map(|(_, part)| part.tags.iter().copied()));
+        }
+        tags
+    }
 }
 
-fn with_switches(mut feature: CombinedFeature, parts: &[(&str, bool)]) -> CombinedFeature {
-    feature.state = state(parts.iter().map(|(_, enabled)| *enabled));
-    for (number, (name, _)) in parts.iter().enumerate() {
-        let is_first = parts[..number].iter().all(|(other, _)| other != name);
-        if name.is_empty() || !is_first {
+/// A tag of a combined feature.
+struct FeaturePart<'a> {
+    switch: &'a str,
+    choice: &'a str,
+    enabled: bool,
+}
+
+fn with_switches(mut feature: CombinedFeature, parts: &[FeaturePart]) -> CombinedFeature {
+    for (number, FeaturePart { switch, choice, .. }) in parts.iter().enumerate() {
+        let is_first = parts[..number].iter().all(|other| other.switch != *switch);
+        if switch.is_empty() || !is_first {
             continue;
         }
-        let own = parts.iter().zip(&feature.tags).filter(|((other, _), _)| other == name);
-        let (enabled, tags): (Vec<bool>, Vec<Uid>) = own.map(|((_, enabled), tag)| (*enabled, *tag)).unzip();
-        feature.switches.push(FeatureSwitch { name: (*name).to_owned(), state: state(enabled.into_iter()), tags });
+        let own = parts.iter().zip(&feature.tags).filter(|(other, _)| other.switch == *switch);
+        let (enabled, tags): (Vec<bool>, Vec<Uid>) = own.map(|(part, tag)| (part.enabled, *tag)).unzip();
+        let (name, choice) = ((*switch).to_owned(), (*choice).to_owned());
+        feature.switches.push(FeatureSwitch { name, choice, state: state(enabled.into_iter()), tags });
     }
+    // Of a choice one part counts: the others are off while the feature is on.
+    let unchosen = feature.unchosen();
+    let counts = |(part, tag): (&FeaturePart, &Uid)| (part.enabled || !unchosen.contains(tag)).then_some(part.enabled);
+    feature.state = state(parts.iter().zip(&feature.tags).filter_map(counts));
     feature
 }
 

@@ -1,5 +1,12 @@
 //! Labels of the left and right side.
 
+/// Gives a label the name of the other side, if it names a side.
+pub fn mirror_label(label: &mut String) {
+    if let Some(mirrored) = mirrored_label(label) {
+        *label = mirrored;
+    }
+}
+
 /// The mirrored label, for the joint on the other side, or `None` if the label names no side.
 ///
 /// The recognised sides are endings `_l`/`_r`, `.l`/`.r`, `-l`/`-r` and the words `left`/`right` anywhere, in lower,

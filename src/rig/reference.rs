@@ -14,6 +14,7 @@
 //! reference  = "@" source { filter }                       (the "@" may be left out after a "+")
 //! source     = "any"                                       every node of the rig
 //!            | "this"                                      the joint that carries the tag
+//!            | "root"                                      the control that carries the rig, see [`Source::Root`]
 //!            | "joints"                                    the document's joints
 //!            | "joint" named                               one joint
 //!            | "hierarchy" [ "this" | named ]              a joint (this if left out) and the joints below it
@@ -50,7 +51,8 @@ use crate::rig::{NodeType, Uid};
 pub use error::{PickError, ReferenceError, ReferenceProblem};
 pub use names::{NameKind, NameScope, Names, RigNames, label_text};
 pub use params::{
-    BadReference, FoundReference, bind_names, map_references, nearest_to_gone, references_in, refresh_names, written_as,
+    BadReference, FoundReference, bind_names, given_names, map_references, nearest_to_gone, references_in,
+    refresh_names, written_as,
 };
 pub(in crate::rig) use params::{map_text_fields, map_uids};
 
@@ -108,6 +110,11 @@ pub enum Source {
     Any,
     /// The joint that carries the tag.
     This,
+    /// The control that carries the rig: of the controls that commands of the root joint make, the first that stands
+    /// below no other. The root joint is the uppermost joint above the tag's; where its commands make no control, it is
+    /// another root joint, if only one has such controls. Parts refer to it where they mean the world: as a parent, a
+    /// rig without such a control stands for it.
+    Root,
     /// The joints of the document.
     Joints,
     /// A single joint.

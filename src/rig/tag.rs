@@ -41,5 +41,9 @@ pub enum TagKind {
         name: String,
         /// A secondary name that turns a part of the feature on and off.
         switch: String,
+        /// The choice that the switch is one of: of the switches of one choice of a feature, exactly one is on. Empty
+        /// for a switch that stands for itself.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        choice: String,
     },
 }

@@ -78,7 +78,8 @@ impl Bench {
 #[test]
 fn tags_are_entities_below_their_joint_in_order() {
     let mut bench = Bench::new();
-    let kind = TagKind::Feature { kind: "generic".into(), name: "marks".into(), switch: String::new() };
+    let kind =
+        TagKind::Feature { kind: "generic".into(), name: "marks".into(), switch: String::new(), choice: String::new() };
     let tag = TagData { uid: Uid(50), enabled: true, comment: "why".into(), kind };
     bench.edit(RigEdit::AddTag { joint: Uid(1), tag: Box::new(tag), index: 0 });
     bench.tag(1, 51, "mark", "()", Some(50));

@@ -122,7 +122,7 @@ pub fn operation(rig: &Rig, step: &Step) -> Operation {
                 uid,
                 enabled: odd,
                 comment: text.clone(),
-                kind: TagKind::Feature { kind: "limb".into(), name: text.clone(), switch: text },
+                kind: TagKind::Feature { kind: "limb".into(), name: text.clone(), switch: text.clone(), choice: text },
             }),
             index: 0,
         }),

@@ -10,6 +10,7 @@ fn no_text_breaks_the_template_reader() {
     let seeds = vec![
         frozen.as_bytes().to_vec(),
         include_str!("../frozen/format-2.rig.ron").as_bytes().to_vec(),
+        include_str!("../frozen/format-2-choice.rig.ron").as_bytes().to_vec(),
         frozen.replacen("format: 1,", "format: 3, extra: (a: ['\"', r#\"x\"#]),", 1).into_bytes(),
         b"(format: 1, uid: \"0000000000000001\", name: \"n\")".to_vec(),
         b"(format: 1, uid: \"0000000000000001\", name: \"n\", joints: [(uid: \"0000000000000002\", translation: (0, 1, 2),

@@ -513,7 +513,7 @@ fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
         // Any place of the outline that no other control covers.
         let control = built.node(goal).unwrap().control.clone().unwrap();
         let place = bench.app.world().get::<RigRuntime>(rig).unwrap().state().global(goal).unwrap();
-        let lines = lines_of(&control, place.affine().into());
+        let lines = lines_of(&control, place.affine());
         let mut picked = false;
         for point in lines.iter().flatten() {
             let at = sight.project(*point).unwrap();

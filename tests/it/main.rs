@@ -4,6 +4,7 @@
 //! work and measure no time: the benches do.
 
 mod bench;
+mod choices;
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(feature = "cli")]
@@ -80,6 +81,7 @@ mod references;
 mod render;
 mod rig_text;
 mod runtime;
+mod sided;
 mod skin_built;
 mod skin_file;
 mod solvers;

@@ -4,6 +4,7 @@ mod biped;
 #[path = "../../examples/generate_templates/main.rs"]
 mod generator;
 mod limbs;
+mod off;
 mod switches;
 mod trunk;
 

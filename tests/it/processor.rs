@@ -365,7 +365,12 @@ fn circles_that_an_earlier_command_closes_are_found() {
 fn features_and_groups_switch_commands() {
     let mut rig = example();
     let feature = |enabled| {
-        let kind = TagKind::Feature { kind: "generic".into(), name: "extra".into(), switch: String::new() };
+        let kind = TagKind::Feature {
+            kind: "generic".into(),
+            name: "extra".into(),
+            switch: String::new(),
+            choice: String::new(),
+        };
         Box::new(TagData { uid: Uid(200), enabled, comment: String::new(), kind })
     };
     rig.apply(&RigEdit::AddTag { joint: Uid(1), tag: feature(true), index: 0 }).unwrap();

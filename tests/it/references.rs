@@ -370,6 +370,7 @@ fn references() -> impl Strategy<Value = NodeRefs> {
     let source = prop_oneof![
         Just(Source::Any),
         Just(Source::This),
+        Just(Source::Root),
         Just(Source::Joints),
         Just(Source::Hierarchy(Top::This)),
         uid().prop_map(Source::Joint),

@@ -38,7 +38,7 @@ fn command(uid: Uid, module: &str, params: &str, feature: Option<Uid>) -> TagDat
 }
 
 fn feature(uid: Uid, kind: &str, name: &str, switch: &str) -> TagData {
-    tag(uid, TagKind::Feature { kind: kind.into(), name: name.into(), switch: switch.into() })
+    tag(uid, TagKind::Feature { kind: kind.into(), name: name.into(), switch: switch.into(), choice: String::new() })
 }
 
 fn add(rig: &mut Rig, joint: JointData, parent: Option<Uid>) {
@@ -518,26 +518,35 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
     let start = "(a: \"@joint arm_r#0000000000000004 + @joint hand_r#0000000000000005\", b: \"@joints group:arm_r#0000000000000011 label:arm_r#";
     assert!(desk.params(handle).starts_with(start), "{}", desk.params(handle));
 
-    // Fewer joints than the part has: what is left out is told, and found by its label if the rig has it.
-    let notes = desk.run(drop_on(&[ARM_L])).notes;
-    let missing = |what: &str| notes.iter().any(|note| note.contains(what) && note.contains("no counterpart"));
-    assert!(missing("joint \"lower\"") && missing("command \"control/lower\""), "{notes:?}");
-    assert!(notes.iter().any(|note| note.contains("2 joints of the part are left over")), "{notes:?}");
-    desk.rig.apply(&RigEdit::SetLabel(HIPS, Some("lower".into()))).unwrap();
-    desk.run(drop_on(&[ARM_L]));
-    let handle = *desk.tags(ARM_L).last().unwrap();
-    assert!(desk.params(handle).contains("@joint lower#0000000000000001"), "{}", desk.params(handle));
+    // Fewer joints than the part needs: it says which, and nothing changes.
+    let before = desk.rig.clone();
+    let needs = |given| TagError::PartNeeds {
+        part: "arm part".into(),
+        joints: vec!["upper".into(), "lower".into(), "end".into()],
+        given,
+    };
+    assert_eq!(desk.refused(drop_on(&[ARM_L])), needs(1).into());
+    assert_eq!(desk.refused(drop_on(&[ARM_L, HAND_L])), needs(2).into());
+    assert!(desk.rig == before, "a refused part changes nothing");
+    assert!(needs(2).to_string().contains("needs 3 joints, from the first on upper, lower, end; 2 are selected"));
+
+    // A joint that is left out is found by its label, if the rig has it; the last joint's own tags are extras.
+    desk.rig.apply(&RigEdit::SetLabel(HIPS, Some("end".into()))).unwrap();
+    let notes = desk.run(drop_on(&[ARM_L, HAND_L])).notes;
+    assert!(notes.iter().any(|note| note.contains("1 joints of the part are left over")), "{notes:?}");
+    let control = *desk.tags(HAND_L).last().unwrap();
+    assert!(desk.params(control).contains("@joint end#0000000000000001"), "{}", desk.params(control));
 
     // Two joints with the label: it is asked which.
-    desk.rig.apply(&RigEdit::SetLabel(HAND_R, Some("lower".into()))).unwrap();
-    let error = desk.refused(drop_on(&[ARM_L]));
+    desk.rig.apply(&RigEdit::SetLabel(HAND_R, Some("end".into()))).unwrap();
+    let error = desk.refused(drop_on(&[ARM_L, HAND_L]));
     let candidates = vec![HIPS, HAND_R];
-    let ambiguous = TagError::Ambiguous { kind: NameKind::Joint, uid: Uid(0xe1), name: "lower".into(), candidates };
+    let ambiguous = TagError::Ambiguous { kind: NameKind::Joint, uid: Uid(0xe2), name: "end".into(), candidates };
     assert_eq!(error, ambiguous.into());
-    let bindings = [(Uid(0xe1), HAND_R)].into();
-    desk.run(TagOperation::Drop { part: Arc::new(part()), joints: vec![ARM_L], bindings });
-    let handle = *desk.tags(ARM_L).last().unwrap();
-    assert!(desk.params(handle).contains("@joint lower#0000000000000005"), "{}", desk.params(handle));
+    let bindings = [(Uid(0xe2), HAND_R)].into();
+    desk.run(TagOperation::Drop { part: Arc::new(part()), joints: vec![ARM_L, HAND_L], bindings });
+    let control = *desk.tags(HAND_L).last().unwrap();
+    assert!(desk.params(control).contains("@joint end#0000000000000005"), "{}", desk.params(control));
     assert_eq!(desk.refused(drop_on(&[])), TagError::NoTarget.into());
     assert_eq!(desk.refused(drop_on(&[HIPS, Uid(9)])), EditError::NoJoint(Uid(9)).into());
 }
@@ -554,7 +563,8 @@ fn random_operation(rig: &Rig, copied: &mut TagClipboard, (kind, a, b, c): (u8, 
     let key =
         FeatureKey { group: [None, Some(LEFT), Some(RIGHT)][usize::from(a) % 3], kind: "ik".into(), name: "IK".into() };
     let what = [PasteWhat::Tags, PasteWhat::Values, PasteWhat::Both][usize::from(c) % 3];
-    let feature = TagKind::Feature { kind: "ik".into(), name: name.clone(), switch: name.clone() };
+    let feature =
+        TagKind::Feature { kind: "ik".into(), name: name.clone(), switch: name.clone(), choice: String::new() };
     match kind % 14 {
         0 => TagOperation::Add { joints: vec![joint(a), joint(b)], kind: feature, index: Some(usize::from(c % 3)) },
         1 | 2 => {

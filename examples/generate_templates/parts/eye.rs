@@ -21,7 +21,7 @@ pub fn part() -> Writer {
 
 /// What the look-at control of an eye that stands alone moves with.
 fn null(writer: &mut Writer, joint: &str) -> String {
-    writer.command(joint, "space", "null", r#"(world: true, orient: false, creation: (name: "eye_space"))"#);
+    writer.command(joint, "space", "null", r#"(parent: "@root", orient: false, creation: (name: "eye_space"))"#);
     "@command space".to_owned()
 }
 

@@ -17,7 +17,7 @@ pub fn part() -> Writer {
         ("foot_l", [0.06, 0.03, -0.24]),
     ];
     writer.group("leg_l", LEFT).chain("", &chain).orient();
-    writer.command("thigh_l", "space", "null", r#"(world: true, orient: false, creation: (name: "leg_space"))"#);
+    writer.command("thigh_l", "space", "null", r#"(parent: "@root", orient: false, creation: (name: "leg_space"))"#);
     writer.part("leg", |writer| tags(writer, ["thigh_l", "shin_l", "metatarsus_l", "foot_l"], "@command space"));
     writer
 }

@@ -28,7 +28,7 @@ pub fn part() -> Writer {
     writer.group("wing_l", LEFT);
     joints(&mut writer, "", [0.06, 0.42, 0.06], "_l");
     turn(&mut writer, "_l");
-    writer.command("wing_1_l", "space", "null", r#"(world: true, orient: false, creation: (name: "wing_space"))"#);
+    writer.command("wing_1_l", "space", "null", r#"(parent: "@root", orient: false, creation: (name: "wing_space"))"#);
     writer.part("wing", |writer| tags(writer, "_l", "@command space"));
     writer
 }

@@ -271,9 +271,14 @@ pub(super) fn write_tag(
                 target.try_insert(command).try_remove::<FeatureTag>();
             }
         }
-        TagKind::Feature { kind, name, switch } => {
+        TagKind::Feature { kind, name, switch, choice } => {
             if old.is_none_or(|old| old.kind != tag.kind) {
-                let feature = FeatureTag { kind: kind.clone(), name: name.clone(), switch: switch.clone() };
+                let feature = FeatureTag {
+                    kind: kind.clone(),
+                    name: name.clone(),
+                    switch: switch.clone(),
+                    choice: choice.clone(),
+                };
                 target.try_insert(feature).try_remove::<CommandTag>();
             }
         }

@@ -55,7 +55,8 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
         None => skull(rig, analysis, uids, &mut edits),
     };
     let feature = known.feature.unwrap_or_else(|| {
-        let kind = TagKind::Feature { kind: FACE.to_owned(), name: "Face".to_owned(), switch: String::new() };
+        let (kind, name) = (FACE.to_owned(), "Face".to_owned());
+        let kind = TagKind::Feature { kind, name, switch: String::new(), choice: String::new() };
         let tag = TagData { uid: uids.next_uid(), enabled: true, comment: "controls of the face".to_owned(), kind };
         let uid = tag.uid;
         edits.push(RigEdit::AddTag { joint: head, tag: Box::new(tag), index: usize::MAX });

@@ -1,12 +1,15 @@
 //! Nodes of what is built, found by references in their text form.
 
 use super::{
-    super::resolve::{self, Asker},
+    super::{
+        off::Off,
+        resolve::{self, Asker},
+    },
     Builder,
 };
 use crate::rig::{
     Rig, Uid,
-    reference::{NodeRefs, ReferenceError},
+    reference::{NodeRefs, ReferenceError, given_names},
 };
 
 /// The reason why a reference finds no nodes in what is built.
@@ -18,6 +21,14 @@ pub enum FindError {
     /// The reference means something that is not built.
     #[error("{0}")]
     Meaning(String),
+    /// The reference means something that is off.
+    #[error("{text}: {off}; turn it on, or refer to something else")]
+    Off {
+        /// The reference.
+        text: String,
+        /// What is off.
+        off: Off,
+    },
     /// There is no joint that could ask.
     #[error("the rig has no joints, so references find nothing")]
     Empty,
@@ -35,6 +46,27 @@ impl Builder {
         let asker = Asker { rig: self.rig, joint, place: self.cursor() as u32 };
         let found =
             resolve::resolve(&self.world, asker, &references).map_err(|error| FindError::Meaning(error.to_string()))?;
-        Ok(found.into_iter().map(|node| self.world.uid(node)).collect())
+        match found.gaps.into_iter().next() {
+            Some(gap) if found.nodes.is_empty() => Err(FindError::Off { text: text.to_owned(), off: gap.off }),
+            _ => Ok(found.nodes.into_iter().map(|node| self.world.uid(node)).collect()),
+        }
+    }
+    /// What is off of a joint with that label, or of the nodes that a command makes under that name; `None` if nothing
+    /// is, or nothing is called so.
+    pub fn off_named(&self, name: &str) -> Option<Off> {
+        let off = &self.world.off;
+        let of_joint =
+            off.joints.values().find(|joint| matches!(&joint.off, Off::Joint { joint, .. } if **joint == *name));
+        if let Some(joint) = of_joint {
+            return Some(joint.off.clone());
+        }
+        // Of several nodes of a command, those after the first have a number.
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit()).strip_suffix('_').unwrap_or(name);
+        let is_named = |number: &&u32| {
+            let params = &self.commands[**number as usize].params;
+            given_names(params).any(|given| given == name || given == stem)
+        };
+        let found = self.list.iter().filter(|number| off.commands.contains_key(*number)).find(is_named)?;
+        off.commands.get(found).map(|command| command.reason.off().clone())
     }
 }

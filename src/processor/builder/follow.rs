@@ -1,16 +1,15 @@
 //! Taking over what the document says: joints, tags, and what is switched off.
 
-use std::{
-    cmp::Reverse,
-    collections::{HashMap, HashSet},
-    sync::Arc,
-};
+use std::{cmp::Reverse, collections::HashSet, sync::Arc};
+
+use bevy::platform::collections::HashMap;
 
 use super::{Builder, Command, Due};
 use crate::{
     mesh::model::Trs,
     processor::{
-        list::{features, groups_off, is_on, joints_in},
+        list::{Switches, joints_in},
+        off::{Gap, OffCommand, OffJoint, SkipReason},
         scope::Trace,
         world::{Aspect, Birth, NOWHERE, NodeId, Value, same},
     },
@@ -21,8 +20,9 @@ impl Builder {
     /// Takes over what the document says now. Nothing is carried out: see [`Builder::run_to`].
     pub fn sync(&mut self, rig: &Rig) {
         self.rig = rig.uid();
-        self.sync_joints(rig);
-        self.sync_list(rig);
+        let switches = Switches::of(rig);
+        self.sync_joints(rig, &switches);
+        self.sync_list(rig, &switches);
         self.spread_structure();
     }
 
@@ -60,12 +60,12 @@ impl Builder {
         }
     }
 
-    fn sync_joints(&mut self, rig: &Rig) {
-        let off = groups_off(rig);
+    fn sync_joints(&mut self, rig: &Rig, switches: &Switches) {
+        let mut off = HashMap::default();
         let before = std::mem::take(&mut self.world.joints);
         let mut seen = HashSet::with_capacity(rig.len());
         // Joints that are left out: their children hang on what is above, and stay where they are.
-        let mut left_out: HashMap<Uid, (Option<NodeId>, Trs)> = HashMap::new();
+        let mut left_out: HashMap<Uid, (Option<NodeId>, Trs)> = HashMap::default();
         for (order, joint) in rig.walk().enumerate() {
             let data = &joint.data;
             let rest: Trs = data.rest.into();
@@ -76,7 +76,8 @@ impl Builder {
                 },
                 None => (None, rest),
             };
-            if data.group.is_some_and(|group| off.contains(&group)) {
+            if let Some(reason) = switches.joint(data) {
+                off.insert(data.uid, OffJoint { off: reason, above: parent });
                 left_out.insert(data.uid, (parent, base));
                 continue;
             }
@@ -100,6 +101,51 @@ impl Builder {
                 self.set_document(node, aspect, None);
             }
         }
+        self.set_joints_off(off, &switches.groups);
+    }
+
+    /// Notes which joints and groups are off.
+    fn set_joints_off(&mut self, joints: HashMap<Uid, OffJoint>, groups: &HashMap<Uid, Arc<str>>) {
+        let off = &mut self.world.off;
+        if off.joints != joints || off.groups != *groups {
+            (off.joints, off.groups) = (joints, groups.clone());
+            self.structure_changed = Some(0);
+        }
+    }
+
+    /// Notes whether a command is passed over, and why. Those that look for its nodes have to look again if that
+    /// changes.
+    pub(super) fn set_command_off(&mut self, number: u32, off: Option<OffCommand>) {
+        let commands = &mut self.world.off.commands;
+        if commands.get(&number) == off.as_ref() {
+            return;
+        }
+        match off {
+            Some(off) => commands.insert(number, off),
+            None => commands.remove(&number),
+        };
+        self.structure_changes_after(number);
+    }
+
+    /// Notes whether a command made less than it would.
+    pub(super) fn set_partial(&mut self, number: u32, gap: Option<Gap>) {
+        let partial = &mut self.world.off.partial;
+        if partial.get(&number) == gap.as_ref() {
+            return;
+        }
+        match gap {
+            Some(gap) => partial.insert(number, gap),
+            None => partial.remove(&number),
+        };
+        self.structure_changes_after(number);
+    }
+
+    fn structure_changes_after(&mut self, number: u32) {
+        let from = match self.world.places[number as usize] {
+            NOWHERE => 0,
+            place => place + 1,
+        };
+        self.structure_changed = Some(self.structure_changed.map_or(from, |before| before.min(from)));
     }
 
     fn set_document(&mut self, node: NodeId, aspect: Aspect, value: Option<Value>) {
@@ -110,17 +156,23 @@ impl Builder {
         }
     }
 
-    fn sync_list(&mut self, rig: &Rig) {
-        let features = features(rig);
-        let off = groups_off(rig);
+    fn sync_list(&mut self, rig: &Rig, switches: &Switches) {
         let mut list = Vec::with_capacity(self.list.len());
         for uid in joints_in(rig, &self.range) {
             let Some(joint) = rig.joint(uid) else { continue };
-            let built = !joint.data.group.is_some_and(|group| off.contains(&group));
             for tag in &joint.data.tags {
                 let TagKind::Command { module, params, .. } = &tag.kind else { continue };
                 let number = self.world.command(tag.uid);
-                let active = built && is_on(tag, &features);
+                let off = switches.command(&joint.data, tag);
+                let active = off.is_none();
+                self.world.bearers[number as usize] = uid;
+                if let Some(off) = off {
+                    let above = self.world.off.joint(uid).and_then(|gap| gap.above);
+                    let off = OffCommand { module: module.as_str().into(), reason: SkipReason::Own(off), above };
+                    self.set_command_off(number, Some(off));
+                } else if self.world.off.commands.get(&number).is_some_and(OffCommand::is_own) {
+                    self.set_command_off(number, None);
+                }
                 if number as usize == self.commands.len() {
                     self.commands.push(Command {
                         joint: uid,

@@ -2,7 +2,8 @@
 
 use crate::{
     processor::{
-        resolve::{self, Asker},
+        off::{Gap, Off},
+        resolve::{self, Asker, Resolution},
         world::{Aspect, NodeId, Value, World, same},
     },
     rig::{Uid, reference::NodeRefs},
@@ -12,7 +13,7 @@ use crate::{
 #[derive(Debug, Clone)]
 pub(in crate::processor) enum Read {
     Cell(NodeId, Aspect, Option<Value>),
-    References(NodeRefs, Option<Vec<NodeId>>),
+    References(NodeRefs, Option<Resolution>),
     Children(NodeId, Vec<NodeId>),
 }
 
@@ -23,6 +24,12 @@ pub(in crate::processor) struct Trace {
     pub writes: Vec<(NodeId, Aspect)>,
     /// How many nodes and constraints it made.
     pub made: u32,
+    /// What is off of a list that it goes through, if anything is.
+    pub partial: Option<Gap>,
+    /// The parameter that was read last as if it were left out, because what it means is off.
+    pub optional_off: Option<(String, Off)>,
+    /// The nearest node that is built above what it cannot do without.
+    pub above: Option<NodeId>,
 }
 
 impl Trace {
@@ -34,8 +41,8 @@ impl Trace {
     pub fn holds(&self, world: &World, asker: Asker) -> bool {
         self.reads.iter().all(|read| match read {
             Read::Cell(node, aspect, value) => same(world.read_at(*node, *aspect, asker.place), value.as_ref()),
-            Read::References(references, nodes) => {
-                resolve::resolve(world, asker, references).ok().as_ref() == nodes.as_ref()
+            Read::References(references, found) => {
+                resolve::resolve(world, asker, references).ok().as_ref() == found.as_ref()
             }
             Read::Children(node, children) => world_children(world, *node, asker.place) == *children,
         })

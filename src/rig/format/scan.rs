@@ -98,6 +98,18 @@ pub(crate) fn elements(text: &str) -> Vec<usize> {
     starts
 }
 
+/// The place in `to` that corresponds to one in `from`, a text with other insides of the same strings: the same place of
+/// the same token.
+pub(crate) fn same_place(from: &str, to: &str, offset: usize) -> usize {
+    let before = tokens(from).take_while(|token| token.start <= offset).count();
+    let Some(number) = before.checked_sub(1) else { return offset.min(to.len()) };
+    let (Some(token), Some(same)) = (tokens(from).nth(number), tokens(to).nth(number)) else { return to.len() };
+    let within = offset - token.start;
+    // Behind the token it is behind the other one, too.
+    let behind = within.saturating_sub(token.text.len());
+    (same.start + if behind > 0 { same.text.len() + behind } else { within.min(same.text.len()) }).min(to.len())
+}
+
 pub(in crate::rig) struct Token<'a> {
     pub text: &'a str,
     pub start: usize,

@@ -12,13 +12,14 @@ mod write;
 use serde::{Deserialize, Serialize};
 
 pub(in crate::rig) use read::read_text;
-pub use read::{read_header, read_template};
+pub use read::{read_header, read_template, survey_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{quoted, vector};
 
 use crate::rig::{Rig, Uid};
 
-/// The newest format, which this version writes for rigs with a face; all others are written as format 1.
+/// The newest format that is read and written. A file says the oldest format that holds what is in it: format 2 where a
+/// part says its needs, a feature has a choice or a joint is a placed bone of a face, else 1.
 pub const FORMAT: u32 = 2;
 
 /// Largest size in bytes of a template that is read.
@@ -54,6 +55,19 @@ pub struct TemplateHeader {
     /// Named features and their switches, for listings.
     #[serde(default)]
     pub features: Vec<FeatureSummary>,
+    /// What a part needs of the rig that it is dropped into; `None` for other templates.
+    #[serde(default)]
+    pub needs: Option<NeedsSummary>,
+}
+
+/// What a part needs of its host, in a template's header: see [`PartNeeds`](crate::rig::part::PartNeeds).
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct NeedsSummary {
+    /// Labels of the joints that make it whole, in their order.
+    pub joints: Vec<String>,
+    /// Places of the host that it is connected to.
+    #[serde(default)]
+    pub sockets: Vec<String>,
 }
 
 /// Reads a count; a file may also have `None`, which counts as 0.

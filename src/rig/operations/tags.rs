@@ -59,6 +59,9 @@ pub enum TagOperation {
         /// The switch; empty for none.
         switch: String,
     },
+    /// Makes the switches of feature tags those of a choice, of which exactly one is on: the first that is on stays on,
+    /// or the first of all. An empty name makes them switches of their own.
+    Choice(Vec<Uid>, String),
     /// Attaches commands to a feature tag anywhere in the rig, or detaches them.
     Attach(Vec<Uid>, Option<Uid>),
     /// Deletes the copied tags from their joints.
@@ -123,6 +126,21 @@ pub enum TagError {
     /// No joint on the other side to paste onto.
     #[error("none of the copied joints has a joint on the other side; mirror the joints first")]
     NoMirror,
+    /// Fewer joints than a part needs.
+    #[error(
+        "the part \"{part}\" needs {} joints, from the first on {}; {given} are selected: select the rest of the chain, or \
+         add joints",
+        joints.len(),
+        joints.join(", ")
+    )]
+    PartNeeds {
+        /// Name of the part.
+        part: String,
+        /// Labels of the joints that it needs, in their order.
+        joints: Vec<String>,
+        /// The number of joints that it was dropped onto.
+        given: usize,
+    },
     /// A name of the part that fits several objects in the rig.
     #[error(
         "\"{name}\" of the part could be {} {kind}s of the rig ({}); choose one of them",
@@ -151,7 +169,7 @@ impl TagOperation {
             Self::Enable(_, false) => "Disable tags",
             Self::Move { .. } => "Move tags",
             Self::Comment(..) => "Comment tag",
-            Self::Params(..) | Self::Feature { .. } => "Change tag",
+            Self::Params(..) | Self::Feature { .. } | Self::Choice(..) => "Change tag",
             Self::Attach(_, Some(_)) => "Attach to feature",
             Self::Attach(_, None) => "Detach from feature",
             Self::Cut(..) => "Cut tags",
@@ -197,9 +215,26 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
             set(draft, joint, tag)
         }
         TagOperation::Feature { tag, kind, name, switch } => {
-            let kind = TagKind::Feature { kind: kind.clone(), name: name.clone(), switch: switch.clone() };
             feature_tag(draft, *tag)?;
-            change(draft, *tag, |tag| tag.kind = kind)
+            change(draft, *tag, |tag| {
+                if let TagKind::Feature { kind: old_kind, name: old_name, switch: old_switch, .. } = &mut tag.kind {
+                    old_kind.clone_from(kind);
+                    old_name.clone_from(name);
+                    old_switch.clone_from(switch);
+                }
+            })
+        }
+        TagOperation::Choice(tags, name) => {
+            tags.iter().try_for_each(|tag| feature_tag(draft, *tag).map(drop))?;
+            tags.iter().try_for_each(|tag| {
+                change(draft, *tag, |tag| {
+                    if let TagKind::Feature { choice, .. } = &mut tag.kind {
+                        choice.clone_from(name);
+                    }
+                })
+            })?;
+            let edits = feature::settled_choices(draft.rig(), tags);
+            apply(draft, edits)
         }
         TagOperation::Attach(tags, feature) => attach(draft, tags, *feature),
         TagOperation::Cut(clipboard) => paste::cut(draft, clipboard),

@@ -134,6 +134,11 @@ pub(in crate::rig) fn map_text_fields(
     rewritten(params, literals.into_iter(), change).into_owned()
 }
 
+/// Names that a command gives its nodes: texts of the fields `name` of its parameters, at most two brackets deep.
+pub fn given_names(params: &str) -> impl Iterator<Item = String> {
+    text_fields(params, &["name"]).map(|literal| literal.text)
+}
+
 /// The text of the first field with that name, at most two brackets deep, whose value is a string literal.
 pub(super) fn text_field(params: &str, name: &str) -> Option<String> {
     text_fields(params, &[name]).next().map(|literal| literal.text)

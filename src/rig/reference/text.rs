@@ -8,7 +8,7 @@ use super::{
 };
 use crate::rig::Uid;
 
-const SOURCES: [&str; 8] = ["any", "this", "joints", "joint", "hierarchy", "command", "module", "none"];
+const SOURCES: [&str; 9] = ["any", "this", "root", "joints", "joint", "hierarchy", "command", "module", "none"];
 const FILTERS: [&str; 6] = ["rig", "group", "label", "type", "role", "pick"];
 const TYPES: [&str; NodeTypes::NAMES.len()] = {
     let mut names = [""; NodeTypes::NAMES.len()];
@@ -98,6 +98,7 @@ impl<'a> Reader<'a, '_> {
         match word.to_ascii_lowercase().as_str() {
             "any" => reference.source = Source::Any,
             "this" => reference.source = Source::This,
+            "root" => reference.source = Source::Root,
             "joints" => reference.source = Source::Joints,
             "joint" => joint = Some((word, NameKind::Joint, self.named("a joint's label")?)),
             "command" => joint = Some((word, NameKind::Command, self.named("a command's module")?)),

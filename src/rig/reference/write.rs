@@ -35,6 +35,7 @@ fn write_one(out: &mut String, reference: &NodeRef, names: Option<&dyn Names>) {
     match &reference.source {
         Source::Any => out.push_str("any"),
         Source::This => out.push_str("this"),
+        Source::Root => out.push_str("root"),
         Source::Joints => out.push_str("joints"),
         Source::Joint(uid) => {
             out.push_str("joint ");

@@ -36,7 +36,7 @@ impl Maker {
             .filter(|(_, tag)| matches!(&tag.kind, TagKind::Command { module, .. } if module == "mark"))
             .map(|(_, tag)| tag.uid)
             .collect();
-        match self.random.below(if nodes { 9 } else { 4 }) {
+        match self.random.below(if nodes { 10 } else { 4 }) {
             0 => "@this".to_owned(),
             1 | 2 => format!("@joint #{}", self.joint(rig)),
             3 => format!("@hierarchy #{} pick:{}", self.joint(rig), self.random.pick(&["START", "MIDDLE", "END"])),
@@ -44,6 +44,7 @@ impl Maker {
             5 => "@module mark pick:START,END".to_owned(),
             6 => format!("@any label:#{} type:null + @this", self.joint(rig)),
             7 => "@any group:own type:null,joint pick:MIDDLE".to_owned(),
+            8 => "@root + @this".to_owned(),
             _ if commands.is_empty() => "@this".to_owned(),
             _ => format!("@command #{} pick:START", self.random.pick(&commands)),
         }
@@ -227,7 +228,12 @@ impl Maker {
             rig.apply(&edit).unwrap();
         }
         for _ in 0..4 {
-            let kind = TagKind::Feature { kind: "generic".into(), name: "f".into(), switch: String::new() };
+            let kind = TagKind::Feature {
+                kind: "generic".into(),
+                name: "f".into(),
+                switch: String::new(),
+                choice: String::new(),
+            };
             let tag = TagData { uid: self.uid(), enabled: !self.random.chance(3), comment: String::new(), kind };
             let joint = self.joint(&rig);
             rig.apply(&RigEdit::AddTag { joint, tag: Box::new(tag), index: 0 }).unwrap();

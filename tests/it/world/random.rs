@@ -65,9 +65,13 @@ fn check(stage: &mut Stage, what: &str) {
                         let of = stage.get::<InFeature>(entity).map(|of| *stage.get::<Uid>(of.0).unwrap());
                         assert_eq!(of, feature.filter(|feature| rig.find_tag(*feature).is_some()), "{what}");
                     }
-                    TagKind::Feature { kind, name, switch } => {
+                    TagKind::Feature { kind, name, switch, choice } => {
                         let told = stage.get::<FeatureTag>(entity).unwrap();
-                        assert_eq!((&told.kind, &told.name, &told.switch), (kind, name, switch), "{what}");
+                        assert_eq!(
+                            (&told.kind, &told.name, &told.switch, &told.choice),
+                            (kind, name, switch, choice),
+                            "{what}"
+                        );
                     }
                 }
             }
@@ -170,7 +174,12 @@ fn step(stage: &mut Stage, random: &mut Random) -> String {
             world.get_mut::<LocalGroup>(group).unwrap().enabled ^= true;
         }
         (15, Some(entity), ..) => {
-            let feature = FeatureTag { kind: "generic".into(), name: format!("f{number}"), switch: String::new() };
+            let feature = FeatureTag {
+                kind: "generic".into(),
+                name: format!("f{number}"),
+                switch: String::new(),
+                choice: String::new(),
+            };
             let feature = world.spawn((feature, TagOf(entity))).id();
             if let Some(tag) = tag_entity {
                 world.entity_mut(tag).insert(InFeature(feature));

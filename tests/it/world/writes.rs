@@ -92,7 +92,8 @@ fn spawning_and_despawning_adds_and_deletes() {
     let world = stage.app.world_mut();
     let upper = world.spawn((Joint, Transform::from_xyz(0.0, 0.5, 0.0), ChildOf(parent), NodeLabel("new".into()))).id();
     let lower = world.spawn((Joint, Transform::from_xyz(0.0, 0.25, 0.0), ChildOf(upper))).id();
-    let feature = FeatureTag { kind: "generic".into(), name: "extras".into(), switch: String::new() };
+    let feature =
+        FeatureTag { kind: "generic".into(), name: "extras".into(), switch: String::new(), choice: String::new() };
     let feature = world.spawn((feature, TagOf(upper))).id();
     let command = CommandTag { module: "control".into(), params: "()".into() };
     let command =

@@ -45,6 +45,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 kind: feature.kind.clone(),
                 name: feature.name.clone(),
                 switch: feature.switch.clone(),
+                choice: feature.choice.clone(),
             },
             (None, None) => return None,
         };

@@ -1,14 +1,18 @@
 //! Reader of templates: strict, with the place of each error.
 
-use std::collections::{HashMap, HashSet};
+use std::{
+    borrow::Cow,
+    collections::{HashMap, HashSet},
+};
 
 use bevy::math::{Quat, Vec3};
 use ron::value::RawValue;
 use serde::Deserialize;
 
 use super::{
-    FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader, comment_placement::take_placement,
-    write::feature_summaries,
+    FORMAT, FeatureSummary, MAX_BYTES, NeedsSummary, Template, TemplateHeader,
+    comment_placement::take_placement,
+    write::{feature_summaries, needs_summary},
 };
 use crate::rig::{
     FaceBonePart, FacePlacement, GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError,
@@ -39,6 +43,8 @@ struct TemplateFile {
     joint_count: Option<usize>,
     #[serde(default)]
     features: Vec<FeatureSummary>,
+    #[serde(default)]
+    needs: Option<NeedsSummary>,
     #[serde(default)]
     groups: Vec<GroupFile>,
     #[serde(default)]
@@ -114,6 +120,8 @@ enum TagFile {
         name: String,
         #[serde(default)]
         switch: String,
+        #[serde(default)]
+        choice: String,
     },
 }
 
@@ -136,14 +144,48 @@ pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
     read_text(utf8(bytes, MAX_BYTES, "template")?, 1)
 }
 
-/// Reads a template inside another file, in which its first line has the number `first_line`.
+/// Reads a template as far as it goes, to tell all that is wrong with it: with every fault of its structure, in the
+/// order of the text, and without what is at fault (a joint without its group, say).
+///
+/// # Errors
+/// A text that cannot be read as a template at all, with the faults that were found before that.
+pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec<SourceError>> {
+    let text = utf8(bytes, MAX_BYTES, "template").map_err(|error| vec![error])?;
+    let (mut notes, mut faults) = (Vec::new(), Vec::new());
+    let fields = scan::fields(text);
+    let readable = TEMPLATE.readable(text, &fields, 1, &mut notes).map_err(|error| vec![error])?;
+    // In a file of a newer format they are notes.
+    let unknown = if matches!(readable, Cow::Borrowed(_)) { TEMPLATE.unknown(&fields) } else { Vec::new() };
+    for field in &unknown {
+        let message = format!("there is no field `{}` here; remove it or correct its name", field.name);
+        faults.push(SourceError::at(text, field.start, message));
+    }
+    let known = if unknown.is_empty() { readable } else { Cow::Owned(blanked(text, &unknown)) };
+    let file = match ron_options().from_str(&known) {
+        Ok(file) => file,
+        Err(error) => {
+            faults.push(SourceError::from_ron(text, &error));
+            faults.sort_by_key(|fault| fault.offset);
+            return Err(faults);
+        }
+    };
+    let rig = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
+    faults.sort_by_key(|fault| fault.offset);
+    Ok((Template { rig, notes }, faults))
+}
+
+/// Reads a template that stands in another file, where its first line has the number `first_line`.
 pub(in crate::rig) fn read_text(text: &str, first_line: usize) -> Result<Template, SourceError> {
     let mut notes = Vec::new();
     let fields = scan::fields(text);
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
     let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
-    let rig = build(&Places { text, fields: &fields }, file, &mut notes)?;
-    Ok(Template { rig, notes })
+    let mut faults = Vec::new();
+    let rig = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
+    match faults.into_iter().next() {
+        Some(fault) => Err(fault),
+        None => Ok(Template { rig, notes }),
+    }
 }
 
 /// Reads the header alone; the rest may be missing or invalid. `bytes` may be the first part of a file.
@@ -180,9 +222,11 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
             "preview",
             "joint_count",
             "features",
+            "needs",
             "groups",
             "joints",
         ]),
+        (2, Some("needs")) => Some(&["joints", "sockets"]),
         (3, Some("features")) => Some(&["kind", "name", "switches"]),
         (3, Some("groups")) => Some(&["uid", "name", "color", "enabled"]),
         (3, Some("joints")) => Some(&[
@@ -201,13 +245,14 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
         ]),
         (4, Some("face")) if above == Some("joints") => Some(&["part", "label", "at"]),
         (5, Some("tags")) if above == Some("joints") => {
-            Some(&["uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch"])
+            Some(&["uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch", "choice"])
         }
         _ => None,
     }
 }
 
-fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result<Rig, SourceError> {
+/// The rig of a file, without what is at fault.
+fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>, faults: &mut Vec<SourceError>) -> Rig {
     let mut rig = Rig::new(file.uid, file.name.clone());
     rig.about = RigAbout {
         name: file.name,
@@ -218,20 +263,16 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result
         preview: file.preview,
     };
     let mut seen = HashSet::new();
-    let mut unique = |uid: Uid| match seen.insert(uid) {
-        true => Ok(()),
-        false => Err(places.error(uid, 1, "uid", format!("uid {uid} is used twice; give the second a uid of its own"))),
-    };
     for group in file.groups {
-        unique(group.uid)?;
-        let color: [f32; 3] = group.color.into();
+        if !seen.insert(group.uid) {
+            faults.push(places.used_twice(group.uid));
+            continue;
+        }
+        let mut color: [f32; 3] = group.color.into();
         if color.iter().any(|part| !part.is_finite()) {
-            return Err(places.error(
-                group.uid,
-                0,
-                "color",
-                "the colour is not finite; use numbers from 0 to 1".into(),
-            ));
+            let message = "the colour is not finite; use numbers from 0 to 1".to_owned();
+            faults.push(places.error(group.uid, 0, "color", message));
+            color = [0.5; 3];
         }
         rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
@@ -240,12 +281,15 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>) -> Result
     if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count) {
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
-    add_joints(&mut rig, format, file.joints, places, unique)?;
+    add_joints(&mut rig, format, file.joints, places, &mut seen, faults);
     bind_references(&mut rig, notes);
     if feature_summaries(&rig) != sorted(file.features) {
         notes.push("the header lists other features than the tags; saving corrects it".to_owned());
     }
-    Ok(rig)
+    if file.needs.is_some() && file.needs != needs_summary(&rig) {
+        notes.push("the header says other needs than the part has; saving corrects it".to_owned());
+    }
+    rig
 }
 
 /// Adds uids to references that people wrote as names alone, and updates the names beside uids.
@@ -281,25 +325,29 @@ fn add_joints(
     format: u32,
     joints: Vec<JointFile>,
     places: &Places,
-    mut unique: impl FnMut(Uid) -> Result<(), SourceError>,
-) -> Result<(), SourceError> {
+    seen: &mut HashSet<Uid>,
+    faults: &mut Vec<SourceError>,
+) {
     let mut data = HashMap::with_capacity(joints.len());
     let mut children: HashMap<Option<Uid>, Vec<Uid>> = HashMap::new();
     let known: HashSet<Uid> = joints.iter().map(|joint| joint.uid).collect();
     let features: HashSet<Uid> = joints.iter().flat_map(|joint| &joint.tags).filter_map(feature_uid).collect();
     let mut order = Vec::with_capacity(joints.len());
-    for joint in joints {
+    for mut joint in joints {
         let uid = joint.uid;
-        unique(uid)?;
-        for (what, other) in [("parent", joint.parent), ("mirror", joint.mirror)] {
-            if let Some(other) = other.filter(|other| !known.contains(other)) {
-                return Err(places.error(uid, 0, what, format!(
+        if !seen.insert(uid) {
+            faults.push(places.used_twice(uid));
+            continue;
+        }
+        for (what, other) in [("parent", &mut joint.parent), ("mirror", &mut joint.mirror)] {
+            if let Some(other) = other.take_if(|other| !known.contains(other)) {
+                faults.push(places.error(uid, 0, what, format!(
                     "joint {uid} names the {what} {other}, which is not in the file; correct it or leave the field out"
                 )));
             }
         }
-        if let Some(group) = joint.group.filter(|group| rig.group(*group).is_none()) {
-            return Err(places.error(
+        if let Some(group) = joint.group.take_if(|group| rig.group(*group).is_none()) {
+            faults.push(places.error(
                 uid,
                 0,
                 "group",
@@ -307,7 +355,7 @@ fn add_joints(
             ));
         }
         let (x, y, z, w) = joint.rotation;
-        let rest = RestTransform {
+        let mut rest = RestTransform {
             translation: <[f32; 3]>::from(joint.translation).into(),
             rotation: Quat::from_xyzw(x, y, z, w),
             scale: Vec3::from(<[f32; 3]>::from(joint.scale)),
@@ -319,36 +367,40 @@ fn add_joints(
                 (true, false) => "scale",
                 (true, true) => "rotation",
             };
-            return Err(places.error(uid, 0, wrong, format!(
+            faults.push(places.error(uid, 0, wrong, format!(
                 "joint {uid} has a transform that is not finite or whose rotation is not of length 1; correct the numbers"
             )));
+            rest = RestTransform::default();
         }
         let mut tags = Vec::with_capacity(joint.tags.len());
         for tag in joint.tags {
-            let tag = tag_from(tag);
-            unique(tag.uid)?;
-            if let TagKind::Command { feature: Some(feature), .. } = &tag.kind
-                && !features.contains(feature)
+            let mut tag = tag_from(tag);
+            if !seen.insert(tag.uid) {
+                faults.push(places.used_twice(tag.uid));
+                continue;
+            }
+            if let TagKind::Command { feature, .. } = &mut tag.kind
+                && let Some(missing) = feature.take_if(|feature| !features.contains(feature))
             {
-                return Err(places.error(
+                faults.push(places.error(
                     tag.uid,
                     0,
                     "feature",
                     format!(
-                        "tag {} is in the feature {feature}, which is not in the file; add it or leave the field out",
+                        "tag {} is in the feature {missing}, which is not in the file; add it or leave the field out",
                         tag.uid
                     ),
                 ));
             }
             tags.push(tag);
         }
-        let placed = joint.face.map(|FaceFile { part, label, at }| {
+        let mut placed = joint.face.map(|FaceFile { part, label, at }| {
             let position = Vec3::from(<[f32; 3]>::from(at));
             FacePlacement { part, label, position }
         });
-        if placed.as_ref().is_some_and(|placed| !placed.position.is_finite()) {
+        if placed.take_if(|placed| !placed.position.is_finite()).is_some() {
             let message = format!("joint {uid} was placed at a position that is not finite; correct the numbers");
-            return Err(places.error(uid, 0, "face", message));
+            faults.push(places.error(uid, 0, "face", message));
         }
         let face = placed.or_else(|| take_placement(format, &mut tags));
         order.push(uid);
@@ -374,20 +426,26 @@ fn add_joints(
         stack.extend(children.get(&parent).into_iter().flatten().rev().map(|child| (parent, *child)));
     };
     push(&mut stack, None);
-    while let Some((parent, uid)) = stack.pop() {
-        let Some(joint) = data.remove(&uid) else { continue };
-        let edit = RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX };
-        rig.apply(&edit).map_err(|error| places.error(uid, 0, "uid", error.to_string()))?;
-        push(&mut stack, Some(uid));
-    }
-    match order.into_iter().find(|uid| data.contains_key(uid)) {
-        Some(uid) => Err(places.error(
+    let mut next = 0;
+    loop {
+        while let Some((parent, uid)) = stack.pop() {
+            let Some(joint) = data.remove(&uid) else { continue };
+            let edit = RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX };
+            if let Err(error) = rig.apply(&edit) {
+                faults.push(places.error(uid, 0, "uid", error.to_string()));
+            }
+            push(&mut stack, Some(uid));
+        }
+        // What is left stands below itself: the first of it becomes a root.
+        let Some(uid) = order[next..].iter().find(|uid| data.contains_key(uid)).copied() else { return };
+        next += order[next..].iter().take_while(|other| **other != uid).count();
+        faults.push(places.error(
             uid,
             0,
             "parent",
             format!("joint {uid} is its own ancestor; give one joint of the cycle another parent"),
-        )),
-        None => Ok(()),
+        ));
+        stack.push((None, uid));
     }
 }
 
@@ -406,8 +464,8 @@ fn tag_from(tag: TagFile) -> TagData {
             comment,
             kind: TagKind::Command { module, params: params.trim().get_ron().to_owned(), feature },
         },
-        TagFile::Feature { uid, enabled, comment, kind, name, switch } => {
-            TagData { uid, enabled, comment, kind: TagKind::Feature { kind, name, switch } }
+        TagFile::Feature { uid, enabled, comment, kind, name, switch, choice } => {
+            TagData { uid, enabled, comment, kind: TagKind::Feature { kind, name, switch, choice } }
         }
     }
 }
@@ -419,6 +477,10 @@ struct Places<'a> {
 }
 
 impl Places<'_> {
+    fn used_twice(&self, uid: Uid) -> SourceError {
+        self.error(uid, 1, "uid", format!("uid {uid} is used twice; give the second a uid of its own"))
+    }
+
     /// An error at the field `name` of the `nth` declaration with that uid (or of the first).
     fn error(&self, uid: Uid, nth: usize, name: &str, message: String) -> SourceError {
         let digits = uid.to_string();

@@ -7,8 +7,10 @@ use std::{
 
 use bevy::math::{Quat, Vec3};
 
-use super::{FORMAT, FeatureSummary};
-use crate::rig::{FacePlacement, NodeKind, Rig, RigJoint, TagData, TagKind, Uid, reference::refresh_names};
+use super::{FORMAT, FeatureSummary, NeedsSummary};
+use crate::rig::{
+    FacePlacement, NodeKind, Rig, RigJoint, TagData, TagKind, Uid, part::PartNeeds, reference::refresh_names,
+};
 
 /// The text of a rig's template. The same rig gives the same bytes. References in parameters are written with the
 /// current names beside the uids.
@@ -20,7 +22,10 @@ pub fn write_template(rig: &Rig) -> String {
 
 fn write_into(out: &mut String, rig: &Rig) -> std::fmt::Result {
     let about = rig.about();
-    let format = if rig.walk().any(|joint| joint.data.face.is_some()) { FORMAT } else { 1 };
+    let needs = needs_summary(rig);
+    let has_choice = |tag: &TagData| matches!(&tag.kind, TagKind::Feature { choice, .. } if !choice.is_empty());
+    let is_newer = |joint: &RigJoint| joint.data.face.is_some() || joint.data.tags.iter().any(has_choice);
+    let format = if needs.is_some() || rig.walk().any(is_newer) { FORMAT } else { 1 };
     writeln!(out, "(\n    format: {format},\n    uid: \"{}\",", rig.uid())?;
     writeln!(out, "    name: {},\n    version: {},", quoted(&about.name), quoted(&about.version))?;
     writeln!(out, "    kind: {},\n    author: {},", quoted(&about.kind), quoted(&about.author))?;
@@ -30,6 +35,10 @@ fn write_into(out: &mut String, rig: &Rig) -> std::fmt::Result {
     }
     writeln!(out, "    joint_count: {},", rig.len())?;
     write_features(out, rig)?;
+    if let Some(NeedsSummary { joints, sockets }) = needs {
+        let list = |names: &[String]| names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
+        writeln!(out, "    needs: (joints: [{}], sockets: [{}]),", list(&joints), list(&sockets))?;
+    }
     writeln!(out, "    groups: [")?;
     for group in rig.groups() {
         let [r, g, b] = group.color;
@@ -63,11 +72,17 @@ fn write_features(out: &mut String, rig: &Rig) -> std::fmt::Result {
     writeln!(out, "    ],")
 }
 
+/// What a rig needs as a part; `None` for one of another kind.
+pub(super) fn needs_summary(rig: &Rig) -> Option<NeedsSummary> {
+    let needs = (rig.about().kind == "part").then(|| PartNeeds::of(rig))?;
+    Some(NeedsSummary { joints: needs.joints, sockets: needs.sockets.iter().map(ToString::to_string).collect() })
+}
+
 /// Named features of the rig with their switches, sorted.
 pub(super) fn feature_summaries(rig: &Rig) -> Vec<FeatureSummary> {
     let mut features: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
     for tag in rig.walk().flat_map(|joint| &joint.data.tags) {
-        if let TagKind::Feature { kind, name, switch } = &tag.kind
+        if let TagKind::Feature { kind, name, switch, .. } = &tag.kind
             && !name.is_empty()
         {
             let switches = features.entry((kind, name)).or_default();
@@ -150,10 +165,13 @@ fn write_tag(out: &mut String, rig: &Rig, tag: &TagData, features: &HashSet<Uid>
             }
             write!(out, "\n                    params: {},", refresh_names(params, rig))?;
         }
-        TagKind::Feature { kind, name, switch } => {
+        TagKind::Feature { kind, name, switch, choice } => {
             write!(out, "\n                    kind: {}, name: {},", quoted(kind), quoted(name))?;
             if !switch.is_empty() {
                 write!(out, "\n                    switch: {},", quoted(switch))?;
+            }
+            if !choice.is_empty() {
+                write!(out, "\n                    choice: {},", quoted(choice))?;
             }
         }
     }

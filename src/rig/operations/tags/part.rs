@@ -10,11 +10,12 @@ use super::{
 };
 use crate::rig::{
     EditError, GroupData, JointData, NodeRefs, Rig, RigEdit, TagKind, Uid,
+    part::{PartNeeds, left_out},
     reference::{NameKind, NameScope, Names, RigScope, map_references, references_in},
 };
 
 /// Puts the tags of a part's joints (parents first, siblings as authored) onto `joints` in order, until either list
-/// ends.
+/// ends. Refused, before anything changes, if the part needs more joints than there are.
 ///
 /// Joints without a label get the part's, joints without a local group the part's group, which is created. References
 /// of the part are mapped to the counterparts of their nodes; without one, to the entry in `bindings`, or to the object
@@ -34,6 +35,7 @@ pub(super) fn drop_part(
     if joints.is_empty() {
         return Err(TagError::NoTarget.into());
     }
+    check_needs(draft.rig(), part, joints, bindings)?;
     let pairs: Vec<(&JointData, Uid)> = part.walk().map(|joint| &joint.data).zip(joints.iter().copied()).collect();
     let mut remap = Remap::default();
     for (joint, target) in &pairs {
@@ -68,12 +70,30 @@ pub(super) fn drop_part(
     refresh_all(draft, &dropped)?;
     let left = part.len().saturating_sub(joints.len());
     if left > 0 {
-        draft.note(format!("{left} joints of the part are left over: only {} are selected", joints.len()));
+        let needs = PartNeeds::of(part).joints;
+        let whole = match needs.len() > joints.len() {
+            true => format!("; the whole part needs {}", needs.join(", ")),
+            false => String::new(),
+        };
+        draft.note(format!("{left} joints of the part are left over: only {} are selected{whole}", joints.len()));
     } else if joints.len() > part.len() {
         let left = joints.len() - part.len();
         draft.note(format!("{left} selected joints are left over: the part has only {}", part.len()));
     }
     Ok(())
+}
+
+/// Refuses fewer joints than the part needs. What the host has under the same label, or `bindings` name, counts.
+fn check_needs(rig: &Rig, part: &Rig, joints: &[Uid], bindings: &BTreeMap<Uid, Uid>) -> Result<(), OperationError> {
+    let is_found = |(kind, uid): &(NameKind, Uid)| {
+        let by_label = || part.name_of(NameKind::Joint, *uid).is_some_and(|label| rig.find_label(&label).is_some());
+        bindings.contains_key(uid) || *kind == NameKind::Joint && by_label()
+    };
+    if left_out(part, joints.len()).iter().all(is_found) {
+        return Ok(());
+    }
+    let (part, needs) = (part.about().name.clone(), PartNeeds::of(part));
+    Err(TagError::PartNeeds { part, joints: needs.joints, given: joints.len() }.into())
 }
 
 /// Maps each group of the part to the group of its first grouped counterpart, or creates it.

@@ -219,8 +219,8 @@ fn with_values(now: TagKind, from: TagKind) -> TagKind {
         (TagKind::Command { module, feature, .. }, TagKind::Command { params, .. }) => {
             TagKind::Command { module, params, feature }
         }
-        (TagKind::Feature { kind, .. }, TagKind::Feature { name, switch, .. }) => {
-            TagKind::Feature { kind, name, switch }
+        (TagKind::Feature { kind, .. }, TagKind::Feature { name, switch, choice, .. }) => {
+            TagKind::Feature { kind, name, switch, choice }
         }
         (now, _) => now,
     }

@@ -1,0 +1,56 @@
+//! How far commands have come.
+
+use super::Builder;
+use crate::{
+    processor::{BuildProblem, SkipReason, world::NOWHERE},
+    rig::Uid,
+};
+
+/// Where a command stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CommandState {
+    /// Not carried out yet, or rolled back.
+    Pending,
+    /// Carried out.
+    Done,
+    /// Passed over: its tag, its feature or its joint's group is off, or something that it cannot do without.
+    Skipped,
+    /// It failed and the build stands before it.
+    Failed,
+}
+
+/// What is known about a command.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommandStatus {
+    /// Where it stands.
+    pub state: CommandState,
+    /// How long it took when it ran last, in microseconds.
+    pub micros: f32,
+    /// How often it ran since the builder was made.
+    pub runs: u32,
+    /// Why it failed, if it did.
+    pub error: Option<BuildProblem>,
+    /// Why it is passed over, if it is.
+    pub skipped: Option<SkipReason>,
+}
+
+impl Builder {
+    /// What is known about a command; `None` if it is not in the list.
+    pub fn status(&self, tag: Uid) -> Option<CommandStatus> {
+        let number = self.world.creator_of(tag)?;
+        let place = Some(self.world.places[number as usize]).filter(|place| *place != NOWHERE)?;
+        let command = &self.commands[number as usize];
+        let cursor = self.cursor() as u32;
+        let off = self.world.off.commands.get(&number);
+        let state = match off {
+            _ if self.failed == Some(number) && place == cursor => CommandState::Failed,
+            _ if place >= cursor => CommandState::Pending,
+            Some(_) => CommandState::Skipped,
+            None => CommandState::Done,
+        };
+        let error = command.error.clone().filter(|_| state == CommandState::Failed);
+        let skipped = off.map(|off| off.reason.clone()).filter(|_| state == CommandState::Skipped);
+        Some(CommandStatus { state, micros: command.micros, runs: command.runs, error, skipped })
+    }
+}

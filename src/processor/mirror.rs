@@ -1,0 +1,129 @@
+//! Values with a side: what they are on the other side of the character.
+//!
+//! The frame of a mirrored joint is the mirror image of the frame with its X axis turned over, so that it stays
+//! right-handed: a direction `(x, y, z)` in a joint's axes becomes `(-x, y, z)`, as one in the rig's axes does, and an
+//! angle about X stays while those about Y and Z change their sign.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+use super::{Amount, ik::JointAngles};
+use crate::rig::fields;
+
+/// A number of the opposite sign, without a negative zero.
+pub fn opposite(value: f32) -> f32 {
+    0.0 - value
+}
+
+/// A direction or a place on the other side.
+pub fn mirrored_direction(direction: Vec3) -> Vec3 {
+    Vec3 { x: opposite(direction.x), ..direction }
+}
+
+/// A line on the other side, whose two directions mean the same: one along X stays as it is.
+pub fn mirrored_line(line: Vec3) -> Vec3 {
+    if line.y == 0.0 && line.z == 0.0 { line } else { mirrored_direction(line) }
+}
+
+/// Angles about X, Y and Z on the other side.
+pub fn mirrored_angles(angles: Vec3) -> Vec3 {
+    Vec3::new(angles.x, opposite(angles.y), opposite(angles.z))
+}
+
+/// Lowest and highest angles of a joint on the other side.
+pub fn mirrored_limits([x, y, z]: JointAngles) -> JointAngles {
+    let over = |(low, high): (Option<f32>, Option<f32>)| (high.map(opposite), low.map(opposite));
+    [x, over(y), over(z)]
+}
+
+impl Amount {
+    /// The opposite number. An attribute stays: the one on the other side has the value that moves that side.
+    pub fn opposite(&self) -> Self {
+        match self {
+            Self::Value(value) => Self::Value(opposite(*value)),
+            attribute @ Self::Attribute(_) => attribute.clone(),
+        }
+    }
+}
+
+/// Parameters with the values that differ between two complete ones, `before` and `after`. Everything else stays as it is
+/// written, and what is left out stays left out where that is possible.
+pub(super) fn with_changes(params: &str, before: &str, after: &str) -> String {
+    let now = values(before);
+    let then = values(after);
+    let mut changed: Vec<(&Path, &str)> = Vec::new();
+    for (path, value) in &then {
+        if now.get(path) != Some(value) {
+            changed.push((path, value));
+        }
+    }
+    changed.sort_unstable();
+    let mut out = params.to_owned();
+    let mut whole: Vec<&str> = Vec::new();
+    for (path, value) in changed {
+        let written = values_with_places(&out);
+        match written.iter().find(|(known, ..)| known == path) {
+            Some((_, start, end)) => out.replace_range(*start..*end, value),
+            // A value that is left out has no side, or else all of the parameter is written.
+            None => whole.extend(path.first().map(|(name, _)| name.as_str()).filter(|name| !whole.contains(name))),
+        }
+    }
+    for name in whole {
+        let all = fields(after);
+        let Some(field) = all.iter().find(|field| field.depth == 1 && field.name == name) else { continue };
+        let value = after[field.value..field.end].trim().trim_end_matches(',').to_owned();
+        let known = fields(&out).into_iter().find(|field| field.depth == 1 && field.name == name);
+        match known.map(|known| value_range(&out, known.value, known.end)) {
+            Some(range) => out.replace_range(range, &value),
+            None => match out.find('(') {
+                Some(open) => {
+                    let is_empty = out[open + 1..].trim_start().starts_with(')');
+                    let comma = if is_empty { "" } else { ", " };
+                    out.insert_str(open + 1, &format!("{name}: {value}{comma}"));
+                }
+                None => out = format!("({name}: {value})"),
+            },
+        }
+    }
+    out
+}
+
+/// Names of fields from the outside in, each with its number among those of its name in the same value.
+type Path = Vec<(String, usize)>;
+
+/// The values without fields in them, by their paths.
+fn values(text: &str) -> HashMap<Path, &str> {
+    values_with_places(text).into_iter().map(|(path, start, end)| (path, &text[start..end])).collect()
+}
+
+fn values_with_places(text: &str) -> Vec<(Path, usize, usize)> {
+    let fields = fields(text);
+    let mut paths: Vec<Path> = Vec::with_capacity(fields.len());
+    let mut counts: HashMap<(Option<usize>, &str), usize> = HashMap::new();
+    let mut is_leaf = vec![true; fields.len()];
+    for field in &fields {
+        let count = counts.entry((field.parent, field.name)).or_default();
+        let mut path = field.parent.map_or_else(Vec::new, |parent| paths[parent].clone());
+        path.push((field.name.to_owned(), *count));
+        *count += 1;
+        paths.push(path);
+        if let Some(parent) = field.parent {
+            is_leaf[parent] = false;
+        }
+    }
+    let leaves = fields.iter().zip(paths).zip(is_leaf).filter(|(_, is_leaf)| *is_leaf);
+    let placed = leaves.map(|((field, path), _)| {
+        let range = value_range(text, field.value, field.end);
+        (path, range.start, range.end)
+    });
+    placed.collect()
+}
+
+/// A value without the blanks around it and the comma after it.
+fn value_range(text: &str, start: usize, end: usize) -> std::ops::Range<usize> {
+    let value = &text[start..end];
+    let trimmed = value.trim().trim_end_matches(',').trim_end();
+    let start = start + value.len() - value.trim_start().len();
+    start..start + trimmed.len()
+}

@@ -1,0 +1,92 @@
+//! Parts: what a template needs of the rig that it is dropped into.
+//!
+//! The joints of a part go onto joints of the host in the order of the part's document. A joint is needed if commands
+//! of other joints refer to it or to its commands; the joints behind the last one needed are extras. Besides, a part is
+//! connected through its sockets.
+
+use std::{collections::HashMap, fmt};
+
+use crate::rig::{
+    NodeRef, Rig, RigJoint, TagKind, Uid,
+    reference::{NameKind, Source, references_in},
+};
+
+/// What a part needs of its host.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PartNeeds {
+    /// Labels of the joints that make it whole, in the order in which they are put onto joints of the host. A joint
+    /// without a label is told by its uid.
+    pub joints: Vec<String>,
+    /// Places of the host that it is connected to.
+    pub sockets: Vec<Socket>,
+}
+
+/// Place of a host that a part is connected to.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Socket {
+    /// The joint above the counterpart of a root joint of the part, with the label of that; the rig where there is none.
+    Parent(String),
+    /// The control that carries the rig, see [`Source::Root`]; the rig where there is none.
+    Root,
+}
+
+impl fmt::Display for Socket {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Parent(joint) => write!(f, "parent of {joint}"),
+            Self::Root => f.write_str("root"),
+        }
+    }
+}
+
+impl PartNeeds {
+    /// What a template needs.
+    pub fn of(part: &Rig) -> Self {
+        let places = places(part);
+        let of_others = part.walk().enumerate().flat_map(|(place, joint)| {
+            let needed = refers_to(joint).filter_map(|(_, uid)| places.get(&uid).copied());
+            needed.filter(move |other| *other != place).collect::<Vec<_>>()
+        });
+        let least = of_others.max().map_or(part.len().min(1), |last| last + 1);
+        let names = part.walk().map(|joint| joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()));
+        let roots = part.walk().filter(|joint| joint.parent.is_none());
+        let parents = roots.map(|joint| joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()));
+        let mut sockets: Vec<Socket> = parents.map(Socket::Parent).collect();
+        let references = part.walk().flat_map(references_of);
+        if references.into_iter().any(|reference| reference.source == Source::Root) {
+            sockets.push(Socket::Root);
+        }
+        Self { joints: names.take(least).collect(), sockets }
+    }
+}
+
+/// The number of the joint that each joint is, and that carries each tag.
+fn places(part: &Rig) -> HashMap<Uid, usize> {
+    let tags = |(place, joint): (usize, &RigJoint)| {
+        let own = std::iter::once((joint.data.uid, place));
+        own.chain(joint.data.tags.iter().map(move |tag| (tag.uid, place))).collect::<Vec<_>>()
+    };
+    part.walk().enumerate().flat_map(tags).collect()
+}
+
+/// The references of a joint's commands.
+fn references_of(joint: &RigJoint) -> Vec<NodeRef> {
+    let params = joint.data.tags.iter().filter_map(|tag| match &tag.kind {
+        TagKind::Command { params, .. } => Some(params.as_str()),
+        TagKind::Feature { .. } => None,
+    });
+    params.flat_map(references_in).filter_map(|found| found.references.ok()).flat_map(|list| list.0).collect()
+}
+
+/// Joints and commands that the commands of a joint refer to.
+fn refers_to(joint: &RigJoint) -> impl Iterator<Item = (NameKind, Uid)> {
+    let uids = references_of(joint).into_iter().flat_map(|reference| reference.uids().collect::<Vec<_>>());
+    uids.filter(|(kind, _)| matches!(kind, NameKind::Joint | NameKind::Command))
+}
+
+/// Joints and commands beyond the first joints of a part that the commands of those refer to.
+pub(in crate::rig) fn left_out(part: &Rig, count: usize) -> Vec<(NameKind, Uid)> {
+    let places = places(part);
+    let needed = part.walk().take(count).flat_map(refers_to);
+    needed.filter(|(_, uid)| places.get(uid).is_some_and(|place| *place >= count)).collect()
+}
