@@ -304,7 +304,7 @@ fn both_sides_move_alike() {
         (
             "driven keys and expressions",
             &[
-                ("e_l", "control", "(follow: false, creation: (name: \"e_l\"))".into()),
+                ("a_l", "control", "(at: \"@joint #6\", follow: false, creation: (name: \"e_l\"))".into()),
                 ("a_l", "control", "(creation: (name: \"a_l\"))".into()),
                 (
                     "a_l",
