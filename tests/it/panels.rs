@@ -540,16 +540,27 @@ fn the_controls_panel_poses_resets_and_switches() {
     desk.frames(2);
     assert_eq!(state(&desk).offset_at(slot).translation, Vec3::ZERO);
 
-    // A switch is thrown without a jump, and back by an undo.
-    let before = state(&desk);
-    let is_ik = before.attribute(switch.control, &switch.attribute).unwrap() >= 0.5;
+    // One of the limbs changes its kinematics.
+    let inverse = |desk: &Desk| -> Vec<bool> {
+        let state = state(desk);
+        let is_ik = |switch: &std::sync::Arc<rigsmith::rig::SwitchData>| {
+            state.attribute(switch.control, &switch.attribute).unwrap() >= 0.5
+        };
+        let limbs = built.switches.iter();
+        limbs.filter(|switch| matches!(switch.matching, rigsmith::rig::Matching::IkFk { .. })).map(is_ik).collect()
+    };
     assert!(desk.says("Switches"));
     // All of it in sight, so that a click meets it.
     desk.resize(320.0, 2400.0);
-    desk.click(if is_ik { "FK" } else { "IK" });
+    let before = inverse(&desk);
+    let steps = desk.steps().0;
+    let is_other = |seen: &&desk::Seen| ["FK", "IK"].contains(&&*seen.label) && seen.on == Some(false);
+    let at = desk.seen.iter().find(is_other).expect("a limb with a value to choose").rect.center();
+    desk.time += 1.0;
+    desk.click_at(at);
     desk.frames(2);
-    let after = state(&desk);
-    assert_ne!(after.attribute(switch.control, &switch.attribute).unwrap() >= 0.5, is_ik);
+    let changed = inverse(&desk).iter().zip(&before).filter(|(now, before)| now != before).count();
+    assert_eq!((changed, desk.steps().0), (1, steps + 1));
 
     // The build steps back and forwards.
     let (place, all) = {
