@@ -15,14 +15,14 @@ use measure::Joint;
 /// The volume that bent knees, elbows, hips and shoulders lose at most, in hundredths of a section, and the triangles that
 /// fold. Weights painted by hand for the same bodies lose 21 to 34, 33 to 60, 23 to 59 and 94 to 160, and fold 3 to 53.
 const KNOWN: [(&str, [(i32, usize); 4]); 8] = [
-    ("biped", [(19, 23), (29, 13), (29, 34), (137, 54)]),
-    ("baby", [(26, 32), (43, 37), (28, 32), (116, 36)]),
-    ("female_heavy_tpose", [(22, 19), (25, 21), (50, 23), (47, 14)]),
-    ("female_young", [(26, 20), (25, 21), (57, 21), (117, 18)]),
-    ("female_young_armsdown", [(26, 20), (25, 21), (55, 24), (197, 43)]),
-    ("male_child_tpose", [(34, 18), (47, 34), (65, 33), (57, 24)]),
-    ("male_muscular_action", [(35, 17), (42, 28), (62, 37), (86, 42)]),
-    ("male_young", [(36, 12), (46, 35), (60, 38), (109, 22)]),
+    ("biped", [(4, 17), (15, 17), (12, 40), (60, 54)]),
+    ("baby", [(15, 30), (39, 46), (19, 39), (79, 31)]),
+    ("female_heavy_tpose", [(8, 16), (10, 24), (29, 28), (7, 13)]),
+    ("female_young", [(13, 18), (11, 25), (32, 20), (49, 16)]),
+    ("female_young_armsdown", [(13, 18), (11, 25), (31, 21), (107, 46)]),
+    ("male_child_tpose", [(25, 21), (43, 40), (45, 35), (22, 24)]),
+    ("male_muscular_action", [(25, 20), (37, 37), (50, 29), (-33, 42)]),
+    ("male_young", [(29, 7), (43, 40), (47, 39), (45, 28)]),
 ];
 
 /// The bundled biped, and the seven bodies where there is data.

@@ -108,6 +108,7 @@ impl Maker {
             "space_switch",
             "reverse_foot",
             "twist",
+            "half_joint",
             "stretch",
             "spring",
             "driven_key",
@@ -177,6 +178,7 @@ impl Maker {
                 "(ankle: \"@joint #{a}\", ball: \"@joint #{middle}\", toe: \"@joint #{b}\", control: {control:?})"
             ),
             "twist" => format!("(start: \"@joint #{middle}\", end: \"@joint #{b}\", count: 2)"),
+            "half_joint" => format!("(at: {joint:?}, share: 0.5)"),
             "stretch" => format!("(start: {control:?}, end: {other:?}, driven: \"@joint #{b}\")"),
             "spring" => format!("(nodes: {joint:?}, frequency: 3.0)"),
             "driven_key" => format!(
