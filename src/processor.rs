@@ -27,6 +27,7 @@ mod review;
 mod scope;
 mod signal;
 mod snapshot;
+mod visibility;
 mod world;
 
 pub use amount::Amount;

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
-    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, NodeId, RigModule, mirrored_direction},
+    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule, mirrored_direction},
     rig::{
-        Attribute, AttributeKind, Constraint, KeyEase, Matching, NodeType, Output, Scalar, SwitchData, Target, VISIBLE,
+        AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
         reference::{NodeRef, NodeRefs},
     },
 };
@@ -186,7 +186,7 @@ impl RigModule for IkFkSwitch {
             control: Some(control),
             solver: self.solver,
             prefer: self.prefer,
-            weight,
+            weight: weight.clone(),
             soft: self.soft.clone(),
             stretch: self.stretch.clone(),
             max_stretch: self.max_stretch,
@@ -195,7 +195,13 @@ impl RigModule for IkFkSwitch {
             ..Ik::new(chain.clone(), goal)
         })?;
         if self.hide {
-            self.hide_idle(scope, control, &fk, [Some(goal), pole])?;
+            // Between the ends of the switch both kinds are visible.
+            for node in &fk {
+                scope.show_where(*node, &weight, [(0.0, 1.0), (1.0, 0.0)])?;
+            }
+            for node in [Some(goal), pole].into_iter().flatten() {
+                scope.show_where(node, &weight, [(0.0, 0.0), (1e-3, 1.0)])?;
+            }
         }
         let switch = SwitchData {
             command: scope.command(),
@@ -216,50 +222,4 @@ impl RigModule for IkFkSwitch {
         self.twist = self.twist.opposite();
         self.prefer = self.prefer.map(mirrored_direction);
     }
-}
-
-impl IkFkSwitch {
-    /// Drives the attribute [`VISIBLE`] of both kinds of controls by the switch. Between its ends all are visible. A goal
-    /// that is no control stands for the nearest control that carries it. Left out are the control that carries the switch
-    /// and those whose visibility is driven already.
-    fn hide_idle(
-        &self,
-        scope: &mut BuildScope<'_>,
-        control: NodeId,
-        fk: &[NodeId],
-        inverse: [Option<NodeId>; 2],
-    ) -> Result<(), ModuleError> {
-        let forward = fk.iter().map(|node| (*node, [(0.0, 1.0), (1.0, 0.0)]));
-        let inverse = inverse.into_iter().flatten().map(|node| (carrier(scope, node), [(0.0, 0.0), (1e-3, 1.0)]));
-        let inverse: Vec<_> = inverse.collect();
-        let nodes: Vec<_> = forward.chain(inverse).collect();
-        for (node, keys) in nodes {
-            let is_taken = scope.attributes(node).iter().any(|known| *known.name == *VISIBLE);
-            if node == control || is_taken || scope.kind(node) != Some(NodeType::Control) {
-                continue;
-            }
-            let kind = AttributeKind::Number { min: Some(0.0), max: Some(1.0) };
-            scope.add_attribute(node, Attribute { name: VISIBLE.into(), kind, default: 1.0 })?;
-            let constraint = Constraint::DrivenKey {
-                driver: Scalar::attribute(scope.uid(control), self.attribute.as_str()),
-                keys: keys.to_vec(),
-                ease: KeyEase::Step,
-                output: Output::Attribute(scope.uid(node), VISIBLE.into()),
-            };
-            scope.constrain("visible", node, 0, constraint)?;
-        }
-        Ok(())
-    }
-}
-
-/// The node, or the nearest node above it that is a control.
-fn carrier(scope: &mut BuildScope<'_>, node: NodeId) -> NodeId {
-    let mut at = Some(node);
-    while let Some(above) = at {
-        if scope.kind(above) == Some(NodeType::Control) {
-            return above;
-        }
-        at = scope.parent(above);
-    }
-    node
 }

@@ -60,6 +60,8 @@ pub struct IkHandle {
     pub iterations: u32,
     /// Nearness to the goal.
     pub tolerance: f32,
+    /// Goal and pole are hidden without effect.
+    pub hide: bool,
 }
 
 impl Default for IkHandle {
@@ -81,6 +83,7 @@ impl Default for IkHandle {
             limits: Vec::new(),
             iterations: 24,
             tolerance: 1e-4,
+            hide: true,
         }
     }
 }
@@ -108,6 +111,7 @@ impl RigModule for IkHandle {
         ("limits", "For ccd: lowest and highest angles in degrees about X, Y and Z of each joint, from the first on."),
         ("iterations", "For fabrik and ccd: rounds at most, 1 to 1000."),
         ("tolerance", "For fabrik and ccd: distance from the goal that is near enough, as a share of the length."),
+        ("hide", "Goal and pole are hidden while an attribute as weight is 0: their attribute \"visible\" is driven."),
     ];
     const SIDED: &'static [&'static str] = &["twist", "prefer", "limits"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_handle.ui.ron"));
@@ -121,6 +125,11 @@ impl RigModule for IkHandle {
         let pole = scope.resolve_maybe("pole", &self.pole)?;
         let control = scope.resolve_maybe("control", &self.control)?;
         let weight = scope.amount("weight", &self.weight, Some(control.unwrap_or(goal)), 0.0..=1.0, 1.0)?;
+        if self.hide {
+            for node in [Some(goal), pole].into_iter().flatten() {
+                scope.show_where(node, &weight, [(0.0, 0.0), (1e-3, 1.0)])?;
+            }
+        }
         scope.add_ik(&Ik {
             pole,
             control,

@@ -234,12 +234,14 @@ fn world_and_document_stay_equal_through_random_deeds() {
         let mut random = Random(7 + number as u64);
         let mut stage = Stage::built(rig);
         let first = write_template(stage.document());
+        let mut deeds: Vec<String> = Vec::new();
         for round in 0..steps / 3 {
-            let what = step(&mut stage, &mut random);
+            deeds.push(step(&mut stage, &mut random));
             if round % 2 == 0 {
                 stage.app.update();
                 stage.app.update();
-                check(&mut stage, &format!("rig {number}, round {round}, {what}"));
+                let last = deeds[deeds.len().saturating_sub(4)..].join("; ");
+                check(&mut stage, &format!("rig {number}, round {round}, the last ones: {last}"));
             }
         }
         stage.app.update();

@@ -132,6 +132,18 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 false
             }
         };
+        if let (true, Some(target)) = (is_taken, target) {
+            // The mirror notes what the entity says now, so that an undo in the same frame is written to it.
+            if let Some(known) = self.tags.tags.get_mut(&uid) {
+                known.joint = target;
+            }
+            if let Some(left) = self.joints.joints.get_mut(&mirrored.joint) {
+                left.tags.retain(|other| *other != uid);
+            }
+            if let Some(reached) = self.joints.joints.get_mut(&target) {
+                reached.tags.push(uid);
+            }
+        }
         if let (false, Some(known)) = (is_taken, known) {
             self.commands.entity(entity).try_insert(TagOf(known));
             // Clearing the list makes the follow system write the order of the tags again.
