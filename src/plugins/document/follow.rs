@@ -102,10 +102,11 @@ pub(in crate::plugins) fn follow_rigs(
             let old_rest = std::mem::replace(&mut mirrored.rest, data.rest);
             describe(&mut commands, mirrored, data.label.as_deref(), data.group, groups.bypass_change_detection());
             let is_posed_otherwise = known.posed.get(&data.uid) != offset;
-            if !is_posed_otherwise && old_rest == data.rest {
+            let Ok((mut pose, mut rest)) = places.get_mut(entity) else { continue };
+            // A rest pose that was written and undone in one frame is still on the entity.
+            if !is_posed_otherwise && old_rest == data.rest && *rest == data.rest {
                 continue;
             }
-            let Ok((mut pose, mut rest)) = places.get_mut(entity) else { continue };
             rest.set_if_neq(data.rest);
             // The program of a running rig writes the transforms of all its nodes.
             if !is_running {

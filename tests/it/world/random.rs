@@ -103,15 +103,18 @@ fn step(stage: &mut Stage, random: &mut Random) -> String {
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let tags: Vec<Uid> = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
     let groups: Vec<Uid> = rig.groups().iter().map(|group| group.uid).collect();
+    // A deed of the same frame may have despawned what the indices still name.
+    let is_alive = |entity: &Entity| stage.app.world().get_entity(*entity).is_ok();
     let joint = random.of(&joints);
-    let entity = joint.and_then(|joint| stage.node(joint));
+    let entity = joint.and_then(|joint| stage.node(joint)).filter(is_alive);
     let tag = random.of(&tags);
-    let tag_entity = tag.and_then(|tag| stage.get::<TagEntities>(stage.rig).unwrap().get(tag));
+    let tag_entity = tag.and_then(|tag| stage.get::<TagEntities>(stage.rig).unwrap().get(tag)).filter(is_alive);
     let group = random.of(&groups);
-    let group_entity = group.and_then(|group| stage.get::<GroupEntities>(stage.rig).unwrap().get(group));
+    let group_entity =
+        group.and_then(|group| stage.get::<GroupEntities>(stage.rig).unwrap().get(group)).filter(is_alive);
     let created: Vec<Entity> = stage
         .get::<rigsmith::plugins::commands::BuiltEntities>(stage.rig)
-        .map(|built| built.iter().map(|(_, entity)| entity).collect())
+        .map(|built| built.iter().map(|(_, entity)| entity).filter(is_alive).collect())
         .unwrap_or_default();
     let number = random.below(1000);
     let what = random.below(24);
@@ -139,7 +142,8 @@ fn step(stage: &mut Stage, random: &mut Random) -> String {
             world.entity_mut(entity).despawn();
         }
         (6, Some(entity), ..) => {
-            if let Some(other) = random.of(&joints).and_then(|other| stage.node(other)) {
+            let other = random.of(&joints).and_then(|other| stage.node(other));
+            if let Some(other) = other.filter(|other| stage.app.world().get_entity(*other).is_ok()) {
                 stage.app.world_mut().entity_mut(entity).insert(ChildOf(other));
             }
         }

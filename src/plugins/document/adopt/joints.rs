@@ -130,8 +130,11 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                     self.commands.entity(entity).try_insert(mirrored.rest);
                 }
             }
-            if mirrored.parent.is_some() && view.child_of.map(ChildOf::parent) != mirrored.parent {
-                self.joint_moved(entity, uid, &mirrored, view.child_of.map(ChildOf::parent));
+            let above = view.child_of.map(ChildOf::parent);
+            if mirrored.parent.is_some() && above != mirrored.parent && self.joint_moved(entity, uid, &mirrored, above)
+            {
+                // The parent that the entity has now, so that an undo in the same frame is written to it.
+                next.parent = above;
             }
             self.joints.joints.insert(uid, next);
         }
@@ -141,7 +144,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         }
     }
 
-    fn joint_moved(&mut self, entity: Entity, uid: Uid, mirrored: &MirroredJoint, above: Option<Entity>) {
+    /// Adopts a new parent; `true` if the document takes it.
+    fn joint_moved(&mut self, entity: Entity, uid: Uid, mirrored: &MirroredJoint, above: Option<Entity>) -> bool {
         let rig_entity = self.trial.rig_entity;
         let parent = match above {
             None => Some(None),
@@ -165,6 +169,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             self.commands.entity(entity).try_insert(ChildOf(before));
         }
         self.trial.respawn |= !is_taken;
+        is_taken
     }
 
     /// Reverts writes of other code to a created node, which follows its command only.
