@@ -195,14 +195,14 @@ fn strokes_across_a_bone_insert_and_scribbles_delete() {
 }
 
 #[test]
-fn absurd_numbers_of_joints_end_soon() {
+fn absurd_numbers_of_joints_make_few() {
     let mut bench = bench(limb(0.1, 0.0, 2.0));
-    let started = std::time::Instant::now();
     make(
         &mut bench,
         "[Stroke(points: [(0.0, 0.2), (0.0, 1.6)], joints: 4000000000), Stroke(points: [(0.05, 0.2), (0.05, 1.6)], joints: 0), Depth(1e30), Volume(4294967295), Click((0.0, 1.0)), Scale(1e38), Scale(1e38), Scale(0), MoveTo((1e38, 1e38, 1e38)), Reach(-1), Stroke(points: [(0.0, 0.2), (0.0, 1.6)], threshold: -1)]",
     );
-    assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
+    let count = bench.rig().len();
+    assert!(count < 10_000, "{count} joints were made");
     assert!(places(&bench).iter().all(|place| place.is_finite()));
 }
 

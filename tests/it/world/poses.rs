@@ -13,7 +13,7 @@ use rigsmith::{
     rig::{NodeType, PoseOffset},
 };
 
-use super::{NEAR, Stage, shipped};
+use super::{NEAR, Random, Stage, shipped};
 
 #[test]
 fn entities_stand_as_the_program_says_at_every_step() {
@@ -57,27 +57,6 @@ fn a_rig_that_is_spawned_and_built_stands_as_it_was_drawn() {
         let entity = stage.node(joint).unwrap();
         let now = stage.get::<GlobalTransform>(entity).unwrap().translation();
         assert!(now.distance(rest) < 2e-5, "{joint} jumped from {rest} to {now}");
-    }
-}
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
-
-    fn signed(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 }
 

@@ -13,28 +13,7 @@ use rigsmith::{
     rig::{RestTransform, TagKind, template::write_template},
 };
 
-use super::{NEAR, Stage, shipped};
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end.max(1) as u64) as usize
-    }
-
-    fn of<T: Copy>(&mut self, list: &[T]) -> Option<T> {
-        (!list.is_empty()).then(|| list[self.below(list.len())])
-    }
-}
+use super::{NEAR, Random, Stage, shipped};
 
 /// Fails unless the entities say what the document says, all of it and nothing else.
 fn check(stage: &mut Stage, what: &str) {
