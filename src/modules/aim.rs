@@ -15,7 +15,7 @@ use crate::{
     solve::aim::{Aim, Up},
 };
 
-/// What the up axis turns to.
+/// Reference for the up axis.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AimUpMode {
@@ -38,7 +38,7 @@ pub enum AimUpMode {
 pub struct AimModule {
     /// The nodes that look.
     pub node: NodeRefs,
-    /// What they look at.
+    /// Targets of the aim.
     pub targets: NodeRefs,
     /// A share for each target.
     pub weights: Vec<Amount>,
@@ -48,15 +48,15 @@ pub struct AimModule {
     pub aim: Axis,
     /// The axis that is kept up.
     pub up_axis: Axis,
-    /// What up is.
+    /// Reference for up.
     pub up: AimUpMode,
     /// The direction that is up.
     pub direction: Vec3,
     /// The node that is up, or whose direction.
     pub up_node: NodeRefs,
-    /// Whether the nodes stay turned as they are.
+    /// True if the nodes stay turned as they are.
     pub keep_offset: bool,
-    /// How much they turn.
+    /// Weight of the constraint, 0 to 1.
     pub weight: Amount,
 }
 

@@ -23,7 +23,7 @@ use crate::{
 pub struct AttributeModule {
     /// The nodes that get it.
     pub node: NodeRefs,
-    /// Its name.
+    /// Name of the attribute.
     pub name: String,
     /// Lowest value.
     pub min: Option<f32>,

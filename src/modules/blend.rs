@@ -30,21 +30,21 @@ use crate::{
 pub struct BlendModule {
     /// The nodes that are driven.
     pub nodes: NodeRefs,
-    /// What they follow at 0.
+    /// Nodes that are followed at 0.
     pub a: NodeRefs,
-    /// What they follow at 1.
+    /// Nodes that are followed at 1.
     pub b: NodeRefs,
     /// Between the two.
     pub blend: Amount,
     /// The node with the attribute.
     pub control: NodeRefs,
-    /// Which axes of the translation follow.
+    /// Axes whose translation follows.
     pub translate: [bool; 3],
-    /// Which angles follow.
+    /// Axes whose rotation follows.
     pub rotate: [bool; 3],
-    /// Which factors follow.
+    /// Axes whose scale follows.
     pub scale: [bool; 3],
-    /// Whether nodes stay where they stand now.
+    /// True if nodes stay where they stand now.
     pub keep_offset: bool,
 }
 

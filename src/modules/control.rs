@@ -21,7 +21,7 @@ use crate::{
 /// sRGB colours of controls on the left, on the right and in the middle.
 pub const SIDE_COLORS: [[f32; 3]; 3] = [[0.25, 0.55, 1.0], [1.0, 0.3, 0.27], [1.0, 0.82, 0.2]];
 
-/// How a control's axes lie.
+/// Directions of a control's axes.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ControlAxes {
@@ -32,7 +32,7 @@ pub enum ControlAxes {
     Rig,
 }
 
-/// How a control's shape lies before it is turned.
+/// Directions of a control's shape before its own rotation.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShapeAxes {
@@ -58,19 +58,19 @@ pub enum ShapeAxes {
 pub struct ControlModule {
     /// The nodes that get one.
     pub at: NodeRefs,
-    /// What the controls stand on.
+    /// Parent of the controls.
     pub parent: NodeRefs,
-    /// Whether controls stand below one another like their nodes.
+    /// True if controls stand below one another like their nodes.
     pub hierarchy: bool,
-    /// How their axes lie.
+    /// Directions of the axes.
     pub axes: ControlAxes,
-    /// Whether a null takes each one's place.
+    /// True if a null takes each one's place.
     pub offset_group: bool,
-    /// Whether the nodes follow.
+    /// True if the nodes follow.
     pub follow: bool,
-    /// Whether they follow the scale, too.
+    /// True if they follow the scale, too.
     pub follow_scale: bool,
-    /// Whether the nodes' own pose is put on top.
+    /// True if the nodes' own pose is put on top.
     pub keep_pose: bool,
     /// The shape's name.
     pub shape: String,
@@ -78,19 +78,19 @@ pub struct ControlModule {
     pub size: Option<f32>,
     /// Half the shape's width, relative to the bone, where `size` is left out.
     pub relative_size: f32,
-    /// How the shape lies.
+    /// Directions of the shape.
     pub shape_axes: ShapeAxes,
-    /// Where the shape lies.
+    /// Translation of the shape, in the rig's units.
     pub shape_translate: Vec3,
-    /// How the shape is turned.
+    /// Rotation of the shape about X, Y and Z, in degrees.
     pub shape_rotate: Vec3,
     /// Factors of the shape.
     pub shape_scale: Vec3,
     /// The colour.
     pub color: Option<[f32; 3]>,
-    /// What of it people move.
+    /// Channels that people move.
     pub channels: Channels,
-    /// How far they move it.
+    /// Lowest and highest values of the channels.
     pub limits: Limits,
     /// See [`Creation`].
     pub creation: Creation,
@@ -282,7 +282,7 @@ impl ControlModule {
         }
     }
 
-    /// Where the shape lies in the control's space.
+    /// Transform of the shape in the control's space.
     fn shape_offset(&self, scope: &mut BuildScope<'_>, node: NodeId, place: Trs) -> Trs {
         let back = place.rotation.inverse();
         let axes = match self.shape_axes {

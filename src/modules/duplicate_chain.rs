@@ -11,7 +11,7 @@ use crate::{
     },
 };
 
-/// What the nodes of a copy are.
+/// Kind of the nodes of a copy.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CopyKind {
@@ -32,13 +32,13 @@ pub enum CopyKind {
 #[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DuplicateChainModule {
-    /// What is copied.
+    /// Chain to copy.
     pub joints: NodeRefs,
-    /// What the uppermost copies stand on.
+    /// Parent of the uppermost copies.
     pub parent: NodeRefs,
-    /// What the copies are.
+    /// Kind of the copies.
     pub kind: CopyKind,
-    /// What their names end in.
+    /// Suffix of the copies' names.
     pub suffix: String,
     /// See [`Creation`].
     pub creation: Creation,

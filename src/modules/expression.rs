@@ -29,7 +29,7 @@ use crate::{
 pub struct Expression {
     /// The arithmetic.
     pub text: String,
-    /// What its names stand for.
+    /// Inputs that the names of the text stand for.
     pub inputs: Vec<Input>,
     /// The nodes that are driven.
     pub output: NodeRefs,

@@ -40,7 +40,7 @@ pub struct IkFkSwitch {
     pub end: NodeRefs,
     /// A control for each joint, in order.
     pub fk: NodeRefs,
-    /// Where the end goes.
+    /// Goal of the end.
     pub goal: NodeRefs,
     /// The side to which the limb bends.
     pub pole: NodeRefs,
@@ -48,17 +48,17 @@ pub struct IkFkSwitch {
     pub control: NodeRefs,
     /// Name of the attribute that switches.
     pub attribute: String,
-    /// Its value until somebody sets another.
+    /// Value of the attribute until somebody sets another.
     pub default: f32,
     /// The joints below the first follow their controls' positions, too.
     pub translate: bool,
     /// The first joint follows its control's position, too.
     pub translate_root: bool,
-    /// How the goal is reached.
+    /// Solver.
     pub solver: IkSolver,
     /// Share of the length over which two bones ease into being straight.
     pub soft: Amount,
-    /// How far two bones lengthen towards the goal.
+    /// Share, 0 to 1, by which two bones lengthen towards the goal.
     pub stretch: Amount,
     /// Longest stretch.
     pub max_stretch: f32,

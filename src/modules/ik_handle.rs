@@ -32,19 +32,19 @@ pub struct IkHandle {
     pub start: NodeRefs,
     /// Last joint of the chain: what reaches the goal.
     pub end: NodeRefs,
-    /// Where the end goes.
+    /// Goal of the end.
     pub goal: NodeRefs,
     /// The side to which the chain bends.
     pub pole: NodeRefs,
     /// The control whose attributes the numbers below may name.
     pub control: NodeRefs,
-    /// How the goal is reached.
+    /// Solver.
     pub solver: IkSolver,
     /// Share of the reach.
     pub weight: Amount,
     /// Share of the length over which two bones ease into being straight.
     pub soft: Amount,
-    /// How far two bones lengthen towards the goal.
+    /// Share, 0 to 1, by which two bones lengthen towards the goal.
     pub stretch: Amount,
     /// Longest stretch.
     pub max_stretch: f32,

@@ -29,7 +29,7 @@ pub struct InsertJointsModule {
     pub joint: NodeRefs,
     /// The lower joint.
     pub child: NodeRefs,
-    /// How many.
+    /// Number of joints to insert.
     pub count: u32,
     /// See [`Creation`].
     pub creation: Creation,

@@ -27,13 +27,13 @@ pub struct LayerModule {
     pub nodes: NodeRefs,
     /// The layer's name.
     pub name: String,
-    /// Whether it is shown.
+    /// True if it is shown.
     pub visible: bool,
-    /// How it is shown.
+    /// Display of the layer.
     pub display: LayerDisplay,
-    /// Its colour.
+    /// Colour of the layer.
     pub color: Option<[f32; 3]>,
-    /// Whether a layer of that name is taken as it is.
+    /// True if a layer of that name is taken as it is.
     pub use_existing: bool,
 }
 

@@ -32,13 +32,13 @@ use crate::{
 pub struct MirrorJointsModule {
     /// The joints to mirror.
     pub joints: NodeRefs,
-    /// What the uppermost copies stand on.
+    /// Parent of the uppermost copies.
     pub parent: NodeRefs,
     /// A point of the plane.
     pub point: Vec3,
     /// The plane's normal.
     pub normal: Vec3,
-    /// Whether the copies' axes point the other way.
+    /// True if the copies' axes point the other way.
     pub opposed: bool,
     /// See [`Creation`].
     pub creation: Creation,

@@ -27,13 +27,13 @@ use crate::{
 pub struct NullModule {
     /// The nodes that get one.
     pub at: NodeRefs,
-    /// What the nulls stand on.
+    /// Parent of the nulls.
     pub parent: NodeRefs,
-    /// Whether they stand below the rig.
+    /// True if they stand below the rig.
     pub world: bool,
-    /// Whether the nodes are hung below their nulls.
+    /// True if the nodes are hung below their nulls.
     pub insert: bool,
-    /// Whether they turn like the nodes.
+    /// True if they turn like the nodes.
     pub orient: bool,
     /// Distance from the node.
     pub translate: Vec3,

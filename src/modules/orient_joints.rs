@@ -14,7 +14,7 @@ use crate::{
     solve::aim::{Aim, Up},
 };
 
-/// Where the up axis of joints points.
+/// Direction of the up axis of joints.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpMode {
@@ -27,7 +27,7 @@ pub enum UpMode {
     Node,
 }
 
-/// What becomes of joints without another below them.
+/// Treatment of joints without another below them.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EndMode {
@@ -56,13 +56,13 @@ pub struct OrientJointsModule {
     pub along: Axis,
     /// The axis that points up.
     pub up_axis: Axis,
-    /// Where up is.
+    /// Direction that counts as up.
     pub up: UpMode,
     /// The direction.
     pub direction: Vec3,
     /// The node that is up.
     pub up_node: NodeRefs,
-    /// What becomes of ends.
+    /// Treatment of ends.
     pub end: EndMode,
 }
 

@@ -25,19 +25,19 @@ pub struct PoleVectorModule {
     pub chain: NodeRefs,
     /// The node that is put in place.
     pub pole: NodeRefs,
-    /// How far from the bend.
+    /// Distance from the bend.
     pub distance: f32,
-    /// Where a straight chain bends to.
+    /// Direction in which a straight chain bends.
     pub prefer: Vec3,
-    /// What a null stands on.
+    /// Parent of a null.
     pub parent: NodeRefs,
-    /// What the pole follows.
+    /// Nodes that the pole follows.
     pub targets: NodeRefs,
     /// A share for each target.
     pub weights: Vec<Amount>,
     /// The node with the attributes.
     pub control: NodeRefs,
-    /// How much it follows.
+    /// Weight of the constraint, 0 to 1.
     pub weight: Amount,
     /// See [`Creation`].
     pub creation: Creation,

@@ -85,7 +85,7 @@ impl Default for ReverseFoot {
     }
 }
 
-/// Where the pivots stand, in the rig's space.
+/// Positions of the pivots in the rig's space.
 struct Sole {
     heel: Vec3,
     toe: Vec3,

@@ -20,19 +20,19 @@ use crate::{
 pub struct ScaleModule {
     /// The nodes that follow.
     pub node: NodeRefs,
-    /// What they follow.
+    /// Nodes that are followed.
     pub targets: NodeRefs,
     /// A share for each target.
     pub weights: Vec<Amount>,
     /// The node with the attributes.
     pub control: NodeRefs,
-    /// Which factors follow.
+    /// Axes whose scale follows.
     pub scale: [bool; 3],
-    /// Whether the node stays where it stands now.
+    /// True if the node stays where it stands now.
     pub keep_offset: bool,
-    /// Whether the node's own pose comes on top.
+    /// True if the node's own pose comes on top.
     pub keep_pose: bool,
-    /// How much the nodes follow.
+    /// Weight of the constraint, 0 to 1.
     pub weight: Amount,
 }
 

@@ -31,7 +31,7 @@ pub struct Stretch {
     pub start: NodeRefs,
     /// to here.
     pub end: NodeRefs,
-    /// What is scaled.
+    /// Joints to scale.
     pub driven: NodeRefs,
     /// The axis that stretches.
     pub axis: Option<Vec3>,

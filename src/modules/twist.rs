@@ -36,7 +36,7 @@ pub struct Twist {
     pub reference: NodeRefs,
     /// Joints that take shares.
     pub driven: NodeRefs,
-    /// How many joints are made.
+    /// Number of joints to make.
     pub count: u32,
     /// Shares.
     pub shares: Vec<f32>,

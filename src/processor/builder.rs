@@ -25,18 +25,18 @@ use super::{
 };
 use crate::rig::{BuiltRig, Rig, Uid};
 
-/// What a run did.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunReport {
     /// Commands that were executed, in order.
     pub executed: Vec<Uid>,
     /// The command that stopped it.
     pub error: Option<BuildError>,
-    /// How many commands are in effect now.
+    /// Number of commands in effect after the run.
     pub cursor: usize,
 }
 
-/// What has to be done about a command before it counts.
+/// Work that a command needs before it counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Due {
     Nothing,
@@ -74,7 +74,7 @@ pub struct Builder {
     cursor: u32,
     failed: Option<u32>,
     breakpoints: HashSet<Uid>,
-    /// Whether something that can close a circle of constraints has changed, and from which place on.
+    /// First place from which something that can close a circle of constraints has changed.
     graph_changed: Option<u32>,
     /// From which place on references may find other nodes than before.
     structure_changed: Option<u32>,
@@ -156,7 +156,7 @@ impl Builder {
         }
     }
 
-    /// What a command wrote to a cell.
+    /// Value that a command wrote to a cell.
     fn own(&self, number: u32, node: NodeId, aspect: Aspect) -> Option<&Value> {
         let writes = &self.world.cell(node, aspect).writes;
         writes.iter().find(|(writer, _)| *writer == number).map(|(_, value)| value)

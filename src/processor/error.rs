@@ -13,7 +13,7 @@ pub enum ModuleError {
         parameter: String,
         /// The reference as text.
         reference: String,
-        /// What is wrong, and the nearest matches.
+        /// Problem, with the nearest matches.
         problem: String,
     },
     /// A parameter that is out of its range or makes no sense with the others.
@@ -21,7 +21,7 @@ pub enum ModuleError {
     Parameter {
         /// The parameter.
         parameter: String,
-        /// What is wrong and what to write.
+        /// Problem, and what to write instead.
         problem: String,
     },
     /// A reference that the command cannot do without means something that is off: no failure, the build passes the
@@ -30,7 +30,7 @@ pub enum ModuleError {
     Off {
         /// The parameter.
         parameter: String,
-        /// What is off.
+        /// Switch that is off.
         off: Off,
     },
     /// Anything else.
@@ -58,7 +58,7 @@ impl ModuleError {
     }
 }
 
-/// What is wrong with a command.
+/// Problem of a command.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BuildProblem {
     /// Nobody registered the module.
@@ -69,7 +69,7 @@ pub enum BuildProblem {
         /// The nearest names, as the rest of a sentence; may be empty.
         nearest: String,
     },
-    /// Its parameters cannot be read.
+    /// The parameters cannot be read.
     #[error("parameters, {0}")]
     Parameters(#[from] SourceError),
     /// The module says no.
@@ -89,6 +89,6 @@ pub struct BuildError {
     pub joint_label: Box<str>,
     /// The module.
     pub module: Box<str>,
-    /// What is wrong.
+    /// Problem.
     pub problem: BuildProblem,
 }

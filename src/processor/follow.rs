@@ -22,19 +22,19 @@ pub struct TargetParams<'a> {
 pub struct FollowParams<'a> {
     /// The nodes that follow.
     pub node: &'a NodeRefs,
-    /// What they follow.
+    /// Nodes that are followed.
     pub targets: TargetParams<'a>,
-    /// Which axes of the translation.
+    /// Axes whose translation follows.
     pub translate: [bool; 3],
-    /// Which angles.
+    /// Axes whose rotation follows.
     pub rotate: [bool; 3],
-    /// Which factors.
+    /// Axes whose scale follows.
     pub scale: [bool; 3],
     /// Keep where the node stands now relative to each target.
     pub keep_offset: bool,
     /// Put the node's own pose on top.
     pub keep_pose: bool,
-    /// How much it follows, 0 to 1.
+    /// Weight of the constraint, 0 to 1.
     pub weight: &'a Amount,
 }
 

@@ -81,7 +81,7 @@ pub enum FormElement {
         /// What it moves by.
         #[serde(default = "hundredth")]
         step: f32,
-        /// What stands after the number, such as a unit.
+        /// Text after the number, such as a unit.
         #[serde(default)]
         unit: String,
     },
@@ -94,10 +94,10 @@ pub enum FormElement {
         /// See [`Bound::label`].
         #[serde(default)]
         label: String,
-        /// What dragging by a pixel adds.
+        /// Change of the number per pixel of a drag.
         #[serde(default = "hundredth")]
         step: f32,
-        /// What stands after the number, such as a unit.
+        /// Text after the number, such as a unit.
         #[serde(default)]
         unit: String,
     },

@@ -11,7 +11,7 @@ use crate::rig::{AngleLimits, ChainSolver, Constraint, Scalar};
 /// plain data of a parameter.
 pub type JointAngles = [(Option<f32>, Option<f32>); 3];
 
-/// How a chain reaches its goal.
+/// Solver of a chain.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IkSolver {
@@ -31,7 +31,7 @@ pub enum IkSolver {
 pub struct Ik {
     /// Joints from the root to the end, each a child of the one before.
     pub chain: Vec<NodeId>,
-    /// Where the end goes.
+    /// Goal of the end.
     pub goal: NodeId,
     /// The side to which the chain bends.
     pub pole: Option<NodeId>,

@@ -7,7 +7,7 @@ use bevy::platform::collections::HashMap;
 use super::off::Off;
 use crate::rig::{JointData, Rig, TagData, TagKind, Uid};
 
-/// Which joints' commands are built.
+/// Joints whose commands are built.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum BuildRange {
     /// All of the rig.
@@ -32,7 +32,7 @@ pub struct ListEntry {
     pub active: bool,
 }
 
-/// What the document switches off.
+/// Groups, features and tags that the document switches off.
 pub(super) struct Switches {
     /// Feature tags that are off, with their names.
     features: HashMap<Uid, Arc<str>>,

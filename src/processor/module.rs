@@ -15,7 +15,7 @@ use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_options};
 pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + Send + Sync + 'static {
     /// The name in tags, in `snake_case`.
     const NAME: &'static str;
-    /// What it does, in one or two sentences.
+    /// Description in one or two sentences.
     const DOC: &'static str;
     /// A line about each parameter: (name, what it is, with its unit and range).
     const PARAMETERS: &'static [(&'static str, &'static str)];
@@ -24,7 +24,7 @@ pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + 
     /// The form that edits its parameters, as text: see [`Form`](super::form::Form). Without one, a form is made
     /// from the parameters' types.
     const FORM: Option<&'static str> = None;
-    /// Its icon as SVG text: 24 by 24 units, lines in `currentColor`.
+    /// Icon as SVG text: 24 by 24 units, lines in `currentColor`.
     const ICON: Option<&'static str> = None;
 
     /// Makes nodes and constraints.
@@ -59,9 +59,9 @@ impl<M: RigModule> DynModule for M {
 pub struct Parameter {
     /// The name.
     pub name: &'static str,
-    /// Its Rust type, without the path.
+    /// Rust type, without the path.
     pub kind: String,
-    /// What it is.
+    /// Description.
     pub doc: &'static str,
     /// The value where a tag leaves it out, as RON.
     pub default: String,
@@ -77,9 +77,9 @@ type Mirror = fn(&str) -> Result<String, SourceError>;
 pub struct ModuleInfo {
     /// The name in tags.
     pub name: &'static str,
-    /// What it does.
+    /// Description.
     pub doc: &'static str,
-    /// Its parameters in order.
+    /// Parameters in order.
     pub parameters: Vec<Parameter>,
     /// See [`RigModule::FORM`].
     pub form: Option<&'static str>,
@@ -87,7 +87,7 @@ pub struct ModuleInfo {
     pub icon: Option<&'static str>,
     /// Identity of its type, for reflection.
     pub type_id: TypeId,
-    /// Its type, for forms made by reflection.
+    /// Type, for forms made by reflection.
     pub type_info: &'static TypeInfo,
     parse: Parse,
     mirror: Mirror,

@@ -49,7 +49,7 @@ pub enum SkipReason {
     Reference {
         /// The parameter.
         parameter: Arc<str>,
-        /// What is off.
+        /// Switch that is off.
         off: Off,
     },
 }
@@ -68,7 +68,7 @@ impl SkipReason {
 pub(super) struct Gap {
     /// The number of nodes before it in the list.
     pub at: usize,
-    /// What is off.
+    /// Switch that is off.
     pub off: Off,
     /// The nearest node above what is missing that is built.
     pub above: Option<NodeId>,

@@ -100,7 +100,7 @@ impl BuildScope<'_> {
         }
     }
 
-    /// Who made a node and what for; `None` for joints of the document.
+    /// Origin of a node: command and purpose; `None` for joints of the document.
     pub fn origin(&mut self, node: NodeId) -> Option<Arc<Origin>> {
         match self.read(node, Aspect::Birth) {
             Some(Value::Birth(birth)) => birth.origin.clone(),
@@ -171,7 +171,7 @@ impl BuildScope<'_> {
         global
     }
 
-    /// Where a node is in the rig's space.
+    /// Transform of a node in the rig's space.
     pub fn position(&mut self, node: NodeId) -> glam::Vec3 {
         self.global(node).translation
     }
@@ -203,7 +203,7 @@ impl BuildScope<'_> {
         }
     }
 
-    /// How a control looks and moves.
+    /// Appearance, channels and limits of a control.
     pub fn control(&mut self, node: NodeId) -> Option<Arc<ControlData>> {
         match self.read(node, Aspect::Control) {
             Some(Value::Control(control)) => Some(control),

@@ -20,19 +20,19 @@ pub struct NodeId(pub(super) u32);
 pub enum Aspect {
     /// That it exists, and as what.
     Birth,
-    /// Its parent.
+    /// Parent of the node.
     Parent,
-    /// Where it stands relative to its parent.
+    /// Transform of the node relative to its parent.
     Base,
-    /// Its label.
+    /// Label of the node.
     Label,
-    /// Its local group.
+    /// Local group of the node.
     Group,
-    /// How it looks and moves as a control.
+    /// Appearance, channels and limits of the node as a control.
     Control,
-    /// Its layer.
+    /// Layer of the node.
     Layer,
-    /// Its attributes.
+    /// Attributes of the node.
     Attributes,
     /// The constraint that it is (constraints have an identity like nodes).
     Constraint,
@@ -56,7 +56,7 @@ pub struct Birth {
     pub kind: NodeType,
     /// The name that it was given, if any.
     pub name: Option<Arc<str>>,
-    /// Who made it; `None` for joints of the document.
+    /// Origin of the node; `None` for joints of the document.
     pub origin: Option<Arc<Origin>>,
     /// Its place among those that the same command made, or among the document's joints.
     pub order: u32,
@@ -157,7 +157,7 @@ pub(super) struct World {
     pub bearers: Vec<Uid>,
     /// The document's joints, in its order.
     pub joints: Vec<NodeId>,
-    /// What is off.
+    /// Switch that is off.
     pub off: OffParts,
 }
 

@@ -26,7 +26,7 @@ pub enum FindError {
     Off {
         /// The reference.
         text: String,
-        /// What is off.
+        /// Switch that is off.
         off: Off,
     },
     /// There is no joint that could ask.

@@ -6,7 +6,7 @@ use crate::{
     rig::Uid,
 };
 
-/// Where a command stands.
+/// State of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CommandState {
@@ -16,18 +16,18 @@ pub enum CommandState {
     Done,
     /// Passed over: its tag, its feature or its joint's group is off, or something that it cannot do without.
     Skipped,
-    /// It failed and the build stands before it.
+    /// Failed; the build stands before it.
     Failed,
 }
 
-/// What is known about a command.
+/// State, time and problem of a command.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandStatus {
-    /// Where it stands.
+    /// State of the command.
     pub state: CommandState,
-    /// How long it took when it ran last, in microseconds.
+    /// Duration of its last run, in microseconds.
     pub micros: f32,
-    /// How often it ran since the builder was made.
+    /// Number of its runs since the builder was made.
     pub runs: u32,
     /// Why it failed, if it did.
     pub error: Option<BuildProblem>,
@@ -36,7 +36,7 @@ pub struct CommandStatus {
 }
 
 impl Builder {
-    /// What is known about a command; `None` if it is not in the list.
+    /// State, time and problem of a command; `None` if it is not in the list.
     pub fn status(&self, tag: Uid) -> Option<CommandStatus> {
         let number = self.world.creator_of(tag)?;
         let place = Some(self.world.places[number as usize]).filter(|place| *place != NOWHERE)?;

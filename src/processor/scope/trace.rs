@@ -17,12 +17,12 @@ pub(in crate::processor) enum Read {
     Children(NodeId, Vec<NodeId>),
 }
 
-/// What a command read and wrote.
+/// Cells that a command read and wrote.
 #[derive(Debug, Clone, Default)]
 pub(in crate::processor) struct Trace {
     pub reads: Vec<Read>,
     pub writes: Vec<(NodeId, Aspect)>,
-    /// How many nodes and constraints it made.
+    /// Number of nodes and constraints that the command made.
     pub made: u32,
     /// What is off of a list that it goes through, if anything is.
     pub partial: Option<Gap>,
