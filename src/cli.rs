@@ -88,6 +88,9 @@ struct WeightArgs {
     /// Influences kept for each vertex while working
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..=8))]
     stored_influences: u8,
+    /// Let parts bend that one joint holds in their whole size; otherwise they move with that joint alone
+    #[arg(long)]
+    bend_parts: bool,
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy)]
@@ -105,6 +108,7 @@ impl WeightArgs {
         WeightSettings {
             max_influences: usize::from(self.stored_influences),
             smoothing: self.smoothing,
+            stiff_parts: !self.bend_parts,
             method: match self.method {
                 MethodArg::Auto => Method::Auto,
                 MethodArg::Heat => Method::Heat,

@@ -9,6 +9,7 @@
 //! last joints are found from the surface; a bone has a girth, and claims skin beyond it only reluctantly; sight is
 //! asked of patches of skin rather than of single points; large meshes are solved on a coarser surface.
 
+mod anatomy;
 mod bind;
 pub mod bone;
 mod bone_tree;
@@ -20,8 +21,11 @@ pub mod fill;
 mod finish;
 mod half;
 mod heat;
+mod islands;
 pub(crate) mod laplacian;
 pub(crate) mod ldl;
+mod odds;
+mod roots;
 mod sight;
 mod twist;
 pub mod voxel_bind;
@@ -89,11 +93,21 @@ pub struct WeightSettings {
     pub voxel_resolution: usize,
     /// Weights below this are dropped before the rest is made to sum to one.
     pub prune: f32,
+    /// Parts of the mesh (connected pieces) that one joint holds in nearly their whole size move with that joint alone,
+    /// as helmets, swords and eyes do, and small parts move as one; `false` lets them bend.
+    pub stiff_parts: bool,
 }
 
 impl Default for WeightSettings {
     fn default() -> Self {
-        Self { max_influences: 8, smoothing: 1.0, method: Method::Auto, voxel_resolution: 256, prune: 0.002 }
+        Self {
+            max_influences: 8,
+            smoothing: 1.0,
+            method: Method::Auto,
+            voxel_resolution: 256,
+            prune: 0.002,
+            stiff_parts: true,
+        }
     }
 }
 
@@ -104,7 +118,7 @@ impl WeightSettings {
     }
 }
 
-/// How the points got their weights; the counts add up to `points`.
+/// How the points got their weights; the counts but `stiff` add up to `points`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WeightReport {
     /// By heat on the surface.
@@ -119,6 +133,8 @@ pub struct WeightReport {
     pub given: usize,
     /// All points.
     pub points: usize,
+    /// Points of parts that move as one ([`WeightSettings::stiff_parts`]), also counted by where their weights come from.
+    pub stiff: usize,
 }
 
 /// Joints whose weights stay as they are; the others share what these leave.
@@ -231,7 +247,8 @@ pub fn skin_weights(
     // Rigid parts neither spread heat nor hide bones.
     let soft: Vec<[u32; 3]> =
         triangles.iter().copied().filter(|t| !t.iter().any(|&p| shaping.is_given(p as usize))).collect();
-    let Bound { place, weights, sources } = bind::bind(points, &soft, &limbs.joints, &limbs.free, settings, progress)?;
+    let Bound { place, weights, sources, stiff } =
+        bind::bind(points, &soft, &limbs.joints, &limbs.free, settings, progress)?;
     for (point, &place) in place.iter().enumerate() {
         let count = match sources[place as usize] {
             _ if shaping.is_given(point) => &mut report.given,
@@ -241,6 +258,7 @@ pub fn skin_weights(
             Source::Nearest | Source::None => &mut report.by_nearest,
         };
         *count += 1;
+        report.stiff += usize::from(stiff[place as usize] && !shaping.is_given(point));
     }
     let result = finish(&|point| limbs.spread(points[point], weights.of(place[point] as usize)));
     step(1.0)?;

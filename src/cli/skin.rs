@@ -238,6 +238,9 @@ pub(super) fn describe_weights(report: &mut Report, weights: &WeightReport) {
         "{} points weighted: {} over the surface, {} through voxels, {} filled, {} by the nearest bone, {} given",
         weights.points, weights.by_surface, weights.by_voxels, weights.by_fill, weights.by_nearest, weights.given
     ));
+    if weights.stiff > 0 {
+        report.line(format!("{} points of parts that one joint holds move as one", weights.stiff));
+    }
     report.set(
         "weights",
         json!({
@@ -247,6 +250,7 @@ pub(super) fn describe_weights(report: &mut Report, weights: &WeightReport) {
             "by_fill": weights.by_fill,
             "by_nearest": weights.by_nearest,
             "given": weights.given,
+            "stiff": weights.stiff,
         }),
     );
 }

@@ -96,6 +96,7 @@ mod tools;
 mod transfer;
 mod voxels;
 mod weights;
+mod weights_bodies;
 #[cfg(all(feature = "editor", feature = "cli"))]
 mod window;
 mod world;

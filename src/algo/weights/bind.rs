@@ -4,11 +4,13 @@ use glam::Vec3;
 
 use super::{
     Method, WeightError, WeightJoint, WeightSettings,
+    anatomy::Anatomy,
     bones::{self, Bones},
     claim::{self, Claim},
     coarse::{self, Coarse},
     fill::fill_unweighted,
     heat,
+    islands::Islands,
     laplacian::Graph,
     sight::Sight,
     voxel_bind::{VoxelError, VoxelSettings, geodesic_voxel_weights},
@@ -34,12 +36,9 @@ pub(crate) struct Bound {
     pub weights: Weights,
     /// Where they come from.
     pub sources: Vec<Source>,
+    /// True for places of parts that move as one.
+    pub stiff: Vec<bool>,
 }
-
-/// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
-const SEEN: f32 = 0.15;
-/// Islands up to this size beside a mesh of size 2 move with what is around them: specks, buttons, teeth.
-const SPECK: f32 = 0.2;
 
 /// Binds checked input to the joints in `free`.
 pub(crate) fn bind(
@@ -62,18 +61,25 @@ pub(crate) fn bind(
         triangles.iter().map(|t| t.map(|p| place[p as usize])).filter(|[a, b, c]| a != b && b != c && c != a).collect();
     let graph = Graph::new(&places, &triangles);
     step(0.1)?;
-    if count <= coarse::LIMIT {
+    let anatomy = Anatomy::new(&joints);
+    let (weights, sources) = if count <= coarse::LIMIT {
         let (weights, sources, _) = job.run(&places, &triangles, &graph)?;
-        return Ok(Bound { place, weights, sources });
+        (weights, sources)
+    } else {
+        let coarse = Coarse::new(&places, &triangles, &graph);
+        let coarse_graph = Graph::new(&coarse.points, &coarse.triangles);
+        let (weights, sources, claims) = job.run(&coarse.points, &coarse.triangles, &coarse_graph)?;
+        let none = Claim::default();
+        let bound = |c: usize| if sources[c] == Source::Surface { &claims[c] } else { &none };
+        let weights = coarse.spread(&weights, &graph, settings.blend(), bound);
+        (weights, coarse.cluster.iter().map(|&c| sources[c as usize]).collect())
+    };
+    let weights = anatomy.share(&places, weights);
+    if !settings.stiff_parts {
+        return Ok(Bound { place, weights, sources, stiff: vec![false; count] });
     }
-    let coarse = Coarse::new(&places, &triangles, &graph);
-    let coarse_graph = Graph::new(&coarse.points, &coarse.triangles);
-    let (weights, sources, claims) = job.run(&coarse.points, &coarse.triangles, &coarse_graph)?;
-    let none = Claim::default();
-    let bound = |c: usize| if sources[c] == Source::Surface { &claims[c] } else { &none };
-    let weights = coarse.spread(&weights, &graph, settings.blend(), bound);
-    let sources = coarse.cluster.iter().map(|&c| sources[c as usize]).collect();
-    Ok(Bound { place, weights, sources })
+    let (weights, stiff) = Islands::new(&places, &triangles).stiffened(&weights);
+    Ok(Bound { place, weights, sources, stiff })
 }
 
 /// What is the same for a mesh and its coarse stand-in.
@@ -97,14 +103,14 @@ impl Job<'_> {
         graph: &Graph,
     ) -> Result<(Weights, Vec<Source>, Vec<Claim>), WeightError> {
         let method = self.settings.method;
-        let sight = Sight::new(places, triangles);
+        let islands = Islands::new(places, triangles);
+        let sight = Sight::new(places, triangles, &islands);
         self.step(0.2)?;
         let bones = bones::build(self.joints, self.takes_part, places, &graph.areas, &sight);
         self.step(0.25)?;
         let mut weights = empty(places.len());
         let mut sources = vec![Source::None; places.len()];
         let mut claims = Vec::new();
-        let islands = Islands::new(places, triangles);
         if method != Method::Voxel {
             claims = claim::claims(places, &bones, graph, &sight);
             self.step(0.5)?;
@@ -143,45 +149,6 @@ impl Job<'_> {
             Err(VoxelError::Cancelled) => Err(WeightError::Cancelled),
             Err(_) => Ok(empty(places.len())),
         }
-    }
-}
-
-/// The connected pieces of a surface.
-struct Islands {
-    /// The island of each place.
-    of: Vec<u32>,
-    /// The longest side of each island's box.
-    extents: Vec<f32>,
-}
-
-impl Islands {
-    fn new(places: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        let (of, count) = adjacency::islands(triangles, places.len());
-        let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); count];
-        for (&island, &place) in of.iter().zip(places) {
-            let (low, high) = &mut boxes[island as usize];
-            (*low, *high) = (low.min(place), high.max(place));
-        }
-        Self { of, extents: boxes.into_iter().map(|(low, high)| (high - low).max_element()).collect() }
-    }
-
-    /// True if the island of a place is small beside the whole mesh.
-    fn is_small(&self, place: usize) -> bool {
-        self.extents[self.of[place] as usize] < SPECK
-    }
-
-    /// For each place whether its island can be bound by heat.
-    fn trusted(&self, graph: &Graph, claims: &[Claim], method: Method) -> Vec<bool> {
-        let mut area = vec![0f64; self.extents.len()];
-        let mut seen = vec![0f64; self.extents.len()];
-        for (v, claim) in claims.iter().enumerate().filter(|c| c.1.heat > 0.0) {
-            area[self.of[v] as usize] += f64::from(graph.areas[v]);
-            if claim.seen {
-                seen[self.of[v] as usize] += f64::from(graph.areas[v]);
-            }
-        }
-        let share = if method == Method::Heat { 0.0 } else { f64::from(SEEN) };
-        self.of.iter().map(|&i| area[i as usize] > 0.0 && seen[i as usize] >= share * area[i as usize]).collect()
     }
 }
 

@@ -11,17 +11,18 @@ use super::{
     WeightJoint,
     bone::BoneSegment,
     bone_tree::{BoneTree, closest_on},
+    roots::{Homes, Roots},
     sight::Sight,
 };
 
-/// Roots with more children than this keep all their bones.
-const MANY_CHILDREN: usize = 256;
 /// How far a last bone runs through the flesh beyond its joint, as a share of the reach of that flesh.
 const LEAF_REACH: f32 = 0.8;
 /// About how many points measure the girth of bones.
 const SAMPLES: usize = 8192;
 /// The share of the flesh around a bone that lies within its girth.
 const GIRTH: f32 = 0.9;
+/// Points handled at a time by one thread.
+const CHUNK: usize = 256;
 /// A bone with fewer measured points than this takes the typical girth.
 const FEW: usize = 4;
 
@@ -32,6 +33,15 @@ pub(crate) struct Bones {
     /// How far the flesh around each bone usually reaches.
     pub girths: Vec<f32>,
     pub tree: BoneTree,
+    homes: Homes,
+}
+
+impl Bones {
+    /// True if a bone may hold flesh of an island: the body parts that a bone runs through are its own. Parts that no
+    /// bone runs through, as hats and capes, belong to the bones of the part that they lie on.
+    pub fn may_hold(&self, bone: u32, island: usize) -> bool {
+        self.homes.is_at_home(self.segments[bone as usize].joint, island)
+    }
 }
 
 /// Builds the bones of the joints that take part, in a frame where the surface has unit size. `areas` are those around
@@ -50,14 +60,14 @@ pub(crate) fn build(
     for parent in joints.iter().filter_map(|j| j.parent) {
         children[parent] += 1;
     }
-    // Roots whose bones run through the air.
+    let tree = Roots::new(joints, &children, sight);
+    let helpers = tree.helpers(joints, sight);
     let carries: Vec<bool> = joints
         .iter()
-        .map(|joint| {
+        .enumerate()
+        .map(|(index, joint)| {
             let Some(parent) = joint.parent else { return false };
-            let head = joints[parent].head;
-            let is_root = joints[parent].parent.is_none() && children[parent] <= MANY_CHILDREN;
-            head.distance(joint.head) > SAME && !(is_root && mostly_outside(head, joint.head, sight))
+            joints[parent].head.distance(joint.head) > SAME && !tree.hangs_in_air[index]
         })
         .collect();
     let behind: Vec<bool> = (0..joints.len()).map(|j| carries[j] && is_behind(joints, &carries, j)).collect();
@@ -71,13 +81,13 @@ pub(crate) fn build(
     for (index, joint) in joints.iter().enumerate() {
         let Some(parent) = joint.parent else { continue };
         let Some(owner) = owners[parent] else { continue };
-        if carries[index] && !(behind[index] && leads_on[parent]) {
+        if carries[index] && !helpers[index] && !(behind[index] && leads_on[parent]) {
             segments.push(BoneSegment { joint: owner, head: joints[parent].head, tail: joint.head });
         }
     }
     let mut leaves = Vec::new();
     for (index, joint) in joints.iter().enumerate() {
-        if children[index] > 0 {
+        if children[index] > 0 || helpers[index] {
             continue;
         }
         let Some(owner) = owners[index] else { continue };
@@ -97,10 +107,11 @@ pub(crate) fn build(
         );
     }
     drop_repeats(&mut segments, &mut leaves);
-    grow_leaves(joints, &mut segments, &leaves, points, areas, sight);
+    let homes = Homes::new(joints.len(), &segments, points, sight);
+    grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, sight);
-    Bones { segments, girths, tree }
+    Bones { segments, girths, tree, homes }
 }
 
 /// True if the bone to `joint` turns back along the bone by which the chain arrived at its parent: an ear that hangs on
@@ -170,14 +181,6 @@ fn drop_repeats(segments: &mut Vec<BoneSegment>, leaves: &mut Vec<(usize, usize)
     segments.retain(|_| flags.next().copied().unwrap_or(true));
 }
 
-/// True if less than half of the samples between `a` and `b` lie inside the surface: such a bone of a root carries the
-/// character through the world and holds no flesh.
-fn mostly_outside(a: Vec3, b: Vec3, sight: &Sight) -> bool {
-    const STATIONS: usize = 8;
-    let inside = (0..STATIONS).filter(|&i| sight.encloses(a.lerp(b, (i as f32 + 0.5) / STATIONS as f32))).count();
-    inside * 2 < STATIONS
-}
-
 /// Lets the bones of last joints run through the flesh around the joint: towards the centroid of the surface that is
 /// nearest to the joint, and nearly as far as that surface reaches. The direction in which the chain arrives would miss
 /// the toes of a foot that was entered from above.
@@ -187,7 +190,7 @@ fn grow_leaves(
     leaves: &[(usize, usize)],
     points: &[Vec3],
     areas: &[f32],
-    sight: &Sight,
+    (sight, homes): (&Sight, &Homes),
 ) {
     if leaves.is_empty() {
         return;
@@ -198,15 +201,23 @@ fn grow_leaves(
     }
     let tree = BoneTree::new(segments);
     let nearest: Vec<usize> = points
-        .par_chunks(256)
-        .flat_map_iter(|chunk| {
+        .par_chunks(CHUNK)
+        .enumerate()
+        .flat_map_iter(|(number, chunk)| {
             let mut near = Vec::new();
             let (segments, leaf_of, tree) = (&*segments, &leaf_of, &tree);
-            chunk.iter().map(move |&point| {
+            chunk.iter().enumerate().map(move |(at, &point)| {
+                let index = number * CHUNK + at;
                 // Beyond the last joint its place and the end of its parent's bone are equally near.
-                tree.nearest(point, 1e-4, |b| closest_on(&segments[b as usize], point).distance(point), &mut near);
+                let island = sight.island(index);
+                let cost = |b: u32| {
+                    let segment = &segments[b as usize];
+                    let may_hold = homes.is_at_home(segment.joint, island);
+                    if may_hold { closest_on(segment, point).distance(point) } else { f32::INFINITY }
+                };
+                tree.nearest(point, 1e-4, cost, &mut near);
                 let leaf = near.iter().map(|e| leaf_of[e.1 as usize]).find(|&l| l != usize::MAX);
-                leaf.filter(|&l| sight.clear(point, joints[leaves[l].1].head)).unwrap_or(usize::MAX)
+                leaf.filter(|&l| sight.clear(index, point, joints[leaves[l].1].head)).unwrap_or(usize::MAX)
             })
         })
         .collect();
@@ -262,7 +273,7 @@ fn girths(segments: &[BoneSegment], tree: &BoneTree, points: &[Vec3], areas: &[f
                 let point = points[p];
                 tree.nearest(point, 0.0, |b| closest_on(&segments[b as usize], point).distance(point), &mut near);
                 let &(distance, bone) = near.first()?;
-                sight.clear(point, closest_on(&segments[bone as usize], point)).then_some((bone, distance))
+                sight.clear(p, point, closest_on(&segments[bone as usize], point)).then_some((bone, distance))
             })
         })
         .collect();

@@ -24,6 +24,8 @@ pub(crate) struct Claim {
     pub heat: f32,
     /// True if nothing lies between the point and the bone that claims it.
     pub seen: bool,
+    /// True if that bone lies on the outer side of the skin, across the air.
+    pub away: bool,
     /// Joint and share; shares sum to one, unused entries are zero.
     pub shares: [(u32, f32); SHARES],
 }
@@ -37,9 +39,11 @@ pub(crate) struct Claim {
 pub(crate) fn claims(points: &[Vec3], bones: &Bones, graph: &Graph, sight: &Sight) -> Vec<Claim> {
     let mut claims: Vec<Claim> = points
         .par_chunks(CHUNK)
-        .flat_map_iter(|chunk| {
+        .enumerate()
+        .flat_map_iter(|(number, chunk)| {
             let mut near = Vec::new();
-            chunk.iter().map(move |&point| claim(point, bones, sight, &mut near))
+            let first = number * CHUNK;
+            chunk.iter().enumerate().map(move |(at, &point)| claim(first + at, point, bones, sight, &mut near))
         })
         .collect();
     for leak in leaks(&claims, graph) {
@@ -48,40 +52,60 @@ pub(crate) fn claims(points: &[Vec3], bones: &Bones, graph: &Graph, sight: &Sigh
     claims
 }
 
-/// Points of patches that their joint sees little of. A patch is a connected set of points with one joint.
+/// Points that their joint does not hold: of patches of which it sees little, and of patches across the air from its
+/// bone that border on other joints, as the flank beside an arm that hangs down. Nostrils and the mouth lie across the
+/// air from the skull, too, but all around them is the head's.
 fn leaks(claims: &[Claim], graph: &Graph) -> Vec<u32> {
-    let mut met = vec![false; claims.len()];
+    let joint = |v: usize| claims[v].shares[0].0;
     let mut leaks = Vec::new();
-    let mut patch = Vec::new();
-    for start in 0..claims.len() {
-        if met[start] || claims[start].heat == 0.0 {
+    let held = |v: usize| claims[v].heat > 0.0;
+    for patch in patches(claims.len(), graph, held, |a, b| joint(a) == joint(b)) {
+        let sum = |seen: bool| {
+            patch.iter().filter(|v| !seen || claims[**v as usize].seen).map(|v| graph.areas[*v as usize]).sum::<f32>()
+        };
+        if sum(true) < SEEN * sum(false) {
+            leaks.extend(patch);
+        }
+    }
+    let away = |v: usize| held(v) && claims[v].away;
+    for patch in patches(claims.len(), graph, away, |a, b| joint(a) == joint(b)) {
+        let border = patch.iter().flat_map(|v| graph.of(*v as usize)).map(|(v, _)| v).filter(|v| held(*v) && !away(*v));
+        let (own, other): (Vec<usize>, Vec<usize>) = border.partition(|v| joint(*v) == joint(patch[0] as usize));
+        if own.len() < other.len() {
+            leaks.extend(patch);
+        }
+    }
+    leaks
+}
+
+/// The connected sets of points that are in question and alike.
+fn patches(
+    count: usize,
+    graph: &Graph,
+    is_in: impl Fn(usize) -> bool,
+    alike: impl Fn(usize, usize) -> bool,
+) -> Vec<Vec<u32>> {
+    let mut met = vec![false; count];
+    let mut patches = Vec::new();
+    for start in 0..count {
+        if met[start] || !is_in(start) {
             continue;
         }
-        let joint = claims[start].shares[0].0;
-        let (mut area, mut seen) = (0f32, 0f32);
         met[start] = true;
-        patch.clear();
-        patch.push(start as u32);
+        let mut patch = vec![start as u32];
         let mut next = 0;
         while let Some(&v) = patch.get(next) {
             next += 1;
-            let v = v as usize;
-            area += graph.areas[v];
-            if claims[v].seen {
-                seen += graph.areas[v];
-            }
-            for (n, _) in graph.of(v) {
-                if !met[n] && claims[n].heat > 0.0 && claims[n].shares[0].0 == joint {
+            for (n, _) in graph.of(v as usize) {
+                if !met[n] && is_in(n) && alike(v as usize, n) {
                     met[n] = true;
                     patch.push(n as u32);
                 }
             }
         }
-        if seen < SEEN * area {
-            leaks.extend_from_slice(&patch);
-        }
+        patches.push(patch);
     }
-    leaks
+    patches
 }
 
 /// How far a bone of this girth has to reach for a point: the distance, and more beyond its own girth, where another
@@ -90,10 +114,14 @@ fn reach(distance: f32, girth: f32) -> f32 {
     distance * (distance / girth).max(1.0)
 }
 
-/// The claim on one point; `near` is scratch space.
-fn claim(point: Vec3, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) -> Claim {
+/// The claim on the point of an index; `near` is scratch space.
+fn claim(index: usize, point: Vec3, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) -> Claim {
     let mut result = Claim::default();
+    let island = sight.island(index);
     let cost = |bone: u32| {
+        if !bones.may_hold(bone, island) {
+            return f32::INFINITY;
+        }
         reach(closest_on(&bones.segments[bone as usize], point).distance(point), bones.girths[bone as usize])
     };
     bones.tree.nearest(point, BAND, cost, near);
@@ -102,7 +130,8 @@ fn claim(point: Vec3, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) 
     // Points on a bone are held firmly, not infinitely so; surfaces have unit size here.
     let distance = point.distance(target).max(1e-5);
     result.heat = HEAT / (distance * distance);
-    result.seen = sight.clear(point, target);
+    result.seen = sight.clear(index, point, target);
+    result.away = !result.seen && sight.faces_away(index, point, target);
     let limit = best * (1.0 + BAND);
     let mut used = 0;
     for &(reach, bone) in near.iter() {

@@ -5,13 +5,23 @@
 //! share, goes to that joint: so a point is never blended over more than half of the angle, and in the middle of the bend
 //! not at all.
 
-use super::WeightJoint;
+use super::{WeightJoint, odds};
+
+/// How far the blend across a hinge is drawn out: the factor of the logarithm of the odds. Skin on the inside of a right
+/// angle folds unless the blend is at least as long as a quarter of a circle around the joint; without a half joint so
+/// long a blend would thin the limb.
+const HINGE: f32 = 0.5;
+/// The same of hips and shoulders, around which the body is too wide for a longer blend.
+const SOCKET: f32 = 1.0;
+/// A joint is a hinge if the bone above it is at least this share of the bone below it, a socket otherwise.
+const HINGED: f32 = 0.8;
 
 /// The half joints of a skeleton.
 pub(crate) struct Halves(Vec<Half>);
 
 struct Half {
     joint: u32,
+    contrast: f32,
     /// For each joint of the skeleton, the side of the bend that it is on.
     sides: Vec<Option<Side>>,
 }
@@ -39,7 +49,8 @@ impl Halves {
         let half = |(joint, data): (usize, &WeightJoint)| {
             let bent = data.halves.filter(|_| is_free[joint])?;
             let sides = (0..joints.len()).map(|joint| side(bent, joint)).collect();
-            Some(Half { joint: joint as u32, sides })
+            let contrast = if is_hinge(joints, bent) { HINGE } else { SOCKET };
+            Some(Half { joint: joint as u32, contrast, sides })
         };
         Self(joints.iter().enumerate().filter_map(half).collect())
     }
@@ -50,14 +61,16 @@ impl Halves {
             let side = |joint: u32| half.sides[joint as usize];
             let sum = |of: Side| row.iter().filter(|(joint, _)| side(*joint) == Some(of)).map(|(_, w)| w).sum::<f32>();
             let (upper, lower) = (sum(Side::Upper), sum(Side::Lower));
-            let common = upper.min(lower);
-            if common <= 0.0 {
+            let both = upper + lower;
+            if upper <= 0.0 || lower <= 0.0 {
                 continue;
             }
+            let share = odds::shifted(lower / both, half.contrast, 0.0);
+            let common = both * share.min(1.0 - share);
             for (joint, weight) in row.iter_mut() {
                 match side(*joint) {
-                    Some(Side::Upper) => *weight *= (upper - common) / upper,
-                    Some(Side::Lower) => *weight *= (lower - common) / lower,
+                    Some(Side::Upper) => *weight *= (both * (1.0 - share) - common) / upper,
+                    Some(Side::Lower) => *weight *= (both * share - common) / lower,
                     None => {}
                 }
             }
@@ -65,4 +78,19 @@ impl Halves {
             row.push((half.joint, 2.0 * common));
         }
     }
+}
+
+/// True if a joint lies between two bones of about the same length.
+fn is_hinge(joints: &[WeightJoint], joint: usize) -> bool {
+    let is_core = |joint: usize| joints[joint].twist.is_none() && joints[joint].halves.is_none();
+    let parent = |joint: usize| {
+        std::iter::successors(joints[joint].parent, |above| joints[*above].parent)
+            .take(joints.len())
+            .find(|above| is_core(*above))
+    };
+    let length = |a: usize, b: usize| joints[a].head.distance(joints[b].head);
+    let Some(above) = parent(joint) else { return false };
+    let children = (0..joints.len()).filter(|child| is_core(*child) && parent(*child) == Some(joint));
+    let below = children.map(|child| length(child, joint)).fold(0.0, f32::max);
+    length(above, joint) >= HINGED * below
 }

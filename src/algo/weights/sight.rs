@@ -4,52 +4,118 @@
 //! Every answer is the same for either orientation of the triangles, so shells that are inside-out cause no trouble.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
+use super::islands::Islands;
 use crate::mesh::{ray::Ray, surface::Surface};
 
-/// Directions in which [`Sight::encloses`] looks.
+/// Directions in which [`encloses`] looks.
 const DIRECTIONS: usize = 32;
 /// The share of a segment at either end in which nothing blocks it: the surface the point lies on.
 const MARGIN: f32 = 1e-3;
 
 /// A surface that answers lines of sight.
-pub(crate) struct Sight(Surface);
+pub(crate) struct Sight {
+    whole: Surface,
+    /// Large islands of a surface of several, each alone.
+    islands: Vec<Option<Surface>>,
+    /// The island of each point.
+    of: Vec<u32>,
+}
 
 impl Sight {
-    /// Builds the hierarchy; indices must be in range and points finite. Triangles without area hide nothing.
-    pub fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        Self(Surface::build(points, triangles))
+    /// Builds the hierarchies; indices must be in range and points finite. Triangles without area hide nothing.
+    pub fn new(points: &[Vec3], triangles: &[[u32; 3]], islands: &Islands) -> Self {
+        let whole = Surface::build(points, triangles);
+        let mut parts = vec![Vec::new(); islands.extents.len()];
+        for triangle in triangles {
+            parts[islands.of[triangle[0] as usize] as usize].push(*triangle);
+        }
+        let is_alone = parts.iter().filter(|part| !part.is_empty()).count() < 2;
+        let island = |(island, triangles): (usize, &Vec<[u32; 3]>)| {
+            let is_part = !is_alone && !triangles.is_empty() && !islands.are_small(island);
+            is_part.then(|| Surface::build(points, triangles))
+        };
+        let islands_of = islands.of.clone();
+        let islands = parts.par_iter().enumerate().map(island).collect();
+        Self { whole, islands, of: islands_of }
     }
 
-    /// True if no triangle crosses the segment strictly between its ends.
-    pub fn clear(&self, from: Vec3, to: Vec3) -> bool {
+    /// True if nothing of its own island lies strictly between a point of the surface and a place: a collar hides no
+    /// neck from the head, nor does a shirt hide the arm. Small islands lie inside of others, which do hide them.
+    pub fn clear(&self, point: usize, from: Vec3, to: Vec3) -> bool {
         let way = to - from;
         let length = way.length();
         let ray = Ray { origin: from, direction: way / length };
-        !self.0.crosses(&ray, MARGIN * length, (1.0 - MARGIN) * length)
+        !self.around(point).crosses(&ray, MARGIN * length, (1.0 - MARGIN) * length)
+    }
+
+    /// True if `to`, a place inside the surface, lies on the outer side of the skin at `from`: the way there goes through
+    /// the air and enters the surface once more than it leaves it.
+    pub fn faces_away(&self, point: usize, from: Vec3, to: Vec3) -> bool {
+        let mut hits = Vec::new();
+        let way = to - from;
+        let length = way.length();
+        self.around(point).hits(&Ray { origin: from, direction: way / length }, &mut hits);
+        let between = MARGIN * length..(1.0 - MARGIN) * length;
+        hits.iter().filter(|hit| between.contains(&hit.distance)).count() % 2 == 1
+    }
+
+    fn around(&self, point: usize) -> &Surface {
+        self.islands[self.of[point] as usize].as_ref().unwrap_or(&self.whole)
     }
 
     /// The distance along the unit vector `direction` to the first surface.
     pub fn first(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
-        self.0.closest(&Ray { origin, direction }).map(|hit| hit.distance)
+        self.whole.closest(&Ray { origin, direction }).map(|hit| hit.distance)
     }
 
-    /// True if the surface is around `point`, by two measures over evenly spread rays, each of which some damage
-    /// spoils.
-    ///
-    /// The mean of signed crossings is the generalised winding number (Jacobson et al. 2013), which holes weaken and
-    /// shells inside each other strengthen, but which needs triangles of one orientation. The share of rays with an odd
-    /// number of crossings does not.
+    /// True if the surface is around `point`.
     pub fn encloses(&self, point: Vec3) -> bool {
-        let (mut winding, mut odd) = (0i32, 0usize);
-        let mut hits = Vec::new();
-        for direction in evenly_spread() {
-            self.0.hits(&Ray { origin: point, direction }, &mut hits);
-            winding += hits.iter().map(|hit| if hit.entering { -1 } else { 1 }).sum::<i32>();
-            odd += hits.len() % 2;
-        }
-        winding.unsigned_abs() as usize * 3 > DIRECTIONS || odd * 8 > DIRECTIONS * 5
+        encloses(&self.whole, point)
     }
+
+    /// True if a large island is around `point`; of a surface of one island, always.
+    pub fn is_within(&self, island: usize, point: Vec3) -> bool {
+        self.islands[island].as_ref().is_none_or(|island| encloses(island, point))
+    }
+
+    /// The large islands of a surface of several.
+    pub fn parts(&self) -> impl Iterator<Item = usize> {
+        (0..self.islands.len()).filter(|island| self.islands[*island].is_some())
+    }
+
+    /// Distance from a place to a large island; infinite to others.
+    pub fn distance(&self, island: usize, place: Vec3) -> f32 {
+        let nearest = self.islands[island].as_ref().and_then(|island| island.closest_point(place));
+        nearest.map_or(f32::INFINITY, |nearest| nearest.distance)
+    }
+
+    /// Number of islands.
+    pub fn islands(&self) -> usize {
+        self.islands.len()
+    }
+
+    /// The island of a point.
+    pub fn island(&self, point: usize) -> usize {
+        self.of[point] as usize
+    }
+}
+
+/// True if a surface is around `point`, by two measures over evenly spread rays, each of which some damage spoils.
+///
+/// The mean of signed crossings is the generalised winding number (Jacobson et al. 2013), which holes weaken and shells
+/// inside each other strengthen, but which needs triangles of one orientation. The share of rays with an odd number of
+/// crossings does not.
+fn encloses(surface: &Surface, point: Vec3) -> bool {
+    let (mut winding, mut odd) = (0i32, 0usize);
+    let mut hits = Vec::new();
+    for direction in evenly_spread() {
+        surface.hits(&Ray { origin: point, direction }, &mut hits);
+        winding += hits.iter().map(|hit| if hit.entering { -1 } else { 1 }).sum::<i32>();
+        odd += hits.len() % 2;
+    }
+    winding.unsigned_abs() as usize * 3 > DIRECTIONS || odd * 8 > DIRECTIONS * 5
 }
 
 /// Unit vectors on a spherical Fibonacci lattice. The golden angle is turned by repeated complex multiplication, so no

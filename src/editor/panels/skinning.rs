@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_egui::egui::{
-    self, Button, CollapsingHeader, ComboBox, DragValue, ProgressBar, RichText, ScrollArea, Slider, Ui,
+    self, Button, Checkbox, CollapsingHeader, ComboBox, DragValue, ProgressBar, RichText, ScrollArea, Slider, Ui,
 };
 
 use super::{
@@ -251,6 +251,11 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
             let field = DragValue::new(&mut next.0.max_influences).range(1..=16).speed(0.05);
             ui.add(field).on_hover_text("The largest number of joints that move one point; many games allow 4");
         });
+        fields::labelled(ui, "Parts", |ui| {
+            let field = Checkbox::new(&mut next.0.stiff_parts, "stiff");
+            ui.add(field)
+                .on_hover_text("Parts that one joint holds (helmets, swords, eyes) move as one; off: they bend");
+        });
         fields::labelled(ui, "Voxels", |ui| {
             let field = DragValue::new(&mut next.0.voxel_resolution).range(32..=1024).speed(2.0);
             ui.add(field).on_hover_text("Voxels along the longest side, where voxels are used");
@@ -326,6 +331,7 @@ fn notes(report: &WeightReport) -> Vec<String> {
         (report.by_fill, "from their neighbours"),
         (report.by_nearest, "by the nearest bone alone: look at them"),
         (report.given, "given"),
+        (report.stiff, "in parts that move as one"),
     ];
     kinds
         .iter()

@@ -1,0 +1,98 @@
+//! The connected pieces of a surface: clothes, hair, gear and eyes beside a body.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+
+use super::{Method, claim::Claim, laplacian::Graph};
+use crate::mesh::{adjacency, model::Weights};
+
+/// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
+const SEEN: f32 = 0.15;
+/// Islands up to this size beside a mesh of size 2 move with what is around them: specks, buttons, teeth.
+const SPECK: f32 = 0.2;
+
+/// A part moves with one joint if that joint holds at least this share of it.
+const HELD: f32 = 0.8;
+
+/// The connected pieces of a surface.
+pub(crate) struct Islands {
+    /// The island of each place.
+    pub of: Vec<u32>,
+    /// The longest side of each island's box.
+    pub extents: Vec<f32>,
+}
+
+impl Islands {
+    /// Finds the pieces of a welded surface.
+    pub fn new(places: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let (of, count) = adjacency::islands(triangles, places.len());
+        let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); count];
+        for (&island, &place) in of.iter().zip(places) {
+            let (low, high) = &mut boxes[island as usize];
+            (*low, *high) = (low.min(place), high.max(place));
+        }
+        Self { of, extents: boxes.into_iter().map(|(low, high)| (high - low).max_element()).collect() }
+    }
+
+    /// True if the island of a place is small beside the whole mesh.
+    pub fn is_small(&self, place: usize) -> bool {
+        self.are_small(self.of[place] as usize)
+    }
+
+    /// True if an island is small beside the whole mesh.
+    pub fn are_small(&self, island: usize) -> bool {
+        self.extents[island] < SPECK
+    }
+
+    /// For each place whether its island can be bound by heat.
+    pub fn trusted(&self, graph: &Graph, claims: &[Claim], method: Method) -> Vec<bool> {
+        let mut area = vec![0f64; self.extents.len()];
+        let mut seen = vec![0f64; self.extents.len()];
+        for (v, claim) in claims.iter().enumerate().filter(|c| c.1.heat > 0.0) {
+            area[self.of[v] as usize] += f64::from(graph.areas[v]);
+            if claim.seen {
+                seen[self.of[v] as usize] += f64::from(graph.areas[v]);
+            }
+        }
+        let share = if method == Method::Heat { 0.0 } else { f64::from(SEEN) };
+        self.of.iter().map(|&i| area[i as usize] > 0.0 && seen[i as usize] >= share * area[i as usize]).collect()
+    }
+
+    /// Weights with which parts stay as stiff as they are: a part that one joint holds in nearly its whole size (helmet,
+    /// eye, sword) moves with that joint, and each small part moves as one. Tells for each place whether it is of such
+    /// a part. A surface in one piece stays as it is.
+    pub fn stiffened(&self, weights: &Weights) -> (Weights, Vec<bool>) {
+        let mut sums: Vec<BTreeMap<u32, f32>> = vec![BTreeMap::new(); self.extents.len()];
+        let mut counts = vec![0usize; self.extents.len()];
+        for (place, &island) in self.of.iter().enumerate() {
+            counts[island as usize] += 1;
+            for (joint, weight) in weights.of(place) {
+                *sums[island as usize].entry(joint).or_default() += weight;
+            }
+        }
+        let is_part = counts.iter().filter(|count| **count > 2).count() > 1;
+        let rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&counts).enumerate())
+            .map(|(island, (sums, count))| {
+                let whole: f32 = sums.values().sum();
+                let first = sums.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))?;
+                match *first.1 >= HELD * whole {
+                    _ if !is_part || *count < 3 => None,
+                    true => Some(vec![(*first.0, 1.0)]),
+                    false if self.are_small(island) => {
+                        Some(sums.iter().map(|(joint, sum)| (*joint, sum / whole)).collect())
+                    }
+                    false => None,
+                }
+            })
+            .collect();
+        let mut stiff = Weights { starts: vec![0], ..Weights::default() };
+        for (place, &island) in self.of.iter().enumerate() {
+            match &rows[island as usize] {
+                Some(row) => stiff.push(row.iter().copied()),
+                None => stiff.push(weights.of(place)),
+            }
+        }
+        (stiff, self.of.iter().map(|island| rows[*island as usize].is_some()).collect())
+    }
+}

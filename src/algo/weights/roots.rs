@@ -1,0 +1,171 @@
+//! Which joints hold flesh, and of which body part: roots, targets and slots hang in the air, and an arm holds no flesh
+//! of a head that is a part of its own.
+
+use glam::Vec3;
+
+use super::{WeightJoint, bone::BoneSegment, sight::Sight};
+
+/// Roots with more children than this keep all their bones.
+const MANY_CHILDREN: usize = 256;
+/// Samples along a bone.
+const STATIONS: usize = 8;
+/// A body part is a bone's home if it encloses the bone's joint or at least this share of the bone.
+const AT_HOME: f32 = 0.7;
+
+/// The joints above the body, which carry a character through the world and hold no flesh.
+pub(crate) struct Roots {
+    /// For each joint, whether it hangs on a root by a bone that runs through the air.
+    pub hangs_in_air: Vec<bool>,
+}
+
+impl Roots {
+    /// Finds the roots of checked joints.
+    pub fn new(joints: &[WeightJoint], children: &[usize], sight: &Sight) -> Self {
+        let order = parents_first(joints);
+        let mut sizes = vec![1usize; joints.len()];
+        for &index in order.iter().rev() {
+            if let Some(parent) = joints[index].parent {
+                sizes[parent] += sizes[index];
+            }
+        }
+        let mut hangs_in_air = vec![false; joints.len()];
+        let mut is_root: Vec<bool> = joints.iter().map(|joint| joint.parent.is_none()).collect();
+        // Roots below which the body hangs in the air: whatever else they carry holds no flesh with them, either.
+        let mut stands_off = vec![false; joints.len()];
+        for &index in &order {
+            let Some(parent) = joints[index].parent.filter(|&parent| is_root[parent]) else { continue };
+            if children[parent] > MANY_CHILDREN {
+                continue;
+            }
+            let (from, to) = (joints[parent].head, joints[index].head);
+            hangs_in_air[index] = share(from, to, |place| sight.encloses(place)) < 0.5;
+            stands_off[parent] |= hangs_in_air[index] && 2 * sizes[index] >= sizes[parent];
+            is_root[index] = hangs_in_air[index] && !sight.encloses(to);
+        }
+        for (index, joint) in joints.iter().enumerate() {
+            hangs_in_air[index] |= joint.parent.is_some_and(|parent| stands_off[parent]);
+        }
+        Self { hangs_in_air }
+    }
+
+    /// The joints of targets and handles: subtrees that hang in the air beside the largest one, at most half as large
+    /// and without a body part of their own.
+    pub fn helpers(&self, joints: &[WeightJoint], sight: &Sight) -> Vec<bool> {
+        let order = parents_first(joints);
+        let mut top: Vec<usize> = (0..joints.len()).collect();
+        let mut sizes = vec![0usize; joints.len()];
+        for &index in &order {
+            if let Some(parent) = joints[index].parent.filter(|_| !self.hangs_in_air[index]) {
+                top[index] = top[parent];
+            }
+            sizes[top[index]] += 1;
+        }
+        let is_hanging = |index: &usize| self.hangs_in_air[*index];
+        let Some(body) = order.iter().copied().filter(is_hanging).max_by_key(|&index| sizes[index]) else {
+            return vec![false; joints.len()];
+        };
+        let parts: Vec<usize> = sight.parts().collect();
+        let homes = |index: usize| -> Vec<bool> {
+            let head = joints[index].head;
+            if parts.is_empty() {
+                return vec![sight.encloses(head)];
+            }
+            parts.iter().map(|&part| sight.is_within(part, head)).collect()
+        };
+        let mut shared = vec![false; parts.len().max(1)];
+        for index in (0..joints.len()).filter(|&index| top[index] == body) {
+            shared.iter_mut().zip(homes(index)).for_each(|(shared, home)| *shared |= home);
+        }
+        let mut own = vec![false; joints.len()];
+        for index in (0..joints.len()).filter(|&index| self.hangs_in_air[top[index]] && top[index] != body) {
+            own[top[index]] |= homes(index).iter().zip(&shared).any(|(home, shared)| *home && !shared);
+        }
+        let is_helper = |index: usize| {
+            let top = top[index];
+            self.hangs_in_air[top] && top != body && 2 * sizes[top] <= sizes[body] && !own[top]
+        };
+        (0..joints.len()).map(is_helper).collect()
+    }
+}
+
+/// The body parts of a surface of several that each joint holds flesh of.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Homes {
+    /// For each island whether it is home to each joint; empty where everybody may hold it.
+    parts: Vec<Vec<bool>>,
+}
+
+/// About how many points of a part without bones look for the part that it lies on.
+const SAMPLES: usize = 32;
+
+impl Homes {
+    /// Looks where the bones of `joints` joints run.
+    pub fn new(joints: usize, segments: &[BoneSegment], points: &[Vec3], sight: &Sight) -> Self {
+        let mut parts = vec![Vec::new(); sight.islands()];
+        for part in sight.parts() {
+            let mut at_home = vec![false; joints];
+            for segment in segments {
+                let is_home = &mut at_home[segment.joint as usize];
+                let is_within = |place| sight.is_within(part, place);
+                *is_home = *is_home
+                    || is_within(segment.head)
+                    || segment.head != segment.tail && share(segment.head, segment.tail, is_within) >= AT_HOME;
+            }
+            parts[part] = if at_home.contains(&true) { at_home } else { Vec::new() };
+        }
+        let bearers: Vec<usize> = (0..parts.len()).filter(|&part| !parts[part].is_empty()).collect();
+        let mut members = vec![Vec::new(); parts.len()];
+        for point in 0..points.len() {
+            members[sight.island(point)].push(point);
+        }
+        for part in sight.parts().filter(|_| !bearers.is_empty()) {
+            if parts[part].is_empty() {
+                let stride = members[part].len().div_ceil(SAMPLES).max(1);
+                let samples = members[part].iter().step_by(stride).map(|&point| points[point]);
+                parts[part] = parts[bearer(samples, &bearers, sight)].clone();
+            }
+        }
+        Self { parts }
+    }
+
+    /// True if a joint may hold flesh of an island.
+    pub fn is_at_home(&self, joint: u32, island: usize) -> bool {
+        self.parts.get(island).is_none_or(|part| part.is_empty() || part[joint as usize])
+    }
+}
+
+/// The share of samples between two places for which something holds.
+fn share(from: Vec3, to: Vec3, holds: impl Fn(Vec3) -> bool) -> f32 {
+    let station = |i: usize| from.lerp(to, (i as f32 + 0.5) / STATIONS as f32);
+    (0..STATIONS).filter(|&i| holds(station(i))).count() as f32 / STATIONS as f32
+}
+
+/// Joints with each parent before its children.
+fn parents_first(joints: &[WeightJoint]) -> Vec<usize> {
+    let mut children = vec![Vec::new(); joints.len()];
+    let mut order = Vec::with_capacity(joints.len());
+    for (index, joint) in joints.iter().enumerate() {
+        match joint.parent {
+            Some(parent) => children[parent].push(index),
+            None => order.push(index),
+        }
+    }
+    let mut next = 0;
+    while let Some(&joint) = order.get(next) {
+        next += 1;
+        order.extend(&children[joint]);
+    }
+    order
+}
+
+/// The part that most of some places are nearest to, of those with bones; the first of several.
+fn bearer(places: impl Iterator<Item = Vec3>, bearers: &[usize], sight: &Sight) -> usize {
+    let mut votes = vec![0usize; bearers.len()];
+    for place in places {
+        let distances = bearers.iter().map(|&part| sight.distance(part, place));
+        let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.into_iter().for_each(|(bearer, _)| votes[bearer] += 1);
+    }
+    let most = votes.iter().copied().max();
+    bearers[votes.iter().position(|&count| Some(count) == most).unwrap_or(0)]
+}

@@ -1,0 +1,298 @@
+//! Automatic weights on bodies and characters with weights painted by hand: how near they are, and how they bend.
+
+use std::{collections::BTreeMap, path::Path};
+
+use glam::{Quat, Vec3};
+use rigsmith::{
+    algo::weights::{WeightJoint, WeightReport, WeightSettings, skin_weights},
+    mesh::{gltf::read_gltf, model::Weights},
+};
+use serde_json::Value;
+
+const BODIES: [&str; 7] = [
+    "baby",
+    "female_heavy_tpose",
+    "female_young",
+    "female_young_armsdown",
+    "male_child_tpose",
+    "male_muscular_action",
+    "male_young",
+];
+
+/// A body with the joints of one of its rigs and the weights painted for them.
+struct Body {
+    points: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    names: Vec<String>,
+    joints: Vec<WeightJoint>,
+    truth: Weights,
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+fn vector(value: &Value) -> Vec3 {
+    Vec3::from_array(std::array::from_fn(|axis| value[axis].as_f64().unwrap() as f32))
+}
+
+impl Body {
+    fn read(bodies: &Path, body: &str, rig: &str) -> Self {
+        let text = std::fs::read_to_string(bodies.join(body).join("body.obj")).unwrap();
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        for line in text.lines() {
+            if let Some(numbers) = line.strip_prefix("v ") {
+                let c: Vec<f32> = numbers.split_ascii_whitespace().map(|n| n.parse().unwrap()).collect();
+                points.push(Vec3::new(c[0], c[1], c[2]));
+            } else if let Some(corners) = line.strip_prefix("f ") {
+                let corner = |text: &str| text.split('/').next().unwrap().parse::<u32>().unwrap() - 1;
+                let f: Vec<u32> = corners.split_ascii_whitespace().map(corner).collect();
+                triangles.extend((2..f.len()).map(|i| [f[0], f[i - 1], f[i]]));
+            }
+        }
+        let painted = json(&bodies.join(format!("gt_weights_{rig}.json")));
+        let bones = json(&bodies.join(body).join("joints.json"))[rig].take();
+        let order = painted["bone_order"].as_array().unwrap();
+        let names: Vec<String> = order.iter().map(|name| name.as_str().unwrap().to_owned()).collect();
+        let index = |name: &str| names.iter().position(|other| other == name);
+        let joint = |name: &String| WeightJoint {
+            head: vector(&bones[name]["head"]),
+            parent: bones[name]["parent"].as_str().and_then(index),
+            tail: None,
+            deforms: true,
+            twist: None,
+            halves: None,
+        };
+        let joints = names.iter().map(joint).collect();
+        let mut truth = Weights::default();
+        for row in painted["weights"].as_array().unwrap() {
+            let influence = |e: &Value| (e[0].as_u64().unwrap() as u32, e[1].as_f64().unwrap() as f32);
+            truth.push(row.as_array().unwrap().iter().map(influence));
+        }
+        Self { points, triangles, names, joints, truth }
+    }
+
+    fn bound(&self) -> (Weights, WeightReport) {
+        skin_weights(&self.points, &self.triangles, &self.joints, &[], None, &WeightSettings::default(), &|_| true)
+            .unwrap()
+    }
+
+    /// Root mean square distance, in hundredths of the height, between the points as weights bend them and as the painted
+    /// ones do: the joint `bent` is turned by a right angle towards `forward`.
+    fn bend_error(&self, weights: &Weights, bent: &str, forward: Vec3) -> f32 {
+        let bent = self.names.iter().position(|name| name == bent).unwrap();
+        let child = self.joints.iter().find(|joint| joint.parent == Some(bent)).unwrap();
+        let at = self.joints[bent].head;
+        let along = (child.head - at).normalize();
+        let turn = Quat::from_rotation_arc(along, (forward - along * along.dot(forward)).normalize());
+        let is_below = |joint: usize| {
+            let mut above = std::iter::successors(Some(joint), |joint| self.joints[*joint].parent);
+            above.any(|joint| joint == bent)
+        };
+        let below: Vec<bool> = (0..self.joints.len()).map(is_below).collect();
+        let share = |weights: &Weights, point: usize| -> f32 {
+            weights.of(point).filter(|(joint, _)| below[*joint as usize]).map(|(_, weight)| weight).sum()
+        };
+        let error = |(number, point): (usize, &Vec3)| {
+            let motion = turn * (*point - at) - (*point - at);
+            (motion * (share(weights, number) - share(&self.truth, number))).length_squared()
+        };
+        let mean = self.points.iter().enumerate().map(error).sum::<f32>() / self.points.len() as f32;
+        let (low, high) = self.points.iter().fold((f32::MAX, f32::MIN), |(a, b), p| (a.min(p.y), b.max(p.y)));
+        100.0 * mean.sqrt() / (high - low)
+    }
+}
+
+/// The mean over the points of half the sum of absolute differences of weights.
+fn difference(a: &Weights, b: &Weights, points: impl Iterator<Item = usize>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    for point in points {
+        let mut row: BTreeMap<u32, f32> = a.of(point).collect();
+        b.of(point).for_each(|(joint, weight)| *row.entry(joint).or_default() -= weight);
+        sum += f64::from(row.values().map(|weight| weight.abs()).sum::<f32>()) / 2.0;
+        count += 1;
+    }
+    sum / f64::from(count)
+}
+
+#[test]
+fn bodies_are_bound_better_than_by_plain_bone_heat() {
+    let Some(data) = crate::prerequisites::test_data() else { return };
+    // Errors as measured; a tenth more is the most. Blender's bone heat has 0.233 and 0.159 on the first body.
+    for (body, rig, measured) in [
+        ("male_young", "game_engine", 0.121),
+        ("male_young", "mixamo", 0.123),
+        ("female_young", "game_engine", 0.128),
+        ("baby", "game_engine", 0.108),
+        ("baby", "mixamo", 0.167),
+    ] {
+        let body_data = Body::read(&data.join("bodies"), body, rig);
+        let (weights, report) = body_data.bound();
+        assert_eq!(report.by_surface, body_data.points.len());
+        let error = difference(&weights, &body_data.truth, 0..body_data.points.len());
+        println!("{body} with {rig}: error {error:.4}");
+        assert!(error <= 1.1 * measured, "{body} with {rig}: error {error:.4}, measured {measured:.4}");
+    }
+}
+
+/// Limbs bent by a right angle lie where painted weights put them. Blender's bone heat with the true tails is at 0.049
+/// (elbow), 0.057 (knee), 0.149 and 0.189 (shoulder), 0.362 and 0.348 (hip); it leaves the baby without weights.
+#[test]
+fn bends_lie_beside_those_of_painted_weights() {
+    let Some(data) = crate::prerequisites::test_data() else { return };
+    let rigs: [(&str, [[&str; 2]; 4], [f32; 4]); 2] = [
+        (
+            "game_engine",
+            [["lowerarm_l", "lowerarm_r"], ["calf_l", "calf_r"], ["upperarm_l", "upperarm_r"], ["thigh_l", "thigh_r"]],
+            [0.034, 0.048, 0.104, 0.139],
+        ),
+        (
+            "mixamo",
+            [
+                ["mixamorig:LeftForeArm", "mixamorig:RightForeArm"],
+                ["mixamorig:LeftLeg", "mixamorig:RightLeg"],
+                ["mixamorig:LeftArm", "mixamorig:RightArm"],
+                ["mixamorig:LeftUpLeg", "mixamorig:RightUpLeg"],
+            ],
+            [0.034, 0.047, 0.159, 0.149],
+        ),
+    ];
+    for (rig, bends, measured) in rigs {
+        let mut sums = [0.0; 4];
+        // The baby is left out, as the peer cannot bind it.
+        for body in &BODIES[1..] {
+            let body = Body::read(&data.join("bodies"), body, rig);
+            let weights = body.bound().0;
+            for (kind, sides) in bends.iter().enumerate() {
+                let forward = if kind == 1 { Vec3::NEG_Z } else { Vec3::Z };
+                sums[kind] += sides.iter().map(|side| body.bend_error(&weights, side, forward)).sum::<f32>() / 2.0;
+            }
+        }
+        let means = sums.map(|sum| sum / (BODIES.len() - 1) as f32);
+        println!("{rig}: elbow, knee, shoulder, hip {means:.3?} % of the height");
+        for (mean, measured) in means.iter().zip(measured) {
+            assert!(*mean <= 1.1 * measured, "{rig}: {means:.4?}, measured {measured}");
+        }
+    }
+}
+
+/// A character from a file: its points at rest, the joints with the helpers or without, and what the file's weights say.
+struct Character {
+    joints: Vec<WeightJoint>,
+    /// The joint's number in the file.
+    nodes: Vec<u32>,
+    weights: Weights,
+    report: WeightReport,
+    truth: Weights,
+    /// The points of each skinned object, by name.
+    objects: Vec<(String, Vec<usize>)>,
+    /// Sum of the file's weights of each joint of the file.
+    held: Vec<f32>,
+}
+
+impl Character {
+    fn bind(path: &Path, with_helpers: bool) -> Self {
+        let no_files = &mut |_: &str| -> Result<Vec<u8>, _> { unreachable!("the file is in one piece") };
+        let model = read_gltf(&std::fs::read(path).unwrap(), "character.glb", no_files).unwrap();
+        let rest = model.at_rest();
+        let truth = model.weights.clone().unwrap();
+        let mut held = vec![0.0; model.nodes.len()];
+        for point in 0..truth.len() {
+            truth.of(point).for_each(|(joint, weight)| held[joint as usize] += weight);
+        }
+        // Joints that hold something, and those above them.
+        let mut is_needed: Vec<bool> = held.iter().map(|held| *held > 0.0 || with_helpers).collect();
+        for node in (0..is_needed.len()).rev().filter(|node| model.nodes[*node].parent.is_some()) {
+            let parent = model.nodes[node].parent.unwrap();
+            is_needed[parent] |= is_needed[node];
+        }
+        let nodes: Vec<u32> = (0..is_needed.len() as u32).filter(|node| is_needed[*node as usize]).collect();
+        let globals = model.rest_globals();
+        let joint = |node: &u32| WeightJoint {
+            head: globals[*node as usize].translation.into(),
+            parent: model.nodes[*node as usize].parent.and_then(|p| nodes.iter().position(|n| *n as usize == p)),
+            tail: None,
+            deforms: true,
+            twist: None,
+            halves: None,
+        };
+        let joints: Vec<WeightJoint> = nodes.iter().map(joint).collect();
+        let mut points = vec![Vec::new(); model.objects.len()];
+        for part in &rest.parts {
+            points[part.object].extend(part.vertices.iter().map(|point| *point as usize));
+        }
+        points.iter_mut().for_each(|points| points.sort_unstable());
+        points.iter_mut().for_each(Vec::dedup);
+        let mut rigid = Vec::new();
+        for (object, points) in model.objects.iter().zip(&points) {
+            let joint = object.node.and_then(|node| nodes.iter().position(|n| *n as usize == node));
+            if let (None, Some(joint)) = (object.skin, joint) {
+                for run in points.chunk_by(|a, b| a + 1 == *b) {
+                    rigid.push((run[0] as u32..run[run.len() - 1] as u32 + 1, joint as u32));
+                }
+            }
+        }
+        let settings = WeightSettings::default();
+        let (weights, report) =
+            skin_weights(&rest.points, &rest.point_triangles(), &joints, &rigid, None, &settings, &|_| true).unwrap();
+        let mut named = Weights::default();
+        for point in 0..weights.len() {
+            named.push(weights.of(point).map(|(joint, weight)| (nodes[joint as usize], weight)));
+        }
+        let objects = model.objects.iter().zip(points).filter(|(object, _)| object.skin.is_some());
+        let objects = objects.map(|(object, points)| (object.name.clone(), points)).collect();
+        Self { joints, nodes, weights: named, report, truth, objects, held }
+    }
+
+    fn error(&self, name: &str) -> f64 {
+        let points = self.objects.iter().filter(|(object, _)| object.contains(name)).flat_map(|(_, points)| points);
+        difference(&self.weights, &self.truth, points.copied())
+    }
+
+    /// Number of points of skinned objects in which a joint takes part that holds nothing in the file.
+    fn claims_of_helpers(&self, is_helper: impl Fn(usize) -> bool) -> usize {
+        let points = self.objects.iter().flat_map(|(_, points)| points);
+        let is_claimed = |point: &&usize| self.weights.of(**point).any(|(joint, _)| is_helper(joint as usize));
+        points.filter(is_claimed).count()
+    }
+}
+
+/// Characters of many parts: the head of a part of its own is the head's, and targets that stand beside the body or in
+/// it hold nothing.
+#[test]
+fn characters_of_many_parts_are_bound_part_by_part() {
+    let Some(data) = crate::prerequisites::test_data() else { return };
+    let path = data.join("characters/Mage.glb");
+    let plain = Character::bind(&path, false);
+    println!("{} joints, error {:.4}, head {:.4}", plain.joints.len(), plain.error(""), plain.error("Head"));
+    assert!(plain.error("") < 1.1 * 0.227, "{}", plain.error(""));
+    assert!(plain.error("Head") < 0.03, "{}", plain.error("Head"));
+    assert_eq!(plain.report.by_voxels, 0, "parts are bound by heat, each alone");
+    let all = Character::bind(&path, true);
+    println!("{} joints, error {:.4}, head {:.4}", all.joints.len(), all.error(""), all.error("Head"));
+    assert!(all.error("") < 1.1 * 0.241 && all.error("Head") < 0.03);
+    // Slots lie inside of the hands and are their last joints; all other helpers stand beside the body.
+    let is_slot = |node: usize| {
+        let parent = all.joints[all.nodes.iter().position(|n| *n as usize == node).unwrap()].parent;
+        parent.is_some_and(|parent| all.held[all.nodes[parent] as usize] > 0.0)
+    };
+    assert_eq!(all.claims_of_helpers(|node| all.held[node] == 0.0 && !is_slot(node)), 0);
+}
+
+/// Errors against the weights of the files, as measured.
+#[test]
+fn characters_and_creatures_are_bound_as_well_as_they_were() {
+    let Some(data) = crate::prerequisites::test_data() else { return };
+    for (file, measured) in [
+        ("gltf_skinned/CesiumMan.glb", 0.089),
+        ("gltf_skinned/RobotExpressive.glb", 0.190),
+        ("gltf_skinned/Fox.glb", 0.228),
+        ("creatures/fox-fox.glb", 0.184),
+        ("creatures/fox-dog.glb", 0.192),
+        ("creatures/bird-eagle.glb", 0.300),
+    ] {
+        let error = Character::bind(&data.join(file), false).error("");
+        println!("{file}: error {error:.4}");
+        assert!(error <= 1.1 * measured, "{file}: {error:.4}, measured {measured}");
+    }
+}
