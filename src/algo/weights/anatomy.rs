@@ -13,6 +13,8 @@ use crate::mesh::model::Weights;
 
 /// Lengths of bones that differ by more than this share are not a pair's.
 const ALIKE: f32 = 0.2;
+/// Joints that a limb has at most, and children of a girdle.
+const MANY: usize = 32;
 /// Joints that a limb has at least: two bones and what they end at.
 const LIMB: usize = 3;
 /// A foot tells which way is forward if it leads at least this share of its length away from the shin.
@@ -184,6 +186,7 @@ impl<'a> Tree<'a> {
         let mut at = from;
         while let Some(&child) = self.children[at].iter().max_by_key(|&&child| self.sizes[child])
             && self.children[at].len() <= 2
+            && path.len() < MANY
         {
             path.push(child);
             at = child;
@@ -210,6 +213,9 @@ impl<'a> Tree<'a> {
 
     /// The pair of limbs that is attached to a joint: of its children exactly two are alike.
     fn girdle(&self, joint: usize) -> Option<Girdle> {
+        if !(2..=MANY).contains(&self.children[joint].len()) {
+            return None;
+        }
         let limbs: Vec<Limb> = self.children[joint].iter().filter_map(|&child| self.limb(child)).collect();
         let mut pairs = Vec::new();
         for (number, limb) in limbs.iter().enumerate() {
@@ -223,12 +229,13 @@ impl<'a> Tree<'a> {
         Some(Girdle { joint, limbs: pair.map(Limb::clone), others })
     }
 
-    fn is_below(&self, joint: usize, above: usize) -> bool {
-        let mut at = Some(joint);
-        while let Some(joint) = at.filter(|&joint| joint != above) {
-            at = self.joints[joint].parent;
+    /// For each joint whether it is one of some joints or below one.
+    fn below(&self, above: &[usize]) -> Vec<bool> {
+        let mut below = vec![false; self.joints.len()];
+        for &joint in &self.order {
+            below[joint] = above.contains(&joint) || self.joints[joint].parent.is_some_and(|parent| below[parent]);
         }
-        at.is_some()
+        below
     }
 
     /// True if the trunk leads away from where the legs lead: forelegs share their flesh otherwise than arms do.
@@ -241,10 +248,8 @@ impl<'a> Tree<'a> {
 
     /// The joint `lower` with all below it, sharing with `upper`.
     fn hinge(&self, share: Share, lower: usize, upper: usize, back: Vec3) -> Hinge {
-        let side = |joint: usize| {
-            let below = self.is_below(joint, lower);
-            (below || joint == upper).then_some(below)
-        };
+        let below = self.below(&[lower]);
+        let side = |joint: usize| (below[joint] || joint == upper).then_some(below[joint]);
         let next = self.children[lower].iter().max_by_key(|&&child| self.sizes[child]);
         let along = next.map_or(Vec3::ZERO, |&next| self.joints[next].head - self.joints[lower].head);
         Hinge {
@@ -274,16 +279,18 @@ impl<'a> Tree<'a> {
 /// root.
 fn girdles(tree: &Tree) -> Option<(Girdle, Girdle)> {
     let mut found: Vec<Girdle> = Vec::new();
+    let mut is_limb = vec![false; tree.joints.len()];
     for &joint in &tree.order {
-        let is_limb = |girdle: &Girdle| girdle.limbs.iter().any(|limb| tree.is_below(joint, limb.path[0]));
-        if !found.iter().any(is_limb) {
-            found.extend(tree.girdle(joint));
+        is_limb[joint] |= tree.joints[joint].parent.is_some_and(|parent| is_limb[parent]);
+        if let Some(girdle) = tree.girdle(joint).filter(|_| !is_limb[joint]) {
+            girdle.limbs.iter().for_each(|limb| is_limb[limb.path[0]] = true);
+            found.push(girdle);
         }
     }
     let [upper, lower]: [Girdle; 2] = found.try_into().ok()?;
-    if !tree.is_below(lower.joint, upper.joint) {
+    if !tree.below(&[upper.joint])[lower.joint] {
         return None;
     }
-    let goes_on = |girdle: &Girdle| girdle.others.iter().any(|&other| !tree.is_below(lower.joint, other));
+    let goes_on = |girdle: &Girdle| girdle.others.iter().any(|&other| !tree.below(&[other])[lower.joint]);
     Some(if goes_on(&upper) && !goes_on(&lower) { (lower, upper) } else { (upper, lower) })
 }
