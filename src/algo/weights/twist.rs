@@ -54,7 +54,14 @@ impl Limbs {
             }
             WeightJoint { parent: parent.and_then(|parent| number[parent]), ..joint }
         };
-        let bones: Vec<Vec<Bone>> = places.iter().map(|&place| bones(joints, place, &is_free)).collect();
+        let mut twists = vec![Vec::new(); joints.len()];
+        for (joint, data) in joints.iter().enumerate().filter(|(joint, _)| is_free[*joint]) {
+            if let Some(twist) = data.twist {
+                twists[twist.joint].push(joint as u32);
+            }
+        }
+        let shared = |&place: &u32| bones(joints, place, &twists[place as usize], &is_free);
+        let bones: Vec<Vec<Bone>> = places.iter().map(shared).collect();
         let takes_part = |core: &usize| is_free[places[*core] as usize] || !bones[*core].is_empty();
         let free = (0..places.len()).filter(takes_part).map(|core| core as u32).collect();
         Self {
@@ -82,17 +89,18 @@ impl Limbs {
     }
 }
 
-/// The bones of a joint that free twist joints share.
-fn bones(joints: &[WeightJoint], owner: u32, is_free: &[bool]) -> Vec<Bone> {
+/// The bones of a joint that its free twist joints share.
+fn bones(joints: &[WeightJoint], owner: u32, twists: &[u32], is_free: &[bool]) -> Vec<Bone> {
     let start = joints[owner as usize].head;
     let mut bones: Vec<(Vec3, Bone)> = Vec::new();
-    for (joint, data) in joints.iter().enumerate() {
-        let Some(twist) = data.twist.filter(|twist| twist.joint == owner as usize && is_free[joint]) else { continue };
+    for &joint in twists {
+        let data = joints[joint as usize];
+        let Some(twist) = data.twist else { continue };
         let along = twist.end - start;
         let at = place(data.head - start, along);
         match bones.iter_mut().find(|(end, _)| *end == twist.end) {
-            Some((_, bone)) => bone.stations.push((at, joint as u32)),
-            None => bones.push((twist.end, Bone { start, along, stations: vec![(at, joint as u32)] })),
+            Some((_, bone)) => bone.stations.push((at, joint)),
+            None => bones.push((twist.end, Bone { start, along, stations: vec![(at, joint)] })),
         }
     }
     let complete = |(_, mut bone): (Vec3, Bone)| {
