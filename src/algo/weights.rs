@@ -7,7 +7,10 @@
 //!
 //! What differs from the paper: a joint has a bone to each child ([`BoneSegment`](bone::BoneSegment)); the bones of
 //! last joints are found from the surface; a bone has a girth, and claims skin beyond it only reluctantly; sight is
-//! asked of patches of skin rather than of single points; large meshes are solved on a coarser surface.
+//! asked of patches of skin rather than of single points, and of each large piece of the surface alone; a piece belongs
+//! to the bones inside of it, and joints that stand off from the body (roots, targets, poles) hold nothing; skin whose
+//! bone lies across the air is left to its neighbours; arms, legs and necks share flesh as painted bodies do; pieces that
+//! one joint holds stay stiff; large meshes are solved on a coarser surface.
 
 mod anatomy;
 mod bind;

@@ -78,6 +78,10 @@ impl From<PoseError> for Failure {
 pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let kind = args.output.as_deref().map(FileKind::of);
     let is_picture = args.output.as_deref().is_some_and(is_png);
+    #[cfg(feature = "render")]
+    if is_picture {
+        super::device_selection::restart_without();
+    }
     if let (Some(output), false) = (&args.output, is_picture)
         && !matches!(kind, Some(Some(FileKind::Glb | FileKind::Gltf | FileKind::Template)))
     {
