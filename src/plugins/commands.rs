@@ -185,7 +185,7 @@ fn build_rigs(
         if processor.follow {
             let goal = processor.goal.unwrap_or(usize::MAX);
             let report = processor.builder.run_to(goal);
-            finish(&mut commands, entity, &processor.builder, (built, failed), report, &mut done);
+            finish(&mut commands, entity, &mut processor.builder, (built, failed), report, &mut done);
         }
     }
     for BuildRequest { rig: entity, step } in requests.read() {
@@ -208,7 +208,7 @@ fn build_rigs(
             }
         };
         let report = carry_out(processor, rig, step);
-        finish(&mut commands, *entity, &processor.builder, (built, failed), report, &mut done);
+        finish(&mut commands, *entity, &mut processor.builder, (built, failed), report, &mut done);
         if is_fresh {
             let processor = std::mem::replace(
                 processor,
@@ -259,15 +259,15 @@ fn carry_out(processor: &mut Processor, rig: &Rig, step: &BuildStep) -> RunRepor
 fn finish(
     commands: &mut Commands,
     rig: Entity,
-    builder: &Builder,
+    builder: &mut Builder,
     (before, had_failed): (Option<&Built>, bool),
     report: RunReport,
     done: &mut MessageWriter<BuildDone>,
 ) {
     let mut entity = commands.entity(rig);
-    let built = builder.built();
-    if before.is_none_or(|before| *before.0 != built) {
-        entity.try_insert(Built(Arc::new(built)));
+    let built = builder.shared_built();
+    if before.is_none_or(|before| !Arc::ptr_eq(&before.0, &built) && before.0 != built) {
+        entity.try_insert(Built(built));
     }
     match &report.error {
         Some(error) => {

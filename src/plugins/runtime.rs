@@ -141,8 +141,11 @@ impl RigRuntime {
     pub fn attach(&mut self, slot: usize, entity: Entity) {
         let Some(node) = self.state.program().nodes().get(slot) else { return };
         let is_read = node.is_posable() || self.mode == InstanceMode::Hierarchy;
+        let had_any = self.nodes[slot].is_some();
         let place = |list: &mut Vec<(u32, Entity)>, is_in: bool| {
-            list.retain(|(known, _)| *known as usize != slot);
+            if had_any {
+                list.retain(|(known, _)| *known as usize != slot);
+            }
             if is_in {
                 list.push((slot as u32, entity));
             }
@@ -154,11 +157,15 @@ impl RigRuntime {
             *shown = UNSEEN;
         }
         self.nodes[slot] = Some(entity);
-        let slots =
-            self.state.program().attributes().iter().enumerate().filter(|(_, attribute)| attribute.node == slot);
-        let slots: Vec<u32> = slots.map(|(number, _)| number as u32).collect();
+        // Attributes are in the order of their nodes.
+        let attributes = self.state.program().attributes();
+        let first = attributes.partition_point(|attribute| attribute.node < slot);
+        let slots = first..first + attributes[first..].partition_point(|attribute| attribute.node == slot);
         if !slots.is_empty() {
-            self.attributes.retain(|_, known| known != &slots);
+            let slots: Vec<u32> = slots.map(|number| number as u32).collect();
+            if had_any {
+                self.attributes.retain(|_, known| known != &slots);
+            }
             self.attributes.insert(entity, slots);
         }
         self.is_due = true;

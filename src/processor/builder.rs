@@ -20,7 +20,7 @@ use super::{
     off::{OffCommand, SkipReason},
     resolve::Asker,
     scope::Trace,
-    snapshot,
+    snapshot::{self, BuiltCache},
     world::{Aspect, NOWHERE, NodeId, Value, World, same},
 };
 use crate::rig::{BuiltRig, Rig, Uid};
@@ -50,6 +50,9 @@ struct Command {
     module: Arc<str>,
     params: Arc<str>,
     loaded: Option<Result<Arc<dyn DynModule>, BuildProblem>>,
+    /// The tag's own switch, and its feature: with the group of the joint they decide whether it is active.
+    enabled: bool,
+    feature: Option<Uid>,
     active: bool,
     trace: Trace,
     /// True if it looked for nodes when it ran last.
@@ -80,6 +83,8 @@ pub struct Builder {
     structure_changed: Option<u32>,
     /// Counts runs.
     run: u32,
+    /// Result of the last run as plain data, with what has changed since.
+    built: BuiltCache,
 }
 
 impl Builder {
@@ -99,6 +104,7 @@ impl Builder {
             graph_changed: None,
             structure_changed: None,
             run: 0,
+            built: BuiltCache::default(),
         }
     }
 
@@ -123,6 +129,7 @@ impl Builder {
     /// Somebody (`None`: the document) changed what a cell holds: whoever read it later has to be looked at.
     /// `circles` is true if that may have closed a circle of constraints.
     fn changed(&mut self, node: NodeId, aspect: Aspect, writer: Option<u32>, circles: bool) {
+        self.built.note(node, aspect);
         let from = writer.map(|writer| self.world.places[writer as usize]);
         let later = |world: &World, number: u32| {
             let place = world.places[number as usize];
@@ -430,6 +437,13 @@ impl Builder {
     /// The built rig as the commands before the cursor made it.
     pub fn built(&self) -> BuiltRig {
         snapshot::snapshot(&self.world, self.cursor() as u32)
+    }
+
+    /// The same as [`Builder::built`], shared: a rig in which nothing has changed since the last call is the same in
+    /// memory, and of others only the nodes and constraints that have changed are read again.
+    pub fn shared_built(&mut self) -> Arc<BuiltRig> {
+        let place = self.cursor() as u32;
+        self.built.refresh(&self.world, place)
     }
 }
 

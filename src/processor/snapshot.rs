@@ -1,9 +1,102 @@
 //! The built world as plain data, as of a place in the list.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
+
+use bevy::platform::collections::{HashMap, HashSet};
 
 use super::world::{Aspect, NodeId, Value, World};
-use crate::rig::{BuiltConstraint, BuiltNode, BuiltRig};
+use crate::{
+    mesh::model::Trs,
+    rig::{Attribute, BuiltConstraint, BuiltNode, BuiltRig, Uid},
+};
+
+/// The last snapshot, and what has changed in the world since.
+#[derive(Default)]
+pub(super) struct BuiltCache {
+    last: Option<Last>,
+    /// Nodes and constraints with changed values, if nothing else has changed.
+    changed: HashSet<NodeId>,
+}
+
+struct Last {
+    built: Arc<BuiltRig>,
+    place: u32,
+    nodes: HashMap<Uid, usize>,
+    /// Index of each constraint, with its number among those of its command.
+    constraints: HashMap<Uid, (usize, u32)>,
+}
+
+impl BuiltCache {
+    /// Most changed values for which reading them one by one is worth while.
+    const FEW: usize = 64;
+
+    /// Drops the snapshot: places of commands have changed.
+    pub fn forget(&mut self) {
+        self.last = None;
+        self.changed.clear();
+    }
+
+    /// Notes a changed value. Names depend on labels and on births, the order of nodes on parents.
+    pub fn note(&mut self, node: NodeId, aspect: Aspect) {
+        if aspect.is_structure() || aspect == Aspect::Switch {
+            self.forget();
+        } else if self.last.is_some() {
+            self.changed.insert(node);
+        }
+    }
+
+    /// The snapshot as of a place.
+    pub fn refresh(&mut self, world: &World, place: u32) -> Arc<BuiltRig> {
+        let changed = std::mem::take(&mut self.changed);
+        let is_known = |last: &&mut Last| last.place == place && changed.len() <= Self::FEW;
+        if let Some(last) = self.last.as_mut().filter(is_known)
+            && (changed.is_empty() || last.patch(world, &changed).is_some())
+        {
+            debug_assert!(*last.built == snapshot(world, place), "a patched snapshot differs from a fresh one");
+            return Arc::clone(&last.built);
+        }
+        let built = Arc::new(snapshot(world, place));
+        let number = |uid: Uid| match world.read_at(world.id(uid)?, Aspect::Constraint, place) {
+            Some(Value::Constraint(number, _)) => Some(*number),
+            _ => None,
+        };
+        let constraints = built.constraints.iter().enumerate();
+        let last = Last {
+            place,
+            nodes: built.nodes.iter().enumerate().map(|(at, node)| (node.uid, at)).collect(),
+            constraints: constraints
+                .filter_map(|(at, constraint)| Some((constraint.uid, (at, number(constraint.uid)?))))
+                .collect(),
+            built: Arc::clone(&built),
+        };
+        self.last = Some(last);
+        built
+    }
+}
+
+impl Last {
+    /// Reads changed values again; `None` if something was there before that is not now, or the other way round.
+    fn patch(&mut self, world: &World, changed: &HashSet<NodeId>) -> Option<()> {
+        let mut built = BuiltRig::clone(&self.built);
+        for id in changed {
+            let uid = world.uid(*id);
+            let node = self.nodes.get(&uid);
+            if let Some(at) = node {
+                let node = built.nodes.get_mut(*at)?;
+                read_values(world, *id, self.place, node);
+            }
+            match (world.read_at(*id, Aspect::Constraint, self.place), self.constraints.get(&uid)) {
+                (Some(Value::Constraint(number, constraint)), Some((at, before))) if number == before => {
+                    built.constraints.get_mut(*at)?.constraint = Arc::clone(constraint);
+                }
+                (None, None) => {}
+                _ => return None,
+            }
+        }
+        self.built = Arc::new(built);
+        Some(())
+    }
+}
 
 pub(super) fn snapshot(world: &World, place: u32) -> BuiltRig {
     let mut alive: Vec<((u32, u32), NodeId)> = Vec::with_capacity(world.slots.len());
@@ -58,29 +151,38 @@ pub(super) fn snapshot(world: &World, place: u32) -> BuiltRig {
 
 fn built(world: &World, node: NodeId, parent: Option<usize>, place: u32) -> Option<BuiltNode> {
     let birth = world.birth(node, place)?;
-    let control = match world.read_at(node, Aspect::Control, place) {
-        Some(Value::Control(control)) => Some(control.clone()),
-        _ => None,
-    };
-    let layer = match world.read_at(node, Aspect::Layer, place) {
-        Some(Value::Layer(layer)) => Some(layer.clone()),
-        _ => None,
-    };
-    let attributes = match world.read_at(node, Aspect::Attributes, place) {
-        Some(Value::Attributes(attributes)) => attributes.clone(),
-        _ => Arc::new([]),
-    };
-    Some(BuiltNode {
+    let mut built = BuiltNode {
         uid: world.uid(node),
         name: world.name(node, place).into(),
         kind: birth.kind,
         parent,
-        base: world.base(node, place),
+        base: Trs::IDENTITY,
         label: world.label(node, place).cloned(),
         group: world.group(node, place),
         origin: birth.origin.clone(),
-        control,
-        layer,
-        attributes,
-    })
+        control: None,
+        layer: None,
+        attributes: NO_ATTRIBUTES.clone(),
+    };
+    read_values(world, node, place, &mut built);
+    Some(built)
+}
+
+static NO_ATTRIBUTES: LazyLock<Arc<[Attribute]>> = LazyLock::new(|| Arc::new([]));
+
+/// Reads what neither the structure nor the names depend on.
+fn read_values(world: &World, node: NodeId, place: u32, built: &mut BuiltNode) {
+    built.base = world.base(node, place);
+    built.control = match world.read_at(node, Aspect::Control, place) {
+        Some(Value::Control(control)) => Some(control.clone()),
+        _ => None,
+    };
+    built.layer = match world.read_at(node, Aspect::Layer, place) {
+        Some(Value::Layer(layer)) => Some(layer.clone()),
+        _ => None,
+    };
+    built.attributes = match world.read_at(node, Aspect::Attributes, place) {
+        Some(Value::Attributes(attributes)) => attributes.clone(),
+        _ => NO_ATTRIBUTES.clone(),
+    };
 }

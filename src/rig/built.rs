@@ -56,7 +56,7 @@ pub enum Matching {
 }
 
 /// A node of a built rig.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct BuiltNode {
     /// Uid of the node: a joint's own, or one that follows from the command, the role and the subject.
     pub uid: Uid,
@@ -98,7 +98,7 @@ pub struct Origin {
 }
 
 /// A constraint with its identity.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct BuiltConstraint {
     /// Uid of the constraint.
     pub uid: Uid,
@@ -256,6 +256,39 @@ impl AttributeKind {
             }
             Self::Choice(names) => value.clamp(0.0, names.len().saturating_sub(1) as f32),
         }
+    }
+}
+
+/// Equality of shared data; data that is the same in memory needs no comparison.
+fn is_same<T: PartialEq + ?Sized>(a: &Arc<T>, b: &Arc<T>) -> bool {
+    Arc::ptr_eq(a, b) || a == b
+}
+
+fn is_same_option<T: PartialEq + ?Sized>(a: &Option<Arc<T>>, b: &Option<Arc<T>>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => is_same(a, b),
+        (None, None) => true,
+        _ => false,
+    }
+}
+
+impl PartialEq for BuiltNode {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { uid, name, kind, parent, base, label, group, origin, control, layer, attributes } = self;
+        (uid, kind, parent, base, group) == (&other.uid, &other.kind, &other.parent, &other.base, &other.group)
+            && is_same(name, &other.name)
+            && is_same_option(label, &other.label)
+            && is_same_option(origin, &other.origin)
+            && is_same_option(control, &other.control)
+            && is_same_option(layer, &other.layer)
+            && is_same(attributes, &other.attributes)
+    }
+}
+
+impl PartialEq for BuiltConstraint {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { uid, command, constraint } = self;
+        (uid, command) == (&other.uid, &other.command) && is_same(constraint, &other.constraint)
     }
 }
 

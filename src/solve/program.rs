@@ -184,12 +184,30 @@ struct Lists {
 }
 
 impl Lists {
-    fn new(lists: impl IntoIterator<Item = Vec<u32>>) -> Self {
-        let mut made = Self { starts: vec![0], items: Vec::new() };
-        for mut list in lists {
-            list.sort_unstable();
-            list.dedup();
-            made.items.extend(list);
+    /// Lists of the second numbers of all pairs with the same first number, below `count`: sorted, each number once.
+    fn new(count: usize, pairs: &[(u32, u32)]) -> Self {
+        let mut ends = vec![0_u32; count + 1];
+        let is_listed = |(list, _): &&(u32, u32)| (*list as usize) < count;
+        pairs.iter().filter(is_listed).for_each(|(list, _)| ends[*list as usize + 1] += 1);
+        (0..count).for_each(|list| ends[list + 1] += ends[list]);
+        let mut sorted = vec![0; ends[count] as usize];
+        let mut next = ends.clone();
+        for (list, item) in pairs.iter().filter(is_listed) {
+            let place = &mut next[*list as usize];
+            sorted[*place as usize] = *item;
+            *place += 1;
+        }
+        let mut made = Self { starts: Vec::with_capacity(count + 1), items: Vec::with_capacity(sorted.len()) };
+        made.starts.push(0);
+        for list in 0..count {
+            let items = &mut sorted[ends[list] as usize..ends[list + 1] as usize];
+            items.sort_unstable();
+            let start = made.items.len();
+            for item in items {
+                if made.items[start..].last() != Some(item) {
+                    made.items.push(*item);
+                }
+            }
             made.starts.push(made.items.len() as u32);
         }
         made
@@ -214,14 +232,19 @@ impl RigProgram {
     ///
     /// See [`ProgramError`]: references to missing nodes, joints that form no chain, cycles.
     pub fn compile(rig: &BuiltRig, options: &CompileOptions) -> Result<Self, ProgramError> {
-        let hash = ContentHash::of(rig, options);
+        Self::compile_hashed(rig, options, ContentHash::of(rig, options))
+    }
+
+    /// Compiles a built rig whose hash is known.
+    fn compile_hashed(rig: &BuiltRig, options: &CompileOptions, hash: ContentHash) -> Result<Self, ProgramError> {
         let mut graph = Graph::new(rig, &options.keep, &options.inputs)?;
         lower::lower(&mut graph)?;
         let driven = graph.finish();
         order::sort(&mut graph)?;
         skip_empty(&mut graph);
         let kept: Vec<usize> = (0..rig.nodes.len()).filter(|node| graph.is_kept(*node)).collect();
-        let slots: BTreeMap<usize, usize> = kept.iter().enumerate().map(|(slot, node)| (*node, slot)).collect();
+        let mut slots = vec![None; rig.nodes.len()];
+        kept.iter().enumerate().for_each(|(slot, node)| slots[*node] = Some(slot));
 
         let mut attributes = Vec::new();
         let mut attribute_registers = Vec::new();
@@ -261,7 +284,7 @@ impl RigProgram {
                 uid: rig.nodes[*node].uid,
                 label: rig.nodes[*node].label.clone(),
                 kind: rig.nodes[*node].kind,
-                parent: rig.nodes[*node].parent.and_then(|parent| slots.get(&parent)).copied(),
+                parent: rig.nodes[*node].parent.and_then(|parent| slots[parent]),
                 base: rig.nodes[*node].base,
                 is_driven: driven[*node] != Driven::Not,
                 pose: numbering.pose(graph.pose(*node)),
@@ -292,7 +315,7 @@ impl RigProgram {
             spring_ops: Vec::new(),
         };
         program.number(&mut numbering);
-        program.connect();
+        program.connect(numbering.transforms.len(), numbering.numbers.len());
         (program.x, program.n, program.poses) = (numbering.transforms, numbering.numbers, numbering.pose.len());
         Ok(program)
     }
@@ -308,12 +331,11 @@ impl RigProgram {
         }
     }
 
-    /// Collects the operations that read each pose, attribute, input and register.
-    fn connect(&mut self) {
-        let mut x_readers: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        let mut n_readers: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        let mut pose_readers: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        let mut writes = vec![(Vec::new(), Vec::new()); self.ops.len()];
+    /// Collects the operations that read each pose, attribute, input and register. `transforms` and `numbers` are the
+    /// counts of the registers.
+    fn connect(&mut self, transforms: usize, numbers: usize) {
+        let (mut poses, mut reads, mut writes) = (Vec::new(), Vec::new(), Vec::new());
+        let number = |N(register): &N| transforms as u32 + register;
         for (at, op) in self.ops.iter_mut().enumerate() {
             if let Op::Spring(state) = op {
                 let state = *state as usize;
@@ -322,24 +344,28 @@ impl RigProgram {
                 }
                 self.spring_ops[state] = at as u32;
             }
+            let at = at as u32;
             op.visit(&mut self.tables, |operand| match operand {
-                Operand::ReadX(x) => x_readers.entry(x.0).or_default().push(at as u32),
-                Operand::ReadN(n) => n_readers.entry(n.0).or_default().push(at as u32),
-                Operand::Pose(pose) => pose_readers.entry(pose.0).or_default().push(at as u32),
-                Operand::WriteX(x) => writes[at].0.push(x.0),
-                Operand::WriteN(n) => writes[at].1.push(n.0),
+                Operand::ReadX(X(register)) => reads.push((*register, at)),
+                Operand::ReadN(register) => reads.push((number(register), at)),
+                Operand::Pose(Pose(pose)) => poses.push((*pose, at)),
+                Operand::WriteX(X(register)) => writes.push((at, *register)),
+                Operand::WriteN(register) => writes.push((at, number(register))),
             });
         }
-        let of = |readers: &BTreeMap<u32, Vec<u32>>, at: usize| readers.get(&(at as u32)).cloned().unwrap_or_default();
-        let poses = self.nodes.iter().filter(|node| node.is_posable()).count();
-        self.pose_readers = Lists::new((0..poses).map(|pose| of(&pose_readers, pose)));
-        self.attribute_readers = Lists::new((0..self.attributes.len()).map(|number| of(&n_readers, number)));
+        let readers = Lists::new(transforms + numbers, &reads);
+        let pairs =
+            |list: usize, register: usize| readers.get(register).iter().map(move |reader| (list as u32, *reader));
+        let attributes = (0..self.attributes.len()).flat_map(|slot| pairs(slot, transforms + slot));
         let first = self.nodes.len() + 1;
-        self.input_readers = Lists::new((0..self.inputs.len()).map(|input| of(&x_readers, first + input)));
-        self.op_readers = Lists::new(writes.iter().map(|(x, n)| {
-            let x = x.iter().filter_map(|x| x_readers.get(x));
-            x.chain(n.iter().filter_map(|n| n_readers.get(n))).flatten().copied().collect()
-        }));
+        let inputs = (0..self.inputs.len()).flat_map(|input| pairs(input, first + input));
+        let ops = writes.iter().flat_map(|(at, register)| pairs(*at as usize, *register as usize));
+        let (attributes, inputs, ops): (Vec<_>, Vec<_>, Vec<_>) =
+            (attributes.collect(), inputs.collect(), ops.collect());
+        self.attribute_readers = Lists::new(self.attributes.len(), &attributes);
+        self.input_readers = Lists::new(self.inputs.len(), &inputs);
+        self.op_readers = Lists::new(self.ops.len(), &ops);
+        self.pose_readers = Lists::new(self.nodes.iter().filter(|node| node.is_posable()).count(), &poses);
     }
 
     /// The hash of the rig and options that the program was compiled from: equal for equal content, on every machine.

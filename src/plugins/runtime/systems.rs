@@ -255,6 +255,10 @@ pub(super) fn correct_globals(
         let world = world.affine();
         for (slot, entity) in &runtime.written {
             let Ok(mut node) = nodes.get_mut(*entity) else { continue };
+            // What neither Bevy nor the program has moved was correct before.
+            if !node.is_changed() && !runtime.state.is_moved(*slot as usize) {
+                continue;
+            }
             let wanted = world * runtime.state.global_at(*slot as usize).affine();
             let now = node.affine();
             let size = wanted.translation.abs().max_element().max(1e-3);

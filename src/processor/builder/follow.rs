@@ -44,8 +44,9 @@ impl Builder {
                 let Some(number) = self.world.creator_of(tag.uid) else { return false };
                 let TagKind::Command { feature, .. } = &tag.kind else { return false };
                 let command = &mut self.commands[number as usize];
-                // Without a feature, its own switch and that of its group decide; the latter has not changed.
-                if feature.is_some() || tag.enabled != command.active || **module != *command.module {
+                // The switches of its feature and of its joint's group have not changed.
+                let is_switched_alike = tag.enabled == command.enabled && *feature == command.feature;
+                if !is_switched_alike || **module != *command.module {
                     return false;
                 }
                 if *params != *command.params {
@@ -161,7 +162,7 @@ impl Builder {
         for uid in joints_in(rig, &self.range) {
             let Some(joint) = rig.joint(uid) else { continue };
             for tag in &joint.data.tags {
-                let TagKind::Command { module, params, .. } = &tag.kind else { continue };
+                let TagKind::Command { module, params, feature } = &tag.kind else { continue };
                 let number = self.world.command(tag.uid);
                 let off = switches.command(&joint.data, tag);
                 let active = off.is_none();
@@ -179,6 +180,8 @@ impl Builder {
                         module: module.as_str().into(),
                         params: params.as_str().into(),
                         loaded: None,
+                        enabled: tag.enabled,
+                        feature: *feature,
                         active,
                         trace: Trace::default(),
                         asks: false,
@@ -191,6 +194,7 @@ impl Builder {
                     self.mark(number, Due::Run);
                 } else {
                     let command = &mut self.commands[number as usize];
+                    (command.enabled, command.feature) = (tag.enabled, *feature);
                     let reads_anew = *command.module != **module || *command.params != **params;
                     if reads_anew {
                         command.module = module.as_str().into();
@@ -209,6 +213,7 @@ impl Builder {
             return;
         }
         // With other places, everything may read something else, and everything has to be looked at.
+        self.built.forget();
         let had_any = !self.list.is_empty();
         let reached = self.list.get(self.cursor as usize).copied();
         for number in std::mem::replace(&mut self.list, list) {

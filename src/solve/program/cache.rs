@@ -5,13 +5,14 @@ use std::{
     sync::{Arc, Weak},
 };
 
-use super::{CompileOptions, ContentHash, ProgramError, RigProgram};
+use super::{CompileOptions, ContentHash, ProgramError, RigProgram, hash::ConstraintHashes};
 use crate::rig::BuiltRig;
 
 /// Programs that are in use, by the hash of their content.
 #[derive(Debug, Default)]
 pub struct ProgramCache {
     programs: BTreeMap<ContentHash, Weak<RigProgram>>,
+    hashes: ConstraintHashes,
 }
 
 impl ProgramCache {
@@ -22,12 +23,12 @@ impl ProgramCache {
     ///
     /// See [`RigProgram::compile`].
     pub fn get(&mut self, rig: &BuiltRig, options: &CompileOptions) -> Result<Arc<RigProgram>, ProgramError> {
-        let hash = ContentHash::of(rig, options);
+        let hash = self.hashes.of(rig, options);
         if let Some(program) = self.programs.get(&hash).and_then(Weak::upgrade) {
             return Ok(program);
         }
         self.programs.retain(|_, program| program.strong_count() > 0);
-        let program = Arc::new(RigProgram::compile(rig, options)?);
+        let program = Arc::new(RigProgram::compile_hashed(rig, options, hash)?);
         self.programs.insert(hash, Arc::downgrade(&program));
         Ok(program)
     }

@@ -3,8 +3,12 @@
 
 mod finish;
 
-use std::{collections::HashMap, sync::Arc};
+use std::{
+    mem::{Discriminant, discriminant},
+    sync::Arc,
+};
 
+use bevy::platform::collections::HashMap;
 use glam::Vec3;
 
 use super::{
@@ -80,7 +84,7 @@ pub(super) struct Graph<'a> {
     exposed: Vec<bool>,
     all: bool,
     numbers: HashMap<u32, N>,
-    scalars: HashMap<String, N>,
+    scalars: HashMap<ScalarKey, N>,
     /// Last values that constraints gave a driven attribute.
     driven: HashMap<(usize, usize), N>,
     morph_terms: Vec<(Arc<str>, Vec<N>)>,
@@ -91,7 +95,7 @@ pub(super) struct Graph<'a> {
 impl<'a> Graph<'a> {
     /// A graph with a register for every node's rig transform: node `i` has register `i + 1`.
     pub fn new(rig: &'a BuiltRig, keep: &Keep, outside: &[ExternalNode]) -> Result<Self, ProgramError> {
-        let mut index = HashMap::with_capacity(rig.nodes.len());
+        let mut index = HashMap::with_capacity_and_hasher(rig.nodes.len(), Default::default());
         let mut built: Vec<Trs> = Vec::with_capacity(rig.nodes.len());
         for (at, node) in rig.nodes.iter().enumerate() {
             if let Some(first) = index.insert(node.uid, at) {
@@ -122,13 +126,13 @@ impl<'a> Graph<'a> {
             morphs: Vec::new(),
             nodes: vec![NodeState::default(); rig.nodes.len()],
             index,
-            last_on: HashMap::new(),
-            outside: HashMap::new(),
+            last_on: HashMap::default(),
+            outside: HashMap::default(),
             exposed,
             all: matches!(keep, Keep::All),
-            numbers: HashMap::new(),
-            scalars: HashMap::new(),
-            driven: HashMap::new(),
+            numbers: HashMap::default(),
+            scalars: HashMap::default(),
+            driven: HashMap::default(),
             morph_terms: Vec::new(),
             aliases: Vec::new(),
         };
@@ -403,7 +407,7 @@ impl<'a> Graph<'a> {
             Scalar::Attribute { node, .. } | Scalar::Choice { node, .. } | Scalar::Channel { node, .. } => *node,
         };
         let at = self.driven(constraint, "attribute's node", node)?;
-        let key = format!("{scalar:?}");
+        let key = scalar_key(at, scalar);
         if let Some(register) = self.scalars.get(&key) {
             return Ok(*register);
         }
@@ -443,6 +447,19 @@ impl<'a> Graph<'a> {
     pub fn attribute(&self, node: usize, number: usize) -> N {
         self.nodes[node].attributes[number]
     }
+}
+
+/// A scalar bit by bit: kind, node, attribute or channel, and numbers.
+type ScalarKey = (Discriminant<Scalar>, usize, Option<Arc<str>>, Option<Channel>, [u32; 2]);
+
+fn scalar_key(node: usize, scalar: &Scalar) -> ScalarKey {
+    let (name, channel, numbers) = match scalar {
+        Scalar::Value(value) => (None, None, [value.to_bits(), 0]),
+        Scalar::Attribute { name, factor, add, .. } => (Some(name), None, [factor.to_bits(), add.to_bits()]),
+        Scalar::Choice { name, value, .. } => (Some(name), None, [value.to_bits(), 0]),
+        Scalar::Channel { channel, .. } => (None, Some(*channel), [0; 2]),
+    };
+    (discriminant(scalar), node, name.cloned(), channel, numbers)
 }
 
 pub(super) fn valid(trs: &Trs) -> bool {

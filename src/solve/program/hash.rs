@@ -1,11 +1,16 @@
 //! Hash of the content that a program is compiled from, the same on every machine.
 
-use std::fmt::{self, Write};
+use std::{
+    fmt::{self, Write},
+    sync::{Arc, Weak},
+};
+
+use bevy::platform::collections::HashMap;
 
 use super::{CompileOptions, Keep};
 use crate::{
     mesh::model::Trs,
-    rig::{AttributeKind, BuiltRig, Channels, Limits},
+    rig::{AttributeKind, BuiltRig, Channels, Constraint, Limits},
 };
 
 /// 128 bits that stand for the content of a built rig and the options of its program: equal for equal content. Not
@@ -25,7 +30,11 @@ impl ContentHash {
     /// Data that the program does not depend on (shapes and colours of controls, layers, groups, origins, names) does
     /// not count.
     pub fn of(rig: &BuiltRig, options: &CompileOptions) -> Self {
-        let mut hasher = Hasher { low: 0x9E37_79B9_7F4A_7C15, high: 0xD1B5_4A32_D192_ED03 };
+        Self::with(rig, options, |constraint| of_constraint(constraint))
+    }
+
+    fn with(rig: &BuiltRig, options: &CompileOptions, mut of: impl FnMut(&Arc<Constraint>) -> u128) -> Self {
+        let mut hasher = Hasher::default();
         hasher.word(rig.nodes.len() as u64);
         for node in &rig.nodes {
             hasher.word(node.uid.0);
@@ -59,8 +68,9 @@ impl ContentHash {
         hasher.word(rig.constraints.len() as u64);
         for constraint in &rig.constraints {
             hasher.word(constraint.uid.0);
-            // The text of a constraint holds all of its fields, also fields added later, and is exact.
-            hasher.debug(&constraint.constraint);
+            let hash = of(&constraint.constraint);
+            hasher.word(hash as u64);
+            hasher.word((hash >> 64) as u64);
         }
         match &options.keep {
             Keep::All => hasher.word(0),
@@ -78,10 +88,47 @@ impl ContentHash {
     }
 }
 
+fn of_constraint(constraint: &Constraint) -> u128 {
+    let mut hasher = Hasher::default();
+    // The text of a constraint holds all of its fields, also fields added later, and is exact.
+    hasher.debug(constraint);
+    hasher.finish().0
+}
+
+/// Hashes of constraints that are in use, so that a change of one constraint does not hash the others again.
+#[derive(Debug, Default)]
+pub(super) struct ConstraintHashes {
+    /// By address. The weak reference keeps the address from being given to another constraint.
+    known: HashMap<usize, (Weak<Constraint>, u128)>,
+    /// Number of entries after the last removal of those out of use.
+    kept: usize,
+}
+
+impl ConstraintHashes {
+    /// Equal to [`ContentHash::of`].
+    pub fn of(&mut self, rig: &BuiltRig, options: &CompileOptions) -> ContentHash {
+        let hash = ContentHash::with(rig, options, |constraint| {
+            let entry = self.known.entry(Arc::as_ptr(constraint).addr());
+            entry.or_insert_with(|| (Arc::downgrade(constraint), of_constraint(constraint))).1
+        });
+        if self.known.len() > 2 * self.kept + 64 {
+            self.known.retain(|_, (constraint, _)| constraint.strong_count() > 0);
+            self.kept = self.known.len();
+        }
+        hash
+    }
+}
+
 /// Two lanes of multiply and fold.
 struct Hasher {
     low: u64,
     high: u64,
+}
+
+impl Default for Hasher {
+    fn default() -> Self {
+        Self { low: 0x9E37_79B9_7F4A_7C15, high: 0xD1B5_4A32_D192_ED03 }
+    }
 }
 
 impl Hasher {

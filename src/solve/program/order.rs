@@ -3,7 +3,7 @@
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::{
-    ProgramError,
+    Lists, ProgramError,
     error::describe,
     graph::{Graph, Step},
     name,
@@ -16,7 +16,9 @@ const NONE: u32 = u32::MAX;
 
 /// Registers that each operation reads and writes, transforms first, then numbers.
 struct Wires {
-    reads: Vec<Vec<usize>>,
+    /// Registers that all operations read, and where each operation's begin.
+    reads: Vec<u32>,
+    starts: Vec<u32>,
     /// The operation that writes each register.
     writer: Vec<u32>,
     is_posed: Vec<bool>,
@@ -24,26 +26,33 @@ struct Wires {
 
 impl Wires {
     fn of(steps: &mut [Step], tables: &mut Tables, transforms: usize, numbers: usize) -> Self {
-        let mut reads = Vec::with_capacity(steps.len());
+        let mut reads = Vec::with_capacity(4 * steps.len());
+        let mut starts = Vec::with_capacity(steps.len() + 1);
         let mut writer = vec![NONE; transforms + numbers];
         let mut is_posed = vec![false; steps.len()];
         for (at, step) in steps.iter_mut().enumerate() {
-            let mut read = Vec::new();
+            starts.push(reads.len() as u32);
             step.op.visit(tables, |operand| match operand {
-                Operand::ReadX(X(register)) => read.push(*register as usize),
-                Operand::ReadN(N(register)) => read.push(transforms + *register as usize),
+                Operand::ReadX(X(register)) => reads.push(*register),
+                Operand::ReadN(N(register)) => reads.push(transforms as u32 + *register),
                 Operand::WriteX(X(register)) => writer[*register as usize] = at as u32,
                 Operand::WriteN(N(register)) => writer[transforms + *register as usize] = at as u32,
                 Operand::Pose(pose) => is_posed[at] |= *pose != super::op::Pose::NONE,
             });
-            reads.push(read);
         }
-        Self { reads, writer, is_posed }
+        starts.push(reads.len() as u32);
+        Self { reads, starts, writer, is_posed }
+    }
+
+    /// Registers that an operation reads.
+    fn reads(&self, step: usize) -> impl Iterator<Item = usize> {
+        let range = self.starts[step] as usize..self.starts[step + 1] as usize;
+        self.reads[range].iter().map(|register| *register as usize)
     }
 
     /// Operations that must run before another.
     fn before(&self, step: usize) -> impl Iterator<Item = usize> {
-        self.reads[step].iter().map(|register| self.writer[*register]).filter(|at| *at != NONE).map(|at| at as usize)
+        self.reads(step).map(|register| self.writer[register]).filter(|at| *at != NONE).map(|at| at as usize)
     }
 }
 
@@ -52,20 +61,16 @@ pub(super) fn sort(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
     let (transforms, numbers) = (graph.x.len(), graph.n.len());
     let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, numbers);
     let count = graph.steps.len();
+    let pairs = (0..count).flat_map(|at| wires.before(at).map(move |before| (before as u32, at as u32)));
+    let after = Lists::new(count, &pairs.collect::<Vec<_>>());
     let mut waits = vec![0; count];
-    let mut after: Vec<Vec<u32>> = vec![Vec::new(); count];
-    for (at, waits) in waits.iter_mut().enumerate() {
-        for before in wires.before(at) {
-            *waits += 1;
-            after[before].push(at as u32);
-        }
-    }
+    after.items.iter().for_each(|at| waits[*at as usize] += 1);
     let key = |at: usize| Reverse((graph.steps[at].node, at));
     let mut ready: BinaryHeap<Reverse<(usize, usize)>> = (0..count).filter(|at| waits[*at] == 0).map(key).collect();
     let mut order = Vec::with_capacity(count);
     while let Some(Reverse((_, at))) = ready.pop() {
         order.push(graph.steps[at]);
-        for next in &after[at] {
+        for next in after.get(at) {
             let next = *next as usize;
             waits[next] -= 1;
             if waits[next] == 0 {
@@ -140,15 +145,14 @@ pub(super) fn prune(graph: &mut Graph<'_>, results: &[X], numbers: &[N]) {
     let mut needed = vec![false; transforms + graph.n.len()];
     results.iter().for_each(|X(register)| needed[*register as usize] = true);
     numbers.iter().for_each(|N(register)| needed[transforms + *register as usize] = true);
-    let mut writes = vec![Vec::new(); graph.steps.len()];
-    for (register, at) in wires.writer.iter().enumerate().filter(|(_, at)| **at != NONE) {
-        writes[*at as usize].push(register);
-    }
+    // Registers without a writer belong to a list that does not exist.
+    let written: Vec<_> = wires.writer.iter().enumerate().map(|(register, at)| (*at, register as u32)).collect();
+    let writes = Lists::new(graph.steps.len(), &written);
     let mut live = vec![false; graph.steps.len()];
     for at in (0..graph.steps.len()).rev() {
-        live[at] = writes[at].iter().any(|register| needed[*register]);
+        live[at] = writes.get(at).iter().any(|register| needed[*register as usize]);
         if live[at] {
-            wires.reads[at].iter().for_each(|register| needed[*register] = true);
+            wires.reads(at).for_each(|register| needed[register] = true);
         }
     }
     let mut at = 0;
@@ -170,7 +174,7 @@ pub(super) fn split_fixed(graph: &mut Graph<'_>, numbers: &[N]) -> Vec<Step> {
         // A spring changes with time alone.
         *change = wires.is_posed[at]
             || matches!(graph.steps[at].op, super::op::Op::Spring(_))
-            || wires.reads[at].iter().any(|register| moves[*register]);
+            || wires.reads(at).any(|register| moves[register]);
         if *change {
             let tables = &mut graph.tables;
             graph.steps[at].op.visit(tables, |operand| match operand {

@@ -1,6 +1,6 @@
 //! Completion of a graph: the operations that make the final values of nodes, attributes and morph targets.
 
-use std::collections::HashMap;
+use bevy::platform::collections::HashMap;
 
 use super::{Driven, Graph, NodeState};
 use crate::{
@@ -28,7 +28,7 @@ impl Graph<'_> {
             };
             self.push(op, node, None);
         }
-        let mut moved: HashMap<X, X> = HashMap::new();
+        let mut moved: HashMap<X, X> = HashMap::default();
         for (node, register) in std::mem::take(&mut self.aliases) {
             let state = &self.nodes[node];
             match state.placed {
