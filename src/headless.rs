@@ -20,7 +20,8 @@ use crate::{
         commands::Built,
         document::{ChangeError, EditRefused, EditRequest},
         face::{
-            ExpressError, ExpressRequest, Expressed, Face, FaceJob, FacePlaced, FaceReport, FaceRequest, PlaceFaceError,
+            ExpressError, ExpressRequest, Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport,
+            FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
         },
         gesture::{Gesture, GestureAnswer, GestureScript},
         skinning::{BindRequest, Bound, SkinningError, SkinningJob},
@@ -28,7 +29,7 @@ use crate::{
         task_pools,
     },
     rig::{
-        BuiltRig, Rig, RigEdit, SkinData, Uid, UidSource,
+        BuiltRig, PoseOffset, Rig, RigEdit, SkinData, StoredPose, Uid, UidSource,
         character::{Character, character, import_skeleton},
         operations::Operation,
     },
@@ -204,6 +205,32 @@ impl Workbench {
     /// Analysis of the mesh's face, if there is one.
     pub fn placed_face(&self) -> Option<&Face> {
         self.app.world().get::<Face>(self.mesh?)
+    }
+
+    /// Blend shapes of ARKit, baked from the placed face with the strongest `influences` of each point.
+    ///
+    /// # Errors
+    /// No face was placed; see [`arkit_shapes`].
+    pub fn arkit_shapes(&self, influences: usize) -> Result<Vec<FaceShape>, WorkbenchError> {
+        let mesh = self.mesh().ok_or(WorkbenchError::NoMesh)?;
+        let face = self.placed_face().ok_or(ExpressError::NoBones)?;
+        let set = &self.app.world().resource::<FaceExpressions>().0;
+        Ok(arkit_shapes(self.rig(), mesh, &face.analysis, set, influences)?)
+    }
+
+    /// Stores poses by name, as one step; poses of the same names are replaced.
+    pub fn store_poses(&mut self, poses: Vec<(String, BTreeMap<Uid, PoseOffset>)>) -> Result<(), WorkbenchError> {
+        let mut edits = Vec::with_capacity(poses.len());
+        for (name, offsets) in poses {
+            let known = self.rig().stored_poses().iter().find(|pose| pose.name == name).map(|pose| pose.uid);
+            let uid = known.unwrap_or_else(|| self.app.world_mut().resource_mut::<UidSource>().next_uid());
+            let pose = Box::new(StoredPose { uid, name, offsets, ..StoredPose::default() });
+            edits.push(match known {
+                Some(_) => RigEdit::SetStoredPose(pose),
+                None => RigEdit::AddStoredPose(pose, usize::MAX),
+            });
+        }
+        self.operate(Operation::Named { name: "Store poses", edits })
     }
 
     fn refused(&mut self) -> Option<WorkbenchError> {

@@ -18,12 +18,13 @@ use crate::{
     algo::face::{
         auto::{AutoSettings, FaceStep},
         bones::FaceBoneKind,
-        expression::ExpressionSet,
+        expression::{ExpressionSet, MAX_STRENGTH},
     },
     files::{FileKind, RealDisk, load_model, load_shapes, stem, store_model, store_rig},
     headless::Workbench,
-    plugins::face::{FaceReport, mixed},
-    rig::Rig,
+    mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Model, Morph},
+    plugins::face::{FaceReport, FaceShape, mixed},
+    rig::{Rig, StoredPose},
 };
 
 /// Arguments of `rigsmith face`.
@@ -52,13 +53,18 @@ pub(super) struct FaceArgs {
     /// Take the whole mesh for a head, even if it looks like a body
     #[arg(long)]
     whole: bool,
-    /// An expression, or one of the units that they are made of, with a strength from 0 to 1; may be repeated
+    /// An expression, or one of the units that they are made of, by its own name or that of ARKit, with a strength from
+    /// 0 to 1.5; may be repeated
     #[arg(long, value_name = "NAME=STRENGTH", value_parser = strength)]
     expression: Vec<(String, f32)>,
     /// Move the bones to fit shapes: a .glb with morph targets, a folder of .obj files, or a .json beside its .f32. Each
     /// shape is kept as a stored pose
     #[arg(long, value_name = "SHAPES")]
     fit: Option<PathBuf>,
+    /// Add the 51 blend shapes of ARKit that a face without a tongue has, baked from the bones: as morph targets and
+    /// clips of one frame in .glb or .gltf, as stored poses in .rig.ron
+    #[arg(long)]
+    arkit: bool,
     /// Output file: .glb or .gltf for the character, .rig.ron for the rig, .png for a picture
     #[arg(short, long)]
     output: Output,
@@ -84,7 +90,7 @@ fn axis(text: &str) -> Result<Vec3, ArgumentError> {
 fn strength(text: &str) -> Result<(String, f32), ArgumentError> {
     let (name, strength) = text.split_once('=').ok_or(ArgumentError::NoStrength)?;
     match strength.trim().parse::<f32>() {
-        Ok(number) if (0.0..=1.0).contains(&number) => Ok((name.trim().to_owned(), number)),
+        Ok(number) if (0.0..=MAX_STRENGTH).contains(&number) => Ok((name.trim().to_owned(), number)),
         Ok(number) if number.is_finite() => Err(ArgumentError::Strength(number)),
         _ => Err(ArgumentError::NoStrength),
     }
@@ -133,11 +139,20 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     if !args.expression.is_empty() {
         express(args, &mut bench, &mut report)?;
     }
+    let mut shapes = Vec::new();
+    if args.arkit {
+        shapes = spinning("baking blend shapes", || bench.arkit_shapes(args.export.settings().max_influences))?;
+        bench.store_poses(shapes.iter().map(|shape| (shape.name.clone(), shape.pose.clone())).collect())?;
+        report.line(format!("{} blend shapes of ARKit", shapes.len()));
+        report.set("arkit", shapes.iter().map(|shape| shape.name.as_str()).collect::<Vec<_>>());
+    }
     report.set("joints", bench.rig().len());
     match output_kind {
         OutputKind::Rig => report.notes(store_rig(&RealDisk, &args.output, bench.rig())?),
         OutputKind::Character => {
             let mut model = bench.character();
+            add_morphs(&mut model, &shapes);
+            model.clips.extend(clips(bench.rig()));
             pose(&mut model.nodes, bench.rig());
             let settings = args.export.settings();
             report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
@@ -170,6 +185,50 @@ fn express(args: &FaceArgs, bench: &mut Workbench, report: &mut Report) -> Resul
     bench.express(strengths.clone())?;
     report.set("expressions", json!(strengths));
     Ok(())
+}
+
+/// Adds shapes as morph targets to the objects that they move. Targets that an object has already stay as they are.
+fn add_morphs(model: &mut Model, shapes: &[FaceShape]) {
+    for object in 0..model.objects.len() {
+        let offset = |shape: &FaceShape, point: u32| shape.offsets.get(point as usize).copied().unwrap_or_default();
+        let mut parts: Vec<_> = model.parts.iter_mut().filter(|part| part.object == object).collect();
+        let moves = |shape: &FaceShape| {
+            parts.iter().flat_map(|part| &part.vertices).any(|point| offset(shape, *point) != Vec3::ZERO)
+        };
+        if !shapes.iter().any(moves) {
+            continue;
+        }
+        let object = &mut model.objects[object];
+        for shape in shapes.iter().filter(|shape| !object.morph_names.contains(&shape.name)).collect::<Vec<_>>() {
+            for part in &mut parts {
+                let positions = part.vertices.iter().map(|point| offset(shape, *point)).collect();
+                part.morphs.push(Morph { positions, ..Morph::default() });
+            }
+            object.morph_names.push(shape.name.clone());
+            if !object.morph_weights.is_empty() {
+                object.morph_weights.push(0.0);
+            }
+        }
+    }
+}
+
+/// A clip of one frame for each stored pose.
+fn clips(rig: &Rig) -> Vec<Clip> {
+    let joints: Vec<_> = rig.walk().map(|joint| &joint.data).collect();
+    let clip = |stored: &StoredPose| {
+        let mut channels = Vec::new();
+        for (node, joint) in joints.iter().enumerate() {
+            let Some(offset) = stored.offsets.get(&joint.uid) else { continue };
+            let posed = offset.on(&joint.rest);
+            let mut add = |target: ChannelTarget, values: Vec<f32>| {
+                channels.push(Channel { target, interpolation: Interpolation::Linear, times: vec![0.0], values });
+            };
+            add(ChannelTarget::Translation(node), posed.translation.to_array().to_vec());
+            add(ChannelTarget::Rotation(node), posed.rotation.to_array().to_vec());
+        }
+        Clip { name: stored.name.clone(), channels, extras: None }
+    };
+    rig.stored_poses().iter().map(clip).collect()
 }
 
 /// Sets the exported joints to their posed transforms; bind poses stay.
@@ -241,7 +300,7 @@ fn describe(report: &mut Report, placed: &FaceReport) {
             placed.confidence
         ));
     }
-    if placed.folds > 0 {
+    if placed.folds > placed.tolerated_folds {
         report.notes.push(format!(
             "{} triangles fold over in the six expressions at full strength; try another --seed or density",
             placed.folds

@@ -316,13 +316,22 @@ impl Workbench {
             found = with;
         }
         if found.len() > 1 {
+            // The goal of a foot is a node of its own, which the control carries.
+            let carrier = |goal: Uid| {
+                let mut at = built.nodes.iter().position(|node| node.uid == goal);
+                while let Some(node) = at.map(|at| &built.nodes[at]).filter(|node| node.kind != NodeType::Control) {
+                    at = node.parent;
+                }
+                at.map(|at| built.nodes[at].uid)
+            };
             let in_effect = |node: &Uid| {
                 let mut of = built.switches.iter().filter_map(|switch| match &switch.matching {
-                    Matching::IkFk { fk, goal, .. } if goal == node || fk.contains(node) => {
+                    Matching::IkFk { fk, goal, .. } => {
+                        let is_goal = carrier(*goal) == Some(*node);
                         let on = state.attribute(switch.control, &switch.attribute).unwrap_or_default() >= 0.5;
-                        Some(on == (goal == node))
+                        (is_goal || fk.contains(node)).then_some(on == is_goal)
                     }
-                    _ => None,
+                    Matching::Space { .. } => None,
                 });
                 of.next_back()
             };

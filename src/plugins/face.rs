@@ -3,6 +3,7 @@
 //! A [`FaceRequest`] analyses a mesh in a task and ends as one edit: joints, weights, a group and tags, so that it can
 //! be undone. Manual changes stay when another density is requested. An [`ExpressRequest`] poses the facial joints.
 
+mod arkit;
 mod edits;
 mod error;
 mod job;
@@ -23,6 +24,7 @@ use crate::{
     mesh::{model::Model, shapes::Shapes},
 };
 
+pub use arkit::{FaceShape, arkit_shapes};
 pub use error::{ExpressError, PlaceFaceError};
 pub use job::FaceJob;
 pub use placed_bones::{FaceRig, PlacedBone};
@@ -107,6 +109,8 @@ pub struct FaceReport {
     pub rounds: usize,
     /// Number of triangles that the six expressions fold over.
     pub folds: usize,
+    /// Number of folded triangles that nobody notices; see [`FaceAnalysis::tolerated_folds`].
+    pub tolerated_folds: usize,
     /// Number of bones that a person had edited, which stayed.
     pub kept: usize,
     /// Root mean square error of the fit over points and shapes, in the mesh's unit.

@@ -2,6 +2,7 @@
 //!
 //! Templates (`.rig.ron`), projects (`.rigsmith.ron`), skeleton text (`.rig`) and weights (`.skin`).
 
+mod poses;
 pub mod project;
 pub(super) mod scan;
 pub mod skin;

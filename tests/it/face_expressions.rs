@@ -107,6 +107,10 @@ impl Head {
         self.triangles.iter().filter(folds).count()
     }
 
+    fn facial_triangles(&self) -> usize {
+        self.triangles.iter().filter(|corners| corners.iter().all(|corner| self.mask[*corner as usize])).count()
+    }
+
     /// What an expression must reach, in eye distances (lids: in their opening), as (what, reached, least).
     fn reached(&self, name: &str, moved: &[Vec3]) -> Vec<(String, f32, f32)> {
         let scale = 1.0 / self.landmarks.eye_distance();
@@ -148,7 +152,11 @@ fn check_head(name: &str, density: usize) {
     }
 }
 
-/// Each of the six expressions reaches what it must, folds nothing and keeps lips and lids apart.
+/// Largest share of the mask's triangles that an expression folds over, in the corners of mouth and eyes. The true
+/// shapes of the same head fold up to 0.5 % of them.
+const FOLDS: f32 = 0.005;
+
+/// Each of the six expressions reaches what it must, folds little and keeps lips and lids apart.
 fn check_six(head: &Head, name: &str, density: usize) {
     for expression in ExpressionSet::bundled().six() {
         let moved = head.moved(&expression.name, 1.0);
@@ -158,7 +166,8 @@ fn check_six(head: &Head, name: &str, density: usize) {
         for (what, reached, least) in reached.into_iter().filter(|(what, ..)| can_part(what)) {
             assert!(reached >= least, "{name}, {density} bones, {}: {what} {reached:.4} < {least}", expression.name);
         }
-        assert_eq!(head.folds(&moved), 0, "{name}, {density} bones, {}: triangles fold", expression.name);
+        let (folds, most) = (head.folds(&moved), (FOLDS * head.facial_triangles() as f32) as usize);
+        assert!(folds <= most, "{name}, {density} bones, {}: {folds} triangles fold", expression.name);
         for (above, below) in [(61, 67), (62, 66), (63, 65), (37, 41), (38, 40), (43, 47), (44, 46)] {
             let gap = |points: &[Vec3]| points[head.marks[above]].y - points[head.marks[below]].y;
             // Lips may overlap in the mesh itself.
@@ -193,7 +202,7 @@ fn strength_nothing_is_rest_and_one_side_leaves_the_other() {
     for head in [bundled(40)].into_iter().chain(head(HEADS[0], 40)) {
         let still = head.moved("happiness", 0.0);
         assert!(still.iter().zip(&head.points).all(|(a, b)| a.distance(*b) < 1e-5));
-        let moved = head.moved("lip_corner_pull_l", 1.0);
+        let moved = head.moved("mouth_smile_l", 1.0);
         let way = |mark: usize| moved[head.marks[mark]].distance(head.points[head.marks[mark]]);
         assert!(way(54) > 0.03 * head.landmarks.eye_distance(), "{}", way(54));
         assert!(way(48) < 0.15 * way(54), "{} {}", way(48), way(54));
@@ -206,7 +215,8 @@ fn every_bundled_file_parses_and_comes_back() {
     let set = ExpressionSet::parse(&files).unwrap();
     assert_eq!(&set, ExpressionSet::bundled());
     assert_eq!(set.six().count(), 6);
-    assert_eq!(set.expressions().len(), 7);
+    assert_eq!(set.expressions().len(), 26);
+    assert_eq!(set.unit_set().arkit_shapes().count(), 51);
     for (file, text) in files {
         if file.ends_with(".units.ron") {
             let units = Unit::parse_list(text, file).unwrap();
@@ -216,7 +226,7 @@ fn every_bundled_file_parses_and_comes_back() {
             assert_eq!(expression, Expression::parse(&expression.to_text().unwrap(), file).unwrap());
         }
     }
-    assert!(set.find("lip_corner_pull_r").is_some_and(|unit| unit.units[0].side == Sides::Right));
+    assert!(set.find("mouth_smile_r").is_some_and(|unit| unit.units[0].side == Sides::Right));
     assert!(set.find("no_such_unit").is_none());
 }
 
@@ -229,7 +239,7 @@ fn malformed_files_say_where() {
     check("a.expr.ron", "", 1, "empty");
     check("a.expr.ron", "(\n name: \"a\",\n units: [(unit: \"none\")],\n)", 3, "no unit");
     check("a.expr.ron", "(\n name: \"A b\",\n units: [],\n)", 2, "a-z");
-    check("a.expr.ron", "(\n name: \"a\",\n units: [(unit: \"b\", strength: 1.5)],\n)", 3, "strength");
+    check("a.expr.ron", "(\n name: \"a\",\n units: [(unit: \"b\", strength: 1.6)],\n)", 3, "strength");
     check("a.expr.ron", "(\n name: \"a\",\n colour: 1,\n units: [],\n)", 3, "colour");
     check("a.expr.ron", &" ".repeat(300 << 10), 1, "KiB");
     let unit = |inside: &str| format!("[\n (name: \"a\", moves: [\n  ({inside}, reach: (0.1, 0.1)),\n ]),\n]");

@@ -32,6 +32,7 @@ mod face_expressions;
 mod face_fit;
 mod face_grouping;
 mod face_landmarks;
+mod face_units;
 mod files;
 mod files_kill;
 mod files_read;

@@ -29,11 +29,11 @@ pub use self::{
     bone_fit::FittedFace,
     fold_repair::{count_folds, repair_folds},
     set::{ExpressionSet, UnitSet},
-    text::{Expression, ExpressionError, Gaze, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
+    text::{Expression, ExpressionError, Gaze, MAX_STRENGTH, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
 };
 
 /// Largest distance that a bone is moved, in eye distances.
-const FURTHEST: f32 = 0.6;
+const FURTHEST: f32 = 0.9;
 
 /// A bone's offset from rest in head space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,13 +73,13 @@ impl Mix {
 
     /// A blend of expressions: strengths of the same unit add up, to the unit's limit at most.
     ///
-    /// Strengths of expressions are cut to 0..=1, NaN counts as 0. Units that are not in `units` are left out (an
+    /// Strengths of expressions are cut to 0..=[`MAX_STRENGTH`], NaN counts as 0. Units that are not in `units` are left out (an
     /// [`ExpressionSet`] has no such expressions).
     pub fn of(expressions: &[(&Expression, f32)], units: &UnitSet) -> Self {
         let mut mix = Self::rest(units);
         for (expression, strength) in expressions {
             for used in &expression.units {
-                mix.add(&used.unit, used.side, used.strength * between(*strength, 1.0), units);
+                mix.add(&used.unit, used.side, used.strength * between(*strength, MAX_STRENGTH), units);
             }
         }
         mix
@@ -110,7 +110,7 @@ fn between(value: f32, most: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(0.0, most) }
 }
 
-/// Poses of bones for a blend of expressions (strengths 0..=1) whose skin follows the blend best.
+/// Poses of bones for a blend of expressions (strengths 0..=[`MAX_STRENGTH`]) whose skin follows the blend best.
 ///
 /// All in head space: rest positions of `bones`, `points` and `landmarks`, and the poses. `weights` as [`apply`] takes
 /// them. This is [`FittedFace`] without triangles, hence without a check for flipped triangles: a few milliseconds for

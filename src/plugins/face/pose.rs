@@ -9,7 +9,7 @@ use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis, FaceError},
         bones::FaceBone,
-        expression::{BonePose, Expression, ExpressionSet, Mix, apply},
+        expression::{BonePose, Expression, ExpressionSet, MAX_STRENGTH, Mix, apply},
     },
     mesh::model::Weights,
     plugins::{
@@ -149,7 +149,7 @@ pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<M
             let nearest = did_you_mean(name, set.names());
             ExpressError::Unknown { name: name.clone(), nearest }
         })?;
-        wanted.push((expression, strength.clamp(0.0, 1.0)));
+        wanted.push((expression, strength.clamp(0.0, MAX_STRENGTH)));
     }
     let wanted: Vec<(&Expression, f32)> = wanted.iter().map(|(expression, s)| (expression.as_ref(), *s)).collect();
     Ok(Mix::of(&wanted, set.unit_set()))
@@ -173,7 +173,7 @@ fn expression_edits(
 }
 
 /// Positions of the analysed points of a rig's face, in head space, with expressions by name, each with a strength from
-/// 0 to 1.
+/// 0 to [`MAX_STRENGTH`].
 ///
 /// # Errors
 /// See [`ExpressError`]: no facial bones, no weights, no such expression.
@@ -189,7 +189,7 @@ pub fn expressed_points(
 }
 
 /// The weights of the analysed points over neck (0), head (1, with all other joints) and the facial bones (from 2).
-fn analysed_weights(skin: &SkinData, known: &FaceRig, analysis: &FaceAnalysis) -> Weights {
+pub(super) fn analysed_weights(skin: &SkinData, known: &FaceRig, analysis: &FaceAnalysis) -> Weights {
     let numbers: Vec<u32> = skin
         .joints
         .iter()

@@ -14,12 +14,12 @@ use serde::{Deserialize, Serialize};
 pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template};
 pub use write::write_template;
-pub(in crate::rig) use write::{quoted, vector};
+pub(in crate::rig) use write::{quoted, vector, write_without_poses};
 
 use crate::rig::{Rig, Uid};
 
 /// The newest format that is read and written. A file says the oldest format that holds what is in it: format 2 where a
-/// part says its needs, a feature has a choice or a joint is a placed bone of a face, else 1.
+/// part says its needs, a feature has a choice, a joint is a placed bone of a face or poses are stored, else 1.
 pub const FORMAT: u32 = 2;
 
 /// Largest size in bytes of a template that is read.

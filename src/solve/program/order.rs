@@ -3,9 +3,10 @@
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::{
-    Lists, ProgramError,
+    ProgramError,
     error::describe,
     graph::{Graph, Step},
+    lists::Lists,
     name,
     op::{N, Operand, Tables, X},
 };

@@ -26,26 +26,27 @@ use crate::{
 /// The most samples of the skin, besides landmarks.
 const SAMPLES: usize = 1600;
 /// Weight of a landmark, as a share of the whole skin's weight.
-const LANDMARK: f64 = 0.02;
+const LANDMARK: f64 = 0.002;
 /// Weight of the pull towards the mean of the field over a bone's patch, as a share of the patch's weight.
-const HOLD: f64 = 0.02;
+const HOLD: f64 = 0.01;
 /// Weight of the distance of two landmarks, as a share of the whole skin's weight.
-const PAIR: f64 = 0.06;
+const PAIR: f64 = 0.02;
 /// Landmarks whose distance matters more than their positions: lips, lids, corners of the mouth, inner brows.
 const PAIRS: [[usize; 2]; 9] =
     [[61, 67], [62, 66], [63, 65], [37, 41], [38, 40], [43, 47], [44, 46], [54, 48], [22, 21]];
 /// Number of the first [`PAIRS`] whose first landmark must stay above the second: lips and lids.
 const APART: usize = 7;
 /// Stiffness between bones with common skin.
-const STIFF: f64 = 0.002;
+const STIFF: f64 = 0.001;
+/// Factor of the field. What bones cannot follow is lost, and makes the rest smaller than the field on average.
+const GAIN: f64 = 1.06;
 /// Largest area of triangles that are ignored, as a share of their longest edge squared.
 pub(super) const SLIVER: f32 = 1e-3;
 /// Shares by which the movements of bones are brought nearer to each other where skin folds, one a round.
-const GENTLY: [f32; 8] = [0.3, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6, 0.6];
-/// The same shares for a second attempt.
-const FIRMLY: [f32; 12] = [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0];
-/// Largest loss by that of the furthest movement, as a share of it.
-const LOSS: f32 = 0.2;
+const ROUNDS: [f32; 8] = [0.3, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6, 0.6];
+/// The most that a repair of folds takes of an expression, as a share of the furthest movement. Skin may crease; an
+/// expression may not vanish for it.
+const TAKEN: f32 = 0.05;
 
 /// A head with its bones and weights, ready to be posed many times.
 pub struct FittedFace<'a> {
@@ -65,6 +66,8 @@ pub struct FittedFace<'a> {
     moving: Vec<u32>,
     /// Points of lips and lids of which the first must stay above the second.
     apart: Vec<[u32; 2]>,
+    /// Bones of skin that mirror each other.
+    pairs: Vec<[usize; 2]>,
 }
 
 /// A point of the skin that should follow the field.
@@ -114,6 +117,7 @@ impl<'a> FittedFace<'a> {
             patch: Vec::new(),
             moving: Vec::new(),
             apart: Vec::new(),
+            pairs: mirrored_pairs(bones, landmarks),
         };
         let Some(opening_lines) = OpeningLines::new(landmarks) else { return face };
         face.gather(&opening_lines, &unknown_of, mask);
@@ -137,8 +141,9 @@ impl<'a> FittedFace<'a> {
 
     /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of units.
     ///
-    /// Bones of skin whose triangles would flip are brought nearer to equal movements in several rounds; lips or lids
-    /// that would cross are moved apart. Cost: points times moves of the field.
+    /// Bones of skin whose triangles would flip are brought nearer to equal movements, by 5 % of the furthest movement at
+    /// most, and alike on both sides in a mix that is alike on both sides; lips or lids that would cross are moved apart.
+    /// Cost: points times moves of the field.
     pub fn pose(&self, mix: &Mix, units: &UnitSet) -> Vec<BonePose> {
         let rest = vec![BonePose::REST; self.bones.len()];
         if mix.is_rest() {
@@ -146,18 +151,7 @@ impl<'a> FittedFace<'a> {
         }
         let Some(field) = Field::new(mix, units, self.bones, self.landmarks) else { return rest };
         let mut poses = self.solve(&field);
-        let gently = self.repaired(&mut poses, &GENTLY);
-        if gently > 0 {
-            let mut firm = poses.clone();
-            let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
-            let lost = |firm: &[BonePose]| {
-                let ways = firm.iter().zip(&poses).map(|(firm, pose)| firm.translation.distance(pose.translation));
-                ways.fold(0.0, f32::max)
-            };
-            if self.repaired(&mut firm, &FIRMLY) < gently && lost(&firm) <= LOSS * furthest {
-                return firm;
-            }
-        }
+        self.repair(&mut poses, mix.strengths.iter().all(|[left, right]| left == right));
         poses
     }
 
@@ -330,7 +324,7 @@ impl<'a> FittedFace<'a> {
         let mut asked = vec![[0.0; 3]; size];
         for sample in &self.samples {
             let rest = |place: Vec3, known: OpeningSide, weight: f64| {
-                let target = field.at(place, known).as_dvec3();
+                let target = field.at(place, known).as_dvec3() * GAIN;
                 match jaw {
                     Some(jaw) if weight > 0.0 => target - (jaw.transform_point3(place) - place).as_dvec3() * weight,
                     _ => target,
@@ -365,6 +359,20 @@ impl<'a> FittedFace<'a> {
         }
         poses
     }
+}
+
+/// Bones of skin that are each nearest to the other's mirror image, and near it.
+fn mirrored_pairs(bones: &[FaceBone], landmarks: &Landmarks) -> Vec<[usize; 2]> {
+    let near = 0.1 * landmarks.eye_distance();
+    let image = |bone: &FaceBone| bone.position.with_x(2.0 * landmarks.middle - bone.position.x);
+    let partner = |of: usize| {
+        let skin = (0..bones.len()).filter(|bone| bones[*bone].kind == FaceBoneKind::Skin);
+        let away = |bone: &usize| bones[*bone].position.distance(image(&bones[of]));
+        skin.min_by(|a, b| away(a).total_cmp(&away(b))).filter(|bone| away(bone) < near)
+    };
+    let partners: Vec<Option<usize>> = (0..bones.len()).map(partner).collect();
+    let mutual = |bone: usize| partners[bone].filter(|other| *other > bone && partners[*other] == Some(bone));
+    (0..bones.len()).filter_map(|bone| Some([bone, mutual(bone)?])).collect()
 }
 
 /// Factorises a symmetric positive matrix in place, L in the lower triangle. A pivot lost to rounding becomes 1.

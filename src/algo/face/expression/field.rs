@@ -19,8 +19,11 @@ pub(super) struct Field {
     scale: f32,
     opening_lines: OpeningLines,
     sources: Vec<Source>,
-    /// Rotation of the jaw, and its pivot.
+    /// Rotation and movement of the jaw bone.
     jaw: Quat,
+    jaw_shift: Vec3,
+    /// Rotation of the skin below the mouth by units that say nothing else of the skin, and its pivot.
+    skin_jaw: Option<Quat>,
     pivot: Vec3,
     /// Rotations of the left and the right eye.
     eyes: [Quat; 2],
@@ -28,7 +31,8 @@ pub(super) struct Field {
 
 /// One unit on one side.
 struct Source {
-    side: usize,
+    /// Side of the face that it is restricted to.
+    side: Option<usize>,
     strength: f32,
     moves: Vec<Move>,
 }
@@ -48,15 +52,24 @@ impl Field {
         let opening_lines = OpeningLines::new(landmarks)?;
         let distance = landmarks.eye_distance();
         let mut sources = Vec::new();
-        let mut open = 0.0;
+        let (mut open, mut open_skin, mut jaw_shift) = (0.0, 0.0, Vec3::ZERO);
         let mut gaze = [[0.0_f32; 2]; 2];
         for (unit, strengths) in units.units().iter().zip(&mix.strengths) {
-            open += unit.jaw * (strengths[0] + strengths[1]) * 0.5;
+            let both = (strengths[0] + strengths[1]) * 0.5;
+            open += unit.jaw * both;
+            if unit.moves.is_empty() {
+                open_skin += unit.jaw * both;
+            }
+            let shift = unit.jaw_shift;
+            jaw_shift += match unit.whole {
+                true => shift * strengths[0] + shift.with_x(-shift.x) * strengths[1],
+                false => shift.with_x(0.0) * both,
+            };
             for (side, &strength) in strengths.iter().enumerate().filter(|(_, strength)| **strength > 0.0) {
                 gaze[side][0] += unit.gaze.out * strength;
                 gaze[side][1] += unit.gaze.up * strength;
                 let moves = unit.moves.iter().map(|one| Move::new(one, side, landmarks)).collect();
-                sources.push(Source { side, strength, moves });
+                sources.push(Source { side: (!unit.whole).then_some(side), strength, moves });
             }
         }
         let eye = |side: usize, [out, up]: [f32; 2]| {
@@ -68,6 +81,8 @@ impl Field {
             opening_lines,
             sources,
             jaw: pitch(open.clamp(0.0, 35.0)),
+            jaw_shift: jaw_shift * distance,
+            skin_jaw: (open_skin > 0.0).then(|| pitch(open_skin.min(35.0))),
             pivot: jaw_bone.map_or_else(|| hinge(landmarks), |bone| bone.position),
             eyes: [eye(0, gaze[0]), eye(1, gaze[1])],
         })
@@ -75,10 +90,13 @@ impl Field {
 
     /// Displacement of the skin at `point`, in units of the mesh.
     pub fn at(&self, point: Vec3, known: OpeningSide) -> Vec3 {
-        let arm = point - self.pivot;
-        let mut sum = (self.jaw * arm - arm) * self.opening_lines.jaw(point, known);
+        let mut sum = Vec3::ZERO;
+        if let Some(jaw) = self.skin_jaw {
+            let arm = point - self.pivot;
+            sum = (jaw * arm - arm) * self.opening_lines.jaw(point, known);
+        }
         for source in &self.sources {
-            let share = self.opening_lines.side(point, source.side) * source.strength;
+            let share = source.side.map_or(1.0, |side| self.opening_lines.side(point, side)) * source.strength;
             if share > 0.0 {
                 sum += source.at(point, known, self.scale, &self.opening_lines) * (share / self.scale);
             }
@@ -88,15 +106,15 @@ impl Field {
 
     /// Pose of a jaw or eye bone.
     pub fn turn(&self, bone: &FaceBone) -> BonePose {
-        let rotation = match bone.kind {
-            FaceBoneKind::Skin => Quat::IDENTITY,
-            FaceBoneKind::Jaw => self.jaw,
+        let (translation, rotation) = match bone.kind {
+            FaceBoneKind::Skin => (Vec3::ZERO, Quat::IDENTITY),
+            FaceBoneKind::Jaw => (self.jaw_shift, self.jaw),
             FaceBoneKind::Eye => {
                 let [left, right] = self.eyes;
-                if self.opening_lines.side(bone.position, 0) >= 0.5 { left } else { right }
+                (Vec3::ZERO, if self.opening_lines.side(bone.position, 0) >= 0.5 { left } else { right })
             }
         };
-        BonePose { translation: Vec3::ZERO, rotation }
+        BonePose { translation, rotation }
     }
 }
 

@@ -7,23 +7,51 @@ use super::text::{Expression, ExpressionError, Sides, Unit, UnitUse, last_quoted
 /// The six basic expressions, in the order in which they are shown.
 const SIX: [&str; 6] = ["happiness", "anger", "sadness", "fear", "disgust", "surprise"];
 
-/// The bundled files of units: name and text.
-const UNITS: [(&str, &str); 4] = [
-    ("units/brows.units.ron", include_str!("../../../../assets/expressions/units/brows.units.ron")),
-    ("units/eyes.units.ron", include_str!("../../../../assets/expressions/units/eyes.units.ron")),
-    ("units/middle.units.ron", include_str!("../../../../assets/expressions/units/middle.units.ron")),
-    ("units/mouth.units.ron", include_str!("../../../../assets/expressions/units/mouth.units.ron")),
+/// A bundled file: its name and its text.
+macro_rules! bundled {
+    ($name:literal) => {
+        ($name, include_str!(concat!("../../../../assets/expressions/", $name)))
+    };
+}
+
+/// The bundled files of units.
+const UNITS: [(&str, &str); 6] = [
+    bundled!("units/brows.units.ron"),
+    bundled!("units/eyes.units.ron"),
+    bundled!("units/cheeks.units.ron"),
+    bundled!("units/jaw.units.ron"),
+    bundled!("units/lips.units.ron"),
+    bundled!("units/mouth.units.ron"),
 ];
 
-/// The bundled expressions: name and text.
-const EXPRESSIONS: [(&str, &str); 7] = [
-    ("neutral.expr.ron", include_str!("../../../../assets/expressions/neutral.expr.ron")),
-    ("happiness.expr.ron", include_str!("../../../../assets/expressions/happiness.expr.ron")),
-    ("anger.expr.ron", include_str!("../../../../assets/expressions/anger.expr.ron")),
-    ("sadness.expr.ron", include_str!("../../../../assets/expressions/sadness.expr.ron")),
-    ("fear.expr.ron", include_str!("../../../../assets/expressions/fear.expr.ron")),
-    ("disgust.expr.ron", include_str!("../../../../assets/expressions/disgust.expr.ron")),
-    ("surprise.expr.ron", include_str!("../../../../assets/expressions/surprise.expr.ron")),
+/// The bundled expressions, and the visemes of Oculus: positions of the mouth for speech.
+const EXPRESSIONS: [(&str, &str); 26] = [
+    bundled!("neutral.expr.ron"),
+    bundled!("happiness.expr.ron"),
+    bundled!("anger.expr.ron"),
+    bundled!("sadness.expr.ron"),
+    bundled!("fear.expr.ron"),
+    bundled!("disgust.expr.ron"),
+    bundled!("surprise.expr.ron"),
+    bundled!("contempt.expr.ron"),
+    bundled!("pain.expr.ron"),
+    bundled!("smirk.expr.ron"),
+    bundled!("wink.expr.ron"),
+    bundled!("visemes/viseme_sil.expr.ron"),
+    bundled!("visemes/viseme_pp.expr.ron"),
+    bundled!("visemes/viseme_ff.expr.ron"),
+    bundled!("visemes/viseme_th.expr.ron"),
+    bundled!("visemes/viseme_dd.expr.ron"),
+    bundled!("visemes/viseme_kk.expr.ron"),
+    bundled!("visemes/viseme_ch.expr.ron"),
+    bundled!("visemes/viseme_ss.expr.ron"),
+    bundled!("visemes/viseme_nn.expr.ron"),
+    bundled!("visemes/viseme_rr.expr.ron"),
+    bundled!("visemes/viseme_aa.expr.ron"),
+    bundled!("visemes/viseme_e.expr.ron"),
+    bundled!("visemes/viseme_ih.expr.ron"),
+    bundled!("visemes/viseme_oh.expr.ron"),
+    bundled!("visemes/viseme_ou.expr.ron"),
 ];
 
 /// Units, each name once.
@@ -43,6 +71,28 @@ impl UnitSet {
         self.units.iter().position(|unit| unit.name == name)
     }
 
+    /// Index and side of the unit with a name of ARKit, such as `mouthSmileLeft` or `jawOpen`; `_L` and `_R` may stand
+    /// for `Left` and `Right`, and restrict a shape of both sides to one.
+    pub fn arkit(&self, name: &str) -> Option<(usize, Sides)> {
+        self.arkit_shapes().find(|(known, ..)| *known == name).map(|(_, unit, side)| (unit, side)).or_else(|| {
+            let (base, side) = one_side(name, ["_L", "_R"])?;
+            let sided = format!("{base}{}", if side == Sides::Left { "Left" } else { "Right" });
+            let unit = self.units.iter().position(|unit| match unit.arkit.as_slice() {
+                [both] => both == base,
+                names => names.contains(&sided),
+            })?;
+            Some((unit, side))
+        })
+    }
+
+    /// The blend shapes of ARKit that the units have: name, index of the unit, and side.
+    pub fn arkit_shapes(&self) -> impl Iterator<Item = (&str, usize, Sides)> {
+        self.units.iter().enumerate().flat_map(|(index, unit)| {
+            let sides: &[Sides] = if unit.arkit.len() == 1 { &[Sides::Both] } else { &[Sides::Left, Sides::Right] };
+            unit.arkit.iter().zip(sides).map(move |(name, side)| (name.as_str(), index, *side))
+        })
+    }
+
     /// Adds the units of a file; adds none on an error (a malformed text or a name that is taken).
     pub fn add(&mut self, text: &str, file: &str) -> Result<(), ExpressionError> {
         let units = Unit::parse_list(text, file)?;
@@ -55,6 +105,12 @@ impl UnitSet {
     }
 }
 
+/// A name without the ending of a side, and the side.
+fn one_side<'a>(name: &'a str, [left, right]: [&str; 2]) -> Option<(&'a str, Sides)> {
+    let left = name.strip_suffix(left).map(|base| (base, Sides::Left));
+    left.or_else(|| name.strip_suffix(right).map(|base| (base, Sides::Right)))
+}
+
 /// Expressions, each name once, and the units that they are made of.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExpressionSet {
@@ -63,7 +119,7 @@ pub struct ExpressionSet {
 }
 
 impl ExpressionSet {
-    /// The bundled set: neutral, happiness, anger, sadness, fear, disgust, surprise, and their units.
+    /// The bundled set: neutral, the six basic expressions, a few others, the visemes, and their units.
     pub fn bundled() -> &'static Self {
         // A test checks that the files have no errors.
         static BUNDLED: LazyLock<ExpressionSet> = LazyLock::new(|| {
@@ -127,20 +183,21 @@ impl ExpressionSet {
     }
 
     /// The expression of a name, or a unit as an expression of its own: on both sides, or on one with `_l` or `_r`
-    /// after its name.
+    /// after its name. Units are found by their names in ARKit, too ([`UnitSet::arkit`]).
     pub fn find(&self, name: &str) -> Option<Cow<'_, Expression>> {
         if let Some(expression) = self.get(name) {
             return Some(Cow::Borrowed(expression));
         }
-        let (unit, side) = match self.units.index(name) {
-            Some(_) => (name, Sides::Both),
-            None => name
-                .strip_suffix("_l")
-                .map(|unit| (unit, Sides::Left))
-                .or_else(|| name.strip_suffix("_r").map(|unit| (unit, Sides::Right)))?,
+        let own = || {
+            let (unit, side) = match self.units.index(name) {
+                Some(_) => (name, Sides::Both),
+                None => one_side(name, ["_l", "_r"])?,
+            };
+            Some((self.units.index(unit)?, side))
         };
-        self.units.index(unit)?;
-        let units = vec![UnitUse { unit: unit.into(), side, strength: 1.0 }];
+        let (unit, side) = own().or_else(|| self.units.arkit(name))?;
+        let unit = self.units.units.get(unit)?.name.clone();
+        let units = vec![UnitUse { unit, side, strength: 1.0 }];
         Some(Cow::Owned(Expression { name: name.into(), about: String::new(), units }))
     }
 

@@ -12,6 +12,8 @@ pub const MAX_TEXT: usize = 256 << 10;
 const MOST: usize = 256;
 /// Longest name in bytes.
 const LONGEST_NAME: usize = 64;
+/// Largest strength of an expression or a unit: beyond 1 is caricature.
+pub const MAX_STRENGTH: f32 = 1.5;
 
 /// Error in a file of units or expressions, with its place.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -34,21 +36,35 @@ pub struct ExpressionError {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unit {
-    /// Name, such as `lip_corner_pull`.
+    /// Name, such as `mouth_smile`.
     #[serde(deserialize_with = "name")]
     pub name: String,
     /// Description: the muscle and its visible effect.
     #[serde(default)]
     pub about: String,
+    /// Numbers of the action units of the Facial Action Coding System that it stands for.
+    #[serde(default, deserialize_with = "few")]
+    pub facs: Vec<u8>,
+    /// Names among the blend shapes of ARKit: one for both sides together, or those of the left and the right side.
+    #[serde(default, deserialize_with = "shape_names")]
+    pub arkit: Vec<String>,
     /// Largest sum of strengths in a blend of expressions.
-    #[serde(default = "one", deserialize_with = "limit")]
+    #[serde(default = "max_strength", deserialize_with = "limit")]
     pub limit: f32,
+    /// True if each side moves the whole face, as a jaw that goes to the left: the movements are not restricted to one
+    /// side.
+    #[serde(default)]
+    pub whole: bool,
     /// Movements of the skin.
     #[serde(default, deserialize_with = "few")]
     pub moves: Vec<UnitMove>,
-    /// Opening of the jaw in degrees.
+    /// Opening of the jaw in degrees. The skin follows `moves`; in a unit without any, the skin below the mouth follows
+    /// the jaw.
     #[serde(default, deserialize_with = "angle")]
     pub jaw: f32,
+    /// Movement of the jaw.
+    #[serde(default, deserialize_with = "vector")]
+    pub jaw_shift: Vec3,
     /// Rotation of the eyeballs.
     #[serde(default)]
     pub gaze: Gaze,
@@ -154,7 +170,7 @@ pub struct UnitUse {
     /// Side of the unit.
     #[serde(default)]
     pub side: Sides,
-    /// Strength, 0 to 1.
+    /// Strength, 0 to [`MAX_STRENGTH`].
     #[serde(default = "one", deserialize_with = "strength")]
     pub strength: f32,
 }
@@ -235,6 +251,10 @@ fn one() -> f32 {
     1.0
 }
 
+fn max_strength() -> f32 {
+    MAX_STRENGTH
+}
+
 /// A number in a range; the error names `what` and the range.
 fn number<'de, D: Deserializer<'de>>(reader: D, what: &str, least: f32, most: f32) -> Result<f32, D::Error> {
     checked(f32::deserialize(reader)?, what, least, most)
@@ -253,7 +273,7 @@ fn limit<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
 }
 
 fn strength<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
-    number(reader, "the strength", 0.0, 1.0)
+    number(reader, "the strength", 0.0, MAX_STRENGTH)
 }
 
 fn angle<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
@@ -303,6 +323,16 @@ fn name<'de, D: Deserializer<'de>>(reader: D) -> Result<String, D::Error> {
         return Err(D::Error::custom("a name is 1 to 64 of a-z, 0-9 and _"));
     }
     Ok(name)
+}
+
+fn shape_names<'de, D: Deserializer<'de>>(reader: D) -> Result<Vec<String>, D::Error> {
+    let names = Vec::<String>::deserialize(reader)?;
+    let is_plain =
+        |name: &String| (1..=LONGEST_NAME).contains(&name.len()) && name.chars().all(|c| c.is_ascii_alphanumeric());
+    if names.len() > 2 || !names.iter().all(is_plain) {
+        return Err(D::Error::custom("give the one name of a blend shape, or that of the left and of the right side"));
+    }
+    Ok(names)
 }
 
 fn few<'de, D: Deserializer<'de>, T: Deserialize<'de>>(reader: D) -> Result<Vec<T>, D::Error> {

@@ -7,6 +7,7 @@ use bevy_egui::egui::{self, CollapsingHeader, Slider, Ui, vec2};
 
 use super::{set, thumbnail::Pictures};
 use crate::{
+    algo::face::expression::{Expression, MAX_STRENGTH},
     editor::panel::Requests,
     plugins::{
         face::{ExpressRequest, Expressions, Face},
@@ -15,6 +16,8 @@ use crate::{
     rig::Rig,
 };
 
+/// Beginning of the names of visemes.
+const VISEME: &str = "viseme_";
 /// Side of a picture in points.
 const SIDE: f32 = 56.0;
 
@@ -63,12 +66,29 @@ pub(super) fn show(
             });
         });
     }
+    let mut row = |ui: &mut Ui, name: &str, words: &str, hint: String| {
+        ui.label(capital(&words.replace('_', " "))).on_hover_text(hint);
+        let (drag, done) = strength(ui, name, &mut next);
+        dragging |= drag;
+        let_go |= done;
+    };
+    let six: Vec<&str> = set.0.six().map(|expression| expression.name.as_str()).collect();
+    let is_other = |expression: &&Expression| !expression.units.is_empty() && !six.contains(&expression.name.as_str());
+    let (visemes, others): (Vec<&Expression>, Vec<&Expression>) =
+        set.0.expressions().iter().filter(is_other).partition(|expression| expression.name.starts_with(VISEME));
+    for (title, list) in [("More expressions", others), ("Visemes", visemes)] {
+        CollapsingHeader::new(title).show(ui, |ui| {
+            for expression in list {
+                let words = expression.name.strip_prefix(VISEME).unwrap_or(&expression.name);
+                row(ui, &expression.name, words, expression.about.clone());
+            }
+        });
+    }
     CollapsingHeader::new("Units").show(ui, |ui| {
-        for name in set.0.units().iter().map(|unit| unit.name.as_str()) {
-            ui.label(capital(&name.replace('_', " ")));
-            let (drag, done) = strength(ui, name, &mut next);
-            dragging |= drag;
-            let_go |= done;
+        for unit in set.0.units() {
+            let facs = unit.facs.iter().map(|number| format!("AU {number}"));
+            let names: Vec<String> = facs.chain(unit.arkit.iter().cloned()).collect();
+            row(ui, &unit.name, &unit.name, format!("{}\n{}", unit.about, names.join(", ")));
         }
     });
     next.retain(|_, strength| *strength > 0.0);
@@ -83,7 +103,7 @@ pub(super) fn show(
 fn strength(ui: &mut Ui, name: &str, strengths: &mut BTreeMap<String, f32>) -> (bool, bool) {
     let mut value = strengths.get(name).copied().unwrap_or(0.0);
     ui.spacing_mut().slider_width = (ui.available_width() - 56.0).max(40.0);
-    let slider = ui.push_id(name, |ui| ui.add(Slider::new(&mut value, 0.0..=1.0).max_decimals(2))).inner;
+    let slider = ui.push_id(name, |ui| ui.add(Slider::new(&mut value, 0.0..=MAX_STRENGTH).max_decimals(2))).inner;
     if slider.changed() {
         strengths.insert(name.to_owned(), value);
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::Vec3;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::floats;
 
@@ -72,6 +72,39 @@ impl Bin {
         let index = self.floats(&elements, Target::Vertices);
         let low = positions.iter().fold(Vec3::INFINITY, |low, position| low.min(*position));
         let high = positions.iter().fold(Vec3::NEG_INFINITY, |high, position| high.max(*position));
+        self.bounds(index, &low.to_array(), &high.to_array());
+        index
+    }
+
+    /// Appends displacements of a morph target, with their bounds: only those that are not zero where that is smaller
+    /// (sparse accessor, section 3.6.2.3 of the specification); returns the accessor.
+    pub(super) fn displacements(&mut self, offsets: &[Vec3]) -> usize {
+        let moved: Vec<usize> = (0..offsets.len()).filter(|at| offsets[*at] != Vec3::ZERO).collect();
+        let wide = offsets.len() > 65535;
+        let index_size = if wide { 4 } else { 2 };
+        if moved.is_empty() || moved.len() * (12 + index_size) + 128 > offsets.len() * 12 {
+            return self.positions(offsets);
+        }
+        let places = match wide {
+            true => little_endian(&moved, |at| (at as u32).to_le_bytes()),
+            false => little_endian(&moved, |at| (at as u16).to_le_bytes()),
+        };
+        let values: Vec<[f32; 3]> = moved.iter().map(|at| offsets[*at].to_array()).collect();
+        let values = little_endian(values.as_flattened(), f32::to_le_bytes);
+        let (places, values) = (self.view(&places, Target::Other), self.view(&values, Target::Other));
+        self.accessors.push(json!({
+            "componentType": 5126,
+            "count": offsets.len(),
+            "type": "VEC3",
+            "sparse": {
+                "count": moved.len(),
+                "indices": { "bufferView": places, "componentType": if wide { 5125 } else { 5123 } },
+                "values": { "bufferView": values },
+            },
+        }));
+        let index = self.accessors.len() - 1;
+        let low = offsets.iter().fold(Vec3::INFINITY, |low, offset| low.min(*offset));
+        let high = offsets.iter().fold(Vec3::NEG_INFINITY, |high, offset| high.max(*offset));
         self.bounds(index, &low.to_array(), &high.to_array());
         index
     }

@@ -227,7 +227,7 @@ fn morphs(part: &Part, used: &[u32], normals: &[Vec3], bake: &Bake, bin: &mut Bi
         let mut positions: Vec<Vec3> = pick(&morph.positions, used).map(|offset| bake.vector(offset)).collect();
         // The target gets zero positions if it has none, because some programs refuse a target without positions.
         positions.resize(used.len(), Vec3::ZERO);
-        target.insert("POSITION".to_owned(), bin.positions(&positions).into());
+        target.insert("POSITION".to_owned(), bin.displacements(&positions).into());
         if !morph.normals.is_empty() && !normals.is_empty() {
             let moved = pick(&morph.normals, used).zip(&own_normals);
             let moved: Vec<[f32; 3]> =

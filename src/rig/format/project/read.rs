@@ -5,14 +5,15 @@ use std::{
     collections::{HashMap, HashSet},
 };
 
-use bevy::math::{Quat, Vec3};
+use bevy::math::Vec3;
 use serde::{Deserialize, Deserializer, de::Error as _, de::IgnoredAny};
 
 use super::{
     FORMAT, JournalReference, MAX_BYTES, MeshReference, Project, ProjectRig, ProjectView, ReadProject, SkinReference,
 };
 use crate::rig::{
-    AttributeValues, EditError, PoseOffset, Rig, RigEdit, SourceError, StoredPose, Uid,
+    AttributeValues, EditError, Rig, RigEdit, SourceError, StoredPose, Uid,
+    format::poses::{OffsetFile, PoseFile, ValueFile},
     format::scan::{self, Field},
     format::source::{ron_options, utf8},
     format::version::Format,
@@ -49,56 +50,6 @@ struct RigFile {
     values: Vec<ValueFile>,
     #[serde(default)]
     poses: Vec<PoseFile>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PoseFile {
-    uid: Uid,
-    name: String,
-    #[serde(default)]
-    offsets: Vec<OffsetFile>,
-    #[serde(default)]
-    values: Vec<ValueFile>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ValueFile {
-    node: Uid,
-    name: String,
-    value: f32,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct OffsetFile {
-    joint: Uid,
-    #[serde(default)]
-    translation: (f32, f32, f32),
-    #[serde(default = "no_rotation")]
-    rotation: (f32, f32, f32, f32),
-    #[serde(default = "no_scale")]
-    scale: (f32, f32, f32),
-}
-
-impl OffsetFile {
-    fn offset(&self) -> PoseOffset {
-        let (x, y, z, w) = self.rotation;
-        PoseOffset {
-            translation: <[f32; 3]>::from(self.translation).into(),
-            rotation: Quat::from_xyzw(x, y, z, w),
-            scale: <[f32; 3]>::from(self.scale).into(),
-        }
-    }
-}
-
-fn no_rotation() -> (f32, f32, f32, f32) {
-    (0.0, 0.0, 0.0, 1.0)
-}
-
-fn no_scale() -> (f32, f32, f32) {
-    (1.0, 1.0, 1.0)
 }
 
 pub(super) fn vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {

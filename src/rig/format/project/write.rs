@@ -2,13 +2,14 @@
 
 use std::fmt::Write;
 
-use bevy::math::{Quat, Vec3};
-
 use super::{FORMAT, Project, ProjectRig, ProjectView};
 use crate::rig::{
-    AttributeValues, PoseOffset, Rig, Uid,
-    format::scan,
-    template::{quoted, vector, write_template},
+    Rig,
+    format::{
+        poses::{write_offsets, write_stored_poses, write_values},
+        scan,
+    },
+    template::{quoted, vector, write_without_poses},
 };
 
 /// The text of a project. The same project gives the same bytes.
@@ -48,7 +49,7 @@ fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
 
 fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
     write!(out, "        (\n            rig: ")?;
-    write_indented(out, &write_template(&entry.rig), "            ");
+    write_indented(out, &write_without_poses(&entry.rig), "            ");
     writeln!(out, ",\n            skins: [")?;
     for skin in &entry.skins {
         writeln!(
@@ -65,14 +66,7 @@ fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
     writeln!(out, "            ],")?;
     write_values(out, entry.rig.attribute_values(), "            ")?;
     writeln!(out, "            poses: [")?;
-    for pose in entry.rig.stored_poses() {
-        writeln!(out, "                (\n                    uid: \"{}\",", pose.uid)?;
-        writeln!(out, "                    name: {},\n                    offsets: [", quoted(&pose.name))?;
-        write_offsets(out, &pose.offsets, "                        ")?;
-        writeln!(out, "                    ],")?;
-        write_values(out, &pose.values, "                    ")?;
-        writeln!(out, "                ),")?;
-    }
+    write_stored_poses(out, &entry.rig, "                ")?;
     writeln!(out, "            ],\n        ),")
 }
 
@@ -81,20 +75,6 @@ fn needs_values(rig: &Rig) -> bool {
     !rig.attribute_values().is_empty()
         || rig.stored_poses().iter().any(|pose| !pose.values.is_empty())
         || rig.pose().keys().any(|node| rig.joint(*node).is_none())
-}
-
-/// Writes a list of attribute values, unless there are none.
-fn write_values(out: &mut String, values: &AttributeValues, indent: &str) -> std::fmt::Result {
-    if values.is_empty() {
-        return Ok(());
-    }
-    writeln!(out, "{indent}values: [")?;
-    for (node, values) in values {
-        for (name, value) in values {
-            writeln!(out, "{indent}    (node: \"{node}\", name: {}, value: {value:?}),", quoted(name))?;
-        }
-    }
-    writeln!(out, "{indent}],")
 }
 
 /// Writes the text of a template with indentation. Parameters of modules stay unchanged, because a line break in them
@@ -112,28 +92,6 @@ fn write_indented(out: &mut String, text: &str, indent: &str) {
         out.push_str(line);
         at += line.len();
     }
-}
-
-fn write_offsets<'a>(
-    out: &mut String,
-    offsets: impl IntoIterator<Item = (&'a Uid, &'a PoseOffset)>,
-    indent: &str,
-) -> std::fmt::Result {
-    for (joint, offset) in offsets {
-        write!(out, "{indent}(joint: \"{joint}\"")?;
-        if offset.translation != Vec3::ZERO {
-            write!(out, ", translation: {}", vector(offset.translation))?;
-        }
-        if offset.rotation != Quat::IDENTITY {
-            let [x, y, z, w] = offset.rotation.to_array();
-            write!(out, ", rotation: ({x:?}, {y:?}, {z:?}, {w:?})")?;
-        }
-        if offset.scale != Vec3::ONE {
-            write!(out, ", scale: {}", vector(offset.scale))?;
-        }
-        writeln!(out, "),")?;
-    }
-    Ok(())
 }
 
 fn write_view(out: &mut String, view: &ProjectView) -> std::fmt::Result {

@@ -16,7 +16,8 @@ use super::{
 };
 use crate::rig::{
     FaceBonePart, FacePlacement, GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError,
-    TagData, TagKind, Uid,
+    StoredPose, TagData, TagKind, Uid,
+    format::poses::PoseFile,
     format::scan::{self, Field},
     format::source::{parse_ron, ron_options, utf8},
     format::version::{Format, blanked},
@@ -49,6 +50,8 @@ struct TemplateFile {
     groups: Vec<GroupFile>,
     #[serde(default)]
     joints: Vec<JointFile>,
+    #[serde(default)]
+    poses: Vec<PoseFile>,
 }
 
 #[derive(Deserialize)]
@@ -196,7 +199,7 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
         Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
     };
     let fields = scan::fields(text);
-    let is_list = |field: &&Field| field.depth == 1 && matches!(field.name, "groups" | "joints");
+    let is_list = |field: &&Field| field.depth == 1 && matches!(field.name, "groups" | "joints" | "poses");
     let mut passed_over = TEMPLATE.unknown(&fields);
     passed_over.extend(fields.iter().filter(is_list));
     passed_over.sort_unstable_by_key(|field| field.start);
@@ -225,7 +228,11 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
             "needs",
             "groups",
             "joints",
+            "poses",
         ]),
+        (3, Some("poses")) => Some(&["uid", "name", "offsets", "values"]),
+        (5, Some("offsets")) if above == Some("poses") => Some(&["joint", "translation", "rotation", "scale"]),
+        (5, Some("values")) if above == Some("poses") => Some(&["node", "name", "value"]),
         (2, Some("needs")) => Some(&["joints", "sockets"]),
         (3, Some("features")) => Some(&["kind", "name", "switches"]),
         (3, Some("groups")) => Some(&["uid", "name", "color", "enabled"]),
@@ -282,6 +289,7 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>, faults: &
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
     add_joints(&mut rig, format, file.joints, places, &mut seen, faults);
+    add_poses(&mut rig, file.poses, places, faults);
     bind_references(&mut rig, notes);
     if feature_summaries(&rig) != sorted(file.features) {
         notes.push("the header lists other features than the tags; saving corrects it".to_owned());
@@ -446,6 +454,29 @@ fn add_joints(
             format!("joint {uid} is its own ancestor; give one joint of the cycle another parent"),
         ));
         stack.push((None, uid));
+    }
+}
+
+/// Adds the stored poses. Offsets of nodes that are not there stay: commands may build them.
+fn add_poses(rig: &mut Rig, poses: Vec<PoseFile>, places: &Places, faults: &mut Vec<SourceError>) {
+    for PoseFile { uid, name, offsets, values } in poses {
+        let mut stored = StoredPose { uid, name, ..StoredPose::default() };
+        for offset in offsets {
+            if !offset.offset().is_valid() || stored.offsets.insert(offset.joint, offset.offset()).is_some() {
+                let message = format!(
+                    "the pose has a transform of {} that is not finite, whose rotation is not of length 1, or that it \
+                     has already; correct it",
+                    offset.joint
+                );
+                faults.push(places.error(uid, 0, "offsets", message));
+            }
+        }
+        for value in values.into_iter().filter(|value| value.value.is_finite()) {
+            stored.values.entry(value.node).or_default().insert(value.name, value.value);
+        }
+        if let Err(error) = rig.apply(&RigEdit::AddStoredPose(Box::new(stored), usize::MAX)) {
+            faults.push(places.error(uid, 1, "uid", error.to_string()));
+        }
     }
 }
 

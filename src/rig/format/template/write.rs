@@ -9,23 +9,32 @@ use bevy::math::{Quat, Vec3};
 
 use super::{FORMAT, FeatureSummary, NeedsSummary};
 use crate::rig::{
-    FacePlacement, NodeKind, Rig, RigJoint, TagData, TagKind, Uid, part::PartNeeds, reference::refresh_names,
+    FacePlacement, NodeKind, Rig, RigJoint, TagData, TagKind, Uid, format::poses::write_stored_poses, part::PartNeeds,
+    reference::refresh_names,
 };
 
 /// The text of a rig's template. The same rig gives the same bytes. References in parameters are written with the
 /// current names beside the uids.
 pub fn write_template(rig: &Rig) -> String {
     let mut out = String::new();
-    write_into(&mut out, rig).unwrap_or_default();
+    write_into(&mut out, rig, true).unwrap_or_default();
     out
 }
 
-fn write_into(out: &mut String, rig: &Rig) -> std::fmt::Result {
+/// The text of a rig's template without its stored poses, for projects, which have them beside it.
+pub(in crate::rig) fn write_without_poses(rig: &Rig) -> String {
+    let mut out = String::new();
+    write_into(&mut out, rig, false).unwrap_or_default();
+    out
+}
+
+fn write_into(out: &mut String, rig: &Rig, with_poses: bool) -> std::fmt::Result {
+    let with_poses = with_poses && !rig.stored_poses().is_empty();
     let about = rig.about();
     let needs = needs_summary(rig);
     let has_choice = |tag: &TagData| matches!(&tag.kind, TagKind::Feature { choice, .. } if !choice.is_empty());
     let is_newer = |joint: &RigJoint| joint.data.face.is_some() || joint.data.tags.iter().any(has_choice);
-    let format = if needs.is_some() || rig.walk().any(is_newer) { FORMAT } else { 1 };
+    let format = if with_poses || needs.is_some() || rig.walk().any(is_newer) { FORMAT } else { 1 };
     writeln!(out, "(\n    format: {format},\n    uid: \"{}\",", rig.uid())?;
     writeln!(out, "    name: {},\n    version: {},", quoted(&about.name), quoted(&about.version))?;
     writeln!(out, "    kind: {},\n    author: {},", quoted(&about.kind), quoted(&about.author))?;
@@ -49,6 +58,10 @@ fn write_into(out: &mut String, rig: &Rig) -> std::fmt::Result {
     let features: HashSet<Uid> = rig.walk().flat_map(|joint| &joint.data.tags).filter_map(feature_uid).collect();
     for joint in rig.walk() {
         write_joint(out, rig, joint, &features)?;
+    }
+    if with_poses {
+        writeln!(out, "    ],\n    poses: [")?;
+        write_stored_poses(out, rig, "        ")?;
     }
     writeln!(out, "    ],\n)")
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::FittedFace;
+use super::{FittedFace, ROUNDS, TAKEN};
 use crate::algo::face::{
     bones::FaceBoneKind,
     expression::{BonePose, apply, limited},
@@ -24,18 +24,38 @@ impl PoseProblems {
 }
 
 impl FittedFace<'_> {
-    /// Repairs a pose, in as many rounds as there are parts; returns the number of remaining problems.
-    pub(super) fn repaired(&self, poses: &mut [BonePose], parts: &[f32]) -> usize {
-        let mut problems = self.problems(poses);
-        for part in parts {
+    /// Repairs a pose as far as it may; alike on both sides if `is_alike`.
+    pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) {
+        let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
+        let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
+        let mut apart = vec![0.0; poses.len()];
+        for share in ROUNDS {
+            let problems = self.problems(poses);
             if problems.count() == 0 {
                 break;
             }
-            self.relax(poses, &problems.folded, *part);
-            self.part(poses, &problems.crossed);
-            problems = self.problems(poses);
+            self.relax(poses, &problems.folded, share);
+            self.part(poses, &problems.crossed, &mut apart);
+            let mut changes: Vec<Vec3> = (poses.iter().zip(&solved).zip(&apart))
+                .map(|((pose, solved), apart)| pose.translation - *solved - Vec3::Y * *apart)
+                .collect();
+            if is_alike {
+                self.even_out(&mut changes);
+            }
+            for (((pose, solved), apart), change) in poses.iter_mut().zip(&solved).zip(&apart).zip(changes) {
+                let change = change.clamp_length_max(TAKEN * furthest);
+                pose.translation = limited(*solved + change + Vec3::Y * *apart, self.landmarks);
+            }
         }
-        problems.count()
+    }
+
+    /// Gives both bones of each pair the mean of their changes.
+    fn even_out(&self, changes: &mut [Vec3]) {
+        for &[one, other] in &self.pairs {
+            let over = |v: Vec3| v.with_x(-v.x);
+            let mean = 0.5 * (changes[one] + over(changes[other]));
+            (changes[one], changes[other]) = (mean, over(mean));
+        }
     }
 
     /// Finds triangles that turn by more than a right angle, and lips and lids that cross.
@@ -64,8 +84,9 @@ impl FittedFace<'_> {
         PoseProblems { folded, crossed }
     }
 
-    /// Raises the first of two points above the second by the missing distance, with the least movement of bones.
-    fn part(&self, poses: &mut [BonePose], crossed: &[([u32; 2], f32)]) {
+    /// Raises the first of two points above the second by the missing distance, with the least movement of bones, which
+    /// is added to `apart`.
+    fn part(&self, poses: &mut [BonePose], crossed: &[([u32; 2], f32)], apart: &mut [f32]) {
         let mut more = vec![0.0_f32; poses.len()];
         for &([above, below], missing) in crossed {
             let mut shares = vec![0.0_f32; poses.len()];
@@ -92,8 +113,9 @@ impl FittedFace<'_> {
                 }
             }
         }
-        for (pose, more) in poses.iter_mut().zip(more).filter(|(_, more)| *more != 0.0) {
-            pose.translation = limited(pose.translation + Vec3::Y * more, self.landmarks);
+        for ((pose, apart), more) in poses.iter_mut().zip(apart).zip(more) {
+            pose.translation.y += more;
+            *apart += more;
         }
     }
 

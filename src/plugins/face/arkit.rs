@@ -1,0 +1,103 @@
+//! Blend shapes of ARKit, baked from the facial bones.
+
+use std::collections::BTreeMap;
+
+use bevy::prelude::*;
+
+use super::{
+    ExpressError, FaceRig,
+    pose::{Frame, analysed_weights},
+};
+use crate::{
+    algo::face::{
+        auto::FaceAnalysis,
+        expression::{BonePose, ExpressionSet, Mix, Sides, apply},
+    },
+    mesh::{influences::keep_strongest, model::Weights},
+    plugins::surface::RigMesh,
+    rig::{PoseOffset, Rig, Uid},
+};
+
+/// Shape whose effect is that of itself with the jaw open, less that of the open jaw: lips that meet cannot come nearer.
+const CLOSE: &str = "mouthClose";
+const OPEN: &str = "jawOpen";
+/// Longest displacement that counts as none, in eye distances: less than a hundredth of a millimetre on a head.
+const STILL: f32 = 1e-4;
+
+/// A blend shape as the facial bones make it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FaceShape {
+    /// Name in ARKit.
+    pub name: String,
+    /// Displacement of each point of the mesh, in the mesh's space and unit.
+    pub offsets: Vec<Vec3>,
+    /// Pose of the facial joints.
+    pub pose: BTreeMap<Uid, PoseOffset>,
+}
+
+/// The blend shapes of ARKit for which the set has units, in the order of the units, as linear skinning by the facial
+/// bones with the strongest `influences` of each point gives them.
+///
+/// # Errors
+/// [`ExpressError::NoBones`] and [`ExpressError::NotSkinned`].
+pub fn arkit_shapes(
+    rig: &Rig,
+    mesh: &RigMesh,
+    analysis: &FaceAnalysis,
+    set: &ExpressionSet,
+    influences: usize,
+) -> Result<Vec<FaceShape>, ExpressError> {
+    let face = FaceRig::read(rig);
+    if face.bones.is_empty() {
+        return Err(ExpressError::NoBones);
+    }
+    let skin = rig.skin(mesh.uid).ok_or(ExpressError::NotSkinned)?;
+    let weights = strongest(&analysed_weights(skin, &face, analysis), influences);
+    let bones = face.face_bones(analysis);
+    let fitted = analysis.fitted(&bones, &weights);
+    let units = set.unit_set();
+    let poses = |shapes: &[(usize, Sides)]| {
+        let mut mix = Mix::rest(units);
+        for (unit, side) in shapes {
+            if let Some(unit) = units.units().get(*unit) {
+                mix.add(&unit.name, *side, 1.0, units);
+            }
+        }
+        fitted.pose(&mix, units)
+    };
+    let open = units.arkit(OPEN);
+    let still = STILL * analysis.landmarks.eye_distance();
+    let shapes = units.arkit_shapes().map(|(name, unit, side)| {
+        let mut own = poses(&[(unit, side)]);
+        if let Some(open) = open.filter(|_| name == CLOSE) {
+            for ((own, both), open) in own.iter_mut().zip(poses(&[(unit, side), open])).zip(poses(&[open])) {
+                *own = BonePose { translation: both.translation - open.translation, ..BonePose::REST };
+            }
+        }
+        let mut offsets = vec![Vec3::ZERO; analysis.mesh_points];
+        let moved = apply(&analysis.points, &weights, &bones, &own);
+        for (point, (moved, rest)) in moved.iter().zip(&analysis.points).enumerate() {
+            let offset = *moved - *rest;
+            if let Some(slot) = offsets.get_mut(analysis.mesh_point(point)).filter(|_| offset.length() > still) {
+                *slot = analysis.to_mesh() * offset;
+            }
+        }
+        let pose = face.bones.iter().zip(&own).filter_map(|(bone, pose)| {
+            let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
+            (!offset.is_rest(1e-7)).then_some((bone.uid, offset))
+        });
+        FaceShape { name: name.to_owned(), offsets, pose: pose.collect() }
+    });
+    Ok(shapes.collect())
+}
+
+fn strongest(weights: &Weights, most: usize) -> Weights {
+    let mut kept = Weights::default();
+    for point in 0..weights.len() {
+        // Several joints of the skin may be one here: what a file keeps is decided joint by joint before.
+        let mut influences: Vec<(u32, f32)> = weights.of(point).collect();
+        keep_strongest(&mut influences, most, 0.0);
+        kept.push(influences.into_iter());
+    }
+    kept
+}

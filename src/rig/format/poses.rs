@@ -1,0 +1,113 @@
+//! Poses in templates and projects: offsets of joints, values of attributes, and stored poses.
+
+use std::fmt::Write;
+
+use bevy::math::{Quat, Vec3};
+use serde::Deserialize;
+
+use super::template::{quoted, vector};
+use crate::rig::{AttributeValues, PoseOffset, Rig, Uid};
+
+/// A stored pose.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PoseFile {
+    pub uid: Uid,
+    pub name: String,
+    #[serde(default)]
+    pub offsets: Vec<OffsetFile>,
+    #[serde(default)]
+    pub values: Vec<ValueFile>,
+}
+
+/// A value of an attribute.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ValueFile {
+    pub node: Uid,
+    pub name: String,
+    pub value: f32,
+}
+
+/// An offset of a joint or a created node.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OffsetFile {
+    pub joint: Uid,
+    #[serde(default)]
+    pub translation: (f32, f32, f32),
+    #[serde(default = "no_rotation")]
+    pub rotation: (f32, f32, f32, f32),
+    #[serde(default = "no_scale")]
+    pub scale: (f32, f32, f32),
+}
+
+impl OffsetFile {
+    /// The offset, checked by nobody yet.
+    pub fn offset(&self) -> PoseOffset {
+        let (x, y, z, w) = self.rotation;
+        PoseOffset {
+            translation: <[f32; 3]>::from(self.translation).into(),
+            rotation: Quat::from_xyzw(x, y, z, w),
+            scale: <[f32; 3]>::from(self.scale).into(),
+        }
+    }
+}
+
+fn no_rotation() -> (f32, f32, f32, f32) {
+    (0.0, 0.0, 0.0, 1.0)
+}
+
+fn no_scale() -> (f32, f32, f32) {
+    (1.0, 1.0, 1.0)
+}
+
+/// Writes a list of attribute values, unless there are none.
+pub(super) fn write_values(out: &mut String, values: &AttributeValues, indent: &str) -> std::fmt::Result {
+    if values.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "{indent}values: [")?;
+    for (node, values) in values {
+        for (name, value) in values {
+            writeln!(out, "{indent}    (node: \"{node}\", name: {}, value: {value:?}),", quoted(name))?;
+        }
+    }
+    writeln!(out, "{indent}],")
+}
+
+/// Writes offsets, one a line.
+pub(super) fn write_offsets<'a>(
+    out: &mut String,
+    offsets: impl IntoIterator<Item = (&'a Uid, &'a PoseOffset)>,
+    indent: &str,
+) -> std::fmt::Result {
+    for (joint, offset) in offsets {
+        write!(out, "{indent}(joint: \"{joint}\"")?;
+        if offset.translation != Vec3::ZERO {
+            write!(out, ", translation: {}", vector(offset.translation))?;
+        }
+        if offset.rotation != Quat::IDENTITY {
+            let [x, y, z, w] = offset.rotation.to_array();
+            write!(out, ", rotation: ({x:?}, {y:?}, {z:?}, {w:?})")?;
+        }
+        if offset.scale != Vec3::ONE {
+            write!(out, ", scale: {}", vector(offset.scale))?;
+        }
+        writeln!(out, "),")?;
+    }
+    Ok(())
+}
+
+/// Writes the stored poses of a rig, as elements of a list.
+pub(super) fn write_stored_poses(out: &mut String, rig: &Rig, indent: &str) -> std::fmt::Result {
+    for pose in rig.stored_poses() {
+        writeln!(out, "{indent}(\n{indent}    uid: \"{}\",", pose.uid)?;
+        writeln!(out, "{indent}    name: {},\n{indent}    offsets: [", quoted(&pose.name))?;
+        write_offsets(out, &pose.offsets, &format!("{indent}        "))?;
+        writeln!(out, "{indent}    ],")?;
+        write_values(out, &pose.values, &format!("{indent}    "))?;
+        writeln!(out, "{indent}),")?;
+    }
+    Ok(())
+}

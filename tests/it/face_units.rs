@@ -1,0 +1,181 @@
+//! Units of the face beside the true shapes of the same heads, and the blend shapes baked from bones.
+
+use std::path::Path;
+
+use glam::Vec3;
+use rigsmith::{
+    algo::face::{
+        auto::{AutoFace, AutoSettings, FaceAnalysis},
+        expression::{ExpressionSet, Mix, Sides, apply},
+    },
+    files::{RealDisk, load_model, load_template},
+    mesh::{
+        model::{ChannelTarget, Model},
+        skinning::skin_points,
+    },
+};
+
+use crate::{cli_build::rigsmith, heads, prerequisites::test_data};
+
+/// True displacements of a head by name.
+fn true_shapes(folder: &Path) -> Vec<(String, Vec<Vec3>)> {
+    let text = std::fs::read_to_string(folder.join("heads/ict_expressions.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let count = json["vertices"].as_u64().unwrap() as usize;
+    let bytes = std::fs::read(folder.join("heads/ict_expressions.f32")).unwrap();
+    let (numbers, _) = bytes.as_chunks::<4>();
+    let numbers: Vec<f32> = numbers.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let (points, _) = numbers.as_chunks::<3>();
+    let names = json["names"].as_array().unwrap().iter().map(|name| name.as_str().unwrap().to_owned());
+    names
+        .zip(points.chunks(count))
+        .map(|(name, shape)| (name, shape.iter().map(|v| Vec3::from(*v)).collect()))
+        .collect()
+}
+
+struct Posable {
+    analysis: FaceAnalysis,
+    face: AutoFace,
+}
+
+impl Posable {
+    fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let settings = AutoSettings { bones: 40, ..AutoSettings::default() };
+        let analysis = FaceAnalysis::new(points, triangles, &settings, &|_, _| true).unwrap();
+        let face = analysis.rig(&[], &settings, ExpressionSet::bundled(), &|_, _| true).unwrap();
+        Self { analysis, face }
+    }
+
+    /// Displacement of each point by a unit.
+    fn moved(&self, unit: usize, side: Sides) -> Vec<Vec3> {
+        let units = ExpressionSet::bundled().unit_set();
+        let mut mix = Mix::rest(units);
+        mix.add(&units.units()[unit].name, side, 1.0, units);
+        let fitted = self.analysis.fitted(&self.face.bones, &self.face.weights);
+        let posed = apply(&self.analysis.points, &self.face.weights, &self.face.bones, &fitted.pose(&mix, units));
+        let to_mesh = self.analysis.to_mesh();
+        posed.iter().zip(&self.analysis.points).map(|(posed, rest)| to_mesh * (*posed - *rest)).collect()
+    }
+}
+
+/// Points of the face proper in the heads with true shapes; the others are neck, back of the head and inside.
+const FACE: usize = 9409;
+
+/// Mean residual (root mean square, of the shape's), cosine and amplitude over all shapes.
+fn beside_truth(name: &str) -> Option<[f64; 3]> {
+    let folder = test_data()?;
+    let (points, triangles) = heads::mesh(&folder.join(format!("heads/{name}.obj")));
+    let head = Posable::new(&points, &triangles);
+    let units = ExpressionSet::bundled().unit_set();
+    let mut sums = [0.0; 3];
+    let mut count = 0.0;
+    for (shape, truth) in true_shapes(&folder) {
+        // Lips that meet only come together where the jaw is open.
+        if shape.starts_with("PupilDilate") || shape == "mouthClose" {
+            continue;
+        }
+        let found = shape.strip_prefix("cheekRaiser").map(|side| {
+            let side = if side == "_L" { Sides::Left } else { Sides::Right };
+            (units.index("cheek_raise").unwrap(), side)
+        });
+        let (unit, side) = found.or_else(|| units.arkit(&shape)).unwrap_or_else(|| panic!("no unit for {shape}"));
+        let moved = head.moved(unit, side);
+        let dot = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).take(FACE).map(|(a, b)| f64::from(a.dot(*b))).sum::<f64>();
+        let off: Vec<Vec3> = moved.iter().zip(&truth).map(|(moved, truth)| *moved - *truth).collect();
+        let (square, own) = (dot(&truth, &truth), dot(&moved, &moved));
+        let measured = [
+            (dot(&off, &off) / square).sqrt(),
+            dot(&moved, &truth) / (own * square).sqrt().max(1e-12),
+            dot(&moved, &truth) / square,
+        ];
+        println!(
+            "{name} {shape}: residual {:.2}, cosine {:.2}, amplitude {:.2}",
+            measured[0], measured[1], measured[2]
+        );
+        sums.iter_mut().zip(measured).for_each(|(sum, value)| *sum += value);
+        count += 1.0;
+    }
+    let mean = sums.map(|sum| sum / count);
+    println!("{name}: residual {:.3}, cosine {:.3}, amplitude {:.3}", mean[0], mean[1], mean[2]);
+    Some(mean)
+}
+
+#[test]
+fn units_do_what_the_true_shapes_do() {
+    // The last head was kept away from the measurement of the units.
+    for (name, most) in
+        [("ict_neutral", 0.44), ("ict_identity_1", 0.44), ("ict_identity_2", 0.46), ("ict_identity_3", 0.49)]
+    {
+        let Some([residual, cosine, amplitude]) = beside_truth(name) else { return };
+        assert!(residual <= most, "{name}: {residual} of the shapes is left");
+        assert!(cosine >= 0.89, "{name}: cosine {cosine}");
+        assert!((0.8..=1.1).contains(&amplitude), "{name}: amplitude {amplitude}");
+    }
+}
+
+#[test]
+fn the_shapes_of_arkit_are_those_of_the_bones() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj").display().to_string();
+    let exports = std::env::var_os("RIGSMITH_EXPORTS").map(std::path::PathBuf::from);
+    let glb = exports.map_or_else(|| folder.path().join("arkit.glb"), |exports| exports.join("arkit.glb"));
+    let (glb, rig) = (glb.display().to_string(), folder.path().join("arkit.rig.ron").display().to_string());
+    let answer = rigsmith(folder.path(), &["face", &head, "--arkit", "-o", &glb, "--json"]);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    assert_eq!(answer.json()["arkit"].as_array().unwrap().len(), 51);
+    let model = load_model(&RealDisk, Path::new(&glb)).unwrap();
+    let names = &model.objects[model.parts[0].object].morph_names;
+    assert_eq!(names.len(), 51);
+    for name in ["eyeBlinkLeft", "jawOpen", "mouthClose", "mouthSmileRight", "noseSneerLeft", "browInnerUp"] {
+        assert!(names.iter().any(|known| known == name), "{name} is baked");
+    }
+    let size = model.points.iter().fold(Vec3::ZERO, |most, point| most.max(point.abs())).max_element();
+    let (mut furthest, mut largest) = (0.0_f32, 0.0_f32);
+    for (number, name) in names.iter().enumerate() {
+        let clip = model.clips.iter().find(|clip| clip.name == *name).unwrap_or_else(|| panic!("no clip {name}"));
+        let mut posed = model.clone();
+        for channel in &clip.channels {
+            match (channel.target, channel.values.as_slice()) {
+                (ChannelTarget::Translation(node), [x, y, z]) => {
+                    posed.nodes[node].rest.translation = Vec3::new(*x, *y, *z);
+                }
+                (ChannelTarget::Rotation(node), [x, y, z, w]) => {
+                    posed.nodes[node].rest.rotation = glam::Quat::from_xyzw(*x, *y, *z, *w);
+                }
+                (target, values) => panic!("{name}: {target:?} {values:?}"),
+            }
+        }
+        let (moved, rest) = (skinned(&posed), skinned(&model));
+        for part in &model.parts {
+            for (vertex, point) in part.vertices.iter().enumerate() {
+                let own = moved[*point as usize] - rest[*point as usize];
+                furthest = furthest.max(own.distance(part.morphs[number].positions[vertex]));
+                largest = largest.max(own.length());
+            }
+        }
+    }
+    assert!(largest > 0.02 * size, "shapes move: {largest}");
+    assert!(furthest <= 2e-4 * size, "{furthest} between shapes and bones on a head of {size}");
+
+    assert_eq!(rigsmith(folder.path(), &["face", &head, "--arkit", "-o", &rig]).code, 0);
+    let template = load_template(&RealDisk, Path::new(&rig)).unwrap();
+    assert_eq!(template.rig.stored_poses().len(), 51);
+}
+
+/// Points of a model skinned by its nodes as they stand.
+fn skinned(model: &Model) -> Vec<Vec3> {
+    let mut globals: Vec<glam::Affine3A> = Vec::new();
+    for node in &model.nodes {
+        let own =
+            glam::Affine3A::from_scale_rotation_translation(node.rest.scale, node.rest.rotation, node.rest.translation);
+        globals.push(node.parent.map_or(own, |parent| globals[parent] * own));
+    }
+    let skin = &model.skins[0];
+    let mut matrices = vec![glam::Affine3A::IDENTITY; model.nodes.len()];
+    for (joint, inverse) in skin.joints.iter().zip(&skin.inverse_binds) {
+        matrices[*joint] = globals[*joint] * glam::Affine3A::from_mat4(*inverse);
+    }
+    let mut points = Vec::new();
+    skin_points(&model.points, model.weights.as_ref().unwrap(), &matrices, &mut points);
+    points
+}
