@@ -337,6 +337,10 @@ fn templates_build_with_any_group_off_and_say_what_is_passed_over() {
         controls(&answer)
     };
     let all = pose(&[]);
+    // A limb's end means the control that moves it, also where its goal is a node below that control.
+    for end in ["hand_l", "foot_l"] {
+        assert_eq!(pose(&["--set", &format!("{end}.translate=(0,0.05,0)")]), all);
+    }
     // One switch of a combined feature, in all limbs and in one.
     let unrolled = pose(&["--feature", "ik=foot_roll=off"]);
     assert!(unrolled.len() <= all.len() && unrolled.contains("\"foot_ik_l\""));

@@ -8,7 +8,7 @@ use rigsmith::{
     rig::{
         EditError, PoseOffset, RestTransform, Rig, RigEdit, StoredPose, Uid,
         operations::{Axis, MirrorPlane, Operation, OperationError},
-        template::write_template,
+        template::{read_template, write_template},
     },
 };
 
@@ -362,13 +362,16 @@ fn who_else_writes_a_pose_keeps_it_until_the_document_poses_that_joint() {
 }
 
 #[test]
-fn templates_and_exports_hold_the_rest_pose() {
+fn templates_and_exports_hold_the_rest_pose_and_stored_ones() {
     let (bench, hips, left, _) = two_arms();
     let mut work = Workbench::with_rig(1, bench.rig.clone());
     let (text, before) = (write_template(work.rig()), work.character());
     work.operate(Operation::Pose(vec![(hips, turn(0.3, 0.0, 0.0)), (left[0], turn(0.0, 1.0, 0.0))])).unwrap();
+    assert_eq!(write_template(work.rig()), text);
     work.operate(Operation::StorePose("bent".into())).unwrap();
     assert_eq!(work.rig().stored_poses()[0].offsets.len(), 2);
-    assert_eq!(write_template(work.rig()), text);
+    let read = read_template(write_template(work.rig()).as_bytes()).unwrap();
+    assert!(read.notes.is_empty() && read.rig.pose().is_empty());
+    assert_eq!(read.rig.stored_poses(), work.rig().stored_poses());
     assert_eq!(work.character(), before);
 }

@@ -6,7 +6,7 @@ use bevy::math::{Quat, Vec3};
 use serde::Deserialize;
 
 use super::template::{quoted, vector};
-use crate::rig::{AttributeValues, PoseOffset, Rig, Uid};
+use crate::rig::{AttributeValues, PoseOffset, Rig, RigEdit, StoredPose, Uid};
 
 /// A stored pose.
 #[derive(Deserialize)]
@@ -54,11 +54,11 @@ impl OffsetFile {
     }
 }
 
-fn no_rotation() -> (f32, f32, f32, f32) {
+pub(super) fn no_rotation() -> (f32, f32, f32, f32) {
     (0.0, 0.0, 0.0, 1.0)
 }
 
-fn no_scale() -> (f32, f32, f32) {
+pub(super) fn no_scale() -> (f32, f32, f32) {
     (1.0, 1.0, 1.0)
 }
 
@@ -110,4 +110,28 @@ pub(super) fn write_stored_poses(out: &mut String, rig: &Rig, indent: &str) -> s
         writeln!(out, "{indent}),")?;
     }
     Ok(())
+}
+
+/// Adds stored poses; `fault` takes the uid of a wrong pose, the place of that uid among equal ones, the field and the
+/// message. Offsets of nodes that are not there stay: commands may build them.
+pub(super) fn add_poses(rig: &mut Rig, poses: Vec<PoseFile>, fault: &mut dyn FnMut(Uid, usize, &str, String)) {
+    for PoseFile { uid, name, offsets, values } in poses {
+        let mut stored = StoredPose { uid, name, ..StoredPose::default() };
+        for offset in offsets {
+            if !offset.offset().is_valid() || stored.offsets.insert(offset.joint, offset.offset()).is_some() {
+                let message = format!(
+                    "the pose has a transform of {} that is not finite, whose rotation is not of length 1, or that it \
+                     has already; correct it",
+                    offset.joint
+                );
+                fault(uid, 0, "offsets", message);
+            }
+        }
+        for value in values.into_iter().filter(|value| value.value.is_finite()) {
+            stored.values.entry(value.node).or_default().insert(value.name, value.value);
+        }
+        if let Err(error) = rig.apply(&RigEdit::AddStoredPose(Box::new(stored), usize::MAX)) {
+            fault(uid, 1, "uid", error.to_string());
+        }
+    }
 }

@@ -2,15 +2,14 @@
 //! chains the constraints of one node in list order.
 
 mod finish;
+mod scalar_key;
 
-use std::{
-    mem::{Discriminant, discriminant},
-    sync::Arc,
-};
+use std::sync::Arc;
 
 use bevy::platform::collections::HashMap;
 use glam::Vec3;
 
+use self::scalar_key::{ScalarKey, scalar_key};
 use super::{
     ExternalNode, Keep, ProgramError,
     error::describe,
@@ -447,19 +446,6 @@ impl<'a> Graph<'a> {
     pub fn attribute(&self, node: usize, number: usize) -> N {
         self.nodes[node].attributes[number]
     }
-}
-
-/// A scalar bit by bit: kind, node, attribute or channel, and numbers.
-type ScalarKey = (Discriminant<Scalar>, usize, Option<Arc<str>>, Option<Channel>, [u32; 2]);
-
-fn scalar_key(node: usize, scalar: &Scalar) -> ScalarKey {
-    let (name, channel, numbers) = match scalar {
-        Scalar::Value(value) => (None, None, [value.to_bits(), 0]),
-        Scalar::Attribute { name, factor, add, .. } => (Some(name), None, [factor.to_bits(), add.to_bits()]),
-        Scalar::Choice { name, value, .. } => (Some(name), None, [value.to_bits(), 0]),
-        Scalar::Channel { channel, .. } => (None, Some(*channel), [0; 2]),
-    };
-    (discriminant(scalar), node, name.cloned(), channel, numbers)
 }
 
 pub(super) fn valid(trs: &Trs) -> bool {

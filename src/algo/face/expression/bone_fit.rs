@@ -28,7 +28,7 @@ const SAMPLES: usize = 1600;
 /// Weight of a landmark, as a share of the whole skin's weight.
 const LANDMARK: f64 = 0.002;
 /// Weight of the pull towards the mean of the field over a bone's patch, as a share of the patch's weight.
-const HOLD: f64 = 0.01;
+const HOLD: f64 = 0.02;
 /// Weight of the distance of two landmarks, as a share of the whole skin's weight.
 const PAIR: f64 = 0.02;
 /// Landmarks whose distance matters more than their positions: lips, lids, corners of the mouth, inner brows.
@@ -37,9 +37,9 @@ const PAIRS: [[usize; 2]; 9] =
 /// Number of the first [`PAIRS`] whose first landmark must stay above the second: lips and lids.
 const APART: usize = 7;
 /// Stiffness between bones with common skin.
-const STIFF: f64 = 0.001;
+const STIFF: f64 = 0.01;
 /// Factor of the field. What bones cannot follow is lost, and makes the rest smaller than the field on average.
-const GAIN: f64 = 1.06;
+const GAIN: f64 = 1.09;
 /// Largest area of triangles that are ignored, as a share of their longest edge squared.
 pub(super) const SLIVER: f32 = 1e-3;
 /// Shares by which the movements of bones are brought nearer to each other where skin folds, one a round.

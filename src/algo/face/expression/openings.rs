@@ -8,6 +8,9 @@ use glam::Vec3;
 use super::text::Part;
 use crate::algo::face::landmarks::Landmarks;
 
+/// Half the height, in eye distances, in which the skin of a closed mouth goes over from the upper to the lower lip.
+const CLOSED_BLEND: f32 = 0.12;
+
 /// Known lip and lid of a point: touching lips cannot be told apart by position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct OpeningSide {
@@ -37,6 +40,8 @@ pub(super) struct OpeningLines {
     scale: f32,
     middle: f32,
     mouth: Line,
+    /// True if the lips can part; a mouth that is one closed surface stretches instead.
+    lips_part: bool,
     /// Lines of the left and the right eye.
     eyes: [Line; 2],
 }
@@ -63,6 +68,7 @@ impl OpeningLines {
         Some(Self {
             scale,
             middle: landmarks.middle * scale,
+            lips_part: landmarks.mouth_open,
             mouth: line(&[[48, 48], [60, 60], [61, 67], [62, 66], [63, 65], [64, 64], [54, 54]]),
             eyes: [line(&[[42, 42], [43, 47], [44, 46], [45, 45]]), line(&[[36, 36], [37, 41], [38, 40], [39, 39]])],
         })
@@ -78,8 +84,8 @@ impl OpeningLines {
     pub fn part(&self, part: Part, point: Vec3, known: OpeningSide) -> f32 {
         match part {
             Part::Everywhere => 1.0,
-            Part::UpperLip => self.upper(&self.mouth, point, known.upper_lip),
-            Part::LowerLip => 1.0 - self.upper(&self.mouth, point, known.upper_lip),
+            Part::UpperLip => self.upper_lip(point, known),
+            Part::LowerLip => 1.0 - self.upper_lip(point, known),
             Part::UpperLid => self.upper(self.eye(point), point, known.upper_lid),
             Part::LowerLid => 1.0 - self.upper(self.eye(point), point, known.upper_lid),
         }
@@ -88,7 +94,7 @@ impl OpeningLines {
     /// Returns `true` if a point is too near to the mouth's line to tell its side by position.
     pub fn near_mouth_line(&self, point: Vec3) -> bool {
         let place = self.mouth.place(point * self.scale);
-        place.beyond <= 0.0 && place.above.abs() < 0.04
+        self.lips_part && place.beyond <= 0.0 && place.above.abs() < 0.04
     }
 
     /// Returns `true` for points above the mouth's line.
@@ -113,6 +119,13 @@ impl OpeningLines {
     fn eye(&self, point: Vec3) -> &Line {
         let [left, right] = &self.eyes;
         if point.x * self.scale >= self.middle { left } else { right }
+    }
+
+    fn upper_lip(&self, point: Vec3, known: OpeningSide) -> f32 {
+        if self.lips_part {
+            return self.upper(&self.mouth, point, known.upper_lip);
+        }
+        ramp(self.mouth.place(point * self.scale).above / CLOSED_BLEND)
     }
 
     fn upper(&self, line: &Line, point: Vec3, known: Option<bool>) -> f32 {

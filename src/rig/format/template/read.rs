@@ -16,8 +16,8 @@ use super::{
 };
 use crate::rig::{
     FaceBonePart, FacePlacement, GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError,
-    StoredPose, TagData, TagKind, Uid,
-    format::poses::PoseFile,
+    TagData, TagKind, Uid,
+    format::poses::{PoseFile, add_poses, no_rotation, no_scale},
     format::scan::{self, Field},
     format::source::{parse_ron, ron_options, utf8},
     format::version::{Format, blanked},
@@ -130,14 +130,6 @@ enum TagFile {
 
 fn yes() -> bool {
     true
-}
-
-fn no_rotation() -> (f32, f32, f32, f32) {
-    (0.0, 0.0, 0.0, 1.0)
-}
-
-fn no_scale() -> (f32, f32, f32) {
-    (1.0, 1.0, 1.0)
 }
 
 const TEMPLATE: Format = Format { what: "template", number: FORMAT, known: known_names };
@@ -283,13 +275,14 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>, faults: &
         }
         rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
-    let format = file.format;
-    let count = file.joints.len();
+    let (format, count) = (file.format, file.joints.len());
     if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count) {
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
     add_joints(&mut rig, format, file.joints, places, &mut seen, faults);
-    add_poses(&mut rig, file.poses, places, faults);
+    add_poses(&mut rig, file.poses, &mut |uid, nth, field, message| {
+        faults.push(places.error(uid, nth, field, message));
+    });
     bind_references(&mut rig, notes);
     if feature_summaries(&rig) != sorted(file.features) {
         notes.push("the header lists other features than the tags; saving corrects it".to_owned());
@@ -457,29 +450,6 @@ fn add_joints(
     }
 }
 
-/// Adds the stored poses. Offsets of nodes that are not there stay: commands may build them.
-fn add_poses(rig: &mut Rig, poses: Vec<PoseFile>, places: &Places, faults: &mut Vec<SourceError>) {
-    for PoseFile { uid, name, offsets, values } in poses {
-        let mut stored = StoredPose { uid, name, ..StoredPose::default() };
-        for offset in offsets {
-            if !offset.offset().is_valid() || stored.offsets.insert(offset.joint, offset.offset()).is_some() {
-                let message = format!(
-                    "the pose has a transform of {} that is not finite, whose rotation is not of length 1, or that it \
-                     has already; correct it",
-                    offset.joint
-                );
-                faults.push(places.error(uid, 0, "offsets", message));
-            }
-        }
-        for value in values.into_iter().filter(|value| value.value.is_finite()) {
-            stored.values.entry(value.node).or_default().insert(value.name, value.value);
-        }
-        if let Err(error) = rig.apply(&RigEdit::AddStoredPose(Box::new(stored), usize::MAX)) {
-            faults.push(places.error(uid, 1, "uid", error.to_string()));
-        }
-    }
-}
-
 fn feature_uid(tag: &TagFile) -> Option<Uid> {
     match tag {
         TagFile::Feature { uid, .. } => Some(*uid),
@@ -522,10 +492,9 @@ impl Places<'_> {
                 && known_names(self.fields, field).is_some()
                 && value.get(..digits.len()).is_some_and(|value| value.eq_ignore_ascii_case(&digits))
         };
-        let declared: Vec<&Field> = self.fields.iter().filter(declares).collect();
-        let thing = declared.get(nth).or(declared.first());
+        let thing = self.fields.iter().filter(declares).nth(nth).or_else(|| self.fields.iter().find(declares));
         let field = thing.and_then(|uid| self.fields.iter().find(|f| f.bracket == uid.bracket && f.name == name));
-        let at = field.or(thing.copied()).map_or(0, |field| field.start);
+        let at = field.or(thing).map_or(0, |field| field.start);
         SourceError::at(self.text, at, message)
     }
 }
