@@ -97,7 +97,7 @@ fn strongest(weights: &Weights, most: usize) -> Weights {
         // Several joints of the skin may be one here: what a file keeps is decided joint by joint before.
         let mut influences: Vec<(u32, f32)> = weights.of(point).collect();
         keep_strongest(&mut influences, most, 0.0);
-        kept.push(influences.into_iter());
+        kept.push(influences);
     }
     kept
 }
