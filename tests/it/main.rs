@@ -27,6 +27,8 @@ mod editor_files;
 mod edits;
 mod exports;
 mod face;
+#[cfg(feature = "cli")]
+mod face_arkit;
 mod face_bones;
 mod face_expressions;
 mod face_fit;
