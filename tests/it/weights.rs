@@ -490,6 +490,18 @@ proptest! {
     }
 }
 
+#[test]
+fn half_joints_alone_are_bound_like_others() {
+    let joint =
+        |parent, deforms, halves| WeightJoint { head: Vec3::ZERO, parent, tail: None, deforms, twist: None, halves };
+    let joints = [joint(None, false, None), joint(Some(0), true, Some(0))];
+    for method in [Method::Auto, Method::Heat, Method::Voxel] {
+        let settings = WeightSettings { method, ..WeightSettings::default() };
+        let (weights, _) = skin_weights(&[Vec3::ZERO], &[], &joints, &[], None, &settings, &|_| true).unwrap();
+        assert_eq!(weights.of(0).collect::<Vec<_>>(), [(1, 1.0)], "{method:?}");
+    }
+}
+
 /// Half joints take what both sides of a bend hold in common, and nothing else changes: at a hip as it is, at a knee
 /// after the blend was drawn out.
 #[test]

@@ -17,6 +17,7 @@ const SOCKET: f32 = 1.0;
 const HINGED: f32 = 0.8;
 
 /// The half joints of a skeleton.
+#[derive(Default)]
 pub(crate) struct Halves(Vec<Half>);
 
 struct Half {

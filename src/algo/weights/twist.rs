@@ -14,7 +14,7 @@ const AT_START: f32 = 0.01;
 
 /// The joints that are bound, and those that share their bones.
 pub(crate) struct Limbs {
-    /// The joints without twist and half joints.
+    /// The joints without twist and half joints; with half joints if nothing else takes part.
     pub joints: Vec<WeightJoint>,
     /// Those of them that take part.
     pub free: Vec<u32>,
@@ -40,7 +40,13 @@ impl Limbs {
         for &joint in free {
             is_free[joint as usize] = true;
         }
-        let is_core = |joint: &WeightJoint| joint.twist.is_none() && joint.halves.is_none();
+        // Half joints take from the joints of a bend: where none of those takes part, they are bound like any other.
+        let is_bound = |joint: usize| {
+            let owner = joints[joint].twist.map_or(joint, |twist| twist.joint);
+            is_free[joint] && joints[owner].halves.is_none()
+        };
+        let has_halves = (0..joints.len()).any(is_bound);
+        let is_core = |joint: &WeightJoint| joint.twist.is_none() && (joint.halves.is_none() || !has_halves);
         let places: Vec<u32> = (0..joints.len() as u32).filter(|&j| is_core(&joints[j as usize])).collect();
         let mut number = vec![None; joints.len()];
         for (core, &place) in places.iter().enumerate() {
@@ -69,7 +75,7 @@ impl Limbs {
             free,
             places,
             bones,
-            halves: Halves::new(joints, &is_free),
+            halves: if has_halves { Halves::new(joints, &is_free) } else { Halves::default() },
         }
     }
 
