@@ -12,18 +12,9 @@ use rigsmith::algo::face::{
 
 use crate::{
     heads::{HEADS, Mesh, bundled, bundled_and, mesh, truth},
-    prerequisites::test_data,
+    prerequisites::{BODIES, test_data},
 };
 
-const BODIES: [&str; 7] = [
-    "baby",
-    "female_heavy_tpose",
-    "female_young",
-    "female_young_armsdown",
-    "male_child_tpose",
-    "male_muscular_action",
-    "male_young",
-];
 const BEASTS: [&str; 4] = ["fox-fox.glb", "fox-dog.glb", "bird-eagle.glb", "spot.obj"];
 
 /// A head with all that is found on it.

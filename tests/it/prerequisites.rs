@@ -3,6 +3,17 @@
 
 use std::{collections::BTreeSet, io::Write, panic::Location, path::PathBuf, process::Command, sync::Mutex};
 
+/// The bodies of the test data.
+pub const BODIES: [&str; 7] = [
+    "baby",
+    "female_heavy_tpose",
+    "female_young",
+    "female_young_armsdown",
+    "male_child_tpose",
+    "male_muscular_action",
+    "male_young",
+];
+
 /// Folder of test meshes that `RIGSMITH_DATA` names, for tests to which real meshes are an addition.
 pub fn data_folder() -> Option<PathBuf> {
     let folder = PathBuf::from(std::env::var_os("RIGSMITH_DATA").filter(|folder| !folder.is_empty())?);

@@ -7,6 +7,7 @@ mod places;
 
 use std::collections::BTreeSet;
 
+use crate::prerequisites::BODIES;
 use bevy::math::{Affine3A, Vec3};
 use rigsmith::rig::{Uid, deform::DeformSkeleton};
 
@@ -31,7 +32,7 @@ const KNOWN: [(&str, [(i32, usize); 4]); 8] = [
 
 /// The bundled biped, and the seven bodies where there is data.
 fn figures() -> impl Iterator<Item = Figure> {
-    std::iter::once(Figure::bundled()).chain(figure::BODIES.into_iter().filter_map(Figure::body))
+    std::iter::once(Figure::bundled()).chain(BODIES.into_iter().filter_map(Figure::body))
 }
 
 /// The twist joints of the bone that begins at a joint, with how far along it they lie.

@@ -9,15 +9,7 @@ use rigsmith::{
 };
 use serde_json::Value;
 
-const BODIES: [&str; 7] = [
-    "baby",
-    "female_heavy_tpose",
-    "female_young",
-    "female_young_armsdown",
-    "male_child_tpose",
-    "male_muscular_action",
-    "male_young",
-];
+use crate::prerequisites::{BODIES, test_data};
 
 /// A body with the joints of one of its rigs and the weights painted for them.
 struct Body {
@@ -117,7 +109,7 @@ fn difference(a: &Weights, b: &Weights, points: impl Iterator<Item = usize>) -> 
 
 #[test]
 fn bodies_are_bound_better_than_by_plain_bone_heat() {
-    let Some(data) = crate::prerequisites::test_data() else { return };
+    let Some(data) = test_data() else { return };
     // Errors as measured; a tenth more is the most. Blender's bone heat has 0.233 and 0.159 on the first body.
     for (body, rig, measured) in [
         ("male_young", "game_engine", 0.121),
@@ -139,7 +131,7 @@ fn bodies_are_bound_better_than_by_plain_bone_heat() {
 /// (elbow), 0.057 (knee), 0.149 and 0.189 (shoulder), 0.362 and 0.348 (hip); it leaves the baby without weights.
 #[test]
 fn bends_lie_beside_those_of_painted_weights() {
-    let Some(data) = crate::prerequisites::test_data() else { return };
+    let Some(data) = test_data() else { return };
     let rigs: [(&str, [[&str; 2]; 4], [f32; 4]); 2] = [
         (
             "game_engine",
@@ -261,7 +253,7 @@ impl Character {
 /// it hold nothing.
 #[test]
 fn characters_of_many_parts_are_bound_part_by_part() {
-    let Some(data) = crate::prerequisites::test_data() else { return };
+    let Some(data) = test_data() else { return };
     let path = data.join("characters/Mage.glb");
     let plain = Character::bind(&path, false);
     println!("{} joints, error {:.4}, head {:.4}", plain.joints.len(), plain.error(""), plain.error("Head"));
@@ -282,7 +274,7 @@ fn characters_of_many_parts_are_bound_part_by_part() {
 /// Errors against the weights of the files, as measured.
 #[test]
 fn characters_and_creatures_are_bound_as_well_as_they_were() {
-    let Some(data) = crate::prerequisites::test_data() else { return };
+    let Some(data) = test_data() else { return };
     for (file, measured) in [
         ("gltf_skinned/CesiumMan.glb", 0.089),
         ("gltf_skinned/RobotExpressive.glb", 0.190),

@@ -8,7 +8,7 @@
 
 use glam::Vec3;
 
-use super::{WeightJoint, odds};
+use super::{WeightJoint, odds, roots::parents_first};
 use crate::mesh::model::Weights;
 
 /// Lengths of bones that differ by more than this share are not a pair's.
@@ -155,19 +155,7 @@ struct Tree<'a> {
 
 impl<'a> Tree<'a> {
     fn new(joints: &'a [WeightJoint]) -> Self {
-        let mut children = vec![Vec::new(); joints.len()];
-        let mut order = Vec::with_capacity(joints.len());
-        for (index, joint) in joints.iter().enumerate() {
-            match joint.parent {
-                Some(parent) => children[parent].push(index),
-                None => order.push(index),
-            }
-        }
-        let mut next = 0;
-        while let Some(&joint) = order.get(next) {
-            next += 1;
-            order.extend(&children[joint]);
-        }
+        let (order, children) = parents_first(joints);
         let mut sizes = vec![1; joints.len()];
         for &joint in order.iter().rev() {
             sizes[joint] += children[joint].iter().map(|&child| sizes[child]).sum::<usize>();

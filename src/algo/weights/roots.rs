@@ -21,7 +21,7 @@ pub(crate) struct Roots {
 impl Roots {
     /// Finds the roots of checked joints.
     pub fn new(joints: &[WeightJoint], children: &[usize], sight: &Sight) -> Self {
-        let order = parents_first(joints);
+        let (order, _) = parents_first(joints);
         let mut sizes = vec![1usize; joints.len()];
         for &index in order.iter().rev() {
             if let Some(parent) = joints[index].parent {
@@ -51,7 +51,7 @@ impl Roots {
     /// The joints of targets and handles: subtrees that hang in the air beside the largest one, at most half as large
     /// and without a body part of their own.
     pub fn helpers(&self, joints: &[WeightJoint], sight: &Sight) -> Vec<bool> {
-        let order = parents_first(joints);
+        let (order, _) = parents_first(joints);
         let mut top: Vec<usize> = (0..joints.len()).collect();
         let mut sizes = vec![0usize; joints.len()];
         for &index in &order {
@@ -140,8 +140,8 @@ fn share(from: Vec3, to: Vec3, holds: impl Fn(Vec3) -> bool) -> f32 {
     (0..STATIONS).filter(|&i| holds(station(i))).count() as f32 / STATIONS as f32
 }
 
-/// Joints with each parent before its children.
-fn parents_first(joints: &[WeightJoint]) -> Vec<usize> {
+/// Joints with each parent before its children, and the children of each joint.
+pub(super) fn parents_first(joints: &[WeightJoint]) -> (Vec<usize>, Vec<Vec<usize>>) {
     let mut children = vec![Vec::new(); joints.len()];
     let mut order = Vec::with_capacity(joints.len());
     for (index, joint) in joints.iter().enumerate() {
@@ -155,7 +155,7 @@ fn parents_first(joints: &[WeightJoint]) -> Vec<usize> {
         next += 1;
         order.extend(&children[joint]);
     }
-    order
+    (order, children)
 }
 
 /// The part that most of some places are nearest to, of those with bones; the first of several.

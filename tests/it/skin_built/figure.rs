@@ -28,17 +28,6 @@ use rigsmith::{
 
 use crate::prerequisites::test_data;
 
-/// The bodies of the test data.
-pub const BODIES: [&str; 7] = [
-    "baby",
-    "female_heavy_tpose",
-    "female_young",
-    "female_young_armsdown",
-    "male_child_tpose",
-    "male_muscular_action",
-    "male_young",
-];
-
 /// Bones of the `game_engine` rig whose names differ from the template's labels.
 const NAMES: [(&str, &str); 10] = [
     ("hips", "pelvis"),
