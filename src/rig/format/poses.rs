@@ -118,17 +118,22 @@ pub(super) fn add_poses(rig: &mut Rig, poses: Vec<PoseFile>, fault: &mut dyn FnM
     for PoseFile { uid, name, offsets, values } in poses {
         let mut stored = StoredPose { uid, name, ..StoredPose::default() };
         for offset in offsets {
-            if !offset.offset().is_valid() || stored.offsets.insert(offset.joint, offset.offset()).is_some() {
+            let joint = offset.joint;
+            if !offset.offset().is_valid() {
                 let message = format!(
-                    "the pose has a transform of {} that is not finite, whose rotation is not of length 1, or that it \
-                     has already; correct it",
-                    offset.joint
+                    "the transform of {joint} is not finite or its rotation not of length 1; correct the numbers"
                 );
                 fault(uid, 0, "offsets", message);
+            } else if stored.offsets.insert(joint, offset.offset()).is_some() {
+                fault(uid, 0, "offsets", format!("joint {joint} is in the pose twice; keep one of the two"));
             }
         }
-        for value in values.into_iter().filter(|value| value.value.is_finite()) {
-            stored.values.entry(value.node).or_default().insert(value.name, value.value);
+        for ValueFile { node, name, value } in values {
+            if !value.is_finite() {
+                fault(uid, 0, "values", format!("the value of \"{name}\" of {node} is not finite; correct the number"));
+            } else if stored.values.entry(node).or_default().insert(name.clone(), value).is_some() {
+                fault(uid, 0, "values", format!("\"{name}\" of {node} has two values; keep one of them"));
+            }
         }
         if let Err(error) = rig.apply(&RigEdit::AddStoredPose(Box::new(stored), usize::MAX)) {
             fault(uid, 1, "uid", error.to_string());
