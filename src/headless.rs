@@ -192,7 +192,7 @@ impl Workbench {
         }
     }
 
-    /// Shows expressions and units by name, each with a strength from 0 to 1, in place of the current ones.
+    /// Shows expressions and units by name, each with a strength from 0 to 1.5, in place of the current ones.
     pub fn express(&mut self, strengths: BTreeMap<String, f32>) -> Result<(), WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });

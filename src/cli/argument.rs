@@ -1,5 +1,7 @@
 //! Reasons why the value of an argument is refused.
 
+use crate::algo::face::expression::MAX_STRENGTH;
+
 /// Reason why the value of an argument is refused.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub(super) enum ArgumentError {
@@ -13,7 +15,7 @@ pub(super) enum ArgumentError {
     #[error("write NAME=STRENGTH, such as happiness=0.8")]
     NoStrength,
     /// The strength of an expression is out of its range.
-    #[error("{0} is not from 0 to 1")]
+    #[error("{0} is not from 0 to {MAX_STRENGTH}")]
     Strength(f32),
     /// The value has to be two angles.
     #[cfg(feature = "render")]

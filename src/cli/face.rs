@@ -225,6 +225,9 @@ fn clips(rig: &Rig) -> Vec<Clip> {
             };
             add(ChannelTarget::Translation(node), posed.translation.to_array().to_vec());
             add(ChannelTarget::Rotation(node), posed.rotation.to_array().to_vec());
+            if posed.scale != joint.rest.scale {
+                add(ChannelTarget::Scale(node), posed.scale.to_array().to_vec());
+            }
         }
         Clip { name: stored.name.clone(), channels, extras: None }
     };

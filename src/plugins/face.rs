@@ -137,7 +137,8 @@ impl Face {
     }
 }
 
-/// Request for expressions and units by name, each with a strength from 0 to 1, in place of the current ones.
+/// Request for expressions and units by name, each with a strength from 0 to [`MAX_STRENGTH`](crate::algo::face::expression::MAX_STRENGTH), in place of the
+/// current ones.
 #[derive(Message, Debug, Clone)]
 pub struct ExpressRequest {
     /// The entity with the mesh.

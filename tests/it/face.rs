@@ -176,7 +176,8 @@ fn expressions_are_poses_and_can_be_undone() {
         let own = bench.rig().pose().iter().filter(|(uid, _)| away(uid) > beside);
         own.map(|(_, offset)| offset.translation.length()).fold(0.0, f32::max)
     };
-    assert!(furthest(true) > 0.0 && furthest(false) < 0.1 * furthest(true), "only the left moves");
+    println!("right {} of left {}", furthest(false), furthest(true));
+    assert!(furthest(true) > 0.0 && furthest(false) < 0.05 * furthest(true), "only the left moves");
 }
 
 #[test]
@@ -329,24 +330,25 @@ fn placing_can_be_cancelled() {
 
 #[test]
 fn real_heads_and_creatures_get_faces() {
+    // The folds of the six expressions together, a tenth above what was measured.
     let files = [
-        "heads/ict_neutral.obj",
-        "heads/ict_identity_1.obj",
-        "heads/ict_identity_2.obj",
-        "heads/lee_perry_smith.obj",
-        "creatures/fox-fox.glb",
-        "creatures/fox-dog.glb",
-        "creatures/bird-eagle.glb",
-        "creatures/spot.obj",
-        "bodies/female_young/full.obj",
-        "bodies/baby/body.obj",
+        ("heads/ict_neutral.obj", 44),
+        ("heads/ict_identity_1.obj", 58),
+        ("heads/ict_identity_2.obj", 128),
+        ("heads/lee_perry_smith.obj", 46),
+        ("creatures/fox-fox.glb", 0),
+        ("creatures/fox-dog.glb", 0),
+        ("creatures/bird-eagle.glb", 0),
+        ("creatures/spot.obj", 0),
+        ("bodies/female_young/full.obj", 0),
+        ("bodies/baby/body.obj", 105),
     ];
-    for file in files {
+    for (file, most) in files {
         let Some(model) = data(file) else { return };
         let mut bench = bench(model);
         let report = bench.face(settings(24), None, &mut |_, _| {}).unwrap_or_else(|error| panic!("{file}: {error}"));
         check_weights(&bench);
-        let most = most_folds(&bench);
+        println!("{file}: {} folds, {most} at most", report.folds);
         assert!(report.folds <= most, "{file}: {} folds, {most} at most", report.folds);
         let known = FaceRig::read(bench.rig());
         assert_eq!(known.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count(), 24, "{file}");
@@ -356,20 +358,22 @@ fn real_heads_and_creatures_get_faces() {
     }
 }
 
-/// Three times what nobody notices, in the six expressions together.
-fn most_folds(bench: &Workbench) -> usize {
-    3 * bench.placed_face().unwrap().analysis.tolerated_folds()
-}
-
 #[test]
 fn faces_of_real_heads_hardly_fold() {
-    let heads = ["ict_neutral", "ict_identity_1", "ict_identity_2", "lee_perry_smith"];
-    for file in heads.map(|name| format!("heads/{name}.obj")) {
+    // The folds of the six expressions together, a tenth above what was measured.
+    let heads = [
+        ("ict_neutral", [37, 84, 40, 88]),
+        ("ict_identity_1", [17, 55, 31, 44]),
+        ("ict_identity_2", [52, 170, 179, 213]),
+        ("lee_perry_smith", [42, 69, 91, 93]),
+    ];
+    for (head, folds) in heads {
+        let file = format!("heads/{head}.obj");
         let Some(model) = data(&file) else { return };
         let mut bench = bench(model);
-        for bones in [12, 40, 60, 80] {
+        for (bones, most) in [12, 40, 60, 80].into_iter().zip(folds) {
             let report = place(&mut bench, bones);
-            let most = most_folds(&bench);
+            println!("{file} with {bones} bones: {} folds, {most} at most", report.folds);
             assert!(report.folds <= most, "{file} with {bones} bones: {} folds, {most} at most", report.folds);
         }
     }

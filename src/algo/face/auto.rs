@@ -270,8 +270,8 @@ impl FaceAnalysis {
     /// Places facial bones and binds the head to them.
     ///
     /// `fixed` bones (head space) stay where they are and count among [`AutoSettings::bones`]. If the six expressions
-    /// fold more skin than [`FaceAnalysis::tolerated_folds`], other seeds are tried, and the result with the fewest folds
-    /// is kept.
+    /// fold more skin than [`FaceAnalysis::tolerated_folds`], other seeds are tried, and the result with the fewest
+    /// folds is kept.
     ///
     /// # Errors
     /// [`FaceError`]: no bones, more than the mask has points, or cancelled.

@@ -73,8 +73,8 @@ impl Mix {
 
     /// A blend of expressions: strengths of the same unit add up, to the unit's limit at most.
     ///
-    /// Strengths of expressions are cut to 0..=[`MAX_STRENGTH`], NaN counts as 0. Units that are not in `units` are left out (an
-    /// [`ExpressionSet`] has no such expressions).
+    /// Strengths of expressions are cut to 0..=[`MAX_STRENGTH`], NaN counts as 0. Units that are not in `units` are left
+    /// out (an [`ExpressionSet`] has no such expressions).
     pub fn of(expressions: &[(&Expression, f32)], units: &UnitSet) -> Self {
         let mut mix = Self::rest(units);
         for (expression, strength) in expressions {

@@ -94,7 +94,7 @@ pub fn arkit_shapes(
 fn strongest(weights: &Weights, most: usize) -> Weights {
     let mut kept = Weights::default();
     for point in 0..weights.len() {
-        // Several joints of the skin may be one here: what a file keeps is decided joint by joint before.
+        // Joints of the body stand side by side here, each with the head's number, as a file counts them.
         let mut influences: Vec<(u32, f32)> = weights.of(point).collect();
         keep_strongest(&mut influences, most, 0.0);
         kept.push(influences);

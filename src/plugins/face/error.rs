@@ -1,6 +1,6 @@
 //! Reasons why a face is not placed, or shows no expression.
 
-use crate::algo::face::auto::FaceError;
+use crate::algo::face::{auto::FaceError, expression::MAX_STRENGTH};
 
 /// Reason why no face was placed; a sentence for people without its full stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -35,7 +35,7 @@ pub enum ExpressError {
     #[error("the mesh is not skinned; place a face first")]
     NotSkinned,
     /// A strength is infinite or undefined.
-    #[error("the strength of \"{name}\" is not a number; write one from 0 to 1")]
+    #[error("the strength of \"{name}\" is not a number; write one from 0 to {MAX_STRENGTH}")]
     Strength {
         /// Name of the expression.
         name: String,

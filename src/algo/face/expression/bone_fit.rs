@@ -141,8 +141,9 @@ impl<'a> FittedFace<'a> {
 
     /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of units.
     ///
-    /// Bones of skin whose triangles would flip are brought nearer to equal movements, by 5 % of the furthest movement at
-    /// most, and alike on both sides in a mix that is alike on both sides; lips or lids that would cross are moved apart.
+    /// Bones of skin whose triangles would flip are brought nearer to equal movements, by 5 % of the furthest movement
+    /// at most, and alike on both sides in a mix that is alike on both sides; lips or lids that would cross are moved
+    /// apart.
     /// Cost: points times moves of the field.
     pub fn pose(&self, mix: &Mix, units: &UnitSet) -> Vec<BonePose> {
         let rest = vec![BonePose::REST; self.bones.len()];
