@@ -1,11 +1,11 @@
 //! A module from outside the crate: `cargo run --example custom_module`.
 //!
-//! A module is a type whose fields are the parameters of its tags. It writes only what building does; rolling back,
+//! A module is a type whose fields are the parameters of its tags, declared with `parameters!`. It writes only what building does; rolling back,
 //! running again when something that it read has changed, and telling where a tag is wrong come with it.
 
 use std::{error::Error, fmt::Write, sync::Arc};
 
-use bevy::{math::Vec3, reflect::Reflect};
+use bevy::math::Vec3;
 use rigsmith::{
     mesh::model::Trs,
     modules,
@@ -17,34 +17,23 @@ use rigsmith::{
     },
     solve::program::{CompileOptions, RigProgram, RigState},
 };
-use serde::{Deserialize, Serialize};
 
-/// Hangs a weight below nodes, which swings as they move.
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Pendulum {
-    /// The nodes.
-    pub at: NodeRefs,
-    /// Distance of the weight.
-    pub length: f32,
-    /// Name, label and groups of what is made.
-    pub creation: Creation,
-}
-
-impl Default for Pendulum {
-    fn default() -> Self {
-        Self { at: NodeRef::this().into(), length: 0.3, creation: Creation::default() }
+rigsmith::parameters! {
+    /// Hangs a weight below nodes, which swings as they move.
+    pub struct Pendulum {
+        /// The nodes that carry a weight.
+        pub at: NodeRefs = NodeRef::this().into(),
+        /// How far below them it hangs, above 0, in the rig's units.
+        pub length: f32 = 0.3,
+        /// Name, groups and label; by default those of the node.
+        pub creation: Creation = Creation::default(),
     }
 }
 
 impl RigModule for Pendulum {
     const NAME: &'static str = "pendulum";
     const DOC: &'static str = "Hangs a weight below nodes, which swings as they move.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("at", "The nodes that carry a weight."),
-        ("length", "How far below them it hangs, above 0, in the rig's units."),
-        ("creation", "Name, groups and label; by default those of the node."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         if !(self.length > 0.0 && self.length.is_finite()) {

@@ -22,6 +22,7 @@ mod list;
 mod mirror;
 mod module;
 mod off;
+mod parameters;
 mod resolve;
 mod review;
 mod scope;

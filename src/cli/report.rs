@@ -128,7 +128,7 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
             if !json {
                 show(error.as_ref());
             }
-            (1, failed(&chain(error.as_ref())))
+            (1, failed(&error.to_string()))
         }
     };
     if json {
@@ -161,21 +161,7 @@ fn show(error: &(dyn std::error::Error + 'static)) {
         });
         eprintln!("{report:?}");
     } else {
-        eprintln!("error: {}", chain(error));
+        // The text of an error contains those of its causes.
+        eprintln!("error: {error}");
     }
-}
-
-/// Text of an error and of those causes that add something to it.
-fn chain(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(next) = cause {
-        let more = next.to_string();
-        if !text.contains(&more) {
-            text.push_str(": ");
-            text.push_str(&more);
-        }
-        cause = next.source();
-    }
-    text
 }

@@ -5,6 +5,7 @@ use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    parameters,
     processor::{
         Amount, Axis, BuildScope, ModuleError, NodeId, RigModule, TargetParams, check_finite, mirrored_direction,
     },
@@ -26,77 +27,44 @@ pub enum AimUpMode {
     Node,
 }
 
-/// Turns nodes so that an axis points at weighted targets. Role: `constraint`, for each node.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::aim::AimModule};
-/// let params = r#"(targets: "@command control#00000000000000aa", aim: z, up_axis: y, direction: (0.0, 1.0, 0.0))"#;
-/// # assert!(rigsmith::modules::all().load(AimModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AimModule {
-    /// The nodes that look.
-    pub node: NodeRefs,
-    /// Targets of the aim.
-    pub targets: NodeRefs,
-    /// A share for each target.
-    pub weights: Vec<Amount>,
-    /// The node with the attributes.
-    pub control: NodeRefs,
-    /// The axis that points at the targets.
-    pub aim: Axis,
-    /// The axis that is kept up.
-    pub up_axis: Axis,
-    /// Reference for up.
-    pub up: AimUpMode,
-    /// The direction that is up.
-    pub direction: Vec3,
-    /// The node that is up, or whose direction.
-    pub up_node: NodeRefs,
-    /// True if the nodes stay turned as they are.
-    pub keep_offset: bool,
-    /// Weight of the constraint, 0 to 1.
-    pub weight: Amount,
-}
-
-impl Default for AimModule {
-    fn default() -> Self {
-        Self {
-            node: NodeRef::this().into(),
-            targets: NodeRefs::NONE,
-            weights: Vec::new(),
-            control: NodeRefs::NONE,
-            aim: Axis::Y,
-            up_axis: Axis::Z,
-            up: AimUpMode::Direction,
-            direction: Vec3::Y,
-            up_node: NodeRefs::NONE,
-            keep_offset: true,
-            weight: Amount::Value(1.0),
-        }
+parameters! {
+    /// Turns nodes so that an axis points at weighted targets. Role: `constraint`, for each node.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::aim::AimModule};
+    /// let params = r#"(targets: "@command control#00000000000000aa", aim: z, up_axis: y, direction: (0.0, 1.0, 0.0))"#;
+    /// # assert!(rigsmith::modules::all().load(AimModule::NAME, params).is_ok());
+    /// ```
+    pub struct AimModule {
+        /// The nodes that look.
+        pub node: NodeRefs = NodeRef::this().into(),
+        /// The nodes that they look at.
+        pub targets: NodeRefs = NodeRefs::NONE,
+        /// For each target its share, a number from 0 or the name of an attribute; all the same if left out.
+        pub weights: Vec<Amount> = Vec::new(),
+        /// The node that has the attributes; those that it lacks are added.
+        pub control: NodeRefs = NodeRefs::NONE,
+        /// The axis that points at the targets: x, y, z, neg_x, neg_y or neg_z.
+        pub aim: Axis = Axis::Y,
+        /// The axis that is kept up as far as the aim allows.
+        pub up_axis: Axis = Axis::Z,
+        /// direction: up is a direction of the rig, or of the up node; node: it is where the up node is.
+        pub up: AimUpMode = AimUpMode::Direction,
+        /// The direction that is up.
+        pub direction: Vec3 = Vec3::Y,
+        /// The node that is up, or in whose space the direction is; the rig's if left out.
+        pub up_node: NodeRefs = NodeRefs::NONE,
+        /// True: the nodes stay turned as they are, and only what the targets do counts.
+        pub keep_offset: bool = true,
+        /// How much the nodes turn, a number from 0 to 1 or the name of an attribute of the control.
+        pub weight: Amount = Amount::Value(1.0),
     }
 }
 
 impl RigModule for AimModule {
     const NAME: &'static str = "aim";
     const DOC: &'static str = "Turns nodes so that one of their axes points at weighted targets.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("node", "The nodes that look."),
-        ("targets", "The nodes that they look at."),
-        (
-            "weights",
-            "For each target its share, a number from 0 or the name of an attribute; all the same if left out.",
-        ),
-        ("control", "The node that has the attributes; those that it lacks are added."),
-        ("aim", "The axis that points at the targets: x, y, z, neg_x, neg_y or neg_z."),
-        ("up_axis", "The axis that is kept up as far as the aim allows."),
-        ("up", "direction: up is a direction of the rig, or of the up node; node: it is where the up node is."),
-        ("direction", "The direction that is up."),
-        ("up_node", "The node that is up, or in whose space the direction is; the rig's if left out."),
-        ("keep_offset", "True: the nodes stay turned as they are, and only what the targets do counts."),
-        ("weight", "How much the nodes turn, a number from 0 to 1 or the name of an attribute of the control."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["aim", "up_axis", "direction"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/aim.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/aim.svg"));

@@ -1,9 +1,7 @@
 //! `attribute`: a named number or choice on a node, for people to set and for other commands to follow.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
+    parameters,
     processor::{BuildScope, ModuleError, RigModule},
     rig::{
         Attribute, AttributeKind,
@@ -11,40 +9,27 @@ use crate::{
     },
 };
 
-/// Adds an attribute to nodes.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::attribute::AttributeModule};
-/// let params = r#"(node: "@this", name: "follow", min: 0.0, max: 1.0, default: 0.5)"#;
-/// # assert!(rigsmith::modules::all().load(AttributeModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AttributeModule {
-    /// The nodes that get it.
-    pub node: NodeRefs,
-    /// Name of the attribute.
-    pub name: String,
-    /// Lowest value.
-    pub min: Option<f32>,
-    /// Highest value.
-    pub max: Option<f32>,
-    /// Names of choices; a number if there are none.
-    pub choices: Vec<String>,
-    /// The value until somebody sets another.
-    pub default: f32,
-}
-
-impl Default for AttributeModule {
-    fn default() -> Self {
-        Self {
-            node: NodeRef::this().into(),
-            name: "value".to_owned(),
-            min: None,
-            max: None,
-            choices: Vec::new(),
-            default: 0.0,
-        }
+parameters! {
+    /// Adds an attribute to nodes.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::attribute::AttributeModule};
+    /// let params = r#"(node: "@this", name: "follow", min: 0.0, max: 1.0, default: 0.5)"#;
+    /// # assert!(rigsmith::modules::all().load(AttributeModule::NAME, params).is_ok());
+    /// ```
+    pub struct AttributeModule {
+        /// The nodes that get it.
+        pub node: NodeRefs = NodeRef::this().into(),
+        /// Its name, unique on the node.
+        pub name: String = "value".to_owned(),
+        /// Lowest value; open if left out.
+        pub min: Option<f32> = None,
+        /// Highest value; open if left out.
+        pub max: Option<f32> = None,
+        /// Names of choices, of which the value is the number; a plain number if there are none.
+        pub choices: Vec<String> = Vec::new(),
+        /// The value until somebody sets another.
+        pub default: f32 = 0.0,
     }
 }
 
@@ -52,14 +37,7 @@ impl RigModule for AttributeModule {
     const NAME: &'static str = "attribute";
     const DOC: &'static str =
         "Adds a named number or choice to nodes, for people to set and for other commands to follow.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("node", "The nodes that get it."),
-        ("name", "Its name, unique on the node."),
-        ("min", "Lowest value; open if left out."),
-        ("max", "Highest value; open if left out."),
-        ("choices", "Names of choices, of which the value is the number; a plain number if there are none."),
-        ("default", "The value until somebody sets another."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/attribute.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/attribute.svg"));
 

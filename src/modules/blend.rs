@@ -1,9 +1,7 @@
 //! `blend`: nodes between two others each.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
+    parameters,
     processor::{Amount, BuildScope, ModuleError, RigModule},
     rig::{
         Constraint, Scalar,
@@ -11,73 +9,47 @@ use crate::{
     },
 };
 
-/// Lets each of some nodes follow one of the list `a` or one of the list `b`, or something between. Role: `constraint`,
-/// for each node.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::blend::BlendModule};
-/// let params = r#"(
-///     nodes: "@hierarchy this",
-///     a: "@command duplicate_chain#00000000000000aa",
-///     b: "@command duplicate_chain#00000000000000ab",
-///     control: "@command control#00000000000000ac",
-///     blend: "ik",
-/// )"#;
-/// # assert!(rigsmith::modules::all().load(BlendModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BlendModule {
-    /// The nodes that are driven.
-    pub nodes: NodeRefs,
-    /// Nodes that are followed at 0.
-    pub a: NodeRefs,
-    /// Nodes that are followed at 1.
-    pub b: NodeRefs,
-    /// Between the two.
-    pub blend: Amount,
-    /// The node with the attribute.
-    pub control: NodeRefs,
-    /// Axes whose translation follows.
-    pub translate: [bool; 3],
-    /// Axes whose rotation follows.
-    pub rotate: [bool; 3],
-    /// Axes whose scale follows.
-    pub scale: [bool; 3],
-    /// True if nodes stay where they stand now.
-    pub keep_offset: bool,
-}
-
-impl Default for BlendModule {
-    fn default() -> Self {
-        Self {
-            nodes: NodeRef::this().into(),
-            a: NodeRefs::NONE,
-            b: NodeRefs::NONE,
-            blend: Amount::Value(0.0),
-            control: NodeRefs::NONE,
-            translate: [true; 3],
-            rotate: [true; 3],
-            scale: [false; 3],
-            keep_offset: true,
-        }
+parameters! {
+    /// Lets each of some nodes follow one of the list `a` or one of the list `b`, or something between. Role: `constraint`,
+    /// for each node.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::blend::BlendModule};
+    /// let params = r#"(
+    ///     nodes: "@hierarchy this",
+    ///     a: "@command duplicate_chain#00000000000000aa",
+    ///     b: "@command duplicate_chain#00000000000000ab",
+    ///     control: "@command control#00000000000000ac",
+    ///     blend: "ik",
+    /// )"#;
+    /// # assert!(rigsmith::modules::all().load(BlendModule::NAME, params).is_ok());
+    /// ```
+    pub struct BlendModule {
+        /// The nodes that are driven.
+        pub nodes: NodeRefs = NodeRef::this().into(),
+        /// What they follow at 0: as many nodes, in the same order.
+        pub a: NodeRefs = NodeRefs::NONE,
+        /// What they follow at 1: as many nodes, in the same order.
+        pub b: NodeRefs = NodeRefs::NONE,
+        /// 0 for a, 1 for b: a number, or the name of an attribute of the control.
+        pub blend: Amount = Amount::Value(0.0),
+        /// The node that has the attribute; it is added if it lacks it.
+        pub control: NodeRefs = NodeRefs::NONE,
+        /// Which axes of the translation follow, in the parent's space.
+        pub translate: [bool; 3] = [true; 3],
+        /// Which angles about X, Y and Z follow, in the parent's space.
+        pub rotate: [bool; 3] = [true; 3],
+        /// Which factors along X, Y and Z follow.
+        pub scale: [bool; 3] = [false; 3],
+        /// Keep where the nodes stand now, in the space of each of the others; false: they lie on them.
+        pub keep_offset: bool = true,
     }
 }
 
 impl RigModule for BlendModule {
     const NAME: &'static str = "blend";
     const DOC: &'static str = "Lets each of some nodes follow one of two others, or something between.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("nodes", "The nodes that are driven."),
-        ("a", "What they follow at 0: as many nodes, in the same order."),
-        ("b", "What they follow at 1: as many nodes, in the same order."),
-        ("blend", "0 for a, 1 for b: a number, or the name of an attribute of the control."),
-        ("control", "The node that has the attribute; it is added if it lacks it."),
-        ("translate", "Which axes of the translation follow, in the parent's space."),
-        ("rotate", "Which angles about X, Y and Z follow, in the parent's space."),
-        ("scale", "Which factors along X, Y and Z follow."),
-        ("keep_offset", "Keep where the nodes stand now, in the space of each of the others; false: they lie on them."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/blend.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/blend.svg"));
 

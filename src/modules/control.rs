@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{
         BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, degrees,
         mirrored_angles, mirrored_direction,
@@ -45,110 +46,61 @@ pub enum ShapeAxes {
     Rig,
 }
 
-/// Makes a control for each of some nodes, which follow it. Roles: `control`, and `offset` for the null that takes its
-/// place.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::control::ControlModule};
-/// let params = r#"(shape: "cube", size: 0.1, limits: (rotate: ((-90.0, 90.0), (None, None), (None, None))))"#;
-/// # assert!(rigsmith::modules::all().load(ControlModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ControlModule {
-    /// The nodes that get one.
-    pub at: NodeRefs,
-    /// Parent of the controls.
-    pub parent: NodeRefs,
-    /// True if controls stand below one another like their nodes.
-    pub hierarchy: bool,
-    /// Directions of the axes.
-    pub axes: ControlAxes,
-    /// True if a null takes each one's place.
-    pub offset_group: bool,
-    /// True if the nodes follow.
-    pub follow: bool,
-    /// True if they follow the scale, too.
-    pub follow_scale: bool,
-    /// True if the nodes' own pose is put on top.
-    pub keep_pose: bool,
-    /// The shape's name.
-    pub shape: String,
-    /// Half the shape's width.
-    pub size: Option<f32>,
-    /// Half the shape's width, relative to the bone, where `size` is left out.
-    pub relative_size: f32,
-    /// Directions of the shape.
-    pub shape_axes: ShapeAxes,
-    /// Translation of the shape, in the rig's units.
-    pub shape_translate: Vec3,
-    /// Rotation of the shape about X, Y and Z, in degrees.
-    pub shape_rotate: Vec3,
-    /// Factors of the shape.
-    pub shape_scale: Vec3,
-    /// The colour.
-    pub color: Option<[f32; 3]>,
-    /// Channels that people move.
-    pub channels: Channels,
-    /// Lowest and highest values of the channels.
-    pub limits: Limits,
-    /// See [`Creation`].
-    pub creation: Creation,
-}
-
-impl Default for ControlModule {
-    fn default() -> Self {
-        Self {
-            at: NodeRef::this().into(),
-            parent: NodeRefs::NONE,
-            hierarchy: true,
-            axes: ControlAxes::Node,
-            offset_group: true,
-            follow: true,
-            follow_scale: false,
-            keep_pose: false,
-            shape: "circle".to_owned(),
-            size: None,
-            relative_size: 0.35,
-            shape_axes: ShapeAxes::Bone,
-            shape_translate: Vec3::ZERO,
-            shape_rotate: Vec3::ZERO,
-            shape_scale: Vec3::ONE,
-            color: None,
-            channels: Channels::default(),
-            limits: Limits::default(),
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Makes a control for each of some nodes, which follow it. Roles: `control`, and `offset` for the null that takes its
+    /// place.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::control::ControlModule};
+    /// let params = r#"(shape: "cube", size: 0.1, limits: (rotate: ((-90.0, 90.0), (None, None), (None, None))))"#;
+    /// # assert!(rigsmith::modules::all().load(ControlModule::NAME, params).is_ok());
+    /// ```
+    pub struct ControlModule {
+        /// The nodes that get one.
+        pub at: NodeRefs = NodeRef::this().into(),
+        /// What the controls stand on; the parent of each node if left out.
+        pub parent: NodeRefs = NodeRefs::NONE,
+        /// True: each stands below the control of the nearest node above it in the list.
+        pub hierarchy: bool = true,
+        /// node: its axes lie like its node's; rig: like the rig's.
+        pub axes: ControlAxes = ControlAxes::Node,
+        /// True: a null takes its place, so that its own base changes nothing.
+        pub offset_group: bool = true,
+        /// True: the nodes follow their controls in place and turn.
+        pub follow: bool = true,
+        /// True: the nodes follow the scale of their controls, too.
+        pub follow_scale: bool = false,
+        /// True: the nodes' own pose, of an expression say, is put on top of what their controls say.
+        pub keep_pose: bool = false,
+        /// Name of the wire shape.
+        pub shape: String = "circle".to_owned(),
+        /// Half the width of the shape in the rig's units, above 0; from the bone's length if left out.
+        pub size: Option<f32> = None,
+        /// Half the width of the shape as a share of the bone's length, where size is left out.
+        pub relative_size: f32 = 0.35,
+        /// bone: the shape's Y lies along the bone; control: along the control's Y; rig: along the rig's.
+        pub shape_axes: ShapeAxes = ShapeAxes::Bone,
+        /// Where the shape lies, along its own axes, in the rig's units.
+        pub shape_translate: Vec3 = Vec3::ZERO,
+        /// Turn of the shape about X, Y and Z, in degrees.
+        pub shape_rotate: Vec3 = Vec3::ZERO,
+        /// Factors of the shape along X, Y and Z.
+        pub shape_scale: Vec3 = Vec3::ONE,
+        /// sRGB colour, 0 to 1 each; by the side of the body if left out.
+        pub color: Option<[f32; 3]> = None,
+        /// Which axes of translation, rotation and scale people move and keys are set on.
+        pub channels: Channels = Channels::default(),
+        /// Lowest and highest values of these; rotation in degrees.
+        pub limits: Limits = Limits::default(),
+        /// Name, groups and label; by default those of the node.
+        pub creation: Creation = Creation::default(),
     }
 }
 
 impl RigModule for ControlModule {
     const NAME: &'static str = "control";
     const DOC: &'static str = "Makes a control, which people move and animate, for each of some nodes.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("at", "The nodes that get one."),
-        ("parent", "What the controls stand on; the parent of each node if left out."),
-        ("hierarchy", "True: each stands below the control of the nearest node above it in the list."),
-        ("axes", "node: its axes lie like its node's; rig: like the rig's."),
-        ("offset_group", "True: a null takes its place, so that its own base changes nothing."),
-        ("follow", "True: the nodes follow their controls in place and turn."),
-        ("follow_scale", "True: the nodes follow the scale of their controls, too."),
-        ("keep_pose", "True: the nodes' own pose, of an expression say, is put on top of what their controls say."),
-        ("shape", "Name of the wire shape."),
-        ("size", "Half the width of the shape in the rig's units, above 0; from the bone's length if left out."),
-        ("relative_size", "Half the width of the shape as a share of the bone's length, where size is left out."),
-        (
-            "shape_axes",
-            "bone: the shape's Y lies along the bone; control: along the control's Y; rig: along the rig's.",
-        ),
-        ("shape_translate", "Where the shape lies, along its own axes, in the rig's units."),
-        ("shape_rotate", "Turn of the shape about X, Y and Z, in degrees."),
-        ("shape_scale", "Factors of the shape along X, Y and Z."),
-        ("color", "sRGB colour, 0 to 1 each; by the side of the body if left out."),
-        ("channels", "Which axes of translation, rotation and scale people move and keys are set on."),
-        ("limits", "Lowest and highest values of these; rotation in degrees."),
-        ("creation", "Name, groups and label; by default those of the node."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["shape_translate", "shape_rotate", "limits", "color"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/control.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/control.svg"));

@@ -1,9 +1,7 @@
 //! `driven_key`: numbers that follow another one along keys.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
+    parameters,
     processor::{BuildScope, ModuleError, RigModule, opposite},
     rig::{
         Channel, Constraint, KeyEase,
@@ -12,72 +10,46 @@ use crate::{
     },
 };
 
-/// Drives a number by another one along keys: fingers by a curl, a corrective shape by an elbow.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::driven_key::DrivenKey};
-/// let params = r#"(
-///     driver: "@command control/hand_l#00000000000000aa",
-///     driver_attribute: "curl",
-///     keys: [(0.0, 0.0), (1.0, 80.0)],
-///     output: "@hierarchy index_1_l#0000000000000004",
-///     output_channel: RotateX,
-/// )"#;
-/// # rigsmith::modules::all().load(DrivenKey::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DrivenKey {
-    /// The node whose number drives.
-    pub driver: NodeRefs,
-    /// The attribute that drives,
-    pub driver_attribute: String,
-    /// or the channel.
-    pub driver_channel: Option<Channel>,
-    /// Pairs of driver and value.
-    pub keys: Vec<(f32, f32)>,
-    /// The run between keys.
-    pub ease: KeyEase,
-    /// The nodes that are driven.
-    pub output: NodeRefs,
-    /// The attribute that is driven,
-    pub output_attribute: String,
-    /// or the channel,
-    pub output_channel: Option<Channel>,
-    /// or the morph target.
-    pub morph: String,
-}
-
-impl Default for DrivenKey {
-    fn default() -> Self {
-        Self {
-            driver: NodeRef::this().into(),
-            driver_attribute: String::new(),
-            driver_channel: None,
-            keys: vec![(0.0, 0.0), (1.0, 1.0)],
-            ease: KeyEase::Smooth,
-            output: NodeRefs::NONE,
-            output_attribute: String::new(),
-            output_channel: None,
-            morph: String::new(),
-        }
+parameters! {
+    /// Drives a number by another one along keys: fingers by a curl, a corrective shape by an elbow.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::driven_key::DrivenKey};
+    /// let params = r#"(
+    ///     driver: "@command control/hand_l#00000000000000aa",
+    ///     driver_attribute: "curl",
+    ///     keys: [(0.0, 0.0), (1.0, 80.0)],
+    ///     output: "@hierarchy index_1_l#0000000000000004",
+    ///     output_channel: RotateX,
+    /// )"#;
+    /// # rigsmith::modules::all().load(DrivenKey::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct DrivenKey {
+        /// The node whose attribute or channel drives.
+        pub driver: NodeRefs = NodeRef::this().into(),
+        /// Name of the attribute that drives.
+        pub driver_attribute: String = String::new(),
+        /// Or the channel of its pose that drives, such as RotateX in degrees.
+        pub driver_channel: Option<Channel> = None,
+        /// Pairs of driver and value, driver increasing; flat before the first and after the last.
+        pub keys: Vec<(f32, f32)> = vec![(0.0, 0.0), (1.0, 1.0)],
+        /// The run between keys: Step, Linear or Smooth, without overshoot.
+        pub ease: KeyEase = KeyEase::Smooth,
+        /// The nodes that are driven; none for a morph target.
+        pub output: NodeRefs = NodeRefs::NONE,
+        /// Name of the attribute of theirs that is driven.
+        pub output_attribute: String = String::new(),
+        /// Or the channel that is driven, on top of how they were built.
+        pub output_channel: Option<Channel> = None,
+        /// Or the name of the morph target whose weight is driven, on every mesh of the rig.
+        pub morph: String = String::new(),
     }
 }
 
 impl RigModule for DrivenKey {
     const NAME: &'static str = "driven_key";
     const DOC: &'static str = "Drives channels, attributes or a morph target by another number, along keys.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("driver", "The node whose attribute or channel drives."),
-        ("driver_attribute", "Name of the attribute that drives."),
-        ("driver_channel", "Or the channel of its pose that drives, such as RotateX in degrees."),
-        ("keys", "Pairs of driver and value, driver increasing; flat before the first and after the last."),
-        ("ease", "The run between keys: Step, Linear or Smooth, without overshoot."),
-        ("output", "The nodes that are driven; none for a morph target."),
-        ("output_attribute", "Name of the attribute of theirs that is driven."),
-        ("output_channel", "Or the channel that is driven, on top of how they were built."),
-        ("morph", "Or the name of the morph target whose weight is driven, on every mesh of the rig."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["driver_attribute", "keys", "output_attribute", "morph"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/driven_key.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/driven_key.svg"));

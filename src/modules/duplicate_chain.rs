@@ -4,6 +4,7 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    parameters,
     processor::{BuildScope, Creation, ModuleError, NodeId, RigModule},
     rig::{
         NodeType,
@@ -22,50 +23,32 @@ pub enum CopyKind {
     Joint,
 }
 
-/// Copies nodes with their hierarchy. Role: `copy`.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::duplicate_chain::DuplicateChainModule};
-/// let params = r#"(joints: "@hierarchy this", suffix: "ik")"#;
-/// # assert!(rigsmith::modules::all().load(DuplicateChainModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DuplicateChainModule {
-    /// Chain to copy.
-    pub joints: NodeRefs,
-    /// Parent of the uppermost copies.
-    pub parent: NodeRefs,
-    /// Kind of the copies.
-    pub kind: CopyKind,
-    /// Suffix of the copies' names.
-    pub suffix: String,
-    /// See [`Creation`].
-    pub creation: Creation,
-}
-
-impl Default for DuplicateChainModule {
-    fn default() -> Self {
-        Self {
-            joints: Source::Hierarchy(Top::This).into(),
-            parent: NodeRefs::NONE,
-            kind: CopyKind::Null,
-            suffix: "copy".to_owned(),
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Copies nodes with their hierarchy. Role: `copy`.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::duplicate_chain::DuplicateChainModule};
+    /// let params = r#"(joints: "@hierarchy this", suffix: "ik")"#;
+    /// # assert!(rigsmith::modules::all().load(DuplicateChainModule::NAME, params).is_ok());
+    /// ```
+    pub struct DuplicateChainModule {
+        /// The nodes to copy; this joint and all below it if left out.
+        pub joints: NodeRefs = Source::Hierarchy(Top::This).into(),
+        /// What the uppermost copies stand on; the parent of each node if left out.
+        pub parent: NodeRefs = NodeRefs::NONE,
+        /// null: the copies move no mesh; joint: they are joints.
+        pub kind: CopyKind = CopyKind::Null,
+        /// What the names of the copies end in.
+        pub suffix: String = "copy".to_owned(),
+        /// Name, groups and label; by default those of each node.
+        pub creation: Creation = Creation::default(),
     }
 }
 
 impl RigModule for DuplicateChainModule {
     const NAME: &'static str = "duplicate_chain";
     const DOC: &'static str = "Copies nodes with their hierarchy, such as one chain to pose and one that reaches.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("joints", "The nodes to copy; this joint and all below it if left out."),
-        ("parent", "What the uppermost copies stand on; the parent of each node if left out."),
-        ("kind", "null: the copies move no mesh; joint: they are joints."),
-        ("suffix", "What the names of the copies end in."),
-        ("creation", "Name, groups and label; by default those of each node."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/duplicate_chain.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/duplicate_chain.svg"));
 

@@ -4,41 +4,42 @@ use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    parameters,
     processor::{BuildScope, ModuleError, RigModule},
     rig::{Channel, Constraint, label::mirror_label, reference::NodeRefs},
     solve::expression::Expression as Compiled,
 };
 
-/// Drives a number by arithmetic over others; see [`expression`](crate::solve::expression) for the language.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::expression::Expression};
-/// let params = r#"(
-///     text: "clamp(curl * 90, 0, 90) + 0.5 * spread",
-///     inputs: [
-///         (name: "curl", node: "@command control/hand_l#00000000000000aa", attribute: "curl"),
-///         (name: "spread", node: "@command control/hand_l#00000000000000aa", channel: RotateZ),
-///     ],
-///     output: "@joint index_1_l#0000000000000004",
-///     output_channel: RotateX,
-/// )"#;
-/// # rigsmith::modules::all().load(Expression::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Expression {
-    /// The arithmetic.
-    pub text: String,
-    /// Inputs that the names of the text stand for.
-    pub inputs: Vec<Input>,
-    /// The nodes that are driven.
-    pub output: NodeRefs,
-    /// The attribute that is driven,
-    pub output_attribute: String,
-    /// or the channel,
-    pub output_channel: Option<Channel>,
-    /// or the morph target.
-    pub morph: String,
+parameters! {
+    /// Drives a number by arithmetic over others; see [`expression`](crate::solve::expression) for the language.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::expression::Expression};
+    /// let params = r#"(
+    ///     text: "clamp(curl * 90, 0, 90) + 0.5 * spread",
+    ///     inputs: [
+    ///         (name: "curl", node: "@command control/hand_l#00000000000000aa", attribute: "curl"),
+    ///         (name: "spread", node: "@command control/hand_l#00000000000000aa", channel: RotateZ),
+    ///     ],
+    ///     output: "@joint index_1_l#0000000000000004",
+    ///     output_channel: RotateX,
+    /// )"#;
+    /// # rigsmith::modules::all().load(Expression::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct Expression {
+        /// Arithmetic over the names of the inputs, with functions such as clamp, min, sin and if; angles in degrees.
+        pub text: String = String::new(),
+        /// Names, each with a node and its attribute or the channel of its pose.
+        pub inputs: Vec<Input> = Vec::new(),
+        /// The nodes that are driven; none for a morph target.
+        pub output: NodeRefs = NodeRefs::NONE,
+        /// Name of the attribute of theirs that is driven.
+        pub output_attribute: String = String::new(),
+        /// Or the channel that is driven, on top of how they were built.
+        pub output_channel: Option<Channel> = None,
+        /// Or the name of the morph target whose weight is driven, on every mesh of the rig.
+        pub morph: String = String::new(),
+    }
 }
 
 /// A name in an expression, and the attribute or channel that it stands for.
@@ -58,17 +59,7 @@ pub struct Input {
 impl RigModule for Expression {
     const NAME: &'static str = "expression";
     const DOC: &'static str = "Drives channels, attributes or a morph target by arithmetic over other numbers.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        (
-            "text",
-            "Arithmetic over the names of the inputs, with functions such as clamp, min, sin and if; angles in degrees.",
-        ),
-        ("inputs", "Names, each with a node and its attribute or the channel of its pose."),
-        ("output", "The nodes that are driven; none for a morph target."),
-        ("output_attribute", "Name of the attribute of theirs that is driven."),
-        ("output_channel", "Or the channel that is driven, on top of how they were built."),
-        ("morph", "Or the name of the morph target whose weight is driven, on every mesh of the rig."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["text", "inputs", "output_attribute", "morph"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/expression.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/expression.svg"));

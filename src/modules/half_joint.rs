@@ -1,10 +1,8 @@
 //! `half_joint`: joints that turn by half of a bend, so that skin keeps its volume there.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{BuildScope, Creation, ModuleError, RigModule},
     rig::{
         Constraint, NodeType, Scalar, Target,
@@ -13,29 +11,23 @@ use crate::{
     },
 };
 
-/// Makes a joint for each of some joints that turns halfway between it and its parent. Role: `half`.
-///
-/// Skinning gives it the skin that both hold in common: see `algo/weights`.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::half_joint::HalfJoint};
-/// let params = r#"(at: "@joint shin_l#0000000000000002", share: 0.5)"#;
-/// # assert!(rigsmith::modules::all().load(HalfJoint::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct HalfJoint {
-    /// The joints that bend.
-    pub at: NodeRefs,
-    /// Share of the bend.
-    pub share: f32,
-    /// Name, groups and label of the joints that are made.
-    pub creation: Creation,
-}
-
-impl Default for HalfJoint {
-    fn default() -> Self {
-        Self { at: NodeRef::this().into(), share: 0.5, creation: Creation::default() }
+parameters! {
+    /// Makes a joint for each of some joints that turns halfway between it and its parent. Role: `half`.
+    ///
+    /// Skinning gives it the skin that both hold in common: see `algo/weights`.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::half_joint::HalfJoint};
+    /// let params = r#"(at: "@joint shin_l#0000000000000002", share: 0.5)"#;
+    /// # assert!(rigsmith::modules::all().load(HalfJoint::NAME, params).is_ok());
+    /// ```
+    pub struct HalfJoint {
+        /// The joints that bend, such as a shin; those without a parent are passed over.
+        pub at: NodeRefs = NodeRef::this().into(),
+        /// Share of the bend, 0 (the parent's side) to 1.
+        pub share: f32 = 0.5,
+        /// Name, groups and label of the joints that are made; by default those of each joint.
+        pub creation: Creation = Creation::default(),
     }
 }
 
@@ -43,11 +35,7 @@ impl RigModule for HalfJoint {
     const NAME: &'static str = "half_joint";
     const DOC: &'static str =
         "Makes joints that turn by half of a bend: skin on knees, elbows, hips and shoulders keeps its volume.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("at", "The joints that bend, such as a shin; those without a parent are passed over."),
-        ("share", "Share of the bend, 0 (the parent's side) to 1."),
-        ("creation", "Name, groups and label of the joints that are made; by default those of each joint."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/half_joint.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/half_joint.svg"));
 

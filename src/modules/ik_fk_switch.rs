@@ -1,11 +1,10 @@
 //! `ik_fk_switch`: a limb that follows its joints' controls, a goal, or anything between.
 
-use bevy::reflect::Reflect;
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule, mirrored_direction},
     rig::{
         AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
@@ -13,90 +12,64 @@ use crate::{
     },
 };
 
-/// Moves a limb by forward or inverse kinematics, as an attribute says; thrown without a jump.
-///
-/// A null on each forward control (role `fk`) stands for its joint. The joints follow these, and the inverse kinematics come on top of that with the attribute as their
-/// weight. Everything is made here: no `ik_handle` or `parent` is needed for these joints.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::ik_fk_switch::IkFkSwitch};
-/// let params = r#"(
-///     start: "@joint upper_arm_l#0000000000000001",
-///     end: "@joint hand_l#0000000000000003",
-///     fk: "@command control/upper_arm_l#00000000000000a0",
-///     goal: "@command control/hand_l#00000000000000aa",
-///     pole: "@command control/elbow_l#00000000000000ab",
-///     control: "@command control/arm_settings_l#00000000000000ac",
-///     stretch: "stretch",
-/// )"#;
-/// # rigsmith::modules::all().load(IkFkSwitch::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct IkFkSwitch {
-    /// First joint of the limb.
-    pub start: NodeRefs,
-    /// Last joint of the limb.
-    pub end: NodeRefs,
-    /// A control for each joint, in order.
-    pub fk: NodeRefs,
-    /// Goal of the end.
-    pub goal: NodeRefs,
-    /// The side to which the limb bends.
-    pub pole: NodeRefs,
-    /// The control that carries the attributes.
-    pub control: NodeRefs,
-    /// Name of the attribute that switches.
-    pub attribute: String,
-    /// Value of the attribute until somebody sets another.
-    pub default: f32,
-    /// The joints below the first follow their controls' positions, too.
-    pub translate: bool,
-    /// The first joint follows its control's position, too.
-    pub translate_root: bool,
-    /// Solver.
-    pub solver: IkSolver,
-    /// Share of the length over which two bones ease into being straight.
-    pub soft: Amount,
-    /// Share, 0 to 1, by which two bones lengthen towards the goal.
-    pub stretch: Amount,
-    /// Longest stretch.
-    pub max_stretch: f32,
-    /// Turn about the line to the goal.
-    pub twist: Amount,
-    /// The end turns with the goal.
-    pub orient_end: bool,
-    /// Bend of a straight limb.
-    pub prefer: Option<Vec3>,
-    /// Controls without effect are hidden.
-    pub hide: bool,
-    /// Name, group and label of the nulls on the forward controls.
-    pub creation: Creation,
-}
-
-impl Default for IkFkSwitch {
-    fn default() -> Self {
-        Self {
-            start: NodeRef::this().into(),
-            end: NodeRefs::NONE,
-            fk: NodeRefs::NONE,
-            goal: NodeRefs::NONE,
-            pole: NodeRefs::NONE,
-            control: NodeRefs::NONE,
-            attribute: "ik_fk".to_owned(),
-            default: 1.0,
-            translate: true,
-            translate_root: false,
-            solver: IkSolver::Auto,
-            soft: Amount::Value(0.0),
-            stretch: Amount::Value(0.0),
-            max_stretch: 2.0,
-            twist: Amount::Value(0.0),
-            orient_end: true,
-            prefer: None,
-            hide: true,
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Moves a limb by forward or inverse kinematics, as an attribute says; thrown without a jump.
+    ///
+    /// A null on each forward control (role `fk`) stands for its joint. The joints follow these, and the inverse kinematics come on top of that with the attribute as their
+    /// weight. Everything is made here: no `ik_handle` or `parent` is needed for these joints.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::ik_fk_switch::IkFkSwitch};
+    /// let params = r#"(
+    ///     start: "@joint upper_arm_l#0000000000000001",
+    ///     end: "@joint hand_l#0000000000000003",
+    ///     fk: "@command control/upper_arm_l#00000000000000a0",
+    ///     goal: "@command control/hand_l#00000000000000aa",
+    ///     pole: "@command control/elbow_l#00000000000000ab",
+    ///     control: "@command control/arm_settings_l#00000000000000ac",
+    ///     stretch: "stretch",
+    /// )"#;
+    /// # rigsmith::modules::all().load(IkFkSwitch::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct IkFkSwitch {
+        /// The first joint of the limb, such as a shoulder.
+        pub start: NodeRefs = NodeRef::this().into(),
+        /// The last joint of the limb, such as a wrist.
+        pub end: NodeRefs = NodeRefs::NONE,
+        /// A control for each joint from start to end, in that order.
+        pub fk: NodeRefs = NodeRefs::NONE,
+        /// The control or null that the end goes to by inverse kinematics.
+        pub goal: NodeRefs = NodeRefs::NONE,
+        /// A control on the side to which the limb bends; none: it bends as the forward controls say.
+        pub pole: NodeRefs = NodeRefs::NONE,
+        /// The control that carries the attributes; the goal if left out.
+        pub control: NodeRefs = NodeRefs::NONE,
+        /// Name of the attribute that switches: 0 forward, 1 inverse. Added if the control lacks it.
+        pub attribute: String = "ik_fk".to_owned(),
+        /// Its value until somebody sets another, 0 to 1.
+        pub default: f32 = 1.0,
+        /// The joints below the first follow the positions of their controls, too: needed for stretching.
+        pub translate: bool = true,
+        /// The first joint follows the position of its control, too, and leaves its parent with it.
+        pub translate_root: bool = false,
+        /// auto, two_bone (three joints), fabrik or ccd (any number).
+        pub solver: IkSolver = IkSolver::Auto,
+        /// Share of the length, 0 to 1, over which two bones ease into being straight; or an attribute's name.
+        pub soft: Amount = Amount::Value(0.0),
+        /// 0 keeps the lengths of two bones, 1 stretches them to the goal; or an attribute's name.
+        pub stretch: Amount = Amount::Value(0.0),
+        /// Longest stretch as a factor, 1 or more.
+        pub max_stretch: f32 = 2.0,
+        /// Turn of two bones about the line to the goal in degrees; or an attribute's name.
+        pub twist: Amount = Amount::Value(0.0),
+        /// The end turns with the goal, keeping how the two stand to each other as built.
+        pub orient_end: bool = true,
+        /// Direction in the rig's space in which a straight limb bends; as built, or to the pole, if left out.
+        pub prefer: Option<Vec3> = None,
+        /// Controls of the kinematics that has no effect are hidden: their attribute "visible" is driven.
+        pub hide: bool = true,
+        /// Name, group and label of the nulls that stand on the forward controls for the joints.
+        pub creation: Creation = Creation::default(),
     }
 }
 
@@ -104,30 +77,7 @@ impl RigModule for IkFkSwitch {
     const NAME: &'static str = "ik_fk_switch";
     const DOC: &'static str = "Moves a limb by its joints' own controls (0) or by a goal (1), as an attribute says; the \
                                switch can be thrown without a jump.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("start", "The first joint of the limb, such as a shoulder."),
-        ("end", "The last joint of the limb, such as a wrist."),
-        ("fk", "A control for each joint from start to end, in that order."),
-        ("goal", "The control or null that the end goes to by inverse kinematics."),
-        ("pole", "A control on the side to which the limb bends; none: it bends as the forward controls say."),
-        ("control", "The control that carries the attributes; the goal if left out."),
-        ("attribute", "Name of the attribute that switches: 0 forward, 1 inverse. Added if the control lacks it."),
-        ("default", "Its value until somebody sets another, 0 to 1."),
-        ("translate", "The joints below the first follow the positions of their controls, too: needed for stretching."),
-        ("translate_root", "The first joint follows the position of its control, too, and leaves its parent with it."),
-        ("solver", "auto, two_bone (three joints), fabrik or ccd (any number)."),
-        ("soft", "Share of the length, 0 to 1, over which two bones ease into being straight; or an attribute's name."),
-        ("stretch", "0 keeps the lengths of two bones, 1 stretches them to the goal; or an attribute's name."),
-        ("max_stretch", "Longest stretch as a factor, 1 or more."),
-        ("twist", "Turn of two bones about the line to the goal in degrees; or an attribute's name."),
-        ("orient_end", "The end turns with the goal, keeping how the two stand to each other as built."),
-        (
-            "prefer",
-            "Direction in the rig's space in which a straight limb bends; as built, or to the pole, if left out.",
-        ),
-        ("hide", "Controls of the kinematics that has no effect are hidden: their attribute \"visible\" is driven."),
-        ("creation", "Name, group and label of the nulls that stand on the forward controls for the joints."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["twist", "prefer"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.svg"));

@@ -1,118 +1,72 @@
 //! `ik_handle`: a chain of joints that reaches for a goal.
 
-use bevy::reflect::Reflect;
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use crate::{
+    parameters,
     processor::{
         Amount, BuildScope, Ik, IkSolver, JointAngles, ModuleError, RigModule, mirrored_direction, mirrored_limits,
     },
     rig::reference::{NodeRef, NodeRefs},
 };
 
-/// Makes a chain of joints reach for a goal.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::ik_handle::IkHandle};
-/// let params = r#"(
-///     start: "@this",
-///     end: "@joint hand_l#0000000000000003",
-///     goal: "@command control/hand_l#00000000000000aa",
-///     pole: "@command control/elbow_l#00000000000000ab",
-///     soft: 0.02,
-///     stretch: "stretch",
-/// )"#;
-/// # rigsmith::modules::all().load(IkHandle::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct IkHandle {
-    /// First joint of the chain.
-    pub start: NodeRefs,
-    /// Last joint of the chain: what reaches the goal.
-    pub end: NodeRefs,
-    /// Goal of the end.
-    pub goal: NodeRefs,
-    /// The side to which the chain bends.
-    pub pole: NodeRefs,
-    /// The control whose attributes the numbers below may name.
-    pub control: NodeRefs,
-    /// Solver.
-    pub solver: IkSolver,
-    /// Share of the reach.
-    pub weight: Amount,
-    /// Share of the length over which two bones ease into being straight.
-    pub soft: Amount,
-    /// Share, 0 to 1, by which two bones lengthen towards the goal.
-    pub stretch: Amount,
-    /// Longest stretch.
-    pub max_stretch: f32,
-    /// Turn about the line to the goal.
-    pub twist: Amount,
-    /// The end turns with the goal.
-    pub orient_end: bool,
-    /// Bend of a straight chain.
-    pub prefer: Option<Vec3>,
-    /// Limits of the joints.
-    pub limits: Vec<JointAngles>,
-    /// Rounds of the solver.
-    pub iterations: u32,
-    /// Nearness to the goal.
-    pub tolerance: f32,
-    /// Goal and pole are hidden without effect.
-    pub hide: bool,
-}
-
-impl Default for IkHandle {
-    fn default() -> Self {
-        Self {
-            start: NodeRef::this().into(),
-            end: NodeRefs::NONE,
-            goal: NodeRefs::NONE,
-            pole: NodeRefs::NONE,
-            control: NodeRefs::NONE,
-            solver: IkSolver::Auto,
-            weight: Amount::Value(1.0),
-            soft: Amount::Value(0.0),
-            stretch: Amount::Value(0.0),
-            max_stretch: 2.0,
-            twist: Amount::Value(0.0),
-            orient_end: true,
-            prefer: None,
-            limits: Vec::new(),
-            iterations: 24,
-            tolerance: 1e-4,
-            hide: true,
-        }
+parameters! {
+    /// Makes a chain of joints reach for a goal.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::ik_handle::IkHandle};
+    /// let params = r#"(
+    ///     start: "@this",
+    ///     end: "@joint hand_l#0000000000000003",
+    ///     goal: "@command control/hand_l#00000000000000aa",
+    ///     pole: "@command control/elbow_l#00000000000000ab",
+    ///     soft: 0.02,
+    ///     stretch: "stretch",
+    /// )"#;
+    /// # rigsmith::modules::all().load(IkHandle::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct IkHandle {
+        /// The first joint of the chain, such as a shoulder.
+        pub start: NodeRefs = NodeRef::this().into(),
+        /// The last joint of the chain, such as a wrist: what reaches the goal.
+        pub end: NodeRefs = NodeRefs::NONE,
+        /// The control or null that the end goes to.
+        pub goal: NodeRefs = NodeRefs::NONE,
+        /// A control or null on the side to which the chain bends; none: it bends as it stands.
+        pub pole: NodeRefs = NodeRefs::NONE,
+        /// The control whose attributes the numbers may name; the goal if left out.
+        pub control: NodeRefs = NodeRefs::NONE,
+        /// auto, two_bone (three joints), fabrik or ccd (any number; ccd keeps limits).
+        pub solver: IkSolver = IkSolver::Auto,
+        /// 0 leaves the chain as it is, 1 reaches; a number or an attribute's name.
+        pub weight: Amount = Amount::Value(1.0),
+        /// Share of the length, 0 to 1, over which two bones ease into being straight; or an attribute's name.
+        pub soft: Amount = Amount::Value(0.0),
+        /// 0 keeps the lengths of two bones, 1 stretches them to the goal; or an attribute's name.
+        pub stretch: Amount = Amount::Value(0.0),
+        /// Longest stretch as a factor, 1 or more.
+        pub max_stretch: f32 = 2.0,
+        /// Turn of two bones about the line to the goal in degrees; or an attribute's name.
+        pub twist: Amount = Amount::Value(0.0),
+        /// The end turns with the goal, keeping how the two stand to each other as built.
+        pub orient_end: bool = true,
+        /// Direction in the rig's space in which a straight chain bends; as built, or to the pole, if left out.
+        pub prefer: Option<Vec3> = None,
+        /// For ccd: lowest and highest angles in degrees about X, Y and Z of each joint, from the first on.
+        pub limits: Vec<JointAngles> = Vec::new(),
+        /// For fabrik and ccd: rounds at most, 1 to 1000.
+        pub iterations: u32 = 24,
+        /// For fabrik and ccd: distance from the goal that is near enough, as a share of the length.
+        pub tolerance: f32 = 1e-4,
+        /// Goal and pole are hidden while an attribute as weight is 0: their attribute "visible" is driven.
+        pub hide: bool = true,
     }
 }
 
 impl RigModule for IkHandle {
     const NAME: &'static str = "ik_handle";
     const DOC: &'static str = "Makes a chain of joints reach for a goal: two bones exactly, longer chains in rounds.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("start", "The first joint of the chain, such as a shoulder."),
-        ("end", "The last joint of the chain, such as a wrist: what reaches the goal."),
-        ("goal", "The control or null that the end goes to."),
-        ("pole", "A control or null on the side to which the chain bends; none: it bends as it stands."),
-        ("control", "The control whose attributes the numbers may name; the goal if left out."),
-        ("solver", "auto, two_bone (three joints), fabrik or ccd (any number; ccd keeps limits)."),
-        ("weight", "0 leaves the chain as it is, 1 reaches; a number or an attribute's name."),
-        ("soft", "Share of the length, 0 to 1, over which two bones ease into being straight; or an attribute's name."),
-        ("stretch", "0 keeps the lengths of two bones, 1 stretches them to the goal; or an attribute's name."),
-        ("max_stretch", "Longest stretch as a factor, 1 or more."),
-        ("twist", "Turn of two bones about the line to the goal in degrees; or an attribute's name."),
-        ("orient_end", "The end turns with the goal, keeping how the two stand to each other as built."),
-        (
-            "prefer",
-            "Direction in the rig's space in which a straight chain bends; as built, or to the pole, if left out.",
-        ),
-        ("limits", "For ccd: lowest and highest angles in degrees about X, Y and Z of each joint, from the first on."),
-        ("iterations", "For fabrik and ccd: rounds at most, 1 to 1000."),
-        ("tolerance", "For fabrik and ccd: distance from the goal that is near enough, as a share of the length."),
-        ("hide", "Goal and pole are hidden while an attribute as weight is 0: their attribute \"visible\" is driven."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["twist", "prefer", "limits"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_handle.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/ik_handle.svg"));

@@ -1,10 +1,8 @@
 //! `insert_joints`: joints between a joint and the next.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{BuildScope, Creation, ModuleError, RigModule},
     rig::{
         NodeType,
@@ -15,41 +13,30 @@ use crate::{
 /// The most joints that one command inserts.
 const MOST: u32 = 64;
 
-/// Puts joints evenly between a joint and its child, which is hung below the last of them. Role: `joint`.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::insert_joints::InsertJointsModule};
-/// let params = r#"(joint: "@this", count: 3)"#;
-/// # assert!(rigsmith::modules::all().load(InsertJointsModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct InsertJointsModule {
-    /// The upper joint.
-    pub joint: NodeRefs,
-    /// The lower joint.
-    pub child: NodeRefs,
-    /// Number of joints to insert.
-    pub count: u32,
-    /// See [`Creation`].
-    pub creation: Creation,
-}
-
-impl Default for InsertJointsModule {
-    fn default() -> Self {
-        Self { joint: NodeRef::this().into(), child: NodeRefs::NONE, count: 1, creation: Creation::default() }
+parameters! {
+    /// Puts joints evenly between a joint and its child, which is hung below the last of them. Role: `joint`.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::insert_joints::InsertJointsModule};
+    /// let params = r#"(joint: "@this", count: 3)"#;
+    /// # assert!(rigsmith::modules::all().load(InsertJointsModule::NAME, params).is_ok());
+    /// ```
+    pub struct InsertJointsModule {
+        /// The upper joint.
+        pub joint: NodeRefs = NodeRef::this().into(),
+        /// The lower joint, a child of the upper; its only child joint if left out.
+        pub child: NodeRefs = NodeRefs::NONE,
+        /// How many joints, 1 to 64.
+        pub count: u32 = 1,
+        /// Name, groups and label; by default those of the upper joint.
+        pub creation: Creation = Creation::default(),
     }
 }
 
 impl RigModule for InsertJointsModule {
     const NAME: &'static str = "insert_joints";
     const DOC: &'static str = "Puts joints evenly between a joint and the next, which is hung below the last of them.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("joint", "The upper joint."),
-        ("child", "The lower joint, a child of the upper; its only child joint if left out."),
-        ("count", "How many joints, 1 to 64."),
-        ("creation", "Name, groups and label; by default those of the upper joint."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/insert_joints.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/insert_joints.svg"));
 

@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
+    parameters,
     processor::{BuildScope, ModuleError, RigModule},
     rig::{
         LayerData, LayerDisplay,
@@ -13,57 +11,34 @@ use crate::{
     },
 };
 
-/// Puts nodes into a layer.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::layer::LayerModule};
-/// let params = r#"(nodes: "@any type:control", name: "controls", display: reference)"#;
-/// # assert!(rigsmith::modules::all().load(LayerModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LayerModule {
-    /// The nodes.
-    pub nodes: NodeRefs,
-    /// The layer's name.
-    pub name: String,
-    /// True if it is shown.
-    pub visible: bool,
-    /// Display of the layer.
-    pub display: LayerDisplay,
-    /// Colour of the layer.
-    pub color: Option<[f32; 3]>,
-    /// True if a layer of that name is taken as it is.
-    pub use_existing: bool,
-}
-
-impl Default for LayerModule {
-    fn default() -> Self {
-        Self {
-            nodes: NodeRef::this().into(),
-            name: "layer".to_owned(),
-            visible: true,
-            display: LayerDisplay::Normal,
-            color: None,
-            use_existing: false,
-        }
+parameters! {
+    /// Puts nodes into a layer.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::layer::LayerModule};
+    /// let params = r#"(nodes: "@any type:control", name: "controls", display: reference)"#;
+    /// # assert!(rigsmith::modules::all().load(LayerModule::NAME, params).is_ok());
+    /// ```
+    pub struct LayerModule {
+        /// The nodes; each is in one layer at most, the last one.
+        pub nodes: NodeRefs = NodeRef::this().into(),
+        /// The layer's name.
+        pub name: String = "layer".to_owned(),
+        /// False: its nodes are hidden.
+        pub visible: bool = true,
+        /// normal: as they are; template: grey and not to be picked; reference: not to be picked.
+        pub display: LayerDisplay = LayerDisplay::Normal,
+        /// sRGB colour, 0 to 1 each, in place of the nodes' own; their own if left out.
+        pub color: Option<[f32; 3]> = None,
+        /// True: if an earlier command made a layer of that name, it stays as it is and gets the nodes.
+        pub use_existing: bool = false,
     }
 }
 
 impl RigModule for LayerModule {
     const NAME: &'static str = "layer";
     const DOC: &'static str = "Puts nodes into a layer, to be shown and hidden together.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("nodes", "The nodes; each is in one layer at most, the last one."),
-        ("name", "The layer's name."),
-        ("visible", "False: its nodes are hidden."),
-        ("display", "normal: as they are; template: grey and not to be picked; reference: not to be picked."),
-        ("color", "sRGB colour, 0 to 1 each, in place of the nodes' own; their own if left out."),
-        (
-            "use_existing",
-            "True: if an earlier command made a layer of that name, it stays as it is and gets the nodes.",
-        ),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/layer.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/layer.svg"));
 

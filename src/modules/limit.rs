@@ -1,9 +1,7 @@
 //! `limit`: nodes that stay within ends.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
+    parameters,
     processor::{BuildScope, ModuleError, RigModule, check_limits},
     rig::{
         Constraint, Limits,
@@ -11,35 +9,26 @@ use crate::{
     },
 };
 
-/// Keeps nodes within ends, whatever drives them. Role: `constraint`, for each node.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::limit::LimitModule};
-/// let params = r#"(nodes: "@this", limits: (rotate: ((0.0, 150.0), (0.0, 0.0), (0.0, 0.0))))"#;
-/// # assert!(rigsmith::modules::all().load(LimitModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LimitModule {
-    /// The nodes.
-    pub nodes: NodeRefs,
-    /// The ends.
-    pub limits: Limits,
-}
-
-impl Default for LimitModule {
-    fn default() -> Self {
-        Self { nodes: NodeRef::this().into(), limits: Limits::default() }
+parameters! {
+    /// Keeps nodes within ends, whatever drives them. Role: `constraint`, for each node.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::limit::LimitModule};
+    /// let params = r#"(nodes: "@this", limits: (rotate: ((0.0, 150.0), (0.0, 0.0), (0.0, 0.0))))"#;
+    /// # assert!(rigsmith::modules::all().load(LimitModule::NAME, params).is_ok());
+    /// ```
+    pub struct LimitModule {
+        /// The nodes.
+        pub nodes: NodeRefs = NodeRef::this().into(),
+        /// Lowest and highest values against how they were built; rotation in degrees; None where open.
+        pub limits: Limits = Limits::default(),
     }
 }
 
 impl RigModule for LimitModule {
     const NAME: &'static str = "limit";
     const DOC: &'static str = "Keeps nodes within ends, whatever drives them.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("nodes", "The nodes."),
-        ("limits", "Lowest and highest values against how they were built; rotation in degrees; None where open."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["limits"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/limit.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/limit.svg"));

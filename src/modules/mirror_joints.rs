@@ -1,14 +1,11 @@
 //! `mirror_joints`: the other side of a hierarchy of joints.
 
-use bevy::{
-    math::{Mat3, Quat},
-    reflect::Reflect,
-};
+use bevy::math::{Mat3, Quat};
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{
         BuildScope, Creation, ModuleError, NodeId, RigModule, check_finite, mirrored_direction, mirrored_line,
     },
@@ -20,57 +17,34 @@ use crate::{
     },
 };
 
-/// Makes the mirror image of joints as joints of their own. Role: `joint`.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::mirror_joints::MirrorJointsModule};
-/// let params = r#"(joints: "@hierarchy this", opposed: true)"#;
-/// # assert!(rigsmith::modules::all().load(MirrorJointsModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MirrorJointsModule {
-    /// The joints to mirror.
-    pub joints: NodeRefs,
-    /// Parent of the uppermost copies.
-    pub parent: NodeRefs,
-    /// A point of the plane.
-    pub point: Vec3,
-    /// The plane's normal.
-    pub normal: Vec3,
-    /// True if the copies' axes point the other way.
-    pub opposed: bool,
-    /// See [`Creation`].
-    pub creation: Creation,
-}
-
-impl Default for MirrorJointsModule {
-    fn default() -> Self {
-        Self {
-            joints: Source::Hierarchy(Top::This).into(),
-            parent: NodeRefs::NONE,
-            point: Vec3::ZERO,
-            normal: Vec3::X,
-            opposed: false,
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Makes the mirror image of joints as joints of their own. Role: `joint`.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::mirror_joints::MirrorJointsModule};
+    /// let params = r#"(joints: "@hierarchy this", opposed: true)"#;
+    /// # assert!(rigsmith::modules::all().load(MirrorJointsModule::NAME, params).is_ok());
+    /// ```
+    pub struct MirrorJointsModule {
+        /// The joints to mirror; this joint and all below it if left out.
+        pub joints: NodeRefs = Source::Hierarchy(Top::This).into(),
+        /// What the uppermost copies stand on; the parent of each joint if left out.
+        pub parent: NodeRefs = NodeRefs::NONE,
+        /// A point of the mirror plane, in the rig's units.
+        pub point: Vec3 = Vec3::ZERO,
+        /// The direction across the plane, in the rig's space; X between left and right.
+        pub normal: Vec3 = Vec3::X,
+        /// True: the copies' axes point the other way, so that the same turn on both sides is a mirrored movement.
+        pub opposed: bool = false,
+        /// Name, groups and label; by default each joint's label with the other side in it.
+        pub creation: Creation = Creation::default(),
     }
 }
 
 impl RigModule for MirrorJointsModule {
     const NAME: &'static str = "mirror_joints";
     const DOC: &'static str = "Makes the mirror image of joints, with labels of the other side.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("joints", "The joints to mirror; this joint and all below it if left out."),
-        ("parent", "What the uppermost copies stand on; the parent of each joint if left out."),
-        ("point", "A point of the mirror plane, in the rig's units."),
-        ("normal", "The direction across the plane, in the rig's space; X between left and right."),
-        (
-            "opposed",
-            "True: the copies' axes point the other way, so that the same turn on both sides is a mirrored movement.",
-        ),
-        ("creation", "Name, groups and label; by default each joint's label with the other side in it."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["point", "normal"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/mirror_joints.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/mirror_joints.svg"));

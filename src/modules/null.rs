@@ -1,11 +1,10 @@
 //! `null`: a node that carries others, at other nodes.
 
-use bevy::reflect::Reflect;
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{
         BuildScope, Creation, ModuleError, RigModule, check_finite, degrees, mirrored_angles, mirrored_direction,
     },
@@ -15,62 +14,38 @@ use crate::{
     },
 };
 
-/// Makes a null for each of some nodes. Role: `null`.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::null::NullModule};
-/// let params = r#"(at: "@this", world: true, creation: (name: "arm_root"))"#;
-/// # assert!(rigsmith::modules::all().load(NullModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct NullModule {
-    /// The nodes that get one.
-    pub at: NodeRefs,
-    /// Parent of the nulls.
-    pub parent: NodeRefs,
-    /// True if they stand below the rig.
-    pub world: bool,
-    /// True if the nodes are hung below their nulls.
-    pub insert: bool,
-    /// True if they turn like the nodes.
-    pub orient: bool,
-    /// Distance from the node.
-    pub translate: Vec3,
-    /// Turn against the node.
-    pub rotate: Vec3,
-    /// See [`Creation`].
-    pub creation: Creation,
-}
-
-impl Default for NullModule {
-    fn default() -> Self {
-        Self {
-            at: NodeRef::this().into(),
-            parent: NodeRefs::NONE,
-            world: false,
-            insert: false,
-            orient: true,
-            translate: Vec3::ZERO,
-            rotate: Vec3::ZERO,
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Makes a null for each of some nodes. Role: `null`.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::null::NullModule};
+    /// let params = r#"(at: "@this", world: true, creation: (name: "arm_root"))"#;
+    /// # assert!(rigsmith::modules::all().load(NullModule::NAME, params).is_ok());
+    /// ```
+    pub struct NullModule {
+        /// The nodes that get one.
+        pub at: NodeRefs = NodeRef::this().into(),
+        /// What the nulls stand on; the parent of each node if left out.
+        pub parent: NodeRefs = NodeRefs::NONE,
+        /// True: they stand below the rig itself, on no parent.
+        pub world: bool = false,
+        /// True: each node is hung below its null, which takes its place.
+        pub insert: bool = false,
+        /// True: they turn and scale like the nodes; false: along the rig's axes.
+        pub orient: bool = true,
+        /// Distance from the node, along the null's axes before it is turned, in the rig's units.
+        pub translate: Vec3 = Vec3::ZERO,
+        /// Turn against the node about X, Y and Z, in degrees.
+        pub rotate: Vec3 = Vec3::ZERO,
+        /// Name, groups and label; by default those of the node.
+        pub creation: Creation = Creation::default(),
     }
 }
 
 impl RigModule for NullModule {
     const NAME: &'static str = "null";
     const DOC: &'static str = "Makes a node that carries others, at each of some nodes.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("at", "The nodes that get one."),
-        ("parent", "What the nulls stand on; the parent of each node if left out."),
-        ("world", "True: they stand below the rig itself, on no parent."),
-        ("insert", "True: each node is hung below its null, which takes its place."),
-        ("orient", "True: they turn and scale like the nodes; false: along the rig's axes."),
-        ("translate", "Distance from the node, along the null's axes before it is turned, in the rig's units."),
-        ("rotate", "Turn against the node about X, Y and Z, in degrees."),
-        ("creation", "Name, groups and label; by default those of the node."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["translate", "rotate"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/null.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/null.svg"));

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{Axis, BuildScope, ModuleError, NodeId, RigModule, check_finite, mirrored_direction},
     rig::{
         NodeType,
@@ -40,64 +41,37 @@ pub enum EndMode {
     Keep,
 }
 
-/// Turns joints so that one axis lies along the bone and another points up. Joints stay where they are.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::orient_joints::OrientJointsModule};
-/// let params = r#"(joints: "@hierarchy this", along: y, up_axis: z, up: plane, direction: (0.0, 0.0, 1.0))"#;
-/// # assert!(rigsmith::modules::all().load(OrientJointsModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct OrientJointsModule {
-    /// The joints to turn.
-    pub joints: NodeRefs,
-    /// The axis along the bone.
-    pub along: Axis,
-    /// The axis that points up.
-    pub up_axis: Axis,
-    /// Direction that counts as up.
-    pub up: UpMode,
-    /// The direction.
-    pub direction: Vec3,
-    /// The node that is up.
-    pub up_node: NodeRefs,
-    /// Treatment of ends.
-    pub end: EndMode,
-}
-
-impl Default for OrientJointsModule {
-    fn default() -> Self {
-        Self {
-            joints: Source::Hierarchy(Top::This).into(),
-            along: Axis::Y,
-            up_axis: Axis::Z,
-            up: UpMode::Direction,
-            direction: Vec3::Z,
-            up_node: NodeRefs::NONE,
-            end: EndMode::Parent,
-        }
+parameters! {
+    /// Turns joints so that one axis lies along the bone and another points up. Joints stay where they are.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::orient_joints::OrientJointsModule};
+    /// let params = r#"(joints: "@hierarchy this", along: y, up_axis: z, up: plane, direction: (0.0, 0.0, 1.0))"#;
+    /// # assert!(rigsmith::modules::all().load(OrientJointsModule::NAME, params).is_ok());
+    /// ```
+    pub struct OrientJointsModule {
+        /// The joints to turn; this joint and all below it if left out.
+        pub joints: NodeRefs = Source::Hierarchy(Top::This).into(),
+        /// The axis that points to the next joint: x, y, z, neg_x, neg_y or neg_z.
+        pub along: Axis = Axis::Y,
+        /// The axis that points up as far as the bone allows.
+        pub up_axis: Axis = Axis::Z,
+        /// direction: up is a direction of the rig; plane: across the plane in which the chain bends; node: to a node.
+        pub up: UpMode = UpMode::Direction,
+        /// Up in the rig's space; also where a chain is straight.
+        pub direction: Vec3 = Vec3::Z,
+        /// The node that is up where `up` is node.
+        pub up_node: NodeRefs = NodeRefs::NONE,
+        /// Joints at the end of a chain: parent: turned like the one above; rig: along the rig's axes; keep: as they
+        /// are.
+        pub end: EndMode = EndMode::Parent,
     }
 }
 
 impl RigModule for OrientJointsModule {
     const NAME: &'static str = "orient_joints";
     const DOC: &'static str = "Turns joints so that one axis lies along the bone and another points up.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("joints", "The joints to turn; this joint and all below it if left out."),
-        ("along", "The axis that points to the next joint: x, y, z, neg_x, neg_y or neg_z."),
-        ("up_axis", "The axis that points up as far as the bone allows."),
-        (
-            "up",
-            "direction: up is a direction of the rig; plane: across the plane in which the chain bends; node: to a node.",
-        ),
-        ("direction", "Up in the rig's space; also where a chain is straight."),
-        ("up_node", "The node that is up where `up` is node."),
-        (
-            "end",
-            "Joints at the end of a chain: parent: turned like the one above; rig: along the rig's axes; keep: as they are.",
-        ),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["along", "up_axis", "direction"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/orient_joints.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/orient_joints.svg"));

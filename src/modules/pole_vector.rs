@@ -1,83 +1,51 @@
 //! `pole_vector`: the node towards which a chain bends, in the right place.
 
-use bevy::reflect::Reflect;
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{Amount, BuildScope, Creation, ModuleError, RigModule, TargetParams, check_finite, mirrored_direction},
     rig::{Constraint, NodeType, reference::NodeRefs},
 };
 
-/// Puts a control or null where a chain bends to, for an `ik_handle` to take as its pole. Without one it makes a null,
-/// with the role `pole`. With targets, the pole follows them, with the role `constraint`.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::pole_vector::PoleVectorModule};
-/// let params = r#"(chain: "@hierarchy this pick:0,1,2", pole: "@command control#00000000000000aa", distance: 0.8)"#;
-/// # assert!(rigsmith::modules::all().load(PoleVectorModule::NAME, params).is_ok());
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PoleVectorModule {
-    /// The chain from its root to its end.
-    pub chain: NodeRefs,
-    /// The node that is put in place.
-    pub pole: NodeRefs,
-    /// Distance from the bend.
-    pub distance: f32,
-    /// Direction in which a straight chain bends.
-    pub prefer: Vec3,
-    /// Parent of a null.
-    pub parent: NodeRefs,
-    /// Nodes that the pole follows.
-    pub targets: NodeRefs,
-    /// A share for each target.
-    pub weights: Vec<Amount>,
-    /// The node with the attributes.
-    pub control: NodeRefs,
-    /// Weight of the constraint, 0 to 1.
-    pub weight: Amount,
-    /// See [`Creation`].
-    pub creation: Creation,
-}
-
-impl Default for PoleVectorModule {
-    fn default() -> Self {
-        Self {
-            chain: NodeRefs::NONE,
-            pole: NodeRefs::NONE,
-            distance: 0.75,
-            prefer: Vec3::Z,
-            parent: NodeRefs::NONE,
-            targets: NodeRefs::NONE,
-            weights: Vec::new(),
-            control: NodeRefs::NONE,
-            weight: Amount::Value(1.0),
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Puts a control or null where a chain bends to, for an `ik_handle` to take as its pole. Without one it makes a null,
+    /// with the role `pole`. With targets, the pole follows them, with the role `constraint`.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::pole_vector::PoleVectorModule};
+    /// let params = r#"(chain: "@hierarchy this pick:0,1,2", pole: "@command control#00000000000000aa", distance: 0.8)"#;
+    /// # assert!(rigsmith::modules::all().load(PoleVectorModule::NAME, params).is_ok());
+    /// ```
+    pub struct PoleVectorModule {
+        /// The chain of at least three nodes from its root to its end.
+        pub chain: NodeRefs = NodeRefs::NONE,
+        /// The control or null that is put in place; a null is made if left out.
+        pub pole: NodeRefs = NodeRefs::NONE,
+        /// How far the pole is from the bend, as a share of the chain's length, above 0.
+        pub distance: f32 = 0.75,
+        /// Where a straight chain bends to, in the rig's space.
+        pub prefer: Vec3 = Vec3::Z,
+        /// What a null that is made stands on; below the rig if left out.
+        pub parent: NodeRefs = NodeRefs::NONE,
+        /// Nodes whose place the pole follows from where it is; none to leave it where its parent takes it.
+        pub targets: NodeRefs = NodeRefs::NONE,
+        /// For each target its share, a number from 0 or the name of an attribute; all the same if left out.
+        pub weights: Vec<Amount> = Vec::new(),
+        /// The node that has the attributes; those that it lacks are added.
+        pub control: NodeRefs = NodeRefs::NONE,
+        /// How much the pole follows, a number from 0 to 1 or the name of an attribute of the control.
+        pub weight: Amount = Amount::Value(1.0),
+        /// Name, groups and label of a null that is made.
+        pub creation: Creation = Creation::default(),
     }
 }
 
 impl RigModule for PoleVectorModule {
     const NAME: &'static str = "pole_vector";
     const DOC: &'static str = "Puts a control or null where a chain bends to, and lets it follow weighted targets.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("chain", "The chain of at least three nodes from its root to its end."),
-        ("pole", "The control or null that is put in place; a null is made if left out."),
-        ("distance", "How far the pole is from the bend, as a share of the chain's length, above 0."),
-        ("prefer", "Where a straight chain bends to, in the rig's space."),
-        ("parent", "What a null that is made stands on; below the rig if left out."),
-        ("targets", "Nodes whose place the pole follows from where it is; none to leave it where its parent takes it."),
-        (
-            "weights",
-            "For each target its share, a number from 0 or the name of an attribute; all the same if left out.",
-        ),
-        ("control", "The node that has the attributes; those that it lacks are added."),
-        ("weight", "How much the pole follows, a number from 0 to 1 or the name of an attribute of the control."),
-        ("creation", "Name, groups and label of a null that is made."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["prefer"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/pole_vector.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/pole_vector.svg"));

@@ -1,11 +1,10 @@
 //! `reverse_foot`: pivots over which a foot rolls, from heel to toe and from side to side.
 
-use bevy::reflect::Reflect;
 use glam::{Mat3, Quat, Vec3};
-use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{Amount, BuildScope, Creation, ModuleError, NodeId, RigModule, mirrored_direction},
     rig::{
         AttributeKind, Channel, Constraint, KeyEase, NodeType, Output, Scalar, Target,
@@ -13,75 +12,53 @@ use crate::{
     },
 };
 
-/// Makes the pivots of a foot below its control, and the attributes that roll it.
-///
-/// The pivots carry one another: heel, toe tip, outer and inner edge, the turn on the ball, the lift on the ball. The
-/// last carries the node with the role `goal`, to which the leg's inverse kinematics go.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::reverse_foot::ReverseFoot};
-/// let params = r#"(
-///     ankle: "@joint foot_l#0000000000000003",
-///     ball: "@joint ball_l#0000000000000004",
-///     toe: "@joint toe_l#0000000000000005",
-///     control: "@command control/foot_l#00000000000000aa",
-/// )"#;
-/// # rigsmith::modules::all().load(ReverseFoot::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ReverseFoot {
-    /// The ankle.
-    pub ankle: NodeRefs,
-    /// The joint at the ball.
-    pub ball: NodeRefs,
-    /// The tip of the toes.
-    pub toe: NodeRefs,
-    /// The foot's control.
-    pub control: NodeRefs,
-    /// The back of the sole.
-    pub heel: NodeRefs,
-    /// The inner edge of the sole.
-    pub inner: NodeRefs,
-    /// The outer edge of the sole.
-    pub outer: NodeRefs,
-    /// Distance of the heel behind the ankle.
-    pub heel_back: f32,
-    /// Width of the sole.
-    pub width: f32,
-    /// Up from the sole.
-    pub up: Vec3,
-    /// Angle at which the roll moves on to the toe, until somebody sets another.
-    pub break_angle: f32,
-    /// The ball's joint turns with the toes.
-    pub drive_ball: bool,
-    /// Share of that.
-    pub weight: Amount,
-    /// The control whose attribute that may be.
-    pub weight_control: NodeRefs,
-    /// Name, group and label of the pivots.
-    pub creation: Creation,
-}
-
-impl Default for ReverseFoot {
-    fn default() -> Self {
-        Self {
-            ankle: NodeRef::this().into(),
-            ball: NodeRefs::NONE,
-            toe: NodeRefs::NONE,
-            control: NodeRefs::NONE,
-            heel: NodeRefs::NONE,
-            inner: NodeRefs::NONE,
-            outer: NodeRefs::NONE,
-            heel_back: 0.3,
-            width: 0.4,
-            up: Vec3::Y,
-            break_angle: 35.0,
-            drive_ball: true,
-            weight: Amount::Value(1.0),
-            weight_control: NodeRefs::NONE,
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Makes the pivots of a foot below its control, and the attributes that roll it.
+    ///
+    /// The pivots carry one another: heel, toe tip, outer and inner edge, the turn on the ball, the lift on the ball. The
+    /// last carries the node with the role `goal`, to which the leg's inverse kinematics go.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::reverse_foot::ReverseFoot};
+    /// let params = r#"(
+    ///     ankle: "@joint foot_l#0000000000000003",
+    ///     ball: "@joint ball_l#0000000000000004",
+    ///     toe: "@joint toe_l#0000000000000005",
+    ///     control: "@command control/foot_l#00000000000000aa",
+    /// )"#;
+    /// # rigsmith::modules::all().load(ReverseFoot::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct ReverseFoot {
+        /// The ankle's joint: the end of the leg.
+        pub ankle: NodeRefs = NodeRef::this().into(),
+        /// The joint at the ball of the foot.
+        pub ball: NodeRefs = NodeRefs::NONE,
+        /// A joint or null at the tip of the toes; beyond the ball, half as far as it is from ankle, if left out.
+        pub toe: NodeRefs = NodeRefs::NONE,
+        /// The foot's control; the pivots hang below it, and it gets the attributes.
+        pub control: NodeRefs = NodeRefs::NONE,
+        /// A joint or null at the back of the sole; placed by heel_back if left out.
+        pub heel: NodeRefs = NodeRefs::NONE,
+        /// A joint or null at the inner edge of the sole; placed by width if left out.
+        pub inner: NodeRefs = NodeRefs::NONE,
+        /// A joint or null at the outer edge of the sole; placed by width if left out.
+        pub outer: NodeRefs = NodeRefs::NONE,
+        /// Distance of the heel behind the ankle, as a share of that from ankle to toe tip; 0 or more.
+        pub heel_back: f32 = 0.3,
+        /// Width of the sole at the ball, as a share of the distance from ankle to toe tip; 0 or more.
+        pub width: f32 = 0.4,
+        /// Up from the sole, in the rig's space.
+        pub up: Vec3 = Vec3::Y,
+        /// Degrees at which the roll moves on from ball to toe, until somebody sets others; 0 to 180.
+        pub break_angle: f32 = 35.0,
+        /// The ball's joint turns with the toes, which stay flat while the heel lifts.
+        pub drive_ball: bool = true,
+        /// Share of that, 0 to 1: a number or an attribute's name, such as that of ik_fk_switch.
+        pub weight: Amount = Amount::Value(1.0),
+        /// The control that carries that attribute; the foot's if left out.
+        pub weight_control: NodeRefs = NodeRefs::NONE,
+        /// Name, group and label of the pivots.
+        pub creation: Creation = Creation::default(),
     }
 }
 
@@ -102,26 +79,7 @@ impl RigModule for ReverseFoot {
     const NAME: &'static str = "reverse_foot";
     const DOC: &'static str = "Makes the pivots over which a foot rolls, with the attributes roll, bank, toe, swivel and \
                                break_angle; the node with the role goal is where the leg's inverse kinematics go.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("ankle", "The ankle's joint: the end of the leg."),
-        ("ball", "The joint at the ball of the foot."),
-        (
-            "toe",
-            "A joint or null at the tip of the toes; beyond the ball, half as far as it is from ankle, if left out.",
-        ),
-        ("control", "The foot's control; the pivots hang below it, and it gets the attributes."),
-        ("heel", "A joint or null at the back of the sole; placed by heel_back if left out."),
-        ("inner", "A joint or null at the inner edge of the sole; placed by width if left out."),
-        ("outer", "A joint or null at the outer edge of the sole; placed by width if left out."),
-        ("heel_back", "Distance of the heel behind the ankle, as a share of that from ankle to toe tip; 0 or more."),
-        ("width", "Width of the sole at the ball, as a share of the distance from ankle to toe tip; 0 or more."),
-        ("up", "Up from the sole, in the rig's space."),
-        ("break_angle", "Degrees at which the roll moves on from ball to toe, until somebody sets others; 0 to 180."),
-        ("drive_ball", "The ball's joint turns with the toes, which stay flat while the heel lifts."),
-        ("weight", "Share of that, 0 to 1: a number or an attribute's name, such as that of ik_fk_switch."),
-        ("weight_control", "The control that carries that attribute; the foot's if left out."),
-        ("creation", "Name, group and label of the pivots."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["up"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/reverse_foot.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/reverse_foot.svg"));

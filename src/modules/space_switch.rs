@@ -1,9 +1,7 @@
 //! `space_switch`: a control that moves with one of several nodes, as an attribute says.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
+    parameters,
     processor::{BuildScope, Creation, ModuleError, RigModule},
     rig::{
         AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
@@ -12,59 +10,42 @@ use crate::{
     },
 };
 
-/// Lets a control move with one of several nodes, as a choice attribute says; thrown without a jump.
-///
-/// A null between the control and its parent follows the chosen space and keeps how it was built relative to it, so the
-/// control itself stays free.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::space_switch::SpaceSwitch};
-/// let params = r#"(
-///     control: "@command control/hand_l#00000000000000aa",
-///     spaces: "@command control/root#00000000000000a0 + @joint chest#0000000000000005 + @joint head#0000000000000007",
-///     names: ["world", "chest", "head"],
-/// )"#;
-/// # rigsmith::modules::all().load(SpaceSwitch::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SpaceSwitch {
-    /// The control that changes spaces.
-    pub control: NodeRefs,
-    /// The spaces.
-    pub spaces: NodeRefs,
-    /// Names of the spaces.
-    pub names: Vec<String>,
-    /// The control that carries the attribute.
-    pub attribute_on: NodeRefs,
-    /// Name of the attribute.
-    pub attribute: String,
-    /// Number of the space until somebody chooses another.
-    pub default: u32,
-    /// The position follows.
-    pub translate: bool,
-    /// The rotation follows.
-    pub rotate: bool,
-    /// The scale follows.
-    pub scale: bool,
-    /// Name, group and label of the null.
-    pub creation: Creation,
-}
-
-impl Default for SpaceSwitch {
-    fn default() -> Self {
-        Self {
-            control: NodeRef::this().into(),
-            spaces: NodeRefs::NONE,
-            names: Vec::new(),
-            attribute_on: NodeRefs::NONE,
-            attribute: "space".to_owned(),
-            default: 0,
-            translate: true,
-            rotate: true,
-            scale: false,
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Lets a control move with one of several nodes, as a choice attribute says; thrown without a jump.
+    ///
+    /// A null between the control and its parent follows the chosen space and keeps how it was built relative to it, so the
+    /// control itself stays free.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::space_switch::SpaceSwitch};
+    /// let params = r#"(
+    ///     control: "@command control/hand_l#00000000000000aa",
+    ///     spaces: "@command control/root#00000000000000a0 + @joint chest#0000000000000005 + @joint head#0000000000000007",
+    ///     names: ["world", "chest", "head"],
+    /// )"#;
+    /// # rigsmith::modules::all().load(SpaceSwitch::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct SpaceSwitch {
+        /// The control that changes spaces. A null that follows the space is put between it and its parent.
+        pub control: NodeRefs = NodeRef::this().into(),
+        /// Nodes that the control can move with, in the order of the choices.
+        pub spaces: NodeRefs = NodeRefs::NONE,
+        /// A name for each space, in that order; the nodes' own names if left out.
+        pub names: Vec<String> = Vec::new(),
+        /// The control that carries the attribute; the control itself if left out.
+        pub attribute_on: NodeRefs = NodeRefs::NONE,
+        /// Name of the choice attribute that is added.
+        pub attribute: String = "space".to_owned(),
+        /// Number of the space until somebody chooses another, counted from 0.
+        pub default: u32 = 0,
+        /// The position follows the space.
+        pub translate: bool = true,
+        /// The rotation follows the space.
+        pub rotate: bool = true,
+        /// The scale follows the space.
+        pub scale: bool = false,
+        /// Name, group and label of the null.
+        pub creation: Creation = Creation::default(),
     }
 }
 
@@ -72,18 +53,7 @@ impl RigModule for SpaceSwitch {
     const NAME: &'static str = "space_switch";
     const DOC: &'static str = "Lets a control move with one of several nodes, as an attribute says; spaces can be changed \
                                without a jump.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("control", "The control that changes spaces. A null that follows the space is put between it and its parent."),
-        ("spaces", "Nodes that the control can move with, in the order of the choices."),
-        ("names", "A name for each space, in that order; the nodes' own names if left out."),
-        ("attribute_on", "The control that carries the attribute; the control itself if left out."),
-        ("attribute", "Name of the choice attribute that is added."),
-        ("default", "Number of the space until somebody chooses another, counted from 0."),
-        ("translate", "The position follows the space."),
-        ("rotate", "The rotation follows the space."),
-        ("scale", "The scale follows the space."),
-        ("creation", "Name, group and label of the null."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["names"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/space_switch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/space_switch.svg"));

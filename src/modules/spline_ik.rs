@@ -1,9 +1,7 @@
 //! `spline_ik`: a chain of joints along a smooth curve.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
+    parameters,
     processor::{Amount, BuildScope, ModuleError, RigModule},
     rig::{
         Constraint,
@@ -11,69 +9,41 @@ use crate::{
     },
 };
 
-/// Lays a chain of joints along a curve through controls: spines, necks, tails.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::spline_ik::SplineIk};
-/// let params = r#"(
-///     start: "@joint spine_1#0000000000000001",
-///     end: "@joint chest#0000000000000005",
-///     points: "@command control/hips#00000000000000a1 + @command control/chest#00000000000000a2",
-///     stretch: "stretch",
-/// )"#;
-/// # rigsmith::modules::all().load(SplineIk::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SplineIk {
-    /// First joint of the chain.
-    pub start: NodeRefs,
-    /// Last joint of the chain.
-    pub end: NodeRefs,
-    /// Nodes that the curve runs through.
-    pub points: NodeRefs,
-    /// The control whose attributes the numbers below may name.
-    pub control: NodeRefs,
-    /// Share of the curve's length that the chain takes over.
-    pub stretch: Amount,
-    /// Twist along the chain.
-    pub twist: Amount,
-    /// Share of the curve.
-    pub weight: Amount,
-}
-
-impl Default for SplineIk {
-    fn default() -> Self {
-        Self {
-            start: NodeRef::this().into(),
-            end: NodeRefs::NONE,
-            points: NodeRefs::NONE,
-            control: NodeRefs::NONE,
-            stretch: Amount::Value(0.0),
-            twist: Amount::Value(0.0),
-            weight: Amount::Value(1.0),
-        }
+parameters! {
+    /// Lays a chain of joints along a curve through controls: spines, necks, tails.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::spline_ik::SplineIk};
+    /// let params = r#"(
+    ///     start: "@joint spine_1#0000000000000001",
+    ///     end: "@joint chest#0000000000000005",
+    ///     points: "@command control/hips#00000000000000a1 + @command control/chest#00000000000000a2",
+    ///     stretch: "stretch",
+    /// )"#;
+    /// # rigsmith::modules::all().load(SplineIk::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct SplineIk {
+        /// The first joint of the chain.
+        pub start: NodeRefs = NodeRef::this().into(),
+        /// The last joint of the chain.
+        pub end: NodeRefs = NodeRefs::NONE,
+        /// Two or more controls, from start to end: the curve runs through them, first and last give the twist.
+        pub points: NodeRefs = NodeRefs::NONE,
+        /// The control whose attributes the numbers may name; the last point if left out.
+        pub control: NodeRefs = NodeRefs::NONE,
+        /// 0 keeps the bones' lengths, 1 spreads the joints over the whole curve; or an attribute's name.
+        pub stretch: Amount = Amount::Value(0.0),
+        /// Twist along the chain in degrees, on top of that of the first and last points; or an attribute's name.
+        pub twist: Amount = Amount::Value(0.0),
+        /// 0 leaves the chain as it is, 1 follows the curve; a number or an attribute's name.
+        pub weight: Amount = Amount::Value(1.0),
     }
 }
 
 impl RigModule for SplineIk {
     const NAME: &'static str = "spline_ik";
     const DOC: &'static str = "Lays a chain of joints along a smooth curve through controls: spines, necks, tails.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("start", "The first joint of the chain."),
-        ("end", "The last joint of the chain."),
-        (
-            "points",
-            "Two or more controls, from start to end: the curve runs through them, first and last give the twist.",
-        ),
-        ("control", "The control whose attributes the numbers may name; the last point if left out."),
-        ("stretch", "0 keeps the bones' lengths, 1 spreads the joints over the whole curve; or an attribute's name."),
-        (
-            "twist",
-            "Twist along the chain in degrees, on top of that of the first and last points; or an attribute's name.",
-        ),
-        ("weight", "0 leaves the chain as it is, 1 follows the curve; a number or an attribute's name."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["twist"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/spline_ik.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/spline_ik.svg"));

@@ -1,9 +1,7 @@
 //! `spring`: nodes that lag behind, swing and settle.
 
-use bevy::reflect::Reflect;
-use serde::{Deserialize, Serialize};
-
 use crate::{
+    parameters,
     processor::{Amount, BuildScope, ModuleError, RigModule},
     rig::{
         Constraint,
@@ -11,58 +9,36 @@ use crate::{
     },
 };
 
-/// Lets nodes lag behind what moves them, swing and settle: hair, tails, ears, antennas.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::spring::Spring};
-/// let params = r#"(nodes: "@hierarchy this", frequency: 3.0, damping: 0.3)"#;
-/// # rigsmith::modules::all().load(Spring::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Spring {
-    /// The nodes.
-    pub nodes: NodeRefs,
-    /// Swings a second.
-    pub frequency: Amount,
-    /// How soon it settles.
-    pub damping: Amount,
-    /// Share of the lag.
-    pub weight: Amount,
-    /// The position lags.
-    pub translate: bool,
-    /// The direction of the bone lags.
-    pub rotate: bool,
-    /// The control whose attributes the numbers may name.
-    pub control: NodeRefs,
-}
-
-impl Default for Spring {
-    fn default() -> Self {
-        Self {
-            nodes: NodeRef::this().into(),
-            frequency: Amount::Value(2.0),
-            damping: Amount::Value(0.4),
-            weight: Amount::Value(1.0),
-            translate: false,
-            rotate: true,
-            control: NodeRefs::NONE,
-        }
+parameters! {
+    /// Lets nodes lag behind what moves them, swing and settle: hair, tails, ears, antennas.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::spring::Spring};
+    /// let params = r#"(nodes: "@hierarchy this", frequency: 3.0, damping: 0.3)"#;
+    /// # rigsmith::modules::all().load(Spring::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct Spring {
+        /// The nodes, each of which swings for itself.
+        pub nodes: NodeRefs = NodeRef::this().into(),
+        /// Swings a second, above 0 to 60; a number or an attribute's name.
+        pub frequency: Amount = Amount::Value(2.0),
+        /// 0 swings for ever, 1 settles without swinging, up to 10; a number or an attribute's name.
+        pub damping: Amount = Amount::Value(0.4),
+        /// 0 leaves the nodes as they are, 1 swings; a number or an attribute's name.
+        pub weight: Amount = Amount::Value(1.0),
+        /// The position lags.
+        pub translate: bool = false,
+        /// The direction lags in which the node's children lie.
+        pub rotate: bool = true,
+        /// The control whose attributes the numbers may name; the first of the nodes if left out.
+        pub control: NodeRefs = NodeRefs::NONE,
     }
 }
 
 impl RigModule for Spring {
     const NAME: &'static str = "spring";
     const DOC: &'static str = "Lets nodes lag behind what moves them, swing and settle: hair, tails, ears, antennas.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("nodes", "The nodes, each of which swings for itself."),
-        ("frequency", "Swings a second, above 0 to 60; a number or an attribute's name."),
-        ("damping", "0 swings for ever, 1 settles without swinging, up to 10; a number or an attribute's name."),
-        ("weight", "0 leaves the nodes as they are, 1 swings; a number or an attribute's name."),
-        ("translate", "The position lags."),
-        ("rotate", "The direction lags in which the node's children lie."),
-        ("control", "The control whose attributes the numbers may name; the first of the nodes if left out."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/spring.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/spring.svg"));
 

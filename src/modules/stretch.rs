@@ -1,10 +1,9 @@
 //! `stretch`: nodes that grow and shrink with the distance between two others.
 
-use bevy::reflect::Reflect;
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use crate::{
+    parameters,
     processor::{Amount, BuildScope, ModuleError, RigModule, mirrored_line},
     rig::{
         Constraint,
@@ -12,74 +11,45 @@ use crate::{
     },
 };
 
-/// Scales nodes along an axis by how far two others are apart, and keeps their volume.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::stretch::Stretch};
-/// let params = r#"(
-///     start: "@command control/hips#00000000000000a0",
-///     end: "@command control/chest#00000000000000a1",
-///     driven: "@joint spine#0000000000000002",
-///     volume: 1.0,
-/// )"#;
-/// # rigsmith::modules::all().load(Stretch::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Stretch {
-    /// From here,
-    pub start: NodeRefs,
-    /// to here.
-    pub end: NodeRefs,
-    /// Joints to scale.
-    pub driven: NodeRefs,
-    /// The axis that stretches.
-    pub axis: Option<Vec3>,
-    /// Share of the volume that is kept.
-    pub volume: Amount,
-    /// Lowest factor.
-    pub min: f32,
-    /// Highest factor.
-    pub max: f32,
-    /// Share of the stretch.
-    pub weight: Amount,
-    /// The control whose attributes the numbers may name.
-    pub control: NodeRefs,
-}
-
-impl Default for Stretch {
-    fn default() -> Self {
-        Self {
-            start: NodeRefs::NONE,
-            end: NodeRefs::NONE,
-            driven: NodeRef::this().into(),
-            axis: None,
-            volume: Amount::Value(1.0),
-            min: 0.1,
-            max: 10.0,
-            weight: Amount::Value(1.0),
-            control: NodeRefs::NONE,
-        }
+parameters! {
+    /// Scales nodes along an axis by how far two others are apart, and keeps their volume.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::stretch::Stretch};
+    /// let params = r#"(
+    ///     start: "@command control/hips#00000000000000a0",
+    ///     end: "@command control/chest#00000000000000a1",
+    ///     driven: "@joint spine#0000000000000002",
+    ///     volume: 1.0,
+    /// )"#;
+    /// # rigsmith::modules::all().load(Stretch::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct Stretch {
+        /// The node from which the distance is measured.
+        pub start: NodeRefs = NodeRefs::NONE,
+        /// The node to which it is measured; not one below what is scaled.
+        pub end: NodeRefs = NodeRefs::NONE,
+        /// The nodes that are scaled.
+        pub driven: NodeRefs = NodeRef::this().into(),
+        /// The axis that stretches, in the space of each; the one nearest to the line from start to end if left out.
+        pub axis: Option<Vec3> = None,
+        /// 0 keeps the other two axes, 1 keeps the volume; a number from -4 to 4 or an attribute's name.
+        pub volume: Amount = Amount::Value(1.0),
+        /// Lowest factor, above 0.
+        pub min: f32 = 0.1,
+        /// Highest factor, not below min.
+        pub max: f32 = 10.0,
+        /// 0 is no stretch, 1 all of it; a number or an attribute's name.
+        pub weight: Amount = Amount::Value(1.0),
+        /// The control whose attributes the numbers may name; the end if left out.
+        pub control: NodeRefs = NodeRefs::NONE,
     }
 }
 
 impl RigModule for Stretch {
     const NAME: &'static str = "stretch";
     const DOC: &'static str = "Scales nodes along an axis by how far two others are apart, keeping their volume.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("start", "The node from which the distance is measured."),
-        ("end", "The node to which it is measured; not one below what is scaled."),
-        ("driven", "The nodes that are scaled."),
-        (
-            "axis",
-            "The axis that stretches, in the space of each; the one nearest to the line from start to end if left out.",
-        ),
-        ("volume", "0 keeps the other two axes, 1 keeps the volume; a number from -4 to 4 or an attribute's name."),
-        ("min", "Lowest factor, above 0."),
-        ("max", "Highest factor, not below min."),
-        ("weight", "0 is no stretch, 1 all of it; a number or an attribute's name."),
-        ("control", "The control whose attributes the numbers may name; the end if left out."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const SIDED: &'static [&'static str] = &["axis"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/stretch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/stretch.svg"));

@@ -1,11 +1,10 @@
 //! `twist`: joints along a bone that take shares of its twist.
 
-use bevy::reflect::Reflect;
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     mesh::model::Trs,
+    parameters,
     processor::{BuildScope, Creation, ModuleError, NodeId, RigModule},
     rig::{
         Constraint, NodeType, Scalar,
@@ -13,52 +12,36 @@ use crate::{
     },
 };
 
-/// Shares the twist of a joint among others along a bone, which it can make.
-///
-/// A forearm takes its twist from the hand at its end; an upper arm takes back its own twist at the shoulder, with
-/// `counter`.
-///
-/// ```
-/// # use rigsmith::{processor::RigModule, modules::twist::Twist};
-/// let params = r#"(start: "@joint forearm_l#0000000000000002", end: "@joint hand_l#0000000000000003", count: 2)"#;
-/// # rigsmith::modules::all().load(Twist::NAME, params).map(|_| ()).unwrap();
-/// ```
-#[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Twist {
-    /// The joint at the bone's start.
-    pub start: NodeRefs,
-    /// The joint at the bone's end.
-    pub end: NodeRefs,
-    /// Whose twist is shared.
-    pub source: NodeRefs,
-    /// Against what the twist is measured.
-    pub reference: NodeRefs,
-    /// Joints that take shares.
-    pub driven: NodeRefs,
-    /// Number of joints to make.
-    pub count: u32,
-    /// Shares.
-    pub shares: Vec<f32>,
-    /// Takes the twist back instead of adding to it.
-    pub counter: bool,
-    /// Name, group and label of joints that are made.
-    pub creation: Creation,
-}
-
-impl Default for Twist {
-    fn default() -> Self {
-        Self {
-            start: NodeRef::this().into(),
-            end: NodeRefs::NONE,
-            source: NodeRefs::NONE,
-            reference: NodeRefs::NONE,
-            driven: NodeRefs::NONE,
-            count: 2,
-            shares: Vec::new(),
-            counter: false,
-            creation: Creation::default(),
-        }
+parameters! {
+    /// Shares the twist of a joint among others along a bone, which it can make.
+    ///
+    /// A forearm takes its twist from the hand at its end; an upper arm takes back its own twist at the shoulder, with
+    /// `counter`.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::twist::Twist};
+    /// let params = r#"(start: "@joint forearm_l#0000000000000002", end: "@joint hand_l#0000000000000003", count: 2)"#;
+    /// # rigsmith::modules::all().load(Twist::NAME, params).map(|_| ()).unwrap();
+    /// ```
+    pub struct Twist {
+        /// The joint at the bone's start, such as an elbow; joints that are made hang on it.
+        pub start: NodeRefs = NodeRef::this().into(),
+        /// The joint at the bone's end, such as a wrist.
+        pub end: NodeRefs = NodeRefs::NONE,
+        /// The joint whose twist is shared; the end if left out, or the start with counter.
+        pub source: NodeRefs = NodeRefs::NONE,
+        /// The node against which the twist is measured; the parent of the source if left out.
+        pub reference: NodeRefs = NodeRefs::NONE,
+        /// Joints that take shares, from start to end; they are made if left out.
+        pub driven: NodeRefs = NodeRefs::NONE,
+        /// How many joints are made, 1 to 64; spread evenly along the bone.
+        pub count: u32 = 2,
+        /// The share of the twist of each joint; evenly from start to end if left out.
+        pub shares: Vec<f32> = Vec::new(),
+        /// Takes the twist back, wholly at the start of the bone: for upper arms and thighs.
+        pub counter: bool = false,
+        /// Name, group and label of joints that are made.
+        pub creation: Creation = Creation::default(),
     }
 }
 
@@ -68,17 +51,7 @@ const MOST: u32 = 64;
 impl RigModule for Twist {
     const NAME: &'static str = "twist";
     const DOC: &'static str = "Shares the twist of a joint among joints along a bone, and makes those joints.";
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
-        ("start", "The joint at the bone's start, such as an elbow; joints that are made hang on it."),
-        ("end", "The joint at the bone's end, such as a wrist."),
-        ("source", "The joint whose twist is shared; the end if left out, or the start with counter."),
-        ("reference", "The node against which the twist is measured; the parent of the source if left out."),
-        ("driven", "Joints that take shares, from start to end; they are made if left out."),
-        ("count", "How many joints are made, 1 to 64; spread evenly along the bone."),
-        ("shares", "The share of the twist of each joint; evenly from start to end if left out."),
-        ("counter", "Takes the twist back, wholly at the start of the bone: for upper arms and thighs."),
-        ("creation", "Name, group and label of joints that are made."),
-    ];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/twist.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/twist.svg"));
 

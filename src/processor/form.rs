@@ -243,7 +243,7 @@ pub fn read_module_form(bytes: &[u8], module: &ModuleInfo) -> Result<Form, Sourc
         let Some((param, _)) = element.bound() else { continue };
         let place = places.next().unwrap_or_default();
         let wrong = |message: String| SourceError::at(text, place, message);
-        let info = type_at(module, param).map_err(wrong)?;
+        let info = type_at(module, param).map_err(|error| wrong(error.to_string()))?;
         if seen.contains(&param) {
             return Err(wrong(format!("`{param}` is edited twice; keep one of the two")));
         }
@@ -290,16 +290,40 @@ impl TypeAt {
     }
 }
 
-fn type_at(module: &ModuleInfo, path: &str) -> Result<TypeAt, String> {
+/// Reason why a path names no parameter of a module.
+#[derive(Debug, thiserror::Error)]
+enum NoParameter {
+    /// The path goes on behind a parameter without fields.
+    #[error("`{parameter}` of {module} has no parts; name it as a whole")]
+    Whole {
+        /// The path as far as it can be followed.
+        parameter: String,
+        /// Name of the module.
+        module: &'static str,
+    },
+    /// A name of the path is unknown.
+    #[error("the module {module} has no parameter `{path}`{nearest}")]
+    Unknown {
+        /// Name of the module.
+        module: &'static str,
+        /// The path.
+        path: String,
+        /// Proposal of another name, or nothing.
+        nearest: String,
+    },
+}
+
+/// The type of the parameter that a path with dots names.
+fn type_at(module: &ModuleInfo, path: &str) -> Result<TypeAt, NoParameter> {
     let mut at = TypeAt { info: Some(module.type_info), path: module.type_info.type_path_table() };
     let mut before = String::new();
     for name in path.split('.') {
         let Some(TypeInfo::Struct(info)) = at.info else {
-            return Err(format!("`{before}` of {} has no parts; name it as a whole", module.name));
+            return Err(NoParameter::Whole { parameter: before, module: module.name });
         };
         let Some(field) = info.field(name) else {
             let nearest = did_you_mean(name, info.field_names().iter().copied());
-            return Err(format!("the module {} has no parameter `{path}`{nearest}", module.name));
+            return Err(NoParameter::Unknown { module: module.name, path: path.to_owned(), nearest });
         };
         at = TypeAt { info: field.type_info(), path: field.type_path_table() };
         before = if before.is_empty() { name.to_owned() } else { format!("{before}.{name}") };

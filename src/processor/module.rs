@@ -10,7 +10,8 @@ use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_options};
 
 /// What a command does: its fields are the parameters of the tag, [`RigModule::construct`] is the work.
 ///
-/// Give the type `#[serde(default, deny_unknown_fields)]`, so that tags may leave parameters out and misspelt ones are
+/// [`parameters!`](crate::parameters) declares the type with its parameters, their words and defaults. A type written by
+/// hand needs `#[serde(default, deny_unknown_fields)]`, so that tags may leave parameters out and misspelt ones are
 /// told. There is no destructor to write: everything that goes through the scope is taken back exactly.
 pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + Send + Sync + 'static {
     /// The name in tags, in `snake_case`.

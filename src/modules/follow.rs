@@ -1,0 +1,118 @@
+//! `orient`, `point`, `scale` and `parent`: nodes that follow the turn, the place, the size or all of others.
+
+use crate::{
+    parameters,
+    processor::{Amount, BuildScope, FollowParams, ModuleError, RigModule, TargetParams},
+    rig::reference::{NodeRef, NodeRefs},
+};
+
+/// Declares a module that follows: its name, its words and the channels that it has, with their defaults.
+macro_rules! follow_module {
+    (
+        $(#[$meta:meta])*
+        $Name:ident, $name:literal, $doc:literal,
+        $($(#[doc = $channel_doc:literal])+ $channel:ident: $default:expr),+
+    ) => {
+        parameters! {
+            $(#[$meta])*
+            pub struct $Name {
+                /// The nodes that follow.
+                pub node: NodeRefs = NodeRef::this().into(),
+                /// The nodes that they follow.
+                pub targets: NodeRefs = NodeRefs::NONE,
+                /// For each target its share, a number from 0 or the name of an attribute; all the same if left out.
+                pub weights: Vec<Amount> = Vec::new(),
+                /// The node that has the attributes; those that it lacks are added.
+                pub control: NodeRefs = NodeRefs::NONE,
+                $($(#[doc = $channel_doc])+ pub $channel: [bool; 3] = $default,)+
+                /// Keep where the node stands now, in the space of each target: as the target turns, it goes around
+                /// it; false: the node lies on its targets.
+                pub keep_offset: bool = true,
+                /// True: the node's own pose comes on top, so that people can still move it.
+                pub keep_pose: bool = false,
+                /// How much the nodes follow, a number from 0 to 1 or the name of an attribute of the control.
+                pub weight: Amount = Amount::Value(1.0),
+            }
+        }
+
+        impl RigModule for $Name {
+            const NAME: &'static str = $name;
+            const DOC: &'static str = $doc;
+            const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
+            const FORM: Option<&'static str> = Some(include_str!(concat!("../../assets/modules/", $name, ".ui.ron")));
+            const ICON: Option<&'static str> = Some(include_str!(concat!("../../assets/modules/", $name, ".svg")));
+
+            fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+                let targets = TargetParams { targets: &self.targets, weights: &self.weights, control: &self.control };
+                let mut follow = FollowParams {
+                    node: &self.node,
+                    targets,
+                    translate: [false; 3],
+                    rotate: [false; 3],
+                    scale: [false; 3],
+                    keep_offset: self.keep_offset,
+                    keep_pose: self.keep_pose,
+                    weight: &self.weight,
+                };
+                $(follow.$channel = self.$channel;)+
+                scope.follow(&follow)
+            }
+        }
+    };
+}
+
+follow_module! {
+    /// Lets nodes turn like weighted targets. Role: `constraint`, for each node.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::follow::OrientModule};
+    /// let params = r#"(node: "@this", targets: "@command control#00000000000000aa", keep_offset: true)"#;
+    /// # assert!(rigsmith::modules::all().load(OrientModule::NAME, params).is_ok());
+    /// ```
+    OrientModule, "orient", "Lets nodes turn like weighted targets.",
+    /// Which angles about X, Y and Z follow, in the parent's space.
+    rotate: [true; 3]
+}
+
+follow_module! {
+    /// Lets nodes follow the place of weighted targets. Role: `constraint`, for each node.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::follow::PointModule};
+    /// let params = r#"(node: "@this", targets: "@command control#00000000000000aa", keep_offset: true)"#;
+    /// # assert!(rigsmith::modules::all().load(PointModule::NAME, params).is_ok());
+    /// ```
+    PointModule, "point", "Lets nodes follow the place of weighted targets.",
+    /// Which axes of the translation follow, in the parent's space.
+    translate: [true; 3]
+}
+
+follow_module! {
+    /// Lets nodes scale like weighted targets. Role: `constraint`, for each node.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::follow::ScaleModule};
+    /// let params = r#"(node: "@this", targets: "@command control#00000000000000aa", keep_offset: true)"#;
+    /// # assert!(rigsmith::modules::all().load(ScaleModule::NAME, params).is_ok());
+    /// ```
+    ScaleModule, "scale", "Lets nodes scale like weighted targets.",
+    /// Which factors along X, Y and Z follow.
+    scale: [true; 3]
+}
+
+follow_module! {
+    /// Lets nodes follow weighted targets as if they stood on them. Role: `constraint`, for each node.
+    ///
+    /// ```
+    /// # use rigsmith::{processor::RigModule, modules::follow::ParentModule};
+    /// let params = r#"(node: "@this", targets: "@command control#00000000000000aa", keep_offset: true)"#;
+    /// # assert!(rigsmith::modules::all().load(ParentModule::NAME, params).is_ok());
+    /// ```
+    ParentModule, "parent", "Lets nodes follow weighted targets as if they stood on them.",
+    /// Which axes of the translation follow, in the parent's space.
+    translate: [true; 3],
+    /// Which angles about X, Y and Z follow, in the parent's space.
+    rotate: [true; 3],
+    /// Which factors along X, Y and Z follow.
+    scale: [false; 3]
+}
