@@ -30,7 +30,10 @@ use self::{
     track::{SAMPLES, Span, Track},
 };
 use super::{placement::PlaceSettings, view::ViewPlane};
-use crate::mesh::{ray::Hit, surface::Surface};
+use crate::mesh::{
+    ray::{Hit, Ray},
+    surface::Surface,
+};
 
 /// Largest number of joints of a stroke, for any setting.
 pub const MAX_JOINTS: usize = 1000;
@@ -40,8 +43,8 @@ const EDGE: f32 = 0.5;
 /// Least share of the volume's depth between a joint and either side of the volume.
 const MARGIN: f32 = 0.15;
 
-/// The least number of joints of a [limb](ChainChoice::Limb).
-const LIMB_JOINTS: usize = 3;
+/// Least share of a stroke that has to run beside a plane of symmetry for the stroke to have a side.
+const SIDE_SHARE: f32 = 0.2;
 
 /// Settings of a stroke's placement in depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +56,45 @@ pub struct StrokeSettings {
     pub place: PlaceSettings,
     /// Recentring: each joint takes one step to the centroid of the limb's section.
     pub recentre: bool,
+}
+
+/// Half of space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfSpace {
+    /// A point of the border, in the surface's space.
+    pub point: Vec3,
+    /// Unit normal of the border, towards the half.
+    pub normal: Vec3,
+}
+
+impl HalfSpace {
+    /// The side of a plane of symmetry on which a stroke runs, of which some rays cross volumes on both sides (a pelvis
+    /// before its legs); `None` if no ray does, or nearly all do.
+    ///
+    /// `spans` are the ends of the volume on each ray under the stroke, `point`, `normal` and `tolerance` the plane and
+    /// the distance below which a place is on it.
+    pub fn of_stroke(spans: &[[Vec3; 2]], point: Vec3, normal: Vec3, tolerance: f32) -> Option<Self> {
+        let distance = |place: Vec3| (place - point).dot(normal);
+        let ends = spans.iter().map(|ends| ends.map(distance));
+        let is_across = |[a, b]: [f32; 2]| a.min(b) < -tolerance && a.max(b) > tolerance;
+        let (across, beside): (Vec<_>, Vec<_>) = ends.partition(|ends| is_across(*ends));
+        let least = SIDE_SHARE * spans.len() as f32;
+        let positive = beside.iter().filter(|[a, b]| a + b > 0.0).count();
+        let side = if 2 * positive >= beside.len() { 1.0 } else { -1.0 };
+        (!across.is_empty() && beside.len() as f32 >= least).then_some(Self { point, normal: normal * side })
+    }
+
+    /// First and last distance of a ray inside of the half-space; the last below the first if it is nowhere.
+    fn covered(&self, ray: &Ray) -> [f32; 2] {
+        let (inside, rises) = ((ray.origin - self.point).dot(self.normal), ray.direction.dot(self.normal));
+        let border = -inside / rises;
+        match (rises > 1e-6, rises < -1e-6) {
+            (true, _) => [border, f32::INFINITY],
+            (_, true) => [f32::NEG_INFINITY, border],
+            _ if inside >= 0.0 => [f32::NEG_INFINITY, f32::INFINITY],
+            _ => [f32::INFINITY, f32::NEG_INFINITY],
+        }
+    }
 }
 
 impl Default for StrokeSettings {
@@ -67,8 +109,9 @@ pub enum ChainChoice {
     /// Joints wherever the stroke is further than this from the line between two neighbours; model units on the view
     /// plane. Zero, negative or NaN makes a joint of every point of the stroke.
     Threshold(f32),
-    /// Joints as for [`ChainChoice::Threshold`], but at least three: a limb drawn straight gets a joint to bend at,
-    /// where it fits the limb best.
+    /// Automatic: joints at the firm corners of the stroke as for [`ChainChoice::Threshold`] and at the bends of the
+    /// limb, in depth, too (an ankle seen from the front), each moved to the bend near it. A piece that is most of the
+    /// chain gets a joint to bend at, where it fits the limb best, so a limb drawn straight has at least three.
     Limb(f32),
     /// Exactly this many joints, where they fit the stroke and the limb best; fewer than two count as two, more than
     /// [`MAX_JOINTS`] as that many.
@@ -162,19 +205,34 @@ impl StrokeSamples {
         points: &[Vec2],
         settings: StrokeSettings,
     ) -> Result<Self, StrokeError> {
+        Self::within(surface, plane, points, settings, None)
+    }
+
+    /// Follows a stroke as [`StrokeSamples::new`] does, in half of space: volumes end at its border. A leg drawn from the
+    /// side begins in half of the pelvis, not in its middle.
+    ///
+    /// # Errors
+    /// As [`StrokeSamples::new`].
+    pub fn within(
+        surface: &Surface,
+        plane: &ViewPlane,
+        points: &[Vec2],
+        settings: StrokeSettings,
+        within: Option<HalfSpace>,
+    ) -> Result<Self, StrokeError> {
         let path = Path::new(points)?;
         let fan = Fan::new();
         let with_axis = |track: Track| {
-            let axis = Axis::find(surface, &fan, &track);
+            let axis = Axis::find(surface, plane, &fan, &track);
             (track, axis)
         };
-        let follow = |volume| Track::follow(surface, plane, &path, volume, None).map(with_axis);
+        let follow = |volume| Track::follow(surface, plane, &path, volume, None, within).map(with_axis);
         let (mut track, mut axis) = follow(settings.place.volume).ok_or(StrokeError::Misses)?;
         // A volume that the stroke leaves soon is not its limb: for example a hand before the hip at which a leg
         // begins.
         if settings.place.volume.is_none() && (track.samples.len() as f32) < 0.8 * SAMPLES as f32 {
             let others = (0..track.volumes_at_start as usize).rev();
-            let others = others.filter_map(|first| Track::follow(surface, plane, &path, None, Some(first)));
+            let others = others.filter_map(|first| Track::follow(surface, plane, &path, None, Some(first), within));
             let longest = others.max_by_key(|other| other.samples.len());
             if let Some(longest) =
                 longest.filter(|other| other.samples.len() as f32 > 1.25 * track.samples.len() as f32)
@@ -197,15 +255,16 @@ impl StrokeSamples {
         self.track.samples.iter().map(|sample| sample.middle)
     }
 
+    /// Entry and exit of the volume under the stroke, at even lengths along it, in the surface's space.
+    pub fn crossings(&self) -> impl Iterator<Item = [Vec3; 2]> {
+        self.track.samples.iter().map(|sample| [sample.ray.at(sample.span.near), sample.ray.at(sample.span.far)])
+    }
+
     /// Chooses joints and places them: a ray, and a fan of section rays if recentring is on, for each.
     pub fn chain(&self, surface: &Surface, choice: ChainChoice) -> StrokeChain {
         let places = match choice {
             ChainChoice::Threshold(threshold) => split::by_threshold(&self.path, threshold),
-            ChainChoice::Limb(threshold) => {
-                let strays = split::by_threshold(&self.path, threshold);
-                let straight = strays.len() < LIMB_JOINTS;
-                if straight { corners::choose(&self.track, self.axis.as_ref(), LIMB_JOINTS) } else { strays }
-            }
+            ChainChoice::Limb(threshold) => corners::automatic(&self.path, &self.track, self.axis.as_ref(), threshold),
             ChainChoice::Joints(count) => corners::choose(&self.track, self.axis.as_ref(), count.clamp(2, MAX_JOINTS)),
         };
         let [first, last] = self.track.covered();
@@ -247,7 +306,7 @@ impl StrokeSamples {
         let source = self.path.at(at);
         let ray = self.plane.ray(source);
         surface.hits(&ray, hits);
-        let span = self.track.span_at(hits, at)?;
+        let span = self.track.span_at(hits, &ray, at)?;
         let count = hits.len();
         let depth = self.settings.place.depth();
         let section = self.axis.as_ref().map(|axis| axis.recentre(surface, &self.fan, at, &ray, hits));
@@ -259,7 +318,7 @@ impl StrokeSamples {
             Some((centroid, _)) if self.settings.recentre => {
                 let ray = self.plane.project(centroid).map_or(ray, |point| self.plane.ray(point));
                 surface.hits(&ray, hits);
-                let span = self.track.span_at(hits, at).unwrap_or(span);
+                let span = self.track.span_at(hits, &ray, at).unwrap_or(span);
                 ray.at(span.at(depth))
             }
             _ => ray.at(span.at(depth)),
@@ -286,7 +345,7 @@ impl StrokeSamples {
             let Some(seen) = self.plane.project(place) else { break };
             let ray = self.plane.ray(seen);
             surface.hits(&ray, hits);
-            let Some(Span { near, far }) = self.track.span_at(hits, at) else { continue };
+            let Some(Span { near, far }) = self.track.span_at(hits, &ray, at) else { continue };
             if far - near >= EDGE * radius {
                 let depth = (place - ray.origin).dot(ray.direction);
                 let margin = MARGIN * (far - near);

@@ -10,6 +10,7 @@ use crate::{
         BuiltRig, JointData, NodeKind, Rig, RigEdit, SkinData, Uid, UidSource,
         bake::baked,
         deform::{DeformSkeleton, replaced_joints},
+        label::label_pairs,
         text::RigText,
     },
 };
@@ -25,7 +26,8 @@ pub struct ImportedSkeleton {
     pub skin: Option<Arc<SkinData>>,
 }
 
-/// Turns a model's nodes and weights into joints: names become labels, rest transforms stay as they are.
+/// Turns a model's nodes and weights into joints: names become labels, rest transforms stay as they are. Joints whose names
+/// differ in their side alone become pairs.
 pub fn import_skeleton(model: &Model, uids: &mut UidSource) -> ImportedSkeleton {
     let nodes: Vec<Uid> = model.nodes.iter().map(|_| uids.next_uid()).collect();
     let edits = model.nodes.iter().zip(&nodes).map(|(node, uid)| {
@@ -38,7 +40,8 @@ pub fn import_skeleton(model: &Model, uids: &mut UidSource) -> ImportedSkeleton 
         };
         RigEdit::AddJoint { joint: Box::new(joint), parent: node.parent.map(|parent| nodes[parent]), index: usize::MAX }
     });
-    let edits = edits.collect();
+    let labels: Vec<Option<&str>> = model.nodes.iter().map(|node| Some(node.name.as_str())).collect();
+    let edits = edits.chain(pair_edits(&labels, &nodes)).collect();
     let skin = model.weights.clone().map(|weights| SkinData { joints: nodes.clone(), weights, ..SkinData::default() });
     ImportedSkeleton { edits, nodes, skin: skin.map(Arc::new) }
 }
@@ -72,7 +75,17 @@ pub fn import_rig_text(text: &RigText, uids: &mut UidSource) -> (Vec<RigEdit>, V
         });
         stack.extend(children[number].iter().rev());
     }
+    let labels: Vec<Option<&str>> = text.joints.iter().map(|joint| joint.label.as_deref()).collect();
+    edits.extend(pair_edits(&labels, &ids));
     (edits, ids)
+}
+
+/// Edits that make pairs of joints whose labels differ in their side alone.
+fn pair_edits(labels: &[Option<&str>], joints: &[Uid]) -> Vec<RigEdit> {
+    let pair = |[a, b]: [usize; 2]| {
+        [RigEdit::SetMirror(joints[a], Some(joints[b])), RigEdit::SetMirror(joints[b], Some(joints[a]))]
+    };
+    label_pairs(labels).into_iter().flat_map(pair).collect()
 }
 
 /// The `.rig` text of a rig: positions in the rig's space and topology, parents first.

@@ -15,6 +15,25 @@ pub fn mirrored_label(label: &str) -> Option<String> {
     swap_ending(label).or_else(|| swap_start(label)).or_else(|| swap_word(label))
 }
 
+/// Pairs of labels that differ in their side alone, as indices, each below its partner's; labels that stand twice have no
+/// pair.
+pub fn label_pairs(labels: &[Option<&str>]) -> Vec<[usize; 2]> {
+    let mut places: std::collections::BTreeMap<&str, Option<usize>> = std::collections::BTreeMap::new();
+    for (index, label) in labels.iter().enumerate() {
+        if let Some(label) = label {
+            places.entry(label).and_modify(|place| *place = None).or_insert(Some(index));
+        }
+    }
+    let place = |label: &str| places.get(label).copied().flatten();
+    let pair = |index: usize| {
+        let label = labels[index]?;
+        let other = mirrored_label(label)?;
+        let is_pair = mirrored_label(&other).as_deref() == Some(label) && place(label) == Some(index);
+        place(&other).filter(|partner| is_pair && index < *partner).map(|partner| [index, partner])
+    };
+    (0..labels.len()).filter_map(pair).collect()
+}
+
 /// Side that a label names: `-1` right, `1` left, `0` none.
 pub fn label_side(label: &str) -> i32 {
     let Some(other) = mirrored_label(label) else { return 0 };

@@ -7,6 +7,7 @@
 mod draft;
 mod frame;
 mod hierarchy;
+mod naming;
 mod orient;
 mod place;
 mod pose;
@@ -27,14 +28,15 @@ use crate::rig::{EditError, GroupData, PoseOffset, RestTransform, Rig, RigEdit, 
 /// A change of a rig that a person requests. Positions and transforms are in the rig's space.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Operation {
-    /// Adds a joint at a position as a child of `parent`, or as a root, and selects it.
+    /// Adds a joint at a position as a child of `parent`, or as a root, names it, and selects it.
     Place {
         /// Position of the joint.
         position: Vec3,
         /// Parent of the joint.
         parent: Option<Uid>,
     },
-    /// Adds a chain of joints, the first as a child of `parent`, and selects the last.
+    /// Adds a chain of joints, the first as a child of `parent`, and selects the last. They are named by chain, side and
+    /// place (`arm_l_2`); Y points along the bone, X is the axis about which the chain bends.
     Chain {
         /// Positions of the joints, in order.
         positions: Vec<Vec3>,

@@ -24,7 +24,7 @@ use rigsmith::{
         viewport::{RigViewport, Sight},
     },
     prelude::*,
-    rig::{NodeKind, operations::MirrorPlane, template::read_template},
+    rig::{JointData, NodeKind, RestTransform, RigEdit, operations::MirrorPlane, template::read_template},
     test_app::strict_app,
 };
 
@@ -53,6 +53,7 @@ fn joint(uid: u64, position: [f32; 3], parent: Option<usize>) -> DrawnJoint {
         position: position.into(),
         axes: Mat3::IDENTITY,
         parent,
+        bone: Vec3::ZERO,
         kind: NodeKind::Joint,
         color: None,
         emphasis: Emphasis::None,
@@ -62,7 +63,8 @@ fn joint(uid: u64, position: [f32; 3], parent: Option<usize>) -> DrawnJoint {
 }
 
 fn chain() -> Vec<DrawnJoint> {
-    vec![joint(1, [0.0, 0.0, 0.0], None), joint(2, [0.0, 0.4, 0.0], Some(0)), joint(3, [0.3, 0.4, 0.0], Some(1))]
+    let tip = DrawnJoint { bone: Vec3::X * 0.3, ..joint(3, [0.3, 0.4, 0.0], Some(1)) };
+    vec![joint(1, [0.0, 0.0, 0.0], None), joint(2, [0.0, 0.4, 0.0], Some(0)), tip]
 }
 
 fn draw(joints: &[DrawnJoint], sight: &Sight) -> Ink {
@@ -154,6 +156,29 @@ fn bones_span_their_joints_and_close() {
     assert_eq!(list.len(), 3);
     let leaf = list[2];
     assert!(leaf.leaf && leaf.joint == 2 && leaf.tail.distance(Vec3::new(0.4, 0.4, 0.0)) < 1e-6);
+}
+
+/// The tail of a joint without children turns with it, as the skin below it does.
+#[test]
+fn a_leaf_is_drawn_as_it_is_posed() {
+    let mut rig = Rig::default();
+    for (uid, parent, place) in [(1, None, Vec3::ZERO), (2, Some(Uid(1)), Vec3::new(0.0, 0.3, 0.0))] {
+        let rest = RestTransform { rotation: Quat::from_rotation_x(0.4), ..RestTransform::from_translation(place) };
+        let joint = JointData { uid: Uid(uid), rest, ..Default::default() };
+        rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent, index: 0 }).unwrap();
+    }
+    let tail = |pose: &dyn Fn(Uid) -> Affine3A| {
+        let joints = drawn_joints(&rig, &Selection::default(), &Hovered::default(), |uid| Some(pose(uid)));
+        let leaf = *bones(&joints).last().unwrap();
+        leaf.tail - joints[leaf.joint].position
+    };
+    let rest = |uid: Uid| Affine3A::from(rig.rest_global(uid));
+    let above = rest(Uid(1)).transform_vector3(Vec3::new(0.0, 0.1, 0.0));
+    assert!(tail(&rest).distance(above) < 1e-6, "at rest it goes on straight");
+    let turn = Quat::from_rotation_z(1.0);
+    let turned = |uid: Uid| if uid == Uid(2) { rest(uid) * Affine3A::from_quat(turn) } else { rest(uid) };
+    let expected = rest(Uid(2)).transform_vector3(turn * rest(Uid(2)).inverse().transform_vector3(above));
+    assert!(tail(&turned).distance(expected) < 1e-6, "{} {expected}", tail(&turned));
 }
 
 #[test]

@@ -59,6 +59,7 @@ mod journal;
 mod journal_kill;
 mod kmeans;
 mod layout;
+mod leg_strokes;
 mod linkage;
 mod mirror;
 mod models;

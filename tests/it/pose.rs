@@ -182,6 +182,9 @@ fn scale_and_negative_axes_are_mirrored_where_axes_are_parallel() {
     let (mut bench, _, left, right) = two_arms();
     let plane = bench.plane.take().unwrap();
     // The other shoulder is turned by a quarter and mirrored by a negative scale, as some exporters do.
+    let mut rest = bench.rig.joint(left[0]).unwrap().data.rest;
+    rest.rotation = Quat::IDENTITY;
+    bench.rig.apply(&RigEdit::SetRest(left[0], rest)).unwrap();
     let mut rest = bench.rig.joint(right[0]).unwrap().data.rest;
     rest.rotation = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
     rest.scale = Vec3::new(1.0, -1.0, 1.0);

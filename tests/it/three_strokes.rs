@@ -37,8 +37,8 @@ enum Limb {
 }
 
 /// A mesh and where its bones are: positions by the names that both sources below are turned into.
-struct Body {
-    name: String,
+pub struct Body {
+    pub name: String,
     path: PathBuf,
     joints: Vec<(String, Vec3)>,
     bones: Vec<(Limb, Vec3, Vec3)>,
@@ -90,7 +90,7 @@ impl Body {
         body
     }
 
-    fn at(&self, joint: &str) -> Vec3 {
+    pub fn at(&self, joint: &str) -> Vec3 {
         self.joints.iter().find(|(name, _)| name == joint).unwrap_or_else(|| panic!("{} has no {joint}", self.name)).1
     }
 
@@ -104,7 +104,7 @@ impl Body {
     }
 }
 
-fn bundled() -> Body {
+pub fn bundled() -> Body {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models");
     let text = std::fs::read_to_string(root.join("biped.rig")).unwrap();
     let name = |name: &str| match name {
@@ -128,7 +128,7 @@ fn bundled() -> Body {
 }
 
 /// Every body of the test data, by name.
-fn bodies() -> Vec<Body> {
+pub fn bodies() -> Vec<Body> {
     let Some(data) = test_data() else { return Vec::new() };
     let mut folders: Vec<PathBuf> = std::fs::read_dir(data.join("bodies"))
         .unwrap()
@@ -149,7 +149,7 @@ fn bodies() -> Vec<Body> {
 }
 
 /// A small generator of repeatable numbers from -1 to 1.
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
     fn next(&mut self) -> f32 {
@@ -163,7 +163,7 @@ impl Random {
 
 /// A line as a hand draws it: it starts and ends a little early or late, keeps to one side, wavers and trembles, by at
 /// most `stray` together.
-fn drawn(line: &[Vec2], stray: f32, random: &mut Random) -> Vec<Vec2> {
+pub fn drawn(line: &[Vec2], stray: f32, random: &mut Random) -> Vec<Vec2> {
     let total: f32 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
     let (early, late) = (random.next() * stray, random.next() * stray);
     let [shift, waver, tremble] = [0.45, 0.45, 0.1].map(|share| share * stray);
@@ -213,14 +213,14 @@ struct Sketch {
     seed: u64,
 }
 
-struct Bench {
-    bench: Workbench,
+pub struct Bench {
+    pub bench: Workbench,
     surface: Surface,
-    bounds: [Vec3; 2],
+    pub bounds: [Vec3; 2],
 }
 
 impl Bench {
-    fn new(body: &Body) -> Self {
+    pub fn new(body: &Body) -> Self {
         let model = load_model(&RealDisk, &body.path).unwrap();
         let mut bench = Workbench::new(5, &body.name);
         let surface = Surface::build(&model.points, &model.point_triangles());
@@ -235,7 +235,7 @@ impl Bench {
         Self { bench, surface, bounds: [low, high] }
     }
 
-    fn height(&self) -> f32 {
+    pub fn height(&self) -> f32 {
         self.bounds[1].y - self.bounds[0].y
     }
 
@@ -277,27 +277,32 @@ impl Bench {
                 Some(counts) => ChainChoice::Joints(counts[number]),
                 None => ChainChoice::Threshold(0.02 * (self.bounds[1] - self.bounds[0]).max_element()),
             };
-            let rig = self.bench.rig_entity();
-            let app = self.bench.app_mut();
-            app.world_mut().write_message(StrokeRequest {
-                rig,
-                plane,
-                points: drawn(&line, strays[number] * height, &mut random),
-                choice,
-                settings: StrokeSettings::default(),
-                chain_only: true,
-                reach: 0.005 * height,
-                parent: StrokeParent::Natural,
-                chain: None,
-            });
-            while app.world_mut().resource_mut::<Messages<StrokeDone>>().drain().count() == 0 {
-                app.update();
-            }
+            self.stroke(plane, drawn(&line, strays[number] * height, &mut random), choice);
             let added: Vec<Uid> =
                 self.bench.rig().walk().map(|joint| joint.data.uid).filter(|uid| !known.contains(uid)).collect();
             known.extend(&added);
             added
         })
+    }
+
+    /// Draws a stroke that becomes a chain.
+    pub fn stroke(&mut self, plane: ViewPlane, points: Vec<Vec2>, choice: ChainChoice) {
+        let (rig, reach) = (self.bench.rig_entity(), 0.005 * self.height());
+        let app = self.bench.app_mut();
+        app.world_mut().write_message(StrokeRequest {
+            rig,
+            plane,
+            points,
+            choice,
+            settings: StrokeSettings::default(),
+            chain_only: true,
+            reach,
+            parent: StrokeParent::Natural,
+            chain: None,
+        });
+        while app.world_mut().resource_mut::<Messages<StrokeDone>>().drain().count() == 0 {
+            app.update();
+        }
     }
 
     fn inside(&self, point: Vec3) -> bool {

@@ -8,12 +8,16 @@
 use glam::Vec3;
 
 use super::{
+    HalfSpace,
     section::{Fan, Section},
     track::{Sample, Track},
 };
-use crate::mesh::{
-    ray::{Hit, Ray},
-    surface::Surface,
+use crate::{
+    algo::view::ViewPlane,
+    mesh::{
+        ray::{Hit, Ray},
+        surface::Surface,
+    },
 };
 
 /// Strides of the coarse pass and the fine pass through the samples of the track.
@@ -33,6 +37,14 @@ const BESIDE: f32 = 0.4;
 const LASTING: f32 = 1.5;
 /// Length in radii over which the direction of the extrapolated line is measured.
 const STRAIGHT: f32 = 3.0;
+
+/// The part in which a limb ends turns into depth if it goes on there for so many radii of the limb, and so many times
+/// as far as to the other side.
+const TURNED: f32 = 2.5;
+const ONE_SIDED: f32 = 1.6;
+/// Distance beyond the stroke, in radii, at which such a part has ended, and distance of the last joint from its tip.
+const BEYOND: f32 = 1.5;
+const TIP: f32 = 0.8;
 
 /// Largest distance of a joint from the stroke, in radii, where the limb has no section of its own.
 const TREMBLE: f32 = 0.35;
@@ -59,11 +71,13 @@ pub(super) struct Axis {
     pub(super) stations: Vec<Station>,
     /// The median radius.
     pub(super) radius: f32,
+    within: Option<HalfSpace>,
 }
 
 impl Axis {
     /// Finds the centre line; `None` if the stroke has no length inside the volume, or the volume no inside.
-    pub(super) fn find(surface: &Surface, fan: &Fan, track: &Track) -> Option<Self> {
+    pub(super) fn find(surface: &Surface, plane: &ViewPlane, fan: &Fan, track: &Track) -> Option<Self> {
+        let within = track.within;
         let coarse = every(&track.samples, COARSE);
         let half = median(coarse.iter().map(|s| 0.5 * (s.span.far - s.span.near))).filter(|&half| half > 0.0)?;
         let middles: Vec<Vec3> = coarse.iter().map(|s| s.middle).collect();
@@ -73,22 +87,64 @@ impl Axis {
         let sections: Vec<Option<Section>> = coarse
             .iter()
             .zip(&starts)
-            .map(|(s, &tangent)| fan.section(surface, s.middle, tangent, 3.0 * half, 3, &mut hits))
+            .map(|(s, &tangent)| fan.section(surface, within, s.middle, tangent, 3.0 * half, 3, &mut hits))
             .collect();
-        let rough = Self::assemble(&coarse, &sections, &starts, half)?;
+        let rough = Self::assemble(&coarse, &sections, &starts, half, within)?;
 
         let fine = every(&track.samples, FINE);
         let places: Vec<Station> = fine.iter().map(|s| rough.station(s.at, &s.ray)).collect();
         let normals: Vec<Vec3> = places.iter().map(|s| s.tangent).collect();
         let sections: Vec<Option<Section>> = places
             .iter()
-            .map(|station| fan.section(surface, station.centre, station.tangent, REACH * station.radius, 3, &mut hits))
+            .map(|station| {
+                fan.section(surface, within, station.centre, station.tangent, REACH * station.radius, 3, &mut hits)
+            })
             .collect();
-        Self::assemble(&fine, &sections, &normals, rough.radius)
+        let mut found = Self::assemble(&fine, &sections, &normals, rough.radius, within)?;
+        found.turn_at_end(surface, plane, track);
+        Some(found)
+    }
+
+    /// Leads the line on into a part that the limb ends in and that points along the view, like a foot seen from the
+    /// front: where the volume goes far to one side of the line in depth, and ends just beyond the stroke.
+    fn turn_at_end(&mut self, surface: &Surface, plane: &ViewPlane, track: &Track) {
+        // A single section at the very end is one of a sole, not of the limb.
+        let Some(last) = self.stations.windows(2).rposition(|pair| pair[0].own && pair[1].own) else { return };
+        let last = last + 1;
+        let (from, radius) = (self.stations[last], self.stations[last].radius);
+        // How far the volume goes towards the camera and away from it, seen from the line.
+        let reach = |sample: &Sample| {
+            let depth = (from.centre - sample.ray.origin).dot(sample.ray.direction);
+            [depth - sample.span.near, sample.span.far - depth]
+        };
+        let furthest = |sample: &Sample| reach(sample).into_iter().fold(0.0, f32::max);
+        let beyond = track.samples.iter().filter(|sample| sample.at > from.at);
+        let Some(end) = beyond.max_by(|a, b| furthest(a).total_cmp(&furthest(b))) else { return };
+        let [before, behind] = reach(end);
+        if before.max(behind) < TURNED * radius
+            || before.max(behind) < ONE_SIDED * before.min(behind)
+            || track.goes_on(surface, plane, BEYOND * radius)
+        {
+            return;
+        }
+        let tip = if before > behind { end.span.near + TIP * radius } else { end.span.far - TIP * radius };
+        let tip = end.ray.at(tip);
+        let Some(tangent) = (tip - from.centre).try_normalize() else { return };
+        let count = self.stations.len() - last - 1;
+        for (number, station) in self.stations[last + 1..].iter_mut().enumerate() {
+            *station =
+                Station { centre: from.centre.lerp(tip, (number + 1) as f32 / count as f32), tangent, ..*station };
+        }
     }
 
     /// Joins sections to a line: finds the limb's own sections and extrapolates over the others.
-    fn assemble(samples: &[Sample], sections: &[Option<Section>], normals: &[Vec3], radius: f32) -> Option<Self> {
+    fn assemble(
+        samples: &[Sample],
+        sections: &[Option<Section>],
+        normals: &[Vec3],
+        radius: f32,
+        within: Option<HalfSpace>,
+    ) -> Option<Self> {
         let own = own(samples, sections, normals)?;
         let measured = |i: usize| sections[i].filter(|_| own[i]);
         let radius = median((0..samples.len()).filter_map(|i| measured(i).map(|s| s.radius))).unwrap_or(radius);
@@ -130,7 +186,7 @@ impl Axis {
                 Station { at: sample.at, centre, radius, tangent, own, aside }
             })
             .collect();
-        (stations.len() > 1).then_some(Self { stations, radius })
+        (stations.len() > 1).then_some(Self { stations, radius, within })
     }
 
     /// The station under `ray`, which is at the arc length `at` of the stroke.
@@ -173,7 +229,8 @@ impl Axis {
             let too_far = aside - aside.clamp_length_max(TREMBLE * station.radius);
             return (station.centre - too_far, station.radius);
         }
-        let section = fan.section(surface, station.centre, station.tangent, REACH * station.radius, 1, hits);
+        let section =
+            fan.section(surface, self.within, station.centre, station.tangent, REACH * station.radius, 1, hits);
         section.map_or((station.centre, station.radius), |s| (s.centroid, s.radius))
     }
 }

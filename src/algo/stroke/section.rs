@@ -3,6 +3,7 @@
 use bevy::math::ops;
 use glam::{Vec2, Vec3};
 
+use super::HalfSpace;
 use crate::mesh::{
     ray::{Hit, Ray},
     surface::Surface,
@@ -38,10 +39,11 @@ impl Fan {
 
     /// The section through `from` at right angles to `normal`: the polygon of the ends of every `stride`-th ray. A ray
     /// that hits no wall within `limit` (a hole, or the way into the torso) takes its length from its neighbours.
-    /// `None` if there are too many such rays, or the polygon has no area.
+    /// `None` if there are too many such rays, or the polygon has no area. The border of the half-space is a wall.
     pub(super) fn section(
         &self,
         surface: &Surface,
+        within: Option<HalfSpace>,
         from: Vec3,
         normal: Vec3,
         limit: f32,
@@ -53,8 +55,11 @@ impl Fan {
         let mut reach: Vec<Option<f32>> = circle
             .iter()
             .map(|c| {
-                surface.hits(&Ray { origin: from, direction: u * c.x + v * c.y }, hits);
-                hits.first().map(|hit| hit.distance).filter(|&distance| distance <= limit)
+                let ray = Ray { origin: from, direction: u * c.x + v * c.y };
+                surface.hits(&ray, hits);
+                let wall = hits.first().map_or(f32::INFINITY, |hit| hit.distance);
+                let border = within.map_or(f32::INFINITY, |half| half.covered(&ray)[1]);
+                Some(wall.min(border)).filter(|&distance| distance <= limit)
             })
             .collect();
         let open = reach.iter().filter(|r| r.is_none()).count();

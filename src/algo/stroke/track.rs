@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::path::Path;
+use super::{HalfSpace, path::Path};
 use crate::{
     algo::view::ViewPlane,
     mesh::{
@@ -59,6 +59,8 @@ pub(super) struct Track {
     /// Marks a stroke that could have followed other volumes.
     pub(super) ambiguous: bool,
     volume: Option<u32>,
+    /// The half of space in which volumes count.
+    pub(super) within: Option<HalfSpace>,
 }
 
 impl Track {
@@ -70,6 +72,7 @@ impl Track {
         path: &Path,
         volume: Option<u32>,
         first: Option<usize>,
+        within: Option<HalfSpace>,
     ) -> Option<Self> {
         let mut hits = Vec::new();
         let mut samples: Vec<Sample> = Vec::with_capacity(SAMPLES);
@@ -80,7 +83,7 @@ impl Track {
             let source = path.at(at);
             let ray = plane.ray(source);
             surface.hits(&ray, &mut hits);
-            let spans = spans(&hits);
+            let spans = spans(&hits, &ray, within);
             ambiguous |= spans.len() > 1;
             let span = match samples.last() {
                 None if spans.is_empty() => continue,
@@ -96,7 +99,7 @@ impl Track {
             };
             samples.push(Sample { at, source, ray, span, middle: ray.at(span.middle()) });
         }
-        (!samples.is_empty()).then_some(Self { samples, volume_at_start, volumes_at_start, ambiguous, volume })
+        (!samples.is_empty()).then_some(Self { samples, volume_at_start, volumes_at_start, ambiguous, volume, within })
     }
 
     /// Arc lengths of the first and last sample.
@@ -104,17 +107,38 @@ impl Track {
         [self.samples[0].at, self.samples[self.samples.len() - 1].at]
     }
 
+    /// Returns `true` if a ray at a distance beyond the stroke's end still meets the volume in which the stroke ends.
+    pub(super) fn goes_on(&self, surface: &Surface, plane: &ViewPlane, distance: f32) -> bool {
+        let (middle, end) = (self.samples[self.samples.len() / 2], self.samples[self.samples.len() - 1]);
+        let ray = plane.ray(end.source + (end.source - middle.source).normalize_or_zero() * distance);
+        let mut hits = Vec::new();
+        surface.hits(&ray, &mut hits);
+        spans(&hits, &ray, self.within).iter().any(|span| span.overlap(end.span) > 0.0)
+    }
+
     /// The span of a ray that belongs to the tracked volume near the arc length `at`.
-    pub(super) fn span_at(&self, hits: &[Hit], at: f32) -> Option<Span> {
+    pub(super) fn span_at(&self, hits: &[Hit], ray: &Ray, at: f32) -> Option<Span> {
         let next = self.samples.partition_point(|s| s.at < at).min(self.samples.len() - 1);
         let nearest =
             if next > 0 && at - self.samples[next - 1].at < self.samples[next].at - at { next - 1 } else { next };
-        continuing(&spans(hits), self.samples[nearest].span, self.volume)
+        continuing(&spans(hits, ray, self.within), self.samples[nearest].span, self.volume)
     }
 }
 
-/// The volumes of a ray. Sheets without thickness count only if there is no volume; several of them make one span.
-fn spans(hits: &[Hit]) -> Vec<Span> {
+/// The volumes of a ray, cut off at the border of a half-space. Sheets without thickness count only if there is no
+/// volume; several of them make one span.
+fn spans(hits: &[Hit], ray: &Ray, within: Option<HalfSpace>) -> Vec<Span> {
+    let mut spans = whole_spans(hits);
+    let Some([near, far]) = within.map(|half| half.covered(ray)) else { return spans };
+    spans.retain_mut(|span| {
+        let is_inside = span.far >= near && span.near <= far;
+        *span = Span { near: span.near.max(near), far: span.far.min(far) };
+        is_inside
+    });
+    spans
+}
+
+fn whole_spans(hits: &[Hit]) -> Vec<Span> {
     let all: Vec<Span> = volumes(hits).into_iter().map(|v| Span { near: v.near, far: v.far }).collect();
     let solid: Vec<Span> = all.iter().copied().filter(|s| s.far > s.near).collect();
     match (solid.is_empty(), hits) {

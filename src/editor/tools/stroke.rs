@@ -329,7 +329,7 @@ fn tune(tool: &mut ResMut<StrokeTool>, change: StrokeTune, rig: Option<EditedRig
             preview.on = None;
         }
     }
-    if let (StrokeTune::Choice(ChainChoice::Threshold(threshold)), Some(rig)) = (change, rig) {
+    if let (StrokeTune::Choice(ChainChoice::Limb(threshold)), Some(rig)) = (change, rig) {
         tool.threshold = threshold / rig.size();
     }
 }

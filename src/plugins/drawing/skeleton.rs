@@ -40,6 +40,8 @@ pub struct DrawnJoint {
     pub axes: Mat3,
     /// Index of its parent in the list; parents come first.
     pub parent: Option<usize>,
+    /// The bone that leads to the joint at rest, turned and scaled with the joint as it is posed; in the rig's space.
+    pub bone: Vec3,
     /// Joint or null.
     pub kind: NodeKind,
     /// Colour of its local group; `None` without one.
@@ -74,6 +76,8 @@ pub fn drawn_joints(
         numbers.insert(uid, joints.len());
         globals.push(global);
         let axes = Mat3::from(global.matrix3);
+        let rest = joint.data.rest;
+        let bone = rest.rotation.inverse() * rest.translation / rest.scale;
         let color = joint.data.group.and_then(|group| colors.iter().find(|(uid, _)| *uid == group));
         joints.push(DrawnJoint {
             uid,
@@ -84,6 +88,7 @@ pub fn drawn_joints(
                 axes.z_axis.normalize_or(Vec3::Z),
             ),
             parent,
+            bone: if bone.is_finite() { axes * bone } else { Vec3::ZERO },
             kind: joint.data.kind,
             color: color.map(|(_, tint)| *tint),
             emphasis: Emphasis::None,
@@ -129,7 +134,7 @@ fn children(joints: &[DrawnJoint]) -> Vec<usize> {
 }
 
 /// Bones of a rig. A joint without children gets a tail as long as a third of the bone that leads to it, in the same
-/// direction, unless it is part of a fan.
+/// direction at rest and turned with the joint, unless it is part of a fan.
 pub fn bones(joints: &[DrawnJoint]) -> Vec<DrawnBone> {
     let children = children(joints);
     let mut list = Vec::with_capacity(joints.len() * 2);
@@ -142,8 +147,10 @@ pub fn bones(joints: &[DrawnJoint]) -> Vec<DrawnBone> {
     }
     for (number, joint) in joints.iter().enumerate() {
         let is_leaf = children[number] == 0 && joint.kind == NodeKind::Joint;
-        let Some(parent) = joint.parent.filter(|parent| is_leaf && children[*parent] < FAN) else { continue };
-        let tail = joint.position + (joint.position - joints[parent].position) / 3.0;
+        if !is_leaf || joint.parent.is_none_or(|parent| children[parent] >= FAN) {
+            continue;
+        }
+        let tail = joint.position + joint.bone / 3.0;
         list.push(DrawnBone { joint: number, tail, leaf: true, fan: false });
     }
     list

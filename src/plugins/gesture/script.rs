@@ -319,7 +319,7 @@ impl GestureRun<'_, '_> {
         let choice = match (joints, threshold) {
             (Some(count), _) => ChainChoice::Joints(count),
             (None, Some(threshold)) => ChainChoice::Threshold(threshold),
-            (None, None) => ChainChoice::Threshold(0.02 * self.size()),
+            (None, None) => ChainChoice::Limb(0.02 * self.size()),
         };
         StrokeRequest {
             rig: self.entity,

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 
 use crate::{
     algo::{
-        stroke::{ChainChoice, StrokeChain, StrokeError, StrokeSamples, StrokeSettings},
+        stroke::{ChainChoice, HalfSpace, StrokeChain, StrokeError, StrokeSamples, StrokeSettings},
         view::ViewPlane,
     },
     mesh::{ray::Ray, surface::Surface},
@@ -64,7 +64,9 @@ impl FollowedStroke {
     ///
     /// A stroke is central (a spine) if the middles of the volume under it [run along the plane of
     /// symmetry](MirrorPlane::runs_along) and the segments from them to that plane stay inside the mesh, unlike those
-    /// of a leg beside the other. It is then taken as if drawn exactly on the plane, and so are its joints.
+    /// of a leg beside the other. It is then taken as if drawn exactly on the plane, and so are its joints. Any other
+    /// stroke that begins in a volume of both sides (a leg drawn from the side begins in the pelvis) is kept on its own
+    /// side, see [`HalfSpace::of_stroke`].
     ///
     /// # Errors
     /// As [`StrokeSamples::new`].
@@ -79,7 +81,14 @@ impl FollowedStroke {
         let Some(mirror) = symmetry else { return Ok(drawn) };
         let middles: Vec<Vec3> = drawn.samples.middles().collect();
         if !mirror.runs_along(&middles) || blocked(&drawn.surface, &mirror, &middles) > BLOCKED {
-            return Ok(drawn);
+            let crossings: Vec<[Vec3; 2]> = drawn.samples.crossings().collect();
+            let half = HalfSpace::of_stroke(&crossings, mirror.point, mirror.normal, mirror.tolerance);
+            if half.is_none() {
+                return Ok(drawn);
+            }
+            // What the stroke meets on its own side alone may be nothing.
+            let beside = StrokeSamples::within(&drawn.surface, plane, points, settings, half);
+            return Ok(Self { samples: beside.unwrap_or(drawn.samples), ..drawn });
         }
         let on_plane: Vec<Vec2> = middles.iter().filter_map(|middle| plane.project(mirror.onto(*middle))).collect();
         // On the plane the stroke may be too short: seen along the line on which it runs.

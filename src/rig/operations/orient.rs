@@ -54,16 +54,39 @@ fn rotation_for(draft: &Draft, joint: Uid, along: Axis) -> Option<Quat> {
         None => bones.max_by(|a, b| a.y.abs().total_cmp(&b.y.abs())),
     };
     match direction {
-        Some(direction) => Some(frame(direction, along)),
+        Some(direction) => Some(frame(direction, along, flexion(draft, joint))),
         None => parent.map(|parent| rig.rest_global(parent).to_scale_rotation_translation().1),
     }
 }
 
-/// The rotation that takes `along` to `direction` and the next axis as near as possible to the character's front (+Z),
-/// or to up if the bone itself points to the front.
-fn frame(direction: Vec3, along: Axis) -> Quat {
+/// Least and largest angle of a bend that says about which axis a chain bends: below, its bones are in line; above, the
+/// lower one belongs to another chain.
+const BENT: [f32; 2] = [15.0_f32.to_radians(), 80.0_f32.to_radians()];
+
+/// The axis about which a chain bends, at right angles to two bones: those that meet in the joint, or, where it starts a
+/// chain, those that meet in the next. `None` where the chain is straight.
+fn flexion(draft: &Draft, joint: Uid) -> Option<Vec3> {
+    let rig = draft.rig();
+    let only_child = |joint: Uid| rig.children(Some(joint)).first().filter(|_| rig.children(Some(joint)).len() == 1);
+    let bend = |joint: Uid| {
+        let parent = rig.joint(joint)?.parent.filter(|parent| only_child(*parent).is_some())?;
+        let [above, here, below] = [parent, joint, *only_child(joint)?].map(|joint| rig.position(joint));
+        let (incoming, outgoing) = ((here - above).try_normalize()?, (below - here).try_normalize()?);
+        let angle = incoming.angle_between(outgoing);
+        (BENT[0]..BENT[1]).contains(&angle).then(|| incoming.cross(outgoing).normalize())
+    };
+    bend(joint).or_else(|| bend(*only_child(joint)?))
+}
+
+/// The rotation that takes `along` to `direction` and the axis across it to the `flexion` axis. Where the chain does not
+/// bend, the third axis goes as near as possible to the character's front (+Z), or to up if the bone itself points to the
+/// front.
+fn frame(direction: Vec3, along: Axis, flexion: Option<Vec3>) -> Quat {
     let hint = if direction.z.abs() < 0.9 { Vec3::Z } else { Vec3::Y };
-    let side = direction.cross(hint).normalize();
+    let usual = direction.cross(hint).normalize();
+    let bent = flexion.and_then(|axis| axis.reject_from_normalized(direction).try_normalize());
+    // The sign of straight chains; where the two are at right angles, that of the bend.
+    let side = bent.map_or(usual, |axis| if axis.dot(usual) < -0.2 { -axis } else { axis });
     let front = side.cross(direction);
     let columns = match along {
         Axis::X => Mat3::from_cols(direction, -side, front),

@@ -64,9 +64,9 @@ fn contents(ui: &mut egui::Ui, preview: &StrokePreview, size: f32, requests: &mu
     };
     let slider =
         egui::Slider::new(&mut share, 0.2..=10.0).logarithmic(true).fixed_decimals(1).suffix(" %").text("threshold");
-    let hint = "Joints wherever the stroke strays further than this share of the character's size from the bones";
+    let hint = "Joints at corners of the stroke and bends of the limb that stray further than this share of the character's size from the bones";
     if ui.add(slider).on_hover_text(hint).changed() {
-        requests.send(StrokeTune::Choice(ChainChoice::Threshold(share * 0.01 * size)));
+        requests.send(StrokeTune::Choice(ChainChoice::Limb(share * 0.01 * size)));
     }
     if let Some((volume, of)) = chain.and_then(volumes) {
         ui.separator();

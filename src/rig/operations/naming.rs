@@ -1,0 +1,214 @@
+//! Names of drawn joints: by chain, side and place, such as `spine_1` and `arm_l_2`.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bevy::math::Vec3;
+
+use super::{Draft, MirrorPlane};
+use crate::rig::{EditError, Rig, RigEdit, Uid, label::mirrored_label};
+
+/// Least share of a chain's extent that its rise or fall has to be, to be a chain that goes up or down.
+const STEEP: f32 = 0.6;
+
+/// A label of a drawn joint, taken apart: the chain's name with its side, and the place in the chain from 1.
+struct Place<'a> {
+    chain: &'a str,
+    number: u32,
+}
+
+impl<'a> Place<'a> {
+    fn of(label: &'a str) -> Option<Self> {
+        let (chain, number) = label.rsplit_once('_')?;
+        let number = number.parse().ok().filter(|number| *number > 0)?;
+        (!chain.is_empty()).then_some(Self { chain, number })
+    }
+
+    /// The chain's name without its side.
+    fn base(&self) -> &'a str {
+        let sideless = self.chain.strip_suffix("_l").or_else(|| self.chain.strip_suffix("_r"));
+        sideless.unwrap_or(self.chain)
+    }
+}
+
+/// The name of a chain that is drawn, and the place of its first joint.
+pub(super) struct ChainName {
+    base: String,
+    first: u32,
+    taken: BTreeSet<String>,
+}
+
+impl ChainName {
+    /// Names a chain by the joint that it hangs on and by where it goes. `positions` are the places of its joints,
+    /// `parent` the joint above. The names are those of a character that stands upright and looks along +Z.
+    pub fn new(rig: &Rig, positions: &[Vec3], parent: Option<Uid>, plane: Option<&MirrorPlane>) -> Self {
+        let taken = rig.walk().filter_map(|joint| joint.data.label.clone()).collect();
+        let upper = parent.and_then(|parent| rig.joint(parent));
+        let known = upper.and_then(|joint| joint.data.label.as_deref()).and_then(Place::of);
+        if let (Some(place), Some(joint)) = (&known, upper)
+            && joint.children.is_empty()
+            && stays_on_side(place.chain, positions, rig.position(joint.data.uid), plane)
+        {
+            return Self { base: place.base().to_owned(), first: place.number + 1, taken };
+        }
+        let base = base(rig, positions, parent, known.as_ref(), plane);
+        let free = |number: &u32| {
+            let chain = if *number == 1 { base.to_owned() } else { format!("{base}{number}") };
+            !taken.iter().filter_map(|label| Place::of(label)).any(|place| place.base() == chain)
+        };
+        let number = (1..).find(free).unwrap_or(1);
+        Self { base: if number == 1 { base.to_owned() } else { format!("{base}{number}") }, first: 1, taken }
+    }
+
+    /// True if the chain goes on with the numbers of the chain that it is drawn onto.
+    pub fn continues(&self) -> bool {
+        self.first > 1
+    }
+
+    /// The name of the joint at a place of the chain, from 0: with the side on which `position` lies.
+    pub fn joint(&mut self, place: usize, position: Vec3, plane: Option<&MirrorPlane>) -> String {
+        let side = match side(position, plane) {
+            0 => "",
+            1 => "_l",
+            _ => "_r",
+        };
+        let mut number = self.first + place as u32;
+        loop {
+            let name = format!("{}{side}_{number}", self.base);
+            if self.taken.insert(name.clone()) {
+                return name;
+            }
+            number += 1;
+        }
+    }
+}
+
+/// Side of a place: 1 left (towards +X), -1 right, 0 on the plane between them.
+fn side(position: Vec3, plane: Option<&MirrorPlane>) -> i32 {
+    let across = plane.map_or(position.x, |plane| plane.distance(position));
+    let tolerance = plane.map_or(1e-4, |plane| plane.tolerance);
+    i32::from(across > tolerance) - i32::from(across < -tolerance)
+}
+
+/// True if a chain below a joint of another one is its continuation and not, like an arm on a spine, a chain of its own.
+fn stays_on_side(chain: &str, positions: &[Vec3], from: Vec3, plane: Option<&MirrorPlane>) -> bool {
+    let has_side = chain.ends_with("_l") || chain.ends_with("_r");
+    let is_beside = |position: &Vec3| side(*position, plane) != 0;
+    has_side == (side(from, plane) != 0) && positions.iter().all(|position| is_beside(position) == has_side)
+}
+
+/// The name of a chain that is no continuation.
+fn base(
+    rig: &Rig,
+    positions: &[Vec3],
+    parent: Option<Uid>,
+    known: Option<&Place>,
+    plane: Option<&MirrorPlane>,
+) -> &'static str {
+    let (Some(&first), Some(&last)) = (positions.first(), positions.last()) else { return "joint" };
+    let way = last - first;
+    let is_beside = positions.iter().any(|position| side(*position, plane) != 0);
+    let Some(parent) = parent else {
+        return match (positions.len(), is_beside) {
+            (1, false) => "root",
+            (1, true) => "joint",
+            (_, false) => "spine",
+            (_, true) if way.y < -STEEP * way.length() => "leg",
+            (_, true) => "arm",
+        };
+    };
+    match known.map(Place::base) {
+        Some(base) if base.contains("arm") => return "finger",
+        Some(base) if base.contains("leg") => return "toe",
+        _ => {}
+    }
+    let way = if positions.len() > 1 { way } else { last - rig.position(parent) };
+    let share = way.normalize_or_zero();
+    let trunk = Trunk::new(rig, parent);
+    match is_beside {
+        false if trunk.is_lower(parent) && share.y < STEEP => "tail",
+        false if trunk.is_lower(parent) => "spine",
+        false => "neck",
+        // A spine that lies: four legs.
+        true if trunk.lies() && share.y < -STEEP && trunk.is_in_front(first) => "front_leg",
+        true if trunk.lies() && share.y < -STEEP => "hind_leg",
+        true if trunk.is_lower(parent) => "leg",
+        true => "arm",
+    }
+}
+
+/// The joints from a joint up to its root, and those that continue them: a spine.
+struct Trunk {
+    joints: BTreeMap<Uid, usize>,
+    start: Vec3,
+    end: Vec3,
+}
+
+impl Trunk {
+    fn new(rig: &Rig, joint: Uid) -> Self {
+        let mut chain: Vec<Uid> = rig.ancestors(joint).map(|above| above.data.uid).collect();
+        chain.reverse();
+        chain.retain(|above| *above != joint);
+        chain.push(joint);
+        let mut next = joint;
+        // Downwards along first children, which were drawn first.
+        while let Some(&child) = rig.children(Some(next)).first() {
+            if chain.contains(&child) || rig.joint(child).is_some_and(|joint| joint.data.mirror.is_some()) {
+                break;
+            }
+            chain.push(child);
+            next = child;
+        }
+        let place = |joint: Option<&Uid>| joint.map_or(Vec3::ZERO, |joint| rig.position(*joint));
+        let (start, end) = (place(chain.first()), place(chain.last()));
+        Self { joints: chain.iter().enumerate().map(|(number, joint)| (*joint, number)).collect(), start, end }
+    }
+
+    /// True for the joints of the lower half.
+    fn is_lower(&self, joint: Uid) -> bool {
+        self.joints.get(&joint).is_some_and(|number| 2 * number < self.joints.len().max(1))
+    }
+
+    /// True if it is longer than high.
+    fn lies(&self) -> bool {
+        let way = self.end - self.start;
+        way.y.abs() < STEEP * way.length()
+    }
+
+    fn is_in_front(&self, place: Vec3) -> bool {
+        place.z > 0.5 * (self.start.z + self.end.z)
+    }
+}
+
+/// Numbers the joints below an inserted one again, if they have names of the same chain, and names the inserted one.
+pub(super) fn number_inserted(draft: &mut Draft, joint: Uid, child: Uid) -> Result<(), EditError> {
+    let rig = draft.rig();
+    let label = |joint: Uid| rig.joint(joint).and_then(|joint| joint.data.label.clone());
+    let Some(first) = label(child) else { return Ok(()) };
+    let Some(Place { chain, number }) = Place::of(&first) else { return Ok(()) };
+    let mut names = vec![(joint, first.clone())];
+    let (mut at, mut number) = (child, number);
+    loop {
+        number += 1;
+        names.push((at, format!("{chain}_{number}")));
+        let next =
+            rig.children(Some(at)).iter().copied().find(|next| label(*next).as_ref() == names.last().map(|n| &n.1));
+        let Some(next) = next else { break };
+        at = next;
+    }
+    let moved: BTreeSet<Uid> = names.iter().map(|(joint, _)| *joint).collect();
+    let is_free = |name: &String| {
+        !rig.walk().any(|joint| joint.data.label.as_ref() == Some(name) && !moved.contains(&joint.data.uid))
+    };
+    if !names.iter().all(|(_, name)| is_free(name)) {
+        return Ok(());
+    }
+    for (joint, name) in names {
+        draft.apply(RigEdit::SetLabel(joint, Some(name)))?;
+    }
+    Ok(())
+}
+
+/// The name of the joint on the other side of a named one.
+pub(super) fn partner_name(name: &str) -> String {
+    mirrored_label(name).unwrap_or_else(|| name.to_owned())
+}
