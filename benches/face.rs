@@ -38,6 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// One line of the table.
 fn row(name: &str, model: &Model, bones: usize, runs: usize) -> Result<(), Box<dyn Error>> {
     let mut times = Vec::new();
+    let mut slides = Vec::new();
     let mut report = FaceReport::default();
     for _ in 0..runs {
         let mut bench = Workbench::new(1, name);
@@ -48,19 +49,27 @@ fn row(name: &str, model: &Model, bones: usize, runs: usize) -> Result<(), Box<d
         let before = bench.rig().pose().len();
         bench.express(BTreeMap::from([("happiness".to_owned(), 1.0)]))?;
         assert!(bench.rig().pose().len() > before, "an expression moves something");
+        // A slider that is dragged.
+        for step in 1..=9 {
+            let start = Instant::now();
+            bench.express(BTreeMap::from([("happiness".to_owned(), 0.1 * step as f32)]))?;
+            slides.push(start.elapsed().as_secs_f64() * 1e3);
+        }
     }
-    times.sort_by(f64::total_cmp);
-    let median = times[times.len() / 2];
+    let [median, slide] = [times, slides].map(|mut times| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    });
     let steps: Vec<String> =
         report.times.iter().map(|(step, time)| format!("\"{step}\": {:.2}", time.as_secs_f64() * 1e3)).collect();
     println!(
-        "{name}: {} points, {bones} bones, {median:.0} ms from click to skinned face, {} folds",
+        "{name}: {} points, {bones} bones, {median:.0} ms from click to skinned face, {slide:.1} ms a slider's step, {} folds",
         model.points.len(),
         report.folds
     );
     println!(
-        "{{\"head\": \"{name}\", \"points\": {}, \"bones\": {bones}, \"click_to_face_ms\": {median:.2}, \"folds\": {}, \
-         \"steps_ms\": {{{}}}}}",
+        "{{\"head\": \"{name}\", \"points\": {}, \"bones\": {bones}, \"click_to_face_ms\": {median:.2}, \
+         \"slider_ms\": {slide:.2}, \"folds\": {}, \"steps_ms\": {{{}}}}}",
         model.points.len(),
         report.folds,
         steps.join(", ")

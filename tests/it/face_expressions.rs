@@ -85,14 +85,34 @@ fn rigged(
     Head { points, triangles, landmarks, marks, mask: groups.mask, bones, weights }
 }
 
+/// Movements of units are solved once and summed; the order in which units are first used makes no difference.
+#[test]
+fn a_kept_face_poses_like_a_new_one() {
+    let head = bundled(40);
+    let set = ExpressionSet::bundled();
+    let units = set.unit_set();
+    let Head { points, triangles, mask, weights, bones, landmarks, .. } = &head;
+    let fitted = || FittedFace::new(points, triangles, mask, weights, bones, landmarks, units);
+    let kept = fitted();
+    let names: Vec<&str> = set.six().map(|expression| expression.name.as_str()).collect();
+    for pair in names.windows(2) {
+        let blend: Vec<_> = pair.iter().map(|name| (set.find(name).unwrap(), 0.6)).collect();
+        let blend: Vec<_> = blend.iter().map(|(expression, strength)| (expression.as_ref(), *strength)).collect();
+        let mix = Mix::of(&blend, units);
+        assert_eq!(kept.pose(&mix), fitted().pose(&mix), "{pair:?}");
+        assert_eq!(kept.pose(&mix), kept.pose(&mix), "{pair:?}");
+    }
+    assert!(kept.pose(&Mix::rest(units)).iter().all(|pose| *pose == BonePose::REST));
+}
+
 impl Head {
     fn moved(&self, name: &str, strength: f32) -> Vec<Vec3> {
         let set = ExpressionSet::bundled();
         let expression = set.find(name).unwrap();
-        let face =
-            FittedFace::new(&self.points, &self.triangles, &self.mask, &self.weights, &self.bones, &self.landmarks);
-        let mix = Mix::of(&[(expression.as_ref(), strength)], set.unit_set());
-        apply(&self.points, &self.weights, &self.bones, &face.pose(&mix, set.unit_set()))
+        let units = set.unit_set();
+        let Self { points, triangles, mask, weights, bones, landmarks, .. } = self;
+        let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, units);
+        apply(points, weights, bones, &face.pose(&Mix::of(&[(expression.as_ref(), strength)], units)))
     }
 
     fn folds(&self, moved: &[Vec3]) -> usize {
@@ -185,12 +205,12 @@ fn the_bundled_head_shows_the_six() {
 
 #[test]
 fn few_bones_show_the_six() {
-    check_head(HEADS[0], 20, 8);
+    check_head(HEADS[0], 20, 10);
 }
 
 #[test]
 fn forty_bones_show_the_six() {
-    HEADS.into_iter().zip([25, 17, 47]).for_each(|(name, most_folds)| check_head(name, 40, most_folds));
+    HEADS.into_iter().zip([25, 23, 52]).for_each(|(name, most_folds)| check_head(name, 40, most_folds));
 }
 
 #[test]
@@ -302,8 +322,8 @@ fn what_does_not_fit_together_is_survived() {
     let points = [Vec3::ZERO, Vec3::X];
     let mut weights = Weights::default();
     weights.push([(2, 0.5), (9, 0.5)]);
-    let poses =
-        FittedFace::new(&points, &[[0, 1, 7]], &[true], &weights, &bones, &landmarks).pose(&mix, set.unit_set());
+    let units = set.unit_set();
+    let poses = FittedFace::new(&points, &[[0, 1, 7]], &[true], &weights, &bones, &landmarks, units).pose(&mix);
     assert!(poses.len() == 1 && poses[0].translation.is_finite());
     assert_eq!(apply(&points, &weights, &bones, &[]).len(), 2);
     landmarks.points[45] = landmarks.points[36];

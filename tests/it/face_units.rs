@@ -44,8 +44,8 @@ impl Posable {
         let units = ExpressionSet::bundled().unit_set();
         let mut mix = Mix::rest(units);
         mix.add(&units.units()[unit].name, side, 1.0, units);
-        let fitted = self.analysis.fitted(&self.face.bones, &self.face.weights);
-        let posed = apply(&self.analysis.points, &self.face.weights, &self.face.bones, &fitted.pose(&mix, units));
+        let fitted = self.analysis.fitted(&self.face.bones, &self.face.weights, units);
+        let posed = apply(&self.analysis.points, &self.face.weights, &self.face.bones, &fitted.pose(&mix));
         let to_mesh = self.analysis.to_mesh();
         posed.iter().zip(&self.analysis.points).map(|(posed, rest)| to_mesh * (*posed - *rest)).collect()
     }

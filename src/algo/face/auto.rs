@@ -11,7 +11,7 @@ use glam::{Quat, Vec3};
 use super::{
     axes::{AxesError, HeadAxes, guess_axes},
     bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, place_bones},
-    expression::{ExpressionSet, FittedFace, count_folds, repair_folds},
+    expression::{ExpressionSet, FittedFace, UnitSet, count_folds, repair_folds},
     grouping::{GroupingError, HeadGroups, group_head},
     head_bones::{HeadBones, HeadBonesError, head_bones},
     head_part::{HeadPartError, head_part},
@@ -269,9 +269,8 @@ impl FaceAnalysis {
 
     /// Places facial bones and binds the head to them.
     ///
-    /// `fixed` bones (head space) stay where they are and count among [`AutoSettings::bones`]. If the six expressions
-    /// fold more skin than [`FaceAnalysis::tolerated_folds`], other seeds are tried, and the result with the fewest
-    /// folds is kept.
+    /// `fixed` bones (head space) stay where they are and count among [`AutoSettings::bones`]. Weights are smoothed where
+    /// the six expressions would fold skin over; [`AutoFace::folds`] tells what is left.
     ///
     /// # Errors
     /// [`FaceError`]: no bones, more than the mask has points, or cancelled.
@@ -285,33 +284,11 @@ impl FaceAnalysis {
         if settings.bones == 0 {
             return Err(FaceError::NoBones);
         }
-        let mut best: Option<AutoFace> = None;
-        for attempt in 0..SEEDS {
-            let seed = settings.seed.wrapping_add(attempt.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-            let face = self.rig_once(fixed, settings, seed, expressions, progress)?;
-            if best.as_ref().is_none_or(|best| face.folds < best.folds) {
-                best = Some(face);
-            }
-            if best.as_ref().is_some_and(|best| best.folds <= self.tolerated_folds()) {
-                break;
-            }
-        }
-        best.ok_or(FaceError::NoBones)
-    }
-
-    fn rig_once(
-        &self,
-        fixed: &[FixedBone],
-        settings: &AutoSettings,
-        seed: u64,
-        expressions: &ExpressionSet,
-        progress: FaceProgress,
-    ) -> Result<AutoFace, FaceError> {
         let Self { points, triangles, shells, groups, landmarks, .. } = self;
         begin(progress, FaceStep::Bones)?;
         let how = FaceBonesSettings {
             bones: settings.bones,
-            seed,
+            seed: settings.seed,
             starts: settings.starts,
             symmetric: settings.symmetric,
             extras: settings.extras,
@@ -348,8 +325,8 @@ impl FaceAnalysis {
     }
 
     /// The head with the given bones and weights, prepared for expressions.
-    pub fn fitted<'a>(&'a self, bones: &'a [FaceBone], weights: &'a Weights) -> FittedFace<'a> {
-        FittedFace::new(&self.points, &self.triangles, &self.groups.mask, weights, bones, &self.landmarks)
+    pub fn fitted(&self, bones: &[FaceBone], weights: &Weights, units: &UnitSet) -> FittedFace {
+        FittedFace::new(&self.points, &self.triangles, &self.groups.mask, weights, bones, &self.landmarks, units)
     }
 
     /// Rotation from head space to the mesh's space.
@@ -377,9 +354,6 @@ impl FaceAnalysis {
         }
     }
 }
-
-/// Number of seeds tried where expressions fold skin over.
-const SEEDS: u64 = 4;
 
 fn check(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), FaceError> {
     if points.is_empty() || triangles.is_empty() {

@@ -123,7 +123,8 @@ pub fn pose(
     points: &[Vec3],
     landmarks: &Landmarks,
 ) -> Vec<BonePose> {
-    FittedFace::new(points, &[], &[], weights, bones, landmarks).pose(&Mix::of(wanted, set.unit_set()), set.unit_set())
+    let units = set.unit_set();
+    FittedFace::new(points, &[], &[], weights, bones, landmarks, units).pose(&Mix::of(wanted, units))
 }
 
 /// Poses of bones for a mix of units, without regard to weights: the field, sampled at the bones.

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use bevy::prelude::*;
 
 use super::{
-    ExpressError, FaceRig,
-    pose::{Frame, analysed_weights},
+    ExpressError,
+    pose::{Frame, analysed_weights, facial_bones},
 };
 use crate::{
     algo::face::{
@@ -47,15 +47,11 @@ pub fn arkit_shapes(
     set: &ExpressionSet,
     influences: usize,
 ) -> Result<Vec<FaceShape>, ExpressError> {
-    let face = FaceRig::read(rig);
-    if face.bones.is_empty() {
-        return Err(ExpressError::NoBones);
-    }
-    let skin = rig.skin(mesh.uid).ok_or(ExpressError::NotSkinned)?;
+    let (face, skin) = facial_bones(rig, mesh)?;
     let weights = strongest(&analysed_weights(skin, &face, analysis), influences);
     let bones = face.face_bones(analysis);
-    let fitted = analysis.fitted(&bones, &weights);
     let units = set.unit_set();
+    let fitted = analysis.fitted(&bones, &weights, units);
     let poses = |shapes: &[(usize, Sides)]| {
         let mut mix = Mix::rest(units);
         for (unit, side) in shapes {
@@ -63,7 +59,7 @@ pub fn arkit_shapes(
                 mix.add(&unit.name, *side, 1.0, units);
             }
         }
-        fitted.pose(&mix, units)
+        fitted.pose(&mix)
     };
     let open = units.arkit(OPEN);
     let still = STILL * analysis.landmarks.eye_distance();

@@ -1,6 +1,6 @@
 //! Expressions on a rig: strengths become pose offsets of facial joints.
 
-use std::{borrow::Cow, collections::BTreeMap};
+use std::{borrow::Cow, collections::BTreeMap, sync::Arc};
 
 use bevy::prelude::*;
 
@@ -8,8 +8,7 @@ use super::{ExpressError, ExpressRequest, Expressed, Expressions, Face, FaceExpr
 use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis, FaceError},
-        bones::FaceBone,
-        expression::{BonePose, Expression, ExpressionSet, MAX_STRENGTH, Mix, apply},
+        expression::{BonePose, Expression, ExpressionSet, FittedFace, MAX_STRENGTH, Mix, apply},
     },
     mesh::model::Weights,
     plugins::{
@@ -67,15 +66,17 @@ impl Frame {
 pub(super) fn express(
     mut commands: Commands,
     mut requests: MessageReader<ExpressRequest>,
-    meshes: Query<(&RigMesh, &SkinOf, Option<&Face>)>,
+    meshes: Query<(&RigMesh, &SkinOf, Option<&Face>, Option<&PreparedFace>)>,
     rigs: Query<(&Rig, Option<&RigHistory>)>,
     set: Res<FaceExpressions>,
     mut told: MessageWriter<Expressed>,
 ) {
     for ExpressRequest { mesh: entity, strengths, preview } in requests.read() {
-        let found =
-            meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, of.0, rigs.get(of.0).ok()?, face)));
-        let Some((mesh, rig_entity, (rig, history), face)) = found else {
+        let found = meshes
+            .get(*entity)
+            .ok()
+            .and_then(|(mesh, of, face, prepared)| Some((mesh, of.0, rigs.get(of.0).ok()?, face, prepared)));
+        let Some((mesh, rig_entity, (rig, history), face, prepared)) = found else {
             told.write(Expressed { mesh: *entity, result: Err(ExpressError::NoRig) });
             continue;
         };
@@ -87,14 +88,16 @@ pub(super) fn express(
         let result = analysed.map_err(ExpressError::from).and_then(|face| {
             // A preview is undone before the next preview or edit.
             let settled = history.map_or(Cow::Borrowed(rig), |history| history.settled(rig));
-            let edits = expression_edits(&settled, mesh, &face.analysis, &set.0, strengths)?;
+            let mix = mixed(&set.0, strengths)?;
+            let prepared = PreparedFace::reused(prepared, &settled, mesh, &face.analysis, &set.0)?;
+            let edits = expression_edits(&settled, &prepared, &mix);
             let operation = Operation::Named { name: "Express", edits };
             let change = if *preview { Change::Preview(operation) } else { Change::Do(operation) };
             if !*preview {
                 commands.write_message(EditRequest { rig: rig_entity, change: Change::CancelPreview });
             }
             commands.write_message(EditRequest { rig: rig_entity, change });
-            commands.entity(*entity).insert((Expressions(strengths.clone()), face));
+            commands.entity(*entity).insert((Expressions(strengths.clone()), face, prepared));
             Ok(())
         });
         told.write(Expressed { mesh: *entity, result });
@@ -107,32 +110,52 @@ fn analyse(mesh: &RigMesh) -> Result<Face, FaceError> {
     Ok(Face { analysis: analysis.into(), settings, rest: mesh.rest.clone() })
 }
 
-/// The face of a rig in the form of the expressions.
-struct Posed {
+/// A mesh's face as expressions take it, kept from one expression to the next: a slider that is dragged only sums up
+/// movements that are solved already.
+#[derive(Component, Clone)]
+pub(super) struct PreparedFace(Arc<PreparedParts>);
+
+struct PreparedParts {
+    analysis: Arc<FaceAnalysis>,
+    set: Arc<ExpressionSet>,
+    skin: Arc<SkinData>,
     known: FaceRig,
-    bones: Vec<FaceBone>,
-    weights: Weights,
-    poses: Vec<BonePose>,
+    fitted: FittedFace,
 }
 
-/// Poses of the facial bones for strengths.
-fn posed(
-    rig: &Rig,
-    mesh: &RigMesh,
-    analysis: &FaceAnalysis,
-    set: &ExpressionSet,
-    strengths: &BTreeMap<String, f32>,
-) -> Result<Posed, ExpressError> {
+/// The facial bones of a rig, and the skin of a mesh that is bound to them.
+pub(super) fn facial_bones<'a>(rig: &'a Rig, mesh: &RigMesh) -> Result<(FaceRig, &'a Arc<SkinData>), ExpressError> {
     let known = FaceRig::read(rig);
     if known.bones.is_empty() {
         return Err(ExpressError::NoBones);
     }
-    let skin = rig.skin(mesh.uid).ok_or(ExpressError::NotSkinned)?;
-    let mix = mixed(set, strengths)?;
-    let weights = analysed_weights(skin, &known, analysis);
-    let bones = known.face_bones(analysis);
-    let poses = analysis.fitted(&bones, &weights).pose(&mix, set.unit_set());
-    Ok(Posed { known, bones, weights, poses })
+    Ok((known, rig.skin(mesh.uid).ok_or(ExpressError::NotSkinned)?))
+}
+
+impl PreparedFace {
+    /// The face that was prepared `before`, if rig, mesh, analysis and units are still the same, or a new one.
+    fn reused(
+        before: Option<&Self>,
+        rig: &Rig,
+        mesh: &RigMesh,
+        analysis: &Arc<FaceAnalysis>,
+        set: &Arc<ExpressionSet>,
+    ) -> Result<Self, ExpressError> {
+        let (known, skin) = facial_bones(rig, mesh)?;
+        let serves = |parts: &PreparedParts| {
+            Arc::ptr_eq(&parts.analysis, analysis)
+                && Arc::ptr_eq(&parts.set, set)
+                && Arc::ptr_eq(&parts.skin, skin)
+                && parts.known == known
+        };
+        if let Some(before) = before.filter(|before| serves(&before.0)) {
+            return Ok(before.clone());
+        }
+        let weights = analysed_weights(skin, &known, analysis);
+        let fitted = analysis.fitted(&known.face_bones(analysis), &weights, set.unit_set());
+        let (analysis, set, skin) = (analysis.clone(), set.clone(), skin.clone());
+        Ok(Self(Arc::new(PreparedParts { analysis, set, skin, known, fitted })))
+    }
 }
 
 /// A blend of expressions and units by name; a unit's name may end in `_l` or `_r` for one side.
@@ -155,21 +178,16 @@ pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<M
     Ok(Mix::of(&wanted, set.unit_set()))
 }
 
-/// The edits that pose the facial joints for strengths. Facial joints that are not moved are reset to rest.
-fn expression_edits(
-    rig: &Rig,
-    mesh: &RigMesh,
-    analysis: &FaceAnalysis,
-    set: &ExpressionSet,
-    strengths: &BTreeMap<String, f32>,
-) -> Result<Vec<RigEdit>, ExpressError> {
-    let Posed { known, poses, .. } = posed(rig, mesh, analysis, set, strengths)?;
+/// The edits that pose the facial joints for a mix. Facial joints that are not moved are reset to rest.
+fn expression_edits(rig: &Rig, prepared: &PreparedFace, mix: &Mix) -> Vec<RigEdit> {
+    let PreparedParts { analysis, known, fitted, .. } = prepared.0.as_ref();
+    let poses = fitted.pose(mix);
     let edits = known.bones.iter().zip(&poses).filter_map(|(bone, pose)| {
         let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
         let offset = (!offset.is_rest(1e-7)).then_some(offset);
         (rig.offset(bone.uid) != offset.as_ref()).then_some(RigEdit::SetOffset(bone.uid, offset))
     });
-    Ok(edits.collect())
+    edits.collect()
 }
 
 /// Positions of the analysed points of a rig's face, in head space, with expressions by name, each with a strength from
@@ -184,7 +202,11 @@ pub fn expressed_points(
     set: &ExpressionSet,
     strengths: &BTreeMap<String, f32>,
 ) -> Result<Vec<Vec3>, ExpressError> {
-    let Posed { bones, weights, poses, .. } = posed(rig, mesh, analysis, set, strengths)?;
+    let mix = mixed(set, strengths)?;
+    let (known, skin) = facial_bones(rig, mesh)?;
+    let weights = analysed_weights(skin, &known, analysis);
+    let bones = known.face_bones(analysis);
+    let poses = analysis.fitted(&bones, &weights, set.unit_set()).pose(&mix);
     Ok(apply(&analysis.points, &weights, &bones, &poses))
 }
 

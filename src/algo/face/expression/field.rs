@@ -6,7 +6,7 @@ use super::{
     BonePose, Mix, UnitSet,
     openings::{OpeningLines, OpeningSide},
     pitch,
-    text::{Part, UnitMove},
+    text::{Part, Unit, UnitMove},
     yaw,
 };
 use crate::algo::face::{
@@ -68,14 +68,12 @@ impl Field {
             for (side, &strength) in strengths.iter().enumerate().filter(|(_, strength)| **strength > 0.0) {
                 gaze[side][0] += unit.gaze.out * strength;
                 gaze[side][1] += unit.gaze.up * strength;
-                let moves = unit.moves.iter().map(|one| Move::new(one, side, landmarks)).collect();
-                sources.push(Source { side: (!unit.whole).then_some(side), strength, moves });
+                sources.push(Source::new(unit, side, strength, landmarks));
             }
         }
         let eye = |side: usize, [out, up]: [f32; 2]| {
             yaw(if side == 0 { out } else { -out }.clamp(-40.0, 40.0)) * pitch(-up.clamp(-35.0, 35.0))
         };
-        let jaw_bone = bones.iter().find(|bone| bone.kind == FaceBoneKind::Jaw);
         Some(Self {
             scale: 1.0 / distance,
             opening_lines,
@@ -83,12 +81,27 @@ impl Field {
             jaw: pitch(open.clamp(0.0, 35.0)),
             jaw_shift: jaw_shift * distance,
             skin_jaw: (open_skin > 0.0).then(|| pitch(open_skin.min(35.0))),
-            pivot: jaw_bone.map_or_else(|| hinge(landmarks), |bone| bone.position),
+            pivot: jaw_pivot(bones, landmarks),
             eyes: [eye(0, gaze[0]), eye(1, gaze[1])],
         })
     }
 
-    /// Displacement of the skin at `point`, in units of the mesh.
+    /// The field of one unit on one side, without its jaw.
+    pub fn of_unit(unit: &Unit, side: usize, opening_lines: &OpeningLines, landmarks: &Landmarks) -> Self {
+        Self {
+            scale: 1.0 / landmarks.eye_distance(),
+            opening_lines: opening_lines.clone(),
+            sources: vec![Source::new(unit, side, 1.0, landmarks)],
+            jaw: Quat::IDENTITY,
+            jaw_shift: Vec3::ZERO,
+            skin_jaw: None,
+            pivot: Vec3::ZERO,
+            eyes: [Quat::IDENTITY; 2],
+        }
+    }
+
+    /// Displacement of the skin at `point`, in units of the mesh: a sum over units and the jaw's part, each linear in its
+    /// strength or in the jaw's rotation matrix.
     pub fn at(&self, point: Vec3, known: OpeningSide) -> Vec3 {
         let mut sum = Vec3::ZERO;
         if let Some(jaw) = self.skin_jaw {
@@ -102,6 +115,11 @@ impl Field {
             }
         }
         sum
+    }
+
+    /// Rotation of the skin below the mouth by units that say nothing else of the skin.
+    pub fn skin_jaw(&self) -> Option<Quat> {
+        self.skin_jaw
     }
 
     /// Pose of a jaw or eye bone.
@@ -119,6 +137,11 @@ impl Field {
 }
 
 impl Source {
+    fn new(unit: &Unit, side: usize, strength: f32, landmarks: &Landmarks) -> Self {
+        let moves = unit.moves.iter().map(|one| Move::new(one, side, landmarks)).collect();
+        Self { side: (!unit.whole).then_some(side), strength, moves }
+    }
+
     /// Displacement in eye distances: near each place its own movement, in between a blend, and less with distance.
     fn at(&self, point: Vec3, known: OpeningSide, scale: f32, opening_lines: &OpeningLines) -> Vec3 {
         let (mut sum, mut weights, mut outside) = (Vec3::ZERO, 0.0, 1.0);
@@ -160,6 +183,12 @@ impl Move {
             part: one.part,
         }
     }
+}
+
+/// The point about which the skin below the mouth turns: the jaw bone, or the hinge.
+pub(super) fn jaw_pivot(bones: &[FaceBone], landmarks: &Landmarks) -> Vec3 {
+    let jaw_bone = bones.iter().find(|bone| bone.kind == FaceBoneKind::Jaw);
+    jaw_bone.map_or_else(|| hinge(landmarks), |bone| bone.position)
 }
 
 /// Approximate hinge of the lower jaw: a little in front of and below the ears, where the outline begins.

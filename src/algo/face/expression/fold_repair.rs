@@ -15,9 +15,7 @@ use crate::{
     mesh::{adjacency::weld, influences::keep_strongest, model::Weights, skinning::skin_points},
 };
 
-/// Number of passes; each solves the bones' movements anew.
-const PASSES: usize = 3;
-/// Rounds of averaging in a pass.
+/// Rounds of averaging.
 const ROUNDS: usize = 24;
 /// Round from which neighbours of the corners are averaged, too.
 const WIDEN: usize = 6;
@@ -29,7 +27,7 @@ type Influences = Vec<(u32, f32)>;
 /// Averages weights where one of the six expressions at full strength turns a triangle by more than a right angle.
 ///
 /// All in head space; `mask` and `weights` as [`FittedFace::new`] takes them. Points at the same place keep the same
-/// weights. Returns the number of triangles that still fold. Cost: a few poses of every expression.
+/// weights. Returns the number of triangles that still fold. Cost: a pose of each expression.
 pub fn repair_folds(
     set: &ExpressionSet,
     points: &[Vec3],
@@ -43,67 +41,56 @@ pub fn repair_folds(
         return 0;
     }
     let six: Vec<&Expression> = set.six().collect();
-    let poses = |weights: &Weights| -> Vec<Vec<Affine3A>> {
-        let face = FittedFace::new(points, &[], mask, weights, bones, landmarks);
-        let matrices = |expression: &&Expression| {
-            let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()), set.unit_set());
-            let moved = posed.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
-            [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
-        };
-        six.par_iter().map(matrices).collect()
+    let face = FittedFace::new(points, &[], mask, weights, bones, landmarks, set.unit_set());
+    let matrices = |expression: &&Expression| -> Vec<Affine3A> {
+        let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
+        let moved = posed.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
+        [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
     };
+    let poses: Vec<Vec<Affine3A>> = six.par_iter().map(matrices).collect();
     let with_area = with_area(points, triangles);
-    let mut left = 0;
-    let mut neighbourhood: Option<Neighbourhood> = None;
-    for _ in 0..PASSES {
-        let poses = poses(weights);
-        let mut own: BTreeMap<u32, Influences> = BTreeMap::new();
-        let mut folded = all_folded(points, triangles, &with_area, weights, &poses);
-        left = folded.len();
+    let mut own: BTreeMap<u32, Influences> = BTreeMap::new();
+    let mut folded = all_folded(points, triangles, &with_area, weights, &poses);
+    if folded.is_empty() {
+        return 0;
+    }
+    let neighbourhood = Neighbourhood::new(points, triangles);
+    for round in 0..ROUNDS {
+        let mut corners: BTreeSet<u32> = folded
+            .iter()
+            .filter_map(|&triangle| triangles.get(triangle as usize))
+            .flatten()
+            .map(|&corner| neighbourhood.place_of[corner as usize])
+            .collect();
+        if round >= WIDEN {
+            let more: Vec<u32> = corners.iter().flat_map(|&place| neighbourhood.next(place)).collect();
+            corners.extend(more);
+        }
+        let averaged: Vec<(u32, Influences)> =
+            corners.iter().map(|&place| (place, neighbourhood.average(place, weights, &own))).collect();
+        for (place, influences) in averaged {
+            for &point in &neighbourhood.points[place as usize] {
+                own.insert(point, influences.clone());
+            }
+        }
+        let near: BTreeSet<u32> = own
+            .keys()
+            .flat_map(|&point| neighbourhood.triangles[neighbourhood.place_of[point as usize] as usize].iter().copied())
+            .collect();
+        folded = self::folded(points, triangles, near.into_iter(), weights, &own, &poses);
         if folded.is_empty() {
             break;
         }
-        let neighbourhood = neighbourhood.get_or_insert_with(|| Neighbourhood::new(points, triangles));
-        for round in 0..ROUNDS {
-            let mut corners: BTreeSet<u32> = folded
-                .iter()
-                .filter_map(|&triangle| triangles.get(triangle as usize))
-                .flatten()
-                .map(|&corner| neighbourhood.place_of[corner as usize])
-                .collect();
-            if round >= WIDEN {
-                let more: Vec<u32> = corners.iter().flat_map(|&place| neighbourhood.next(place)).collect();
-                corners.extend(more);
-            }
-            let averaged: Vec<(u32, Influences)> =
-                corners.iter().map(|&place| (place, neighbourhood.average(place, weights, &own))).collect();
-            for (place, influences) in averaged {
-                for &point in &neighbourhood.points[place as usize] {
-                    own.insert(point, influences.clone());
-                }
-            }
-            let near: BTreeSet<u32> = own
-                .keys()
-                .flat_map(|&point| {
-                    neighbourhood.triangles[neighbourhood.place_of[point as usize] as usize].iter().copied()
-                })
-                .collect();
-            folded = self::folded(points, triangles, near.into_iter(), weights, &own, &poses);
-            left = folded.len();
-            if folded.is_empty() {
-                break;
-            }
-        }
-        let mut repaired = Weights::default();
-        for point in 0..points.len() {
-            match own.get(&(point as u32)) {
-                Some(influences) => repaired.push(influences.iter().copied()),
-                None => repaired.push(weights.of(point)),
-            }
-        }
-        *weights = repaired;
     }
-    left
+    let mut repaired = Weights::default();
+    for point in 0..points.len() {
+        match own.get(&(point as u32)) {
+            Some(influences) => repaired.push(influences.iter().copied()),
+            None => repaired.push(weights.of(point)),
+        }
+    }
+    *weights = repaired;
+    folded.len()
 }
 
 /// Number of triangles that turn by more than a right angle in the six expressions at full strength, after
@@ -122,11 +109,11 @@ pub fn count_folds(
     if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
         return 0;
     }
-    let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks);
+    let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set());
     let with_area = with_area(points, triangles);
     let six: Vec<&Expression> = set.six().collect();
     let folds = |expression: &&Expression| {
-        let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()), set.unit_set());
+        let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
         turned(points, triangles, &with_area, &apply(points, weights, bones, &posed)).len()
     };
     six.par_iter().map(folds).sum()

@@ -1,11 +1,11 @@
 //! Problems of a pose, folded skin and crossed lips or lids, and their repair.
 
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
-use super::{FittedFace, ROUNDS, TAKEN};
+use super::{FittedFace, PATIENCE, ROUNDS, TAKEN, moving_skin::PosedSkin, samples::influences};
 use crate::algo::face::{
     bones::FaceBoneKind,
-    expression::{BonePose, apply, limited},
+    expression::{BonePose, limited},
 };
 
 /// Problems of a pose.
@@ -23,15 +23,22 @@ impl PoseProblems {
     }
 }
 
-impl FittedFace<'_> {
+impl FittedFace {
     /// Repairs a pose as far as it may; alike on both sides if `is_alike`.
     pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) {
         let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
         let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
         let mut apart = vec![0.0; poses.len()];
+        if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
+            return;
+        }
+        let mut posed = PosedSkin::new(&self.moving, self.matrices(poses));
+        let (mut fewest, mut in_vain) = (usize::MAX, 0);
         for share in ROUNDS {
-            let problems = self.problems(poses);
-            if problems.count() == 0 {
+            let problems = self.problems(&posed);
+            in_vain = if problems.count() < fewest { 0 } else { in_vain + 1 };
+            fewest = fewest.min(problems.count());
+            if problems.count() == 0 || in_vain == PATIENCE {
                 break;
             }
             self.relax(poses, &problems.folded, share);
@@ -44,9 +51,16 @@ impl FittedFace<'_> {
             }
             for (((pose, solved), apart), change) in poses.iter_mut().zip(&solved).zip(&apart).zip(changes) {
                 let change = change.clamp_length_max(TAKEN * furthest);
-                pose.translation = limited(*solved + change + Vec3::Y * *apart, self.landmarks);
+                pose.translation = limited(*solved + change + Vec3::Y * *apart, &self.landmarks);
             }
+            posed.update(self.matrices(poses));
         }
+    }
+
+    /// Matrices of neck, head and each bone.
+    fn matrices(&self, poses: &[BonePose]) -> Vec<Affine3A> {
+        let moved = poses.iter().zip(&self.bones).map(|(pose, bone)| pose.affine(bone.position));
+        [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
     }
 
     /// Gives both bones of each pair the mean of their changes.
@@ -59,29 +73,20 @@ impl FittedFace<'_> {
     }
 
     /// Finds triangles that turn by more than a right angle, and lips and lids that cross.
-    fn problems(&self, poses: &[BonePose]) -> PoseProblems {
-        if self.moving.is_empty() && self.apart.is_empty() {
-            return PoseProblems::default();
-        }
-        let posed = apply(self.points, self.weights, self.bones, poses);
-        let normal = |points: &[Vec3], corners: [u32; 3]| {
-            let [a, b, c] = corners.map(|corner| points[corner as usize]);
-            (b - a).cross(c - a)
-        };
-        let turned = |corners: &[u32; 3]| normal(self.points, *corners).dot(normal(&posed, *corners)) < 0.0;
-        let folded = self.moving.iter().map(|&index| self.triangles[index as usize]).filter(turned).collect();
+    fn problems(&self, posed: &PosedSkin) -> PoseProblems {
         let slack = 0.002 * self.landmarks.eye_distance();
         let mut crossed = Vec::new();
-        for &[above, below] in &self.apart {
+        for &[above, below] in &self.moving.apart {
             let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
-            let rest = gap(self.points);
+            let rest = gap(&self.moving.points);
             // Lips that touch at rest may keep touching.
             let least = if rest > slack { 0.3 * rest } else { rest - slack };
-            if gap(&posed) < least {
-                crossed.push(([above, below], least - gap(&posed)));
+            let now = gap(&posed.points);
+            if now < least {
+                crossed.push(([above, below], least - now));
             }
         }
-        PoseProblems { folded, crossed }
+        PoseProblems { folded: posed.folded().collect(), crossed }
     }
 
     /// Raises the first of two points above the second by the missing distance, with the least movement of bones, which
@@ -91,7 +96,7 @@ impl FittedFace<'_> {
         for &([above, below], missing) in crossed {
             let mut shares = vec![0.0_f32; poses.len()];
             for (point, sign) in [(above, 1.0), (below, -1.0)] {
-                for (joint, weight) in self.influences(point as usize) {
+                for (joint, weight) in influences(&self.moving.weights, point as usize) {
                     let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < shares.len()) else {
                         continue;
                     };
@@ -127,14 +132,14 @@ impl FittedFace<'_> {
         for &corners in folded {
             let mut mean = Vec3::ZERO;
             for corner in corners {
-                for (joint, weight) in self.influences(corner as usize) {
+                for (joint, weight) in influences(&self.moving.weights, corner as usize) {
                     let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < poses.len()) else {
                         continue;
                     };
                     mean += weight / 3.0
                         * match jaw {
                             Some((jaw, turn)) if jaw == bone => {
-                                let point = self.points[corner as usize];
+                                let point = self.moving.points[corner as usize];
                                 turn.transform_point3(point) - point
                             }
                             _ => poses[bone].translation,
@@ -142,7 +147,7 @@ impl FittedFace<'_> {
                 }
             }
             for corner in corners {
-                for (joint, weight) in self.influences(corner as usize) {
+                for (joint, weight) in influences(&self.moving.weights, corner as usize) {
                     let bone = (joint as usize).wrapping_sub(2);
                     if let Some((sum, weights)) = alike.get_mut(bone) {
                         *sum += mean * weight;
@@ -151,7 +156,7 @@ impl FittedFace<'_> {
                 }
             }
         }
-        for ((pose, bone), (sum, weights)) in poses.iter_mut().zip(self.bones).zip(alike) {
+        for ((pose, bone), (sum, weights)) in poses.iter_mut().zip(&self.bones).zip(alike) {
             if bone.kind == FaceBoneKind::Skin && weights > 0.0 {
                 pose.translation += (sum / weights - pose.translation) * (part * weights.min(1.0)).min(1.0);
             }

@@ -1,0 +1,214 @@
+//! Samples of the skin that should follow the field.
+
+use glam::Vec3;
+
+use crate::{
+    algo::face::{
+        bones::{FaceBone, FaceBoneKind},
+        expression::openings::{OpeningLines, OpeningSide},
+        landmarks::Landmarks,
+    },
+    mesh::model::Weights,
+};
+
+/// The most samples of the skin, besides landmarks.
+const SAMPLES: usize = 1600;
+/// Weight of a landmark, as a share of the whole skin's weight.
+const LANDMARK: f64 = 0.002;
+/// Weight of the distance of two landmarks, as a share of the whole skin's weight.
+const PAIR: f64 = 0.02;
+/// Landmarks whose distance matters more than their positions: lips, lids, corners of the mouth, inner brows.
+const PAIRS: [[usize; 2]; 9] =
+    [[61, 67], [62, 66], [63, 65], [37, 41], [38, 40], [43, 47], [44, 46], [54, 48], [22, 21]];
+/// Number of the first [`PAIRS`] whose first landmark must stay above the second: lips and lids.
+const APART: usize = 7;
+
+/// A place at which the field is sampled.
+#[derive(Clone)]
+pub(super) struct Mark {
+    /// The point, or for landmarks the landmark itself.
+    pub place: Vec3,
+    /// Its lip and lid.
+    pub known: OpeningSide,
+    /// Weight of the jaw bone there.
+    pub jaw: f64,
+}
+
+/// A point of the skin that should follow the field.
+#[derive(Clone)]
+pub(super) struct Sample {
+    pub mark: Mark,
+    /// The other end of a pair whose difference counts.
+    pub minus: Option<Mark>,
+    pub counts: f64,
+    /// Numbers of skin bones among the skin bones, and their weights.
+    pub influences: Vec<(u32, f64)>,
+}
+
+/// A face whose skin is sampled.
+struct Skin<'a> {
+    points: &'a [Vec3],
+    weights: &'a Weights,
+    bones: &'a [FaceBone],
+    /// Number of each bone among the skin bones.
+    unknown_of: Vec<u32>,
+}
+
+/// The influences of a point; none past the end of `weights`.
+pub(super) fn influences(weights: &Weights, point: usize) -> impl Iterator<Item = (u32, f32)> + '_ {
+    let range = match (weights.starts.get(point), weights.starts.get(point + 1)) {
+        (Some(&start), Some(&end)) => start as usize..end as usize,
+        _ => 0..0,
+    };
+    let joints = weights.joints.get(range.clone()).unwrap_or_default();
+    joints.iter().copied().zip(weights.values.get(range).unwrap_or_default().iter().copied())
+}
+
+/// Samples on the whole skin and at the landmarks, and the points of lips and lids of which the first must stay above
+/// the second.
+pub(super) fn gather(
+    points: &[Vec3],
+    mask: &[bool],
+    weights: &Weights,
+    bones: &[FaceBone],
+    landmarks: &Landmarks,
+    opening_lines: &OpeningLines,
+) -> (Vec<Sample>, Vec<[u32; 2]>) {
+    let mut unknown_of = vec![u32::MAX; bones.len()];
+    let skin_bones = (0..bones.len()).filter(|&bone| bones[bone].kind == FaceBoneKind::Skin);
+    for (unknown, bone) in skin_bones.enumerate() {
+        unknown_of[bone] = unknown as u32;
+    }
+    let skin = Skin { points, weights, bones, unknown_of };
+    let lower_share: Vec<f32> = (0..points.len()).map(|index| skin.lower_share(index, opening_lines)).collect();
+    let mut samples = skin.everywhere(mask, landmarks, opening_lines, &lower_share);
+    let candidates: Vec<usize> =
+        (0..points.len()).filter(|&index| mask.is_empty() || mask.get(index).copied().unwrap_or(false)).collect();
+    let mut at_marks = Vec::new();
+    for (mark, &place) in landmarks.points.iter().enumerate() {
+        let known = OpeningSide::of_landmark(mark);
+        let fits = |index: usize| match known.upper_lip {
+            None => true,
+            Some(upper) => (lower_share[index] < 0.5) == upper,
+        };
+        let nearest = candidates.iter().copied().filter(|&index| fits(index)).min_by(|&a, &b| {
+            let [a, b] = [a, b].map(|index| points[index].distance_squared(place));
+            a.total_cmp(&b)
+        });
+        let sample = nearest.and_then(|index| skin.sample(index, place));
+        if let Some(mut sample) = sample.clone() {
+            sample.mark.known = known;
+            sample.counts = LANDMARK;
+            samples.push(sample);
+        }
+        at_marks.push(nearest.zip(sample));
+    }
+    let mut apart = Vec::new();
+    for (number, [a, b]) in PAIRS.into_iter().enumerate() {
+        let (Some(Some((point, one))), Some(Some((other_point, other)))) = (at_marks.get(a), at_marks.get(b)) else {
+            continue;
+        };
+        let minus = Mark { known: OpeningSide::of_landmark(b), ..other.mark.clone() };
+        let mut pair = Sample { counts: PAIR, minus: Some(minus), ..one.clone() };
+        pair.mark.known = OpeningSide::of_landmark(a);
+        for &(unknown, weight) in &other.influences {
+            match pair.influences.iter_mut().find(|(known, _)| *known == unknown) {
+                Some((_, known)) => *known -= weight,
+                None => pair.influences.push((unknown, -weight)),
+            }
+        }
+        samples.push(pair);
+        if number < APART && point != other_point {
+            apart.push([*point as u32, *other_point as u32]);
+        }
+    }
+    (samples, apart)
+}
+
+impl Skin<'_> {
+    fn bone(&self, joint: u32) -> Option<usize> {
+        (joint as usize).checked_sub(2).filter(|&bone| bone < self.bones.len())
+    }
+
+    /// Share of a point's weights that belongs to the jaw and to bones below the mouth's line.
+    fn lower_share(&self, index: usize, opening_lines: &OpeningLines) -> f32 {
+        let (mut lower, mut all) = (0.0, 0.0);
+        for (joint, weight) in influences(self.weights, index) {
+            let Some(bone) = self.bone(joint) else { continue };
+            all += weight;
+            let bone = &self.bones[bone];
+            if bone.kind == FaceBoneKind::Jaw || !opening_lines.above_mouth(bone.position) {
+                lower += weight;
+            }
+        }
+        lower / all.max(1e-6)
+    }
+
+    /// Samples on the whole skin.
+    fn everywhere(
+        &self,
+        mask: &[bool],
+        landmarks: &Landmarks,
+        opening_lines: &OpeningLines,
+        lower_share: &[f32],
+    ) -> Vec<Sample> {
+        let mut samples = Vec::new();
+        let thinned = self.thinned(mask, landmarks);
+        for (index, &point) in self.points.iter().enumerate().filter(|(index, _)| thinned[*index]) {
+            let Some(mut sample) = self.sample(index, point) else { continue };
+            // Where lips touch, only the skin's own weights tell the upper from the lower one.
+            if opening_lines.near_mouth_line(point) {
+                match lower_share[index] {
+                    share if share > 0.8 => sample.mark.known.upper_lip = Some(false),
+                    share if share < 0.2 => sample.mark.known.upper_lip = Some(true),
+                    _ => continue,
+                }
+            }
+            samples.push(sample);
+        }
+        let each = 1.0 / samples.len().max(1) as f64;
+        for sample in &mut samples {
+            sample.counts = each;
+        }
+        samples
+    }
+
+    /// Marks the points of the mask that become samples: all, or on a dense mesh about [`SAMPLES`] of them. A point and
+    /// its mirror image are both taken or both left out.
+    fn thinned(&self, mask: &[bool], landmarks: &Landmarks) -> Vec<bool> {
+        let inside = |index: usize| mask.is_empty() || mask.get(index).copied().unwrap_or(false);
+        let count = (0..self.points.len()).filter(|&index| inside(index)).count();
+        if count <= SAMPLES {
+            return (0..self.points.len()).map(inside).collect();
+        }
+        let fine = 1000.0 / landmarks.eye_distance().max(f32::MIN_POSITIVE);
+        let limit = (SAMPLES as f64 / count as f64 * f64::from(u32::MAX)) as u64;
+        let taken = |point: &Vec3| {
+            let place = [(point.x - landmarks.middle).abs(), point.y, point.z];
+            let mut mixed = 0x9e37_79b9_7f4a_7c15_u64;
+            for value in place {
+                mixed = (mixed ^ ((value * fine).round() as i64 as u64)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                mixed ^= mixed >> 29;
+            }
+            (mixed >> 32) < limit
+        };
+        self.points.iter().enumerate().map(|(index, point)| inside(index) && taken(point)).collect()
+    }
+
+    /// A sample of a point, if bones move it at all.
+    fn sample(&self, index: usize, place: Vec3) -> Option<Sample> {
+        let mark = Mark { place, known: OpeningSide::default(), jaw: 0.0 };
+        let mut sample = Sample { mark, minus: None, counts: 0.0, influences: Vec::new() };
+        let mut all = 0.0;
+        for (joint, weight) in influences(self.weights, index) {
+            let Some(bone) = self.bone(joint).filter(|_| weight.is_finite()) else { continue };
+            all += weight;
+            match self.bones[bone].kind {
+                FaceBoneKind::Skin => sample.influences.push((self.unknown_of[bone], f64::from(weight))),
+                FaceBoneKind::Jaw => sample.mark.jaw += f64::from(weight),
+                FaceBoneKind::Eye => {}
+            }
+        }
+        (all > 0.02 && place.is_finite() && !sample.influences.is_empty()).then_some(sample)
+    }
+}
