@@ -112,6 +112,7 @@ impl Workbench {
 
     /// Runs one operation as one step of the history.
     pub fn operate(&mut self, operation: Operation) -> Result<(), WorkbenchError> {
+        self.forget_refusals();
         self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
         self.app.update();
         self.refused().map_or(Ok(()), Err)
@@ -143,6 +144,7 @@ impl Workbench {
         progress: &mut dyn FnMut(f32),
     ) -> Result<WeightReport, WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
+        self.forget_refusals();
         self.app.world_mut().write_message(BindRequest { mesh, settings, rigid });
         loop {
             self.app.update();
@@ -150,12 +152,8 @@ impl Workbench {
             if let Some(bound) = bound {
                 // The edit that binds the weights is applied in the next frame.
                 self.app.update();
-                let refused = self.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().last();
-                return match (bound.result, refused) {
-                    (Ok(_), Some(refused)) => Err(WorkbenchError::Refused(refused.reason)),
-                    (Ok(report), None) => Ok(report),
-                    (Err(error), _) => Err(error.into()),
-                };
+                let report = bound.result?;
+                return self.refused().map_or(Ok(report), Err);
             }
             if let Some(job) = self.app.world().get::<SkinningJob>(mesh) {
                 progress(job.progress());
@@ -173,6 +171,7 @@ impl Workbench {
         progress: &mut dyn FnMut(FaceStep, f32),
     ) -> Result<FaceReport, WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
+        self.forget_refusals();
         self.app.world_mut().write_message(FaceRequest { mesh, settings, fit });
         loop {
             self.app.update();
@@ -195,6 +194,7 @@ impl Workbench {
     /// Shows expressions and units by name, each with a strength from 0 to 1.5, in place of the current ones.
     pub fn express(&mut self, strengths: BTreeMap<String, f32>) -> Result<(), WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
+        self.forget_refusals();
         self.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
         self.app.update();
         let told = self.app.world_mut().resource_mut::<Messages<Expressed>>().drain().last();
@@ -231,6 +231,12 @@ impl Workbench {
             });
         }
         self.operate(Operation::Named { name: "Store poses", edits })
+    }
+
+    /// Drops refusals of earlier edits, which gestures have answered already, so that none is taken for the next
+    /// result.
+    fn forget_refusals(&mut self) {
+        self.app.world_mut().resource_mut::<Messages<EditRefused>>().clear();
     }
 
     fn refused(&mut self) -> Option<WorkbenchError> {

@@ -16,7 +16,7 @@ use crate::{
         model::Model,
     },
     modules,
-    processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, locate, locate_declared, review},
+    processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, SourceText, review},
     rig::{
         Rig, SourceError, TagData, TagKind, Uid,
         feature::{FeatureKinds, undecided_choices},
@@ -130,11 +130,14 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     };
     let rig = template.rig;
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes));
-    let commands = problems_of_commands(&rig, &text);
-    let kinds: Vec<SourceError> = FeatureKinds::default()
-        .unknown_in(&rig)
+    let places = SourceText::new(&text);
+    let (commands, failing) = problems_of_commands(&rig, &places);
+    let unknown = FeatureKinds::default().unknown_in(&rig);
+    let unknown_kinds = unknown.len();
+    let kinds: Vec<SourceError> = unknown
         .into_iter()
-        .map(|kind| locate_declared(&text, kind.tag, "kind", kind.to_string()))
+        .take(LISTED)
+        .map(|kind| places.locate_declared(kind.tag, "kind", kind.to_string()))
         .collect();
     let choices: Vec<SourceError> = undecided_choices(&rig)
         .into_iter()
@@ -143,14 +146,14 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
             let message = format!(
                 "not exactly one switch of the choice \"{choice}\" of the feature \"{feature}\" is on; choose one"
             );
-            locate_declared(&text, tag, "choice", message)
+            places.locate_declared(tag, "choice", message)
         })
         .collect();
     let told = [
         (choices.len(), "choice is not decided", "choices are not decided"),
         (faults.len(), "fault of the structure", "faults of the structure"),
-        (kinds.len(), "kind of feature is not registered", "kinds of features are not registered"),
-        (commands.len(), "command cannot be built", "commands cannot be built"),
+        (unknown_kinds, "kind of feature is not registered", "kinds of features are not registered"),
+        (failing, "command cannot be built", "commands cannot be built"),
     ];
     let told = told.into_iter().filter(|(count, ..)| *count > 0);
     let told: Vec<String> =
@@ -158,6 +161,10 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     found.error = (!told.is_empty()).then(|| told.join(", "));
     found.remarks = template.notes;
     found.remarks.extend(remarks_on_rig(&rig));
+    let unlisted = failing - commands.len() + unknown_kinds - kinds.len();
+    if unlisted > 0 {
+        found.remarks.push(format!("{unlisted} more problems are not listed"));
+    }
     found.problems = faults.into_iter().chain(kinds).chain(choices).chain(commands).collect();
     found.problems.sort_by_key(|problem| problem.offset);
     Ok(())
@@ -170,24 +177,30 @@ fn counted(faults: &[SourceError]) -> String {
     }
 }
 
-fn problems_of_commands(rig: &Rig, text: &str) -> Vec<SourceError> {
+/// The most problems of one kind whose places are looked for and listed.
+const LISTED: usize = 200;
+
+/// The first problems of commands with their places, and the number of all.
+fn problems_of_commands(rig: &Rig, places: &SourceText) -> (Vec<SourceError>, usize) {
     let modules = Arc::new(modules::all());
     let problems = review(rig, &modules);
     if problems.is_empty() {
-        return problem_of_program(rig, &modules, text).into_iter().collect();
+        let of_program: Vec<SourceError> = problem_of_program(rig, &modules, places).into_iter().collect();
+        let count = of_program.len();
+        return (of_program, count);
     }
-    problems.iter().map(|problem| locate(text, rig, problem)).collect()
+    (problems.iter().take(LISTED).map(|problem| places.locate(rig, problem)).collect(), problems.len())
 }
 
 /// Problem that keeps a fully built rig from moving, such as constraints that wait for each other by way of a parent;
 /// placed at the first command that it names.
-fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, text: &str) -> Option<SourceError> {
+fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, places: &SourceText) -> Option<SourceError> {
     let built = Builder::build(rig, modules).ok()?;
     let problem = RigProgram::compile(&built, &CompileOptions::default()).err()?.to_string();
     let named = problem.split("command ").skip(1).filter_map(|rest| rest.get(..16)?.parse::<Uid>().ok());
     let found = named.filter_map(|uid| rig.find_tag(uid)).next();
     let Some((joint, TagData { uid, kind: TagKind::Command { module, .. }, .. })) = found else {
-        return Some(SourceError::at(text, 0, problem));
+        return Some(places.beginning(problem));
     };
     let error = BuildError {
         command: *uid,
@@ -196,7 +209,7 @@ fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, text: &str) -> Option<S
         module: module.as_str().into(),
         problem: BuildProblem::Module(ModuleError::other(problem)),
     };
-    Some(locate(text, rig, &error))
+    Some(places.locate(rig, &error))
 }
 
 fn remarks_on_model(model: &Model) -> Vec<String> {

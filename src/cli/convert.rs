@@ -13,7 +13,7 @@ use crate::{
         model::{Model, SkinBinding},
     },
     rig::{
-        Rig, Uid, UidSource,
+        Rig, UidSource,
         character::{import_skeleton, inverse_bind},
     },
 };
@@ -87,12 +87,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
 /// Lists all joints in a skin, because readers recognise joints by the skins that list them, even without skinned
 /// points.
 pub(super) fn mark_joints(model: &mut Model, rig: &Rig) {
-    let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+    let joints = rig.rest_globals();
     if model.skins.is_empty() && !joints.is_empty() {
         model.skins = vec![SkinBinding {
             name: rig.about().name.clone(),
             joints: (0..joints.len()).collect(),
-            inverse_binds: joints.iter().map(|joint| inverse_bind(&rig.rest_global(*joint))).collect(),
+            inverse_binds: joints.iter().map(|(_, global)| inverse_bind(global)).collect(),
         }];
     }
 }

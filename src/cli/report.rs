@@ -1,6 +1,6 @@
 //! Results of commands, for people and for programs.
 
-use std::{io::Write, process::ExitCode};
+use std::{borrow::Cow, fmt::Write as _, io::Write, path::Path, process::ExitCode};
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use serde_json::{Map, Value, json};
@@ -100,16 +100,18 @@ struct InSource {
 pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
     let (code, answer) = match result {
         Ok(report) => {
-            let code = u8::from(report.at_fault);
+            let mut code = u8::from(report.at_fault);
             if !json {
-                print(report.lines.iter().map(String::as_str));
+                if !print(report.lines.iter().map(String::as_str)) {
+                    code = code.max(1);
+                }
                 for note in &report.notes {
-                    eprintln!("note: {note}");
+                    complain(&format!("note: {note}"));
                 }
             }
             if let (true, Some(list)) = (json, &report.list) {
-                print([list.to_string().as_str()]);
-                return ExitCode::from(code);
+                let is_written = print([list.to_string().as_str()]);
+                return ExitCode::from(if is_written { code } else { code.max(1) });
             }
             let mut answer = Map::from_iter([("ok".to_owned(), Value::from(!report.at_fault))]);
             answer.extend(report.json);
@@ -120,7 +122,7 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
         }
         Err(Failure::Usage(message)) => {
             if !json {
-                eprintln!("error: {message}\n\nFor more information, try 'rigsmith --help'.");
+                complain(&format!("error: {message}\n\nFor more information, try 'rigsmith --help'."));
             }
             (2, failed(&message))
         }
@@ -131,37 +133,121 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
             (1, failed(&error.to_string()))
         }
     };
-    if json {
-        print([Value::Object(answer).to_string().as_str()]);
-    }
-    ExitCode::from(code)
+    let is_written = !json || print([Value::Object(answer).to_string().as_str()]);
+    ExitCode::from(if is_written { code } else { code.max(1) })
 }
 
-/// Prints lines; a closed pipe is no error.
-fn print<'a>(lines: impl IntoIterator<Item = &'a str>) {
+/// Prints lines; `false` if standard output is closed or full.
+fn print<'a>(lines: impl IntoIterator<Item = &'a str>) -> bool {
     let mut out = std::io::stdout().lock();
-    for line in lines {
-        if writeln!(out, "{line}").is_err() {
-            return;
+    lines.into_iter().all(|line| writeln!(out, "{}", printable(line)).is_ok()) && out.flush().is_ok()
+}
+
+/// Prints to standard error; nobody can be told if that is closed, too.
+fn complain(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{}", printable(text));
+}
+
+/// A text without what a terminal obeys: names in files may hold control characters and marks that turn the direction
+/// of writing. They are written as their numbers.
+fn printable(text: &str) -> Cow<'_, str> {
+    let is_obeyed = |c: char| {
+        (c.is_control() && !matches!(c, '\n' | '\t'))
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{61c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(is_obeyed) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_obeyed(c) {
+            let _ = write!(shown, "{}", c.escape_unicode());
+        } else {
+            shown.push(c);
         }
     }
+    Cow::Owned(shown)
 }
 
 fn failed(message: &str) -> Map<String, Value> {
     Map::from_iter([("ok".to_owned(), Value::from(false)), ("error".to_owned(), json!(message))])
 }
 
+/// Length of a line, in bytes, from which only a piece of it is shown.
+const LONG: usize = 200;
+
 fn show(error: &(dyn std::error::Error + 'static)) {
     if let Some(LoadError::Source { path, text, source }) = error.downcast_ref::<LoadError>() {
+        let offset = source.offset.min(text.len());
+        let around = lines_around(text, offset);
+        if around.lines().any(|line| line.len() > LONG) {
+            complain(&piece_of_line(path, text, offset, &format!("error: {error}"), &source.message));
+            return;
+        }
         let report = miette::Report::new(InSource {
             message: error.to_string(),
             what: source.message.clone(),
             code: NamedSource::new(path.display().to_string(), text.clone()),
-            place: SourceSpan::from(source.offset.min(text.len())),
+            place: SourceSpan::from(offset),
         });
-        eprintln!("{report:?}");
+        // The report is coloured by escapes of its own, which have to reach the terminal.
+        let _ = writeln!(std::io::stderr().lock(), "{report:?}");
     } else {
         // The text of an error contains those of its causes.
-        eprintln!("error: {error}");
+        complain(&format!("error: {error}"));
+    }
+}
+
+/// The line of a place, the one before it and the one after it.
+fn lines_around(text: &str, offset: usize) -> &str {
+    let bytes = text.as_bytes();
+    let mut start = offset;
+    for _ in 0..2 {
+        start = bytes[..start].iter().rposition(|byte| *byte == b'\n').unwrap_or(0);
+    }
+    let mut end = offset;
+    for _ in 0..2 {
+        end = bytes[end..].iter().position(|byte| *byte == b'\n').map_or(bytes.len(), |next| end + next + 1);
+    }
+    text.get(start..end).unwrap_or(text)
+}
+
+/// An error in a long line: its place, and what stands around it.
+fn piece_of_line(path: &Path, text: &str, offset: usize, message: &str, what: &str) -> String {
+    let offset = text.floor_char_boundary(offset);
+    let before = &text[..offset];
+    let start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    let end = text[offset..].find('\n').map_or(text.len(), |newline| offset + newline);
+    let (line, column) = (before.matches('\n').count() + 1, text[start..offset].chars().count() + 1);
+    let from = text.floor_char_boundary(offset.saturating_sub(LONG / 2).max(start));
+    let to = text.floor_char_boundary((offset + LONG / 2).min(end));
+    let left = if from > start { "…" } else { "" };
+    let right = if to < end { "…" } else { "" };
+    let pad = " ".repeat(text[from..offset].chars().count() + left.chars().count());
+    let path = path.display();
+    format!("{message}\n  --> {path}:{line}:{column}\n  | {left}{}{right}\n  | {pad}^ {what}", &text[from..to])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terminals_obey_nothing_in_names() {
+        assert_eq!(printable("arm\u{1b}[31m\u{202e}_l\n"), "arm\\u{1b}[31m\\u{202e}_l\n");
+        assert!(matches!(printable("Kopf_ä"), Cow::Borrowed("Kopf_ä")));
+    }
+
+    #[test]
+    fn a_piece_of_a_long_line_is_shown() {
+        let text = format!("first\n{}é?{}\nlast", "a".repeat(100_000), "b".repeat(100_000));
+        let offset = text.find('?').unwrap();
+        let shown = piece_of_line(Path::new("x.ron"), &text, offset, "error: no", "here");
+        let lines: Vec<&str> = shown.lines().collect();
+        assert_eq!(lines[1], "  --> x.ron:2:100002");
+        assert!(lines[2].len() < 2 * LONG, "{}", lines[2].len());
+        let column = |line: &str, c: char| line.chars().position(|other| other == c);
+        assert_eq!(column(lines[2], '?'), column(lines[3], '^'));
+        assert_eq!(lines_around("a\nb\nc\nd", 4), "\nb\nc\nd");
     }
 }

@@ -91,10 +91,10 @@ impl Builder {
     /// A builder that knows these modules.
     pub fn new(modules: Arc<Modules>) -> Self {
         Self {
+            world: World::new(modules.limits),
             modules,
             range: BuildRange::Rig,
             rig: Uid(0),
-            world: World::default(),
             commands: Vec::new(),
             list: Vec::new(),
             due: BinaryHeap::new(),

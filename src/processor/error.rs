@@ -36,6 +36,16 @@ pub enum ModuleError {
     /// Anything else.
     #[error("{0}")]
     Other(String),
+    /// More than [`BuildLimits`](super::BuildLimits) allows.
+    #[error(
+        "there would be more than {limit} {what}; make fewer: a reference like @any names what was made before, too"
+    )]
+    TooMany {
+        /// Name of what there is too much of.
+        what: &'static str,
+        /// The limit.
+        limit: usize,
+    },
     /// Nodes and constraints that drive each other in a circle.
     #[error("these drive each other in a circle: {0}; remove one of the constraints, or let it follow something else")]
     Cycle(String),

@@ -117,6 +117,24 @@ impl ModuleInfo {
 #[derive(Debug, Clone, Default, bevy::ecs::resource::Resource)]
 pub struct Modules {
     by_name: BTreeMap<&'static str, ModuleInfo>,
+    /// Limits of what the commands of one rig may make.
+    pub limits: BuildLimits,
+}
+
+/// Limits of what the commands of one rig may make, so that a few tags that name everything, and what they made
+/// themselves, do not fill the memory. A character has some hundreds of nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BuildLimits {
+    /// The most nodes and constraints together.
+    pub made: usize,
+    /// The most attributes of one node.
+    pub attributes: usize,
+}
+
+impl Default for BuildLimits {
+    fn default() -> Self {
+        Self { made: 16_384, attributes: 1024 }
+    }
 }
 
 impl Modules {

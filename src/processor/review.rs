@@ -1,6 +1,6 @@
 //! Everything that is wrong with a rig's commands at once.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 use super::{BuildError, BuildProblem, Builder, ModuleError, Modules};
 use crate::rig::{
@@ -46,7 +46,8 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
         switch_off(&mut rig, error.joint, tag);
         problems.push(error);
     }
-    problems.sort_by_key(|error| order.iter().position(|tag| *tag == error.command));
+    let places: HashMap<Uid, usize> = order.into_iter().enumerate().map(|(place, tag)| (tag, place)).collect();
+    problems.sort_by_key(|error| places.get(&error.command).copied());
     problems
 }
 
@@ -82,42 +83,63 @@ fn switch_off(rig: &mut Rig, joint: Uid, tag: TagData) {
     let _ = rig.apply(&RigEdit::SetTag(joint, Box::new(TagData { enabled: false, ..tag })));
 }
 
-/// The place of a command's problem in the text of its template: in the parameter that is wrong, else at the tag. The
-/// beginning of the text if the tag is not in it. `rig` is the rig as it was read, whose parameters have uids beside the
-/// names that people write alone.
-pub fn locate(text: &str, rig: &Rig, error: &BuildError) -> SourceError {
-    let found = fields(text);
-    let message = format!("{}: {}", error.module, error.problem);
-    let Some(tag) = declaration(text, &found, error.command) else { return SourceError::at(text, 0, message) };
-    let at_tag = tag.end - text[tag.value..tag.end].trim_start().len();
-    let params = found.iter().find(|field| field.bracket == tag.bracket && field.name == "params");
-    let Some(params) = params else { return SourceError::at(text, at_tag, message) };
-    let start = params.end - text[params.value..params.end].trim_start().len();
-    let written = &text[start..params.end];
-    match &error.problem {
-        BuildProblem::Parameters(inner) => {
-            let read = rig.find_tag(error.command).and_then(|(_, tag)| match &tag.kind {
-                TagKind::Command { params, .. } => Some(params.as_str()),
-                TagKind::Feature { .. } => None,
-            });
-            let offset = read.map_or(inner.offset, |read| same_place(read, written, inner.offset));
-            SourceError::at(text, start + offset, format!("{}: {}", error.module, inner.message))
-        }
-        BuildProblem::Module(ModuleError::Reference { parameter, .. } | ModuleError::Parameter { parameter, .. }) => {
-            let first = parameter.split([',', ' ', '[', '.']).next().unwrap_or_default();
-            let field = fields(written).into_iter().find(|field| field.name == first).map(|field| start + field.start);
-            SourceError::at(text, field.unwrap_or(at_tag), message)
-        }
-        _ => SourceError::at(text, at_tag, message),
-    }
+/// The text of a template, in which the places of problems are looked up.
+pub struct SourceText<'a> {
+    text: &'a str,
+    fields: Vec<Field<'a>>,
 }
 
-/// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.
-pub fn locate_declared(text: &str, uid: Uid, field: &str, message: String) -> SourceError {
-    let found = fields(text);
-    let Some(declared) = declaration(text, &found, uid) else { return SourceError::at(text, 0, message) };
-    let named = found.iter().find(|other| other.bracket == declared.bracket && other.name == field);
-    SourceError::at(text, named.unwrap_or(declared).start, message)
+impl<'a> SourceText<'a> {
+    /// Scans a text once, for any number of problems.
+    pub fn new(text: &'a str) -> Self {
+        Self { text, fields: fields(text) }
+    }
+
+    /// A problem of the whole text.
+    pub fn beginning(&self, message: String) -> SourceError {
+        SourceError::at(self.text, 0, message)
+    }
+
+    /// The place of a command's problem in the text of its template: in the parameter that is wrong, else at the tag.
+    /// The beginning of the text if the tag is not in it. `rig` is the rig as it was read, whose parameters have uids
+    /// beside the names that people write alone.
+    pub fn locate(&self, rig: &Rig, error: &BuildError) -> SourceError {
+        let (text, found) = (self.text, &self.fields);
+        let message = format!("{}: {}", error.module, error.problem);
+        let Some(tag) = declaration(text, found, error.command) else { return SourceError::at(text, 0, message) };
+        let at_tag = tag.end - text[tag.value..tag.end].trim_start().len();
+        let params = found.iter().find(|field| field.bracket == tag.bracket && field.name == "params");
+        let Some(params) = params else { return SourceError::at(text, at_tag, message) };
+        let start = params.end - text[params.value..params.end].trim_start().len();
+        let written = &text[start..params.end];
+        match &error.problem {
+            BuildProblem::Parameters(inner) => {
+                let read = rig.find_tag(error.command).and_then(|(_, tag)| match &tag.kind {
+                    TagKind::Command { params, .. } => Some(params.as_str()),
+                    TagKind::Feature { .. } => None,
+                });
+                let offset = read.map_or(inner.offset, |read| same_place(read, written, inner.offset));
+                SourceError::at(text, start + offset, format!("{}: {}", error.module, inner.message))
+            }
+            BuildProblem::Module(
+                ModuleError::Reference { parameter, .. } | ModuleError::Parameter { parameter, .. },
+            ) => {
+                let first = parameter.split([',', ' ', '[', '.']).next().unwrap_or_default();
+                let named = fields(written).into_iter().find(|field| field.name == first);
+                SourceError::at(text, named.map_or(at_tag, |field| start + field.start), message)
+            }
+            _ => SourceError::at(text, at_tag, message),
+        }
+    }
+
+    /// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.
+    pub fn locate_declared(&self, uid: Uid, field: &str, message: String) -> SourceError {
+        let Some(declared) = declaration(self.text, &self.fields, uid) else {
+            return SourceError::at(self.text, 0, message);
+        };
+        let named = self.fields.iter().find(|other| other.bracket == declared.bracket && other.name == field);
+        SourceError::at(self.text, named.unwrap_or(declared).start, message)
+    }
 }
 
 /// The field by which something introduces itself.

@@ -379,6 +379,9 @@ impl BuildScope<'_> {
 
     /// The place of something that the command makes for a purpose.
     fn identity(&mut self, role: &str, subject: NodeId, number: u32) -> Result<NodeId, ModuleError> {
+        if self.world.is_full(self.asker.place + 1) {
+            return Err(ModuleError::TooMany { what: "nodes and constraints", limit: self.world.limits.made });
+        }
         let uid = created_uid(self.command(), role, self.uid(subject), number);
         let node = self.world.slot(uid, Some(self.command));
         let mine = |aspect: Aspect| self.is_own(node, aspect);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::platform::collections::HashMap;
 
-use super::off::OffParts;
+use super::{module::BuildLimits, off::OffParts};
 use crate::{
     mesh::model::Trs,
     rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, SwitchData, Uid},
@@ -159,9 +159,17 @@ pub(super) struct World {
     pub joints: Vec<NodeId>,
     /// Switch that is off.
     pub off: OffParts,
+    /// Limits of what commands make.
+    pub limits: BuildLimits,
+    /// Number of slots for what commands make.
+    made: usize,
 }
 
 impl World {
+    pub fn new(limits: BuildLimits) -> Self {
+        Self { limits, ..Self::default() }
+    }
+
     pub fn id(&self, uid: Uid) -> Option<NodeId> {
         self.ids.get(&uid).copied()
     }
@@ -180,8 +188,20 @@ impl World {
         self.ids.insert(uid, id);
         if let Some(creator) = creator {
             self.created[creator as usize].push(id);
+            self.made += 1;
         }
         id
+    }
+
+    /// Returns `true` if commands have made all that they may, seen by the command at `place`.
+    pub fn is_full(&self, place: u32) -> bool {
+        // Slots stay when what was made is gone.
+        self.made >= self.limits.made && {
+            let is_there =
+                |node: &NodeId| self.exists(*node, place) || self.read_at(*node, Aspect::Constraint, place).is_some();
+            let made = self.created.iter().flatten().filter(|node| is_there(node));
+            made.count() >= self.limits.made
+        }
     }
 
     /// The number of a command, made where there is none.

@@ -2,6 +2,7 @@
 
 use bevy::math::{Vec2, Vec3};
 use rigsmith::{
+    algo::weights::WeightSettings,
     headless::Workbench,
     mesh::model::{Faces, Model, Object, Part},
     plugins::gesture::{Gesture, GestureAnswer, read_gestures},
@@ -367,4 +368,13 @@ fn gestures_are_read_strictly() {
     assert!(read_gestures(&[b'[', 0xFF]).is_err());
     assert!(read_gestures("[".repeat(10_000).as_bytes()).is_err());
     assert!(read_gestures(&vec![b' '; 17 << 20]).is_err());
+}
+
+/// A gesture that was refused says so in its answer; it is not taken for the result of what is done next.
+#[test]
+fn a_refused_gesture_does_not_fail_the_skinning_after_it() {
+    let mut bench = bench(limb(0.1, 0.0, 2.0));
+    let answers = make(&mut bench, "[Stroke(points: [(0.0, 0.1), (0.0, 1.9)], joints: 4), Redo, Redo]");
+    assert!(answers[0].done && !answers[1].done && !answers[2].done, "{answers:?}");
+    bench.skin(WeightSettings::default(), Vec::new(), &mut |_| {}).unwrap();
 }

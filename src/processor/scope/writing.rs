@@ -63,7 +63,8 @@ impl BuildScope<'_> {
     /// Adds an attribute to a node.
     ///
     /// # Errors
-    /// If it has one of that name already, or the name is empty, or the ends are in the wrong order.
+    /// If it has one of that name already, or the name is empty, or the ends are in the wrong order, or it has as many
+    /// as it may.
     pub fn add_attribute(&mut self, node: NodeId, attribute: Attribute) -> Result<(), ModuleError> {
         let name = &attribute.name;
         let mut list = self.attributes(node).to_vec();
@@ -78,6 +79,10 @@ impl BuildScope<'_> {
             && min > max
         {
             return Err(ModuleError::other(format!("\"{name}\" goes from {min} to {max}: exchange the two")));
+        }
+        let limit = self.world.limits.attributes;
+        if list.len() >= limit {
+            return Err(ModuleError::TooMany { what: "attributes of one node", limit });
         }
         let default = attribute.clamp(attribute.default);
         list.push(Attribute { default, ..attribute });
