@@ -154,6 +154,11 @@ fn joint_of(bench: &Workbench, label: &str) -> Uid {
     bench.rig().walk().find(|joint| joint.data.label.as_deref() == Some(label)).unwrap().data.uid
 }
 
+fn chain(bench: &mut Workbench, places: &[[f32; 3]], parent: Option<Uid>) {
+    let positions = places.iter().map(|place| Vec3::from(*place)).collect();
+    bench.operate(Operation::Chain { positions, parent }).unwrap();
+}
+
 /// Strokes and clicks name joints by chain, side and place, chains go on with their numbers, and undoing takes the names
 /// back.
 #[test]
@@ -162,10 +167,6 @@ fn joints_are_named_when_they_are_made() {
     let rig = bench.rig_entity();
     bench.app_mut().world_mut().get_mut::<Symmetry>(rig).unwrap().0 = Some(MirrorPlane::sagittal(2.0));
     let first = bench.rig().clone();
-    let chain = |bench: &mut Workbench, places: &[[f32; 3]], parent: Option<Uid>| {
-        let positions = places.iter().map(|place| Vec3::from(*place)).collect();
-        bench.operate(Operation::Chain { positions, parent }).unwrap();
-    };
     chain(&mut bench, &[[0.0, 1.0, 0.0], [0.0, 1.2, 0.0], [0.0, 1.4, 0.0]], None);
     let top = joint_of(&bench, "spine_3");
     chain(&mut bench, &[[0.2, 1.4, 0.0], [0.5, 1.4, -0.05], [0.8, 1.4, 0.0]], Some(top));
@@ -203,4 +204,25 @@ fn joints_are_named_when_they_are_made() {
     let undone = bench.gestures(vec![Gesture::Undo; 9]);
     assert!(undone.iter().all(|answer| answer.done), "{undone:?}");
     assert_eq!(*bench.rig(), first);
+}
+
+/// Arms that hang down begin at the shoulders, wherever the joint is that they hang on.
+#[test]
+fn arms_that_hang_are_no_legs() {
+    for arm in
+        [[[0.2, 1.4, 0.0], [0.35, 1.2, 0.0], [0.5, 1.0, 0.0]], [[0.2, 1.4, 0.0], [0.22, 1.1, 0.0], [0.2, 0.8, 0.05]]]
+    {
+        let mut bench = Workbench::new(7, "names");
+        let rig = bench.rig_entity();
+        bench.app_mut().world_mut().get_mut::<Symmetry>(rig).unwrap().0 = Some(MirrorPlane::sagittal(2.0));
+        chain(&mut bench, &[[0.0, 0.95, 0.0], [0.0, 1.3, 0.0], [0.0, 1.8, 0.0]], None);
+        let chest = joint_of(&bench, "spine_2");
+        chain(&mut bench, &arm, Some(chest));
+        let pelvis = joint_of(&bench, "spine_1");
+        chain(&mut bench, &[[0.1, 0.9, 0.0], [0.1, 0.5, 0.05], [0.1, 0.1, 0.0]], Some(pelvis));
+        let all = labels(&bench);
+        for name in ["arm_l_1", "arm_l_3", "arm_r_3", "leg_l_1", "leg_r_3"] {
+            assert!(all.iter().any(|label| label == name), "{name}: {all:?}");
+        }
+    }
 }

@@ -10,6 +10,9 @@ use crate::rig::{EditError, Rig, RigEdit, Uid, label::mirrored_label};
 /// Least share of a chain's extent that its rise or fall has to be, to be a chain that goes up or down.
 const STEEP: f32 = 0.6;
 
+/// Place along the trunk, from 0 at its start to 1 at its end, below which legs begin; arms begin above it.
+const HIP: f32 = 0.35;
+
 /// A label of a drawn joint, taken apart: the chain's name with its side, and the place in the chain from 1.
 struct Place<'a> {
     chain: &'a str,
@@ -131,8 +134,11 @@ fn base(
         // A spine that lies: four legs.
         true if trunk.lies() && share.y < -STEEP && trunk.is_in_front(first) => "front_leg",
         true if trunk.lies() && share.y < -STEEP => "hind_leg",
-        true if trunk.is_lower(parent) => "leg",
-        true => "arm",
+        true => match trunk.height_of(first) {
+            Some(height) if height < HIP => "leg",
+            None if share.y < -STEEP => "leg",
+            _ => "arm",
+        },
     }
 }
 
@@ -166,6 +172,12 @@ impl Trunk {
     /// True for the joints of the lower half.
     fn is_lower(&self, joint: Uid) -> bool {
         self.joints.get(&joint).is_some_and(|number| 2 * number < self.joints.len().max(1))
+    }
+
+    /// Place of a point along the trunk, from 0 at its start to 1 at its end; `None` for a trunk of one joint.
+    fn height_of(&self, point: Vec3) -> Option<f32> {
+        let way = self.end - self.start;
+        (way.length_squared() > 0.0).then(|| (point - self.start).dot(way) / way.length_squared())
     }
 
     /// True if it is longer than high.
