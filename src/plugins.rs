@@ -17,6 +17,7 @@
 //! | `GlobalTransform` of a node | propagation, corrected where Bevy would shear | overwritten |
 //! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`commands::CommandReport`], [`commands::Built`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; an inserted `Uid` is put back and told, the others stand until the build writes them |
 //! | label, group, rest and parent of a created node, and the node itself | the build | put back and told: change the command instead |
+//! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame; what is shown already is none; unknown names are told by [`face::Expressed`] |
 //! | `Name` of joints, groups and nodes | the label or name | stands until that changes |
 
 pub mod commands;

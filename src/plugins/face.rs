@@ -45,7 +45,7 @@ impl Plugin for FacePlugin {
             .add_systems(
                 Update,
                 (
-                    pose::express.after(RigSystems::Gesture).before(RigSystems::Edits),
+                    (pose::adopt, pose::express).chain().after(RigSystems::Gesture).before(RigSystems::Edits),
                     (job::start, job::land).chain().in_set(RigSystems::Bind),
                 ),
             );
@@ -158,6 +158,11 @@ pub struct Expressed {
     pub result: Result<(), ExpressError>,
 }
 
-/// Current strengths of a face by name; beside the mesh.
-#[derive(Component, Debug, Clone, PartialEq, Default)]
+/// Current strengths of a face by name, each from 0 to [`MAX_STRENGTH`](crate::algo::face::expression::MAX_STRENGTH);
+/// beside the mesh.
+///
+/// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
+/// the answer is an [`Expressed`] message. A value equal to what is shown is no edit.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
+#[reflect(Component, Debug, Clone, PartialEq, Default)]
 pub struct Expressions(pub BTreeMap<String, f32>);

@@ -367,6 +367,7 @@ impl BuildScope<'_> {
 
     pub(super) fn write(&mut self, node: NodeId, aspect: Aspect, value: Value) {
         let command = self.command;
+        self.world.note_parent(node, &value);
         let writes = &mut self.world.cell_mut(node, aspect).writes;
         match writes.iter_mut().find(|(writer, _)| *writer == command) {
             Some((_, old)) => *old = value,

@@ -136,6 +136,8 @@ pub(super) struct Slot {
     pub creator: Option<u32>,
     /// Constraints that drive it, now or as of some other place.
     pub driven_by: Vec<NodeId>,
+    /// Nodes that stand on it, now or as of some other place, in rising order.
+    pub below: Vec<NodeId>,
     pub cells: [Cell; Aspect::COUNT],
 }
 
@@ -184,7 +186,7 @@ impl World {
             return *id;
         }
         let id = NodeId(self.slots.len() as u32);
-        self.slots.push(Slot { uid, creator, driven_by: Vec::new(), cells: Default::default() });
+        self.slots.push(Slot { uid, creator, driven_by: Vec::new(), below: Vec::new(), cells: Default::default() });
         self.ids.insert(uid, id);
         if let Some(creator) = creator {
             self.created[creator as usize].push(id);
@@ -224,6 +226,15 @@ impl World {
 
     pub fn cell(&self, node: NodeId, aspect: Aspect) -> &Cell {
         &self.slots[node.0 as usize].cells[aspect as usize]
+    }
+
+    /// Notes a value that is about to be written: nodes that may stand on another are found without a search.
+    pub fn note_parent(&mut self, node: NodeId, value: &Value) {
+        let Value::Parent(Some(parent)) = value else { return };
+        let below = &mut self.slots[parent.0 as usize].below;
+        if let Err(at) = below.binary_search(&node) {
+            below.insert(at, node);
+        }
     }
 
     pub fn cell_mut(&mut self, node: NodeId, aspect: Aspect) -> &mut Cell {

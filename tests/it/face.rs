@@ -17,7 +17,9 @@ use rigsmith::{
     mesh::{model::Model, shapes::Shapes},
     plugins::{
         document::{Change, EditRequest},
-        face::{FaceJob, FacePlaced, FaceRequest, FaceRig, PlaceFaceError},
+        face::{ExpressError, Expressed, Expressions, FaceJob, FacePlaced, FaceRequest, FaceRig, PlaceFaceError},
+        history::RigHistory,
+        surface::RigMesh,
     },
     rig::{NodeKind, Rig, Uid, operations::Operation},
 };
@@ -377,4 +379,37 @@ fn faces_of_real_heads_hardly_fold() {
             assert!(report.folds <= most, "{file} with {bones} bones: {} folds, {most} at most", report.folds);
         }
     }
+}
+
+/// A game sets expressions by name, by writing a component.
+#[test]
+fn written_expressions_move_the_face() {
+    let mut bench = bench(bundled("head.obj"));
+    place(&mut bench, 24);
+    let rig = bench.rig_entity();
+    let world = bench.app_mut().world_mut();
+    let mesh = world.query_filtered::<Entity, With<RigMesh>>().single(world).unwrap();
+    let write = |bench: &mut Workbench, name: &str, strength: f32| {
+        let world = bench.app_mut().world_mut();
+        world.entity_mut(mesh).insert(Expressions([(name.to_owned(), strength)].into()));
+        bench.app_mut().update();
+        let world = bench.app_mut().world_mut();
+        let steps = world.get::<RigHistory>(rig).unwrap().steps().0.len();
+        let answer = world.resource_mut::<Messages<Expressed>>().drain().last();
+        (steps, answer.map(|answer| answer.result))
+    };
+    let (before, first) = write(&mut bench, "happiness", 0.0);
+    assert_eq!(first, Some(Ok(())));
+    let (steps, answer) = write(&mut bench, "happiness", 1.0);
+    assert_eq!((steps, answer), (before + 1, Some(Ok(()))));
+    let by_component = bench.rig().pose().clone();
+    assert!(by_component.len() > 5, "{by_component:?}");
+    let (steps, answer) = write(&mut bench, "happiness", 1.0);
+    assert_eq!((steps, answer), (before + 1, None), "what is shown already is no edit");
+    let (steps, answer) = write(&mut bench, "hapiness", 1.0);
+    assert_eq!(steps, before + 1);
+    assert!(matches!(answer, Some(Err(ExpressError::Unknown { .. }))), "{answer:?}");
+    write(&mut bench, "surprise", 1.0);
+    bench.express([("happiness".to_owned(), 1.0)].into()).unwrap();
+    assert_eq!(*bench.rig().pose(), by_component, "as by request");
 }

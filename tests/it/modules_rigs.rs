@@ -836,7 +836,7 @@ fn commands_that_double_what_there_is_end_at_the_limit() {
         .map(|tag| format!(r#"Command(uid: "00000000000000a{tag:x}", module: "control", params: (at: "@any"))"#))
         .collect();
     let text = format!(
-        r#"(format: 1, uid: "0000000000000001", name: "n", joints: [(uid: "0000000000000002", tags: [{}])])"#,
+        r#"(format: 1, uid: "0000000000000001", name: "n", joints: [(uid: "0000000000000002", translation: (0.0, 0.1, 0.0), tags: [{}])])"#,
         tags.join(", ")
     );
     let rig = rigsmith::rig::template::read_template(text.as_bytes()).unwrap().rig;

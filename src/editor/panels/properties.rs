@@ -1,8 +1,9 @@
-//! Properties panel of the selected joints: label, group, rest pose, lock of weights. Several joints share their common
+//! Properties panel of the selected joints: label, group, rest pose, lock of weights, tags. Several joints share their common
 //! fields.
 //!
 //! A typed or dragged value is one step of the history. The rig shows a number while it is dragged.
 
+mod tags;
 mod values;
 
 use bevy::prelude::*;
@@ -69,6 +70,9 @@ impl EditorPanel for PropertiesPanel {
             ui.separator();
             self.relations(ui, &shown, requests);
             self.lock_field(ui, &shown, requests);
+            if let [joint] = self.values.joints[..] {
+                tags::tags(ui, world, &shown, joint, requests);
+            }
         });
     }
 }

@@ -63,6 +63,22 @@ impl Frame {
     }
 }
 
+/// Strengths that the rig shows, or that it refused, to tell what others write to [`Expressions`].
+#[derive(Component)]
+pub(super) struct Answered(BTreeMap<String, f32>);
+
+/// Requests the expressions that others wrote to [`Expressions`].
+pub(super) fn adopt(
+    faces: Query<(Entity, &Expressions, Option<&Answered>), (With<RigMesh>, Changed<Expressions>)>,
+    mut requests: MessageWriter<ExpressRequest>,
+) {
+    for (mesh, Expressions(strengths), answered) in &faces {
+        if answered.is_none_or(|answered| answered.0 != *strengths) {
+            requests.write(ExpressRequest { mesh, strengths: strengths.clone(), preview: false });
+        }
+    }
+}
+
 pub(super) fn express(
     mut commands: Commands,
     mut requests: MessageReader<ExpressRequest>,
@@ -100,6 +116,7 @@ pub(super) fn express(
             commands.entity(*entity).insert((Expressions(strengths.clone()), face, prepared));
             Ok(())
         });
+        commands.entity(*entity).insert(Answered(strengths.clone()));
         told.write(Expressed { mesh: *entity, result });
     }
 }

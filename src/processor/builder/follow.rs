@@ -150,6 +150,9 @@ impl Builder {
     }
 
     fn set_document(&mut self, node: NodeId, aspect: Aspect, value: Option<Value>) {
+        if let Some(value) = &value {
+            self.world.note_parent(node, value);
+        }
         let cell = self.world.cell_mut(node, aspect);
         if !same(cell.document.as_ref(), value.as_ref()) {
             cell.document = value;

@@ -50,9 +50,8 @@ impl Trace {
 }
 
 pub(super) fn world_children(world: &World, node: NodeId, place: u32) -> Vec<NodeId> {
-    let all = (0..world.slots.len() as u32).map(NodeId);
-    let mut children: Vec<NodeId> =
-        all.filter(|child| world.parent(*child, place) == Some(node) && world.exists(*child, place)).collect();
+    let is_child = |child: &NodeId| world.parent(*child, place) == Some(node) && world.exists(*child, place);
+    let mut children: Vec<NodeId> = world.slots[node.0 as usize].below.iter().copied().filter(is_child).collect();
     resolve::sort(world, &mut children, place);
     children
 }
