@@ -11,7 +11,7 @@ use glam::{Quat, Vec3};
 use super::{
     axes::{AxesError, HeadAxes, guess_axes},
     bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, place_bones},
-    expression::{ExpressionSet, FittedFace, UnitSet, count_folds, repair_folds},
+    expression::{ExpressionSet, FittedFace, UnitSet, repair_folds},
     grouping::{GroupingError, HeadGroups, group_head},
     head_bones::{HeadBones, HeadBonesError, head_bones},
     head_part::{HeadPartError, head_part},
@@ -316,11 +316,7 @@ impl FaceAnalysis {
         };
         begin(progress, FaceStep::Expressions)?;
         let mask = &groups.mask;
-        let left = repair_folds(expressions, points, triangles, mask, &mut face.weights, &face.bones, landmarks);
-        if left > 0 {
-            // The expression solver may still avoid folds that the weights allow.
-            face.folds = count_folds(expressions, points, triangles, mask, &face.weights, &face.bones, landmarks);
-        }
+        face.folds = repair_folds(expressions, points, triangles, mask, &mut face.weights, &face.bones, landmarks);
         Ok(face)
     }
 

@@ -27,7 +27,7 @@ use crate::mesh::{model::Weights, skinning::skin_points};
 
 pub use self::{
     bone_fit::FittedFace,
-    fold_repair::{count_folds, repair_folds},
+    fold_repair::repair_folds,
     set::{ExpressionSet, UnitSet},
     text::{Expression, ExpressionError, Gaze, MAX_STRENGTH, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
 };

@@ -4,18 +4,20 @@
 //! movement that opens the two flips it. Holding the bones back would weaken the expression; averaging the weights of
 //! the triangle's corners with their neighbours' is not visible.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use glam::{Affine3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
-use super::{ExpressionSet, FittedFace, Mix, apply, bone_fit::SLIVER, text::Expression};
+use super::{ExpressionSet, FittedFace, Mix, bone_fit::SLIVER, text::Expression};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks},
     mesh::{adjacency::weld, influences::keep_strongest, model::Weights, skinning::skin_points},
 };
 
-/// Rounds of averaging.
+/// Number of passes; each solves the bones' movements anew.
+const PASSES: usize = 2;
+/// Rounds of averaging in a pass.
 const ROUNDS: usize = 24;
 /// Round from which neighbours of the corners are averaged, too.
 const WIDEN: usize = 6;
@@ -27,7 +29,9 @@ type Influences = Vec<(u32, f32)>;
 /// Averages weights where one of the six expressions at full strength turns a triangle by more than a right angle.
 ///
 /// All in head space; `mask` and `weights` as [`FittedFace::new`] takes them. Points at the same place keep the same
-/// weights. Returns the number of triangles that still fold. Cost: a pose of each expression.
+/// weights. Bones move otherwise with other weights, so that each pass poses anew, and the weights with the fewest folds
+/// are kept. Returns the folds that are left, summed over the six, after [`FittedFace::pose`] has repaired the poses.
+/// Cost: a few poses of every expression.
 pub fn repair_folds(
     set: &ExpressionSet,
     points: &[Vec3],
@@ -41,82 +45,32 @@ pub fn repair_folds(
         return 0;
     }
     let six: Vec<&Expression> = set.six().collect();
-    let face = FittedFace::new(points, &[], mask, weights, bones, landmarks, set.unit_set());
-    let matrices = |expression: &&Expression| -> Vec<Affine3A> {
-        let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
-        let moved = posed.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
-        [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
-    };
-    let poses: Vec<Vec<Affine3A>> = six.par_iter().map(matrices).collect();
     let with_area = with_area(points, triangles);
-    let mut own: BTreeMap<u32, Influences> = BTreeMap::new();
-    let mut folded = all_folded(points, triangles, &with_area, weights, &poses);
-    if folded.is_empty() {
-        return 0;
-    }
-    let neighbourhood = Neighbourhood::new(points, triangles);
-    for round in 0..ROUNDS {
-        let mut corners: BTreeSet<u32> = folded
-            .iter()
-            .filter_map(|&triangle| triangles.get(triangle as usize))
-            .flatten()
-            .map(|&corner| neighbourhood.place_of[corner as usize])
-            .collect();
-        if round >= WIDEN {
-            let more: Vec<u32> = corners.iter().flat_map(|&place| neighbourhood.next(place)).collect();
-            corners.extend(more);
+    let mut neighbourhood: Option<Neighbourhood> = None;
+    let mut best: Option<(usize, Weights)> = None;
+    for pass in 0..=PASSES {
+        let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set());
+        let matrices = |expression: &&Expression| -> Vec<Affine3A> {
+            let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
+            let moved = posed.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
+            [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
+        };
+        let poses: Vec<Vec<Affine3A>> = six.par_iter().map(matrices).collect();
+        let (sum, folded) = all_folded(points, triangles, &with_area, weights, &poses);
+        if best.as_ref().is_none_or(|(least, _)| sum < *least) {
+            best = Some((sum, weights.clone()));
         }
-        let averaged: Vec<(u32, Influences)> =
-            corners.iter().map(|&place| (place, neighbourhood.average(place, weights, &own))).collect();
-        for (place, influences) in averaged {
-            for &point in &neighbourhood.points[place as usize] {
-                own.insert(point, influences.clone());
-            }
-        }
-        let near: BTreeSet<u32> = own
-            .keys()
-            .flat_map(|&point| neighbourhood.triangles[neighbourhood.place_of[point as usize] as usize].iter().copied())
-            .collect();
-        folded = self::folded(points, triangles, near.into_iter(), weights, &own, &poses);
-        if folded.is_empty() {
+        if sum == 0 || pass == PASSES {
             break;
         }
+        let neighbourhood = neighbourhood.get_or_insert_with(|| Neighbourhood::new(points, triangles));
+        let mut averaged = Averaged { neighbourhood, weights, own: vec![Vec::new(); neighbourhood.points.len()] };
+        averaged.smooth(points, triangles, folded, &poses);
+        *weights = averaged.weights();
     }
-    let mut repaired = Weights::default();
-    for point in 0..points.len() {
-        match own.get(&(point as u32)) {
-            Some(influences) => repaired.push(influences.iter().copied()),
-            None => repaired.push(weights.of(point)),
-        }
-    }
-    *weights = repaired;
-    folded.len()
-}
-
-/// Number of triangles that turn by more than a right angle in the six expressions at full strength, after
-/// [`FittedFace::pose`] has repaired the poses.
-///
-/// All in head space, as [`repair_folds`] takes it.
-pub fn count_folds(
-    set: &ExpressionSet,
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    mask: &[bool],
-    weights: &Weights,
-    bones: &[FaceBone],
-    landmarks: &Landmarks,
-) -> usize {
-    if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
-        return 0;
-    }
-    let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set());
-    let with_area = with_area(points, triangles);
-    let six: Vec<&Expression> = set.six().collect();
-    let folds = |expression: &&Expression| {
-        let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
-        turned(points, triangles, &with_area, &apply(points, weights, bones, &posed)).len()
-    };
-    six.par_iter().map(folds).sum()
+    let Some((left, best)) = best else { return 0 };
+    *weights = best;
+    left
 }
 
 /// Indices of triangles that are not slivers: slivers have no orientation.
@@ -142,22 +96,25 @@ fn turned(rest: &[Vec3], triangles: &[[u32; 3]], which: &[u32], posed: &[Vec3]) 
     which.iter().copied().filter(is_turned).collect()
 }
 
-/// Triangles whose orientation any of the poses flips, in rising order.
+/// Folds of all poses, and the triangles whose orientation any of them flips, in rising order.
 fn all_folded(
     points: &[Vec3],
     triangles: &[[u32; 3]],
     which: &[u32],
     weights: &Weights,
     poses: &[Vec<Affine3A>],
-) -> Vec<u32> {
+) -> (usize, Vec<u32>) {
     let of_pose = |matrices: &Vec<Affine3A>| {
         let mut posed = Vec::new();
         skin_points(points, weights, matrices, &mut posed);
         turned(points, triangles, which, &posed)
     };
     let all: Vec<Vec<u32>> = poses.par_iter().map(of_pose).collect();
-    let all: BTreeSet<u32> = all.into_iter().flatten().collect();
-    all.into_iter().collect()
+    let sum = all.iter().map(Vec::len).sum();
+    let mut all = all.concat();
+    all.sort_unstable();
+    all.dedup();
+    (sum, all)
 }
 
 /// Neighbourhood of each place of the welded surface.
@@ -193,22 +150,71 @@ impl Neighbourhood {
         }
         neighbourhood
     }
+}
 
-    fn next(&self, place: u32) -> Vec<u32> {
-        self.corners[place as usize].clone()
+/// Weights of a surface, some of them averaged.
+struct Averaged<'a> {
+    neighbourhood: &'a Neighbourhood,
+    weights: &'a Weights,
+    /// Averaged weights of each place; empty where they are as they were.
+    own: Vec<Influences>,
+}
+
+impl Averaged<'_> {
+    /// Averages until no triangle is folded or all rounds are over.
+    fn smooth(&mut self, points: &[Vec3], triangles: &[[u32; 3]], mut folded: Vec<u32>, poses: &[Vec<Affine3A>]) {
+        for round in 0..ROUNDS {
+            let corners = folded.iter().flat_map(|&triangle| triangles[triangle as usize]);
+            let mut places: Vec<u32> = corners.map(|corner| self.neighbourhood.place_of[corner as usize]).collect();
+            places.sort_unstable();
+            places.dedup();
+            if round >= WIDEN {
+                let next = places.iter().flat_map(|&place| &self.neighbourhood.corners[place as usize]);
+                places = next.chain(&places).copied().collect();
+                places.sort_unstable();
+                places.dedup();
+            }
+            let averages: Vec<Influences> = places.par_iter().map(|&place| self.average(place)).collect();
+            for (&place, influences) in places.iter().zip(averages) {
+                self.own[place as usize] = influences;
+            }
+            // The corners of all folded triangles have changed, so that no other triangle can be folded.
+            let mut near: Vec<u32> =
+                places.iter().flat_map(|&place| &self.neighbourhood.triangles[place as usize]).copied().collect();
+            near.sort_unstable();
+            near.dedup();
+            folded = near
+                .into_par_iter()
+                .filter(|&triangle| self.is_folded(points, triangles[triangle as usize], poses))
+                .collect();
+            if folded.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// The weights of all points.
+    fn weights(&self) -> Weights {
+        let mut weights = Weights::default();
+        for (point, &place) in self.neighbourhood.place_of.iter().enumerate() {
+            match self.own[place as usize].as_slice() {
+                [] => weights.push(self.weights.of(point)),
+                own => weights.push(own.iter().copied()),
+            }
+        }
+        weights
     }
 
     /// Half a place's own weights plus half the mean of its neighbours'.
-    fn average(&self, place: u32, weights: &Weights, own: &BTreeMap<u32, Influences>) -> Influences {
+    fn average(&self, place: u32) -> Influences {
         let mut sum: BTreeMap<u32, f32> = BTreeMap::new();
         let mut add = |place: u32, share: f32| {
-            let Some(&point) = self.points[place as usize].first() else { return };
-            for (joint, weight) in influences(point, weights, own) {
+            for (joint, weight) in self.of_place(place) {
                 *sum.entry(joint).or_default() += weight * share;
             }
         };
         add(place, 0.5);
-        let next = &self.corners[place as usize];
+        let next = &self.neighbourhood.corners[place as usize];
         for &other in next {
             add(other, 0.5 / next.len() as f32);
         }
@@ -216,35 +222,27 @@ impl Neighbourhood {
         keep_strongest(&mut all, INFLUENCES, 0.0);
         all
     }
-}
 
-fn influences(point: u32, weights: &Weights, own: &BTreeMap<u32, Influences>) -> Influences {
-    own.get(&point).cloned().unwrap_or_else(|| weights.of(point as usize).collect())
-}
+    fn of_place(&self, place: u32) -> Influences {
+        match self.own[place as usize].as_slice() {
+            [] => {
+                let point = self.neighbourhood.points[place as usize].first();
+                point.map(|&point| self.weights.of(point as usize).collect()).unwrap_or_default()
+            }
+            own => own.to_vec(),
+        }
+    }
 
-/// Triangles whose orientation any of the poses flips, with changed weights in `own`.
-fn folded(
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    which: impl Iterator<Item = u32>,
-    weights: &Weights,
-    own: &BTreeMap<u32, Influences>,
-    poses: &[Vec<Affine3A>],
-) -> Vec<u32> {
-    let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
-    let turned = |index: &u32| {
-        let corners = triangles[*index as usize];
+    /// True if any of the poses flips the orientation of a triangle.
+    fn is_folded(&self, points: &[Vec3], corners: [u32; 3], poses: &[Vec<Affine3A>]) -> bool {
+        let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
         let rest = corners.map(|corner| points[corner as usize]);
-        let moving = |corner: &u32| match own.get(corner) {
-            Some(_) => true,
-            None => weights.of(*corner as usize).any(|(joint, _)| joint >= 2),
-        };
         let [a, b, c] = rest;
         let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
-        if !corners.iter().any(moving) || normal(rest).length() <= SLIVER * longest {
+        if normal(rest).length() <= SLIVER * longest {
             return false;
         }
-        let influences = corners.map(|corner| influences(corner, weights, own));
+        let influences = corners.map(|corner| self.of_place(self.neighbourhood.place_of[corner as usize]));
         poses.iter().any(|matrices| {
             let posed = [0, 1, 2].map(|k| {
                 let mut sum = Vec3A::ZERO;
@@ -257,6 +255,5 @@ fn folded(
             });
             normal(rest).dot(normal(posed)) < 0.0
         })
-    };
-    which.filter(turned).collect()
+    }
 }
