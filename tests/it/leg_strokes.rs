@@ -1,5 +1,5 @@
 //! Legs from one stroke: from the front and from the side, to the ankle and to the toes, on the bodies with truth.
-//! Joints have names and axes from the moment they are drawn.
+//! Joints have names and axes from the moment they are drawn. `RIGSMITH_SEEDS` sets how many hands draw each stroke.
 
 use bevy::prelude::*;
 use rigsmith::{
@@ -15,7 +15,7 @@ use rigsmith::{
     },
 };
 
-use crate::three_strokes::{Bench, Body, Random, bodies, bundled, drawn};
+use crate::three_strokes::{Bench, Body, Random, assert_no_faults, bodies, bundled, drawn, seeds};
 
 /// A leg stroke.
 #[derive(Debug, Clone, Copy)]
@@ -116,7 +116,7 @@ fn faults(bench: &Bench, body: &Body, stroke: LegStroke, left: &[Uid]) -> Vec<St
 fn check(body: &Body) -> Vec<String> {
     let mut bench = Bench::new(body);
     let mut all = Vec::new();
-    for seed in 0..4 {
+    for seed in 0..seeds(4) {
         for view in [View::Front, View::Left] {
             for (to_toes, low) in [(false, 0.0), (true, 0.0), (false, 0.035)] {
                 // The bend of a straight leg is not seen from its front.
@@ -135,14 +135,12 @@ fn check(body: &Body) -> Vec<String> {
 
 #[test]
 fn the_bundled_biped() {
-    let faults = check(&bundled());
-    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
+    assert_no_faults(&check(&bundled()));
 }
 
 #[test]
 fn bodies_of_all_kinds() {
-    let faults: Vec<String> = bodies().iter().flat_map(check).collect();
-    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
+    assert_no_faults(&bodies().iter().flat_map(check).collect::<Vec<_>>());
 }
 
 /// Labels of all joints, in order.
@@ -225,4 +223,43 @@ fn arms_that_hang_are_no_legs() {
             assert!(all.iter().any(|label| label == name), "{name}: {all:?}");
         }
     }
+}
+
+/// Without symmetry both arms are drawn by hand: each gets the names of its side.
+#[test]
+fn sides_that_are_drawn_one_by_one_have_the_same_names() {
+    let mut bench = Workbench::new(7, "names");
+    chain(&mut bench, &[[0.0, 0.95, 0.0], [0.0, 1.3, 0.0], [0.0, 1.8, 0.0]], None);
+    let chest = joint_of(&bench, "spine_2");
+    for side in [1.0, -1.0] {
+        chain(&mut bench, &[[0.2 * side, 1.4, 0.0], [0.5 * side, 1.4, -0.05], [0.8 * side, 1.4, 0.0]], Some(chest));
+        chain(&mut bench, &[[0.2 * side, 1.6, 0.0], [0.5 * side, 1.6, -0.05], [0.8 * side, 1.6, 0.0]], Some(chest));
+    }
+    let mut found = labels(&bench);
+    found.retain(|label| label.contains("arm"));
+    found.sort();
+    let expected = ["arm2_l", "arm2_r", "arm_l", "arm_r"].map(|chain| [1, 2, 3].map(|n| format!("{chain}_{n}")));
+    assert_eq!(found, expected.concat());
+}
+
+/// Labels that are there already may end with any number and hold any name.
+#[test]
+fn names_go_around_what_is_there() {
+    let mut bench = Workbench::new(7, "names");
+    let rig = bench.rig_entity();
+    bench.app_mut().world_mut().get_mut::<Symmetry>(rig).unwrap().0 = Some(MirrorPlane::sagittal(2.0));
+    bench.operate(Operation::Place { position: Vec3::new(0.0, 1.0, 0.0), parent: None }).unwrap();
+    let root = joint_of(&bench, "root_1");
+    bench.operate(Operation::Labels(vec![(root, "x_4294967295".into())])).unwrap();
+    chain(&mut bench, &[[0.0, 1.2, 0.0], [0.0, 1.4, 0.0]], Some(root));
+    let top = bench.rig().walk().last().unwrap().data.uid;
+    bench.operate(Operation::Place { position: Vec3::new(0.0, 1.6, 0.0), parent: Some(top) }).unwrap();
+    // The name of the partner is taken.
+    bench.operate(Operation::Labels(vec![(top, "arm_r_2".into())])).unwrap();
+    chain(&mut bench, &[[0.2, 1.4, 0.0], [0.5, 1.4, -0.05], [0.8, 1.4, 0.0]], Some(root));
+    let all = labels(&bench);
+    let distinct: std::collections::BTreeSet<&String> = all.iter().collect();
+    assert_eq!(distinct.len(), all.len(), "{all:?}");
+    let mirrored = |label: &String| !label.contains("_l_") || all.contains(&label.replace("_l_", "_r_"));
+    assert!(all.iter().all(mirrored), "{all:?}");
 }

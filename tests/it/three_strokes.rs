@@ -412,14 +412,15 @@ impl Bench {
     }
 }
 
-fn seeds() -> u64 {
-    std::env::var("RIGSMITH_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(3)
+/// Number of hands that draw.
+pub fn seeds(otherwise: u64) -> u64 {
+    std::env::var("RIGSMITH_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(otherwise)
 }
 
 fn sketches() -> Vec<Sketch> {
     let mut all = Vec::new();
     let counts = [None, Some([4, 3, 3]), Some([5, 4, 4]), Some([6, 3, 4])];
-    for seed in 0..seeds() {
+    for seed in 0..seeds(3) {
         for camera in [Camera::Orthographic, Camera::Perspective] {
             for (number, joints) in counts.into_iter().enumerate() {
                 let turn = seed as usize + number;
@@ -457,16 +458,19 @@ fn check(body: &Body) -> Vec<String> {
     faults
 }
 
-#[test]
-fn the_bundled_biped() {
-    let faults = check(&bundled());
+/// Fails with all faults that were found.
+pub fn assert_no_faults(faults: &[String]) {
     assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
 }
 
 #[test]
+fn the_bundled_biped() {
+    assert_no_faults(&check(&bundled()));
+}
+
+#[test]
 fn bodies_of_all_kinds() {
-    let faults: Vec<String> = bodies().iter().flat_map(check).collect();
-    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
+    assert_no_faults(&bodies().iter().flat_map(check).collect::<Vec<_>>());
 }
 
 #[test]

@@ -13,6 +13,9 @@ const STEEP: f32 = 0.6;
 /// Place along the trunk, from 0 at its start to 1 at its end, below which legs begin; arms begin above it.
 const HIP: f32 = 0.35;
 
+/// Highest number that is counted on from.
+const HIGHEST: u32 = 1_000_000;
+
 /// A label of a drawn joint, taken apart: the chain's name with its side, and the place in the chain from 1.
 struct Place<'a> {
     chain: &'a str,
@@ -22,7 +25,7 @@ struct Place<'a> {
 impl<'a> Place<'a> {
     fn of(label: &'a str) -> Option<Self> {
         let (chain, number) = label.rsplit_once('_')?;
-        let number = number.parse().ok().filter(|number| *number > 0)?;
+        let number = number.parse().ok().filter(|number| (1..=HIGHEST).contains(number))?;
         (!chain.is_empty()).then_some(Self { chain, number })
     }
 
@@ -37,29 +40,33 @@ impl<'a> Place<'a> {
 pub(super) struct ChainName {
     base: String,
     first: u32,
-    taken: BTreeSet<String>,
 }
 
 impl ChainName {
     /// Names a chain by the joint that it hangs on and by where it goes. `positions` are the places of its joints,
     /// `parent` the joint above. The names are those of a character that stands upright and looks along +Z.
     pub fn new(rig: &Rig, positions: &[Vec3], parent: Option<Uid>, plane: Option<&MirrorPlane>) -> Self {
-        let taken = rig.walk().filter_map(|joint| joint.data.label.clone()).collect();
         let upper = parent.and_then(|parent| rig.joint(parent));
         let known = upper.and_then(|joint| joint.data.label.as_deref()).and_then(Place::of);
         if let (Some(place), Some(joint)) = (&known, upper)
             && joint.children.is_empty()
             && stays_on_side(place.chain, positions, rig.position(joint.data.uid), plane)
         {
-            return Self { base: place.base().to_owned(), first: place.number + 1, taken };
+            return Self { base: place.base().to_owned(), first: place.number + 1 };
         }
         let base = base(rig, positions, parent, known.as_ref(), plane);
-        let free = |number: &u32| {
-            let chain = if *number == 1 { base.to_owned() } else { format!("{base}{number}") };
-            !taken.iter().filter_map(|label| Place::of(label)).any(|place| place.base() == chain)
+        // With a plane of symmetry the name has to be free on both sides.
+        let side = positions.last().map_or("", |last| side_ending(*last, plane));
+        let number_of = |place: Place| {
+            let is_here =
+                plane.is_some() || place.chain.strip_suffix(place.base()) == Some("") || place.chain.ends_with(side);
+            let number = place.base().strip_prefix(base).filter(|_| is_here)?;
+            if number.is_empty() { Some(1) } else { number.parse().ok() }
         };
-        let number = (1..).find(free).unwrap_or(1);
-        Self { base: if number == 1 { base.to_owned() } else { format!("{base}{number}") }, first: 1, taken }
+        let labels = rig.walk().filter_map(|joint| joint.data.label.as_deref());
+        let taken: BTreeSet<u32> = labels.filter_map(Place::of).filter_map(number_of).collect();
+        let number = (1..).find(|number| !taken.contains(number)).unwrap_or(1);
+        Self { base: if number == 1 { base.to_owned() } else { format!("{base}{number}") }, first: 1 }
     }
 
     /// True if the chain goes on with the numbers of the chain that it is drawn onto.
@@ -68,20 +75,23 @@ impl ChainName {
     }
 
     /// The name of the joint at a place of the chain, from 0: with the side on which `position` lies.
-    pub fn joint(&mut self, place: usize, position: Vec3, plane: Option<&MirrorPlane>) -> String {
-        let side = match side(position, plane) {
-            0 => "",
-            1 => "_l",
-            _ => "_r",
+    pub fn joint(&self, rig: &Rig, place: usize, position: Vec3, plane: Option<&MirrorPlane>) -> String {
+        let side = side_ending(position, plane);
+        let name = |number: u32| format!("{}{side}_{number}", self.base);
+        let is_free = |name: &String| {
+            rig.find_label(name).is_none() && (plane.is_none() || rig.find_label(&partner_name(name)).is_none())
         };
-        let mut number = self.first + place as u32;
-        loop {
-            let name = format!("{}{side}_{number}", self.base);
-            if self.taken.insert(name.clone()) {
-                return name;
-            }
-            number += 1;
-        }
+        let first = self.first + place as u32;
+        (first..).map(name).find(is_free).unwrap_or_else(|| name(first))
+    }
+}
+
+/// The end of a chain's name that tells the side of a place.
+fn side_ending(position: Vec3, plane: Option<&MirrorPlane>) -> &'static str {
+    match side(position, plane) {
+        0 => "",
+        1 => "_l",
+        _ => "_r",
     }
 }
 
@@ -153,12 +163,11 @@ impl Trunk {
     fn new(rig: &Rig, joint: Uid) -> Self {
         let mut chain: Vec<Uid> = rig.ancestors(joint).map(|above| above.data.uid).collect();
         chain.reverse();
-        chain.retain(|above| *above != joint);
         chain.push(joint);
         let mut next = joint;
         // Downwards along first children, which were drawn first.
         while let Some(&child) = rig.children(Some(next)).first() {
-            if chain.contains(&child) || rig.joint(child).is_some_and(|joint| joint.data.mirror.is_some()) {
+            if rig.joint(child).is_some_and(|joint| joint.data.mirror.is_some()) {
                 break;
             }
             chain.push(child);
@@ -208,10 +217,9 @@ pub(super) fn number_inserted(draft: &mut Draft, joint: Uid, child: Uid) -> Resu
         at = next;
     }
     let moved: BTreeSet<Uid> = names.iter().map(|(joint, _)| *joint).collect();
-    let is_free = |name: &String| {
-        !rig.walk().any(|joint| joint.data.label.as_ref() == Some(name) && !moved.contains(&joint.data.uid))
-    };
-    if !names.iter().all(|(_, name)| is_free(name)) {
+    let others = rig.walk().filter(|joint| !moved.contains(&joint.data.uid));
+    let taken: BTreeSet<&str> = others.filter_map(|joint| joint.data.label.as_deref()).collect();
+    if names.iter().any(|(_, name)| taken.contains(name.as_str())) {
         return Ok(());
     }
     for (joint, name) in names {

@@ -23,11 +23,11 @@ pub(super) fn chain(draft: &mut Draft, positions: &[Vec3], parent: Option<Uid>) 
     }
     let settled = settle(positions, plane.as_ref());
     let places: Vec<Vec3> = settled.iter().map(|(position, _)| *position).collect();
-    let mut name = ChainName::new(draft.rig(), &places, parent, plane.as_ref());
+    let name = ChainName::new(draft.rig(), &places, parent, plane.as_ref());
     let tip = parent.filter(|parent| name.continues() && is_drawn_tip(draft.rig(), *parent));
     let mut turned: Vec<Uid> = tip.into_iter().collect();
     for (number, (position, other)) in settled.into_iter().enumerate() {
-        let name = name.joint(number, position, plane.as_ref());
+        let name = name.joint(draft.rig(), number, position, plane.as_ref());
         let joint = add(draft, position, parent, Some(name.clone()))?;
         turned.push(joint);
         match other {
