@@ -63,18 +63,16 @@ impl Frame {
     }
 }
 
-/// Strengths that the rig shows, or that it refused, to tell what others write to [`Expressions`].
-#[derive(Component)]
-pub(super) struct Answered(BTreeMap<String, f32>);
-
-/// Requests the expressions that others wrote to [`Expressions`].
+/// Requests the expressions that others wrote to [`Expressions`]. What [`express`] wrote itself came together with the
+/// prepared face.
 pub(super) fn adopt(
-    faces: Query<(Entity, &Expressions, Option<&Answered>), (With<RigMesh>, Changed<Expressions>)>,
+    faces: Query<(Entity, Ref<Expressions>, Option<Ref<PreparedFace>>), With<RigMesh>>,
     mut requests: MessageWriter<ExpressRequest>,
 ) {
-    for (mesh, Expressions(strengths), answered) in &faces {
-        if answered.is_none_or(|answered| answered.0 != *strengths) {
-            requests.write(ExpressRequest { mesh, strengths: strengths.clone(), preview: false });
+    for (mesh, expressions, prepared) in &faces {
+        let is_own = prepared.is_some_and(|prepared| prepared.last_changed() == expressions.last_changed());
+        if expressions.is_changed() && !is_own {
+            requests.write(ExpressRequest { mesh, strengths: expressions.0.clone(), preview: false });
         }
     }
 }
@@ -107,16 +105,20 @@ pub(super) fn express(
             let mix = mixed(&set.0, strengths)?;
             let prepared = PreparedFace::reused(prepared, &settled, mesh, &face.analysis, &set.0)?;
             let edits = expression_edits(&settled, &prepared, &mix);
+            // What is shown already is no step.
+            let is_shown = edits.is_empty();
             let operation = Operation::Named { name: "Express", edits };
-            let change = if *preview { Change::Preview(operation) } else { Change::Do(operation) };
-            if !*preview {
+            if *preview {
+                commands.write_message(EditRequest { rig: rig_entity, change: Change::Preview(operation) });
+            } else {
                 commands.write_message(EditRequest { rig: rig_entity, change: Change::CancelPreview });
+                if !is_shown {
+                    commands.write_message(EditRequest { rig: rig_entity, change: Change::Do(operation) });
+                }
             }
-            commands.write_message(EditRequest { rig: rig_entity, change });
             commands.entity(*entity).insert((Expressions(strengths.clone()), face, prepared));
             Ok(())
         });
-        commands.entity(*entity).insert(Answered(strengths.clone()));
         told.write(Expressed { mesh: *entity, result });
     }
 }
