@@ -139,8 +139,11 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
         .take(LISTED)
         .map(|kind| places.locate_declared(kind.tag, "kind", kind.to_string()))
         .collect();
-    let choices: Vec<SourceError> = undecided_choices(&rig)
+    let undecided = undecided_choices(&rig);
+    let undecided_count = undecided.len();
+    let choices: Vec<SourceError> = undecided
         .into_iter()
+        .take(LISTED)
         .map(|(feature, choice, tag)| {
             let feature = feature.name;
             let message = format!(
@@ -150,7 +153,7 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
         })
         .collect();
     let told = [
-        (choices.len(), "choice is not decided", "choices are not decided"),
+        (undecided_count, "choice is not decided", "choices are not decided"),
         (faults.len(), "fault of the structure", "faults of the structure"),
         (unknown_kinds, "kind of feature is not registered", "kinds of features are not registered"),
         (failing, "command cannot be built", "commands cannot be built"),
@@ -161,7 +164,7 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     found.error = (!told.is_empty()).then(|| told.join(", "));
     found.remarks = template.notes;
     found.remarks.extend(remarks_on_rig(&rig));
-    let unlisted = failing - commands.len() + unknown_kinds - kinds.len();
+    let unlisted = failing - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len();
     if unlisted > 0 {
         found.remarks.push(format!("{unlisted} more problems are not listed"));
     }

@@ -151,11 +151,7 @@ fn complain(text: &str) {
 /// A text without what a terminal obeys: names in files may hold control characters and marks that turn the direction
 /// of writing. They are written as their numbers.
 fn printable(text: &str) -> Cow<'_, str> {
-    let is_obeyed = |c: char| {
-        (c.is_control() && !matches!(c, '\n' | '\t'))
-            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{61c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
-    if !text.contains(is_obeyed) {
+    if !has_obeyed(text) {
         return Cow::Borrowed(text);
     }
     let mut shown = String::with_capacity(text.len());
@@ -173,14 +169,24 @@ fn failed(message: &str) -> Map<String, Value> {
     Map::from_iter([("ok".to_owned(), Value::from(false)), ("error".to_owned(), json!(message))])
 }
 
+/// True for characters that a terminal obeys instead of showing them.
+fn is_obeyed(c: char) -> bool {
+    (c.is_control() && !matches!(c, '\n' | '\t'))
+        || matches!(c, '\u{200e}' | '\u{200f}' | '\u{61c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+fn has_obeyed(text: &str) -> bool {
+    text.contains(is_obeyed)
+}
+
 /// Length of a line, in bytes, from which only a piece of it is shown.
 const LONG: usize = 200;
 
 fn show(error: &(dyn std::error::Error + 'static)) {
     if let Some(LoadError::Source { path, text, source }) = error.downcast_ref::<LoadError>() {
         let offset = source.offset.min(text.len());
-        let around = lines_around(text, offset);
-        if around.lines().any(|line| line.len() > LONG) {
+        let is_plain = |text: &str| text.lines().all(|line| line.len() <= LONG && !has_obeyed(line));
+        if !is_plain(lines_around(text, offset)) || has_obeyed(&error.to_string()) {
             complain(&piece_of_line(path, text, offset, &format!("error: {error}"), &source.message));
             return;
         }
@@ -217,7 +223,7 @@ fn piece_of_line(path: &Path, text: &str, offset: usize, message: &str, what: &s
     let offset = text.floor_char_boundary(offset);
     let before = &text[..offset];
     let start = before.rfind('\n').map_or(0, |newline| newline + 1);
-    let end = text[offset..].find('\n').map_or(text.len(), |newline| offset + newline);
+    let end = text[offset..].find(['\r', '\n']).map_or(text.len(), |newline| offset + newline);
     let (line, column) = (before.matches('\n').count() + 1, text[start..offset].chars().count() + 1);
     let from = text.floor_char_boundary(offset.saturating_sub(LONG / 2).max(start));
     let to = text.floor_char_boundary((offset + LONG / 2).min(end));

@@ -201,7 +201,7 @@ fn parameters<M: RigModule>() -> Vec<Parameter> {
     let TypeInfo::Struct(info) = M::type_info() else { return Vec::new() };
     let default = M::default();
     let parameter = |field: &bevy::reflect::NamedField| {
-        let doc = M::PARAMETERS.iter().find(|(name, _)| *name == field.name()).map_or("", |(_, doc)| doc);
+        let doc = M::PARAMETERS.iter().find(|(name, _)| *name == field.name()).map_or("", |(_, doc)| doc.trim());
         let kind = field.type_path_table().short_path().to_owned();
         let default = default_text(&default, field.name());
         Parameter { name: field.name(), kind, doc, default, sided: M::SIDED.contains(&field.name()) }

@@ -4,6 +4,7 @@
 //! work and measure no time: the benches do.
 
 mod bench;
+mod build_limits;
 mod choices;
 #[cfg(feature = "cli")]
 mod cli;
