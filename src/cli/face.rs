@@ -1,5 +1,7 @@
 //! `rigsmith face`: bones, weights and expressions for a head mesh.
 
+mod written;
+
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
@@ -130,9 +132,11 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
         up: args.up,
         forward: args.forward,
         whole: args.whole,
+        influences: args.export.settings().max_influences,
         ..AutoSettings::default()
     };
     let mut progress = Progress::new("placing the face");
+    let fitted = shapes.clone();
     let placed = bench.face(settings, shapes, &mut |_: FaceStep, part| progress.at(part))?;
     drop(progress);
     describe(&mut report, &placed);
@@ -156,12 +160,28 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
             pose(&mut model.nodes, bench.rig());
             let settings = args.export.settings();
             report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
+            if let (Some(shapes), Some(mesh), true) = (&fitted, bench.mesh(), args.expression.is_empty()) {
+                let (rest, count) = (&mesh.rest.points, placed.points[0]);
+                let error = spinning("reading back", || written::fit_error(&args.output, &model, rest, shapes, count))?;
+                report_written_error(&mut report, error);
+            }
         }
         OutputKind::Picture => picture(args, &bench, &mut report)?,
     }
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// Reports the error of the fit that the written file shows.
+fn report_written_error(report: &mut Report, error: Option<f32>) {
+    match error {
+        Some(error) => {
+            report.line(format!("the written file shows the shapes with an error of {error:.5} (root mean square)"));
+            report.set("written_fit_error", error);
+        }
+        None => report.notes.push("the error of the fit was not measured in the file: its vertices are others".into()),
+    }
 }
 
 fn output_kind(args: &FaceArgs) -> Result<OutputKind, Failure> {

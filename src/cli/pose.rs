@@ -39,6 +39,7 @@ pub(super) struct PoseSteps {
 
 impl PoseSteps {
     /// True if no step is requested.
+    #[cfg(feature = "render")]
     pub(super) fn is_empty(&self) -> bool {
         self.set.is_empty() && self.switches.is_empty() && self.frames == 0 && self.parts.is_empty()
     }

@@ -24,6 +24,7 @@ pub(super) struct SwitchArgs {
 
 impl SwitchArgs {
     /// True if nothing is switched.
+    #[cfg(feature = "render")]
     pub fn is_empty(&self) -> bool {
         self.feature.is_empty() && self.group.is_empty()
     }

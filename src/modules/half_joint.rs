@@ -1,5 +1,7 @@
 //! `half_joint`: joints that turn by half of a bend, so that skin keeps its volume there.
 
+use bevy::prelude::Vec3;
+
 use crate::{
     mesh::model::Trs,
     parameters,
@@ -26,6 +28,9 @@ parameters! {
         pub at: NodeRefs = NodeRef::this().into(),
         /// Share of the bend, 0 (the parent's side) to 1.
         pub share: f32 = 0.5,
+        /// Length by which each joint moves outwards, like the tip of an elbow, when the limb is bent by 180°, as a share of
+        /// the bone below. At an angle it moves by this times the sine of half the angle.
+        pub push: f32 = 0.0,
         /// Name, groups and label of the joints that are made; by default those of each joint.
         pub creation: Creation = Creation::default(),
     }
@@ -41,19 +46,34 @@ impl RigModule for HalfJoint {
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         scope.in_range("share", self.share, 0.0..=1.0)?;
+        scope.in_range("push", self.push, -1.0..=1.0)?;
         for (joint, number) in scope.resolve_some("at", &self.at)?.into_iter().zip(0..) {
             // Nothing bends at a root: a limb that is not connected yet builds, too.
             let Some(parent) = scope.parent(joint) else { continue };
             let creation = scope.creation_for(&self.creation, joint, number);
-            let half = scope.spawn(NodeType::Joint, HALF, joint, 0, Some(joint), Trs::IDENTITY, &creation)?;
+            let (mut above, mut own) = (scope.kept_offset(joint, parent), Trs::IDENTITY);
+            let mut rest = Trs::IDENTITY;
+            // Both targets lie beside the joint, along the two bones: their mean leaves the joint when the limb bends.
+            if self.push != 0.0
+                && let Some(bone) = scope.bone(joint)
+            {
+                let (here, upper) = (scope.global(joint), scope.global(parent));
+                let length = self.push * bone.length();
+                let on = (here.translation - upper.translation).normalize_or_zero() * length;
+                let back = bone.normalize_or_zero() * -length;
+                let point = |offset: Vec3| Trs { translation: here.translation + offset, ..here };
+                above = point(on).relative_to(&upper);
+                own = point(back).relative_to(&here);
+                rest = point(on.lerp(back, self.share)).relative_to(&here);
+            }
+            let half = scope.spawn(NodeType::Joint, HALF, joint, 0, Some(joint), rest, &creation)?;
             let target = |node: Trs, uid, weight| Target { node: uid, weight: Scalar::Value(weight), offset: node };
-            let (above, own) = (scope.kept_offset(joint, parent), Trs::IDENTITY);
             let targets =
                 vec![target(above, scope.uid(parent), 1.0 - self.share), target(own, scope.uid(joint), self.share)];
             let constraint = Constraint::Transform {
                 driven: scope.uid(half),
                 targets,
-                translate: [false; 3],
+                translate: [self.push != 0.0; 3],
                 rotate: [true; 3],
                 scale: [false; 3],
                 weight: Scalar::Value(1.0),

@@ -7,7 +7,7 @@ use std::{
 
 use rigsmith::files::{RealDisk, load_model, load_template};
 
-use crate::cli_build::rigsmith;
+use crate::{cli_build::rigsmith, prerequisites::test_data};
 
 fn head() -> String {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
@@ -40,6 +40,27 @@ fn a_head_becomes_a_character_and_a_rig() {
     let first = fs::read(&rig).unwrap();
     assert_eq!(rigsmith(folder.path(), &happy).code, 0);
     assert_eq!(fs::read(&rig).unwrap(), first, "the same command writes the same bytes");
+}
+
+/// Bones and weights are fitted for as many influences as the file holds, and the error told is that of the file.
+#[test]
+fn a_fit_is_as_good_as_what_is_written() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let [head, shapes] =
+        ["ict_neutral.obj", "ict_expressions.json"].map(|file| data.join("heads").join(file).display().to_string());
+    // In centimetres, a tenth above what was measured.
+    for (bones, influences, most) in [("10", "4", 0.0525), ("20", "4", 0.034), ("40", "4", 0.0235), ("20", "8", 0.0295)]
+    {
+        let args =
+            ["face", &head, "--bones", bones, "--fit", &shapes, "--influences", influences, "-o", "fit.glb", "--json"];
+        let answer = rigsmith(folder.path(), &args);
+        assert_eq!(answer.code, 0, "{}", answer.err);
+        let [fitted, written] = ["fit_error", "written_fit_error"].map(|key| answer.json()[key].as_f64().unwrap());
+        println!("{bones} bones, {influences} influences: {fitted:.4} fitted, {written:.4} written");
+        assert!(written < most, "{bones} bones, {influences} influences: {written}");
+        assert!((written - fitted).abs() < 0.03 * fitted, "{written} is written, {fitted} was fitted");
+    }
 }
 
 #[test]

@@ -712,6 +712,29 @@ fn half_joints_take_half_of_a_bend_and_stay_on_it() {
     }
 }
 
+/// The tip of an elbow: a pushed joint leaves the bend on the outside, by the sine of half the angle.
+#[test]
+fn half_joints_are_pushed_out_of_a_bend() {
+    let mut bench = Bench::new(&ARM);
+    let tag = bench.tag(4, "half_joint", &format!("(at: \"{}\", push: 0.2)", joint(3)));
+    let mut play = bench.play();
+    let half = play.built.find_role(Uid(tag), "half").next().unwrap().uid;
+    let outwards = |play: &mut Play| {
+        let [upper, middle, lower] = [2, 3, 4].map(|number| play.joint(number).translation);
+        let (on, back) = ((middle - upper).normalize(), (middle - lower).normalize());
+        (middle + 0.1 * middle.distance(lower) * (on + back), play.at(half).translation, middle)
+    };
+    for angle in [0.0_f32, 45.0, 90.0, 135.0] {
+        play.pose(Uid(3), [0.0; 3], Quat::from_axis_angle(Vec3::new(0.3, 1.0, -0.2).normalize(), angle.to_radians()));
+        let (expected, found, middle) = outwards(&mut play);
+        assert!(found.distance(expected) < 1e-5, "{angle}°: {found}, not {expected}");
+        assert!(angle < 90.0 || found.distance(middle) > 0.02, "{angle}°: {found} is at {middle}");
+    }
+    let mut far = Bench::new(&ARM);
+    far.tag(4, "half_joint", &format!("(at: \"{}\", push: 2.0)", joint(3)));
+    assert!(far.error().contains("push"), "{}", far.error());
+}
+
 #[test]
 fn numbers_drive_numbers() {
     let mut bench = Bench::new(&ARM);

@@ -17,17 +17,18 @@ use measure::Joint;
 /// The volume that bent knees, elbows, hips and shoulders lose at most, in hundredths of a section, and the triangles that
 /// fold. Weights painted by hand for the same bodies lose 21 to 34, 33 to 60, 23 to 59 and 94 to 160, and fold 3 to 53.
 ///
-/// No weights can keep more than the place of the joint allows: sections that turn about an axis beside their centre, by
-/// a share of the radius, lose 0.785 of that share, and the elbows of the bodies lie up to 0.45 of the radius off.
+/// Weights alone cannot keep more than the place of the joint allows: sections that turn about an axis beside their
+/// centre, by a share of the radius, lose 0.785 of that share, and the elbows of the bodies lie up to 0.45 of the radius
+/// off. Half joints of knees, elbows and shoulders move outwards, as far as no body folds more by it.
 const KNOWN: [(&str, [(i32, usize); 4]); 8] = [
-    ("biped", [(16, 0), (20, 0), (12, 40), (73, 0)]),
-    ("baby", [(33, 0), (44, 10), (19, 39), (74, 7)]),
-    ("female_heavy_tpose", [(17, 0), (7, 0), (29, 28), (37, 0)]),
-    ("female_young", [(22, 0), (7, 0), (32, 20), (55, 2)]),
-    ("female_young_armsdown", [(22, 0), (7, 0), (31, 21), (69, 5)]),
-    ("male_child_tpose", [(45, 0), (48, 6), (45, 35), (51, 0)]),
-    ("male_muscular_action", [(44, 0), (47, 8), (50, 29), (2, 1)]),
-    ("male_young", [(48, 0), (47, 7), (47, 39), (57, 2)]),
+    ("biped", [(7, 0), (15, 0), (12, 40), (70, 0)]),
+    ("baby", [(29, 0), (41, 9), (19, 39), (71, 7)]),
+    ("female_heavy_tpose", [(9, 0), (2, 0), (29, 28), (31, 0)]),
+    ("female_young", [(14, 0), (2, 0), (32, 20), (51, 2)]),
+    ("female_young_armsdown", [(14, 0), (2, 0), (31, 21), (66, 5)]),
+    ("male_child_tpose", [(38, 0), (44, 6), (45, 35), (43, 0)]),
+    ("male_muscular_action", [(39, 0), (42, 8), (50, 29), (2, 0)]),
+    ("male_young", [(43, 0), (42, 6), (47, 39), (53, 2)]),
 ];
 
 /// The bundled biped, and the seven bodies where there is data.

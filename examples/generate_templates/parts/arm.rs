@@ -103,7 +103,7 @@ pub fn tags(writer: &mut Writer, around: &Around) {
         elbow.switch("@command elbow role:control", ", rotate: false"),
     );
     twists(writer, at, ("upper_arm_l", "forearm_l"), ("forearm_l", "hand_l"));
-    halves(writer, at, &["upper_arm_l", "forearm_l"]);
+    halves(writer, at, &[("upper_arm_l", 0.02), ("forearm_l", 0.03)]);
 }
 
 /// A control that carries the switches of a limb and goes with its end.
@@ -120,17 +120,19 @@ pub fn settings(writer: &mut Writer, at: &str, name: &str) {
     );
 }
 
-/// Joints that turn by half of a limb's bends, so that skin keeps its volume there, in the feature `volume`.
-pub fn halves(writer: &mut Writer, at: &str, bends: &[&str]) {
+/// Joints that turn by half of a limb's bends, so that skin keeps its volume there, in the feature `volume`. Each bend
+/// has the length by which its joint moves outwards.
+pub fn halves(writer: &mut Writer, at: &str, bends: &[(&str, f32)]) {
     writer.feature(at, "deform", "volume");
-    for bend in bends {
+    for (bend, push) in bends {
         let name = format!("{}_half_l", bend.trim_end_matches("_l"));
+        let push = if *push == 0.0 { String::new() } else { format!(" push: {push},") };
         writer.optional(
             "volume",
             at,
             &format!("{bend}_half"),
             "half_joint",
-            format!("(at: \"@joint {bend}\", creation: (name: \"{name}\"))"),
+            &format!("(at: \"@joint {bend}\",{push} creation: (name: \"{name}\"))"),
         );
     }
 }

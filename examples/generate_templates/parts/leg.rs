@@ -126,5 +126,5 @@ pub fn tags(writer: &mut Writer, around: &Around) {
         knee.switch("@command knee role:control", ", rotate: false"),
     );
     twists(writer, at, ("thigh_l", "shin_l"), ("shin_l", "foot_l"));
-    halves(writer, at, &["thigh_l", "shin_l"]);
+    halves(writer, at, &[("thigh_l", 0.0), ("shin_l", 0.04)]);
 }

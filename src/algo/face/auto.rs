@@ -44,6 +44,8 @@ pub struct AutoSettings {
     pub whole: bool,
     /// Number of groups at which the depths are cut before front groups are joined; found from the mesh if `None`.
     pub groups: Option<usize>,
+    /// Largest number of joints that move a point after a fit to shapes, 1 to 8: those that will be exported.
+    pub influences: usize,
 }
 
 impl Default for AutoSettings {
@@ -58,6 +60,7 @@ impl Default for AutoSettings {
             forward: None,
             whole: false,
             groups: None,
+            influences: 4,
         }
     }
 }

@@ -191,7 +191,7 @@ impl JobInput {
                     joint.is_some_and(|joint| joint.data.locked)
                 };
                 let locked: Vec<bool> = face.bones.iter().map(locked).collect();
-                let fit = analysis.refit(&face, &shapes.displacements, &locked, &told)?;
+                let fit = analysis.refit(&face, &shapes.displacements, &locked, settings.influences, &told)?;
                 face = fit.face.clone();
                 Some(fit)
             }
