@@ -1,19 +1,26 @@
-//! Draws heads in six expressions and two densities, as in the README.
+//! Draws heads in six expressions and two densities, as in the README, above the same expressions summed from given
+//! shapes.
 //!
 //! ```text
-//! cargo run --release --example faces_sheet -- docs/faces.png HEAD.obj...
+//! cargo run --release --example faces_sheet -- docs/faces.png SHAPES.json HEAD.obj...
 //! ```
+//!
+//! The shapes have the names of ARKit. Heads with another number of points than the shapes have no row of sums.
 
 use std::{collections::BTreeMap, error::Error, path::Path};
 
 use bevy::{asset::RenderAssetUsages, math::UVec2, prelude::*, render::render_resource::Extent3d};
 use rigsmith::{
     algo::{
-        face::{auto::AutoSettings, expression::ExpressionSet},
+        face::{
+            auto::AutoSettings,
+            expression::{Expression, ExpressionSet, Mix, Sides},
+        },
         view::View,
     },
-    files::{RealDisk, load_model, save_atomic, stem},
+    files::{RealDisk, load_model, load_shapes, save_atomic, stem},
     headless::Workbench,
+    mesh::{model::Model, shapes::Shapes},
     plugins::drawing::{LabelChoice, RigDrawing},
     render::{PictureSettings, png, take_picture},
 };
@@ -26,13 +33,19 @@ const DENSITIES: [usize; 2] = [20, 60];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let output = arguments.next().ok_or("say where to write: FILE.png HEAD...")?;
+    let output = arguments.next().ok_or("say where to write: FILE.png SHAPES.json HEAD...")?;
+    let shapes = arguments.next().ok_or("say where the shapes are: FILE.png SHAPES.json HEAD...")?;
     let heads: Vec<String> = arguments.collect();
     let mut rows = Vec::new();
     for head in &heads {
         for bones in DENSITIES {
             println!("{} with {bones} bones", stem(Path::new(head)));
             rows.push(row(Path::new(head), bones)?);
+        }
+        let model = load_model(&RealDisk, Path::new(head))?;
+        if let Ok(shapes) = load_shapes(&RealDisk, Path::new(&shapes), &model) {
+            println!("{} by its shapes", stem(Path::new(head)));
+            rows.push(row_of_sums(&model, &shapes)?);
         }
     }
     let columns = rows.first().map_or(0, Vec::len);
@@ -71,9 +84,56 @@ fn row(head: &Path, bones: usize) -> Result<Vec<Image>, Box<dyn Error>> {
     Ok(pictures)
 }
 
+/// The head at rest, then the six expressions as sums of shapes.
+fn row_of_sums(model: &Model, shapes: &Shapes) -> Result<Vec<Image>, Box<dyn Error>> {
+    let mut rest = Workbench::new(1, "face");
+    rest.open(model.clone(), true)?;
+    rest.face(AutoSettings::default(), None, &mut |_, _| {})?;
+    let bounds = rest.placed_face().map(|face| face.analysis.face_box());
+    let mut pictures = Vec::new();
+    for expression in std::iter::once(None).chain(ExpressionSet::bundled().six().map(Some)) {
+        let mut moved = model.clone();
+        if let Some(expression) = expression {
+            add_shapes(&mut moved, expression, shapes);
+        }
+        let mut bench = Workbench::new(1, "shapes");
+        bench.open(moved, true)?;
+        pictures.push(drawn(&bench, false, bounds)?);
+    }
+    Ok(pictures)
+}
+
+/// Moves the points of a model by the shapes of an expression's units.
+fn add_shapes(model: &mut Model, expression: &Expression, shapes: &Shapes) {
+    let units = ExpressionSet::bundled().unit_set();
+    let mix = Mix::of(&[(expression, 1.0)], units);
+    for (name, moved) in shapes.names.iter().zip(&shapes.displacements) {
+        // The shape of the cheek muscle alone; ARKit has it with the lids.
+        let cheek = name
+            .strip_prefix("cheekRaiser_")
+            .and_then(|side| Some((units.index("cheek_raise")?, if side == "L" { Sides::Left } else { Sides::Right })));
+        let Some((unit, side)) = cheek.or_else(|| units.arkit(name)) else { continue };
+        let sides = mix.strengths[unit];
+        let strength = match side {
+            Sides::Left => sides[0],
+            Sides::Right => sides[1],
+            _ => 0.5 * (sides[0] + sides[1]),
+        };
+        for (point, moved) in model.points.iter_mut().zip(moved) {
+            *point += *moved * strength;
+        }
+    }
+    for part in &mut model.parts {
+        part.normals.clear();
+    }
+}
+
 fn picture(bench: &Workbench, rig: bool) -> Result<Image, Box<dyn Error>> {
+    drawn(bench, rig, bench.placed_face().map(|face| face.analysis.face_box()))
+}
+
+fn drawn(bench: &Workbench, rig: bool, bounds: Option<[Vec3; 2]>) -> Result<Image, Box<dyn Error>> {
     let drawing = RigDrawing { rig, grid: false, labels: LabelChoice::None, ball_scale: 0.4, ..RigDrawing::default() };
-    let bounds = bench.placed_face().map(|face| face.analysis.face_box());
     let settings = PictureSettings { size: CELL, view: View::Front, drawing, bounds, ..PictureSettings::default() };
     let mesh = bench.mesh().ok_or("no mesh")?.clone();
     Ok(take_picture(bench.rig().clone(), vec![mesh], &settings)?)

@@ -35,6 +35,7 @@ mod face_expressions;
 mod face_fit;
 mod face_grouping;
 mod face_landmarks;
+mod face_symmetry;
 mod face_units;
 mod files;
 mod files_kill;

@@ -132,7 +132,7 @@ pub fn halves(writer: &mut Writer, at: &str, bends: &[(&str, f32)]) {
             at,
             &format!("{bend}_half"),
             "half_joint",
-            &format!("(at: \"@joint {bend}\",{push} creation: (name: \"{name}\"))"),
+            format!("(at: \"@joint {bend}\",{push} creation: (name: \"{name}\"))"),
         );
     }
 }

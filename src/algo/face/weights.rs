@@ -7,6 +7,7 @@
 mod interior;
 mod sides;
 mod skin;
+mod symmetry;
 
 use glam::Vec3;
 
@@ -20,6 +21,8 @@ use crate::{
     algo::weights::laplacian::Graph,
     mesh::{adjacency::weld, influences::keep_strongest, model::Weights},
 };
+
+pub(crate) use symmetry::Mirror;
 
 /// Joint of the neck bone.
 pub const NECK: u32 = 0;
@@ -87,7 +90,8 @@ pub(crate) struct Face<'a> {
 ///
 /// `points` are in head space; `shells`, `groups`, `landmarks` and `bones` belong to them. Joints of the result: 0 is
 /// the neck, 1 the head, 2 + i is `bones[i]`. Every point has one to eight influences, strongest first, that sum to
-/// one; points at equal places have equal weights. The same input gives the same bits with any number of threads.
+/// one; points at equal places have equal weights, and so, mirrored, have points of a symmetric head that are each
+/// other's mirror images. The same input gives the same bits with any number of threads.
 /// `progress` is called with a share from 0 to 1 and returns whether to go on.
 ///
 /// # Errors
@@ -163,6 +167,9 @@ pub fn face_weights(
     let mut weights = Weights { starts: vec![0], ..Weights::default() };
     for &v in &welded {
         weights.push(rows[v as usize].iter().copied());
+    }
+    if let Some(mirror) = Mirror::new(points, bones, landmarks) {
+        mirror.apply(&mut weights);
     }
     Ok(weights)
 }

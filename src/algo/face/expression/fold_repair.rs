@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{ExpressionSet, FittedFace, Mix, bone_fit::SLIVER, text::Expression};
 use crate::{
-    algo::face::{bones::FaceBone, landmarks::Landmarks},
+    algo::face::{bones::FaceBone, landmarks::Landmarks, weights::Mirror},
     mesh::{adjacency::weld, influences::keep_strongest, model::Weights, skinning::skin_points},
 };
 
@@ -48,6 +48,7 @@ pub fn repair_folds(
     let with_area = with_area(points, triangles);
     let mut neighbourhood: Option<Neighbourhood> = None;
     let mut best: Option<(usize, Weights)> = None;
+    let mirror = Mirror::new(points, bones, landmarks);
     for pass in 0..=PASSES {
         let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set());
         let matrices = |expression: &&Expression| -> Vec<Affine3A> {
@@ -67,6 +68,9 @@ pub fn repair_folds(
         let mut averaged = Averaged { neighbourhood, weights, own: vec![Vec::new(); neighbourhood.points.len()] };
         averaged.smooth(points, triangles, folded, &poses);
         *weights = averaged.weights();
+        if let Some(mirror) = &mirror {
+            mirror.apply(weights);
+        }
     }
     let Some((left, best)) = best else { return 0 };
     *weights = best;
