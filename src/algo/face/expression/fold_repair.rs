@@ -58,9 +58,11 @@ pub fn repair_folds(
         };
         let poses: Vec<Vec<Affine3A>> = six.par_iter().map(matrices).collect();
         let (sum, folded) = all_folded(points, triangles, &with_area, weights, &poses);
-        if best.as_ref().is_none_or(|(least, _)| sum < *least) {
-            best = Some((sum, weights.clone()));
+        // A pass that helped nothing is the last.
+        if best.as_ref().is_some_and(|(least, _)| sum >= *least) {
+            break;
         }
+        best = Some((sum, weights.clone()));
         if sum == 0 || pass == PASSES {
             break;
         }
