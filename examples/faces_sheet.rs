@@ -43,9 +43,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             rows.push(row(Path::new(head), bones)?);
         }
         let model = load_model(&RealDisk, Path::new(head))?;
-        if let Ok(shapes) = load_shapes(&RealDisk, Path::new(&shapes), &model) {
-            println!("{} by its shapes", stem(Path::new(head)));
-            rows.push(row_of_sums(&model, &shapes)?);
+        match load_shapes(&RealDisk, Path::new(&shapes), &model) {
+            Ok(shapes) => {
+                println!("{} by its shapes", stem(Path::new(head)));
+                rows.push(row_of_sums(&model, &shapes)?);
+            }
+            Err(error) => println!("no row of sums: {error}"),
         }
     }
     let columns = rows.first().map_or(0, Vec::len);

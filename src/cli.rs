@@ -122,7 +122,7 @@ impl WeightArgs {
 /// Options of exported characters.
 #[derive(Args, Debug, Clone)]
 struct ExportArgs {
-    /// Influences written for each vertex; more than 4 need a second set that not every program reads
+    /// Influences written for each vertex, and found by a fit; more than 4 need a second set that not every program reads
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
     influences: u8,
     /// Write all joints, not only joints with weights and their ancestors

@@ -160,9 +160,13 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
             pose(&mut model.nodes, bench.rig());
             let settings = args.export.settings();
             report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
-            if let (Some(shapes), Some(mesh), true) = (&fitted, bench.mesh(), args.expression.is_empty()) {
-                let (rest, count) = (&mesh.rest.points, placed.points[0]);
-                let error = spinning("reading back", || written::fit_error(&args.output, &model, rest, shapes, count))?;
+            // Another pose, and clips of ARKit of the same names, would be measured.
+            let is_plain = args.expression.is_empty() && !args.arkit;
+            let placed_face = bench.placed_face().filter(|_| is_plain);
+            if let (Some(shapes), Some(mesh), Some(face)) = (&fitted, bench.mesh(), placed_face) {
+                let rest = &mesh.rest.points;
+                let head: Vec<usize> = (0..placed.points[0]).map(|point| face.analysis.mesh_point(point)).collect();
+                let error = spinning("reading back", || written::fit_error(&args.output, &model, rest, shapes, &head))?;
                 report_written_error(&mut report, error);
             }
         }

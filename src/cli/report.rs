@@ -229,9 +229,10 @@ fn piece_of_line(path: &Path, text: &str, offset: usize, message: &str, what: &s
     let to = text.floor_char_boundary((offset + LONG / 2).min(end));
     let left = if from > start { "…" } else { "" };
     let right = if to < end { "…" } else { "" };
-    let pad = " ".repeat(text[from..offset].chars().count() + left.chars().count());
+    let [piece, before] = [&text[from..to], &text[from..offset]].map(printable);
+    let pad = " ".repeat(before.chars().count() + left.chars().count());
     let path = path.display();
-    format!("{message}\n  --> {path}:{line}:{column}\n  | {left}{}{right}\n  | {pad}^ {what}", &text[from..to])
+    format!("{message}\n  --> {path}:{line}:{column}\n  | {left}{piece}{right}\n  | {pad}^ {what}")
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use crate::{
     parameters,
     processor::{BuildScope, Creation, ModuleError, RigModule},
     rig::{
-        Constraint, NodeType, Scalar, Target,
+        Constraint, NodeType, Scalar, Target, Uid,
         deform::HALF,
         reference::{NodeRef, NodeRefs},
     },
@@ -28,8 +28,8 @@ parameters! {
         pub at: NodeRefs = NodeRef::this().into(),
         /// Share of the bend, 0 (the parent's side) to 1.
         pub share: f32 = 0.5,
-        /// Length by which each joint moves outwards, like the tip of an elbow, when the limb is bent by 180°, as a share of
-        /// the bone below. At an angle it moves by this times the sine of half the angle.
+        /// Length by which each joint moves outwards, like the tip of an elbow, as a share of the bone that begins there: at
+        /// an angle, and with a share of 0.5, by this times the sine of half the angle.
         pub push: f32 = 0.0,
         /// Name, groups and label of the joints that are made; by default those of each joint.
         pub creation: Creation = Creation::default(),
@@ -51,36 +51,43 @@ impl RigModule for HalfJoint {
             // Nothing bends at a root: a limb that is not connected yet builds, too.
             let Some(parent) = scope.parent(joint) else { continue };
             let creation = scope.creation_for(&self.creation, joint, number);
-            let (mut above, mut own) = (scope.kept_offset(joint, parent), Trs::IDENTITY);
+            let mut targets = [(parent, scope.kept_offset(joint, parent)), (joint, Trs::IDENTITY)];
             let mut rest = Trs::IDENTITY;
-            // Both targets lie beside the joint, along the two bones: their mean leaves the joint when the limb bends.
-            if self.push != 0.0
-                && let Some(bone) = scope.bone(joint)
-            {
+            // Two targets beside the joint, along the two bones: their mean leaves the joint when the limb bends. The
+            // first one goes with the joint, which may move, and turns with the parent.
+            let bone = if self.push == 0.0 { None } else { scope.bone(joint) };
+            if let Some(bone) = bone {
                 let (here, upper) = (scope.global(joint), scope.global(parent));
                 let length = self.push * bone.length();
                 let on = (here.translation - upper.translation).normalize_or_zero() * length;
                 let back = bone.normalize_or_zero() * -length;
-                let point = |offset: Vec3| Trs { translation: here.translation + offset, ..here };
-                above = point(on).relative_to(&upper);
-                own = point(back).relative_to(&here);
-                rest = point(on.lerp(back, self.share)).relative_to(&here);
+                let point = |offset: Vec3| Trs { translation: here.translation + offset, ..here }.relative_to(&here);
+                let unbent = scope.spawn(NodeType::Null, "unbent", joint, 0, Some(joint), Trs::IDENTITY, &creation)?;
+                let kept = Target { node: scope.uid(parent), weight: Scalar::Value(1.0), offset: targets[0].1 };
+                scope.constrain("unbend", joint, 0, turned(scope.uid(unbent), vec![kept], false))?;
+                targets = [(unbent, point(on)), (joint, point(back))];
+                rest = point(on.lerp(back, self.share));
             }
             let half = scope.spawn(NodeType::Joint, HALF, joint, 0, Some(joint), rest, &creation)?;
-            let target = |node: Trs, uid, weight| Target { node: uid, weight: Scalar::Value(weight), offset: node };
-            let targets =
-                vec![target(above, scope.uid(parent), 1.0 - self.share), target(own, scope.uid(joint), self.share)];
-            let constraint = Constraint::Transform {
-                driven: scope.uid(half),
-                targets,
-                translate: [self.push != 0.0; 3],
-                rotate: [true; 3],
-                scale: [false; 3],
-                weight: Scalar::Value(1.0),
-                keep_pose: false,
-            };
+            let weights = [1.0 - self.share, self.share].map(Scalar::Value);
+            let targets = targets.into_iter().zip(weights);
+            let targets = targets.map(|((node, offset), weight)| Target { node: scope.uid(node), weight, offset });
+            let constraint = turned(scope.uid(half), targets.collect(), bone.is_some());
             scope.constrain("turn", joint, 0, constraint)?;
         }
         Ok(())
+    }
+}
+
+/// A constraint that turns a node with its targets, and moves it with them if `moves`.
+fn turned(driven: Uid, targets: Vec<Target>, moves: bool) -> Constraint {
+    Constraint::Transform {
+        driven,
+        targets,
+        translate: [moves; 3],
+        rotate: [true; 3],
+        scale: [false; 3],
+        weight: Scalar::Value(1.0),
+        keep_pose: false,
     }
 }

@@ -719,13 +719,16 @@ fn half_joints_are_pushed_out_of_a_bend() {
     let tag = bench.tag(4, "half_joint", &format!("(at: \"{}\", push: 0.2)", joint(3)));
     let mut play = bench.play();
     let half = play.built.find_role(Uid(tag), "half").next().unwrap().uid;
+    let on = (play.joint(3).translation - play.joint(2).translation).normalize();
     let outwards = |play: &mut Play| {
-        let [upper, middle, lower] = [2, 3, 4].map(|number| play.joint(number).translation);
-        let (on, back) = ((middle - upper).normalize(), (middle - lower).normalize());
+        let [middle, lower] = [3, 4].map(|number| play.joint(number).translation);
+        let back = (middle - lower).normalize();
         (middle + 0.1 * middle.distance(lower) * (on + back), play.at(half).translation, middle)
     };
     for angle in [0.0_f32, 45.0, 90.0, 135.0] {
-        play.pose(Uid(3), [0.0; 3], Quat::from_axis_angle(Vec3::new(0.3, 1.0, -0.2).normalize(), angle.to_radians()));
+        // A limb that stretches moves its joints.
+        let bend = Quat::from_axis_angle(Vec3::new(0.3, 1.0, -0.2).normalize(), angle.to_radians());
+        play.pose(Uid(3), [0.002 * angle, 0.0, 0.0], bend);
         let (expected, found, middle) = outwards(&mut play);
         assert!(found.distance(expected) < 1e-5, "{angle}°: {found}, not {expected}");
         assert!(angle < 90.0 || found.distance(middle) > 0.02, "{angle}°: {found} is at {middle}");

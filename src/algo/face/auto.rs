@@ -44,7 +44,8 @@ pub struct AutoSettings {
     pub whole: bool,
     /// Number of groups at which the depths are cut before front groups are joined; found from the mesh if `None`.
     pub groups: Option<usize>,
-    /// Largest number of joints that move a point after a fit to shapes, 1 to 8: those that will be exported.
+    /// Largest number of joints that move a point after a fit to shapes, 1 to 8; 4, which every program reads, unless
+    /// more are exported.
     pub influences: usize,
 }
 

@@ -8,14 +8,13 @@ use crate::{
     cli::report::Failure,
     files::{RealDisk, load_model},
     mesh::{
-        model::{Channel, ChannelTarget, Model},
+        model::{Channel, ChannelTarget, MaterialSet, Model, Part},
         shapes::Shapes,
     },
 };
 
 /// Root mean square distance, in the mesh's unit, between the points of `shapes` and those of the character at `path`
-/// posed by its clip of the same name; over all shapes and the `count` points of the head, like the error of the fit
-/// itself.
+/// posed by its clip of the same name; over all shapes and the points `head` of the mesh, like the error of the fit itself.
 ///
 /// `stored` is the character that was written; its points are those of `rest` and of the shapes. `None` if the file
 /// holds other vertices.
@@ -27,13 +26,20 @@ pub(super) fn fit_error(
     stored: &Model,
     rest: &[Vec3],
     shapes: &Shapes,
-    count: usize,
+    head: &[usize],
 ) -> Result<Option<f32>, Failure> {
     let mut written = load_model(&RealDisk, path)?;
     let clips = std::mem::take(&mut written.clips);
     let rests: Vec<_> = written.nodes.iter().map(|node| node.rest).collect();
-    // The reader numbers the vertices of all parts, one part after the other.
-    let vertices: Vec<u32> = stored.parts.iter().flat_map(|part| part.vertices.iter().copied()).collect();
+    // Points, weights and nodes are all that is posed here.
+    written.material_set = MaterialSet::default();
+    for part in &mut written.parts {
+        *part = Part { object: part.object, vertices: std::mem::take(&mut part.vertices), ..Part::default() };
+    }
+    // Parts are written object by object, and the reader numbers their vertices in that order.
+    let mut parts: Vec<&Part> = stored.parts.iter().filter(|part| !part.triangles.is_empty()).collect();
+    parts.sort_by_key(|part| part.object);
+    let vertices: Vec<u32> = parts.iter().flat_map(|part| part.vertices.iter().copied()).collect();
     if vertices.len() != written.points.len() {
         return Ok(None);
     }
@@ -49,15 +55,17 @@ pub(super) fn fit_error(
             node.rest = *rest;
         }
         // A shape that moves no bone has no clip: the file shows it as the character at rest.
-        let channels = clips.iter().find(|clip| clip.name == *name).map_or(&[][..], |clip| &clip.channels);
+        // Clips that the mesh brought along come before those of the fit.
+        let channels = clips.iter().rfind(|clip| clip.name == *name).map_or(&[][..], |clip| &clip.channels);
         channels.iter().for_each(|channel| set(&mut written, channel));
         let posed = written.at_rest().points;
-        for ((point, moved), vertex) in rest.iter().zip(moved).zip(&first) {
-            let Some(vertex) = *vertex else { continue };
-            square += f64::from((*point + *moved).distance_squared(posed[vertex]));
+        for &point in head {
+            let vertex = first.get(point).copied().flatten();
+            let Some(((rest, moved), vertex)) = rest.get(point).zip(moved.get(point)).zip(vertex) else { continue };
+            square += f64::from((*rest + *moved).distance_squared(posed[vertex]));
         }
     }
-    let all = (count * shapes.names.len()).max(1);
+    let all = (head.len() * shapes.names.len()).max(1);
     Ok(Some((square / all as f64).sqrt() as f32))
 }
 

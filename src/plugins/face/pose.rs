@@ -63,14 +63,18 @@ impl Frame {
     }
 }
 
-/// Requests the expressions that others wrote to [`Expressions`]. What [`express`] wrote itself came together with the
-/// prepared face.
+/// Strengths that [`express`] wrote last to [`Expressions`], always together with them.
+#[derive(Component)]
+pub(super) struct OwnStrengths(BTreeMap<String, f32>);
+
+/// Requests the expressions that others wrote to [`Expressions`]: what [`express`] wrote has the same tick and the same
+/// strengths as [`OwnStrengths`].
 pub(super) fn adopt(
-    faces: Query<(Entity, Ref<Expressions>, Option<Ref<PreparedFace>>), With<RigMesh>>,
+    faces: Query<(Entity, Ref<Expressions>, Option<Ref<OwnStrengths>>), With<RigMesh>>,
     mut requests: MessageWriter<ExpressRequest>,
 ) {
-    for (mesh, expressions, prepared) in &faces {
-        let is_own = prepared.is_some_and(|prepared| prepared.last_changed() == expressions.last_changed());
+    for (mesh, expressions, own) in &faces {
+        let is_own = own.is_some_and(|own| own.last_changed() == expressions.last_changed() && own.0 == expressions.0);
         if expressions.is_changed() && !is_own {
             requests.write(ExpressRequest { mesh, strengths: expressions.0.clone(), preview: false });
         }
@@ -105,7 +109,7 @@ pub(super) fn express(
             let mix = mixed(&set.0, strengths)?;
             let prepared = PreparedFace::reused(prepared, &settled, mesh, &face.analysis, &set.0)?;
             let edits = expression_edits(&settled, &prepared, &mix);
-            // What is shown already is no step.
+            // An expression that the face shows already adds no step to the history.
             let is_shown = edits.is_empty();
             let operation = Operation::Named { name: "Express", edits };
             if *preview {
@@ -116,7 +120,12 @@ pub(super) fn express(
                     commands.write_message(EditRequest { rig: rig_entity, change: Change::Do(operation) });
                 }
             }
-            commands.entity(*entity).insert((Expressions(strengths.clone()), face, prepared));
+            commands.entity(*entity).insert((
+                Expressions(strengths.clone()),
+                OwnStrengths(strengths.clone()),
+                face,
+                prepared,
+            ));
             Ok(())
         });
         told.write(Expressed { mesh: *entity, result });

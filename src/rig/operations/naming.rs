@@ -13,7 +13,7 @@ const STEEP: f32 = 0.6;
 /// Place along the trunk, from 0 at its start to 1 at its end, below which legs begin; arms begin above it.
 const HIP: f32 = 0.35;
 
-/// Highest number that is counted on from.
+/// Highest number of a label from which a chain goes on.
 const HIGHEST: u32 = 1_000_000;
 
 /// A label of a drawn joint, taken apart: the chain's name with its side, and the place in the chain from 1.
@@ -58,8 +58,7 @@ impl ChainName {
         // With a plane of symmetry the name has to be free on both sides.
         let side = positions.last().map_or("", |last| side_ending(*last, plane));
         let number_of = |place: Place| {
-            let is_here =
-                plane.is_some() || place.chain.strip_suffix(place.base()) == Some("") || place.chain.ends_with(side);
+            let is_here = plane.is_some() || place.chain == place.base() || place.chain.ends_with(side);
             let number = place.base().strip_prefix(base).filter(|_| is_here)?;
             if number.is_empty() { Some(1) } else { number.parse().ok() }
         };
@@ -78,11 +77,16 @@ impl ChainName {
     pub fn joint(&self, rig: &Rig, place: usize, position: Vec3, plane: Option<&MirrorPlane>) -> String {
         let side = side_ending(position, plane);
         let name = |number: u32| format!("{}{side}_{number}", self.base);
-        let is_free = |name: &String| {
-            rig.find_label(name).is_none() && (plane.is_none() || rig.find_label(&partner_name(name)).is_none())
+        let is_free = |name: &String, is_taken: &dyn Fn(&str) -> bool| {
+            !is_taken(name) && (plane.is_none() || !is_taken(&partner_name(name)))
         };
         let first = self.first + place as u32;
-        (first..).map(name).find(is_free).unwrap_or_else(|| name(first))
+        let own = name(first);
+        if is_free(&own, &|name| rig.find_label(name).is_some()) {
+            return own;
+        }
+        let labels: BTreeSet<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
+        (first + 1..).map(name).find(|name| is_free(name, &|name| labels.contains(name))).unwrap_or(own)
     }
 }
 

@@ -26,8 +26,8 @@ impl FaceAnalysis {
     /// Moves the bones of a face and recomputes the weights, so that the bones can show given shapes.
     ///
     /// `shapes` are displacements, one a point of the *mesh*, in the mesh's space and unit; `locked` marks bones that
-    /// must stay; no point is moved by more than `influences` joints (1 to 8). Returns the face, the poses of its bones in each shape (head space), and the root mean square error
-    /// over points and shapes. About two seconds for 57 shapes of 11,000 points and 40 bones.
+    /// must stay; no point is moved by more than `influences` joints (1 to 8). Returns the face, the poses of its bones in
+    /// each shape (head space), and the root mean square error over points and shapes. About two seconds for 57 shapes of 11,000 points and 40 bones.
     ///
     /// # Errors
     /// [`FaceError::Fit`], or cancelled.

@@ -17,6 +17,10 @@ use crate::{
 const NEAR: f32 = 2e-4;
 /// Largest distance between a bone and the mirror image of its partner, as a share of the distance of the eyes.
 const APART: f32 = 0.01;
+/// Largest number of a cell along each axis.
+const FAR: f32 = 1e9;
+/// Largest number of different places in a cell; others have no partner.
+const CROWD: usize = 16;
 
 /// Mirrored points and joints of a head.
 pub(crate) struct Mirror {
@@ -32,13 +36,17 @@ impl Mirror {
     /// `points` and `bones` are in head space.
     pub fn new(points: &[Vec3], bones: &[FaceBone], landmarks: &Landmarks) -> Option<Self> {
         let near = NEAR * landmarks.eye_distance();
-        if !landmarks.symmetric || near <= 0.0 {
+        if !landmarks.symmetric || !(near > 0.0 && near.is_finite()) {
             return None;
         }
-        let cell = |point: Vec3| (point / near).round().as_ivec3();
+        let cell = |point: Vec3| (point / near).round().clamp(Vec3::splat(-FAR), Vec3::splat(FAR)).as_ivec3();
         let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::with_capacity(points.len());
         for (index, point) in points.iter().enumerate() {
-            cells.entry(cell(*point)).or_default().push(index as u32);
+            // Points at one place have equal weights: one of them stands for all.
+            let cell = cells.entry(cell(*point)).or_default();
+            if cell.len() < CROWD && !cell.iter().any(|other| points[*other as usize] == *point) {
+                cell.push(index as u32);
+            }
         }
         let partner = |point: &Vec3| {
             let image = point.with_x(2.0 * landmarks.middle - point.x);
@@ -49,7 +57,12 @@ impl Mirror {
             let nearest = found.min_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
             nearest.filter(|other| distance(other) <= near * near)
         };
-        let points = points.iter().map(partner).collect();
+        let partners: Vec<Option<u32>> = points.iter().map(partner).collect();
+        let is_mutual = |(point, other): (&Vec3, Option<u32>)| {
+            let back = partners[other? as usize]?;
+            (points[back as usize] == *point).then_some(other?)
+        };
+        let mutual = points.iter().zip(partners.iter().copied()).map(is_mutual).collect();
         // Bones that a person has moved may have left their partner's mirror image.
         let apart = APART * landmarks.eye_distance();
         let is_image = |bone: &FaceBone, other: usize| {
@@ -61,7 +74,7 @@ impl Mirror {
             is_image(bone, other).then_some(FIRST + other as u32)
         };
         let joints = (0..FIRST).map(Some).chain(bones.iter().enumerate().map(image)).collect();
-        Some(Self { points, joints })
+        Some(Self { points: mutual, joints })
     }
 
     /// Gives each point the mean of its own weights and its partner's mirrored ones, where all joints have an image.
