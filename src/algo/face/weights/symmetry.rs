@@ -36,7 +36,7 @@ impl Mirror {
     /// `points` and `bones` are in head space.
     pub fn new(points: &[Vec3], bones: &[FaceBone], landmarks: &Landmarks) -> Option<Self> {
         let near = NEAR * landmarks.eye_distance();
-        if !landmarks.symmetric || !(near > 0.0 && near.is_finite()) {
+        if !(landmarks.symmetric && near > 0.0 && near.is_finite()) {
             return None;
         }
         let cell = |point: Vec3| (point / near).round().clamp(Vec3::splat(-FAR), Vec3::splat(FAR)).as_ivec3();
