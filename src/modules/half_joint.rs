@@ -14,7 +14,8 @@ use crate::{
 };
 
 parameters! {
-    /// Makes a joint for each of some joints that turns halfway between it and its parent. Role: `half`.
+    /// Makes a joint for each of some joints that turns halfway between it and its parent. Roles: `half`, and `unbent` for
+    /// the null that a pushed joint needs.
     ///
     /// Skinning gives it the skin that both hold in common: see `algo/weights`.
     ///
@@ -62,7 +63,10 @@ impl RigModule for HalfJoint {
                 let on = (here.translation - upper.translation).normalize_or_zero() * length;
                 let back = bone.normalize_or_zero() * -length;
                 let point = |offset: Vec3| Trs { translation: here.translation + offset, ..here }.relative_to(&here);
-                let unbent = scope.spawn(NodeType::Null, "unbent", joint, 0, Some(joint), Trs::IDENTITY, &creation)?;
+                let name = creation.name.as_ref().map(|name| format!("{name}_unbent"));
+                // The label is that of the joint which is asked for.
+                let own = Creation { name, label: None, ..creation.clone() };
+                let unbent = scope.spawn(NodeType::Null, "unbent", joint, 0, Some(joint), Trs::IDENTITY, &own)?;
                 let kept = Target { node: scope.uid(parent), weight: Scalar::Value(1.0), offset: targets[0].1 };
                 scope.constrain("unbend", joint, 0, turned(scope.uid(unbent), vec![kept], false))?;
                 targets = [(unbent, point(on)), (joint, point(back))];

@@ -27,7 +27,8 @@ impl FaceAnalysis {
     ///
     /// `shapes` are displacements, one a point of the *mesh*, in the mesh's space and unit; `locked` marks bones that
     /// must stay; no point is moved by more than `influences` joints (1 to 8). Returns the face, the poses of its bones in
-    /// each shape (head space), and the root mean square error over points and shapes. About two seconds for 57 shapes of 11,000 points and 40 bones.
+    /// each shape (head space), and the root mean square error over points and shapes. About two seconds for 57 shapes of
+    /// 11,000 points and 40 bones.
     ///
     /// # Errors
     /// [`FaceError::Fit`], or cancelled.
