@@ -11,6 +11,7 @@ mod demo;
 #[cfg(feature = "render")]
 mod device_selection;
 mod face;
+mod format;
 mod info;
 mod modules;
 mod outputs;
@@ -65,6 +66,8 @@ enum Command {
     Info(info::InfoArgs),
     /// Look for problems in files
     Check(check::CheckArgs),
+    /// Put templates into their layout, with or without the uids that follow from names
+    Format(format::FormatArgs),
     /// Run the commands of a rig and save the built rig
     Build(build::BuildArgs),
     /// Build a rig, pose it by its controls as an app does, and save the character or a picture
@@ -193,6 +196,7 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Check(args)) => check::run(&args),
+        Some(Command::Format(args)) => format::run(&args),
         Some(Command::Build(args)) => build::run(&args),
         Some(Command::Pose(args)) => pose::run(&args),
         Some(Command::Modules(args)) => Ok(modules::run(&args)),

@@ -43,4 +43,4 @@ pub use project::{
 };
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
-pub use store::{StoreError, store_model, store_rig, store_skin};
+pub use store::{StoreError, store_model, store_rig, store_rig_over, store_skin};

@@ -32,7 +32,7 @@ mod visibility;
 mod world;
 
 pub use amount::Amount;
-pub use authoring::{check_finite, check_limits, degrees};
+pub use authoring::{check_finite, check_limits};
 pub use axis::Axis;
 pub use builder::{Builder, CommandState, CommandStatus, FindError, RunReport};
 pub use creation::Creation;

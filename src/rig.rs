@@ -39,9 +39,10 @@ pub(crate) use format::{
     scan::{Field, elements, fields, same_place},
     source::{parse_ron, ron_options, utf8},
 };
-pub use group::GroupData;
-pub use joint::{FaceBonePart, FacePlacement, JointData, NodeKind, RestTransform, RigJoint};
+pub use group::{GROUP_COLORS, GroupData};
+pub use joint::{FaceBonePart, FacePlacement, JointData, NodeKind, RestTransform, RigJoint, degrees};
 pub use pose::{AttributeValues, PoseOffset, StoredPose};
 pub use reference::{NodeRef, NodeRefs};
 pub use tag::{TagData, TagKind};
+pub(crate) use uid::mix;
 pub use uid::{Uid, UidError, UidSource};

@@ -130,7 +130,8 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     };
     let rig = template.rig;
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes));
-    let places = SourceText::new(&text);
+    let explicit = template::explicit(&text);
+    let places = SourceText::new(&explicit);
     let (commands, failing) = problems_of_commands(&rig, &places);
     let unknown = FeatureKinds::default().unknown_in(&rig);
     let unknown_kinds = unknown.len();

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, progress::spinning, skin::load_rig};
 use crate::{
-    files::{FileKind, RealDisk, load_model, stem, store_model, store_rig},
+    files::{FileKind, RealDisk, load_model, stem, store_model, store_rig, store_rig_over},
     headless::Workbench,
     mesh::{
         gltf::GltfWriteSettings,
@@ -60,7 +60,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
         }
         (Some(RigText | Template), Some(RigText | Template)) => {
             let rig = load_rig(&args.input, &mut report)?;
-            store_rig(&RealDisk, &args.output, &rig)?
+            store_rig_over(&RealDisk, &args.output, &rig, &[&args.input])?
         }
         (Some(RigText | Template), Some(Gltf | Glb)) => {
             let bench = Workbench::with_rig(SEED, load_rig(&args.input, &mut report)?);

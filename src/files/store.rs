@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Disk, FileKind, FileSet, LoadError, SaveError, save_atomic, save_set, stem, verify};
+use super::{Disk, FileKind, FileSet, LoadError, SaveError, read_capped, save_atomic, save_set, stem, verify};
 use crate::{
     mesh::{
         gltf::{GltfError, GltfWriteSettings, write_glb, write_gltf},
@@ -173,17 +173,41 @@ fn lost_in_obj(model: &Model) -> Vec<String> {
     if lost.is_empty() { Vec::new() } else { vec![format!("OBJ cannot hold {}: left out", lost.join(", "))] }
 }
 
+/// Saves a rig over a template that was read: only what changed is written into its text, see
+/// [`write_template_over`](template::write_template_over). That is the first of the files in `sources` that is a template
+/// of the same rig; without one, and for another kind of file, it is saved as by [`store_rig`].
+pub fn store_rig_over(disk: &dyn Disk, path: &Path, rig: &Rig, sources: &[&Path]) -> Result<Vec<String>, StoreError> {
+    if FileKind::of(path) != Some(FileKind::Template) {
+        return store_rig(disk, path, rig);
+    }
+    let text_of = |path: &Path| {
+        let bytes = read_capped(disk, path, template::MAX_BYTES as u64).ok()?;
+        let is_same = template::read_header(&bytes).is_ok_and(|header| header.uid == rig.uid());
+        let text = String::from_utf8(bytes).ok().filter(|_| is_same)?;
+        Some(text.strip_prefix('\u{FEFF}').map(str::to_owned).unwrap_or(text))
+    };
+    let written = match sources.iter().find_map(|source| text_of(source)) {
+        Some(text) => template::write_template_over(rig, &text),
+        None => write_template(rig),
+    };
+    save_template(disk, path, &written)?;
+    Ok(Vec::new())
+}
+
+fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), StoreError> {
+    if text.len() > template::MAX_BYTES {
+        return Err(StoreError::TooLarge { path: path.into(), mebibytes: text.len() >> 20 });
+    }
+    verify::template(path, text.as_bytes())?;
+    Ok(save_atomic(disk, path, text.as_bytes())?)
+}
+
 /// Saves a rig as `.rig.ron`, or its skeleton as `.rig`. Returns notes about content that the format could not keep, a
 /// sentence each.
 pub fn store_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>, StoreError> {
     match FileKind::of(path) {
         Some(FileKind::Template) => {
-            let text = write_template(rig);
-            if text.len() > template::MAX_BYTES {
-                return Err(StoreError::TooLarge { path: path.into(), mebibytes: text.len() >> 20 });
-            }
-            verify::template(path, text.as_bytes())?;
-            save_atomic(disk, path, text.as_bytes())?;
+            save_template(disk, path, &write_template(rig))?;
             Ok(Vec::new())
         }
         Some(FileKind::RigText) => {

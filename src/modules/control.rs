@@ -8,11 +8,11 @@ use crate::{
     mesh::model::Trs,
     parameters,
     processor::{
-        BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, degrees,
-        mirrored_angles, mirrored_direction,
+        BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, mirrored_angles,
+        mirrored_direction,
     },
     rig::{
-        Channels, Constraint, ControlData, Limits, NodeType, Scalar, Target,
+        Channels, Constraint, ControlData, Limits, NodeType, Scalar, Target, degrees,
         nearest::did_you_mean,
         reference::{NodeRef, NodeRefs},
         shapes,

@@ -5,11 +5,9 @@ use glam::Vec3;
 use crate::{
     mesh::model::Trs,
     parameters,
-    processor::{
-        BuildScope, Creation, ModuleError, RigModule, check_finite, degrees, mirrored_angles, mirrored_direction,
-    },
+    processor::{BuildScope, Creation, ModuleError, RigModule, check_finite, mirrored_angles, mirrored_direction},
     rig::{
-        NodeType,
+        NodeType, degrees,
         reference::{NodeRef, NodeRefs},
     },
 };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::{BuildScope, Creation, ModuleError, NodeId, Side};
 use crate::{
@@ -13,17 +13,6 @@ use crate::{
         reference::{NodeRef, NodeRefs, Source},
     },
 };
-
-/// Angles about X, Y and Z in degrees, one after the other in that order (X is applied last), as a rotation.
-pub fn degrees(angles: Vec3) -> Quat {
-    let [x, y, z] = angles.to_array().map(f32::to_radians);
-    let half = |angle: f32| (bevy::math::ops::sin(angle * 0.5), bevy::math::ops::cos(angle * 0.5));
-    let about = |axis: Vec3, angle: f32| {
-        let (sin, cos) = half(angle);
-        Quat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos)
-    };
-    (about(Vec3::X, x) * about(Vec3::Y, y) * about(Vec3::Z, z)).normalize()
-}
 
 impl BuildScope<'_> {
     /// Creation parameters for one of several nodes, the one for `subject`: names after the first get a number, and the

@@ -7,6 +7,7 @@ use crate::rig::{
     Field, Rig, RigEdit, SourceError, TagData, TagKind, Uid, fields,
     reference::{GroupScope, references_in},
     same_place,
+    template::Explicit,
 };
 
 /// How many failing commands are looked for.
@@ -85,31 +86,37 @@ fn switch_off(rig: &mut Rig, joint: Uid, tag: TagData) {
 
 /// The text of a template, in which the places of problems are looked up.
 pub struct SourceText<'a> {
-    text: &'a str,
+    /// The text without shorthand, in which every declaration has its uid.
+    explicit: &'a Explicit<'a>,
     fields: Vec<Field<'a>>,
 }
 
 impl<'a> SourceText<'a> {
     /// Scans a text once, for any number of problems.
-    pub fn new(text: &'a str) -> Self {
-        Self { text, fields: fields(text) }
+    pub fn new(explicit: &'a Explicit<'a>) -> Self {
+        Self { explicit, fields: fields(&explicit.text) }
     }
 
     /// A problem of the whole text.
     pub fn beginning(&self, message: String) -> SourceError {
-        SourceError::at(self.text, 0, message)
+        self.at(0, message)
+    }
+
+    /// A problem at a place of the explicit text, placed in the source.
+    fn at(&self, offset: usize, message: String) -> SourceError {
+        self.explicit.fault(SourceError::at(&self.explicit.text, offset, message))
     }
 
     /// The place of a command's problem in the text of its template: in the parameter that is wrong, else at the tag.
     /// The beginning of the text if the tag is not in it. `rig` is the rig as it was read, whose parameters have uids
     /// beside the names that people write alone.
     pub fn locate(&self, rig: &Rig, error: &BuildError) -> SourceError {
-        let (text, found) = (self.text, &self.fields);
+        let (text, found) = (&*self.explicit.text, &self.fields);
         let message = format!("{}: {}", error.module, error.problem);
-        let Some(tag) = declaration(text, found, error.command) else { return SourceError::at(text, 0, message) };
+        let Some(tag) = declaration(text, found, error.command) else { return self.at(0, message) };
         let at_tag = tag.end - text[tag.value..tag.end].trim_start().len();
         let params = found.iter().find(|field| field.bracket == tag.bracket && field.name == "params");
-        let Some(params) = params else { return SourceError::at(text, at_tag, message) };
+        let Some(params) = params else { return self.at(at_tag, message) };
         let start = params.end - text[params.value..params.end].trim_start().len();
         let written = &text[start..params.end];
         match &error.problem {
@@ -119,26 +126,24 @@ impl<'a> SourceText<'a> {
                     TagKind::Feature { .. } => None,
                 });
                 let offset = read.map_or(inner.offset, |read| same_place(read, written, inner.offset));
-                SourceError::at(text, start + offset, format!("{}: {}", error.module, inner.message))
+                self.at(start + offset, format!("{}: {}", error.module, inner.message))
             }
             BuildProblem::Module(
                 ModuleError::Reference { parameter, .. } | ModuleError::Parameter { parameter, .. },
             ) => {
                 let first = parameter.split([',', ' ', '[', '.']).next().unwrap_or_default();
                 let named = fields(written).into_iter().find(|field| field.name == first);
-                SourceError::at(text, named.map_or(at_tag, |field| start + field.start), message)
+                self.at(named.map_or(at_tag, |field| start + field.start), message)
             }
-            _ => SourceError::at(text, at_tag, message),
+            _ => self.at(at_tag, message),
         }
     }
 
     /// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.
     pub fn locate_declared(&self, uid: Uid, field: &str, message: String) -> SourceError {
-        let Some(declared) = declaration(self.text, &self.fields, uid) else {
-            return SourceError::at(self.text, 0, message);
-        };
+        let Some(declared) = declaration(&self.explicit.text, &self.fields, uid) else { return self.at(0, message) };
         let named = self.fields.iter().find(|other| other.bracket == declared.bracket && other.name == field);
-        SourceError::at(self.text, named.unwrap_or(declared).start, message)
+        self.at(named.unwrap_or(declared).start, message)
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Templates (`.rig.ron`), projects (`.rigsmith.ron`), skeleton text (`.rig`) and weights (`.skin`).
 
+pub(super) mod layout;
 mod poses;
 pub mod project;
 pub(super) mod scan;
@@ -9,4 +10,5 @@ pub mod skin;
 pub(super) mod source;
 pub mod template;
 pub mod text;
+pub(super) mod tree;
 mod version;

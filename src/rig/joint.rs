@@ -79,6 +79,17 @@ impl From<Trs> for RestTransform {
     }
 }
 
+/// Angles about X, Y and Z in degrees, one after the other in that order (X is applied last), as a rotation.
+pub fn degrees(angles: Vec3) -> Quat {
+    let [x, y, z] = angles.to_array().map(f32::to_radians);
+    let half = |angle: f32| (bevy::math::ops::sin(angle * 0.5), bevy::math::ops::cos(angle * 0.5));
+    let about = |axis: Vec3, angle: f32| {
+        let (sin, cos) = half(angle);
+        Quat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos)
+    };
+    (about(Vec3::X, x) * about(Vec3::Y, y) * about(Vec3::Z, z)).normalize()
+}
+
 /// Kind of a node of the skeleton.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum NodeKind {

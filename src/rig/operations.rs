@@ -23,7 +23,7 @@ pub use place::settle;
 pub use symmetry::MirrorPlane;
 pub use tags::{CopiedIdentifiers, CopiedJoint, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope};
 
-use crate::rig::{EditError, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
+use crate::rig::{EditError, GROUP_COLORS, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
 
 /// A change of a rig that a person requests. Positions and transforms are in the rig's space.
 #[derive(Debug, Clone, PartialEq)]
@@ -325,15 +325,3 @@ fn named_group(draft: &mut Draft, name: &str, color: Option<[f32; 3]>) -> Result
     };
     Ok(Some(group.uid))
 }
-
-/// Colours of groups without a chosen colour, distinguishable with a colour vision deficiency, too (the palette of
-/// Okabe and Ito 2008, without black).
-const GROUP_COLORS: [[f32; 3]; 7] = [
-    [0.90, 0.62, 0.00],
-    [0.34, 0.71, 0.91],
-    [0.00, 0.62, 0.45],
-    [0.94, 0.89, 0.26],
-    [0.00, 0.45, 0.70],
-    [0.84, 0.37, 0.00],
-    [0.80, 0.47, 0.65],
-];

@@ -34,8 +34,9 @@
 //! Examples: `@this`, `@joint upper_arm_l#0123456789abcdef`, `@command control/hand_l#00000000000000aa role:offset`,
 //! `@joints group:arm_l#00000000000000bb type:joint,control pick:START,2,END`, `@joint hand_l + @joint hand_r`.
 //!
-//! The name of a command is its module, and the label of its joint after a `/` where that is needed; the name of a
-//! label is the label.
+//! The name of a command is its module, and the label of its joint after a `/` where that is needed; where several commands
+//! of a module stand on one joint, the name that the command gives its nodes stands in place of the label or behind it:
+//! `control/hand_l`, `control/hand_ik_l`, `control/hand_l/hand_ik_l`. The name of a label is the label.
 
 mod error;
 mod names;
@@ -52,7 +53,7 @@ pub use error::{PickError, ReferenceError, ReferenceProblem};
 pub use names::{NameKind, NameScope, Names, RigNames, label_text};
 pub use params::{
     BadReference, FoundReference, bind_names, given_names, map_references, nearest_to_gone, references_in,
-    refresh_names, written_as,
+    refresh_names, without_uids, written_as,
 };
 pub(in crate::rig) use params::{map_text_fields, map_uids};
 

@@ -11,6 +11,29 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 #[reflect(Component)]
 pub struct Uid(pub u64);
 
+impl Uid {
+    /// The uid that follows from names: the same for the same texts in the same order; never zero.
+    pub fn derived<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
+        let mut hash = 0x5249_4753_4d49_5448;
+        for name in names {
+            // The length keeps ("ab", "c") and ("a", "bc") apart.
+            hash = mix(hash ^ name.len() as u64);
+            for byte in name.bytes() {
+                hash = mix(hash ^ u64::from(byte));
+            }
+        }
+        Self(hash.max(1))
+    }
+}
+
+/// One round of SplitMix64's finaliser.
+pub(crate) fn mix(value: u64) -> u64 {
+    let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
 impl fmt::Display for Uid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:016x}", self.0)
@@ -66,11 +89,8 @@ impl UidSource {
     /// The next uid; never zero.
     pub fn next_uid(&mut self) -> Uid {
         loop {
+            let z = mix(self.state);
             self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            let mut z = self.state;
-            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            z ^= z >> 31;
             if z != 0 {
                 return Uid(z);
             }

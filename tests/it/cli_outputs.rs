@@ -156,3 +156,33 @@ fn the_demonstration_keeps_what_is_there() {
     assert!(said.contains("kept the biped.glb"), "{said}");
     assert_eq!(fs::read_to_string(&glb).unwrap(), "somebody's biped");
 }
+
+#[test]
+fn templates_are_formatted_in_place_or_not_at_all() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let read = |name: &str| fs::read_to_string(at(name)).unwrap();
+    let rough = "(format: 2, name: \"a\", // mine\n joints: [(label: \"j\"), (label: \"k\",parent:\"j\")])\n";
+    let tidy = "(\n    format: 2,\n    name: \"a\", // mine\n    joints: [\n        (label: \"j\"),\n        (label: \"k\", parent: \"j\"),\n    ],\n)\n";
+    fs::write(at("a.rig.ron"), rough).unwrap();
+    let (code, said) = rigsmith(folder.path(), &["format", "--check", "a.rig.ron"]);
+    assert_eq!((code, read("a.rig.ron").as_str()), (1, rough), "{said}");
+    let (code, said) = rigsmith(folder.path(), &["format", "a.rig.ron"]);
+    assert_eq!((code, read("a.rig.ron").as_str()), (0, tidy), "{said}");
+    assert_eq!(rigsmith(folder.path(), &["format", "--check", "a.rig.ron"]).0, 0);
+    let (code, said) = rigsmith(folder.path(), &["format", "--uids", "write", "a.rig.ron", "--json"]);
+    assert!(code == 0 && said.contains("\"changed\": true"), "{said}");
+    assert_eq!(read("a.rig.ron").matches("uid: ").count(), 3);
+    assert_eq!(rigsmith(folder.path(), &["format", "--uids", "derive", "a.rig.ron"]).0, 0);
+    assert_eq!(read("a.rig.ron"), tidy);
+    // One file that is at fault, and none is touched; another kind of file is wrong usage.
+    fs::write(at("a.rig.ron"), rough).unwrap();
+    fs::write(at("bad.rig.ron"), "(format: 2, name: \"b\", joints: [(label: \"j\", parent: \"x\")])").unwrap();
+    let (code, said) = rigsmith(folder.path(), &["format", "a.rig.ron", "bad.rig.ron"]);
+    assert!(code == 1 && said.contains("no joint \"x\"") && said.contains("bad.rig.ron"), "{said}");
+    assert_eq!(read("a.rig.ron"), rough);
+    assert_eq!(rigsmith(folder.path(), &["format", "b.obj"]).0, 2);
+    // What is converted keeps what its author wrote.
+    assert_eq!(rigsmith(folder.path(), &["convert", "a.rig.ron", "c.rig.ron"]).0, 0);
+    assert_eq!(read("c.rig.ron"), rough);
+}

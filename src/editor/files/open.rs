@@ -344,6 +344,11 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     // A journal left by a crash beside the project stays there until a person decides about it.
     let places = places(world, project.clone().filter(|_| pending.is_none()));
     let is_recovered = work.is_some();
+    let opened = work.as_ref().map_or(&origin, |work| work.recovered.origin());
+    let template = match opened {
+        Origin::Template { path, .. } => Some(path.clone()),
+        _ => None,
+    };
     let (bundle, journal) = match work {
         Some(work) => {
             let Resumed { journal, kept } =
@@ -360,7 +365,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     };
     let sink = watched(journal.clone());
     let saved = if is_recovered { SavedAt::Nowhere } else { SavedAt::Step(None) };
-    let document = OpenDocument { name: title.clone(), project, saved, journal, missing, is_placed: false };
+    let document = OpenDocument { name: title.clone(), project, template, saved, journal, missing, is_placed: false };
     let entity = world.spawn((bundle, sink, document)).id();
     for (mesh, source) in meshes {
         world.spawn((mesh, source, SkinOf(entity)));

@@ -26,7 +26,7 @@ use crate::{
     files::{
         Disk, FileKind, MeshShape, MeshToSave, ProjectToSave, RealDisk,
         journal::{Journal, SaveMark},
-        project_files, read_capped, save_atomic, save_set, stem, store_model, store_rig, store_skin,
+        project_files, read_capped, save_atomic, save_set, stem, store_model, store_rig_over, store_skin,
     },
     mesh::{gltf::GltfWriteSettings, model::Model},
     plugins::{commands::Built, history::RigHistory, surface::RigMesh},
@@ -223,8 +223,9 @@ fn export(world: &mut World, path: PathBuf) {
     let mesh = open.into_iter().next().map(|(_, mesh, _)| mesh.clone());
     let (step, name) = (last_step(world, rig), file_name(&path));
     let built = world.get::<Built>(rig).map(|built| built.0.clone());
+    let template = world.get::<OpenDocument>(rig).and_then(|document| document.template.clone());
     let task = spawn(move || {
-        let mut notes = export_to(&path, &data, built.as_deref(), mesh.as_ref())?;
+        let mut notes = export_to(&path, &data, built.as_deref(), mesh.as_ref(), template.as_deref())?;
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
         }
@@ -238,6 +239,7 @@ fn export_to(
     rig: &Rig,
     built: Option<&BuiltRig>,
     mesh: Option<&RigMesh>,
+    template: Option<&Path>,
 ) -> Result<Vec<String>, WriteError> {
     match FileKind::of(path) {
         Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
@@ -255,7 +257,10 @@ fn export_to(
             let settings = GltfWriteSettings { all_joints: skin.is_none(), ..default() };
             Ok(store_model(&RealDisk, path, &model, &settings)?)
         }
-        Some(FileKind::Template | FileKind::RigText) => Ok(store_rig(&RealDisk, path, rig)?),
+        Some(FileKind::Template | FileKind::RigText) => {
+            let sources = [Some(path), template];
+            Ok(store_rig_over(&RealDisk, path, rig, &sources.into_iter().flatten().collect::<Vec<_>>())?)
+        }
         Some(FileKind::Skin) => {
             let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
             let (mesh, skin) = both.ok_or(WriteError::NoWeights)?;

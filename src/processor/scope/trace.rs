@@ -6,7 +6,7 @@ use crate::{
         resolve::{self, Asker, Resolution},
         world::{Aspect, NodeId, Value, World, same},
     },
-    rig::{Uid, reference::NodeRefs},
+    rig::{Uid, mix, reference::NodeRefs},
 };
 
 /// Something that a command read, with what it found.
@@ -65,12 +65,4 @@ pub(super) fn created_uid(command: Uid, role: &str, subject: Uid, number: u32) -
     hash = mix(hash ^ subject.0);
     hash = mix(hash ^ u64::from(number));
     Uid(hash.max(1))
-}
-
-/// One round of SplitMix64's finaliser.
-fn mix(value: u64) -> u64 {
-    let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }

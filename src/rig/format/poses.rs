@@ -101,15 +101,17 @@ pub(super) fn write_offsets<'a>(
 
 /// Writes the stored poses of a rig, as elements of a list.
 pub(super) fn write_stored_poses(out: &mut String, rig: &Rig, indent: &str) -> std::fmt::Result {
-    for pose in rig.stored_poses() {
-        writeln!(out, "{indent}(\n{indent}    uid: \"{}\",", pose.uid)?;
-        writeln!(out, "{indent}    name: {},\n{indent}    offsets: [", quoted(&pose.name))?;
-        write_offsets(out, &pose.offsets, &format!("{indent}        "))?;
-        writeln!(out, "{indent}    ],")?;
-        write_values(out, &pose.values, &format!("{indent}    "))?;
-        writeln!(out, "{indent}),")?;
-    }
-    Ok(())
+    rig.stored_poses().iter().try_for_each(|pose| write_stored_pose(out, pose, indent))
+}
+
+/// Writes a stored pose, as an element of a list.
+pub(super) fn write_stored_pose(out: &mut String, pose: &StoredPose, indent: &str) -> std::fmt::Result {
+    writeln!(out, "{indent}(\n{indent}    uid: \"{}\",", pose.uid)?;
+    writeln!(out, "{indent}    name: {},\n{indent}    offsets: [", quoted(&pose.name))?;
+    write_offsets(out, &pose.offsets, &format!("{indent}        "))?;
+    writeln!(out, "{indent}    ],")?;
+    write_values(out, &pose.values, &format!("{indent}    "))?;
+    writeln!(out, "{indent}),")
 }
 
 /// Adds stored poses; `fault` takes the uid of a wrong pose, the place of that uid among equal ones, the field and the

@@ -4,22 +4,45 @@
 //! follow, one field group a line, so that a change of one value changes one line. Reading checks everything before
 //! it returns, so that a scene never sees half a rig; loading what was saved gives the same rig, and saving that the
 //! same bytes.
+//!
+//! # Shorthand
+//!
+//! People write format 2, in which whatever follows from the rest is left out:
+//!
+//! - A uid that is left out is derived: that of a joint from its label, of a group, a stored pose and the rig from the
+//!   name, of a tag from its joint, its module and the name that it gives (kind, name and switch of a feature); the second
+//!   of equal tags on a joint is the second for good.
+//! - `parent`, `mirror`, `group` and `feature` take a label or name; a feature's switch stands behind a point, as in
+//!   `ik.space`, and of several features of a name the one on the same joint is meant.
+//! - `control(shape: "ring")` stands for `Command(module: "control", params: (shape: "ring"))`. The fields `uid`,
+//!   `enabled`, `comment` and `feature` belong to the tag, all others to the module.
+//! - `rotation` takes three angles in degrees, about X, Y and Z, besides a quaternion.
+//! - Whatever has a default can be left out: the translation, the colour of a group, the number of joints.
 
 mod comment_placement;
+mod file;
+mod header;
+mod over;
 mod read;
+mod shorthand;
+mod tidy;
 mod write;
 
 use serde::{Deserialize, Serialize};
 
+pub use over::write_template_over;
 pub(in crate::rig) use read::read_text;
-pub use read::{read_header, read_template, survey_template};
+pub use read::{read_header, read_template, survey_template, text_of};
+pub use shorthand::{Explicit, explicit};
+pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{quoted, vector, write_without_poses};
 
 use crate::rig::{Rig, Uid};
 
-/// The newest format that is read and written. A file says the oldest format that holds what is in it: format 2 where a
-/// part says its needs, a feature has a choice, a joint is a placed bone of a face or poses are stored, else 1.
+/// The newest format that is read and written. A file that the program writes by itself says the oldest format that holds
+/// what is in it: format 2 where a part says its needs, a feature has a choice, a joint is a placed bone of a face or poses
+/// are stored, else 1. People write format 2, which has shorthand.
 pub const FORMAT: u32 = 2;
 
 /// Largest size in bytes of a template that is read.
@@ -31,6 +54,7 @@ pub struct TemplateHeader {
     /// Format of the file.
     pub format: u32,
     /// Uid of the rig.
+    #[serde(default)]
     pub uid: Uid,
     /// Name of the rig.
     pub name: String,

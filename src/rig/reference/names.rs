@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, fmt};
 
-use super::{GroupScope, RigScope, params::text_field};
+use super::{GroupScope, RigScope, given_names, params::text_field};
 use crate::rig::{Rig, RigJoint, TagData, TagKind, Uid};
 
 /// Kind of object that a uid of a reference stands for.
@@ -16,7 +16,8 @@ pub enum NameKind {
     Joint,
     /// The joint or command that bears a label, by that label.
     Label,
-    /// A command tag, by its module, and the label of its joint after a `/` where that is needed.
+    /// A command tag, by its module, and the label of its joint after a `/` where that is needed. The name that the command
+    /// gives may stand in place of the label or, after another `/`, behind it.
     Command,
 }
 
@@ -46,6 +47,11 @@ pub trait Names {
     /// The current name of an object; `None` if it does not exist or has no name.
     fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>>;
 
+    /// The names by which an object can be found, as far as no other has them, the usual one first.
+    fn names_of(&self, kind: NameKind, uid: Uid) -> Vec<String> {
+        self.name_of(kind, uid).into_iter().map(Cow::into_owned).collect()
+    }
+
     /// Uids of the objects with a name, in the order of the document.
     fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid>;
 
@@ -54,6 +60,18 @@ pub trait Names {
 }
 
 impl Names for Rig {
+    fn names_of(&self, kind: NameKind, uid: Uid) -> Vec<String> {
+        let mut list: Vec<String> = self.name_of(kind, uid).into_iter().map(Cow::into_owned).collect();
+        if kind == NameKind::Command
+            && let Some((joint, tag)) = self.find_tag(uid)
+            && let (Some(module), Some(given)) = (module(tag), given_name(tag))
+        {
+            list.push(format!("{module}/{given}"));
+            list.extend(joint.data.label.as_ref().map(|label| format!("{module}/{label}/{given}")));
+        }
+        list
+    }
+
     fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
         match kind {
             NameKind::Rig => (self.uid() == uid).then(|| Cow::Borrowed(self.about().name.as_str())),
@@ -73,12 +91,7 @@ impl Names for Rig {
             NameKind::Group => self.groups().iter().filter(|group| group.name == name).map(|group| group.uid).collect(),
             NameKind::Joint => labelled(self, name).map(|joint| joint.data.uid).collect(),
             NameKind::Label => bearer(self, scope.group, name).into_iter().collect(),
-            NameKind::Command => commands(self)
-                .filter(|(joint, tag)| {
-                    module(tag) == Some(name) || command_name(joint, tag).is_some_and(|own| own == name)
-                })
-                .map(|(_, tag)| tag.uid)
-                .collect(),
+            NameKind::Command => find_commands(self, name),
         }
     }
 
@@ -163,6 +176,31 @@ fn bearer(rig: &Rig, group: GroupScope, label: &str) -> Option<Uid> {
         _ => true,
     };
     all.iter().find(in_group).or(all.first()).map(|(_, uid)| *uid)
+}
+
+/// Commands with a name: the module, and behind a `/` the label of the joint, which decides, or the name that the command
+/// gives its nodes, or both with a `/` between.
+fn find_commands(rig: &Rig, name: &str) -> Vec<Uid> {
+    let by_joint = |(joint, tag): &(&RigJoint, &TagData)| {
+        module(tag) == Some(name) || command_name(joint, tag).is_some_and(|own| own == name)
+    };
+    let found: Vec<Uid> = commands(rig).filter(by_joint).map(|(_, tag)| tag.uid).collect();
+    let Some((wanted, rest)) = name.split_once('/').filter(|_| found.len() != 1) else { return found };
+    let by_given = |(joint, tag): &(&RigJoint, &TagData)| {
+        module(tag) == Some(wanted)
+            && given_name(tag).is_some_and(|given| {
+                let on_joint = rest.strip_suffix(given.as_str()).and_then(|joint| joint.strip_suffix('/'));
+                given == rest || on_joint.is_some() && on_joint == joint.data.label.as_deref()
+            })
+    };
+    let given: Vec<Uid> = commands(rig).filter(by_given).map(|(_, tag)| tag.uid).collect();
+    if given.len() == 1 || found.is_empty() { given } else { found }
+}
+
+/// Name that a command gives its nodes, or what else it makes.
+fn given_name(tag: &TagData) -> Option<String> {
+    let TagKind::Command { params, .. } = &tag.kind else { return None };
+    given_names(params).find(|name| !name.is_empty())
 }
 
 fn labelled<'a>(rig: &'a Rig, label: &'a str) -> impl Iterator<Item = &'a RigJoint> {

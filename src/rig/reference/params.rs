@@ -91,6 +91,35 @@ pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<
     (bound, bad)
 }
 
+/// The parameters with names alone in place of the uids that `leave_out` chooses, in every reference that [`bind_names`]
+/// gives the same uids again.
+pub fn without_uids<'a>(params: &'a str, names: &dyn Names, leave_out: impl Fn(Uid) -> bool) -> Cow<'a, str> {
+    rewritten(params, literals(params), |text| {
+        let mut places = Vec::new();
+        let before = read_with(text, Some(names), &mut places).ok()?;
+        places.retain(|place| place.has_uid && leave_out(place.uid));
+        places.sort_unstable_by_key(|place| place.name.start);
+        let mut out = String::with_capacity(text.len());
+        let mut at = 0;
+        for place in places {
+            let beside = text[place.name.end..].trim_start();
+            let hash = text.len() - beside.len();
+            let end = hash + 1 + place.uid.to_string().len();
+            let written = text.get(hash + 1..end).and_then(|digits| digits.parse().ok());
+            let is_its = |name: &String| names.find(NameScope::default(), place.kind, name) == [place.uid];
+            if let Some(name) = names.names_of(place.kind, place.uid).into_iter().find(is_its)
+                && written == Some(place.uid)
+            {
+                out.push_str(&text[at..place.name.start]);
+                out.push_str(&name_text(&name));
+                at = end;
+            }
+        }
+        out.push_str(&text[at..]);
+        (read_with(&out, Some(names), &mut Vec::new()).ok()? == before).then_some(out)
+    })
+}
+
 /// References as written in the parameters, with the names there, for quotation in errors. Without names if they are
 /// not in the parameters.
 pub fn written_as(params: &str, references: &NodeRefs) -> String {

@@ -6,137 +6,38 @@ use std::{
 };
 
 use bevy::math::{Quat, Vec3};
-use ron::value::RawValue;
-use serde::Deserialize;
 
 use super::{
-    FORMAT, FeatureSummary, MAX_BYTES, NeedsSummary, Template, TemplateHeader,
+    FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader,
     comment_placement::take_placement,
+    file::{FaceFile, JointFile, TagFile, TemplateFile, known_names},
+    header::complete,
+    shorthand::{Explicit, explicit},
     write::{feature_summaries, needs_summary},
 };
 use crate::rig::{
-    FaceBonePart, FacePlacement, GroupData, JointData, NodeKind, RestTransform, Rig, RigAbout, RigEdit, SourceError,
-    TagData, TagKind, Uid,
-    format::poses::{PoseFile, add_poses, no_rotation, no_scale},
+    FacePlacement, GROUP_COLORS, GroupData, JointData, RestTransform, Rig, RigAbout, RigEdit, SourceError, TagData,
+    TagKind, Uid,
+    format::poses::add_poses,
     format::scan::{self, Field},
     format::source::{parse_ron, ron_options, utf8},
     format::version::{Format, blanked},
     reference::{bind_names, refresh_names},
 };
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TemplateFile {
-    format: u32,
-    uid: Uid,
-    name: String,
-    #[serde(default)]
-    version: String,
-    #[serde(default)]
-    kind: String,
-    #[serde(default)]
-    author: String,
-    #[serde(default)]
-    description: String,
-    #[serde(default)]
-    preview: Option<String>,
-    #[serde(default)]
-    joint_count: Option<usize>,
-    #[serde(default)]
-    features: Vec<FeatureSummary>,
-    #[serde(default)]
-    needs: Option<NeedsSummary>,
-    #[serde(default)]
-    groups: Vec<GroupFile>,
-    #[serde(default)]
-    joints: Vec<JointFile>,
-    #[serde(default)]
-    poses: Vec<PoseFile>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct GroupFile {
-    uid: Uid,
-    name: String,
-    color: (f32, f32, f32),
-    #[serde(default = "yes")]
-    enabled: bool,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct JointFile {
-    uid: Uid,
-    #[serde(default)]
-    parent: Option<Uid>,
-    #[serde(default)]
-    label: Option<String>,
-    #[serde(default)]
-    group: Option<Uid>,
-    #[serde(default)]
-    mirror: Option<Uid>,
-    #[serde(default)]
-    kind: NodeKind,
-    #[serde(default)]
-    locked: bool,
-    translation: (f32, f32, f32),
-    #[serde(default = "no_rotation")]
-    rotation: (f32, f32, f32, f32),
-    #[serde(default = "no_scale")]
-    scale: (f32, f32, f32),
-    #[serde(default)]
-    face: Option<FaceFile>,
-    #[serde(default)]
-    tags: Vec<TagFile>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FaceFile {
-    part: FaceBonePart,
-    label: String,
-    at: (f32, f32, f32),
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-enum TagFile {
-    Command {
-        uid: Uid,
-        #[serde(default = "yes")]
-        enabled: bool,
-        #[serde(default)]
-        comment: String,
-        module: String,
-        #[serde(default)]
-        feature: Option<Uid>,
-        params: Box<RawValue>,
-    },
-    Feature {
-        uid: Uid,
-        #[serde(default = "yes")]
-        enabled: bool,
-        #[serde(default)]
-        comment: String,
-        kind: String,
-        name: String,
-        #[serde(default)]
-        switch: String,
-        #[serde(default)]
-        choice: String,
-    },
-}
-
-fn yes() -> bool {
-    true
-}
-
 const TEMPLATE: Format = Format { what: "template", number: FORMAT, known: known_names };
+
+/// The text of a template's bytes.
+///
+/// # Errors
+/// Bytes that are no UTF-8, none at all, or more than [`MAX_BYTES`].
+pub fn text_of(bytes: &[u8]) -> Result<&str, SourceError> {
+    utf8(bytes, MAX_BYTES, "template")
+}
 
 /// Reads a template. An error anywhere refuses the whole template.
 pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
-    read_text(utf8(bytes, MAX_BYTES, "template")?, 1)
+    read_text(text_of(bytes)?, 1)
 }
 
 /// Reads a template as far as it goes, to tell all that is wrong with it: with every fault of its structure, in the
@@ -145,10 +46,17 @@ pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
 /// # Errors
 /// A text that cannot be read as a template at all, with the faults that were found before that.
 pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec<SourceError>> {
-    let text = utf8(bytes, MAX_BYTES, "template").map_err(|error| vec![error])?;
-    let (mut notes, mut faults) = (Vec::new(), Vec::new());
+    let source = text_of(bytes).map_err(|error| vec![error])?;
+    let explicit = explicit(source);
+    let (text, mut notes, mut faults) = (&*explicit.text, Vec::new(), Vec::new());
+    let in_source = |faults: Vec<SourceError>| {
+        let mut all: Vec<SourceError> = faults.into_iter().map(|fault| explicit.fault(fault)).collect();
+        all.extend(explicit.faults.iter().cloned());
+        all.sort_by_key(|fault| fault.offset);
+        all
+    };
     let fields = scan::fields(text);
-    let readable = TEMPLATE.readable(text, &fields, 1, &mut notes).map_err(|error| vec![error])?;
+    let readable = TEMPLATE.readable(text, &fields, 1, &mut notes).map_err(|error| in_source(vec![error]))?;
     // In a file of a newer format they are notes.
     let unknown = if matches!(readable, Cow::Borrowed(_)) { TEMPLATE.unknown(&fields) } else { Vec::new() };
     for field in &unknown {
@@ -160,18 +68,24 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
         Ok(file) => file,
         Err(error) => {
             faults.push(SourceError::from_ron(text, &error));
-            faults.sort_by_key(|fault| fault.offset);
-            return Err(faults);
+            return Err(in_source(faults));
         }
     };
     let rig = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
-    faults.sort_by_key(|fault| fault.offset);
-    Ok((Template { rig, notes }, faults))
+    Ok((Template { rig, notes }, in_source(faults)))
 }
 
 /// Reads a template that stands in another file, where its first line has the number `first_line`.
-pub(in crate::rig) fn read_text(text: &str, first_line: usize) -> Result<Template, SourceError> {
-    let mut notes = Vec::new();
+pub(in crate::rig) fn read_text(source: &str, first_line: usize) -> Result<Template, SourceError> {
+    let explicit = explicit(source);
+    match explicit.faults.first() {
+        Some(fault) => Err(fault.clone()),
+        None => read_explicit(&explicit, first_line).map_err(|error| explicit.fault(error)),
+    }
+}
+
+fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, SourceError> {
+    let (text, mut notes) = (&*explicit.text, Vec::new());
     let fields = scan::fields(text);
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
     let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
@@ -196,58 +110,10 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
     passed_over.extend(fields.iter().filter(is_list));
     passed_over.sort_unstable_by_key(|field| field.start);
     let whole = parse_ron(&blanked(text, &passed_over));
-    let Some(first) = fields.iter().find(is_list) else { return whole };
+    let Some(first) = fields.iter().find(is_list) else { return whole.map(|header| complete(header, text)) };
     // If the lists are cut short or invalid, the text before them is enough for the header.
-    whole.or_else(|_| parse_ron(&format!("{})", &text[..first.start])))
-}
-
-/// Names that are allowed for a field at its place; `None` where any name is allowed (parameters of modules).
-fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
-    let parent = field.parent.map(|parent| &fields[parent]);
-    let above = parent.and_then(|parent| parent.parent).map(|above| fields[above].name);
-    match (field.depth, parent.map(|parent| parent.name)) {
-        (1, None) => Some(&[
-            "format",
-            "uid",
-            "name",
-            "version",
-            "kind",
-            "author",
-            "description",
-            "preview",
-            "joint_count",
-            "features",
-            "needs",
-            "groups",
-            "joints",
-            "poses",
-        ]),
-        (3, Some("poses")) => Some(&["uid", "name", "offsets", "values"]),
-        (5, Some("offsets")) if above == Some("poses") => Some(&["joint", "translation", "rotation", "scale"]),
-        (5, Some("values")) if above == Some("poses") => Some(&["node", "name", "value"]),
-        (2, Some("needs")) => Some(&["joints", "sockets"]),
-        (3, Some("features")) => Some(&["kind", "name", "switches"]),
-        (3, Some("groups")) => Some(&["uid", "name", "color", "enabled"]),
-        (3, Some("joints")) => Some(&[
-            "uid",
-            "parent",
-            "label",
-            "group",
-            "mirror",
-            "kind",
-            "locked",
-            "translation",
-            "rotation",
-            "scale",
-            "face",
-            "tags",
-        ]),
-        (4, Some("face")) if above == Some("joints") => Some(&["part", "label", "at"]),
-        (5, Some("tags")) if above == Some("joints") => {
-            Some(&["uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch", "choice"])
-        }
-        _ => None,
-    }
+    let header = whole.or_else(|_| parse_ron(&format!("{})", &text[..first.start])))?;
+    Ok(complete(header, text))
 }
 
 /// The rig of a file, without what is at fault.
@@ -262,12 +128,12 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>, faults: &
         preview: file.preview,
     };
     let mut seen = HashSet::new();
-    for group in file.groups {
+    for (number, group) in file.groups.into_iter().enumerate() {
         if !seen.insert(group.uid) {
             faults.push(places.used_twice(group.uid));
             continue;
         }
-        let mut color: [f32; 3] = group.color.into();
+        let mut color = group.color.map_or(GROUP_COLORS[number % GROUP_COLORS.len()], <[f32; 3]>::from);
         if color.iter().any(|part| !part.is_finite()) {
             let message = "the colour is not finite; use numbers from 0 to 1".to_owned();
             faults.push(places.error(group.uid, 0, "color", message));
@@ -284,7 +150,7 @@ fn build(places: &Places, file: TemplateFile, notes: &mut Vec<String>, faults: &
         faults.push(places.error(uid, nth, field, message));
     });
     bind_references(&mut rig, notes);
-    if feature_summaries(&rig) != sorted(file.features) {
+    if file.features.is_some_and(|features| feature_summaries(&rig) != sorted(features)) {
         notes.push("the header lists other features than the tags; saving corrects it".to_owned());
     }
     if file.needs.is_some() && file.needs != needs_summary(&rig) {

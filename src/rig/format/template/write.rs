@@ -9,7 +9,9 @@ use bevy::math::{Quat, Vec3};
 
 use super::{FORMAT, FeatureSummary, NeedsSummary};
 use crate::rig::{
-    FacePlacement, NodeKind, Rig, RigJoint, TagData, TagKind, Uid, format::poses::write_stored_poses, part::PartNeeds,
+    FacePlacement, GroupData, NodeKind, Rig, RigJoint, StoredPose, TagData, TagKind, Uid,
+    format::poses::{write_stored_pose, write_stored_poses},
+    part::PartNeeds,
     reference::refresh_names,
 };
 
@@ -31,10 +33,7 @@ pub(in crate::rig) fn write_without_poses(rig: &Rig) -> String {
 fn write_into(out: &mut String, rig: &Rig, with_poses: bool) -> std::fmt::Result {
     let with_poses = with_poses && !rig.stored_poses().is_empty();
     let about = rig.about();
-    let needs = needs_summary(rig);
-    let has_choice = |tag: &TagData| matches!(&tag.kind, TagKind::Feature { choice, .. } if !choice.is_empty());
-    let is_newer = |joint: &RigJoint| joint.data.face.is_some() || joint.data.tags.iter().any(has_choice);
-    let format = if with_poses || needs.is_some() || rig.walk().any(is_newer) { FORMAT } else { 1 };
+    let format = if with_poses { needed_format(rig) } else { format_without_poses(rig) };
     writeln!(out, "(\n    format: {format},\n    uid: \"{}\",", rig.uid())?;
     writeln!(out, "    name: {},\n    version: {},", quoted(&about.name), quoted(&about.version))?;
     writeln!(out, "    kind: {},\n    author: {},", quoted(&about.kind), quoted(&about.author))?;
@@ -43,19 +42,16 @@ fn write_into(out: &mut String, rig: &Rig, with_poses: bool) -> std::fmt::Result
         writeln!(out, "    preview: {},", quoted(preview))?;
     }
     writeln!(out, "    joint_count: {},", rig.len())?;
-    write_features(out, rig)?;
-    if let Some(NeedsSummary { joints, sockets }) = needs {
-        let list = |names: &[String]| names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
-        writeln!(out, "    needs: (joints: [{}], sockets: [{}]),", list(&joints), list(&sockets))?;
+    writeln!(out, "    features: {},", feature_list(rig))?;
+    if let Some(needs) = needs_text(rig) {
+        writeln!(out, "    needs: {needs},")?;
     }
     writeln!(out, "    groups: [")?;
     for group in rig.groups() {
-        let [r, g, b] = group.color;
-        write!(out, "        (uid: \"{}\", name: {}, color: ({r:?}, {g:?}, {b:?})", group.uid, quoted(&group.name))?;
-        writeln!(out, "{}),", if group.enabled { "" } else { ", enabled: false" })?;
+        writeln!(out, "        {},", group_text(group))?;
     }
     writeln!(out, "    ],\n    joints: [")?;
-    let features: HashSet<Uid> = rig.walk().flat_map(|joint| &joint.data.tags).filter_map(feature_uid).collect();
+    let features = feature_uids(rig);
     for joint in rig.walk() {
         write_joint(out, rig, joint, &features)?;
     }
@@ -66,23 +62,85 @@ fn write_into(out: &mut String, rig: &Rig, with_poses: bool) -> std::fmt::Result
     writeln!(out, "    ],\n)")
 }
 
-fn write_features(out: &mut String, rig: &Rig) -> std::fmt::Result {
+/// Oldest format that holds all of a rig's template.
+pub(super) fn needed_format(rig: &Rig) -> u32 {
+    if rig.stored_poses().is_empty() { format_without_poses(rig) } else { FORMAT }
+}
+
+fn format_without_poses(rig: &Rig) -> u32 {
+    let has_choice = |tag: &TagData| matches!(&tag.kind, TagKind::Feature { choice, .. } if !choice.is_empty());
+    let is_newer = |joint: &RigJoint| joint.data.face.is_some() || joint.data.tags.iter().any(has_choice);
+    if rig.about().kind == "part" || rig.walk().any(is_newer) { FORMAT } else { 1 }
+}
+
+/// The list of named features, an element a line.
+pub(super) fn feature_list(rig: &Rig) -> String {
     let features = feature_summaries(rig);
     if features.is_empty() {
-        return writeln!(out, "    features: [],");
+        return "[]".to_owned();
     }
-    writeln!(out, "    features: [")?;
+    let mut out = String::from("[\n");
     for feature in features {
         let switches: Vec<String> = feature.switches.iter().map(|switch| quoted(switch)).collect();
-        let switches = switches.join(", ");
-        writeln!(
-            out,
-            "        (kind: {}, name: {}, switches: [{switches}]),",
-            quoted(&feature.kind),
-            quoted(&feature.name)
-        )?;
+        let (kind, name, switches) = (quoted(&feature.kind), quoted(&feature.name), switches.join(", "));
+        out.push_str(&format!("        (kind: {kind}, name: {name}, switches: [{switches}]),\n"));
     }
-    writeln!(out, "    ],")
+    out.push_str("    ]");
+    out
+}
+
+/// What a part needs; `None` for another rig.
+pub(super) fn needs_text(rig: &Rig) -> Option<String> {
+    let NeedsSummary { joints, sockets } = needs_summary(rig)?;
+    let list = |names: &[String]| names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
+    Some(format!("(joints: [{}], sockets: [{}])", list(&joints), list(&sockets)))
+}
+
+/// A local group.
+pub(super) fn group_text(group: &GroupData) -> String {
+    let [r, g, b] = group.color;
+    let enabled = if group.enabled { "" } else { ", enabled: false" };
+    format!("(uid: \"{}\", name: {}, color: ({r:?}, {g:?}, {b:?}){enabled})", group.uid, quoted(&group.name))
+}
+
+/// A joint with its tags.
+pub(super) fn joint_text(rig: &Rig, joint: &RigJoint) -> String {
+    let mut out = String::new();
+    let written = write_joint(&mut out, rig, joint, &feature_uids(rig));
+    debug_assert!(written.is_ok(), "writing to a string does not fail");
+    element(&out)
+}
+
+/// A tag.
+pub(super) fn tag_text(rig: &Rig, tag: &TagData) -> String {
+    let mut out = String::new();
+    let written = write_tag(&mut out, rig, tag, &feature_uids(rig));
+    debug_assert!(written.is_ok(), "writing to a string does not fail");
+    element(&out)
+}
+
+/// A stored pose.
+pub(super) fn pose_text(pose: &StoredPose) -> String {
+    let mut out = String::new();
+    let written = write_stored_pose(&mut out, pose, "        ");
+    debug_assert!(written.is_ok(), "writing to a string does not fail");
+    element(&out)
+}
+
+/// Placement of a facial bone.
+pub(super) fn face_text(face: &FacePlacement) -> String {
+    let FacePlacement { part, label, position } = face;
+    format!("(part: {part:?}, label: {}, at: {})", quoted(label), vector(*position))
+}
+
+/// An element of a list without the comma behind it.
+fn element(text: &str) -> String {
+    let text = text.trim();
+    text.strip_suffix(',').unwrap_or(text).to_owned()
+}
+
+fn feature_uids(rig: &Rig) -> HashSet<Uid> {
+    rig.walk().flat_map(|joint| &joint.data.tags).filter_map(feature_uid).collect()
 }
 
 /// What a rig needs as a part; `None` for one of another kind.
@@ -144,9 +202,8 @@ fn write_joint(out: &mut String, rig: &Rig, joint: &RigJoint, features: &HashSet
     if rest.scale != Vec3::ONE {
         write!(out, "\n            scale: {},", vector(rest.scale))?;
     }
-    if let Some(FacePlacement { part, label, position }) = &data.face {
-        let (label, position) = (quoted(label), vector(*position));
-        write!(out, "\n            face: (part: {part:?}, label: {label}, at: {position}),")?;
+    if let Some(face) = &data.face {
+        write!(out, "\n            face: {},", face_text(face))?;
     }
     if !data.tags.is_empty() {
         writeln!(out, "\n            tags: [")?;

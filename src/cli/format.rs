@@ -1,0 +1,81 @@
+//! `rigsmith format`: templates in their layout.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+
+use super::{Failure, Report};
+use crate::{
+    files::{FileKind, LoadError, RealDisk, read_capped, save_atomic},
+    rig::template::{self, UidStyle},
+};
+
+/// Arguments of `rigsmith format`.
+#[derive(Args, Debug)]
+pub(super) struct FormatArgs {
+    /// The templates, `.rig.ron`
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Change nothing, and fail if a file is not in its layout
+    #[arg(long)]
+    check: bool,
+    /// What becomes of uids
+    #[arg(long, value_enum, default_value_t = UidsArg::Keep)]
+    uids: UidsArg,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy)]
+enum UidsArg {
+    /// Leave them as they are
+    Keep,
+    /// Write in all that are left out
+    Write,
+    /// Take out those that follow from labels and names
+    Derive,
+}
+
+pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
+    let style = match args.uids {
+        UidsArg::Keep => UidStyle::Kept,
+        UidsArg::Write => UidStyle::Written,
+        UidsArg::Derive => UidStyle::Derived,
+    };
+    let mut report = Report::default();
+    let mut list = Vec::new();
+    // All of them are read before the first is written.
+    let mut formatted = Vec::new();
+    for path in &args.files {
+        formatted.push(format(path, style)?);
+    }
+    for (path, (before, after)) in args.files.iter().zip(formatted) {
+        let changed = before != after;
+        if changed && !args.check {
+            save_atomic(&RealDisk, path, after.as_bytes()).map_err(|error| Failure::Input(Box::new(error)))?;
+        }
+        report.line(match (changed, args.check) {
+            (false, _) => format!("{}: in its layout", path.display()),
+            (true, true) => format!("{}: not in its layout; `rigsmith format` changes it", path.display()),
+            (true, false) => format!("{}: formatted", path.display()),
+        });
+        report.at_fault |= changed && args.check;
+        list.push(json!({ "file": path.display().to_string(), "changed": changed }));
+    }
+    report.set("files", Value::Array(list));
+    Ok(report)
+}
+
+/// Text of a file, as it is and in its layout.
+fn format(path: &Path, style: UidStyle) -> Result<(String, String), Failure> {
+    if FileKind::of(path) != Some(FileKind::Template) {
+        return Err(Failure::Usage(format!("`{}` is no template; `format` takes .rig.ron", path.display())));
+    }
+    let bytes =
+        read_capped(&RealDisk, path, template::MAX_BYTES as u64).map_err(|error| Failure::Input(Box::new(error)))?;
+    let all = String::from_utf8_lossy(&bytes).into_owned();
+    let formatted = template::text_of(&bytes).and_then(|text| template::format_template(text, style));
+    match formatted {
+        Ok(after) => Ok((all, after)),
+        Err(source) => Err(LoadError::Source { path: path.into(), text: all, source }.into()),
+    }
+}

@@ -1,0 +1,173 @@
+//! Contents of a template file as they are deserialised, and the names of its fields.
+
+use ron::value::RawValue;
+use serde::Deserialize;
+
+use super::{FeatureSummary, NeedsSummary};
+use crate::rig::{
+    FaceBonePart, NodeKind, Uid,
+    format::{
+        poses::{PoseFile, no_rotation, no_scale},
+        scan::Field,
+    },
+};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TemplateFile {
+    pub(super) format: u32,
+    pub(super) uid: Uid,
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) version: String,
+    #[serde(default)]
+    pub(super) kind: String,
+    #[serde(default)]
+    pub(super) author: String,
+    #[serde(default)]
+    pub(super) description: String,
+    #[serde(default)]
+    pub(super) preview: Option<String>,
+    #[serde(default)]
+    pub(super) joint_count: Option<usize>,
+    #[serde(default)]
+    pub(super) features: Option<Vec<FeatureSummary>>,
+    #[serde(default)]
+    pub(super) needs: Option<NeedsSummary>,
+    #[serde(default)]
+    pub(super) groups: Vec<GroupFile>,
+    #[serde(default)]
+    pub(super) joints: Vec<JointFile>,
+    #[serde(default)]
+    pub(super) poses: Vec<PoseFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GroupFile {
+    pub(super) uid: Uid,
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) color: Option<(f32, f32, f32)>,
+    #[serde(default = "yes")]
+    pub(super) enabled: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct JointFile {
+    pub(super) uid: Uid,
+    #[serde(default)]
+    pub(super) parent: Option<Uid>,
+    #[serde(default)]
+    pub(super) label: Option<String>,
+    #[serde(default)]
+    pub(super) group: Option<Uid>,
+    #[serde(default)]
+    pub(super) mirror: Option<Uid>,
+    #[serde(default)]
+    pub(super) kind: NodeKind,
+    #[serde(default)]
+    pub(super) locked: bool,
+    #[serde(default)]
+    pub(super) translation: (f32, f32, f32),
+    #[serde(default = "no_rotation")]
+    pub(super) rotation: (f32, f32, f32, f32),
+    #[serde(default = "no_scale")]
+    pub(super) scale: (f32, f32, f32),
+    #[serde(default)]
+    pub(super) face: Option<FaceFile>,
+    #[serde(default)]
+    pub(super) tags: Vec<TagFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FaceFile {
+    pub(super) part: FaceBonePart,
+    pub(super) label: String,
+    pub(super) at: (f32, f32, f32),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) enum TagFile {
+    Command {
+        uid: Uid,
+        #[serde(default = "yes")]
+        enabled: bool,
+        #[serde(default)]
+        comment: String,
+        module: String,
+        #[serde(default)]
+        feature: Option<Uid>,
+        params: Box<RawValue>,
+    },
+    Feature {
+        uid: Uid,
+        #[serde(default = "yes")]
+        enabled: bool,
+        #[serde(default)]
+        comment: String,
+        kind: String,
+        #[serde(default)]
+        name: String,
+        #[serde(default)]
+        switch: String,
+        #[serde(default)]
+        choice: String,
+    },
+}
+
+pub(super) fn yes() -> bool {
+    true
+}
+
+/// Names that are allowed for a field at its place; `None` where any name is allowed (parameters of modules).
+pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
+    let parent = field.parent.map(|parent| &fields[parent]);
+    let above = parent.and_then(|parent| parent.parent).map(|above| fields[above].name);
+    match (field.depth, parent.map(|parent| parent.name)) {
+        (1, None) => Some(&[
+            "format",
+            "uid",
+            "name",
+            "version",
+            "kind",
+            "author",
+            "description",
+            "preview",
+            "joint_count",
+            "features",
+            "needs",
+            "groups",
+            "joints",
+            "poses",
+        ]),
+        (3, Some("poses")) => Some(&["uid", "name", "offsets", "values"]),
+        (5, Some("offsets")) if above == Some("poses") => Some(&["joint", "translation", "rotation", "scale"]),
+        (5, Some("values")) if above == Some("poses") => Some(&["node", "name", "value"]),
+        (2, Some("needs")) => Some(&["joints", "sockets"]),
+        (3, Some("features")) => Some(&["kind", "name", "switches"]),
+        (3, Some("groups")) => Some(&["uid", "name", "color", "enabled"]),
+        (3, Some("joints")) => Some(&[
+            "uid",
+            "parent",
+            "label",
+            "group",
+            "mirror",
+            "kind",
+            "locked",
+            "translation",
+            "rotation",
+            "scale",
+            "face",
+            "tags",
+        ]),
+        (4, Some("face")) if above == Some("joints") => Some(&["part", "label", "at"]),
+        (5, Some("tags")) if above == Some("joints") => {
+            Some(&["uid", "enabled", "comment", "module", "feature", "params", "kind", "name", "switch", "choice"])
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,434 @@
+//! Saving over a text: only what changed is written, so that comments, blank lines, the order and the style of what a
+//! person wrote stay, and one changed value is one changed line.
+
+mod order;
+pub(super) mod patch;
+
+use bevy::math::{Quat, Vec3};
+
+use super::{
+    read::read_text,
+    shorthand::{Declaration, Declared, TAG_FIELDS, TagForm},
+    write::{
+        face_text, feature_list, feature_summaries, group_text, joint_text, needed_format, needs_text, pose_text,
+        tag_text,
+    },
+    write_template,
+};
+use crate::rig::{
+    JointData, NodeKind, Rig, RigJoint, TagData, TagKind, Uid, degrees,
+    format::{
+        template::{quoted, vector},
+        tree::{Item, NodeId, Tree},
+    },
+    reference::{bind_names, given_names, refresh_names, without_uids},
+};
+use order::reordered;
+use patch::Patch;
+
+/// The text of a rig's template, as changes of a text of the same rig; that of [`write_template`] if `source` is no
+/// template of this rig, or cannot be changed so that it says the same.
+pub fn write_template_over(rig: &Rig, source: &str) -> String {
+    let plain = write_template(rig);
+    over(rig, source, &plain).unwrap_or(plain)
+}
+
+fn over(rig: &Rig, source: &str, plain: &str) -> Option<String> {
+    let before = read_text(source, 1).ok()?.rig;
+    if before.uid() != rig.uid() {
+        return None;
+    }
+    let wanted = comparable(read_text(plain, 1).ok()?.rig);
+    let is_right = |text: &str| read_text(text, 1).is_ok_and(|read| comparable(read.rig) == wanted);
+    let declared = Declared::find(source)?;
+    let text = Rewriter::new(rig, &before, &declared).text();
+    if is_right(&text) {
+        return Some(text);
+    }
+    let text = reordered(rig, &text)?;
+    is_right(&text).then_some(text)
+}
+
+/// A rig whose parameters do not depend on blanks, comments and the order of fields.
+pub(super) fn comparable(mut rig: Rig) -> Rig {
+    for joint in rig.joints.values_mut() {
+        for tag in &mut joint.data.tags {
+            if let TagKind::Command { params, .. } = &mut tag.kind {
+                *params = canonical(params);
+            }
+        }
+    }
+    rig
+}
+
+/// Parameters on one line, fields in the order of their names.
+fn canonical(params: &str) -> String {
+    fn write(out: &mut String, tree: &Tree, id: NodeId) {
+        let node = tree.node(id);
+        let Some(open) = node.bracket else { return out.push_str(tree.written(id)) };
+        out.push_str(node.name);
+        out.push(open);
+        let mut items: Vec<&Item> = node.items.iter().collect();
+        if open == '(' {
+            items.sort_by_key(|item| item.key);
+        }
+        for item in items {
+            if let Some(key) = item.key {
+                out.push_str(key);
+                out.push(':');
+            }
+            write(out, tree, item.value);
+            out.push(',');
+        }
+        out.push(')');
+    }
+    let Some(tree) = Tree::parse(params) else { return params.to_owned() };
+    let mut out = String::with_capacity(params.len());
+    write(&mut out, &tree, tree.root());
+    out
+}
+
+/// Text of a joint that is new in a text; with names, it refers by label where that is the joint's alone.
+fn new_joint(rig: &Rig, joint: &RigJoint, with_names: bool) -> String {
+    let mut text = joint_text(rig, joint);
+    if !with_names {
+        return text;
+    }
+    for (field, uid) in [("parent", joint.parent), ("mirror", joint.data.mirror)] {
+        let called = uid.and_then(|uid| Some((uid, rig.joint(uid)?.data.label.as_deref()?)));
+        if let Some((uid, label)) = called.filter(|(_, label)| is_unique(rig, "joint", label)) {
+            text = text.replacen(&format!("{field}: \"{uid}\""), &format!("{field}: {}", quoted(label)), 1);
+        }
+    }
+    if let Some(group) =
+        joint.data.group.and_then(|group| rig.group(group)).filter(|g| is_unique(rig, "group", &g.name))
+    {
+        text = text.replacen(&format!("group: \"{}\"", group.uid), &format!("group: {}", quoted(&group.name)), 1);
+    }
+    without_uids(&text, rig, |_| true).into_owned()
+}
+
+/// Returns `true` if one thing alone has that name: a group for the field `group`, else a joint.
+fn is_unique(rig: &Rig, field: &str, name: &str) -> bool {
+    match field {
+        "group" => rig.groups().iter().filter(|group| group.name == name).count() == 1,
+        _ => rig.walk().filter(|joint| joint.data.label.as_deref() == Some(name)).count() == 1,
+    }
+}
+
+struct Rewriter<'d, 'a> {
+    rig: &'d Rig,
+    before: &'d Rig,
+    declared: &'d Declared<'a>,
+    /// True in a text that leaves uids out: it gets names.
+    with_names: bool,
+    patch: Patch<'d, 'a>,
+}
+
+impl<'d, 'a> Rewriter<'d, 'a> {
+    fn new(rig: &'d Rig, before: &'d Rig, declared: &'d Declared<'a>) -> Self {
+        let with_names = declared.all().any(|one| !one.is_written);
+        Self { rig, before, declared, with_names, patch: Patch::new(&declared.tree) }
+    }
+
+    fn tree(&self) -> &'d Tree<'a> {
+        &self.declared.tree
+    }
+
+    /// The changed text. Order of what is there already stays.
+    fn text(mut self) -> String {
+        self.header();
+        self.groups();
+        self.joints();
+        self.poses();
+        self.patch.text()
+    }
+
+    fn header(&mut self) {
+        let (root, rig) = (self.tree().root(), self.rig);
+        if self.declared.format() < needed_format(rig) {
+            self.patch.set(root, "format", &needed_format(rig).to_string());
+        }
+        let (old, new) = (self.before.about(), rig.about());
+        self.keep_uid(root, &self.declared.rig, ["rig", &new.name]);
+        let fields = [
+            ("name", &old.name, &new.name),
+            ("version", &old.version, &new.version),
+            ("kind", &old.kind, &new.kind),
+            ("author", &old.author, &new.author),
+            ("description", &old.description, &new.description),
+        ];
+        for (field, old, new) in fields {
+            self.set_text(root, field, old, new);
+        }
+        if old.preview != new.preview {
+            self.patch.set_or_remove(root, "preview", new.preview.as_deref().map(quoted).as_deref());
+        }
+        let tree = self.tree();
+        if let Some(count) = tree.field(root, "joint_count")
+            && tree.written(count.value) != rig.len().to_string()
+        {
+            self.patch.set(root, "joint_count", &rig.len().to_string());
+        }
+        if tree.field(root, "features").is_some() && feature_summaries(rig) != feature_summaries(self.before) {
+            self.patch.set(root, "features", &feature_list(rig));
+        }
+        if tree.field(root, "needs").is_some()
+            && let Some(needs) = needs_text(rig)
+            && needs_text(self.before).as_ref() != Some(&needs)
+        {
+            self.patch.set(root, "needs", &needs);
+        }
+    }
+
+    /// Writes a uid that does not follow from the name any more.
+    fn keep_uid(&mut self, node: NodeId, declared: &Declaration, names: [&str; 2]) {
+        if !declared.is_written && declared.uid != Uid::derived(names) && declared.derived == Some(declared.uid) {
+            self.patch.put_first(node, &format!("uid: \"{}\"", declared.uid));
+        }
+    }
+
+    fn set_text(&mut self, node: NodeId, field: &str, old: &str, new: &str) {
+        if old != new {
+            self.patch.set_or_remove(node, field, (!new.is_empty()).then(|| quoted(new)).as_deref());
+        }
+    }
+
+    fn groups(&mut self) {
+        let rig = self.rig;
+        for declared in &self.declared.groups {
+            let (Some(old), Some(new)) = (self.before.group(declared.uid), rig.group(declared.uid)) else { continue };
+            self.keep_uid(declared.node, declared, ["group", &new.name]);
+            self.set_text(declared.node, "name", &old.name, &new.name);
+            self.patch.set_numbers(declared.node, "color", &old.color, &new.color);
+            if old.enabled != new.enabled {
+                self.patch.set_or_remove(declared.node, "enabled", (!new.enabled).then_some("false"));
+            }
+        }
+        let wanted: Vec<Uid> = rig.groups().iter().map(|group| group.uid).collect();
+        let text = |uid: Uid| rig.group(uid).map(group_text).unwrap_or_default();
+        self.patch.list(self.tree().root(), "groups", &self.declared.groups, &wanted, None, text);
+    }
+
+    fn poses(&mut self) {
+        let rig = self.rig;
+        for declared in &self.declared.poses {
+            let (old, new) = (self.before.stored_pose(declared.uid), rig.stored_pose(declared.uid));
+            let (Some(old), Some(new)) = (old, new) else { continue };
+            if old.offsets != new.offsets || old.values != new.values {
+                self.patch.replace(declared.node, &pose_text(new));
+                continue;
+            }
+            self.keep_uid(declared.node, declared, ["pose", &new.name]);
+            self.set_text(declared.node, "name", &old.name, &new.name);
+        }
+        let wanted: Vec<Uid> = rig.stored_poses().iter().map(|pose| pose.uid).collect();
+        let text = |uid: Uid| rig.stored_pose(uid).map(pose_text).unwrap_or_default();
+        self.patch.list(self.tree().root(), "poses", &self.declared.poses, &wanted, None, text);
+    }
+
+    fn joints(&mut self) {
+        let (rig, declared, with_names) = (self.rig, self.declared, self.with_names);
+        for (declared, tags) in declared.joints.iter().zip(&declared.tags) {
+            let (Some(old), Some(new)) = (self.before.joint(declared.uid), rig.joint(declared.uid)) else { continue };
+            self.joint(declared, old, new);
+            for tag in tags {
+                let old = old.data.tags.iter().find(|old| old.uid == tag.uid);
+                let new = new.data.tags.iter().find(|new| new.uid == tag.uid);
+                if let (Some(old), Some(new)) = (old, new) {
+                    self.tag(tag, old, new);
+                }
+            }
+            let wanted: Vec<Uid> = new.data.tags.iter().map(|tag| tag.uid).collect();
+            let text = |uid: Uid| rig.find_tag(uid).map(|(_, tag)| tag_text(rig, tag)).unwrap_or_default();
+            self.patch.list(declared.node, "tags", tags, &wanted, None, text);
+        }
+        let wanted: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+        let text = |uid: Uid| rig.joint(uid).map(|joint| new_joint(rig, joint, with_names)).unwrap_or_default();
+        // A joint comes behind its elder brother, or else behind its parent.
+        let behind = |uid: Uid| {
+            let joint = rig.joint(uid)?;
+            let place = rig.children(joint.parent).iter().position(|child| *child == uid)?;
+            place.checked_sub(1).map(|elder| rig.children(joint.parent)[elder]).or(joint.parent)
+        };
+        self.patch.list(self.tree().root(), "joints", &declared.joints, &wanted, Some(&behind), text);
+    }
+
+    fn joint(&mut self, declared: &Declaration, old: &RigJoint, new: &RigJoint) {
+        let node = declared.node;
+        let (was, is): (&JointData, &JointData) = (&old.data, &new.data);
+        self.keep_uid(node, declared, ["joint", is.label.as_deref().unwrap_or_default()]);
+        if was.label != is.label {
+            self.patch.set_or_remove(node, "label", is.label.as_deref().map(quoted).as_deref());
+        }
+        let label = |rig: &Rig, uid: Uid| rig.joint(uid).and_then(|joint| joint.data.label.clone());
+        let group = |rig: &Rig, uid: Uid| rig.group(uid).map(|group| group.name.clone());
+        let is_there = |uid: &Uid| self.rig.joint(*uid).is_some();
+        let (parent, mirror, in_group) = (new.parent, is.mirror.filter(is_there), is.group);
+        self.refer(node, "parent", old.parent, parent, &label);
+        self.refer(node, "mirror", was.mirror, mirror, &label);
+        self.refer(node, "group", was.group, in_group, &group);
+        if was.kind != is.kind {
+            self.patch.set_or_remove(node, "kind", (is.kind == NodeKind::Null).then_some("Null"));
+        }
+        if was.locked != is.locked {
+            self.patch.set_or_remove(node, "locked", is.locked.then_some("true"));
+        }
+        let (was_rest, rest) = (&was.rest, &is.rest);
+        self.patch.set_numbers(node, "translation", &was_rest.translation.to_array(), &rest.translation.to_array());
+        if was_rest.rotation != rest.rotation {
+            self.rotation(node, was_rest.rotation, rest.rotation);
+        }
+        match rest.scale == Vec3::ONE && was_rest.scale != Vec3::ONE {
+            true => self.patch.set_or_remove(node, "scale", None),
+            false => self.patch.set_numbers(node, "scale", &was_rest.scale.to_array(), &rest.scale.to_array()),
+        }
+        if was.face != is.face {
+            self.patch.set_or_remove(node, "face", is.face.as_ref().map(face_text).as_deref());
+        }
+    }
+
+    /// Writes a rotation in whole thousandths of a degree if that is how it is written and exact, else as a quaternion.
+    fn rotation(&mut self, node: NodeId, old: Quat, new: Quat) {
+        let tree = self.tree();
+        let written = tree.field(node, "rotation").map(|field| tree.node(field.value).items.len());
+        if new == Quat::IDENTITY {
+            return self.patch.set_or_remove(node, "rotation", None);
+        }
+        if written == Some(4) {
+            return self.patch.set_numbers(node, "rotation", &old.to_array(), &new.to_array());
+        }
+        let (x, y, z) = new.to_euler(bevy::math::EulerRot::XYZ);
+        let angles = Vec3::new(x, y, z).map(|angle| (angle.to_degrees() * 1000.0).round() / 1000.0);
+        let [x, y, z, w] = new.to_array();
+        let text = match written == Some(3) && degrees(angles) == new {
+            true => vector(angles),
+            false => format!("({x:?}, {y:?}, {z:?}, {w:?})"),
+        };
+        self.patch.set(node, "rotation", &text);
+    }
+
+    /// Writes whom a field refers to, if that has changed, or if the name in the text is another's now.
+    fn refer(
+        &mut self,
+        node: NodeId,
+        field: &str,
+        old: Option<Uid>,
+        new: Option<Uid>,
+        name: &dyn Fn(&Rig, Uid) -> Option<String>,
+    ) {
+        let tree = self.tree();
+        let written = tree.string(node, field).filter(|written| written.parse::<Uid>().is_err());
+        let current = new.and_then(|uid| name(self.rig, uid));
+        let is_kept = old == new && (written.is_none() || written == current);
+        let is_unique = current.as_ref().is_some_and(|current| is_unique(self.rig, field, current));
+        if is_kept && (written.is_none() || is_unique) {
+            return;
+        }
+        let text = new.map(|uid| match current.filter(|_| is_unique && self.with_names) {
+            Some(name) => quoted(&name),
+            None => format!("\"{uid}\""),
+        });
+        self.patch.set_or_remove(node, field, text.as_deref());
+    }
+
+    fn tag(&mut self, declared: &Declaration, old: &TagData, new: &TagData) {
+        let (tree, node) = (self.tree(), declared.node);
+        let form = TagForm::of(tree, node);
+        if old.enabled != new.enabled {
+            self.patch.set_or_remove(node, "enabled", (!new.enabled).then_some("false"));
+        }
+        self.set_text(node, "comment", &old.comment, &new.comment);
+        match (&old.kind, &new.kind) {
+            (TagKind::Command { module: was, feature: was_in, .. }, TagKind::Command { module, params, feature })
+                if was == module =>
+            {
+                let is_there = |uid: &Uid| self.rig.find_tag(*uid).is_some();
+                let feature = feature.filter(is_there);
+                if *was_in != feature {
+                    self.patch.set_or_remove(node, "feature", feature.map(|uid| format!("\"{uid}\"")).as_deref());
+                }
+                self.parameters(declared, matches!(form, Some(TagForm::Short(_))), params);
+            }
+            (
+                TagKind::Feature { kind: was_kind, name: was_name, switch: was_switch, choice: was_choice },
+                TagKind::Feature { kind, name, switch, choice },
+            ) => {
+                if !declared.is_written && (was_kind, was_name, was_switch) != (kind, name, switch) {
+                    self.patch.put_first(node, &format!("uid: \"{}\"", declared.uid));
+                }
+                self.set_text(node, "kind", was_kind, kind);
+                self.set_text(node, "name", was_name, name);
+                self.set_text(node, "switch", was_switch, switch);
+                self.set_text(node, "choice", was_choice, choice);
+            }
+            _ => self.patch.replace(node, &tag_text(self.rig, new)),
+        }
+    }
+
+    fn parameters(&mut self, declared: &Declaration, is_short: bool, params: &str) {
+        let (tree, node) = (self.tree(), declared.node);
+        let current = refresh_names(params, self.rig);
+        let Some(now) = Tree::parse(&current) else { return };
+        let field = tree.field(node, "params");
+        match (is_short, field) {
+            (true, _) if tree.node(node).bracket.is_none() => {
+                if !now.node(now.root()).items.is_empty() {
+                    let module = tree.written(node);
+                    self.patch.replace(node, &format!("{module}{}", self.styled(&current)));
+                }
+            }
+            (true, _) => self.fields(node, &now, now.root(), &TAG_FIELDS),
+            (false, Some(field)) => self.value(field.value, &now, now.root()),
+            (false, None) if !now.node(now.root()).items.is_empty() => {
+                self.patch.set(node, "params", &self.styled(&current));
+            }
+            (false, None) => {}
+        }
+        let given = given_names(params).find(|name| !name.is_empty());
+        if !declared.is_written && given != declared.name {
+            self.patch.put_first(node, &format!("uid: \"{}\"", declared.uid));
+        }
+    }
+
+    /// Changes a value into another one, field by field where both are structs.
+    fn value(&mut self, node: NodeId, now: &Tree, value: NodeId) {
+        let tree = self.tree();
+        let is_struct = |tree: &Tree, id: NodeId| {
+            let node = tree.node(id);
+            node.bracket == Some('(') && !node.items.is_empty() && node.items.iter().all(|item| item.key.is_some())
+        };
+        let (bound, _) = bind_names(tree.written(node), self.rig);
+        if canonical(&refresh_names(&bound, self.rig)) == canonical(now.written(value)) {
+            return;
+        }
+        if is_struct(tree, node) && is_struct(now, value) && tree.node(node).name == now.node(value).name {
+            self.fields(node, now, value, &[]);
+        } else {
+            let text = self.styled(now.written(value));
+            self.patch.replace(node, &text);
+        }
+    }
+
+    fn fields(&mut self, node: NodeId, now: &Tree, value: NodeId, others: &[&str]) {
+        let tree = self.tree();
+        for item in &tree.node(node).items {
+            let Some(key) = item.key.filter(|key| !others.contains(key)) else { continue };
+            match now.field(value, key) {
+                Some(other) => self.value(item.value, now, other.value),
+                None => self.patch.set_or_remove(node, key, None),
+            }
+        }
+        for item in &now.node(value).items {
+            if let Some(key) = item.key.filter(|key| tree.field(node, key).is_none()) {
+                let text = self.styled(now.written(item.value));
+                self.patch.set(node, key, &text);
+            }
+        }
+    }
+
+    /// A value as it is written into this text: references without uids where the text has names.
+    fn styled(&self, text: &str) -> String {
+        if self.with_names { without_uids(text, self.rig, |_| true).into_owned() } else { text.to_owned() }
+    }
+}

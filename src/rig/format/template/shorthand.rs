@@ -1,0 +1,310 @@
+//! Shorthand of format 2: what people leave out of a template follows from what they write.
+//!
+//! A uid that is left out is derived: a joint's from its label, a group's and a stored pose's from the name, a tag's from
+//! its joint, its module and the name that it gives, the rig's from its name. Joints, groups and features are referred to
+//! by these names, `control(shape: "ring")` stands for `Command(module: "control", params: (shape: "ring"))`, and three
+//! angles in degrees for a rotation. [`explicit`] writes all of it out, so that one strict reader reads every file, and
+//! keeps the places of the source for errors.
+
+mod declared;
+
+use std::{borrow::Cow, collections::HashMap, ops::Range};
+
+use crate::rig::{
+    Uid, degrees,
+    format::{
+        source::SourceError,
+        template::quoted,
+        tree::{Item, NodeId, Tree},
+    },
+    nearest::{did_you_mean, listed},
+    reference::NameKind,
+};
+
+pub(in crate::rig::format) use declared::{Declaration, Declared, TagForm};
+
+/// The first format with shorthand.
+const FIRST_FORMAT: u32 = 2;
+
+/// Fields of a tag in the short form; all others are parameters of its module.
+pub(in crate::rig::format) const TAG_FIELDS: [&str; 4] = ["uid", "enabled", "comment", "feature"];
+
+/// Text of a template without shorthand, with the place in its source of everything in it.
+pub struct Explicit<'a> {
+    source: &'a str,
+    /// The text.
+    pub text: Cow<'a, str>,
+    /// Pieces of the text in order; empty if it is the source.
+    pieces: Vec<Piece>,
+    /// Names that nothing has, and declarations that nothing identifies.
+    pub faults: Vec<SourceError>,
+}
+
+/// Piece of an explicit text: copied from the source, or written in place of some of it.
+struct Piece {
+    start: usize,
+    source: usize,
+    is_copy: bool,
+}
+
+impl Explicit<'_> {
+    /// Place in the source of a place in the text, in bytes.
+    pub fn in_source(&self, offset: usize) -> usize {
+        let Some(number) = self.pieces.partition_point(|piece| piece.start <= offset).checked_sub(1) else {
+            return offset.min(self.source.len());
+        };
+        let piece = &self.pieces[number];
+        piece.source + if piece.is_copy { offset - piece.start } else { 0 }
+    }
+
+    /// An error in the text as one in the source.
+    pub fn fault(&self, error: SourceError) -> SourceError {
+        match self.pieces.is_empty() {
+            true => error,
+            false => SourceError::at(self.source, self.in_source(error.offset), error.message),
+        }
+    }
+}
+
+/// The text of a template without shorthand. A text of format 1, and one whose brackets do not match, is itself.
+pub fn explicit(source: &str) -> Explicit<'_> {
+    let unchanged = Explicit { source, text: Cow::Borrowed(source), pieces: Vec::new(), faults: Vec::new() };
+    let Some(declared) = Declared::find(source).filter(|declared| declared.format() >= FIRST_FORMAT) else {
+        return unchanged;
+    };
+    let mut writer = Writer::new(&declared);
+    writer.declarations();
+    let Writer { mut changes, mut faults, .. } = writer;
+    faults.extend(declared.faults);
+    faults.sort_by_key(|fault| fault.offset);
+    if changes.is_empty() {
+        return Explicit { faults, ..unchanged };
+    }
+    changes.sort_by_key(|change| (change.range.start, change.range.end));
+    let (mut text, mut pieces) = (String::with_capacity(source.len() * 2), Vec::new());
+    let mut at = 0;
+    for Change { range, text: with } in &changes {
+        pieces.push(Piece { start: text.len(), source: at, is_copy: true });
+        text.push_str(&source[at..range.start.max(at)]);
+        pieces.push(Piece { start: text.len(), source: range.start, is_copy: false });
+        text.push_str(with);
+        at = range.end.max(at);
+    }
+    pieces.push(Piece { start: text.len(), source: at, is_copy: true });
+    text.push_str(&source[at..]);
+    Explicit { source, text: Cow::Owned(text), pieces, faults }
+}
+
+/// Text in place of a range of the source.
+struct Change {
+    range: Range<usize>,
+    text: String,
+}
+
+/// Uids of the things with a name.
+type Called<'d> = HashMap<Cow<'d, str>, Vec<Uid>>;
+
+struct Writer<'d, 'a> {
+    declared: &'d Declared<'a>,
+    groups: Called<'d>,
+    joints: Called<'d>,
+    features: Called<'d>,
+    changes: Vec<Change>,
+    faults: Vec<SourceError>,
+}
+
+impl<'d, 'a> Writer<'d, 'a> {
+    fn new(declared: &'d Declared<'a>) -> Self {
+        fn called<'d>(named: impl Iterator<Item = (Cow<'d, str>, Uid)>) -> Called<'d> {
+            let mut called = Called::new();
+            for (name, uid) in named {
+                called.entry(name).or_default().push(uid);
+            }
+            called
+        }
+        let named = |one: &'d Declaration| Some((Cow::Borrowed(one.name.as_deref()?), one.uid));
+        let feature = |tag: &Declaration| Some((Cow::Owned(feature_name(&declared.tree, tag.node)?), tag.uid));
+        Self {
+            declared,
+            groups: called(declared.groups.iter().filter_map(named)),
+            joints: called(declared.joints.iter().filter_map(named)),
+            features: called(declared.tags.iter().flatten().filter_map(feature)),
+            changes: Vec::new(),
+            faults: Vec::new(),
+        }
+    }
+
+    fn tree(&self) -> &'d Tree<'a> {
+        &self.declared.tree
+    }
+
+    fn declarations(&mut self) {
+        let declared = self.declared;
+        for declaration in std::iter::once(&declared.rig).chain(&declared.groups).chain(&declared.poses) {
+            self.say_uid(declaration);
+        }
+        for pose in &declared.poses {
+            for (list, field) in [("offsets", "joint"), ("values", "node")] {
+                for item in self.tree().elements(pose.node, list) {
+                    self.refer(item.value, field, NameKind::Joint);
+                    self.say_rotation(item.value);
+                }
+            }
+        }
+        for (joint, tags) in declared.joints.iter().zip(&declared.tags) {
+            self.say_uid(joint);
+            self.refer(joint.node, "parent", NameKind::Joint);
+            self.refer(joint.node, "mirror", NameKind::Joint);
+            self.refer(joint.node, "group", NameKind::Group);
+            self.say_rotation(joint.node);
+            for tag in tags {
+                if let Some(TagForm::Short(module)) = TagForm::of(self.tree(), tag.node) {
+                    self.say_command(tag, module, tags);
+                    continue;
+                }
+                self.say_uid(tag);
+                self.say_parameters(tag.node);
+                if let Some(field) = self.tree().field(tag.node, "feature") {
+                    let said = self.feature(field, tags);
+                    self.replace(field.value, said);
+                }
+            }
+        }
+    }
+
+    fn say_uid(&mut self, declaration: &Declaration) {
+        let node = self.tree().node(declaration.node);
+        if !declaration.is_written && node.bracket == Some('(') && self.tree().field(declaration.node, "uid").is_none()
+        {
+            let comma = if node.items.is_empty() { "" } else { ", " };
+            self.put(node.inside..node.inside, format!("uid: \"{}\"{comma}", declaration.uid));
+        }
+    }
+
+    /// Writes the parameters of a command that leaves them out.
+    fn say_parameters(&mut self, tag: NodeId) {
+        let node = self.tree().node(tag);
+        let is_command = matches!(TagForm::of(self.tree(), tag), Some(TagForm::Command));
+        if is_command && self.tree().field(tag, "params").is_none() && !node.items.is_empty() {
+            self.put(node.inside..node.inside, "params: (), ".to_owned());
+        }
+    }
+
+    /// Writes the uid in place of a name in a field.
+    fn refer(&mut self, node: NodeId, field: &str, kind: NameKind) {
+        let Some(item) = self.tree().field(node, field) else { return };
+        let Some(name) = self.tree().string(node, field).filter(|name| name.parse::<Uid>().is_err()) else { return };
+        let among = if kind == NameKind::Group { &self.groups } else { &self.joints };
+        let said = match found(among, &name, &kind.to_string()) {
+            Ok(uid) => format!("\"{uid}\""),
+            Err(message) => self.fault(item, message),
+        };
+        self.replace(item.value, said);
+    }
+
+    /// Value of a field that names a feature: by name, or by name and switch with a point between, or by its kind if it
+    /// has no name; of the same joint, else the only one of the file.
+    fn feature(&mut self, item: &Item<'a>, own: &[Declaration]) -> String {
+        let tree = self.tree();
+        let written = tree.written(item.value);
+        let name: Option<String> = ron::from_str(tree.written(tree.optional(item.value))).ok();
+        let Some(name) = name.filter(|name| name.parse::<Uid>().is_err()) else { return written.to_owned() };
+        let mut of_joint = own.iter().filter(|tag| feature_name(tree, tag.node).as_deref() == Some(&*name));
+        let said = match (of_joint.next(), of_joint.next()) {
+            (Some(tag), None) => Ok(tag.uid),
+            _ => found(&self.features, &name, "feature"),
+        };
+        match said {
+            Ok(uid) => format!("\"{uid}\""),
+            Err(message) => self.fault(item, message),
+        }
+    }
+
+    /// Writes a command of the short form in the long one.
+    fn say_command(&mut self, tag: &Declaration, module: &str, tags: &[Declaration]) {
+        let tree = self.tree();
+        let node = tree.node(tag.node);
+        let mut front = format!("Command(uid: \"{}\", module: {}, ", tag.uid, quoted(module));
+        for item in node.items.iter().filter(|item| item.key.is_some_and(|key| TAG_FIELDS.contains(&key))) {
+            let field = item.key.unwrap_or_default();
+            let said = match field {
+                "feature" => self.feature(item, tags),
+                _ => tree.written(item.value).to_owned(),
+            };
+            if field != "uid" {
+                front.push_str(&format!("{field}: {said}, "));
+            } else if !tag.is_written {
+                let message =
+                    format!("{said} is no uid; write 16 hexadecimal digits in quotes, or leave the field out");
+                self.fault(item, message);
+            }
+            let blanks = tree.text[item.end..].len() - tree.text[item.end..].trim_start_matches([' ', '\t']).len();
+            self.put(item.start..item.end + blanks, String::new());
+        }
+        front.push_str("params: (");
+        if node.bracket.is_none() {
+            self.put(node.range.clone(), format!("{front}))"));
+            return;
+        }
+        self.put(node.range.start..node.inside, front);
+        self.put(node.range.end..node.range.end, ")".to_owned());
+    }
+
+    /// Writes a quaternion in place of three angles.
+    fn say_rotation(&mut self, node: NodeId) {
+        let tree = self.tree();
+        let Some(value) = tree.field(node, "rotation").map(|field| field.value) else { return };
+        let angles: Vec<f32> =
+            tree.node(value).items.iter().filter_map(|item| tree.written(item.value).parse().ok()).collect();
+        if let ([x, y, z], 3) = (angles.as_slice(), tree.node(value).items.len()) {
+            let [x, y, z, w] = degrees([*x, *y, *z].into()).to_array();
+            self.replace(value, format!("({x:?}, {y:?}, {z:?}, {w:?})"));
+        }
+    }
+
+    fn replace(&mut self, node: NodeId, text: String) {
+        self.put(self.tree().node(node).range.clone(), text);
+    }
+
+    fn put(&mut self, range: Range<usize>, text: String) {
+        self.changes.push(Change { range, text });
+    }
+
+    /// Tells a fault of a field; returns the value that stands for the missing one.
+    fn fault(&mut self, item: &Item, message: String) -> String {
+        self.faults.push(SourceError::at(self.tree().text, item.start, message));
+        "None".to_owned()
+    }
+}
+
+/// The only thing with that name.
+///
+/// # Errors
+/// A message with the nearest names, or with the uids of all that have the name.
+fn found(among: &Called, name: &str, kind: &str) -> Result<Uid, String> {
+    match among.get(name).map(Vec::as_slice) {
+        Some([uid]) => Ok(*uid),
+        Some(uids) => {
+            let uids = uids.iter().map(Uid::to_string).collect::<Vec<_>>();
+            Err(format!("{} {kind}s are called \"{name}\"; write the uid, {}", uids.len(), listed(&uids, "or")))
+        }
+        None => {
+            let mut names: Vec<&str> = among.keys().map(|name| &**name).collect();
+            names.sort_unstable();
+            Err(format!("there is no {kind} \"{name}\" in the file{}", did_you_mean(name, names)))
+        }
+    }
+}
+
+/// Name by which commands refer to a feature; `None` for another tag.
+pub(in crate::rig::format) fn feature_name(tree: &Tree, node: NodeId) -> Option<String> {
+    if !matches!(TagForm::of(tree, node)?, TagForm::Feature) {
+        return None;
+    }
+    let text = |field: &str| tree.string(node, field).filter(|text| !text.is_empty());
+    let name = text("name").or_else(|| text("kind"))?;
+    Some(match text("switch") {
+        Some(switch) => format!("{name}.{switch}"),
+        None => name,
+    })
+}
