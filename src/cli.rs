@@ -23,6 +23,7 @@ mod report;
 mod sketch;
 mod skin;
 mod switches;
+mod update;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -68,6 +69,10 @@ enum Command {
     Check(check::CheckArgs),
     /// Put templates into their layout, with or without the uids that follow from names
     Format(format::FormatArgs),
+    /// Say what differs between two templates
+    Diff(update::DiffArgs),
+    /// Bring a rig to a new version of its template: what you changed stays
+    Update(update::UpdateArgs),
     /// Run the commands of a rig and save the built rig
     Build(build::BuildArgs),
     /// Build a rig, pose it by its controls as an app does, and save the character or a picture
@@ -197,6 +202,8 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Format(args)) => format::run(&args),
+        Some(Command::Diff(args)) => update::run_diff(&args),
+        Some(Command::Update(args)) => update::run_update(&args),
         Some(Command::Build(args)) => build::run(&args),
         Some(Command::Pose(args)) => pose::run(&args),
         Some(Command::Modules(args)) => Ok(modules::run(&args)),

@@ -23,6 +23,7 @@ pub mod shapes;
 pub mod step;
 mod tag;
 mod uid;
+pub mod update;
 
 pub use built::{
     Attribute, AttributeKind, BuiltConstraint, BuiltNode, BuiltRig, Channels, ControlData, LayerData, LayerDisplay,

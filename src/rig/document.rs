@@ -1,7 +1,7 @@
 //! The rig as one document: joints in a hierarchy, groups, tags and weights.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, HashMap, HashSet},
     sync::Arc,
 };
 
@@ -9,7 +9,7 @@ use bevy::{math::Affine3, prelude::*};
 
 use crate::{
     mesh::model::Weights,
-    rig::{AttributeValues, GroupData, PoseOffset, RestTransform, RigJoint, StoredPose, TagData, Uid},
+    rig::{AttributeValues, GroupData, JointData, PoseOffset, RestTransform, RigJoint, StoredPose, TagData, Uid},
 };
 
 /// A rig (= global group). All data can be read; only [`Rig::apply`](crate::rig::edit) changes them.
@@ -203,6 +203,50 @@ impl Rig {
         }
         let local = parent.inverse() * *global;
         RestTransform::from_affine(if local.is_finite() { &local } else { global })
+    }
+
+    /// Replaces all joints: by uid the data and the parent. `order` gives the order of children of a joint, or of the
+    /// roots; those that it does not name come last. A joint without its parent is a root, and of joints that stand below
+    /// each other the first by uid becomes one.
+    pub(super) fn set_joints(
+        &mut self,
+        joints: BTreeMap<Uid, (JointData, Option<Uid>)>,
+        order: impl Fn(Option<Uid>) -> Vec<Uid>,
+    ) {
+        let mut parents: BTreeMap<Uid, Option<Uid>> = joints
+            .iter()
+            .map(|(uid, (_, parent))| (*uid, parent.filter(|parent| joints.contains_key(parent))))
+            .collect();
+        let mut reached: HashSet<Uid> = HashSet::new();
+        for start in joints.keys() {
+            let mut path = HashSet::new();
+            let mut at = Some(*start);
+            while let Some(uid) = at.filter(|uid| !reached.contains(uid)) {
+                if !path.insert(uid) {
+                    parents.insert(*start, None);
+                    break;
+                }
+                at = parents.get(&uid).copied().flatten();
+            }
+            reached.extend(path);
+        }
+        let mut children: HashMap<Option<Uid>, Vec<Uid>> = HashMap::new();
+        for (uid, parent) in &parents {
+            children.entry(*parent).or_default().push(*uid);
+        }
+        for (parent, list) in &mut children {
+            let places: HashMap<Uid, usize> = order(*parent).into_iter().zip(0..).collect();
+            list.sort_by_key(|uid| places.get(uid).copied().unwrap_or(usize::MAX));
+        }
+        self.tags.clear();
+        self.joints.clear();
+        self.roots = children.remove(&None).unwrap_or_default();
+        for (uid, (data, _)) in joints {
+            self.tags.extend(data.tags.iter().map(|tag| (tag.uid, uid)));
+            let below = children.remove(&Some(uid)).unwrap_or_default();
+            let parent = parents.get(&uid).copied().flatten();
+            self.joints.insert(uid, RigJoint { data, parent, children: below });
+        }
     }
 
     /// The weights of a bound mesh.

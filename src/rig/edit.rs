@@ -15,7 +15,8 @@ use serde::{Deserialize, Serialize};
 use crate::{
     mesh::model::Weights,
     rig::{
-        GroupData, JointData, PoseOffset, RestTransform, Rig, RigJoint, StoredPose, TagData, TagKind, Uid,
+        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigJoint, StoredPose, TagData,
+        TagKind, Uid,
         document::{RigAbout, SkinData},
         format::source::ron_options,
     },
@@ -91,6 +92,10 @@ pub enum RigEdit {
     SetStoredPose(Box<StoredPose>),
     /// Several edits as one: all are applied or none.
     Batch(Vec<RigEdit>),
+    /// Makes a joint a null, or a null a joint.
+    SetKind(Uid, NodeKind),
+    /// Sets the record of a joint's placement as a facial bone.
+    SetFace(Uid, Option<Box<FacePlacement>>),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -225,6 +230,15 @@ impl Rig {
             RigEdit::RemoveStoredPose(uid) => self.remove_stored_pose(*uid)?,
             RigEdit::SetStoredPose(pose) => self.set_stored_pose(pose)?,
             RigEdit::Batch(edits) => self.apply_batch(edits)?,
+            RigEdit::SetKind(uid, kind) => {
+                let joint = self.joint_mut(*uid)?;
+                RigEdit::SetKind(*uid, std::mem::replace(&mut joint.data.kind, *kind))
+            }
+            RigEdit::SetFace(uid, face) => {
+                let joint = self.joint_mut(*uid)?;
+                let old = std::mem::replace(&mut joint.data.face, face.as_deref().cloned());
+                RigEdit::SetFace(*uid, old.map(Box::new))
+            }
         })
     }
 

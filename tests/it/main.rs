@@ -101,6 +101,7 @@ mod three_strokes;
 #[cfg(feature = "editor")]
 mod tools;
 mod transfer;
+mod update;
 mod voxels;
 mod weights;
 mod weights_bodies;

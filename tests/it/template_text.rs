@@ -14,16 +14,16 @@ use rigsmith::{
     },
 };
 
-fn read(text: &str) -> Rig {
+pub(super) fn read(text: &str) -> Rig {
     read_template(text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}")).rig
 }
 
-fn apply(rig: &mut Rig, edit: RigEdit) {
+pub(super) fn apply(rig: &mut Rig, edit: RigEdit) {
     rig.apply(&edit).unwrap();
 }
 
 /// A rig without blanks in its parameters.
-fn plain(mut rig: Rig) -> String {
+pub(super) fn plain(mut rig: Rig) -> String {
     let tags: Vec<(Uid, TagData)> =
         rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.clone()))).collect();
     for (joint, mut tag) in tags {
@@ -61,7 +61,7 @@ fn changed_lines(before: &str, after: &str) -> (usize, usize) {
     (a.len() - same - rest, b.len() - same - rest)
 }
 
-const CHAIN: &str = r#"// A tail.
+pub(super) const CHAIN: &str = r#"// A tail.
 (
     format: 2,
     name: "tail", // of a cat
@@ -236,10 +236,10 @@ fn a_save_changes_what_changed_and_nothing_else() {
 }
 
 /// Numbers from a seed.
-struct Dice(UidSource);
+pub(super) struct Dice(pub(super) UidSource);
 
 impl Dice {
-    fn below(&mut self, count: u64) -> u64 {
+    pub(super) fn below(&mut self, count: u64) -> u64 {
         self.0.next_uid().0 % count
     }
 
@@ -249,7 +249,7 @@ impl Dice {
 }
 
 /// A template as somebody might write it, with comments in odd places, in an uneven layout.
-fn handwritten(seed: u64) -> String {
+pub(super) fn handwritten(seed: u64) -> String {
     let dice = &mut Dice(UidSource::seeded(seed));
     let comments = ["", "", "", " // why not", " /* sic */", "\n    // \"quoted\" (and bracketed]\n", "\n\n"];
     let mut out = String::from(dice.pick(&["", "// A rig.\n", "/* two\n   lines */\n\n"]));
@@ -314,7 +314,7 @@ fn handwritten(seed: u64) -> String {
 }
 
 /// A change of one value of a rig.
-fn change(rig: &mut Rig, dice: &mut Dice) -> &'static str {
+pub(super) fn change(rig: &mut Rig, dice: &mut Dice) -> &'static str {
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let uid = joints[dice.below(joints.len() as u64) as usize];
     let data = rig.joint(uid).unwrap().data.clone();

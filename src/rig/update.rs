@@ -1,0 +1,363 @@
+//! Update of a rig to another version of its template, and differences of two rigs.
+//!
+//! An update compares three rigs: the *base*, which is the version that was accepted last, the rig as it is *now*, and the
+//! template as it is in the *file*. What the file changed is taken, what a person changed or added stays, and where both
+//! changed the same field to different values there is a conflict, which is decided by a choice and never by itself. Things
+//! are matched by uid; a joint or tag that seems to have got another name, because it stands at the same place with the
+//! same content, keeps its uid.
+
+mod edits;
+mod fields;
+mod order;
+mod renamed;
+
+use std::collections::{BTreeMap, HashSet};
+
+use serde::Serialize;
+
+use super::{GroupData, JointData, Rig, StoredPose, TagData, TagKind, Uid};
+use fields::{Field, about_fields, group_fields, joint_fields, pose_fields, tag_fields, tag_title};
+use order::merged_order;
+
+pub use edits::edits_between;
+
+/// Kind of a change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChangeKind {
+    /// Something is new.
+    Added,
+    /// Something is gone.
+    Removed,
+    /// A field has another value.
+    Changed,
+    /// Something has another name and is the same otherwise.
+    Renamed,
+}
+
+/// One change of an update.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Change {
+    /// Kind of the change.
+    pub kind: ChangeKind,
+    /// Uid of the joint, tag, group or pose; of the rig for its header.
+    pub uid: Uid,
+    /// Label of the joint, or of the joint of the tag; its uid without one. `None` for groups, poses and the header.
+    pub joint: Option<String>,
+    /// Module or kind of feature, and the name that the tag gives after a `/`; `None` if no tag is concerned.
+    pub tag: Option<String>,
+    /// Name of the field; of a parameter as `params.NAME`; `group NAME` or `pose NAME` for those.
+    pub field: Option<String>,
+    /// Value before, as it is written in files.
+    pub from: Option<String>,
+    /// Value after.
+    pub to: Option<String>,
+    /// True where both sides changed the field; `from` is the value now and `to` that of the file.
+    pub conflict: bool,
+}
+
+/// Side whose value is taken in a conflict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Take {
+    /// That of the file.
+    Theirs,
+    /// That of the rig now.
+    Mine,
+}
+
+/// An update.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Update {
+    /// The rig after the update: with everything but its template's content as it is now.
+    pub rig: Rig,
+    /// Changes, header first, then groups, joints in the order of the file, and poses.
+    pub changes: Vec<Change>,
+}
+
+impl Update {
+    /// Number of conflicts.
+    pub fn conflicts(&self) -> usize {
+        self.changes.iter().filter(|change| change.conflict).count()
+    }
+}
+
+/// Differences of two rigs, from the first to the second.
+pub fn diff(from: &Rig, to: &Rig) -> Vec<Change> {
+    update(Some(from), from, to, Take::Theirs).changes
+}
+
+/// The update of a rig `now` to the content of `file`. Without a `base` whatever differs is a conflict, and what the file
+/// does not have stays.
+pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
+    let mut changes = Vec::new();
+    let renamed = renamed::renamed(base.unwrap_or(now), file, &mut changes);
+    let file = renamed.as_ref().unwrap_or(file);
+    let mut merge = Merge { base, now, file, take, changes, rig: now.clone(), placed: HashSet::new() };
+    merge.header();
+    merge.groups();
+    merge.joints();
+    merge.poses();
+    let Merge { rig, changes, .. } = merge;
+    Update { rig, changes }
+}
+
+/// What becomes of something that two of three sides may have.
+enum Fate<T> {
+    Absent,
+    Kept(T),
+    Added(T),
+    Removed,
+}
+
+struct Merge<'a> {
+    base: Option<&'a Rig>,
+    now: &'a Rig,
+    file: &'a Rig,
+    take: Take,
+    changes: Vec<Change>,
+    rig: Rig,
+    /// Tags that have their joint.
+    placed: HashSet<Uid>,
+}
+
+impl Merge<'_> {
+    fn header(&mut self) {
+        let uid = self.now.uid();
+        let base = self.base.map(Rig::about);
+        let named = Named { uid, joint: None, tag: None, prefix: "" };
+        self.rig.about = self.fields(&about_fields(), base, self.now.about(), self.file.about(), &named);
+    }
+
+    fn groups(&mut self) {
+        let (base, now, file) = (self.base, self.now, self.file);
+        let lists = [base, Some(now), Some(file)].map(|rig| uids(rig.into_iter().flat_map(Rig::groups), |g| g.uid));
+        let mut kept: BTreeMap<Uid, GroupData> = BTreeMap::new();
+        for uid in all(&lists) {
+            let prefix = now.group(uid).or(file.group(uid)).map_or_else(String::new, |g| format!("group {} ", g.name));
+            let named = Named { uid, joint: None, tag: None, prefix: &prefix };
+            let sides = (base.and_then(|base| base.group(uid)), now.group(uid), file.group(uid));
+            if let Fate::Kept(group) | Fate::Added(group) = self.fate(&group_fields(), sides, &named) {
+                kept.insert(uid, group);
+            }
+        }
+        // A group stays as long as a joint is in it.
+        let used: HashSet<Uid> = now.walk().filter_map(|joint| joint.data.group).collect();
+        for group in now.groups().iter().filter(|group| used.contains(&group.uid)) {
+            kept.entry(group.uid).or_insert_with(|| group.clone());
+        }
+        let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
+        self.rig.groups = order.into_iter().filter_map(|uid| kept.remove(&uid)).collect();
+    }
+
+    fn poses(&mut self) {
+        let (base, now, file) = (self.base, self.now, self.file);
+        let lists =
+            [base, Some(now), Some(file)].map(|rig| uids(rig.into_iter().flat_map(Rig::stored_poses), |pose| pose.uid));
+        let mut kept: BTreeMap<Uid, StoredPose> = BTreeMap::new();
+        for uid in all(&lists) {
+            let pose = now.stored_pose(uid).or(file.stored_pose(uid));
+            let prefix = pose.map_or_else(String::new, |pose| format!("pose {} ", pose.name));
+            let named = Named { uid, joint: None, tag: None, prefix: &prefix };
+            let sides = (base.and_then(|base| base.stored_pose(uid)), now.stored_pose(uid), file.stored_pose(uid));
+            if let Fate::Kept(pose) | Fate::Added(pose) = self.fate(&pose_fields(), sides, &named) {
+                kept.insert(uid, pose);
+            }
+        }
+        let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
+        self.rig.poses = order.into_iter().filter_map(|uid| kept.remove(&uid)).collect();
+    }
+
+    fn joints(&mut self) {
+        let (base, now, file) = (self.base, self.now, self.file);
+        let walked = |rig: Option<&Rig>| uids(rig.into_iter().flat_map(Rig::walk), |joint| joint.data.uid);
+        let lists = [walked(base), walked(Some(now)), walked(Some(file))];
+        let groups: HashSet<Uid> = self.rig.groups.iter().map(|group| group.uid).collect();
+        let mut joints: BTreeMap<Uid, (JointData, Option<Uid>)> = BTreeMap::new();
+        let mut removed = Vec::new();
+        for uid in order_of_file(&lists[2], &lists[1]) {
+            let label = [now, file].into_iter().find_map(|rig| rig.joint(uid)?.data.label.clone());
+            let title = label.unwrap_or_else(|| uid.to_string());
+            let named = Named { uid, joint: Some(&title), tag: None, prefix: "" };
+            let whole = |rig: &Rig| rig.joint(uid).map(|joint| (joint.data.clone(), joint.parent));
+            let (was, is, theirs) = (base.and_then(whole), whole(now), whole(file));
+            let fields = joint_fields(now, file);
+            match self.fate(&fields, (was.as_ref(), is.as_ref(), theirs.as_ref()), &named) {
+                Fate::Absent => {}
+                Fate::Removed => removed.push(uid),
+                Fate::Added((mut data, parent)) => {
+                    // The tags come one by one, as far as they have not moved here from elsewhere.
+                    data.tags.retain(|tag| now.find_tag(tag.uid).is_none() && self.placed.insert(tag.uid));
+                    joints.insert(uid, (data, parent));
+                }
+                Fate::Kept((mut data, parent)) => {
+                    data.tags = self.tags(uid, &title);
+                    joints.insert(uid, (data, parent));
+                }
+            }
+        }
+        // Whoever is removed stays as long as something of somebody else hangs on it.
+        let mut needed: HashSet<Uid> = HashSet::new();
+        for (_, parent) in joints.values() {
+            let mut above = *parent;
+            while let Some(uid) = above.filter(|uid| !joints.contains_key(uid) && needed.insert(*uid)) {
+                above = now.joint(uid).and_then(|joint| joint.parent);
+            }
+        }
+        for uid in removed.into_iter().filter(|uid| needed.contains(uid)) {
+            if let Some(joint) = now.joint(uid) {
+                joints.insert(uid, (joint.data.clone(), joint.parent));
+                self.changes
+                    .retain(|change| !(change.uid == uid && change.kind == ChangeKind::Removed && !change.conflict));
+            }
+        }
+        for (data, parent) in joints.values_mut() {
+            data.group = data.group.filter(|group| groups.contains(group));
+            *parent = parent.filter(|parent| *parent != data.uid);
+        }
+        self.rig.set_joints(joints, |parent| {
+            let children = |rig: &Rig| rig.children(parent).to_vec();
+            merged_order(base.map(children).as_ref(), &children(now), &children(file))
+        });
+    }
+
+    /// Tags of a joint that stays.
+    fn tags(&mut self, joint: Uid, title: &str) -> Vec<TagData> {
+        let (base, now, file) = (self.base, self.now, self.file);
+        let on = |rig: Option<&Rig>| -> Vec<Uid> {
+            rig.and_then(|rig| rig.joint(joint)).map_or(Vec::new(), |joint| uids(&joint.data.tags, |tag| tag.uid))
+        };
+        let lists = [on(base), on(Some(now)), on(Some(file))];
+        let mut kept: BTreeMap<Uid, TagData> = BTreeMap::new();
+        for uid in all(&lists) {
+            let of = |rig: &Rig| rig.find_tag(uid).filter(|(on, _)| on.data.uid == joint).map(|(_, tag)| tag.clone());
+            let (was, is, theirs) = (base.and_then(of), of(now), of(file));
+            let Some(name) = is.as_ref().or(theirs.as_ref()).or(was.as_ref()).map(tag_title) else { continue };
+            let named = Named { uid, joint: Some(title), tag: Some(&name), prefix: "" };
+            let keys = [&was, &is, &theirs].map(Option::as_ref);
+            let fields = tag_fields(&keys, now, file);
+            let fate = self.fate(&fields, (was.as_ref(), is.as_ref(), theirs.as_ref()), &named);
+            if let Fate::Kept(tag) | Fate::Added(tag) = fate
+                && self.placed.insert(uid)
+            {
+                kept.insert(uid, tag);
+            }
+        }
+        let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
+        order.into_iter().filter_map(|uid| kept.remove(&uid)).collect()
+    }
+
+    /// Whether something is there afterwards, and with which content.
+    fn fate<T: Clone>(
+        &mut self,
+        fields: &[Field<T>],
+        (base, now, file): (Option<&T>, Option<&T>, Option<&T>),
+        named: &Named,
+    ) -> Fate<T> {
+        let same = |a: &T, b: &T| fields.iter().all(|field| (field.text)(a) == (field.text)(b));
+        match (now, file) {
+            (None, None) => Fate::Absent,
+            (Some(now), Some(file)) => Fate::Kept(self.fields(fields, base, now, file, named)),
+            (None, Some(file)) => match base {
+                None => {
+                    self.whole(ChangeKind::Added, named, false);
+                    Fate::Added(file.clone())
+                }
+                // Deleted by the person: it comes back only by choice, if the file changed it since.
+                Some(base) if same(base, file) => Fate::Absent,
+                Some(_) => {
+                    self.whole(ChangeKind::Added, named, true);
+                    if self.take == Take::Theirs { Fate::Added(file.clone()) } else { Fate::Absent }
+                }
+            },
+            (Some(now), None) => match base {
+                // Added by the person, or nobody knows.
+                None => Fate::Kept(now.clone()),
+                Some(base) if same(base, now) => {
+                    self.whole(ChangeKind::Removed, named, false);
+                    Fate::Removed
+                }
+                Some(_) => {
+                    self.whole(ChangeKind::Removed, named, true);
+                    if self.take == Take::Theirs { Fate::Removed } else { Fate::Kept(now.clone()) }
+                }
+            },
+        }
+    }
+
+    fn fields<T: Clone>(&mut self, fields: &[Field<T>], base: Option<&T>, now: &T, file: &T, named: &Named) -> T {
+        let mut merged = now.clone();
+        let is_renamed =
+            self.changes.iter().any(|change| change.uid == named.uid && change.kind == ChangeKind::Renamed);
+        for field in fields.iter().filter(|field| field.is_own) {
+            let (mine, theirs) = ((field.text)(now), (field.text)(file));
+            let base = base.map(&field.text);
+            if mine == theirs || base.as_ref() == Some(&theirs) {
+                continue;
+            }
+            let conflict = base != Some(mine.clone());
+            let told = Change {
+                kind: ChangeKind::Changed,
+                field: Some(format!("{}{}", named.prefix, field.name)),
+                from: mine,
+                to: theirs,
+                conflict,
+                ..named.change()
+            };
+            if conflict || !is_renamed || field.name != "label" {
+                self.changes.push(told);
+            }
+            if !conflict || self.take == Take::Theirs {
+                (field.take)(&mut merged, file);
+            }
+        }
+        merged
+    }
+
+    fn whole(&mut self, kind: ChangeKind, named: &Named, conflict: bool) {
+        let field = Some(named.prefix.trim().to_owned()).filter(|field| !field.is_empty());
+        self.changes.push(Change { kind, field, conflict, ..named.change() });
+    }
+}
+
+/// What changes are told about.
+struct Named<'a> {
+    uid: Uid,
+    joint: Option<&'a str>,
+    tag: Option<&'a str>,
+    prefix: &'a str,
+}
+
+impl Named<'_> {
+    fn change(&self) -> Change {
+        Change {
+            kind: ChangeKind::Changed,
+            uid: self.uid,
+            joint: self.joint.map(str::to_owned),
+            tag: self.tag.map(str::to_owned),
+            field: None,
+            from: None,
+            to: None,
+            conflict: false,
+        }
+    }
+}
+
+fn uids<'a, T: 'a>(list: impl IntoIterator<Item = &'a T>, uid: impl Fn(&T) -> Uid) -> Vec<Uid> {
+    list.into_iter().map(uid).collect()
+}
+
+/// Each uid of the lists once: those of the file first, then of the rig now, then of the base.
+fn all([base, now, file]: &[Vec<Uid>; 3]) -> Vec<Uid> {
+    let mut seen = HashSet::new();
+    file.iter().chain(now).chain(base).copied().filter(|uid| seen.insert(*uid)).collect()
+}
+
+fn order_of_file(file: &[Uid], now: &[Uid]) -> Vec<Uid> {
+    let mut seen = HashSet::new();
+    file.iter().chain(now).copied().filter(|uid| seen.insert(*uid)).collect()
+}
+
+/// Returns `true` if a tag is a command.
+fn is_command(tag: &TagData) -> bool {
+    matches!(tag.kind, TagKind::Command { .. })
+}

@@ -1,0 +1,162 @@
+//! Edits that make one rig of another.
+
+use std::collections::HashMap;
+
+use crate::rig::{EditError, Rig, RigEdit, RigJoint, TagData, Uid};
+
+/// The edits after which `from` has the content of `to`: header, groups, joints, tags and stored poses. Weights, the current
+/// pose and attribute values stay; those of joints that go, go with them. What is the same in both is not touched.
+///
+/// # Errors
+/// [`EditError`] of an edit that is refused: one of the two has values that no rig can have.
+pub fn edits_between(from: &Rig, to: &Rig) -> Result<Vec<RigEdit>, EditError> {
+    let mut steps = Steps { rig: from.clone(), edits: Vec::new() };
+    if from.about() != to.about() {
+        steps.apply(RigEdit::SetAbout(Box::new(to.about().clone())))?;
+    }
+    steps.groups(to)?;
+    steps.leaving_tags(to)?;
+    steps.joints(to)?;
+    steps.tags(to)?;
+    steps.leaving(to)?;
+    steps.poses(to)?;
+    Ok(steps.edits)
+}
+
+/// Edits so far, and the rig after them.
+struct Steps {
+    rig: Rig,
+    edits: Vec<RigEdit>,
+}
+
+impl Steps {
+    fn apply(&mut self, edit: RigEdit) -> Result<(), EditError> {
+        self.rig.apply(&edit)?;
+        self.edits.push(edit);
+        Ok(())
+    }
+
+    fn groups(&mut self, to: &Rig) -> Result<(), EditError> {
+        for (place, group) in to.groups().iter().enumerate() {
+            match self.rig.group(group.uid) {
+                None => self.apply(RigEdit::AddLocalGroup(group.clone(), place))?,
+                Some(own) if own != group => self.apply(RigEdit::SetLocalGroup(group.clone()))?,
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes away the tags that are gone, or on another joint.
+    fn leaving_tags(&mut self, to: &Rig) -> Result<(), EditError> {
+        let stays = |joint: Uid, tag: Uid| to.find_tag(tag).is_some_and(|(on, _)| on.data.uid == joint);
+        let all = self.rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.uid)));
+        let leaving: Vec<_> = all.filter(|(joint, tag)| !stays(*joint, *tag)).collect();
+        leaving.into_iter().try_for_each(|(joint, tag)| self.apply(RigEdit::RemoveTag(joint, tag)))
+    }
+
+    /// Puts every joint in its place, parents first, and gives it its fields.
+    fn joints(&mut self, to: &Rig) -> Result<(), EditError> {
+        let mut places: HashMap<Uid, usize> = HashMap::new();
+        for joint in to.walk() {
+            for (place, child) in joint.children.iter().enumerate() {
+                places.insert(*child, place);
+            }
+        }
+        places.extend(to.roots().iter().copied().zip(0..));
+        for joint in to.walk() {
+            let (uid, parent) = (joint.data.uid, joint.parent);
+            let index = places.get(&uid).copied().unwrap_or(usize::MAX);
+            let Some(own) = self.rig.joint(uid) else {
+                self.apply(RigEdit::AddJoint { joint: Box::new(joint.data.clone()), parent, index })?;
+                continue;
+            };
+            let is_there = own.parent == parent && self.rig.children(parent).get(index) == Some(&uid);
+            let own = own.clone();
+            if !is_there {
+                self.apply(RigEdit::SetParent { joint: uid, parent, index })?;
+            }
+            self.fields(&own, joint)?;
+        }
+        Ok(())
+    }
+
+    fn fields(&mut self, own: &RigJoint, joint: &RigJoint) -> Result<(), EditError> {
+        let (uid, own, data) = (joint.data.uid, &own.data, &joint.data);
+        if own.label != data.label {
+            self.apply(RigEdit::SetLabel(uid, data.label.clone()))?;
+        }
+        if own.group != data.group {
+            self.apply(RigEdit::SetGroup(uid, data.group))?;
+        }
+        if own.mirror != data.mirror {
+            self.apply(RigEdit::SetMirror(uid, data.mirror))?;
+        }
+        if own.locked != data.locked {
+            self.apply(RigEdit::SetLocked(uid, data.locked))?;
+        }
+        if own.rest != data.rest {
+            self.apply(RigEdit::SetRest(uid, data.rest))?;
+        }
+        if own.kind != data.kind {
+            self.apply(RigEdit::SetKind(uid, data.kind))?;
+        }
+        if own.face != data.face {
+            self.apply(RigEdit::SetFace(uid, data.face.clone().map(Box::new)))?;
+        }
+        Ok(())
+    }
+
+    fn tags(&mut self, to: &Rig) -> Result<(), EditError> {
+        for joint in to.walk() {
+            let uid = joint.data.uid;
+            for (index, tag) in joint.data.tags.iter().enumerate() {
+                let own = self.rig.joint(uid).map_or(&[][..], |own| own.data.tags.as_slice());
+                let place = own.iter().position(|own| own.uid == tag.uid);
+                let is_same = place.is_some_and(|place| own[place] == *tag);
+                let add = || RigEdit::AddTag { joint: uid, tag: Box::new(TagData::clone(tag)), index };
+                match place {
+                    None => self.apply(add())?,
+                    Some(place) if place != index => {
+                        self.apply(RigEdit::RemoveTag(uid, tag.uid))?;
+                        self.apply(add())?;
+                    }
+                    Some(_) if !is_same => self.apply(RigEdit::SetTag(uid, Box::new(tag.clone())))?,
+                    Some(_) => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes away joints, lowest first, and then groups.
+    fn leaving(&mut self, to: &Rig) -> Result<(), EditError> {
+        let mut joints: Vec<Uid> = self.rig.walk().map(|joint| joint.data.uid).collect();
+        joints.retain(|uid| to.joint(*uid).is_none());
+        joints.iter().rev().try_for_each(|uid| self.apply(RigEdit::RemoveJoint(*uid)))?;
+        let groups: Vec<Uid> = self.rig.groups().iter().map(|group| group.uid).collect();
+        let leaving = groups.into_iter().filter(|uid| to.group(*uid).is_none());
+        leaving.collect::<Vec<_>>().into_iter().try_for_each(|uid| self.apply(RigEdit::RemoveLocalGroup(uid)))
+    }
+
+    fn poses(&mut self, to: &Rig) -> Result<(), EditError> {
+        let own: Vec<Uid> = self.rig.stored_poses().iter().map(|pose| pose.uid).collect();
+        for uid in own.into_iter().filter(|uid| to.stored_pose(*uid).is_none()) {
+            self.apply(RigEdit::RemoveStoredPose(uid))?;
+        }
+        for (index, pose) in to.stored_poses().iter().enumerate() {
+            let place = self.rig.stored_poses().iter().position(|own| own.uid == pose.uid);
+            let is_same = self.rig.stored_pose(pose.uid) == Some(pose);
+            match place {
+                Some(place) if place == index && is_same => {}
+                Some(place) if place == index => self.apply(RigEdit::SetStoredPose(Box::new(pose.clone())))?,
+                Some(_) => {
+                    self.apply(RigEdit::RemoveStoredPose(pose.uid))?;
+                    self.apply(RigEdit::AddStoredPose(Box::new(pose.clone()), index))?;
+                }
+                None => self.apply(RigEdit::AddStoredPose(Box::new(pose.clone()), index))?,
+            }
+        }
+        Ok(())
+    }
+}

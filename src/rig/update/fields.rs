@@ -1,0 +1,236 @@
+//! Fields of what an update compares: how each is written, and how it is taken over.
+
+use std::collections::BTreeSet;
+
+use super::is_command;
+use crate::rig::{
+    GroupData, JointData, Rig, RigAbout, StoredPose, TagData, TagKind, Uid,
+    format::{
+        template::{quoted, vector},
+        tree::Tree,
+    },
+    reference::{given_names, refresh_names},
+};
+
+/// A field of something.
+pub(super) struct Field<'a, T> {
+    pub name: String,
+    /// Its value as it is written; `None` where it has none.
+    pub text: Box<dyn Fn(&T) -> Option<String> + 'a>,
+    /// Takes it over from another one.
+    pub take: Box<dyn Fn(&mut T, &T) + 'a>,
+    /// False for what is compared by itself, and says here only whether something is as it was.
+    pub is_own: bool,
+}
+
+fn field<'a, T>(name: &str, text: impl Fn(&T) -> Option<String> + 'a, take: impl Fn(&mut T, &T) + 'a) -> Field<'a, T> {
+    Field { name: name.to_owned(), text: Box::new(text), take: Box::new(take), is_own: true }
+}
+
+fn written(text: &str) -> Option<String> {
+    (!text.is_empty()).then(|| quoted(text))
+}
+
+pub(super) fn about_fields() -> Vec<Field<'static, RigAbout>> {
+    vec![
+        field("name", |a: &RigAbout| written(&a.name), |a, b| a.name.clone_from(&b.name)),
+        field("version", |a: &RigAbout| written(&a.version), |a, b| a.version.clone_from(&b.version)),
+        field("kind", |a: &RigAbout| written(&a.kind), |a, b| a.kind.clone_from(&b.kind)),
+        field("author", |a: &RigAbout| written(&a.author), |a, b| a.author.clone_from(&b.author)),
+        field("description", |a: &RigAbout| written(&a.description), |a, b| a.description.clone_from(&b.description)),
+        field("preview", |a: &RigAbout| a.preview.as_deref().map(quoted), |a, b| a.preview.clone_from(&b.preview)),
+    ]
+}
+
+pub(super) fn group_fields() -> Vec<Field<'static, GroupData>> {
+    let color = |group: &GroupData| {
+        let [r, g, b] = group.color;
+        Some(format!("({r:?}, {g:?}, {b:?})"))
+    };
+    vec![
+        field("name", |a: &GroupData| Some(quoted(&a.name)), |a, b| a.name.clone_from(&b.name)),
+        field("color", color, |a, b| a.color = b.color),
+        field("enabled", |a: &GroupData| Some(a.enabled.to_string()), |a, b| a.enabled = b.enabled),
+    ]
+}
+
+pub(super) fn pose_fields() -> Vec<Field<'static, StoredPose>> {
+    vec![
+        field("name", |a: &StoredPose| Some(quoted(&a.name)), |a, b| a.name.clone_from(&b.name)),
+        field("offsets", |a: &StoredPose| Some(format!("{:?}", a.offsets)), |a, b| a.offsets.clone_from(&b.offsets)),
+        field("values", |a: &StoredPose| Some(format!("{:?}", a.values)), |a, b| a.values.clone_from(&b.values)),
+    ]
+}
+
+/// Fields of a joint and its parent. Others are told by their names in the rig now, else in the file.
+pub(super) fn joint_fields<'a>(now: &'a Rig, file: &'a Rig) -> Vec<Field<'a, (JointData, Option<Uid>)>> {
+    type Joint = (JointData, Option<Uid>);
+    let joint = move |uid: Uid| {
+        let label = [now, file].into_iter().find_map(|rig| rig.joint(uid)?.data.label.clone());
+        format!("{}#{uid}", label.unwrap_or_default())
+    };
+    let group = move |uid: Uid| {
+        let name = [now, file].into_iter().find_map(|rig| Some(rig.group(uid)?.name.clone()));
+        format!("{}#{uid}", name.unwrap_or_default())
+    };
+    let face = |(data, _): &Joint| data.face.as_ref().map(|face| format!("{face:?}"));
+    let rotation = |(data, _): &Joint| {
+        let [x, y, z, w] = data.rest.rotation.to_array();
+        Some(format!("({x:?}, {y:?}, {z:?}, {w:?})"))
+    };
+    vec![
+        field("label", |(a, _): &Joint| a.label.as_deref().map(quoted), |(a, _), (b, _)| a.label.clone_from(&b.label)),
+        field("parent", move |(_, parent): &Joint| parent.map(joint), |(_, a), (_, b)| *a = *b),
+        field("group", move |(a, _): &Joint| a.group.map(group), |(a, _), (b, _)| a.group = b.group),
+        field("mirror", move |(a, _): &Joint| a.mirror.map(joint), |(a, _), (b, _)| a.mirror = b.mirror),
+        field("kind", |(a, _): &Joint| Some(format!("{:?}", a.kind)), |(a, _), (b, _)| a.kind = b.kind),
+        field("locked", |(a, _): &Joint| Some(a.locked.to_string()), |(a, _), (b, _)| a.locked = b.locked),
+        field(
+            "translation",
+            |(a, _): &Joint| Some(vector(a.rest.translation)),
+            |(a, _), (b, _)| a.rest.translation = b.rest.translation,
+        ),
+        field("rotation", rotation, |(a, _), (b, _)| a.rest.rotation = b.rest.rotation),
+        field("scale", |(a, _): &Joint| Some(vector(a.rest.scale)), |(a, _), (b, _)| a.rest.scale = b.rest.scale),
+        field("face", face, |(a, _), (b, _)| a.face.clone_from(&b.face)),
+        Field { is_own: false, ..field("tags", |(a, _): &Joint| Some(format!("{:?}", a.tags)), |_, _| {}) },
+    ]
+}
+
+/// Module or kind of feature, and the name that the tag gives.
+pub(super) fn tag_title(tag: &TagData) -> String {
+    match &tag.kind {
+        TagKind::Command { module, params, .. } => match given_names(params).find(|name| !name.is_empty()) {
+            Some(name) => format!("{module}/{name}"),
+            None => module.clone(),
+        },
+        TagKind::Feature { kind, name, switch, .. } => {
+            let parts = [kind.as_str(), name, switch];
+            parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("/")
+        }
+    }
+}
+
+/// Fields of a tag, with each parameter that one of the three versions has. Tags of different kind or module differ in the
+/// field `module`, and are taken over as a whole.
+pub(super) fn tag_fields<'a>(versions: &[Option<&TagData>; 3], now: &'a Rig, file: &'a Rig) -> Vec<Field<'a, TagData>> {
+    let feature = move |uid: Uid| {
+        let title = [now, file].into_iter().find_map(|rig| Some(tag_title(rig.find_tag(uid)?.1)));
+        format!("{}#{uid}", title.unwrap_or_default())
+    };
+    let kind = |tag: &TagData| match &tag.kind {
+        TagKind::Command { module, .. } => Some(quoted(module)),
+        TagKind::Feature { kind, .. } => Some(format!("feature {}", quoted(kind))),
+    };
+    let whole = |a: &mut TagData, b: &TagData| a.kind.clone_from(&b.kind);
+    let mut list = vec![
+        field("enabled", |a: &TagData| Some(a.enabled.to_string()), |a, b| a.enabled = b.enabled),
+        field("comment", |a: &TagData| written(&a.comment), |a, b| a.comment.clone_from(&b.comment)),
+    ];
+    let there: Vec<&TagData> = versions.iter().copied().flatten().collect();
+    let alike = there.windows(2).all(|pair| kind(pair[0]) == kind(pair[1]));
+    if !alike {
+        list.push(field("module", kind, whole));
+        return list;
+    }
+    if !there.iter().any(|tag| is_command(tag)) {
+        for (place, name) in ["name", "switch", "choice"].into_iter().enumerate() {
+            let text = move |tag: &TagData| feature_texts(&tag.kind).and_then(|texts| written(texts[place]));
+            let take = move |a: &mut TagData, b: &TagData| {
+                if let (Some(a), Some(b)) = (feature_texts_mut(&mut a.kind), feature_texts(&b.kind)) {
+                    a[place].clone_from(b[place]);
+                }
+            };
+            list.push(field(name, text, take));
+        }
+        return list;
+    }
+    let of_feature = move |tag: &TagData| match &tag.kind {
+        TagKind::Command { feature: Some(uid), .. } => Some(feature(*uid)),
+        _ => None,
+    };
+    let take_feature = |a: &mut TagData, b: &TagData| {
+        if let (TagKind::Command { feature: a, .. }, TagKind::Command { feature: b, .. }) = (&mut a.kind, &b.kind) {
+            *a = *b;
+        }
+    };
+    list.push(field("feature", of_feature, take_feature));
+    let params: Vec<&str> = there.iter().map(|tag| params_of(tag)).collect();
+    let keys: Option<BTreeSet<String>> = params
+        .iter()
+        .map(|params| keys(params))
+        .collect::<Option<Vec<_>>>()
+        .map(|keys| keys.into_iter().flatten().collect());
+    let Some(keys) = keys else {
+        // Parameters that are no struct are one value.
+        let all = move |tag: &TagData| Some(refresh_names(params_of(tag), now).into_owned());
+        list.push(field("params", all, whole));
+        return list;
+    };
+    for key in keys {
+        let (own, name) = (key.clone(), format!("params.{key}"));
+        let value =
+            move |tag: &TagData| parameter(params_of(tag), &own).map(|text| refresh_names(&text, now).into_owned());
+        let take = move |a: &mut TagData, b: &TagData| {
+            let value = parameter(params_of(b), &key);
+            if let TagKind::Command { params, .. } = &mut a.kind {
+                *params = with_parameter(params, &key, value.as_deref());
+            }
+        };
+        list.push(field(&name, value, take));
+    }
+    list
+}
+
+fn params_of(tag: &TagData) -> &str {
+    match &tag.kind {
+        TagKind::Command { params, .. } => params,
+        TagKind::Feature { .. } => "",
+    }
+}
+
+/// Names of the fields of parameters; `None` if they are no struct.
+fn keys(params: &str) -> Option<Vec<String>> {
+    let tree = Tree::parse(params)?;
+    let root = tree.node(tree.root());
+    let is_struct = root.bracket == Some('(') && root.name.is_empty();
+    let keys: Option<Vec<String>> = root.items.iter().map(|item| item.key.map(str::to_owned)).collect();
+    keys.filter(|_| is_struct)
+}
+
+/// Text of a parameter.
+fn parameter(params: &str, key: &str) -> Option<String> {
+    let tree = Tree::parse(params)?;
+    let field = tree.field(tree.root(), key)?;
+    Some(tree.written(field.value).to_owned())
+}
+
+/// Parameters with another value of one of them, or without it.
+fn with_parameter(params: &str, key: &str, value: Option<&str>) -> String {
+    let Some(tree) = Tree::parse(params) else { return params.to_owned() };
+    let root = tree.node(tree.root());
+    let mut list: Vec<String> = Vec::new();
+    for item in &root.items {
+        let text = if item.key == Some(key) { value } else { Some(tree.written(item.value)) };
+        list.extend(text.map(|text| format!("{}: {text}", item.key.unwrap_or_default())));
+    }
+    if let (Some(value), None) = (value, tree.field(tree.root(), key)) {
+        list.push(format!("{key}: {value}"));
+    }
+    format!("({})", list.join(", "))
+}
+
+/// Name, switch and choice of a feature.
+fn feature_texts(kind: &TagKind) -> Option<[&String; 3]> {
+    match kind {
+        TagKind::Feature { name, switch, choice, .. } => Some([name, switch, choice]),
+        TagKind::Command { .. } => None,
+    }
+}
+
+fn feature_texts_mut(kind: &mut TagKind) -> Option<[&mut String; 3]> {
+    match kind {
+        TagKind::Feature { name, switch, choice, .. } => Some([name, switch, choice]),
+        TagKind::Command { .. } => None,
+    }
+}
