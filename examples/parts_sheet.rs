@@ -207,7 +207,7 @@ fn posed(template: &Rig, moves: &[Move]) -> Result<Rig, Box<dyn Error>> {
                 state.set_offset(control, PoseOffset { translation, ..PoseOffset::IDENTITY })?;
             }
             Move::Turn(label, shape, degrees) => {
-                let rotation = rigsmith::processor::degrees(Vec3::from(*degrees));
+                let rotation = rigsmith::rig::degrees(Vec3::from(*degrees));
                 state.set_offset(
                     find(&built, label, |node| has_shape(node, shape))?,
                     PoseOffset::from_rotation(rotation),

@@ -6,6 +6,7 @@
 mod argument;
 mod build;
 mod check;
+mod compose;
 mod convert;
 mod demo;
 #[cfg(feature = "render")]
@@ -13,7 +14,9 @@ mod device_selection;
 mod face;
 mod format;
 mod info;
+mod list;
 mod modules;
+mod new;
 mod outputs;
 mod pose;
 mod progress;
@@ -24,6 +27,7 @@ mod sketch;
 mod skin;
 mod switches;
 mod update;
+mod watch;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -69,6 +73,18 @@ enum Command {
     Check(check::CheckArgs),
     /// Put templates into their layout, with or without the uids that follow from names
     Format(format::FormatArgs),
+    /// Write a template to start from, with comments
+    New(new::NewArgs),
+    /// List the templates of a folder by their headers
+    List(list::ListArgs),
+    /// Put several rigs into one
+    Merge(compose::MergeArgs),
+    /// Put a template's tags onto joints of a rig, in order
+    Inject(compose::InjectArgs),
+    /// Take joints out of a rig into a rig of their own
+    Extract(compose::ExtractArgs),
+    /// Build a template again whenever its file is saved, and write the character
+    Watch(watch::WatchArgs),
     /// Say what differs between two templates
     Diff(update::DiffArgs),
     /// Bring a rig to a new version of its template: what you changed stays
@@ -204,6 +220,12 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Some(Command::Format(args)) => format::run(&args),
         Some(Command::Diff(args)) => update::run_diff(&args),
         Some(Command::Update(args)) => update::run_update(&args),
+        Some(Command::New(args)) => new::run(&args),
+        Some(Command::List(args)) => list::run(&args),
+        Some(Command::Merge(args)) => compose::merge(&args),
+        Some(Command::Inject(args)) => compose::inject(&args),
+        Some(Command::Extract(args)) => compose::extract(&args),
+        Some(Command::Watch(args)) => watch::run(&args, cli.json),
         Some(Command::Build(args)) => build::run(&args),
         Some(Command::Pose(args)) => pose::run(&args),
         Some(Command::Modules(args)) => Ok(modules::run(&args)),

@@ -138,7 +138,7 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
 }
 
 /// Prints lines; `false` if standard output is closed or full.
-fn print<'a>(lines: impl IntoIterator<Item = &'a str>) -> bool {
+pub(super) fn print<'a>(lines: impl IntoIterator<Item = &'a str>) -> bool {
     let mut out = std::io::stdout().lock();
     lines.into_iter().all(|line| writeln!(out, "{}", printable(line)).is_ok()) && out.flush().is_ok()
 }

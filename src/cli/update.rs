@@ -92,7 +92,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-fn load(path: &Path, report: &mut Report) -> Result<Rig, Failure> {
+pub(super) fn load(path: &Path, report: &mut Report) -> Result<Rig, Failure> {
     if FileKind::of(path) != Some(FileKind::Template) {
         return Err(Failure::Usage(format!("`{}` is no template; give a .rig.ron", path.display())));
     }

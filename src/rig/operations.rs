@@ -7,6 +7,7 @@
 mod draft;
 mod frame;
 mod hierarchy;
+mod merge;
 mod naming;
 mod orient;
 mod place;
@@ -14,6 +15,8 @@ mod pose;
 mod symmetry;
 mod tags;
 mod transform;
+
+use std::sync::Arc;
 
 use bevy::math::{Affine3, Quat, Vec3};
 
@@ -141,6 +144,13 @@ pub enum Operation {
     DeletePose(Uid),
     /// Changes tags.
     Tags(TagOperation),
+    /// Puts another rig's joints, groups and tags into this one.
+    Merge {
+        /// The other rig.
+        other: Arc<Rig>,
+        /// What its roots hang on, where they are now; they stay roots without one.
+        parent: Option<Uid>,
+    },
     /// Applies edits.
     Edits(Vec<RigEdit>),
     /// Applies edits under a given name.
@@ -200,6 +210,7 @@ impl Operation {
             Self::RenamePose(..) => "Rename pose",
             Self::DeletePose(..) => "Delete pose",
             Self::Tags(operation) => operation.name(),
+            Self::Merge { .. } => "Merge rig",
             Self::Edits(edits) => match edits[..] {
                 [RigEdit::SetSkin(_, Some(_))] => "Skin mesh",
                 _ => "Edit rig",
@@ -274,6 +285,7 @@ impl Operation {
             Self::RenamePose(pose, name) => pose::rename(draft, *pose, name),
             Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),
             Self::Tags(operation) => tags::run(draft, operation),
+            Self::Merge { other, parent } => merge::merge(draft, other, *parent),
             Self::Edits(edits) | Self::Named { edits, .. } => {
                 edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?))
             }

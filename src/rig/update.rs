@@ -92,7 +92,8 @@ pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
     let mut changes = Vec::new();
     let renamed = renamed::renamed(base.unwrap_or(now), file, &mut changes);
     let file = renamed.as_ref().unwrap_or(file);
-    let mut merge = Merge { base, now, file, take, changes, rig: now.clone(), placed: HashSet::new() };
+    let told = changes.iter().map(|change: &Change| change.uid).collect();
+    let mut merge = Merge { base, now, file, take, changes, rig: now.clone(), placed: HashSet::new(), renamed: told };
     merge.header();
     merge.groups();
     merge.joints();
@@ -118,6 +119,8 @@ struct Merge<'a> {
     rig: Rig,
     /// Tags that have their joint.
     placed: HashSet<Uid>,
+    /// Things that are told as renamed.
+    renamed: HashSet<Uid>,
 }
 
 impl Merge<'_> {
@@ -286,8 +289,7 @@ impl Merge<'_> {
 
     fn fields<T: Clone>(&mut self, fields: &[Field<T>], base: Option<&T>, now: &T, file: &T, named: &Named) -> T {
         let mut merged = now.clone();
-        let is_renamed =
-            self.changes.iter().any(|change| change.uid == named.uid && change.kind == ChangeKind::Renamed);
+        let is_renamed = self.renamed.contains(&named.uid);
         for field in fields.iter().filter(|field| field.is_own) {
             let (mine, theirs) = ((field.text)(now), (field.text)(file));
             let base = base.map(&field.text);

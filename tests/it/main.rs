@@ -14,6 +14,8 @@ mod cli_build;
 mod cli_face;
 #[cfg(feature = "cli")]
 mod cli_outputs;
+#[cfg(feature = "cli")]
+mod cli_templates;
 mod commands;
 mod custom_module;
 #[cfg(feature = "draw")]

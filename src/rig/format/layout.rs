@@ -164,7 +164,7 @@ impl<'t, 'a> Layout<'t, 'a> {
         let mut rest = gap;
         let (line, below) = rest.split_once('\n').unwrap_or((rest, ""));
         let line_comment = line.trim();
-        if follows && !line_comment.is_empty() && !is_open_comment(line_comment) {
+        if follows && !line_comment.is_empty() && open_comments(line_comment, 0) == 0 {
             self.out.push(' ');
             self.out.push_str(line_comment);
             rest = if rest.contains('\n') { below } else { "" };
@@ -195,7 +195,7 @@ impl<'t, 'a> Layout<'t, 'a> {
                 self.out.push_str(line.trim_end());
             }
             self.out.push('\n');
-            inside = (inside + line.matches("/*").count()).saturating_sub(line.matches("*/").count());
+            inside = open_comments(line, inside);
         }
         if blank && follows_line(&self.out) {
             self.out.push('\n');
@@ -210,8 +210,24 @@ fn follows_line(out: &str) -> bool {
     out.ends_with('\n') && !before.ends_with(['\n', '(', '[', '{']) && !before.is_empty()
 }
 
-fn is_open_comment(line: &str) -> bool {
-    line.matches("/*").count() > line.matches("*/").count()
+/// Number of comments over several lines that are open behind a line of comments, with `open` before it.
+fn open_comments(line: &str, mut open: usize) -> usize {
+    let mut rest = line;
+    while let Some(at) = rest.find(['/', '*']) {
+        rest = &rest[at..];
+        let mark = rest.get(..2).unwrap_or_default();
+        match mark {
+            "//" if open == 0 => return 0,
+            "/*" => open += 1,
+            "*/" => open = open.saturating_sub(1),
+            _ => {
+                rest = &rest[1..];
+                continue;
+            }
+        }
+        rest = &rest[2..];
+    }
+    open
 }
 
 /// Places of comments and blank lines between tokens.

@@ -10,6 +10,11 @@ use super::scan::{Token, tokens};
 /// Most brackets around a value: as many as the RON reader takes.
 const DEPTH: usize = 128;
 
+/// Most nodes of a tree: this many, and one for so many bytes of its text. A text of nothing but short numbers has more,
+/// and would need a hundred times its size.
+const FREE_NODES: usize = 300_000;
+const BYTES_PER_NODE: usize = 8;
+
 /// Number of a node in its [`Tree`].
 pub(in crate::rig) type NodeId = usize;
 
@@ -49,14 +54,14 @@ pub(in crate::rig) struct Item<'a> {
 }
 
 impl<'a> Tree<'a> {
-    /// Tree of a text with one value; `None` if its brackets do not match, an item has no value, or brackets are nested
-    /// deeper than [`DEPTH`]. A node has a lower number than those inside of it. Time is linear.
+    /// Tree of a text with one value; `None` if its brackets do not match, an item has no value, brackets are nested
+    /// deeper than [`DEPTH`], or there are too many of them. A node has a lower number than those inside of it. Time is linear.
     pub fn parse(text: &'a str) -> Option<Self> {
         let mut nodes: Vec<Node> = vec![Node::plain(0..0)];
         // The item under construction of every open bracket: its key, its start, its value.
         let mut open: Vec<(NodeId, Option<Pending>)> = vec![(0, None)];
         for token in tokens(text).skip(attribute(text)) {
-            if open.len() > DEPTH {
+            if open.len() > DEPTH || nodes.len() > FREE_NODES + text.len() / BYTES_PER_NODE {
                 return None;
             }
             let start = start_of(text, &token);

@@ -5,7 +5,6 @@
 mod clipboard;
 mod part;
 mod paste;
-mod remap;
 
 use std::{collections::BTreeMap, sync::Arc};
 

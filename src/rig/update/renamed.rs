@@ -3,10 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{Change, ChangeKind, fields::tag_title};
-use crate::rig::{
-    Rig, RigJoint, TagData, TagKind, Uid,
-    reference::{map_references, map_uids},
-};
+use crate::rig::{Rig, RigJoint, TagData, TagKind, Uid, reference::map_text_fields, remap::Remap};
 
 /// The file with the uids of `base` for joints and tags that are at the same place with the same content under another name;
 /// `None` if there are none. Each is told as a change.
@@ -33,7 +30,7 @@ pub(super) fn renamed(base: &Rig, file: &Rig, changes: &mut Vec<Change>) -> Opti
         };
         tags(known, joint, base, file, &mut same, changes);
     }
-    (!same.is_empty()).then(|| with_uids(file, &same))
+    (!same.is_empty()).then(|| with_uids(file, same))
 }
 
 /// Returns `true` if two joints have the same place and tags, whatever their names.
@@ -87,9 +84,7 @@ fn tags(
 /// Returns `true` if two commands have the same parameters but for the names that they give.
 fn is_same_but_name(a: &TagData, b: &TagData) -> bool {
     let plain = |tag: &TagData| match &tag.kind {
-        TagKind::Command { params, .. } => {
-            Some(crate::rig::reference::map_text_fields(params, &["name", "label"], |_| Some(String::new())))
-        }
+        TagKind::Command { params, .. } => Some(map_text_fields(params, &["name", "label"], |_| Some(String::new()))),
         TagKind::Feature { .. } => None,
     };
     a.enabled == b.enabled && plain(a).is_some() && plain(a) == plain(b)
@@ -109,30 +104,14 @@ fn change(uid: Uid, from: &Option<String>, to: &Option<String>) -> Change {
 }
 
 /// A rig with other uids of joints and tags, in references, too.
-fn with_uids(rig: &Rig, uids: &HashMap<Uid, Uid>) -> Rig {
-    let get = |uid: Uid| uids.get(&uid).copied().unwrap_or(uid);
+fn with_uids(rig: &Rig, uids: HashMap<Uid, Uid>) -> Rig {
+    let before: HashMap<Uid, Uid> = uids.iter().map(|(from, to)| (*to, *from)).collect();
+    let remap = Remap { uids, ..Remap::default() };
+    let get = |uid: Uid| remap.get(uid).unwrap_or(uid);
+    let joints = rig.walk().map(|joint| (get(joint.data.uid), (remap.joint(&joint.data), joint.parent.map(get))));
     let mut out = rig.clone();
-    let joints = rig.walk().map(|joint| {
-        let mut data = joint.data.clone();
-        data.uid = get(data.uid);
-        data.mirror = data.mirror.map(get);
-        for tag in &mut data.tags {
-            tag.uid = get(tag.uid);
-            if let TagKind::Command { params, feature, .. } = &mut tag.kind {
-                *feature = feature.map(get);
-                let referred = map_references(params, |reference| {
-                    for (_, uid) in reference.uids_mut() {
-                        *uid = get(*uid);
-                    }
-                });
-                *params = map_uids(&referred, |uid| uids.get(&uid).copied());
-            }
-        }
-        (data.uid, (data, joint.parent.map(get)))
-    });
-    let joints = joints.collect();
-    out.set_joints(joints, |parent| {
-        let own = parent.map(|parent| uids.iter().find(|(_, to)| **to == parent).map_or(parent, |(from, _)| *from));
+    out.set_joints(joints.collect(), |parent| {
+        let own = parent.map(|parent| before.get(&parent).copied().unwrap_or(parent));
         rig.children(own).iter().map(|child| get(*child)).collect()
     });
     out

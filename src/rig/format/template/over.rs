@@ -4,14 +4,19 @@
 mod order;
 pub(super) mod patch;
 
+use std::{
+    collections::{HashMap, HashSet},
+    rc::Rc,
+};
+
 use bevy::math::{Quat, Vec3};
 
 use super::{
     read::read_text,
     shorthand::{Declaration, Declared, TAG_FIELDS, TagForm},
     write::{
-        face_text, feature_list, feature_summaries, group_text, joint_text, needed_format, needs_text, pose_text,
-        tag_text,
+        face_text, feature_list, feature_summaries, feature_uids, group_text, joint_text, needed_format, needs_text,
+        pose_text, tag_text,
     },
     write_template,
 };
@@ -89,30 +94,48 @@ fn canonical(params: &str) -> String {
 }
 
 /// Text of a joint that is new in a text; with names, it refers by label where that is the joint's alone.
-fn new_joint(rig: &Rig, joint: &RigJoint, with_names: bool) -> String {
-    let mut text = joint_text(rig, joint);
+fn new_joint(rig: &Rig, joint: &RigJoint, names: &NamesInUse, with_names: bool) -> String {
+    let mut text = joint_text(rig, joint, &names.features);
     if !with_names {
         return text;
     }
     for (field, uid) in [("parent", joint.parent), ("mirror", joint.data.mirror)] {
         let called = uid.and_then(|uid| Some((uid, rig.joint(uid)?.data.label.as_deref()?)));
-        if let Some((uid, label)) = called.filter(|(_, label)| is_unique(rig, "joint", label)) {
+        if let Some((uid, label)) = called.filter(|(_, label)| names.is_unique("joint", label)) {
             text = text.replacen(&format!("{field}: \"{uid}\""), &format!("{field}: {}", quoted(label)), 1);
         }
     }
     if let Some(group) =
-        joint.data.group.and_then(|group| rig.group(group)).filter(|g| is_unique(rig, "group", &g.name))
+        joint.data.group.and_then(|group| rig.group(group)).filter(|g| names.is_unique("group", &g.name))
     {
         text = text.replacen(&format!("group: \"{}\"", group.uid), &format!("group: {}", quoted(&group.name)), 1);
     }
     without_uids(&text, rig, |_| true).into_owned()
 }
 
-/// Returns `true` if one thing alone has that name: a group for the field `group`, else a joint.
-fn is_unique(rig: &Rig, field: &str, name: &str) -> bool {
-    match field {
-        "group" => rig.groups().iter().filter(|group| group.name == name).count() == 1,
-        _ => rig.walk().filter(|joint| joint.data.label.as_deref() == Some(name)).count() == 1,
+/// How many joints and groups have each name, and the features of a rig.
+struct NamesInUse {
+    joints: HashMap<String, usize>,
+    groups: HashMap<String, usize>,
+    features: HashSet<Uid>,
+}
+
+impl NamesInUse {
+    fn of(rig: &Rig) -> Self {
+        let (mut joints, mut groups) = (HashMap::new(), HashMap::new());
+        for label in rig.walk().filter_map(|joint| joint.data.label.clone()) {
+            *joints.entry(label).or_default() += 1;
+        }
+        for group in rig.groups() {
+            *groups.entry(group.name.clone()).or_default() += 1;
+        }
+        Self { joints, groups, features: feature_uids(rig) }
+    }
+
+    /// Returns `true` if one thing alone has that name: a group for the field `group`, else a joint.
+    fn is_unique(&self, field: &str, name: &str) -> bool {
+        let names = if field == "group" { &self.groups } else { &self.joints };
+        names.get(name) == Some(&1)
     }
 }
 
@@ -122,13 +145,21 @@ struct Rewriter<'d, 'a> {
     declared: &'d Declared<'a>,
     /// True in a text that leaves uids out: it gets names.
     with_names: bool,
+    names: Rc<NamesInUse>,
     patch: Patch<'d, 'a>,
 }
 
 impl<'d, 'a> Rewriter<'d, 'a> {
     fn new(rig: &'d Rig, before: &'d Rig, declared: &'d Declared<'a>) -> Self {
         let with_names = declared.all().any(|one| !one.is_written);
-        Self { rig, before, declared, with_names, patch: Patch::new(&declared.tree) }
+        Self {
+            rig,
+            before,
+            declared,
+            with_names,
+            names: Rc::new(NamesInUse::of(rig)),
+            patch: Patch::new(&declared.tree),
+        }
     }
 
     fn tree(&self) -> &'d Tree<'a> {
@@ -228,7 +259,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
     }
 
     fn joints(&mut self) {
-        let (rig, declared, with_names) = (self.rig, self.declared, self.with_names);
+        let (rig, declared, with_names, names) = (self.rig, self.declared, self.with_names, self.names.clone());
         for (declared, tags) in declared.joints.iter().zip(&declared.tags) {
             let (Some(old), Some(new)) = (self.before.joint(declared.uid), rig.joint(declared.uid)) else { continue };
             self.joint(declared, old, new);
@@ -240,11 +271,12 @@ impl<'d, 'a> Rewriter<'d, 'a> {
                 }
             }
             let wanted: Vec<Uid> = new.data.tags.iter().map(|tag| tag.uid).collect();
-            let text = |uid: Uid| rig.find_tag(uid).map(|(_, tag)| tag_text(rig, tag)).unwrap_or_default();
+            let text =
+                |uid: Uid| rig.find_tag(uid).map(|(_, tag)| tag_text(rig, tag, &names.features)).unwrap_or_default();
             self.patch.list(declared.node, "tags", tags, &wanted, None, text);
         }
         let wanted: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
-        let text = |uid: Uid| rig.joint(uid).map(|joint| new_joint(rig, joint, with_names)).unwrap_or_default();
+        let text = |uid: Uid| rig.joint(uid).map(|joint| new_joint(rig, joint, &names, with_names)).unwrap_or_default();
         // A joint comes behind its elder brother, or else behind its parent.
         let behind = |uid: Uid| {
             let joint = rig.joint(uid)?;
@@ -321,7 +353,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         let written = tree.string(node, field).filter(|written| written.parse::<Uid>().is_err());
         let current = new.and_then(|uid| name(self.rig, uid));
         let is_kept = old == new && (written.is_none() || written == current);
-        let is_unique = current.as_ref().is_some_and(|current| is_unique(self.rig, field, current));
+        let is_unique = current.as_ref().is_some_and(|current| self.names.is_unique(field, current));
         if is_kept && (written.is_none() || is_unique) {
             return;
         }
@@ -340,15 +372,21 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         }
         self.set_text(node, "comment", &old.comment, &new.comment);
         match (&old.kind, &new.kind) {
-            (TagKind::Command { module: was, feature: was_in, .. }, TagKind::Command { module, params, feature })
-                if was == module =>
-            {
+            (
+                TagKind::Command { module: was, feature: was_in, params: old },
+                TagKind::Command { module, params, feature },
+            ) if was == module => {
                 let is_there = |uid: &Uid| self.rig.find_tag(*uid).is_some();
                 let feature = feature.filter(is_there);
                 if *was_in != feature {
                     self.patch.set_or_remove(node, "feature", feature.map(|uid| format!("\"{uid}\"")).as_deref());
                 }
                 self.parameters(declared, matches!(form, Some(TagForm::Short(_))), params);
+                // The uid follows from the name that the command gives.
+                let given = |params: &str| given_names(params).find(|name| !name.is_empty());
+                if !declared.is_written && given(old) != given(params) {
+                    self.patch.put_first(node, &format!("uid: \"{}\"", declared.uid));
+                }
             }
             (
                 TagKind::Feature { kind: was_kind, name: was_name, switch: was_switch, choice: was_choice },
@@ -362,7 +400,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
                 self.set_text(node, "switch", was_switch, switch);
                 self.set_text(node, "choice", was_choice, choice);
             }
-            _ => self.patch.replace(node, &tag_text(self.rig, new)),
+            _ => self.patch.replace(node, &tag_text(self.rig, new, &self.names.features)),
         }
     }
 
@@ -384,10 +422,6 @@ impl<'d, 'a> Rewriter<'d, 'a> {
                 self.patch.set(node, "params", &self.styled(&current));
             }
             (false, None) => {}
-        }
-        let given = given_names(params).find(|name| !name.is_empty());
-        if !declared.is_written && given != declared.name {
-            self.patch.put_first(node, &format!("uid: \"{}\"", declared.uid));
         }
     }
 
@@ -414,6 +448,10 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         let tree = self.tree();
         for item in &tree.node(node).items {
             let Some(key) = item.key.filter(|key| !others.contains(key)) else { continue };
+            // Which of two of a name is meant, nobody knows.
+            if tree.node(node).items.iter().filter(|other| other.key == Some(key)).count() > 1 {
+                continue;
+            }
             match now.field(value, key) {
                 Some(other) => self.value(item.value, now, other.value),
                 None => self.patch.set_or_remove(node, key, None),

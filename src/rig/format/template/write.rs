@@ -104,17 +104,17 @@ pub(super) fn group_text(group: &GroupData) -> String {
 }
 
 /// A joint with its tags.
-pub(super) fn joint_text(rig: &Rig, joint: &RigJoint) -> String {
+pub(super) fn joint_text(rig: &Rig, joint: &RigJoint, features: &HashSet<Uid>) -> String {
     let mut out = String::new();
-    let written = write_joint(&mut out, rig, joint, &feature_uids(rig));
+    let written = write_joint(&mut out, rig, joint, features);
     debug_assert!(written.is_ok(), "writing to a string does not fail");
     element(&out)
 }
 
 /// A tag.
-pub(super) fn tag_text(rig: &Rig, tag: &TagData) -> String {
+pub(super) fn tag_text(rig: &Rig, tag: &TagData, features: &HashSet<Uid>) -> String {
     let mut out = String::new();
-    let written = write_tag(&mut out, rig, tag, &feature_uids(rig));
+    let written = write_tag(&mut out, rig, tag, features);
     debug_assert!(written.is_ok(), "writing to a string does not fail");
     element(&out)
 }
@@ -139,7 +139,8 @@ fn element(text: &str) -> String {
     text.strip_suffix(',').unwrap_or(text).to_owned()
 }
 
-fn feature_uids(rig: &Rig) -> HashSet<Uid> {
+/// Uids of the feature tags of a rig.
+pub(super) fn feature_uids(rig: &Rig) -> HashSet<Uid> {
     rig.walk().flat_map(|joint| &joint.data.tags).filter_map(feature_uid).collect()
 }
 

@@ -6,12 +6,12 @@ use super::{
     super::{Draft, OperationError},
     TagError, add,
     paste::refresh_all,
-    remap::Remap,
 };
 use crate::rig::{
     EditError, GroupData, JointData, NodeRefs, Rig, RigEdit, TagKind, Uid,
     part::{PartNeeds, left_out},
     reference::{NameKind, NameScope, Names, RigScope, map_references, references_in},
+    remap::Remap,
 };
 
 /// Puts the tags of a part's joints (parents first, siblings as authored) onto `joints` in order, until either list

@@ -4,11 +4,13 @@ use super::{
     super::{Draft, OperationError, named_group},
     TagClipboard, TagError, add,
     clipboard::CopiedJoint,
-    delete, found, refresh,
-    remap::{Remap, mirror_names, other_side, pair_tags},
-    set,
+    delete, found, refresh, set,
 };
-use crate::rig::{EditError, RigEdit, TagData, TagKind, Uid, label::mirrored_label};
+use crate::rig::{
+    EditError, RigEdit, TagData, TagKind, Uid,
+    label::mirrored_label,
+    remap::{Remap, mirror_names, other_side, pair_tags},
+};
 
 /// Part of the copied tags that is pasted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

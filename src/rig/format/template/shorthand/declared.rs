@@ -150,7 +150,7 @@ impl Finder<'_, '_> {
         for item in tree.elements(joint.node, "tags") {
             let key = tag_key(tree, item);
             let number = counted.entry(key.clone()).and_modify(|count| *count += 1).or_default();
-            let number = (*number > 0).then(|| number.to_string()).unwrap_or_default();
+            let number = if *number > 0 { number.to_string() } else { String::new() };
             let [module, name, switch] = &key;
             let derived = Uid::derived(["tag", &on, module, name, switch, &number]);
             let written = written_uid(tree, item.value);

@@ -1,16 +1,16 @@
-//! Mapping of uids in copied tags to the uids at their target.
+//! Mapping of uids in copied joints and tags to the uids at their target.
 
 use std::collections::{HashMap, HashSet};
 
 use crate::rig::{
-    Rig, TagData, TagKind, Uid,
+    JointData, Rig, TagData, TagKind, Uid,
     label::mirrored_label,
     reference::{NameKind, map_references, map_text_fields, map_uids},
 };
 
 /// Map of uids of joints, tags and groups. Others stay.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Remap {
+pub(in crate::rig) struct Remap {
     pub uids: HashMap<Uid, Uid>,
     /// Joints without a label, which no label reference can name.
     pub unlabelled: HashSet<Uid>,
@@ -34,6 +34,23 @@ impl Remap {
         map_uids(&referred, |uid| self.get(uid))
     }
 
+    /// A copy of a joint under its next uid, with all its tags. What is mapped nowhere stays as it is.
+    pub fn joint(&self, joint: &JointData) -> JointData {
+        let get = |uid: Uid| self.get(uid).unwrap_or(uid);
+        let mut joint = joint.clone();
+        joint.uid = get(joint.uid);
+        joint.mirror = joint.mirror.map(get);
+        joint.group = joint.group.map(get);
+        for tag in &mut joint.tags {
+            tag.uid = get(tag.uid);
+            if let TagKind::Command { params, feature, .. } = &mut tag.kind {
+                *params = self.params(params);
+                *feature = feature.map(get);
+            }
+        }
+        joint
+    }
+
     /// A copy of a tag under its next uid. A feature that is not in `rig` and not among the copies is left out.
     pub fn tag(&self, rig: &Rig, tag: &TagData) -> TagData {
         let mut tag = tag.clone();
@@ -51,7 +68,7 @@ impl Remap {
 
 /// Counterparts on the other side of a rig: joints, their tags (the tag of the same module or kind with the same
 /// number), and the local groups of joints.
-pub(super) fn other_side(rig: &Rig) -> HashMap<Uid, Uid> {
+pub(in crate::rig) fn other_side(rig: &Rig) -> HashMap<Uid, Uid> {
     let mut other = HashMap::new();
     let mut groups: HashMap<Uid, Option<Uid>> = HashMap::new();
     for joint in rig.walk() {
@@ -79,7 +96,7 @@ pub(super) fn other_side(rig: &Rig) -> HashMap<Uid, Uid> {
 }
 
 /// Pairs each tag with the one at the same place among those of its module or kind.
-pub(super) fn pair_tags(pairs: &mut HashMap<Uid, Uid>, from: &[TagData], to: &[TagData]) {
+pub(in crate::rig) fn pair_tags(pairs: &mut HashMap<Uid, Uid>, from: &[TagData], to: &[TagData]) {
     let mut used: HashSet<Uid> = HashSet::new();
     for tag in from {
         if let Some(like) = to.iter().find(|other| is_like(tag, other) && !used.contains(&other.uid)) {
@@ -98,7 +115,7 @@ fn is_like(a: &TagData, b: &TagData) -> bool {
 }
 
 /// Mirrors the names that a tag gives (node names, labels, a feature's name).
-pub(super) fn mirror_names(tag: &mut TagData) {
+pub(in crate::rig) fn mirror_names(tag: &mut TagData) {
     match &mut tag.kind {
         TagKind::Command { params, .. } => *params = map_text_fields(params, &["name", "label"], mirrored_label),
         TagKind::Feature { name, .. } => {

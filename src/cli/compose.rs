@@ -1,0 +1,175 @@
+//! `rigsmith merge`, `inject` and `extract`: rigs made of others.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{Failure, InPlaceArgs, Report, SEED, update::load};
+use crate::{
+    files::{RealDisk, stem, store_rig, store_rig_over},
+    rig::{
+        Rig, Uid, UidSource,
+        extract::{self, Extracted},
+        nearest::{did_you_mean, listed},
+        operations::{Operation, TagOperation},
+    },
+};
+
+/// Arguments of `rigsmith merge`.
+#[derive(Args, Debug)]
+pub(super) struct MergeArgs {
+    /// The rigs, `.rig.ron`: all others come into the first
+    #[arg(required = true, num_args = 2..)]
+    rigs: Vec<PathBuf>,
+    /// Joint of the first rig on which the roots of the others hang; they stay roots without it
+    #[arg(long, value_name = "LABEL")]
+    parent: Option<String>,
+    /// The file to write, `.rig.ron`
+    #[arg(short, long)]
+    output: PathBuf,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
+}
+
+/// Arguments of `rigsmith inject`.
+#[derive(Args, Debug)]
+pub(super) struct InjectArgs {
+    /// The template, such as a part
+    template: PathBuf,
+    /// The rig
+    rig: PathBuf,
+    /// Labels or uids of the joints, in the order in which they take the template's tags
+    #[arg(long, value_delimiter = ',', required = true, value_name = "LABEL,...")]
+    joints: Vec<String>,
+    /// The file to write, `.rig.ron`
+    #[arg(short, long)]
+    output: PathBuf,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
+}
+
+/// Arguments of `rigsmith extract`.
+#[derive(Args, Debug)]
+pub(super) struct ExtractArgs {
+    /// The rig
+    rig: PathBuf,
+    /// Labels or uids of the joints
+    #[arg(long, value_delimiter = ',', required = true, value_name = "LABEL,...")]
+    joints: Vec<String>,
+    /// Take the joints below them, too
+    #[arg(long)]
+    hierarchy: bool,
+    /// Give everything a new uid
+    #[arg(long)]
+    new_uids: bool,
+    /// The file to write, `.rig.ron`
+    #[arg(short, long)]
+    output: PathBuf,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
+}
+
+pub(super) fn merge(args: &MergeArgs) -> Result<Report, Failure> {
+    let inputs: Vec<&Path> = args.rigs.iter().map(PathBuf::as_path).collect();
+    args.in_place.check(&inputs, Some(&args.output), &[])?;
+    let mut report = Report::default();
+    let rigs = args.rigs.iter().map(|path| load(path, &mut report)).collect::<Result<Vec<_>, _>>()?;
+    let Some((first, others)) = rigs.split_first() else { return Ok(report) };
+    let mut rig = first.clone();
+    let parent = args.parent.as_deref().map(|label| joint(&rig, label)).transpose()?;
+    let mut uids = uids_of(&rigs);
+    for other in others {
+        let operation = Operation::Merge { other: Arc::new(other.clone()), parent };
+        run(&mut rig, &operation, &mut uids, &mut report)?;
+    }
+    write(&args.output, &rig, &[&args.rigs[0]], &mut report)?;
+    report.line(format!("{} joints of {} rigs", rig.len(), rigs.len()));
+    Ok(report)
+}
+
+pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
+    args.in_place.check(&[&args.template, &args.rig], Some(&args.output), &[])?;
+    let mut report = Report::default();
+    let (template, mut rig) = (load(&args.template, &mut report)?, load(&args.rig, &mut report)?);
+    let joints = args.joints.iter().map(|label| joint(&rig, label)).collect::<Result<Vec<_>, _>>()?;
+    let mut uids = uids_of(&[rig.clone(), template.clone()]);
+    let count = |rig: &Rig| rig.walk().map(|joint| joint.data.tags.len()).sum::<usize>();
+    let before = count(&rig);
+    let left = (template.len().saturating_sub(joints.len()), joints.len().saturating_sub(template.len()));
+    let operation =
+        Operation::Tags(TagOperation::Drop { part: Arc::new(template), joints, bindings: Default::default() });
+    run(&mut rig, &operation, &mut uids, &mut report)?;
+    write(&args.output, &rig, &[&args.rig], &mut report)?;
+    report.line(format!("{} tags injected", count(&rig) - before));
+    report.set("tags", count(&rig) - before);
+    report.set("joints_left", json!({ "template": left.0, "rig": left.1 }));
+    Ok(report)
+}
+
+pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
+    args.in_place.check(&[&args.rig], Some(&args.output), &[])?;
+    let mut report = Report::default();
+    let rig = load(&args.rig, &mut report)?;
+    let mut joints = args.joints.iter().map(|label| joint(&rig, label)).collect::<Result<Vec<_>, _>>()?;
+    if args.hierarchy {
+        joints = joints.iter().flat_map(|top| rig.hierarchy(*top).map(|joint| joint.data.uid)).collect();
+    }
+    let mut uids = uids_of(std::slice::from_ref(&rig));
+    let name = stem(&args.output);
+    let extracted = extract::extract(&rig, &joints, &name, args.new_uids.then_some(&mut uids));
+    let Extracted { rig: out, left } = extracted.map_err(|error| Failure::Input(Box::new(error)))?;
+    report.notes(store_rig(&RealDisk, &args.output, &out)?);
+    report.notes.extend(left.iter().cloned());
+    report.line(format!("wrote {}: {} joints", args.output.display(), out.len()));
+    report.set("joints", out.len());
+    report.set("left", Value::from(left));
+    Ok(report)
+}
+
+fn run(rig: &mut Rig, operation: &Operation, uids: &mut UidSource, report: &mut Report) -> Result<(), Failure> {
+    let outcome = operation.run(rig, uids, None).map_err(|error| Failure::Input(Box::new(error)))?;
+    report.notes(outcome.notes);
+    Ok(())
+}
+
+fn write(output: &Path, rig: &Rig, sources: &[&Path], report: &mut Report) -> Result<(), Failure> {
+    report.notes(store_rig_over(&RealDisk, output, rig, sources)?);
+    report.line(format!("wrote {}", output.display()));
+    report.set("joints", rig.len());
+    Ok(())
+}
+
+/// A source of uids that follows from the rigs: the same for the same.
+fn uids_of(rigs: &[Rig]) -> UidSource {
+    let all = rigs.iter().flat_map(|rig| std::iter::once(rig.uid()).chain(rig.walk().map(|joint| joint.data.uid)));
+    UidSource::seeded(all.fold(SEED, |seed, uid| seed.rotate_left(1) ^ uid.0))
+}
+
+/// The joint with a label, or with a uid.
+fn joint(rig: &Rig, wanted: &str) -> Result<Uid, Failure> {
+    if let Some(uid) = wanted.parse::<Uid>().ok().filter(|uid| rig.joint(*uid).is_some()) {
+        return Ok(uid);
+    }
+    let labelled = rig.walk().filter(|joint| joint.data.label.as_deref() == Some(wanted));
+    let found: Vec<Uid> = labelled.map(|joint| joint.data.uid).collect();
+    match found[..] {
+        [uid] => Ok(uid),
+        [] => {
+            let labels = rig.walk().filter_map(|joint| joint.data.label.as_deref());
+            let name = &rig.about().name;
+            Err(Failure::Input(
+                format!("no joint of \"{name}\" is called \"{wanted}\"{}", did_you_mean(wanted, labels)).into(),
+            ))
+        }
+        _ => {
+            let uids: Vec<String> = found.iter().map(Uid::to_string).collect();
+            let count = uids.len();
+            let all = listed(&uids, "or");
+            Err(Failure::Input(format!("{count} joints are called \"{wanted}\"; give the uid of one, {all}").into()))
+        }
+    }
+}

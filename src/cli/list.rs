@@ -1,0 +1,122 @@
+//! `rigsmith list`: templates of a folder, by their headers alone.
+
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{Failure, Report};
+use crate::{
+    files::FileKind,
+    rig::template::{self, TemplateHeader},
+};
+
+/// Arguments of `rigsmith list`.
+#[derive(Args, Debug)]
+pub(super) struct ListArgs {
+    /// The folder; folders in it count, too
+    #[arg(default_value = ".")]
+    folder: PathBuf,
+}
+
+/// Bytes of a file that are read first: a header of usual length.
+const FIRST_BYTES: u64 = 8 << 10;
+
+/// Most files that are listed.
+const MOST: usize = 10_000;
+
+pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
+    let mut report = Report::default();
+    let mut paths = Vec::new();
+    let mut folders = vec![args.folder.clone()];
+    let mut is_first = true;
+    while let Some(folder) = folders.pop() {
+        let entries = match std::fs::read_dir(&folder) {
+            Ok(entries) => entries,
+            Err(error) if is_first => {
+                return Err(Failure::Input(
+                    format!("`{}` cannot be listed: {error}; give a folder", folder.display()).into(),
+                ));
+            }
+            Err(error) => {
+                report.notes.push(format!("`{}` is left out: {error}", folder.display()));
+                continue;
+            }
+        };
+        is_first = false;
+        for entry in entries.flatten() {
+            let (path, kind) = (entry.path(), entry.file_type());
+            let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
+            match kind {
+                Ok(kind) if kind.is_dir() && !is_hidden => folders.push(path),
+                Ok(kind) if kind.is_file() && FileKind::of(&path) == Some(FileKind::Template) => paths.push(path),
+                _ => {}
+            }
+        }
+    }
+    paths.sort();
+    if paths.len() > MOST {
+        report.notes.push(format!("{} more templates are not listed", paths.len() - MOST));
+        paths.truncate(MOST);
+    }
+    let mut list = Vec::new();
+    for path in &paths {
+        match header(path) {
+            Ok(header) => {
+                report.line(line(path, &header));
+                list.push(value(path, &header));
+            }
+            Err(error) => {
+                report.line(format!("{}: {error}", path.display()));
+                list.push(json!({ "file": path.display().to_string(), "error": error }));
+            }
+        }
+    }
+    if paths.is_empty() {
+        report.line(format!("no templates, .rig.ron, in {}", args.folder.display()));
+    }
+    report.set("templates", Value::Array(list));
+    Ok(report)
+}
+
+/// Header of a file: of its beginning if that is enough, else of all of it.
+fn header(path: &Path) -> Result<TemplateHeader, String> {
+    let read = |limit: u64| -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        File::open(path)?.take(limit).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    let first = read(FIRST_BYTES).map_err(|error| error.to_string())?;
+    let is_whole = (first.len() as u64) < FIRST_BYTES;
+    match template::read_header(&first) {
+        Ok(header) if is_whole || header.joint_count > 0 => Ok(header),
+        _ => {
+            let all = read(template::MAX_BYTES as u64).map_err(|error| error.to_string())?;
+            template::read_header(&all).map_err(|error| error.to_string())
+        }
+    }
+}
+
+fn line(path: &Path, header: &TemplateHeader) -> String {
+    let TemplateHeader { name, version, kind, joint_count, .. } = header;
+    let parts = [kind.as_str(), version].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
+    let about = header.description.split(['.', ':']).next().unwrap_or_default();
+    let about = if about.is_empty() { String::new() } else { format!(": {about}") };
+    format!(
+        "{}  {name} ({parts}{}{joint_count} joints){about}",
+        path.display(),
+        if parts.is_empty() { "" } else { ", " }
+    )
+}
+
+fn value(path: &Path, header: &TemplateHeader) -> Value {
+    let mut value = serde_json::to_value(header).unwrap_or(Value::Null);
+    if let Value::Object(fields) = &mut value {
+        fields.insert("file".to_owned(), Value::from(path.display().to_string()));
+    }
+    value
+}

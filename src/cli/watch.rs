@@ -1,0 +1,234 @@
+//! `rigsmith watch`: builds a template again whenever its file is saved.
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+    thread::sleep,
+    time::{Duration, Instant, SystemTime},
+};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{ExportArgs, Failure, InPlaceArgs, Report, SEED, WeightArgs, build::character_of, report::print};
+use crate::{
+    files::{FileKind, LoadError, RealDisk, read_capped, store_model},
+    headless::{Workbench, posing::PoseError},
+    mesh::model::Trs,
+    plugins::commands::BuildStep,
+    rig::{
+        Rig, RigEdit, TagKind, Uid,
+        operations::Operation,
+        template::{self, read_template},
+        update::edits_between,
+    },
+};
+
+/// Arguments of `rigsmith watch`.
+#[derive(Args, Debug)]
+pub(super) struct WatchArgs {
+    /// The template, `.rig.ron`
+    template: PathBuf,
+    /// A mesh to bind to what is built
+    #[arg(long)]
+    mesh: Option<PathBuf>,
+    /// The character to write after every build, .glb or .gltf
+    #[arg(short, long)]
+    output: PathBuf,
+    /// End after so many builds; otherwise it goes on until it is interrupted
+    #[arg(long, value_name = "N")]
+    count: Option<usize>,
+    #[command(flatten)]
+    weights: WeightArgs,
+    #[command(flatten)]
+    export: ExportArgs,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
+}
+
+/// Time between two looks at the file.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Number of looks after which the content is read even if the file seems unchanged: network folders may say nothing.
+const READ_EVERY: u32 = 50;
+
+/// Commands that are named after a build.
+const NAMED: usize = 6;
+
+pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
+    if FileKind::of(&args.template) != Some(FileKind::Template) {
+        return Err(Failure::Usage(format!("`{}` is no template; give a .rig.ron", args.template.display())));
+    }
+    if !matches!(FileKind::of(&args.output), Some(FileKind::Glb | FileKind::Gltf)) {
+        return Err(Failure::Usage(format!("cannot write `{}`; give .glb or .gltf", args.output.display())));
+    }
+    let inputs: Vec<&Path> =
+        [Some(&args.template), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    args.in_place.check(&inputs, Some(&args.output), &[])?;
+    let mut file = Watched::new(&args.template);
+    let rig = parsed(&args.template, &file.next()?)?;
+    let mut watch = Watch { args, bench: Workbench::with_rig(SEED, rig), is_json };
+    let first = Instant::now();
+    let all = watch.build(first, &[], None)?;
+    let mut is_heard = watch.say(&all);
+    let mut builds = 1;
+    while is_heard && args.count.is_none_or(|count| builds < count) {
+        let bytes = file.next()?;
+        let start = Instant::now();
+        let told = match watch.update(&bytes, start) {
+            Ok(told) => {
+                builds += 1;
+                told
+            }
+            Err(Failure::Input(error)) => json!({ "ok": false, "error": error.to_string() }),
+            Err(usage) => return Err(usage),
+        };
+        is_heard = watch.say(&told);
+    }
+    Ok(Report::default())
+}
+
+/// File whose saves are awaited.
+struct Watched<'a> {
+    path: &'a Path,
+    content: Vec<u8>,
+    seen: Option<(u64, Option<SystemTime>)>,
+}
+
+impl<'a> Watched<'a> {
+    fn new(path: &'a Path) -> Self {
+        Self { path, content: Vec::new(), seen: None }
+    }
+
+    /// The next content of the file that is not as before, once it is the same twice in a row. A file that is not there
+    /// for the moment, as between two steps of a save, is waited for, but not the first time.
+    fn next(&mut self) -> Result<Vec<u8>, Failure> {
+        let mut looks = 0_u32;
+        loop {
+            let state = std::fs::metadata(self.path).ok().map(|data| (data.len(), data.modified().ok()));
+            let is_first = self.content.is_empty();
+            if is_first || state != self.seen || looks % READ_EVERY == READ_EVERY - 1 {
+                match read_capped(&RealDisk, self.path, template::MAX_BYTES as u64) {
+                    Ok(bytes) if bytes != self.content => {
+                        sleep(if is_first { Duration::ZERO } else { LOOK });
+                        let again = read_capped(&RealDisk, self.path, template::MAX_BYTES as u64);
+                        if again.is_ok_and(|again| again == bytes) {
+                            self.seen = state;
+                            self.content.clone_from(&bytes);
+                            return Ok(bytes);
+                        }
+                        continue;
+                    }
+                    Ok(_) => self.seen = state,
+                    Err(error) if is_first => return Err(Failure::Input(Box::new(error))),
+                    Err(_) => {}
+                }
+            }
+            looks += 1;
+            sleep(LOOK);
+        }
+    }
+}
+
+fn parsed(path: &Path, bytes: &[u8]) -> Result<Rig, Failure> {
+    let text = String::from_utf8_lossy(bytes).into_owned();
+    let read = read_template(bytes).map_err(|source| LoadError::Source { path: path.into(), text, source })?;
+    Ok(read.rig)
+}
+
+struct Watch<'a> {
+    args: &'a WatchArgs,
+    bench: Workbench,
+    is_json: bool,
+}
+
+impl Watch<'_> {
+    /// Takes over a saved file. If it cannot be read or built, the rig stays as it was.
+    fn update(&mut self, bytes: &[u8], start: Instant) -> Result<Value, Failure> {
+        let file = parsed(&self.args.template, bytes)?;
+        let (before, runs) = (self.bench.rig().clone(), self.runs());
+        self.change(&before, &file)?;
+        self.build(start, &runs, Some(&before))
+    }
+
+    fn change(&mut self, from: &Rig, to: &Rig) -> Result<(), Failure> {
+        let edits: Vec<RigEdit> = edits_between(from, to).map_err(|error| Failure::Input(Box::new(error)))?;
+        Ok(self.bench.operate(Operation::Edits(edits))?)
+    }
+
+    /// Number of runs of every command, in the order of the build list.
+    fn runs(&self) -> Vec<(Uid, u32)> {
+        let Some(processor) = self.bench.processor() else { return Vec::new() };
+        let builder = processor.builder();
+        let runs = |tag: Uid| Some((tag, builder.status(tag)?.runs));
+        builder.list().iter().filter_map(|entry| runs(entry.command)).collect()
+    }
+
+    /// Builds, writes the character and says which commands ran since `runs`; goes back to `before` if it cannot be built.
+    fn build(&mut self, start: Instant, runs: &[(Uid, u32)], before: Option<&Rig>) -> Result<Value, Failure> {
+        let outcome = self.bench.build(BuildStep::All);
+        if let Some(error) = outcome.error {
+            let message = format!("`{}`: {error} (tag {})", self.args.template.display(), error.command);
+            if let Some(before) = before {
+                let now = self.bench.rig().clone();
+                self.change(&now, before)?;
+                self.bench.build(BuildStep::All);
+            }
+            return Err(Failure::Input(message.into()));
+        }
+        let built_in = start.elapsed();
+        let mut report = Report::default();
+        let locals = self.bench.posed_locals()?;
+        let (rig, built) = (self.bench.rig(), self.bench.built().ok_or(PoseError::NotBuilt)?);
+        let posed: Vec<Trs> =
+            built.nodes.iter().map(|node| locals.get(&node.uid).copied().unwrap_or(node.base)).collect();
+        let args = self.args;
+        let (model, settings) =
+            character_of(rig, built, &posed, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?;
+        store_model(&RealDisk, &args.output, &model, &settings)?;
+        let runs: HashMap<Uid, u32> = runs.iter().copied().collect();
+        let is_newer = |(tag, count): &(Uid, u32)| *count > runs.get(tag).copied().unwrap_or_default();
+        let ran: Vec<String> =
+            self.runs().iter().filter(|run| is_newer(run)).map(|(tag, _)| named(rig, *tag)).collect();
+        let milliseconds = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+        Ok(json!({
+            "ok": true,
+            "ran": ran,
+            "commands": outcome.cursor,
+            "build_ms": milliseconds(built_in),
+            "total_ms": milliseconds(start.elapsed()),
+            "output": args.output.display().to_string(),
+        }))
+    }
+
+    /// Says at once what happened; `false` if nobody can read it any more.
+    fn say(&self, told: &Value) -> bool {
+        if self.is_json {
+            return print([told.to_string().as_str()]);
+        }
+        if let Some(error) = told["error"].as_str() {
+            return print([format!("not taken over: {error}").as_str()]);
+        }
+        let ran: Vec<&str> = told["ran"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+        let names = ran.iter().take(NAMED).copied().collect::<Vec<_>>().join(", ");
+        let more = if ran.len() > NAMED { format!(" and {} more", ran.len() - NAMED) } else { String::new() };
+        let what = if ran.is_empty() { String::new() } else { format!(": {names}{more}") };
+        let (count, of, built, written) = (ran.len(), &told["commands"], &told["build_ms"], &told["total_ms"]);
+        print([format!("{count} of {of} commands ran{what}; built in {built} ms, written in {written} ms").as_str()])
+    }
+}
+
+/// Module and joint of a command.
+fn named(rig: &Rig, tag: Uid) -> String {
+    match rig.find_tag(tag) {
+        Some((joint, tag)) => {
+            let label = joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string());
+            let module = match &tag.kind {
+                TagKind::Command { module, .. } => module.as_str(),
+                TagKind::Feature { kind, .. } => kind.as_str(),
+            };
+            format!("{module} on {label}")
+        }
+        None => tag.to_string(),
+    }
+}

@@ -1,0 +1,68 @@
+//! Merging of one rig into another.
+
+use std::collections::{HashMap, HashSet};
+
+use super::{Draft, OperationError};
+use crate::rig::{EditError, GroupData, Rig, RigEdit, Uid, remap::Remap};
+
+/// Puts the joints of another rig, with groups and tags, into the draft's. The roots hang on `parent`, in the place that they
+/// have in their own rig. Uids, labels and group names stay where they are free; others are new, and labels and names get
+/// the other rig's name in front.
+pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Result<(), OperationError> {
+    if let Some(parent) = parent.filter(|parent| draft.rig().joint(*parent).is_none()) {
+        return Err(EditError::NoJoint(parent).into());
+    }
+    let groups = other.groups().iter().map(|group| group.uid);
+    let joints = other.walk().flat_map(|joint| {
+        std::iter::once(joint.data.uid).chain(joint.data.tags.iter().map(|tag| tag.uid)).collect::<Vec<_>>()
+    });
+    let mut uids: HashMap<Uid, Uid> = HashMap::new();
+    for uid in groups.chain(joints) {
+        if draft.rig().is_taken(uid) {
+            uids.insert(uid, draft.next_uid());
+        }
+    }
+    let remap = Remap { uids, ..Remap::default() };
+    let prefix = &other.about().name;
+    for group in other.groups() {
+        let named = draft.rig().groups().iter().any(|own| own.name == group.name);
+        let name = if named { format!("{prefix}_{}", group.name) } else { group.name.clone() };
+        let uid = remap.get(group.uid).unwrap_or(group.uid);
+        let place = draft.rig().groups().len();
+        draft.apply(RigEdit::AddLocalGroup(GroupData { uid, name, ..group.clone() }, place))?;
+    }
+    let labels: HashSet<String> = draft.rig().walk().filter_map(|joint| joint.data.label.clone()).collect();
+    let mut renamed = 0;
+    let mut selected = Vec::new();
+    for joint in other.walk() {
+        let mut data = remap.joint(&joint.data);
+        if let Some(label) = data.label.as_mut().filter(|label| labels.contains(*label)) {
+            *label = format!("{prefix}_{label}");
+            renamed += 1;
+        }
+        let above = match joint.parent {
+            Some(above) => Some(remap.get(above).unwrap_or(above)),
+            None => {
+                data.rest = draft.rig().local_rest(parent, &joint.data.rest.affine());
+                parent
+            }
+        };
+        if joint.parent.is_none() {
+            selected.push(data.uid);
+        }
+        draft.apply(RigEdit::AddJoint { joint: Box::new(data), parent: above, index: usize::MAX })?;
+    }
+    if !remap.uids.is_empty() {
+        draft.note(format!("{} things of {prefix} got new uids, because the rig has theirs already", remap.uids.len()));
+    }
+    if renamed > 0 {
+        draft.note(format!(
+            "{renamed} joints of {prefix} are called {prefix}_..., because the rig has their labels already"
+        ));
+    }
+    if !other.stored_poses().is_empty() {
+        draft.note(format!("the stored poses of {prefix} are left out"));
+    }
+    draft.select(selected);
+    Ok(())
+}

@@ -1,0 +1,222 @@
+//! Commands on templates: new, list, diff, update, merge, inject, extract.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Child, Command, Stdio},
+    sync::Arc,
+};
+
+use rigsmith::{
+    files::{RealDisk, load_model, load_template},
+    modules,
+    processor::{Builder, review},
+    rig::Rig,
+};
+use serde_json::Value;
+
+use super::cli_outputs::rigsmith;
+
+fn rig(folder: &Path, name: &str) -> Rig {
+    load_template(&RealDisk, &folder.join(name)).unwrap().rig
+}
+
+fn json(folder: &Path, args: &[&str]) -> (i32, Value) {
+    let (code, said) = rigsmith(folder, &[args, &["--json"]].concat());
+    let start = said.find('{').unwrap_or_else(|| panic!("{args:?}: {said}"));
+    let mut values = serde_json::Deserializer::from_str(&said[start..]).into_iter::<Value>();
+    (code, values.next().unwrap().unwrap_or_else(|error| panic!("{args:?}: {error}: {said}")))
+}
+
+fn builds(rig: &Rig) {
+    let modules = Arc::new(modules::all());
+    assert_eq!(review(rig, &modules), Vec::new());
+    Builder::build(rig, &modules).unwrap();
+}
+
+#[test]
+fn new_templates_build_and_take_no_others_place() {
+    let folder = tempfile::tempdir().unwrap();
+    for kind in ["chain", "limb", "sides"] {
+        let name = format!("{kind}.rig.ron");
+        assert_eq!(rigsmith(folder.path(), &["new", kind, "-o", &name]).0, 0);
+        builds(&rig(folder.path(), &name));
+        assert!(fs::read_to_string(folder.path().join(&name)).unwrap().starts_with("// "));
+        assert_eq!(rigsmith(folder.path(), &["format", "--check", &name]).0, 0, "{kind}");
+        assert_eq!(rigsmith(folder.path(), &["new", kind, "-o", &name]).0, 2, "it is there already");
+    }
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "a.txt"]).0, 2);
+    let (code, listed) = json(folder.path(), &["list"]);
+    let templates = listed["templates"].as_array().unwrap();
+    let counts: Vec<u64> = templates.iter().map(|one| one["joint_count"].as_u64().unwrap()).collect();
+    assert_eq!((code, counts), (0, vec![3, 4, 3]));
+    assert_eq!(templates[1]["features"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn a_folder_is_listed_by_headers() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir_all(folder.path().join("a/b")).unwrap();
+    fs::write(folder.path().join("a/b/broken.rig.ron"), "(format: 1, nam").unwrap();
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates");
+    fs::copy(assets.join("biped.rig.ron"), folder.path().join("a/biped.rig.ron")).unwrap();
+    fs::copy(assets.join("parts/arm.rig.ron"), folder.path().join("arm.rig.ron")).unwrap();
+    let (code, listed) = json(folder.path(), &["list"]);
+    assert_eq!(code, 0);
+    let templates = listed["templates"].as_array().unwrap();
+    assert_eq!(templates.len(), 3);
+    assert!(templates[0]["error"].is_string(), "{}", templates[0]);
+    assert_eq!((&templates[1]["name"], &templates[1]["joint_count"]), (&Value::from("biped"), &Value::from(52)));
+    assert_eq!(templates[2]["needs"]["sockets"][1], "root");
+    assert_eq!(rigsmith(folder.path(), &["list", "nowhere"]).0, 1);
+}
+
+#[test]
+fn a_rig_is_brought_to_a_new_version() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let read = |name: &str| fs::read_to_string(at(name)).unwrap();
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "v1.rig.ron"]).0, 0);
+    let v1 = read("v1.rig.ron");
+    fs::write(at("v2.rig.ron"), v1.replace("(0, 1, 0)", "(0, 2, 0)").replace("link_3", "tip")).unwrap();
+    fs::write(at("mine.rig.ron"), v1.replace("control(shape: \"square\")", "control(shape: \"cube\") /* mine */"))
+        .unwrap();
+    let (code, told) = json(folder.path(), &["diff", "v1.rig.ron", "v2.rig.ron"]);
+    let kinds: Vec<&str> = told["changes"].as_array().unwrap().iter().map(|c| c["kind"].as_str().unwrap()).collect();
+    assert_eq!((code, kinds), (0, vec!["renamed", "changed"]), "{told}");
+    let change = &told["changes"][1];
+    assert_eq!((change["joint"].as_str(), change["field"].as_str()), (Some("link_1"), Some("translation")));
+    assert_eq!((change["from"].as_str(), change["to"].as_str()), (Some("(0.0, 1.0, 0.0)"), Some("(0.0, 2.0, 0.0)")));
+    assert_eq!(change["conflict"], false);
+
+    let update = ["update", "mine.rig.ron", "--from", "v2.rig.ron", "--base", "v1.rig.ron"];
+    let (code, said) = rigsmith(folder.path(), &[&update[..], &["--dry-run"]].concat());
+    assert!(code == 0 && said.contains("renamed") && !said.contains("conflict"), "{said}");
+    let (code, said) = rigsmith(folder.path(), &[&update[..], &["-o", "out.rig.ron"]].concat());
+    assert_eq!(code, 0, "{said}");
+    let out = read("out.rig.ron");
+    assert!(out.contains("cube\") /* mine */") && out.contains("(0, 2.0, 0)") && out.contains("\"tip\""), "{out}");
+    builds(&rig(folder.path(), "out.rig.ron"));
+
+    // Both sides changed it: nothing is written until somebody decides.
+    fs::write(at("v3.rig.ron"), v1.replace("\"square\"", "\"sphere\"")).unwrap();
+    let update = ["update", "mine.rig.ron", "--from", "v3.rig.ron", "--base", "v1.rig.ron", "-o", "both.rig.ron"];
+    let (code, told) = json(folder.path(), &update);
+    assert_eq!((code, &told["conflicts"], told["changes"][0]["conflict"].as_bool()), (1, &Value::from(1), Some(true)));
+    assert!(!at("both.rig.ron").exists());
+    assert_eq!(rigsmith(folder.path(), &[&update[..], &["--take", "theirs"]].concat()).0, 0);
+    assert!(read("both.rig.ron").contains("sphere"));
+    assert_eq!(rigsmith(folder.path(), &["update", "mine.rig.ron", "--from", "v3.rig.ron", "-o", "mine.rig.ron"]).0, 2);
+    assert_eq!(rigsmith(folder.path(), &["diff", "mine.rig.ron", "nothing.rig.ron"]).0, 1);
+}
+
+#[test]
+fn rigs_are_made_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates");
+    for (from, to) in [("biped.rig.ron", "biped.rig.ron"), ("parts/tail.rig.ron", "tail.rig.ron")] {
+        fs::copy(assets.join(from), folder.path().join(to)).unwrap();
+    }
+    let (biped, tail) = (rig(folder.path(), "biped.rig.ron"), rig(folder.path(), "tail.rig.ron"));
+
+    // A tail on the hips, twice: the second has uids and labels of its own.
+    let merge = ["merge", "biped.rig.ron", "tail.rig.ron", "tail.rig.ron", "--parent", "hips", "-o", "tails.rig.ron"];
+    let (code, said) = rigsmith(folder.path(), &merge);
+    assert_eq!(code, 0, "{said}");
+    let merged = rig(folder.path(), "tails.rig.ron");
+    assert_eq!(merged.len(), biped.len() + 2 * tail.len());
+    let hips = merged.find_label("hips").unwrap();
+    let first = tail.walk().next().unwrap().data.uid;
+    assert_eq!(merged.joint(first).unwrap().parent, Some(hips));
+    assert!(merged.position(first).distance(tail.position(first)) < 1e-5, "it stays where it was");
+    let labels: std::collections::BTreeSet<_> = merged.walk().map(|joint| joint.data.label.clone()).collect();
+    assert_eq!(labels.len(), merged.len(), "every joint has a label of its own");
+    builds(&merged);
+    // The same again gives the same bytes.
+    let once = fs::read(folder.path().join("tails.rig.ron")).unwrap();
+    assert_eq!(rigsmith(folder.path(), &[&merge[..7], &["again.rig.ron"]].concat()).0, 0);
+    assert_eq!(fs::read(folder.path().join("again.rig.ron")).unwrap(), once);
+
+    // An arm out of it, and its tags onto another chain.
+    let arm = "clavicle_l,upper_arm_l,forearm_l,hand_l";
+    let (code, told) = json(folder.path(), &["extract", "biped.rig.ron", "--joints", arm, "-o", "arm.rig.ron"]);
+    assert_eq!((code, told["joints"].as_u64()), (0, Some(4)), "{told}");
+    assert!(told["left"].as_array().unwrap().iter().any(|left| left.as_str().unwrap().contains("refers to")), "{told}");
+    let extracted = rig(folder.path(), "arm.rig.ron");
+    let (hand, there) = (biped.find_label("hand_l").unwrap(), extracted.find_label("hand_l").unwrap());
+    assert_eq!(hand, there, "uids stay");
+    assert!(extracted.position(there).distance(biped.position(hand)) < 1e-5);
+    let new = ["extract", "biped.rig.ron", "--joints", "clavicle_l", "--hierarchy", "--new-uids", "-o", "new.rig.ron"];
+    assert_eq!(rigsmith(folder.path(), &new).0, 0);
+    let new = rig(folder.path(), "new.rig.ron");
+    assert!(new.len() > 15 && new.walk().all(|joint| biped.joint(joint.data.uid).is_none()));
+
+    fs::write(
+        folder.path().join("chain.rig.ron"),
+        "(format: 2, name: \"c\", joints: [(label: \"a\", translation: (0, 1, 0)), (label: \"b\", parent: \"a\", translation: (0, 1, 0)), (label: \"c\", parent: \"b\", translation: (0, 1, 0))]) // mine\n",
+    )
+    .unwrap();
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "part.rig.ron"]).0, 0);
+    let part = "part.rig.ron";
+    let (code, told) = json(folder.path(), &["inject", part, "chain.rig.ron", "--joints", "a,b,c", "-o", "fk.rig.ron"]);
+    assert!(code == 0 && told["tags"] == 3, "{told}");
+    builds(&rig(folder.path(), "fk.rig.ron"));
+    assert!(fs::read_to_string(folder.path().join("fk.rig.ron")).unwrap().ends_with("// mine\n"));
+    let (code, said) =
+        rigsmith(folder.path(), &["inject", part, "chain.rig.ron", "--joints", "a,x", "-o", "no.rig.ron"]);
+    assert!(
+        code == 1 && said.contains("no joint of \"c\" is called \"x\"") && !folder.path().join("no.rig.ron").exists()
+    );
+}
+
+#[test]
+fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "a.rig.ron"]).0, 0);
+    let text = fs::read_to_string(at("a.rig.ron")).unwrap();
+    /// A process that ends with the test, passed or not.
+    struct Ended(Child);
+    impl Drop for Ended {
+        fn drop(&mut self) {
+            let _ = self.0.kill();
+        }
+    }
+    let watch = Command::new(env!("CARGO_BIN_EXE_rigsmith"))
+        .current_dir(folder.path())
+        .args(["watch", "a.rig.ron", "-o", "a.glb", "--count", "4", "--json"])
+        .stdout(Stdio::piped())
+        .spawn();
+    let mut watch = Ended(watch.unwrap());
+    let mut lines = BufReader::new(watch.0.stdout.take().unwrap()).lines();
+    let mut next = || serde_json::from_str::<Value>(&lines.next().unwrap().unwrap()).unwrap();
+    let glb = || fs::read(at("a.glb")).unwrap();
+    let ran = |told: &Value| told["ran"].as_array().unwrap().len();
+    let first = next();
+    assert_eq!((ran(&first), first["commands"].as_u64()), (3, Some(3)), "{first}");
+    let first_places: Vec<_> =
+        load_model(&RealDisk, &at("a.glb")).unwrap().nodes.iter().map(|node| node.rest.translation).collect();
+    // One parameter: one command; another file in its place, as most programs save.
+    fs::write(at("new"), text.replace("square", "cube")).unwrap();
+    fs::rename(at("new"), at("a.rig.ron")).unwrap();
+    let told = next();
+    assert_eq!(told["ran"], serde_json::json!(["control on link_1"]), "{told}");
+    // A broken file, one whose build fails, and the next good one.
+    fs::write(at("a.rig.ron"), &text[..200]).unwrap();
+    assert_eq!(next()["ok"], false);
+    fs::write(at("a.rig.ron"), text.replace("square", "no such shape")).unwrap();
+    let told = next();
+    assert!(told["ok"] == false && told["error"].as_str().unwrap().contains("no such shape"), "{told}");
+    let after_cube = glb();
+    fs::write(at("a.rig.ron"), text.replace("(0, 0.3, 0)", "(0, 0.5, 0)")).unwrap();
+    assert_eq!(next()["ok"], true);
+    assert_ne!(glb(), after_cube);
+    fs::write(at("a.rig.ron"), &text).unwrap();
+    assert_eq!(next()["ok"], true);
+    let places = || -> Vec<_> {
+        load_model(&RealDisk, &at("a.glb")).unwrap().nodes.iter().map(|node| node.rest.translation).collect()
+    };
+    assert!(places().iter().zip(&first_places).all(|(a, b)| a.distance(*b) < 1e-6), "back to the first");
+    assert!(watch.0.wait().unwrap().success());
+}
