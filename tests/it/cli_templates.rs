@@ -42,6 +42,8 @@ fn new_templates_build_and_take_no_others_place() {
         let name = format!("{kind}.rig.ron");
         assert_eq!(rigsmith(folder.path(), &["new", kind, "-o", &name]).0, 0);
         builds(&rig(folder.path(), &name));
+        let (code, said) = rigsmith(folder.path(), &["check", &name]);
+        assert_eq!(code, 0, "{said}");
         assert!(fs::read_to_string(folder.path().join(&name)).unwrap().starts_with("// "));
         assert_eq!(rigsmith(folder.path(), &["format", "--check", &name]).0, 0, "{kind}");
         assert_eq!(rigsmith(folder.path(), &["new", kind, "-o", &name]).0, 2, "it is there already");

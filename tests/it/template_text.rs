@@ -12,6 +12,7 @@ use rigsmith::{
             UidStyle, format_template, read_header, read_template, survey_template, write_template, write_template_over,
         },
     },
+    solve::program::{CompileOptions, RigProgram},
 };
 
 pub(super) fn read(text: &str) -> Rig {
@@ -469,6 +470,7 @@ fn the_page_on_writing_rigs_is_right() {
         assert_eq!(review(&rig, &modules), Vec::new());
         let built = Builder::build(&rig, &modules).unwrap();
         assert!(built.nodes.iter().any(|node| node.control.is_some()));
+        assert!(RigProgram::compile(&built, &CompileOptions::default()).is_ok(), "{} moves", rig.about().name);
         assert_eq!(&format_template(text, UidStyle::Kept).unwrap(), text, "the page's own layout");
         assert_eq!(write_template_over(&rig, text), *text);
     }
