@@ -24,11 +24,13 @@ mod folder;
 mod identity;
 pub mod journal;
 mod load;
+mod parts;
 mod project;
 mod read;
 mod shapes;
 mod store;
 mod verify;
+mod watch;
 
 pub use atomic::{FileSet, SaveError, SaveStep, is_temp_name, remove_stale_temps, save_atomic, save_set};
 pub use disk::{Disk, DiskFile, Entry, EntryKind, Hold, RealDisk};
@@ -37,6 +39,7 @@ pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
 pub use load::{FileKind, LoadError, load_gestures, load_model, load_rig_text, load_skin, load_template, stem};
+pub use parts::PartFiles;
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote, ProjectToSave,
     load_project, project_files, store_project,
@@ -44,3 +47,4 @@ pub use project::{
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use store::{StoreError, store_model, store_rig, store_rig_over, store_skin};
+pub use watch::{FileWatch, LOOK};

@@ -3,6 +3,7 @@
 pub mod algo;
 pub mod files;
 pub mod headless;
+pub mod instance;
 pub mod mesh;
 pub mod modules;
 pub mod plugins;

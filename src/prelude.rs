@@ -7,15 +7,32 @@ pub use crate::{
         view::{View, ViewPlane},
         weights::WeightSettings,
     },
+    files::{RealDisk, load_model},
+    instance::{
+        AcceptUpdate, ControlPoses, InstanceNodes, RigBuilt, RigFailed, RigInstance, RigInstancePlugin, RigSource,
+        RigTemplate, RigUpdated, TemplateFiles, UpdateOffer,
+    },
     plugins::{
         RigPlugins, RigSystems,
+        commands::Built,
+        controls::ControlsInUse,
         document::{Change, EditRefused, EditRequest, Edited, Joint, NodeOf, Selection, Symmetry},
         gesture::{Gesture, GestureScript},
         picking::{HoverJoint, HoverRequest, Pick, PickRequest, Picked},
         placement::{PlaceRequest, Placed},
+        runtime::{HandOver, InstanceMode, OutsideTransform},
         skinning::{BindRequest, Bound},
         stroke::{FollowedStroke, StrokeDone, StrokeParent, StrokeRequest, StrokeResult},
         surface::{RigMesh, RigSurface, SkinOf},
     },
-    rig::{Rig, RigEdit, Uid, UidSource, operations::Operation},
+    rig::{PoseOffset, Rig, RigEdit, Uid, UidSource, operations::Operation},
+};
+#[cfg(feature = "draw")]
+pub use crate::{
+    instance::SharedMesh,
+    plugins::{
+        display::{DisplayPlugin, MeshDisplay},
+        drawing::{DrawingPlugin, RigDrawing},
+        viewport::RigViewport,
+    },
 };

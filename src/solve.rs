@@ -11,6 +11,7 @@ pub mod curve;
 pub mod expression;
 pub mod fabrik;
 pub mod foot;
+pub mod keep_pose;
 pub mod limit;
 pub mod matching;
 pub mod program;

@@ -93,8 +93,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
         return Ok(report);
     }
     // Checked even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
-    let locals = bench.posed_locals()?;
-    let posed: Vec<Trs> = built.nodes.iter().map(|node| locals.get(&node.uid).copied().unwrap_or(node.base)).collect();
+    let posed = bench.posed_nodes()?;
     if let Some(output) = &args.output {
         let notes = write(args, output, rig, built, &posed, &mut report)?;
         report.notes(notes);

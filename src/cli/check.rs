@@ -10,7 +10,9 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report, skin::load_rig};
 use crate::{
-    files::{FileKind, LoadError, RealDisk, load_gestures, load_model, load_project, load_skin, read_capped},
+    files::{
+        FileKind, LoadError, PartFiles, RealDisk, load_gestures, load_model, load_project, load_skin, read_capped,
+    },
     mesh::{
         adjacency::{edges, islands, weld},
         model::Model,
@@ -120,7 +122,7 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
             return Ok(());
         }
     };
-    let (template, faults) = match template::survey_template(&bytes) {
+    let (template, mut faults) = match template::survey_template(&bytes) {
         Ok(surveyed) => surveyed,
         Err(faults) => {
             found.error = Some(format!("{} is no template that can be read: {}", path.display(), counted(&faults)));
@@ -128,8 +130,12 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
             return Ok(());
         }
     };
-    let rig = template.rig;
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes));
+    let (mut rig, mut remarks) = (template.rig.clone(), template.notes.clone());
+    match PartFiles::new(&RealDisk).put_together(path, &text, template) {
+        Ok(template) => (rig, remarks) = (template.rig, template.notes),
+        Err(fault) => faults.push(fault),
+    }
     let explicit = template::explicit(&text);
     let places = SourceText::new(&explicit);
     let (commands, failing) = problems_of_commands(&rig, &places);
@@ -163,7 +169,7 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     let told: Vec<String> =
         told.map(|(count, one, many)| format!("{count} {}", if count == 1 { one } else { many })).collect();
     found.error = (!told.is_empty()).then(|| told.join(", "));
-    found.remarks = template.notes;
+    found.remarks = remarks;
     found.remarks.extend(remarks_on_rig(&rig));
     let unlisted = failing - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len();
     if unlisted > 0 {

@@ -37,6 +37,17 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             report.set("kind", "template");
             report.set("about", serde_json::to_value(about).unwrap_or(Value::Null));
             report.notes(template.notes);
+            for part in &template.instances {
+                let place = match &part.parent {
+                    _ if !part.onto.is_empty() => format!(" on {}", part.onto.join(", ")),
+                    Some(parent) => format!(" below {parent}"),
+                    None => String::new(),
+                };
+                let side = if part.mirror { ", mirrored" } else { "" };
+                let different = part.changes.len() + part.off.len();
+                report.line(format!("part {}: {}{place}{side}, {different} differences", part.title(), part.part));
+            }
+            report.set("parts", template.instances.iter().map(|part| part.part.clone()).collect::<Vec<_>>());
             describe_joints(&mut report, &template.rig);
         }
         Some(FileKind::RigText) => {

@@ -1,7 +1,6 @@
 //! `rigsmith list`: templates of a folder, by their headers alone.
 
 use std::{
-    fs::File,
     io::Read,
     path::{Path, PathBuf},
 };
@@ -11,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report};
 use crate::{
-    files::FileKind,
+    files::{Disk, EntryKind, FileKind, RealDisk},
     rig::template::{self, TemplateHeader},
 };
 
@@ -35,8 +34,8 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     let mut folders = vec![args.folder.clone()];
     let mut is_first = true;
     while let Some(folder) = folders.pop() {
-        let entries = match std::fs::read_dir(&folder) {
-            Ok(entries) => entries,
+        let names = match RealDisk.list(&folder, MOST) {
+            Ok(names) => names,
             Err(error) if is_first => {
                 return Err(Failure::Input(
                     format!("`{}` cannot be listed: {error}; give a folder", folder.display()).into(),
@@ -48,12 +47,11 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
             }
         };
         is_first = false;
-        for entry in entries.flatten() {
-            let (path, kind) = (entry.path(), entry.file_type());
-            let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
-            match kind {
-                Ok(kind) if kind.is_dir() && !is_hidden => folders.push(path),
-                Ok(kind) if kind.is_file() && FileKind::of(&path) == Some(FileKind::Template) => paths.push(path),
+        for name in names {
+            let path = folder.join(&name);
+            match RealDisk.entry(&path, false).map(|entry| entry.kind) {
+                Ok(EntryKind::Folder) if !name.to_string_lossy().starts_with('.') => folders.push(path),
+                Ok(EntryKind::File) if FileKind::of(&path) == Some(FileKind::Template) => paths.push(path),
                 _ => {}
             }
         }
@@ -87,7 +85,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
 fn header(path: &Path) -> Result<TemplateHeader, String> {
     let read = |limit: u64| -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        File::open(path)?.take(limit).read_to_end(&mut bytes)?;
+        RealDisk.open(path)?.take(limit).read_to_end(&mut bytes)?;
         Ok(bytes)
     };
     let first = read(FIRST_BYTES).map_err(|error| error.to_string())?;

@@ -13,7 +13,6 @@ use crate::{
         Workbench,
         posing::{ControlWrite, PoseError},
     },
-    mesh::model::Trs,
     plugins::commands::BuildStep,
     rig::{Rig, RigEdit, bake::baked, operations::Operation},
 };
@@ -161,20 +160,20 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<Rig, Failure> {
 /// Writes the character, or the skeleton, in the pose of the entities.
 fn write(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
-    let locals = bench.posed_locals()?;
+    let posed = bench.posed_nodes()?;
     if FileKind::of(output) == Some(FileKind::Template) {
         let mut skeleton = baked(bench.rig(), built);
         let joints: Vec<_> = skeleton.walk().map(|joint| joint.data.uid).collect();
+        let index = built.index();
         for joint in joints {
-            if let Some(local) = locals.get(&joint) {
-                let set = RigEdit::SetRest(joint, (*local).into());
+            if let Some(at) = index.get(&joint) {
+                let set = RigEdit::SetRest(joint, posed[*at].into());
                 skeleton.apply(&set).map_err(|error| Failure::Input(Box::new(error)))?;
             }
         }
         report.notes(store_rig(&RealDisk, output, &skeleton)?);
         return Ok(());
     }
-    let posed: Vec<Trs> = built.nodes.iter().map(|node| locals.get(&node.uid).copied().unwrap_or(node.base)).collect();
     let (model, settings) =
         build::character_of(bench.rig(), built, &posed, args.mesh.as_deref(), &args.weights, &args.export, report)?;
     report.notes(store_model(&RealDisk, output, &model, &settings)?);

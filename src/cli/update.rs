@@ -1,6 +1,9 @@
 //! `rigsmith diff` and `rigsmith update`: what differs between versions of a template, and how a rig gets the new one.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -8,9 +11,11 @@ use serde_json::{Value, json};
 use super::{Failure, InPlaceArgs, Report};
 use crate::{
     files::{FileKind, RealDisk, load_template, store_rig_over},
+    modules,
+    processor::keep_poses,
     rig::{
         Rig,
-        update::{Change, ChangeKind, Take, diff, update},
+        update::{Change, Take, diff, update},
     },
 };
 
@@ -73,8 +78,14 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         Some(TakeArg::Theirs) => Take::Theirs,
         Some(TakeArg::Mine) | None => Take::Mine,
     };
-    let updated = update(base.as_ref(), &now, &file, take);
+    let mut updated = update(base.as_ref(), &now, &file, take);
     tell(&mut report, &updated.changes);
+    let poses = keep_poses(&now, &mut updated.rig, &Arc::new(modules::all()))
+        .map_err(|error| Failure::Input(Box::new(error)))?;
+    for note in &poses {
+        report.line(format!("moves    {note}"));
+    }
+    report.set("poses", serde_json::to_value(&poses).unwrap_or(Value::Null));
     let conflicts = updated.conflicts();
     report.set("conflicts", conflicts);
     if conflicts > 0 && args.take.is_none() {
@@ -103,29 +114,11 @@ pub(super) fn load(path: &Path, report: &mut Report) -> Result<Rig, Failure> {
 
 fn tell(report: &mut Report, changes: &[Change]) {
     for change in changes {
-        report.line(told(change));
+        report.line(change.to_string());
     }
     if changes.is_empty() {
         report.line("no differences");
     }
     let list: Vec<Value> = changes.iter().map(|change| serde_json::to_value(change).unwrap_or(Value::Null)).collect();
     report.set("changes", json!(list));
-}
-
-/// A change in a line.
-fn told(change: &Change) -> String {
-    let place = [change.joint.as_deref(), change.tag.as_deref()].into_iter().flatten().collect::<Vec<_>>().join(" ");
-    let field = change.field.as_deref().unwrap_or_default();
-    let what = [place.as_str(), field].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
-    let value = |value: &Option<String>| value.clone().unwrap_or_else(|| "nothing".to_owned());
-    let (from, to) = (value(&change.from), value(&change.to));
-    match (change.kind, change.conflict) {
-        (ChangeKind::Added, false) => format!("added    {what}"),
-        (ChangeKind::Added, true) => format!("conflict {what}: deleted here, changed there"),
-        (ChangeKind::Removed, false) => format!("removed  {what}"),
-        (ChangeKind::Removed, true) => format!("conflict {what}: changed here, deleted there"),
-        (ChangeKind::Changed, false) => format!("changed  {what}: {from} to {to}"),
-        (ChangeKind::Changed, true) => format!("conflict {what}: {from} here, {to} there"),
-        (ChangeKind::Renamed, _) => format!("renamed  {from} to {to}?"),
-    }
 }

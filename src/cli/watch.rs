@@ -4,7 +4,7 @@ use std::{
     collections::HashMap,
     path::{Path, PathBuf},
     thread::sleep,
-    time::{Duration, Instant, SystemTime},
+    time::{Duration, Instant},
 };
 
 use clap::Args;
@@ -12,16 +12,10 @@ use serde_json::{Value, json};
 
 use super::{ExportArgs, Failure, InPlaceArgs, Report, SEED, WeightArgs, build::character_of, report::print};
 use crate::{
-    files::{FileKind, LoadError, RealDisk, read_capped, store_model},
+    files::{FileKind, FileWatch, LOOK, LoadError, PartFiles, RealDisk, store_model},
     headless::{Workbench, posing::PoseError},
-    mesh::model::Trs,
     plugins::commands::BuildStep,
-    rig::{
-        Rig, RigEdit, TagKind, Uid,
-        operations::Operation,
-        template::{self, read_template},
-        update::edits_between,
-    },
+    rig::{Rig, RigEdit, TagKind, Uid, operations::Operation, template, update::edits_between},
 };
 
 /// Arguments of `rigsmith watch`.
@@ -46,12 +40,6 @@ pub(super) struct WatchArgs {
     in_place: InPlaceArgs,
 }
 
-/// Time between two looks at the file.
-const LOOK: Duration = Duration::from_millis(10);
-
-/// Number of looks after which the content is read even if the file seems unchanged: network folders may say nothing.
-const READ_EVERY: u32 = 50;
-
 /// Commands that are named after a build.
 const NAMED: usize = 6;
 
@@ -65,15 +53,16 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     let inputs: Vec<&Path> =
         [Some(&args.template), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, Some(&args.output), &[])?;
-    let mut file = Watched::new(&args.template);
-    let rig = parsed(&args.template, &file.next()?)?;
+    let mut file = FileWatch::new(&args.template, template::MAX_BYTES as u64);
+    let first = file.read(&RealDisk).map_err(|error| Failure::Input(Box::new(error)))?;
+    let rig = parsed(&args.template, first)?;
     let mut watch = Watch { args, bench: Workbench::with_rig(SEED, rig), is_json };
     let first = Instant::now();
     let all = watch.build(first, &[], None)?;
     let mut is_heard = watch.say(&all);
     let mut builds = 1;
     while is_heard && args.count.is_none_or(|count| builds < count) {
-        let bytes = file.next()?;
+        let bytes = next(&mut file);
         let start = Instant::now();
         let told = match watch.update(&bytes, start) {
             Ok(told) => {
@@ -88,52 +77,20 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     Ok(Report::default())
 }
 
-/// File whose saves are awaited.
-struct Watched<'a> {
-    path: &'a Path,
-    content: Vec<u8>,
-    seen: Option<(u64, Option<SystemTime>)>,
-}
-
-impl<'a> Watched<'a> {
-    fn new(path: &'a Path) -> Self {
-        Self { path, content: Vec::new(), seen: None }
-    }
-
-    /// The next content of the file that is not as before, once it is the same twice in a row. A file that is not there
-    /// for the moment, as between two steps of a save, is waited for, but not the first time.
-    fn next(&mut self) -> Result<Vec<u8>, Failure> {
-        let mut looks = 0_u32;
-        loop {
-            let state = std::fs::metadata(self.path).ok().map(|data| (data.len(), data.modified().ok()));
-            let is_first = self.content.is_empty();
-            if is_first || state != self.seen || looks % READ_EVERY == READ_EVERY - 1 {
-                match read_capped(&RealDisk, self.path, template::MAX_BYTES as u64) {
-                    Ok(bytes) if bytes != self.content => {
-                        sleep(if is_first { Duration::ZERO } else { LOOK });
-                        let again = read_capped(&RealDisk, self.path, template::MAX_BYTES as u64);
-                        if again.is_ok_and(|again| again == bytes) {
-                            self.seen = state;
-                            self.content.clone_from(&bytes);
-                            return Ok(bytes);
-                        }
-                        continue;
-                    }
-                    Ok(_) => self.seen = state,
-                    Err(error) if is_first => return Err(Failure::Input(Box::new(error))),
-                    Err(_) => {}
-                }
-            }
-            looks += 1;
-            sleep(LOOK);
+/// The next content of a file.
+fn next(file: &mut FileWatch) -> Vec<u8> {
+    loop {
+        sleep(LOOK);
+        if let Some(content) = file.look(&RealDisk) {
+            return content.to_vec();
         }
     }
 }
 
 fn parsed(path: &Path, bytes: &[u8]) -> Result<Rig, Failure> {
     let text = String::from_utf8_lossy(bytes).into_owned();
-    let read = read_template(bytes).map_err(|source| LoadError::Source { path: path.into(), text, source })?;
-    Ok(read.rig)
+    let read = PartFiles::new(&RealDisk).complete(path, bytes);
+    Ok(read.map_err(|source| LoadError::Source { path: path.into(), text, source })?.rig)
 }
 
 struct Watch<'a> {
@@ -178,10 +135,8 @@ impl Watch<'_> {
         }
         let built_in = start.elapsed();
         let mut report = Report::default();
-        let locals = self.bench.posed_locals()?;
+        let posed = self.bench.posed_nodes()?;
         let (rig, built) = (self.bench.rig(), self.bench.built().ok_or(PoseError::NotBuilt)?);
-        let posed: Vec<Trs> =
-            built.nodes.iter().map(|node| locals.get(&node.uid).copied().unwrap_or(node.base)).collect();
         let args = self.args;
         let (model, settings) =
             character_of(rig, built, &posed, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?;

@@ -139,6 +139,7 @@ impl Plugin for EditorPlugin {
             ReportPlugin,
             FilesPlugin,
             super::building::BuildingPlugin,
+            super::follow::FollowPlugin,
             super::render_errors::RenderErrorsPlugin,
         ))
         .insert_resource(WinitSettings {

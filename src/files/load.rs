@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Disk, ModelFolder, ReadError, open, read_capped};
+use super::{Disk, ModelFolder, PartFiles, ReadError, open, read_capped};
 use crate::{
     mesh::{
         gltf::{self, ExternalError, GltfError, read_gltf},
@@ -13,7 +13,7 @@ use crate::{
         SourceError,
         project::{self, ReadProject, read_project},
         skin::{SkinFile, SkinFileError, content_hash},
-        template::{self, Template, read_template},
+        template::{self, Template},
         text::{self, RigText, RigTextError},
     },
 };
@@ -166,10 +166,10 @@ fn load_gltf(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
     Ok(read_gltf(&bytes, &path.display().to_string(), &mut external)?)
 }
 
-/// Reads a template.
+/// Reads a template with its parts: see [`PartFiles`].
 pub fn load_template(disk: &dyn Disk, path: &Path) -> Result<Template, LoadError> {
     let bytes = read_capped(disk, path, template::MAX_BYTES as u64)?;
-    read_template(&bytes).map_err(|source| in_source(path, &bytes, source))
+    PartFiles::new(disk).complete(path, &bytes).map_err(|source| in_source(path, &bytes, source))
 }
 
 /// Reads a `.rig` text.

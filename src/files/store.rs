@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Disk, FileKind, FileSet, LoadError, SaveError, read_capped, save_atomic, save_set, stem, verify};
+use super::{
+    Disk, FileKind, FileSet, LoadError, PartFiles, SaveError, read_capped, save_atomic, save_set, stem, verify,
+};
 use crate::{
     mesh::{
         gltf::{GltfError, GltfWriteSettings, write_glb, write_gltf},
@@ -175,7 +177,8 @@ fn lost_in_obj(model: &Model) -> Vec<String> {
 
 /// Saves a rig over a template that was read: only what changed is written into its text, see
 /// [`write_template_over`](template::write_template_over). That is the first of the files in `sources` that is a template
-/// of the same rig; without one, and for another kind of file, it is saved as by [`store_rig`].
+/// of the same rig; without one, and for another kind of file, it is saved as by [`store_rig`]. Returns notes, a sentence each:
+/// about what the format cannot hold, and about a text that had to be written anew.
 pub fn store_rig_over(disk: &dyn Disk, path: &Path, rig: &Rig, sources: &[&Path]) -> Result<Vec<String>, StoreError> {
     if FileKind::of(path) != Some(FileKind::Template) {
         return store_rig(disk, path, rig);
@@ -186,12 +189,37 @@ pub fn store_rig_over(disk: &dyn Disk, path: &Path, rig: &Rig, sources: &[&Path]
         let text = String::from_utf8(bytes).ok().filter(|_| is_same)?;
         Some(text.strip_prefix('\u{FEFF}').map(str::to_owned).unwrap_or(text))
     };
-    let written = match sources.iter().find_map(|source| text_of(source)) {
-        Some(text) => template::write_template_over(rig, &text),
-        None => write_template(rig),
+    let found = sources.iter().find_map(|source| Some((*source, text_of(source)?)));
+    if let Some((source, text)) = &found
+        && template::read_template(text.as_bytes()).is_ok_and(|template| !template.parts.is_empty())
+    {
+        let over = over_parts(disk, rig, source, text);
+        save_template(disk, path, &over.clone().unwrap_or_else(|| write_template(rig)))?;
+        let note =
+            "the parts of the template were written out: its text could not be changed to say what the rig is now";
+        return Ok(over.is_none().then(|| note.to_owned()).into_iter().collect());
+    }
+    let source = found.map(|(_, text)| text);
+    let over = source.as_deref().and_then(|text| template::write_template_over(rig, text));
+    let is_anew = source.is_some() && over.is_none();
+    save_template(disk, path, &over.unwrap_or_else(|| write_template(rig)))?;
+    let note = "the file was written anew: its text could not be changed to say what the rig is now, and its comments are gone";
+    Ok(is_anew.then(|| note.to_owned()).into_iter().collect())
+}
+
+/// The text of a template with parts that says what the rig is; `None` if something of the parts is different in it.
+fn over_parts(disk: &dyn Disk, rig: &Rig, path: &Path, text: &str) -> Option<String> {
+    let says = |text: &str| {
+        let read = PartFiles::new(disk).complete(path, text.as_bytes());
+        read.is_ok_and(|template| template::says_the_same(&template.rig, rig))
     };
-    save_template(disk, path, &written)?;
-    Ok(Vec::new())
+    if says(text) {
+        return Some(text.to_owned());
+    }
+    let own = template::read_template(text.as_bytes()).ok()?.rig;
+    let before = PartFiles::new(disk).complete(path, text.as_bytes()).ok()?.rig;
+    let changed = template::write_own_over(rig, &before, &own, text)?;
+    says(&changed).then_some(changed)
 }
 
 fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), StoreError> {

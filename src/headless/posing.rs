@@ -1,6 +1,6 @@
 //! Building and posing on a workbench, through the same requests and the same entities as in an app.
 
-use std::{collections::BTreeMap, str::FromStr, sync::Arc, time::Duration};
+use std::{str::FromStr, sync::Arc, time::Duration};
 
 use bevy::{math::EulerRot, prelude::*, time::TimeUpdateStrategy};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ use crate::{
         commands::{BuildDone, BuildRequest, BuildStep, BuiltEntities, Processor, RunFailure},
         controls::{SwitchError, SwitchRequest, find_switches},
         document::JointEntities,
-        runtime::RigRuntime,
+        runtime::{RigRuntime, is_near},
         schema::Attributes,
     },
     processor::{FindError, Off, RunReport},
@@ -388,18 +388,22 @@ impl Workbench {
         Ok(rig)
     }
 
-    /// Transforms of the built nodes' entities relative to their parents, by uid.
+    /// Transforms of the built nodes' entities relative to their parents, in the order of the nodes. A node that stands where
+    /// it was built, but for rounding, has exactly the transform that it was built with: entities keep what they have where a
+    /// run differs from it by rounding only, so theirs depends on what was before.
     ///
     /// # Errors
     /// If the rig is not built or cannot run.
-    pub fn posed_locals(&self) -> Result<BTreeMap<Uid, Trs>, PoseError> {
+    pub fn posed_nodes(&self) -> Result<Vec<Trs>, PoseError> {
         let built = self.built().ok_or(PoseError::NotBuilt)?;
         self.runtime()?;
         let local = |node: &BuiltNode| {
-            let local = self.app.world().get::<Transform>(self.entity(node.uid)?)?;
-            let Transform { translation, rotation, scale } = *local;
-            Some((node.uid, Trs { translation, rotation, scale }))
+            let local = *self.app.world().get::<Transform>(self.entity(node.uid)?)?;
+            let base =
+                Transform { translation: node.base.translation, rotation: node.base.rotation, scale: node.base.scale };
+            let Transform { translation, rotation, scale } = if is_near(&local, &base) { base } else { local };
+            Some(Trs { translation, rotation, scale })
         };
-        Ok(built.nodes.iter().filter_map(local).collect())
+        Ok(built.nodes.iter().map(|node| local(node).unwrap_or(node.base)).collect())
     }
 }

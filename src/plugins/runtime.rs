@@ -10,6 +10,7 @@
 //! by a person, an animation or a game, and becomes the node's pose offset before the program runs. The program then
 //! writes the `Transform`s of all nodes that moved. The document's pose is passed on only where the document changes.
 
+mod hand_over;
 mod spawn;
 mod systems;
 
@@ -17,12 +18,16 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use bevy::prelude::*;
 
-pub use self::spawn::spawn_instance;
+pub(crate) use self::systems::is_near;
+pub use self::{
+    hand_over::{HandOver, OutsideTransform},
+    spawn::{furnish_instance, spawn_instance},
+};
 pub use super::schema::{NodeOf, RigNodes};
 use super::{RigSystems, configure_sets};
 use crate::{
     rig::{AttributeValues, PoseOffset, Rig, Uid},
-    solve::program::{Memory, RigProgram, RigState},
+    solve::program::{Carry, Memory, RigProgram, RigState},
 };
 
 /// Plugin that runs rigs.
@@ -41,7 +46,9 @@ impl Plugin for RuntimePlugin {
                 )
                     .chain()
                     .in_set(RigSystems::Solve),
-                (systems::scatter_globals, systems::correct_globals).chain().in_set(RigSystems::Scatter),
+                (systems::scatter_globals, systems::correct_globals, hand_over::hand_over)
+                    .chain()
+                    .in_set(RigSystems::Scatter),
             ),
         );
         #[cfg(feature = "draw")]
@@ -50,7 +57,7 @@ impl Plugin for RuntimePlugin {
 }
 
 /// Output mode of an instance: the entities that its results are written to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum InstanceMode {
     /// Every node is an entity in the same hierarchy as in the rig. Controls are posed by their `Transform`; that of
     /// driven nodes is written before Bevy propagates.
@@ -213,18 +220,33 @@ impl RigRuntime {
 
     /// Carries the motion of the same rig's previous program over to this one.
     pub(super) fn carry_over(&mut self, before: &Self) {
-        self.state.carry_over(&before.state);
+        self.carry_along(before, &Carry::between(before.state.program(), self.state.program()));
+    }
+
+    fn carry_along(&mut self, before: &Self, carry: &Carry) {
+        self.state.carry_along(&before.state, carry);
         self.posed.clone_from(&before.posed);
         self.valued.clone_from(&before.valued);
-        for (slot, entity) in before.nodes.iter().enumerate() {
-            let uid = before.state.program().nodes()[slot].uid;
-            if let (Some(entity), Some(now)) = (entity, self.state.program().node(uid)) {
-                self.attach(now, *entity);
-                if let (Some(shown), Some(known)) = (self.shown.get_mut(now), before.shown.get(slot)) {
-                    *shown = *known;
-                }
+        for (slot, from) in carry.nodes().iter().enumerate() {
+            let Some((from, entity)) = from.and_then(|from| Some((from, before.entity(from)?))) else { continue };
+            self.attach(slot, entity);
+            if let (Some(shown), Some(known)) = (self.shown.get_mut(slot), before.shown.get(from)) {
+                *shown = *known;
             }
         }
+    }
+
+    /// Goes on with another program of the same rig: poses, attribute values, the motion of springs and the entities of
+    /// nodes stay. `carry` is [`Carry::between`] the two programs. Nodes that are new have no entities yet, and those of
+    /// nodes that are gone are left alone: see [`furnish_instance`].
+    pub fn exchange(&mut self, program: &Arc<RigProgram>, carry: &Carry) {
+        if carry.is_aligned() {
+            self.state.exchange(program, carry);
+            return;
+        }
+        let mut fresh = Self::new(Arc::clone(program), self.mode);
+        fresh.carry_along(self, carry);
+        *self = fresh;
     }
 }
 

@@ -217,18 +217,8 @@ impl Rig {
             .iter()
             .map(|(uid, (_, parent))| (*uid, parent.filter(|parent| joints.contains_key(parent))))
             .collect();
-        let mut reached: HashSet<Uid> = HashSet::new();
-        for start in joints.keys() {
-            let mut path = HashSet::new();
-            let mut at = Some(*start);
-            while let Some(uid) = at.filter(|uid| !reached.contains(uid)) {
-                if !path.insert(uid) {
-                    parents.insert(*start, None);
-                    break;
-                }
-                at = parents.get(&uid).copied().flatten();
-            }
-            reached.extend(path);
+        for circle in circles(&parents) {
+            parents.insert(circle[0], None);
         }
         let mut children: HashMap<Option<Uid>, Vec<Uid>> = HashMap::new();
         for (uid, parent) in &parents {
@@ -258,4 +248,23 @@ impl Rig {
     pub fn skins(&self) -> impl Iterator<Item = (Uid, &Arc<SkinData>)> {
         self.skins.iter().map(|(mesh, skin)| (*mesh, skin))
     }
+}
+
+/// Circles of joints that hang below themselves, each as its joints from the first one found upwards.
+pub(super) fn circles(parents: &BTreeMap<Uid, Option<Uid>>) -> Vec<Vec<Uid>> {
+    let mut reached: HashSet<Uid> = HashSet::new();
+    let mut circles = Vec::new();
+    for start in parents.keys() {
+        let mut path = Vec::new();
+        let mut at = Some(*start);
+        while let Some(uid) = at.filter(|uid| reached.insert(*uid)) {
+            path.push(uid);
+            at = parents.get(&uid).copied().flatten();
+        }
+        // Whoever ends on the way that it came has gone in a circle.
+        if let Some(place) = at.and_then(|end| path.iter().position(|uid| *uid == end)) {
+            circles.push(path.split_off(place));
+        }
+    }
+    circles
 }

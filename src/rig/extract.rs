@@ -40,7 +40,8 @@ pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSourc
         remap.uids = things.map(|thing| (thing, uids.next_uid())).collect::<HashMap<_, _>>();
     }
     let mut out = Rig::new(uid, name);
-    let about = RigAbout { name: name.to_owned(), kind: "part".to_owned(), ..rig.about().clone() };
+    let author = rig.about().author.clone();
+    let about = RigAbout { name: name.to_owned(), kind: "part".to_owned(), author, ..RigAbout::default() };
     out.apply(&RigEdit::SetAbout(Box::new(about)))?;
     for group in rig.groups().iter().filter(|group| groups.contains(&group.uid)) {
         let mut group = group.clone();

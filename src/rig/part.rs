@@ -4,7 +4,11 @@
 //! of other joints refer to it or to its commands; the joints behind the last one needed are extras. Besides, a part is
 //! connected through its sockets.
 
+mod instance;
+
 use std::{collections::HashMap, fmt};
+
+pub use instance::{MirrorParams, PartChange, PartInstance};
 
 use crate::rig::{
     NodeRef, Rig, RigJoint, TagKind, Uid,

@@ -55,7 +55,7 @@ pub use params::{
     BadReference, FoundReference, bind_names, given_names, map_references, nearest_to_gone, references_in,
     refresh_names, without_uids, written_as,
 };
-pub(in crate::rig) use params::{map_text_fields, map_uids};
+pub(in crate::rig) use params::{given_name, map_text_fields, map_uids};
 
 /// A reference. It resolves to an ordered list of nodes: parents first, siblings as authored, then in the order of
 /// creation.

@@ -11,15 +11,18 @@ mod fields;
 mod order;
 mod renamed;
 
-use std::collections::{BTreeMap, HashSet};
+use std::{
+    collections::{BTreeMap, HashMap, HashSet},
+    fmt,
+};
 
 use serde::Serialize;
 
-use super::{GroupData, JointData, Rig, StoredPose, TagData, TagKind, Uid};
-use fields::{Field, about_fields, group_fields, joint_fields, pose_fields, tag_fields, tag_title};
+use super::{GroupData, JointData, Rig, StoredPose, TagData, Uid, document::circles};
+use fields::{Field, about_fields, group_fields, joint_fields, joint_title, pose_fields, tag_fields, tag_title};
 use order::merged_order;
 
-pub use edits::edits_between;
+pub use edits::{edits_between, pose_edits};
 
 /// Kind of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -56,6 +59,24 @@ pub struct Change {
     pub conflict: bool,
 }
 
+impl fmt::Display for Change {
+    /// The change in a line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parts = [self.joint.as_deref(), self.tag.as_deref(), self.field.as_deref()];
+        let what = parts.into_iter().flatten().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
+        let [from, to] = [&self.from, &self.to].map(|value| value.as_deref().unwrap_or("nothing"));
+        match (self.kind, self.conflict) {
+            (ChangeKind::Added, false) => write!(f, "added    {what}"),
+            (ChangeKind::Added, true) => write!(f, "conflict {what}: deleted here, changed there"),
+            (ChangeKind::Removed, false) => write!(f, "removed  {what}"),
+            (ChangeKind::Removed, true) => write!(f, "conflict {what}: changed here, deleted there"),
+            (ChangeKind::Changed, false) => write!(f, "changed  {what}: {from} to {to}"),
+            (ChangeKind::Changed, true) => write!(f, "conflict {what}: {from} here, {to} there"),
+            (ChangeKind::Renamed, _) => write!(f, "renamed  {from} to {to}?"),
+        }
+    }
+}
+
 /// Side whose value is taken in a conflict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Take {
@@ -72,6 +93,8 @@ pub struct Update {
     pub rig: Rig,
     /// Changes, header first, then groups, joints in the order of the file, and poses.
     pub changes: Vec<Change>,
+    /// Uids that things of the file have here, by those that they have there: what got another name keeps its first uid.
+    pub identities: HashMap<Uid, Uid>,
 }
 
 impl Update {
@@ -79,6 +102,14 @@ impl Update {
     pub fn conflicts(&self) -> usize {
         self.changes.iter().filter(|change| change.conflict).count()
     }
+}
+
+/// A version of a rig with the uids that its things got when they were [renamed](Update::identities) in earlier versions. Where
+/// a uid has come back with an old name, it is the thing's own.
+pub fn with_identities(file: &Rig, identities: &HashMap<Uid, Uid>) -> Rig {
+    let is_there = |uid: &Uid| file.is_taken(*uid);
+    let uids = identities.iter().filter(|(from, to)| is_there(from) && !is_there(to)).map(|(from, to)| (*from, *to));
+    renamed::with_uids(file, uids.collect())
 }
 
 /// Differences of two rigs, from the first to the second.
@@ -90,16 +121,21 @@ pub fn diff(from: &Rig, to: &Rig) -> Vec<Change> {
 /// does not have stays.
 pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
     let mut changes = Vec::new();
+    // What was renamed by an earlier update has the name of the base here, and an older uid.
+    let known = base.and_then(|base| renamed::renamed(now, base, &mut Vec::new()));
+    let base = known.as_ref().map(|(known, _)| known).or(base);
     let renamed = renamed::renamed(base.unwrap_or(now), file, &mut changes);
-    let file = renamed.as_ref().unwrap_or(file);
-    let told = changes.iter().map(|change: &Change| change.uid).collect();
+    changes.retain(|change: &Change| change.from != change.to);
+    let file = renamed.as_ref().map_or(file, |(renamed, _)| renamed);
+    let told = changes.iter().map(|change| change.uid).collect();
     let mut merge = Merge { base, now, file, take, changes, rig: now.clone(), placed: HashSet::new(), renamed: told };
     merge.header();
     merge.groups();
     merge.joints();
     merge.poses();
     let Merge { rig, changes, .. } = merge;
-    Update { rig, changes }
+    let identities = renamed.as_ref().map(|(_, uids)| uids.clone()).unwrap_or_default();
+    Update { rig, changes, identities }
 }
 
 /// What becomes of something that two of three sides may have.
@@ -177,7 +213,7 @@ impl Merge<'_> {
         let groups: HashSet<Uid> = self.rig.groups.iter().map(|group| group.uid).collect();
         let mut joints: BTreeMap<Uid, (JointData, Option<Uid>)> = BTreeMap::new();
         let mut removed = Vec::new();
-        for uid in order_of_file(&lists[2], &lists[1]) {
+        for uid in all(&lists) {
             let label = [now, file].into_iter().find_map(|rig| rig.joint(uid)?.data.label.clone());
             let title = label.unwrap_or_else(|| uid.to_string());
             let named = Named { uid, joint: Some(&title), tag: None, prefix: "" };
@@ -217,10 +253,56 @@ impl Merge<'_> {
             data.group = data.group.filter(|group| groups.contains(group));
             *parent = parent.filter(|parent| *parent != data.uid);
         }
+        self.untangle(&mut joints);
         self.rig.set_joints(joints, |parent| {
             let children = |rig: &Rig| rig.children(parent).to_vec();
             merged_order(base.map(children).as_ref(), &children(now), &children(file))
         });
+        // What created nodes have stays: they may come back.
+        for joint in now.walk().filter(|joint| !self.rig.joints.contains_key(&joint.data.uid)) {
+            self.rig.pose.remove(&joint.data.uid);
+        }
+    }
+
+    /// Parents that each side may have, and both together may not, because a joint would hang below itself: a conflict of
+    /// every joint of the circle.
+    fn untangle(&mut self, joints: &mut BTreeMap<Uid, (JointData, Option<Uid>)>) {
+        let (now, file) = (self.now, self.file);
+        let of = |rig: &Rig, uid: Uid| rig.joint(uid).map(|joint| joint.parent);
+        loop {
+            let parents = joints.iter().map(|(uid, (_, parent))| (*uid, *parent)).collect();
+            let circles: Vec<Uid> = circles(&parents).into_iter().flatten().collect();
+            let mut is_changed = false;
+            for uid in circles {
+                let (Some(mine), Some(theirs), Some((_, parent))) = (of(now, uid), of(file, uid), joints.get_mut(&uid))
+                else {
+                    continue;
+                };
+                if mine == theirs {
+                    continue;
+                }
+                self.parent_conflict(uid, mine, theirs);
+                let taken = if self.take == Take::Theirs { theirs } else { mine };
+                is_changed |= std::mem::replace(parent, taken) != taken;
+            }
+            if !is_changed {
+                return;
+            }
+        }
+    }
+
+    fn parent_conflict(&mut self, uid: Uid, mine: Option<Uid>, theirs: Option<Uid>) {
+        let is_of_parent = |change: &&mut Change| change.uid == uid && change.field.as_deref() == Some("parent");
+        if let Some(told) = self.changes.iter_mut().find(is_of_parent) {
+            told.conflict = true;
+            return;
+        }
+        let [from, to] = [mine, theirs].map(|parent| parent.map(|uid| joint_title(self.now, self.file, uid)));
+        let label = self.now.joint(uid).and_then(|joint| joint.data.label.clone());
+        let title = label.unwrap_or_else(|| uid.to_string());
+        let named = Named { uid, joint: Some(&title), tag: None, prefix: "" };
+        let field = Some("parent".to_owned());
+        self.changes.push(Change { field, from, to, conflict: true, ..named.change() });
     }
 
     /// Tags of a joint that stays.
@@ -352,14 +434,4 @@ fn uids<'a, T: 'a>(list: impl IntoIterator<Item = &'a T>, uid: impl Fn(&T) -> Ui
 fn all([base, now, file]: &[Vec<Uid>; 3]) -> Vec<Uid> {
     let mut seen = HashSet::new();
     file.iter().chain(now).chain(base).copied().filter(|uid| seen.insert(*uid)).collect()
-}
-
-fn order_of_file(file: &[Uid], now: &[Uid]) -> Vec<Uid> {
-    let mut seen = HashSet::new();
-    file.iter().chain(now).copied().filter(|uid| seen.insert(*uid)).collect()
-}
-
-/// Returns `true` if a tag is a command.
-fn is_command(tag: &TagData) -> bool {
-    matches!(tag.kind, TagKind::Command { .. })
 }

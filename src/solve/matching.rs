@@ -82,9 +82,25 @@ pub fn match_switch(
 
 /// Angle between two rotations in degrees. It is computed from the vector part: the dot product of two quaternions has
 /// no digits left for small angles.
-fn angle_between(a: &Trs, b: &Trs) -> f32 {
+pub(super) fn angle_between(a: &Trs, b: &Trs) -> f32 {
     let between = a.rotation.conjugate() * b.rotation;
     2.0 * bevy::math::ops::atan2(between.xyz().length(), between.w.abs()).to_degrees()
+}
+
+/// The offset that brings a node to the place and the rotation of `wanted`; its scale stays. `now` is its rig transform with
+/// the offset that it has.
+pub(super) fn offset_towards(now: &Trs, offset: &PoseOffset, wanted: &Trs) -> PoseOffset {
+    // Rig transform of the node without its pose: now = unposed * offset.
+    let turned = (now.rotation * offset.rotation.conjugate()).normalize();
+    let divided = |a: f32, b: f32| if b == 0.0 { a } else { a / b };
+    let scale = |a: glam::Vec3, b: glam::Vec3| glam::Vec3::new(divided(a.x, b.x), divided(a.y, b.y), divided(a.z, b.z));
+    let unposed = scale(now.scale, offset.scale);
+    let origin = now.translation - turned * (unposed * offset.translation);
+    PoseOffset {
+        translation: scale(turned.conjugate() * (wanted.translation - origin), unposed),
+        rotation: (turned.conjugate() * wanted.rotation).normalize(),
+        scale: offset.scale,
+    }
 }
 
 /// A copy of an instance on which poses are tried.
@@ -125,19 +141,10 @@ impl Attempt<'_> {
                 break;
             }
             let offset = self.offset(node);
-            // Rig transform of the node without its pose: now = unposed * offset.
-            let turned = (now.rotation * offset.rotation.conjugate()).normalize();
-            let divided = |a: f32, b: f32| if b == 0.0 { a } else { a / b };
-            let scale =
-                |a: glam::Vec3, b: glam::Vec3| glam::Vec3::new(divided(a.x, b.x), divided(a.y, b.y), divided(a.z, b.z));
-            let unposed = scale(now.scale, offset.scale);
-            let origin = now.translation - turned * (unposed * offset.translation);
-            let mut next = offset;
-            next.rotation = (turned.conjugate() * wanted.rotation).normalize();
-            let moved = scale(turned.conjugate() * (wanted.translation - origin), unposed);
-            let off = (moved - offset.translation) * unposed;
-            if rotate_only.is_none_or(|most| off.length() > most) {
-                next.translation = moved;
+            let mut next = offset_towards(&now, &offset, wanted);
+            let off = (next.translation - offset.translation) * (now.scale / offset.scale);
+            if rotate_only.is_some_and(|most| off.length() <= most) {
+                next.translation = offset.translation;
             }
             self.set(node, next)?;
         }

@@ -37,7 +37,7 @@ use std::{
 pub use cache::ProgramCache;
 pub use error::{ProgramError, StateError};
 pub use hash::ContentHash;
-pub use state::{LANES, Memory, RigState};
+pub use state::{Carry, LANES, Memory, RigState};
 
 use self::{
     freedom::Freedom,

@@ -159,7 +159,7 @@ fn parts_depend_in_one_direction() {
         "Commands",
         "ResMut",
     ];
-    let rules: [(&str, &[&str]); 16] = [
+    let rules: [(&str, &[&str]); 17] = [
         ("rig", &pure),
         ("mesh", &pure),
         ("algo", &pure),
@@ -174,6 +174,7 @@ fn parts_depend_in_one_direction() {
         ("modules", &["crate::algo"]),
         ("plugins", &["std::fs", "std::path", "crate::cli", "crate::editor", "crate::files"]),
         ("files", &["crate::cli", "crate::editor", "bevy::app", "App"]),
+        ("instance", &["std::fs", "crate::cli", "crate::editor", "crate::headless"]),
         ("cli", &["crate::editor"]),
         ("headless", &["crate::cli", "crate::editor", "crate::files"]),
     ];

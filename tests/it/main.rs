@@ -28,6 +28,8 @@ mod edit_text;
 #[cfg(feature = "editor")]
 mod editor_files;
 mod edits;
+#[cfg(feature = "editor")]
+mod examples;
 mod exports;
 mod face;
 #[cfg(feature = "cli")]
@@ -59,8 +61,10 @@ mod gltf;
 mod gltf_torture;
 mod heads;
 mod influences;
+mod instances;
 mod journal;
 mod journal_kill;
+mod keep_pose;
 mod kmeans;
 mod layout;
 mod leg_strokes;
@@ -75,6 +79,7 @@ mod obj_materials;
 mod obj_torture;
 #[cfg(feature = "editor")]
 mod panels;
+mod part_instances;
 mod parts;
 mod parts_more;
 mod picking;
@@ -93,6 +98,7 @@ mod sided;
 mod skin_built;
 mod skin_file;
 mod solvers;
+mod sources;
 mod stroke;
 mod surface;
 mod surface_refresh;

@@ -1,7 +1,8 @@
 //! Updates of a rig to another version of its template.
 
+use bevy::math::Vec3;
 use rigsmith::rig::{
-    GroupData, JointData, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
+    GroupData, JointData, PoseOffset, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
     update::{Change, ChangeKind, Take, diff, edits_between, update},
 };
 
@@ -222,4 +223,47 @@ fn random_updates_keep_both_sides_and_edits_do_the_same() {
         assert_eq!(plain(there), plain(file.clone()), "seed {seed}: between");
         assert!(diff(&file, &file).is_empty());
     }
+}
+
+#[test]
+fn parents_that_go_in_a_circle_are_a_conflict() {
+    let chain = |parents: [Option<&str>; 3]| {
+        let joint = |(label, parent): (&str, Option<&str>)| {
+            let parent = parent.map(|parent| format!(", parent: \"{parent}\"")).unwrap_or_default();
+            format!("(label: \"{label}\"{parent}, translation: (0, 1, 0)),")
+        };
+        let joints: String = ["a", "b", "c"].into_iter().zip(parents).map(joint).collect();
+        read(&format!("(format: 2, name: \"r\", joints: [{joints}])"))
+    };
+    let base = chain([None, None, Some("a")]);
+    let now = chain([Some("b"), None, Some("a")]);
+    let file = chain([None, Some("a"), Some("a")]);
+    for (take, wanted) in [(Take::Mine, &now), (Take::Theirs, &file)] {
+        let updated = update(Some(&base), &now, &file, take);
+        let parents: Vec<Change> =
+            updated.changes.iter().filter(|change| change.field.as_deref() == Some("parent")).cloned().collect();
+        assert_eq!(parents.len(), 2, "{:?}", updated.changes);
+        assert!(parents.iter().all(|change| change.conflict), "{parents:?}");
+        for joint in wanted.walk() {
+            let (uid, label) = (joint.data.uid, &joint.data.label);
+            assert_eq!(updated.rig.joint(uid).unwrap().parent, joint.parent, "{label:?} with {take:?}");
+        }
+    }
+}
+
+#[test]
+fn poses_of_joints_that_go_go_with_them() {
+    let base = read(CHAIN);
+    let tip = base.find_label("tail_3").unwrap();
+    let mut now = base.clone();
+    let (turned, other) = (PoseOffset { translation: Vec3::Y, ..PoseOffset::IDENTITY }, Uid(77));
+    apply(&mut now, RigEdit::SetOffset(tip, Some(turned)));
+    apply(&mut now, RigEdit::SetOffset(other, Some(turned)));
+    let mut file = base.clone();
+    apply(&mut file, RigEdit::RemoveJoint(tip));
+    let updated = update(Some(&base), &now, &file, Take::Theirs).rig;
+    assert_eq!((updated.offset(tip), updated.offset(other)), (None, Some(&turned)), "that of a created node stays");
+    let edits = edits_between(&now, &updated).unwrap();
+    apply(&mut now, RigEdit::Batch(edits));
+    assert_eq!(now, updated);
 }

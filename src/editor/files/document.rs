@@ -26,7 +26,7 @@ pub struct OpenDocument {
     /// The project file; `None` before the first save.
     pub project: Option<PathBuf>,
     /// The template that was opened; its text is what a template is saved over.
-    pub(super) template: Option<PathBuf>,
+    pub(in crate::editor) template: Option<PathBuf>,
     pub(super) saved: SavedAt,
     pub(super) journal: Journal,
     /// Meshes of the project that were not found; they are saved again unchanged.

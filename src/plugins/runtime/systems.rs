@@ -143,7 +143,7 @@ fn gather(
 }
 
 /// True if two transforms differ only by rounding.
-fn is_near(a: &Transform, b: &Transform) -> bool {
+pub(crate) fn is_near(a: &Transform, b: &Transform) -> bool {
     let size = a.translation.abs().max_element().max(1e-3);
     (a.translation - b.translation).abs().max_element() <= 1e-6 * size
         && (a.scale - b.scale).abs().max_element() <= 1e-6 * a.scale.abs().max_element().max(1e-3)

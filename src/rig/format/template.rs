@@ -31,6 +31,7 @@ mod write;
 use serde::{Deserialize, Serialize};
 
 pub use over::write_template_over;
+pub(crate) use over::{says_the_same, write_own_over};
 pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};
@@ -38,7 +39,7 @@ pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{quoted, vector, write_without_poses};
 
-use crate::rig::{Rig, Uid};
+use crate::rig::{Rig, Uid, part::PartInstance};
 
 /// The newest format that is read and written. A file that the program writes by itself says the oldest format that holds
 /// what is in it: format 2 where a part says its needs, a feature has a choice, a joint is a placed bone of a face or poses
@@ -116,6 +117,10 @@ pub struct FeatureSummary {
 pub struct Template {
     /// The rig.
     pub rig: Rig,
+    /// Parts that have not been put into the rig yet: see [`Template::with_parts`].
+    pub parts: Vec<PartInstance>,
+    /// Parts that have been put into the rig.
+    pub instances: Vec<PartInstance>,
     /// Notes about content that the reader ignored (fields of a newer format, a wrong joint count), a sentence each.
     pub notes: Vec<String>,
 }

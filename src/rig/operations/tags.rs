@@ -9,6 +9,7 @@ mod paste;
 use std::{collections::BTreeMap, sync::Arc};
 
 pub use clipboard::{CopiedIdentifiers, CopiedJoint, TagClipboard, TagScope};
+pub(in crate::rig) use part::drop_part;
 pub use paste::{PasteTo, PasteWhat};
 
 use super::{Draft, OperationError};
@@ -238,7 +239,9 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
         TagOperation::Attach(tags, feature) => attach(draft, tags, *feature),
         TagOperation::Cut(clipboard) => paste::cut(draft, clipboard),
         TagOperation::Paste { clipboard, what, to } => paste::paste(draft, clipboard, *what, to),
-        TagOperation::Drop { part, joints, bindings } => part::drop_part(draft, part, joints, bindings),
+        TagOperation::Drop { part, joints, bindings } => {
+            drop_part(draft, part, joints, bindings, &mut |draft, _| draft.next_uid())
+        }
         TagOperation::SetFeature(key, on) => apply(draft, feature::set_feature(draft.rig(), key, *on)?),
         TagOperation::SetSwitch(key, switch, on) => apply(draft, feature::set_switch(draft.rig(), key, switch, *on)?),
         TagOperation::ChooseSwitch(key, switch) => apply(draft, feature::choose_switch(draft.rig(), key, switch)?),

@@ -2,7 +2,10 @@
 
 use std::{borrow::Cow, fmt};
 
-use super::{GroupScope, RigScope, given_names, params::text_field};
+use super::{
+    GroupScope, RigScope,
+    params::{self, text_field},
+};
 use crate::rig::{Rig, RigJoint, TagData, TagKind, Uid};
 
 /// Kind of object that a uid of a reference stands for.
@@ -200,7 +203,7 @@ fn find_commands(rig: &Rig, name: &str) -> Vec<Uid> {
 /// Name that a command gives its nodes, or what else it makes.
 fn given_name(tag: &TagData) -> Option<String> {
     let TagKind::Command { params, .. } = &tag.kind else { return None };
-    given_names(params).find(|name| !name.is_empty())
+    params::given_name(params)
 }
 
 fn labelled<'a>(rig: &'a Rig, label: &'a str) -> impl Iterator<Item = &'a RigJoint> {

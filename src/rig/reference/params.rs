@@ -168,6 +168,11 @@ pub fn given_names(params: &str) -> impl Iterator<Item = String> {
     text_fields(params, &["name"]).map(|literal| literal.text)
 }
 
+/// The first name that a command gives which is not empty.
+pub(in crate::rig) fn given_name(params: &str) -> Option<String> {
+    given_names(params).find(|name| !name.is_empty())
+}
+
 /// The text of the first field with that name, at most two brackets deep, whose value is a string literal.
 pub(super) fn text_field(params: &str, name: &str) -> Option<String> {
     text_fields(params, &[name]).next().map(|literal| literal.text)

@@ -1,8 +1,15 @@
 //! Edits that make one rig of another.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use crate::rig::{EditError, Rig, RigEdit, RigJoint, TagData, Uid};
+
+/// The edits after which the current pose of `from` is that of `to`.
+pub fn pose_edits(from: &Rig, to: &Rig) -> Vec<RigEdit> {
+    let nodes: BTreeSet<Uid> = from.pose().keys().chain(to.pose().keys()).copied().collect();
+    let is_other = |node: &Uid| from.offset(*node) != to.offset(*node);
+    nodes.into_iter().filter(is_other).map(|node| RigEdit::SetOffset(node, to.offset(node).copied())).collect()
+}
 
 /// The edits after which `from` has the content of `to`: header, groups, joints, tags and stored poses. Weights, the current
 /// pose and attribute values stay; those of joints that go, go with them. What is the same in both is not touched.

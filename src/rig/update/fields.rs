@@ -2,14 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use super::is_command;
 use crate::rig::{
     GroupData, JointData, Rig, RigAbout, StoredPose, TagData, TagKind, Uid,
     format::{
         template::{quoted, vector},
         tree::Tree,
     },
-    reference::{given_names, refresh_names},
+    reference::{given_name, refresh_names},
 };
 
 /// A field of something.
@@ -62,13 +61,16 @@ pub(super) fn pose_fields() -> Vec<Field<'static, StoredPose>> {
     ]
 }
 
+/// A joint as a field refers to it: with its label in the rig now, else in the file.
+pub(super) fn joint_title(now: &Rig, file: &Rig, uid: Uid) -> String {
+    let label = [now, file].into_iter().find_map(|rig| rig.joint(uid)?.data.label.clone());
+    format!("{}#{uid}", label.unwrap_or_default())
+}
+
 /// Fields of a joint and its parent. Others are told by their names in the rig now, else in the file.
 pub(super) fn joint_fields<'a>(now: &'a Rig, file: &'a Rig) -> Vec<Field<'a, (JointData, Option<Uid>)>> {
     type Joint = (JointData, Option<Uid>);
-    let joint = move |uid: Uid| {
-        let label = [now, file].into_iter().find_map(|rig| rig.joint(uid)?.data.label.clone());
-        format!("{}#{uid}", label.unwrap_or_default())
-    };
+    let joint = move |uid: Uid| joint_title(now, file, uid);
     let group = move |uid: Uid| {
         let name = [now, file].into_iter().find_map(|rig| Some(rig.group(uid)?.name.clone()));
         format!("{}#{uid}", name.unwrap_or_default())
@@ -100,7 +102,7 @@ pub(super) fn joint_fields<'a>(now: &'a Rig, file: &'a Rig) -> Vec<Field<'a, (Jo
 /// Module or kind of feature, and the name that the tag gives.
 pub(super) fn tag_title(tag: &TagData) -> String {
     match &tag.kind {
-        TagKind::Command { module, params, .. } => match given_names(params).find(|name| !name.is_empty()) {
+        TagKind::Command { module, params, .. } => match given_name(params) {
             Some(name) => format!("{module}/{name}"),
             None => module.clone(),
         },
@@ -133,7 +135,7 @@ pub(super) fn tag_fields<'a>(versions: &[Option<&TagData>; 3], now: &'a Rig, fil
         list.push(field("module", kind, whole));
         return list;
     }
-    if !there.iter().any(|tag| is_command(tag)) {
+    if !there.iter().any(|tag| matches!(tag.kind, TagKind::Command { .. })) {
         for (place, name) in ["name", "switch", "choice"].into_iter().enumerate() {
             let text = move |tag: &TagData| feature_texts(&tag.kind).and_then(|texts| written(texts[place]));
             let take = move |a: &mut TagData, b: &TagData| {

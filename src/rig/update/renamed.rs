@@ -7,7 +7,7 @@ use crate::rig::{Rig, RigJoint, TagData, TagKind, Uid, reference::map_text_field
 
 /// The file with the uids of `base` for joints and tags that are at the same place with the same content under another name;
 /// `None` if there are none. Each is told as a change.
-pub(super) fn renamed(base: &Rig, file: &Rig, changes: &mut Vec<Change>) -> Option<Rig> {
+pub(super) fn renamed(base: &Rig, file: &Rig, changes: &mut Vec<Change>) -> Option<(Rig, HashMap<Uid, Uid>)> {
     let mut same: HashMap<Uid, Uid> = HashMap::new();
     let mut taken: HashSet<Uid> = HashSet::new();
     for joint in file.walk() {
@@ -30,7 +30,7 @@ pub(super) fn renamed(base: &Rig, file: &Rig, changes: &mut Vec<Change>) -> Opti
         };
         tags(known, joint, base, file, &mut same, changes);
     }
-    (!same.is_empty()).then(|| with_uids(file, same))
+    (!same.is_empty()).then(|| (with_uids(file, same.clone()), same))
 }
 
 /// Returns `true` if two joints have the same place and tags, whatever their names.
@@ -104,7 +104,7 @@ fn change(uid: Uid, from: &Option<String>, to: &Option<String>) -> Change {
 }
 
 /// A rig with other uids of joints and tags, in references, too.
-fn with_uids(rig: &Rig, uids: HashMap<Uid, Uid>) -> Rig {
+pub(super) fn with_uids(rig: &Rig, uids: HashMap<Uid, Uid>) -> Rig {
     let before: HashMap<Uid, Uid> = uids.iter().map(|(from, to)| (*to, *from)).collect();
     let remap = Remap { uids, ..Remap::default() };
     let get = |uid: Uid| remap.get(uid).unwrap_or(uid);

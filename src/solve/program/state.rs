@@ -8,7 +8,7 @@ use std::{cell::RefCell, sync::Arc};
 use glam::{Affine3A, Vec3};
 
 use self::four::Four;
-pub use self::four::LANES;
+pub use self::{carry::Carry, four::LANES};
 use super::{
     ContentHash, RigProgram, StateError,
     graph::valid,
@@ -145,20 +145,17 @@ impl RigState {
     /// An unposed instance. It has results after the first evaluation.
     pub fn with_memory(program: Arc<RigProgram>, memory: Memory) -> Self {
         let nodes = program.nodes.len() + 1;
-        let (mut x, mut n) = (program.x.clone(), program.n.clone());
-        if memory == Memory::Results {
-            x.truncate(nodes + program.inputs.len());
-            n.truncate(program.attributes.len() + program.morphs.len());
-            x.shrink_to_fit();
-            n.shrink_to_fit();
-        }
+        let (transforms, numbers) = match memory {
+            Memory::Whole => (program.x.len(), program.n.len()),
+            Memory::Results => (nodes + program.inputs.len(), program.attributes.len() + program.morphs.len()),
+        };
         let operations = if memory == Memory::Whole { program.ops.len() } else { 0 };
         Self {
             memory,
             poses: vec![PoseOffset::IDENTITY; program.poses],
             springs: vec![SpringState::default(); program.spring_ops.len()],
-            x,
-            n,
+            x: program.x[..transforms].to_vec(),
+            n: program.n[..numbers].to_vec(),
             dirty: vec![0; operations.div_ceil(64)],
             all_dirty: true,
             any_dirty: true,

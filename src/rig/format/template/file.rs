@@ -39,6 +39,8 @@ pub(super) struct TemplateFile {
     #[serde(default)]
     pub(super) joints: Vec<JointFile>,
     #[serde(default)]
+    pub(super) parts: Vec<PartFile>,
+    #[serde(default)]
     pub(super) poses: Vec<PoseFile>,
 }
 
@@ -51,6 +53,59 @@ pub(super) struct GroupFile {
     pub(super) color: Option<(f32, f32, f32)>,
     #[serde(default = "yes")]
     pub(super) enabled: bool,
+}
+
+/// A part instance.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PartFile {
+    #[serde(default)]
+    pub(super) uid: Option<Uid>,
+    pub(super) part: String,
+    #[serde(default)]
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) onto: Vec<String>,
+    #[serde(default)]
+    pub(super) parent: Option<String>,
+    #[serde(default)]
+    pub(super) translation: (f32, f32, f32),
+    #[serde(default)]
+    pub(super) rotation: (f32, f32, f32),
+    #[serde(default = "one")]
+    pub(super) scale: f32,
+    #[serde(default)]
+    pub(super) prefix: String,
+    #[serde(default)]
+    pub(super) mirror: bool,
+    #[serde(default)]
+    pub(super) off: Vec<String>,
+    #[serde(default)]
+    pub(super) changes: Vec<PartChangeFile>,
+}
+
+/// A difference of a part instance.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PartChangeFile {
+    #[serde(default)]
+    pub(super) joint: Option<String>,
+    #[serde(default)]
+    pub(super) tag: Option<String>,
+    #[serde(default)]
+    pub(super) enabled: Option<bool>,
+    #[serde(default)]
+    pub(super) params: Option<Box<RawValue>>,
+    #[serde(default)]
+    pub(super) translation: Option<(f32, f32, f32)>,
+    #[serde(default)]
+    pub(super) rotation: Option<(f32, f32, f32)>,
+    #[serde(default)]
+    pub(super) tags: Option<Box<RawValue>>,
+}
+
+fn one() -> f32 {
+    1.0
 }
 
 #[derive(Deserialize)]
@@ -142,8 +197,26 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "needs",
             "groups",
             "joints",
+            "parts",
             "poses",
         ]),
+        (3, Some("parts")) => Some(&[
+            "uid",
+            "part",
+            "name",
+            "onto",
+            "parent",
+            "translation",
+            "rotation",
+            "scale",
+            "prefix",
+            "mirror",
+            "off",
+            "changes",
+        ]),
+        (5, Some("changes")) if above == Some("parts") => {
+            Some(&["joint", "tag", "enabled", "params", "translation", "rotation", "tags"])
+        }
         (3, Some("poses")) => Some(&["uid", "name", "offsets", "values"]),
         (5, Some("offsets")) if above == Some("poses") => Some(&["joint", "translation", "rotation", "scale"]),
         (5, Some("values")) if above == Some("poses") => Some(&["node", "name", "value"]),

@@ -26,24 +26,19 @@ use crate::rig::{
         template::{quoted, vector},
         tree::{Item, NodeId, Tree},
     },
-    reference::{bind_names, given_names, refresh_names, without_uids},
+    reference::{bind_names, given_name, refresh_names, without_uids},
 };
 use order::reordered;
 use patch::Patch;
 
-/// The text of a rig's template, as changes of a text of the same rig; that of [`write_template`] if `source` is no
-/// template of this rig, or cannot be changed so that it says the same.
-pub fn write_template_over(rig: &Rig, source: &str) -> String {
-    let plain = write_template(rig);
-    over(rig, source, &plain).unwrap_or(plain)
-}
-
-fn over(rig: &Rig, source: &str, plain: &str) -> Option<String> {
+/// The text of a rig's template, as changes of a text of the same rig. `None` if `source` is no template of this rig, or
+/// cannot be changed so that it says the same: [`write_template`] then writes it anew, without its comments.
+pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
     let before = read_text(source, 1).ok()?.rig;
     if before.uid() != rig.uid() {
         return None;
     }
-    let wanted = comparable(read_text(plain, 1).ok()?.rig);
+    let wanted = comparable(read_text(&write_template(rig), 1).ok()?.rig);
     let is_right = |text: &str| read_text(text, 1).is_ok_and(|read| comparable(read.rig) == wanted);
     let declared = Declared::find(source)?;
     let text = Rewriter::new(rig, &before, &declared).text();
@@ -52,6 +47,33 @@ fn over(rig: &Rig, source: &str, plain: &str) -> Option<String> {
     }
     let text = reordered(rig, &text)?;
     is_right(&text).then_some(text)
+}
+
+/// The text of a template with parts, as changes of a text of the same rig; what its parts bring is left to them. `before` is
+/// the rig that the text makes with its parts, and `own` the one without. The text may say something else than `rig` where
+/// that differs in what the parts bring: read it to see.
+pub(crate) fn write_own_over(rig: &Rig, before: &Rig, own: &Rig, source: &str) -> Option<String> {
+    let is_own = |uid: Uid| own.is_taken(uid) || !before.is_taken(uid);
+    let stripped = |rig: &Rig| {
+        let data = |joint: &RigJoint| {
+            let mut data = joint.data.clone();
+            data.tags.retain(|tag| is_own(tag.uid));
+            (data.uid, (data, joint.parent))
+        };
+        let joints = rig.walk().filter(|joint| is_own(joint.data.uid)).map(data).collect();
+        let mut out = rig.clone();
+        out.groups.retain(|group| is_own(group.uid));
+        out.set_joints(joints, |parent| rig.children(parent).to_vec());
+        out
+    };
+    let (rig, before) = (stripped(rig), stripped(before));
+    Some(Rewriter::new(&rig, &before, &Declared::find(source)?).text())
+}
+
+/// True if the templates of two rigs say the same.
+pub(crate) fn says_the_same(a: &Rig, b: &Rig) -> bool {
+    let said = |rig: &Rig| read_text(&write_template(rig), 1).ok().map(|read| comparable(read.rig));
+    said(a).is_some_and(|said_a| said(b) == Some(said_a))
 }
 
 /// A rig whose parameters do not depend on blanks, comments and the order of fields.
@@ -383,8 +405,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
                 }
                 self.parameters(declared, matches!(form, Some(TagForm::Short(_))), params);
                 // The uid follows from the name that the command gives.
-                let given = |params: &str| given_names(params).find(|name| !name.is_empty());
-                if !declared.is_written && given(old) != given(params) {
+                if !declared.is_written && given_name(old) != given_name(params) {
                     self.patch.put_first(node, &format!("uid: \"{}\"", declared.uid));
                 }
             }

@@ -101,22 +101,20 @@ struct Change {
     text: String,
 }
 
-/// Uids of the things with a name.
-type Called<'d> = HashMap<Cow<'d, str>, Vec<Uid>>;
-
-struct Writer<'d, 'a> {
+/// Things of a text by the names that refer to them.
+pub(super) struct Called<'d, 'a> {
     declared: &'d Declared<'a>,
-    groups: Called<'d>,
-    joints: Called<'d>,
-    features: Called<'d>,
-    changes: Vec<Change>,
-    faults: Vec<SourceError>,
+    groups: ByName<'d>,
+    joints: ByName<'d>,
+    features: ByName<'d>,
 }
 
-impl<'d, 'a> Writer<'d, 'a> {
-    fn new(declared: &'d Declared<'a>) -> Self {
-        fn called<'d>(named: impl Iterator<Item = (Cow<'d, str>, Uid)>) -> Called<'d> {
-            let mut called = Called::new();
+type ByName<'d> = HashMap<Cow<'d, str>, Vec<Uid>>;
+
+impl<'d, 'a> Called<'d, 'a> {
+    pub fn new(declared: &'d Declared<'a>) -> Self {
+        fn by_name<'d>(named: impl Iterator<Item = (Cow<'d, str>, Uid)>) -> ByName<'d> {
+            let mut called = ByName::new();
             for (name, uid) in named {
                 called.entry(name).or_default().push(uid);
             }
@@ -126,12 +124,46 @@ impl<'d, 'a> Writer<'d, 'a> {
         let feature = |tag: &Declaration| Some((Cow::Owned(feature_name(&declared.tree, tag.node)?), tag.uid));
         Self {
             declared,
-            groups: called(declared.groups.iter().filter_map(named)),
-            joints: called(declared.joints.iter().filter_map(named)),
-            features: called(declared.tags.iter().flatten().filter_map(feature)),
-            changes: Vec::new(),
-            faults: Vec::new(),
+            groups: by_name(declared.groups.iter().filter_map(named)),
+            joints: by_name(declared.joints.iter().filter_map(named)),
+            features: by_name(declared.tags.iter().flatten().filter_map(feature)),
         }
+    }
+
+    /// The only joint or group with that name.
+    ///
+    /// # Errors
+    /// A message with the nearest names, or with the uids of all that have the name.
+    pub fn find(&self, name: &str, kind: NameKind) -> Result<Uid, String> {
+        let among = if kind == NameKind::Group { &self.groups } else { &self.joints };
+        found(among, name, &kind.to_string())
+    }
+
+    /// The feature with that name: by name, or by name and switch with a point between, or by its kind if it has no name;
+    /// of the same joint, whose tags are `own`, else the only one of the file.
+    ///
+    /// # Errors
+    /// As [`find`](Self::find).
+    pub fn feature(&self, name: &str, own: &[Declaration]) -> Result<Uid, String> {
+        let tree = &self.declared.tree;
+        let mut of_joint = own.iter().filter(|tag| feature_name(tree, tag.node).as_deref() == Some(name));
+        match (of_joint.next(), of_joint.next()) {
+            (Some(tag), None) => Ok(tag.uid),
+            _ => found(&self.features, name, "feature"),
+        }
+    }
+}
+
+struct Writer<'d, 'a> {
+    declared: &'d Declared<'a>,
+    called: Called<'d, 'a>,
+    changes: Vec<Change>,
+    faults: Vec<SourceError>,
+}
+
+impl<'d, 'a> Writer<'d, 'a> {
+    fn new(declared: &'d Declared<'a>) -> Self {
+        Self { declared, called: Called::new(declared), changes: Vec::new(), faults: Vec::new() }
     }
 
     fn tree(&self) -> &'d Tree<'a> {
@@ -194,27 +226,20 @@ impl<'d, 'a> Writer<'d, 'a> {
     fn refer(&mut self, node: NodeId, field: &str, kind: NameKind) {
         let Some(item) = self.tree().field(node, field) else { return };
         let Some(name) = self.tree().string(node, field).filter(|name| name.parse::<Uid>().is_err()) else { return };
-        let among = if kind == NameKind::Group { &self.groups } else { &self.joints };
-        let said = match found(among, &name, &kind.to_string()) {
+        let said = match self.called.find(&name, kind) {
             Ok(uid) => format!("\"{uid}\""),
             Err(message) => self.fault(item, message),
         };
         self.replace(item.value, said);
     }
 
-    /// Value of a field that names a feature: by name, or by name and switch with a point between, or by its kind if it
-    /// has no name; of the same joint, else the only one of the file.
+    /// Value of a field that names a feature.
     fn feature(&mut self, item: &Item<'a>, own: &[Declaration]) -> String {
         let tree = self.tree();
         let written = tree.written(item.value);
         let name: Option<String> = ron::from_str(tree.written(tree.optional(item.value))).ok();
         let Some(name) = name.filter(|name| name.parse::<Uid>().is_err()) else { return written.to_owned() };
-        let mut of_joint = own.iter().filter(|tag| feature_name(tree, tag.node).as_deref() == Some(&*name));
-        let said = match (of_joint.next(), of_joint.next()) {
-            (Some(tag), None) => Ok(tag.uid),
-            _ => found(&self.features, &name, "feature"),
-        };
-        match said {
+        match self.called.feature(&name, own) {
             Ok(uid) => format!("\"{uid}\""),
             Err(message) => self.fault(item, message),
         }
@@ -281,7 +306,7 @@ impl<'d, 'a> Writer<'d, 'a> {
 ///
 /// # Errors
 /// A message with the nearest names, or with the uids of all that have the name.
-fn found(among: &Called, name: &str, kind: &str) -> Result<Uid, String> {
+fn found(among: &ByName, name: &str, kind: &str) -> Result<Uid, String> {
     match among.get(name).map(Vec::as_slice) {
         Some([uid]) => Ok(*uid),
         Some(uids) => {

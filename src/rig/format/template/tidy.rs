@@ -1,20 +1,20 @@
 //! Layout of a template's text, and its uids written in or taken out.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use super::{
     over::{comparable, patch::Patch},
     read::read_text,
-    shorthand::{Declaration, Declared, TagForm, feature_name},
+    shorthand::{Called, Declaration, Declared, TAG_FIELDS, TagForm, feature_name},
 };
 use crate::rig::{
     Rig, SourceError, Uid,
     format::{
         layout::laid_out,
         template::quoted,
-        tree::{NodeId, Tree},
+        tree::{Item, NodeId, Tree},
     },
-    reference::{bind_names, without_uids},
+    reference::{NameKind, bind_names, without_uids},
 };
 
 /// What becomes of uids when a template is formatted.
@@ -52,6 +52,8 @@ struct Uids<'d, 'a> {
     declared: &'d Declared<'a>,
     rig: &'d Rig,
     style: UidStyle,
+    called: Called<'d, 'a>,
+    by_uid: HashMap<Uid, &'d Declaration>,
     /// Uids that the text will not have.
     derived: HashSet<Uid>,
     patch: Patch<'d, 'a>,
@@ -61,7 +63,9 @@ impl<'d, 'a> Uids<'d, 'a> {
     fn new(declared: &'d Declared<'a>, rig: &'d Rig, style: UidStyle) -> Self {
         let follows = |one: &&Declaration| !one.is_written || one.derived == Some(one.uid);
         let derived = declared.all().filter(follows).map(|one| one.uid).collect();
-        Self { declared, rig, style, derived, patch: Patch::new(&declared.tree) }
+        let (called, patch) = (Called::new(declared), Patch::new(&declared.tree));
+        let by_uid = declared.all().map(|one| (one.uid, one)).collect();
+        Self { declared, called, by_uid, rig, style, derived, patch }
     }
 
     fn text(mut self) -> String {
@@ -75,9 +79,9 @@ impl<'d, 'a> Uids<'d, 'a> {
         }
         for (joint, tags) in declared.joints.iter().zip(&declared.tags) {
             for field in ["parent", "mirror"] {
-                self.refer(joint.node, field, &declared.joints);
+                self.refer(joint.node, field, NameKind::Joint);
             }
-            self.refer(joint.node, "group", &declared.groups);
+            self.refer(joint.node, "group", NameKind::Group);
             for tag in tags {
                 self.feature(tag.node, tags);
                 self.parameters(tag.node);
@@ -102,16 +106,12 @@ impl<'d, 'a> Uids<'d, 'a> {
         }
     }
 
-    fn refer(&mut self, node: NodeId, field: &str, among: &[Declaration]) {
+    fn refer(&mut self, node: NodeId, field: &str, kind: NameKind) {
         let Some(written) = self.tree().string(node, field) else { return };
-        let called = |name: &str| among.iter().filter(|one| one.name.as_deref() == Some(name)).count();
-        let one = match written.parse::<Uid>() {
-            Ok(uid) => among.iter().find(|one| one.uid == uid),
-            Err(_) => among.iter().find(|one| one.name.as_deref() == Some(&*written)),
-        };
-        let Some(one) = one else { return };
+        let uid = written.parse::<Uid>().or_else(|_| self.called.find(&written, kind));
+        let Some(one) = uid.ok().and_then(|uid| self.by_uid.get(&uid)) else { return };
         let text = match (self.style, &one.name) {
-            (UidStyle::Derived, Some(name)) if self.derived.contains(&one.uid) && called(name) == 1 => quoted(name),
+            (UidStyle::Derived, Some(name)) if self.is_only(one.uid, self.called.find(name, kind)) => quoted(name),
             (UidStyle::Written, _) => format!("\"{}\"", one.uid),
             _ => return,
         };
@@ -121,21 +121,11 @@ impl<'d, 'a> Uids<'d, 'a> {
     fn feature(&mut self, node: NodeId, own: &[Declaration]) {
         let tree = self.tree();
         let Some(written) = tree.string(node, "feature") else { return };
-        let all = || self.declared.tags.iter().flatten();
-        let name_of = |one: &Declaration| feature_name(tree, one.node);
-        let count = |name: &str, mut among: Box<dyn Iterator<Item = &Declaration> + '_>| {
-            let first = among.find(|one| name_of(one).as_deref() == Some(name)).map(|one| one.uid);
-            (first, among.filter(|one| name_of(one).as_deref() == Some(name)).count())
-        };
-        let found = |name: &str| match count(name, Box::new(own.iter())) {
-            (Some(uid), 0) => Some(uid),
-            _ => count(name, Box::new(all())).0.filter(|_| count(name, Box::new(all())).1 == 0),
-        };
         let text = match (self.style, written.parse::<Uid>()) {
-            (UidStyle::Written, Err(_)) => found(&written).map(|uid| format!("\"{uid}\"")),
-            (UidStyle::Derived, Ok(uid)) if self.derived.contains(&uid) => {
-                let name = all().find(|one| one.uid == uid).and_then(name_of);
-                name.filter(|name| found(name) == Some(uid)).map(|name| quoted(&name))
+            (UidStyle::Written, Err(_)) => self.called.feature(&written, own).ok().map(|uid| format!("\"{uid}\"")),
+            (UidStyle::Derived, Ok(uid)) => {
+                let name = self.by_uid.get(&uid).and_then(|one| feature_name(tree, one.node));
+                name.filter(|name| self.is_only(uid, self.called.feature(name, own))).map(|name| quoted(&name))
             }
             _ => None,
         };
@@ -144,13 +134,22 @@ impl<'d, 'a> Uids<'d, 'a> {
         }
     }
 
+    /// True if a name means that thing, whose uid the text will not have.
+    fn is_only(&self, uid: Uid, named: Result<Uid, String>) -> bool {
+        named == Ok(uid) && self.derived.contains(&uid)
+    }
+
     /// References in the parameters of a command.
     fn parameters(&mut self, tag: NodeId) {
         let tree = self.tree();
-        if !matches!(TagForm::of(tree, tag), Some(TagForm::Command | TagForm::Short(_))) {
-            return;
-        }
-        let mut open = vec![tag];
+        let mut open: Vec<NodeId> = match TagForm::of(tree, tag) {
+            Some(TagForm::Command) => tree.field(tag, "params").map(|params| params.value).into_iter().collect(),
+            Some(TagForm::Short(_)) => {
+                let is_parameter = |item: &&Item| item.key.is_none_or(|key| !TAG_FIELDS.contains(&key));
+                tree.node(tag).items.iter().filter(is_parameter).map(|item| item.value).collect()
+            }
+            _ => return,
+        };
         while let Some(node) = open.pop() {
             open.extend(tree.node(node).items.iter().map(|item| item.value));
             let written = tree.written(node);

@@ -20,11 +20,14 @@ use crate::rig::{
 /// Joints without a label get the part's, joints without a local group the part's group, which is created. References
 /// of the part are mapped to the counterparts of their nodes; without one, to the entry in `bindings`, or to the object
 /// with the same label or name in the rig.
-pub(super) fn drop_part(
+///
+/// `uid_of` gives the uids of what comes of the part's tags and groups.
+pub(in crate::rig) fn drop_part(
     draft: &mut Draft,
     part: &Rig,
     joints: &[Uid],
     bindings: &BTreeMap<Uid, Uid>,
+    uid_of: &mut dyn FnMut(&mut Draft, Uid) -> Uid,
 ) -> Result<(), OperationError> {
     for (number, joint) in joints.iter().enumerate() {
         draft.rig().joint(*joint).ok_or(EditError::NoJoint(*joint))?;
@@ -41,7 +44,7 @@ pub(super) fn drop_part(
     for (joint, target) in &pairs {
         remap.uids.insert(joint.uid, *target);
         for tag in &joint.tags {
-            let uid = draft.next_uid();
+            let uid = uid_of(draft, tag.uid);
             remap.uids.insert(tag.uid, uid);
         }
         let unlabelled = draft.rig().joint(*target).is_some_and(|target| target.data.label.is_none());
@@ -49,7 +52,7 @@ pub(super) fn drop_part(
             draft.apply(RigEdit::SetLabel(*target, joint.label.clone()))?;
         }
     }
-    groups(draft, part, &pairs, &mut remap)?;
+    groups(draft, part, &pairs, &mut remap, uid_of)?;
     bind(draft, part, &pairs, bindings, &mut remap)?;
     let mut dropped = Vec::new();
     for (joint, target) in &pairs {
@@ -97,7 +100,13 @@ fn check_needs(rig: &Rig, part: &Rig, joints: &[Uid], bindings: &BTreeMap<Uid, U
 }
 
 /// Maps each group of the part to the group of its first grouped counterpart, or creates it.
-fn groups(draft: &mut Draft, part: &Rig, pairs: &[(&JointData, Uid)], remap: &mut Remap) -> Result<(), OperationError> {
+fn groups(
+    draft: &mut Draft,
+    part: &Rig,
+    pairs: &[(&JointData, Uid)],
+    remap: &mut Remap,
+    uid_of: &mut dyn FnMut(&mut Draft, Uid) -> Uid,
+) -> Result<(), OperationError> {
     for group in part.groups() {
         let members: Vec<Uid> =
             pairs.iter().filter(|(joint, _)| joint.group == Some(group.uid)).map(|(_, target)| *target).collect();
@@ -106,8 +115,8 @@ fn groups(draft: &mut Draft, part: &Rig, pairs: &[(&JointData, Uid)], remap: &mu
         let target = match first {
             Some(known) => known,
             None => {
-                let group =
-                    GroupData { uid: draft.next_uid(), name: free_name(draft.rig(), &group.name), ..group.clone() };
+                let uid = uid_of(draft, group.uid);
+                let group = GroupData { uid, name: free_name(draft.rig(), &group.name), ..group.clone() };
                 let uid = group.uid;
                 draft.apply(RigEdit::AddLocalGroup(group, usize::MAX))?;
                 uid

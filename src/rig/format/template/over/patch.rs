@@ -174,8 +174,8 @@ impl<'d, 'a> Patch<'d, 'a> {
         let Some(behind) = behind.map(|behind| &value.items[behind]) else {
             let text = match value.items.first() {
                 Some(first) if self.is_alone(first) => {
-                    let indent = self.line_of(first.start).1;
-                    format!("\n{}{},", " ".repeat(indent), laid_out_item(text, indent))
+                    let blanks = self.indentation(first.start);
+                    format!("\n{blanks}{},", laid_out_item(text, blanks.len()))
                 }
                 Some(_) => format!("{text}, "),
                 None => text.to_owned(),
@@ -190,9 +190,9 @@ impl<'d, 'a> Patch<'d, 'a> {
         if !self.is_alone(behind) {
             return self.changes.push((behind.end..behind.end, format!(" {text}{comma}")));
         }
-        let indent = self.line_of(behind.start).1;
+        let blanks = self.indentation(behind.start);
         let at = self.line_end(behind.end);
-        self.changes.push((at..at, format!("\n{}{}{comma}", " ".repeat(indent), laid_out_item(text, indent))));
+        self.changes.push((at..at, format!("\n{blanks}{}{comma}", laid_out_item(text, blanks.len()))));
     }
 
     /// Range of an item that is taken out: with its lines and the comments right above where it has lines of its own.
@@ -224,6 +224,12 @@ impl<'d, 'a> Patch<'d, 'a> {
         let line = self.tree.text[..at].rfind('\n').map_or(0, |at| at + 1);
         let text = &self.tree.text[line..];
         (line, text.len() - text.trim_start_matches([' ', '\t']).len())
+    }
+
+    /// Blanks at the start of the line of a place.
+    fn indentation(&self, at: usize) -> &'a str {
+        let (line, indent) = self.line_of(at);
+        &self.tree.text[line..line + indent]
     }
 
     /// End of the blanks and the comment behind a place on its line.

@@ -1,0 +1,410 @@
+//! Characters of a game: instances of templates, which are updated while they move when the template's file is saved.
+//!
+//! A [`RigInstance`] on an entity makes it a character of a [`RigTemplate`]. A template is built once, on a thread of its own,
+//! for all of its instances, which share the program and have poses, attribute values and springs of their own. With
+//! [`RigInstancePlugin::live`] the files of templates are watched: a saved file is read, compared with what runs, and only the
+//! commands that it concerns run again; then every instance goes on with the new program in one frame, in the pose that it has.
+//! A file that cannot be read, or whose build fails, changes nothing: it is told ([`RigFailed`]), and the next good save is
+//! taken over.
+//!
+//! An instance is as its template says. A rig that people edit, or that a mesh is bound to by Rigsmith, has a document of its
+//! own: [`RigSource`].
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use rigsmith::instance::{RigInstance, RigInstancePlugin, RigTemplate};
+//!
+//! let mut app = App::new();
+//! app.add_plugins((MinimalPlugins, TransformPlugin, RigInstancePlugin::default()));
+//! app.add_systems(Startup, |mut commands: Commands, mut templates: ResMut<Assets<RigTemplate>>| {
+//!     let text = br#"(format: 2, name: "arm", joints: [(label: "arm", tags: [control])])"#;
+//!     if let Ok(template) = RigTemplate::read(text) {
+//!         commands.spawn(RigInstance(templates.add(template)));
+//!     }
+//! });
+//! app.update();
+//! ```
+
+mod apply;
+mod asset;
+mod builds;
+mod skins;
+mod source;
+
+use std::{
+    collections::{HashMap, HashSet},
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use bevy::{
+    app::MainScheduleOrder,
+    asset::{AssetId, AssetLoadFailedEvent, AssetPlugin, io::file::FileAssetReader},
+    ecs::{schedule::ScheduleLabel, system::SystemParam},
+    prelude::*,
+};
+
+use self::builds::{Builds, Work};
+#[cfg(feature = "draw")]
+pub use self::skins::SharedMesh;
+pub use self::{
+    asset::{RigTemplate, RigTemplateLoader, RigTemplateSaver},
+    builds::BuiltTemplate,
+    skins::{BoundTo, SkinBound},
+    source::{AcceptUpdate, RigSource, UPDATE, UpdateOffer},
+};
+use crate::{
+    files::LOOK,
+    mesh::model::Trs,
+    modules,
+    plugins::{
+        commands::{Built, RigModules},
+        runtime::{ControlPose, InstanceMode, NodeOf, RigRuntime, RuntimePlugin},
+    },
+    processor::PoseNote,
+    rig::{PoseOffset, RestTransform, SourceError, Uid, update::Change},
+    solve::program::ProgramError,
+};
+
+/// Plugin of instances. Add it after Bevy's [`AssetPlugin`] and [`RigPlugins`](crate::plugins::RigPlugins) where an app has
+/// them; it adds what it needs of both otherwise.
+#[derive(Debug, Clone)]
+pub struct RigInstancePlugin {
+    /// Files of templates are watched, and what is saved is taken over at once.
+    pub live: bool,
+    /// Time between two looks at a watched file; with many files it is longer.
+    pub look: Duration,
+    /// Time that a file which cannot be read as a template is waited for before it is told: it may be half written.
+    pub patience: Duration,
+}
+
+impl Default for RigInstancePlugin {
+    fn default() -> Self {
+        Self { live: false, look: LOOK, patience: Duration::from_millis(250) }
+    }
+}
+
+impl RigInstancePlugin {
+    /// Plugin that takes over files when they are saved.
+    pub fn live() -> Self {
+        Self { live: true, ..Self::default() }
+    }
+}
+
+/// Schedule in which templates are taken over, right after `Update`.
+#[derive(ScheduleLabel, Debug, Clone, PartialEq, Eq, Hash)]
+pub struct UpdateInstances;
+
+impl Plugin for RigInstancePlugin {
+    fn build(&self, app: &mut App) {
+        if !app.is_plugin_added::<AssetPlugin>() {
+            app.add_plugins(AssetPlugin::default());
+        }
+        if !app.is_plugin_added::<RuntimePlugin>() {
+            app.add_plugins(RuntimePlugin);
+        }
+        if !app.world().contains_resource::<RigModules>() {
+            app.insert_resource(RigModules(Arc::new(modules::all())));
+        }
+        let root = app.get_added_plugins::<AssetPlugin>().first().map(|plugin| plugin.file_path.clone());
+        let root = root.map(|root| FileAssetReader::get_base_path().join(root));
+        app.init_asset::<RigTemplate>()
+            .register_asset_loader(RigTemplateLoader)
+            .insert_resource(RigTemplates {
+                builds: Builds::start(self.look, self.patience),
+                is_live: self.live,
+                root,
+                built: HashMap::new(),
+                own: HashMap::new(),
+                is_fresh: false,
+            })
+            .init_schedule(UpdateInstances);
+        app.world_mut().resource_mut::<MainScheduleOrder>().insert_after(Update, UpdateInstances);
+        app.add_systems(
+            UpdateInstances,
+            (
+                (follow_assets, follow_failures, watch_files).chain(),
+                apply::take_outcomes,
+                apply::update_instances.run_if(apply::is_due),
+                (
+                    source::follow_steps,
+                    source::try_updates,
+                    source::accept_offers,
+                    source::compare_templates,
+                    source::bind_meshes,
+                )
+                    .chain(),
+            )
+                .chain(),
+        );
+        source::add(app);
+        app.add_systems(UpdateInstances, skins::bind_skins.run_if(skins::is_due).after(apply::update_instances));
+        #[cfg(feature = "draw")]
+        app.add_systems(UpdateInstances, skins::share_meshes.after(apply::update_instances).before(skins::bind_skins));
+        app.add_observer(apply::leave);
+    }
+}
+
+/// Makes an entity a character of a template. Its nodes are spawned when the template is loaded and built, as
+/// [`InstanceMode`] says; [`RigBuilt`] tells it. Taking the component off despawns them; another mode spawns others, unposed.
+#[derive(Component, Debug, Clone, PartialEq, Eq)]
+#[require(InstanceMode, Transform)]
+pub struct RigInstance(pub Handle<RigTemplate>);
+
+/// The built template that an instance runs.
+#[derive(Component, Debug, Clone)]
+pub struct RunningTemplate(Arc<BuiltTemplate>);
+
+impl RunningTemplate {
+    /// The built template.
+    pub fn get(&self) -> &Arc<BuiltTemplate> {
+        &self.0
+    }
+}
+
+/// An instance has its nodes.
+#[derive(EntityEvent, Debug, Clone)]
+pub struct RigBuilt {
+    /// The instance.
+    pub entity: Entity,
+}
+
+/// An instance goes on with a changed template.
+#[derive(EntityEvent, Debug, Clone)]
+pub struct RigUpdated {
+    /// The instance.
+    pub entity: Entity,
+    /// Differences of the template.
+    pub changes: Arc<[Change]>,
+    /// Tags of the commands that ran again.
+    pub ran: Arc<[Uid]>,
+    /// Joints that could not be held where they stood, although the change moved only what a pose means.
+    pub poses: Arc<[PoseNote]>,
+}
+
+/// The template of an instance was not taken over; the instance goes on as it was.
+#[derive(EntityEvent, Debug, Clone)]
+pub struct RigFailed {
+    /// The instance.
+    pub entity: Entity,
+    /// The reason.
+    pub error: TemplateError,
+}
+
+/// Reason for which a template is not taken over.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TemplateError {
+    /// The file is no template, or a command in it fails.
+    #[error("{}{source}", named(file.as_deref()))]
+    Source {
+        /// The file, if the template has one.
+        file: Option<PathBuf>,
+        /// Place and reason.
+        source: SourceError,
+    },
+    /// The built rig cannot run.
+    #[error("{}what is built cannot run: {source}", named(file.as_deref()))]
+    CannotRun {
+        /// The file, if the template has one.
+        file: Option<PathBuf>,
+        /// The reason.
+        source: ProgramError,
+    },
+    /// The file cannot be loaded.
+    #[error("{0}")]
+    Load(String),
+}
+
+fn named(file: Option<&Path>) -> String {
+    file.map(|file| format!("`{}`: ", file.display())).unwrap_or_default()
+}
+
+/// Templates that are built, and their files.
+#[derive(Resource)]
+pub struct RigTemplates {
+    builds: Builds,
+    is_live: bool,
+    /// Folder of the asset server's files.
+    root: Option<PathBuf>,
+    built: HashMap<AssetId<RigTemplate>, Arc<BuiltTemplate>>,
+    /// Templates that the thread has built before they became assets.
+    own: HashMap<AssetId<RigTemplate>, RigTemplate>,
+    is_fresh: bool,
+}
+
+impl RigTemplates {
+    /// The built template of an asset; `None` until it is built.
+    pub fn built(&self, template: &Handle<RigTemplate>) -> Option<&Arc<BuiltTemplate>> {
+        self.built.get(&template.id())
+    }
+
+    /// Sends templates that were changed by code, or loaded, to be built.
+    fn follow(&mut self, id: AssetId<RigTemplate>, template: &RigTemplate, modules: &RigModules) {
+        if self.own.get(&id).is_some_and(|own| own.is_same(template)) {
+            return;
+        }
+        self.own.insert(id, template.clone());
+        self.builds.send(Work::Build { id, template: template.clone(), modules: modules.0.clone() });
+    }
+}
+
+/// Templates from files anywhere, also outside of the folder of assets.
+///
+/// ```no_run
+/// use bevy::prelude::*;
+/// use rigsmith::instance::{RigInstance, TemplateFiles};
+///
+/// fn spawn(mut commands: Commands, files: TemplateFiles) {
+///     commands.spawn(RigInstance(files.open("characters/biped.rig.ron")));
+/// }
+/// ```
+#[derive(SystemParam)]
+pub struct TemplateFiles<'w> {
+    assets: Res<'w, Assets<RigTemplate>>,
+    modules: Res<'w, RigModules>,
+    templates: Res<'w, RigTemplates>,
+}
+
+impl TemplateFiles<'_> {
+    /// Loads a template from a file; relative to the working folder. With [`RigInstancePlugin::live`] the file is watched.
+    pub fn open(&self, file: impl Into<PathBuf>) -> Handle<RigTemplate> {
+        let handle = self.assets.reserve_handle();
+        let (id, file, modules) = (handle.id(), file.into(), self.modules.0.clone());
+        self.templates.builds.send(Work::Open { id, file, modules, is_watched: self.templates.is_live });
+        handle
+    }
+
+    /// Takes over a content for a template as if it had been saved to its file.
+    pub fn offer(&self, template: &Handle<RigTemplate>, content: Vec<u8>) {
+        let (id, modules) = (template.id(), self.modules.0.clone());
+        self.templates.builds.send(Work::Content { id, content, modules });
+    }
+}
+
+/// Nodes of instances by name.
+#[derive(SystemParam)]
+pub struct InstanceNodes<'w, 's> {
+    instances: Query<'w, 's, (AnyOf<(&'static RunningTemplate, &'static Built)>, &'static RigRuntime)>,
+}
+
+impl InstanceNodes<'_, '_> {
+    /// Entity of the node with that name, or else of the first with that label: `hand_ik_l`, for example. Look it up once
+    /// and keep it: it stays the same when the template changes.
+    pub fn find(&self, instance: Entity, name: &str) -> Option<Entity> {
+        let ((template, built), runtime) = self.instances.get(instance).ok()?;
+        let built = template.map(|template| &template.0.built).or(built.map(|built| &built.0))?;
+        let nodes = || built.nodes.iter();
+        let named = nodes().filter(|node| &*node.name == name);
+        let labelled = nodes().filter(|node| node.label.as_deref() == Some(name));
+        let mut entities = named.chain(labelled).filter_map(|node| entity(runtime, node.uid));
+        entities.next()
+    }
+
+    /// Entity of the node with that uid.
+    pub fn find_uid(&self, instance: Entity, node: Uid) -> Option<Entity> {
+        entity(self.instances.get(instance).ok()?.1, node)
+    }
+}
+
+/// Poses of controls and joints of running rigs, in either [`InstanceMode`].
+#[derive(SystemParam)]
+pub struct ControlPoses<'w, 's> {
+    nodes: Query<'w, 's, (&'static Uid, &'static NodeOf, AnyOf<(&'static mut ControlPose, &'static mut Transform)>)>,
+    rigs: Query<'w, 's, &'static RigRuntime>,
+}
+
+impl ControlPoses<'_, '_> {
+    /// Poses a node: the offset is on top of its rest pose, in its own space at rest. It takes effect in the same frame, within
+    /// the channels and limits of a control. Returns false if the entity is no node of a running rig.
+    pub fn set(&mut self, node: Entity, offset: PoseOffset) -> bool {
+        let Ok((uid, of, (pose, transform))) = self.nodes.get_mut(node) else { return false };
+        let Ok(runtime) = self.rigs.get(of.0) else { return false };
+        let program = runtime.state().program();
+        let Some(node) = program.node(*uid).map(|slot| &program.nodes()[slot]) else { return false };
+        match (pose, transform) {
+            (Some(mut pose), _) => pose.set_if_neq(offset.into()),
+            (None, Some(mut transform)) => {
+                let Trs { translation, rotation, scale } = node.base;
+                transform.set_if_neq(offset.on(&RestTransform { translation, rotation, scale }))
+            }
+            (None, None) => return false,
+        };
+        true
+    }
+}
+
+fn entity(runtime: &RigRuntime, node: Uid) -> Option<Entity> {
+    runtime.entity(runtime.state().program().node(node)?)
+}
+
+/// Entities that use templates.
+#[derive(SystemParam)]
+struct Users<'w, 's> {
+    all: Query<'w, 's, (Entity, AnyOf<(&'static RigInstance, &'static RigSource)>)>,
+}
+
+impl Users<'_, '_> {
+    /// Entities that use the template.
+    fn of(&self, id: AssetId<RigTemplate>) -> impl Iterator<Item = Entity> {
+        let uses = move |(instance, source): (Option<&RigInstance>, Option<&RigSource>)| {
+            instance.is_some_and(|instance| instance.0.id() == id)
+                || source.is_some_and(|source| source.template.id() == id)
+        };
+        self.all.iter().filter(move |(_, of)| uses(*of)).map(|(entity, _)| entity)
+    }
+}
+
+fn follow_assets(
+    mut events: MessageReader<AssetEvent<RigTemplate>>,
+    assets: Res<Assets<RigTemplate>>,
+    modules: Res<RigModules>,
+    mut templates: ResMut<RigTemplates>,
+) {
+    for event in events.read() {
+        match event {
+            AssetEvent::Added { id } | AssetEvent::Modified { id } => {
+                if let Some(template) = assets.get(*id) {
+                    templates.follow(*id, template, &modules);
+                }
+            }
+            AssetEvent::Removed { id } => {
+                templates.own.remove(id);
+                templates.built.remove(id);
+                templates.builds.send(Work::Forget { id: *id });
+            }
+            AssetEvent::LoadedWithDependencies { .. } | AssetEvent::Unused { .. } => {}
+        }
+    }
+}
+
+/// Tells instances whose template the asset server cannot load.
+fn follow_failures(mut failed: MessageReader<AssetLoadFailedEvent<RigTemplate>>, users: Users, mut commands: Commands) {
+    for AssetLoadFailedEvent { id, error, .. } in failed.read() {
+        let error = TemplateError::Load(error.to_string());
+        for entity in users.of(*id) {
+            commands.trigger(RigFailed { entity, error: error.clone() });
+        }
+    }
+}
+
+/// Watches the files of instances' templates that the asset server loads, or fails to load.
+fn watch_files(
+    instances: Query<&RigInstance, Changed<RigInstance>>,
+    sources: Query<&RigSource, Added<RigSource>>,
+    server: Res<AssetServer>,
+    modules: Res<RigModules>,
+    templates: Res<RigTemplates>,
+    mut watched: Local<HashSet<AssetId<RigTemplate>>>,
+) {
+    let Some(root) = templates.root.as_ref().filter(|_| templates.is_live) else { return };
+    let handles = instances.iter().map(|instance| &instance.0).chain(sources.iter().map(|source| &source.template));
+    for handle in handles {
+        let id = handle.id();
+        let Some(path) = server.get_path(id) else { continue };
+        if path.source().as_str().is_none() && path.label().is_none() && watched.insert(id) {
+            let (file, modules) = (root.join(path.path()), modules.0.clone());
+            templates.builds.send(Work::Watch { id, file, modules });
+        }
+    }
+}

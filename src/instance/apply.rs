@@ -1,0 +1,248 @@
+//! Instances that follow their templates.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use rayon::prelude::*;
+
+use super::{
+    BuiltTemplate, RigBuilt, RigFailed, RigInstance, RigTemplate, RigTemplates, RigUpdated, RunningTemplate, Users,
+};
+use crate::{
+    plugins::{
+        runtime::{ControlPose, InstanceMode, RigNodes, RigRuntime, furnish_instance, spawn_instance},
+        schema::NodeLabel,
+    },
+    processor::PoseNote,
+    rig::{AttributeValues, PoseOffset, Uid},
+    solve::{
+        keep_pose::{KeptPose, PoseKeeper},
+        program::{Carry, ProgramNode, RigProgram, RigState},
+    },
+};
+
+/// Takes over what the thread has built, and tells what it could not build.
+pub(super) fn take_outcomes(
+    mut templates: ResMut<RigTemplates>,
+    mut assets: ResMut<Assets<RigTemplate>>,
+    users: Users,
+    mut commands: Commands,
+) {
+    let outcomes = templates.bypass_change_detection().builds.outcomes();
+    for outcome in outcomes {
+        let id = outcome.id;
+        match outcome.result {
+            Ok(built) => {
+                if let Some(template) = outcome.template {
+                    templates.own.insert(id, template.clone());
+                    // A handle without users has nowhere to put it.
+                    let _ = assets.insert(id, template);
+                }
+                templates.built.insert(id, built);
+                templates.is_fresh = true;
+            }
+            Err(error) => {
+                for entity in users.of(id) {
+                    commands.trigger(RigFailed { entity, error: error.clone() });
+                }
+            }
+        }
+    }
+}
+
+/// True if an instance may not run what it should.
+pub(super) fn is_due(
+    templates: Res<RigTemplates>,
+    changed: Query<(), Or<(Changed<RigInstance>, Changed<InstanceMode>)>>,
+) -> bool {
+    templates.is_fresh || !changed.is_empty()
+}
+
+/// An instance that goes on with another program.
+struct Step<'a> {
+    entity: Entity,
+    runtime: Mut<'a, RigRuntime>,
+    program: &'a Arc<RigProgram>,
+    exchange: usize,
+    /// The pose of the instance where its offsets have to change, so that its joints stand as before.
+    kept: Option<KeptPose>,
+}
+
+/// Exchange of one program for another, the same for all of its instances.
+struct Exchange {
+    from: Arc<RigProgram>,
+    to: Arc<RigProgram>,
+    carry: Carry,
+    keeper: PoseKeeper,
+    /// The nodes are not the same, in the same places.
+    is_other: bool,
+}
+
+/// Gives every instance the program of its template: all of them in this frame.
+pub(super) fn update_instances(world: &mut World) {
+    let mut query =
+        world.query::<(Entity, &RigInstance, &InstanceMode, Option<&RunningTemplate>, Option<&RigRuntime>)>();
+    let mut due: Vec<(Entity, Arc<BuiltTemplate>, InstanceMode, bool)> = Vec::new();
+    let templates = world.resource::<RigTemplates>();
+    for (entity, instance, mode, running, runtime) in query.iter(world) {
+        let Some(built) = templates.built.get(&instance.0.id()) else { continue };
+        let is_other_mode = runtime.is_none_or(|runtime| runtime.mode() != *mode);
+        if is_other_mode || running.is_none_or(|running| !Arc::ptr_eq(&running.0, built)) {
+            due.push((entity, built.clone(), *mode, is_other_mode));
+        }
+    }
+    world.resource_mut::<RigTemplates>().is_fresh = false;
+    let (fresh, going): (Vec<_>, Vec<_>) = due.into_iter().partition(|(.., is_fresh)| *is_fresh);
+    for (entity, built, mode, _) in &fresh {
+        world.entity_mut(*entity).despawn_related::<RigNodes>();
+        spawn_instance(world, *entity, program(built, *mode), *mode);
+        describe(world, *entity, built);
+        world.entity_mut(*entity).insert(RunningTemplate(built.clone()));
+    }
+    let (changed_nodes, mut kept) = exchange(world, &going);
+    for (entity, built) in changed_nodes {
+        furnish_instance(world, entity);
+        describe(world, entity, &built);
+    }
+    for (entity, kept) in &kept {
+        pose_controls(world, *entity, kept);
+    }
+    for (entity, ..) in fresh {
+        world.trigger(RigBuilt { entity });
+    }
+    for (entity, built, ..) in going {
+        let deviations = kept.remove(&entity).map(|kept| kept.deviations).unwrap_or_default();
+        let poses = deviations.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect();
+        world.trigger(RigUpdated { entity, changes: built.changes.clone(), ran: built.ran.clone(), poses });
+    }
+}
+
+fn program(built: &BuiltTemplate, mode: InstanceMode) -> &Arc<RigProgram> {
+    match mode {
+        InstanceMode::Hierarchy => &built.whole,
+        InstanceMode::Direct => &built.lean,
+    }
+}
+
+/// Lets instances go on with the programs of their templates. Returns those whose nodes are others now, and the poses of
+/// those whose offsets are others now.
+fn exchange(
+    world: &mut World,
+    going: &[(Entity, Arc<BuiltTemplate>, InstanceMode, bool)],
+) -> (Vec<(Entity, Arc<BuiltTemplate>)>, EntityHashMap<KeptPose>) {
+    let wanted: EntityHashMap<(&Arc<BuiltTemplate>, InstanceMode)> =
+        going.iter().map(|(entity, built, mode, _)| (*entity, (built, *mode))).collect();
+    let mut query = world.query::<(Entity, &mut RigRuntime, &mut RunningTemplate)>();
+    let mut exchanges: Vec<Exchange> = Vec::new();
+    let (mut steps, mut others) = (Vec::new(), Vec::new());
+    for (entity, runtime, mut running) in query.iter_mut(world) {
+        let Some((built, mode)) = wanted.get(&entity) else { continue };
+        running.0 = (*built).clone();
+        let to = program(built, *mode);
+        let from = runtime.state().program();
+        // The rest of the document may have changed, and the program not.
+        if Arc::ptr_eq(from, to) {
+            continue;
+        }
+        let known = exchanges.iter().position(|known| Arc::ptr_eq(&known.from, from) && Arc::ptr_eq(&known.to, to));
+        let number = known.unwrap_or_else(|| {
+            exchanges.push(Exchange {
+                carry: Carry::between(from, to),
+                keeper: PoseKeeper::between(from, to),
+                is_other: !has_same_nodes(from, to),
+                from: from.clone(),
+                to: to.clone(),
+            });
+            exchanges.len() - 1
+        });
+        if exchanges[number].is_other {
+            others.push((entity, (*built).clone()));
+        }
+        steps.push(Step { entity, runtime, program: to, exchange: number, kept: None });
+    }
+    steps.par_iter_mut().for_each(|Step { runtime, program, exchange, kept, .. }| {
+        let Exchange { carry, keeper, .. } = &exchanges[*exchange];
+        if !keeper.is_idle() {
+            let (offsets, values) = pose_of(runtime.state());
+            *kept = Some(keeper.keep(&offsets, &values))
+                .filter(|kept| kept.offsets != offsets || !kept.deviations.is_empty());
+        }
+        runtime.exchange(program, carry);
+        for slot in 0..program.nodes().len() {
+            let Some(kept) = kept else { break };
+            let offset = kept.offsets.get(&program.nodes()[slot].uid).copied().unwrap_or_default();
+            runtime.state_mut().set_offset_at(slot, offset);
+        }
+    });
+    let kept = steps.into_iter().filter_map(|step| Some((step.entity, step.kept?))).collect();
+    (others, kept)
+}
+
+/// Offsets and attribute values of an instance.
+fn pose_of(state: &RigState) -> (BTreeMap<Uid, PoseOffset>, AttributeValues) {
+    let program = state.program();
+    let offsets = program.nodes().iter().enumerate().map(|(slot, node)| (node.uid, state.offset_at(slot)));
+    let offsets = offsets.filter(|(_, offset)| *offset != PoseOffset::IDENTITY).collect();
+    let mut values = AttributeValues::new();
+    for (slot, attribute) in program.attributes().iter().enumerate().filter(|(_, known)| known.is_settable) {
+        let of = values.entry(program.nodes()[attribute.node].uid).or_default();
+        of.insert(attribute.name.to_string(), state.attribute_at(slot));
+    }
+    (offsets, values)
+}
+
+/// Writes the offsets of a pose to the controls of an instance that are posed by their [`ControlPose`].
+fn pose_controls(world: &mut World, instance: Entity, kept: &KeptPose) {
+    let Some(runtime) = world.get::<RigRuntime>(instance) else { return };
+    let nodes = runtime.state().program().clone();
+    let entities: Vec<(Entity, Uid)> =
+        nodes.nodes().iter().enumerate().filter_map(|(slot, node)| Some((runtime.entity(slot)?, node.uid))).collect();
+    for (entity, uid) in entities {
+        if let Some(mut pose) = world.get_mut::<ControlPose>(entity) {
+            pose.set_if_neq(kept.offsets.get(&uid).copied().unwrap_or_default().into());
+        }
+    }
+}
+
+/// True if two programs have the same nodes in the same order, with the same parents and kinds.
+fn has_same_nodes(a: &RigProgram, b: &RigProgram) -> bool {
+    let (a, b) = (a.nodes(), b.nodes());
+    let same = |(a, b): (&ProgramNode, &ProgramNode)| {
+        (a.uid, a.parent, a.kind, a.is_posable(), &a.label) == (b.uid, b.parent, b.kind, b.is_posable(), &b.label)
+    };
+    a.len() == b.len() && a.iter().zip(b).all(same)
+}
+
+/// Writes labels and names to the entities of nodes.
+fn describe(world: &mut World, instance: Entity, built: &BuiltTemplate) {
+    let Some(runtime) = world.get::<RigRuntime>(instance) else { return };
+    let program = runtime.state().program().clone();
+    let entities: Vec<Option<Entity>> = (0..program.nodes().len()).map(|slot| runtime.entity(slot)).collect();
+    for node in &built.built.nodes {
+        let Some(entity) = program.node(node.uid).and_then(|slot| entities[slot]) else { continue };
+        let Ok(mut entity) = world.get_entity_mut(entity) else { continue };
+        if entity.get::<Name>().map(Name::as_str) != Some(&*node.name) {
+            entity.insert(Name::new(node.name.to_string()));
+        }
+        let label = node.label.as_deref();
+        if entity.get::<NodeLabel>().map(|label| label.0.as_str()) != label {
+            match label {
+                Some(label) => entity.insert(NodeLabel(label.to_owned())),
+                None => entity.remove::<NodeLabel>(),
+            };
+        }
+    }
+}
+
+/// Despawns the nodes of an entity that is no instance any more.
+pub(super) fn leave(removed: On<Remove, RigInstance>, mut commands: Commands) {
+    if let Ok(mut entity) = commands.get_entity(removed.entity) {
+        entity.queue_silenced(|mut entity: EntityWorldMut| {
+            // Replacing the component is no leaving.
+            if !entity.contains::<RigInstance>() {
+                entity.despawn_related::<RigNodes>();
+                entity.remove::<(RigRuntime, RunningTemplate)>();
+            }
+        });
+    }
+}

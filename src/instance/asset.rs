@@ -1,0 +1,155 @@
+//! Templates as assets.
+
+use std::{path::Path, sync::Arc};
+
+use bevy::{
+    asset::{
+        Asset, AssetLoader, AssetPath, AsyncWriteExt, LoadContext,
+        io::{Reader, Writer},
+        saver::{AssetSaver, SavedAsset},
+    },
+    reflect::TypePath,
+};
+
+use crate::{
+    files::PartFiles,
+    rig::{
+        Rig, SourceError,
+        template::{Template, read_template, text_of, write_template, write_template_over},
+    },
+};
+
+/// A template as an asset, `.rig.ron`.
+#[derive(Asset, TypePath, Debug, Clone)]
+pub struct RigTemplate {
+    /// True if the text has parts, whose content the rig has.
+    has_parts: bool,
+    rig: Arc<Rig>,
+    /// The text that the rig was read from; empty for a rig that was made by code.
+    text: Arc<str>,
+}
+
+impl RigTemplate {
+    /// A template of a rig.
+    pub fn new(rig: Rig) -> Self {
+        Self { has_parts: false, rig: Arc::new(rig), text: Arc::from("") }
+    }
+
+    /// The template that a file holds.
+    ///
+    /// # Errors
+    /// See [`read_template`]. A template with parts needs [`read_with_parts`](Self::read_with_parts).
+    pub fn read(content: &[u8]) -> Result<Self, SourceError> {
+        let template = read_template(content)?;
+        if let Some(part) = template.parts.first() {
+            let message =
+                "a template with parts is opened from its file, which says where they are: `TemplateFiles::open`";
+            return Err(SourceError::at(text_of(content)?, part.offset, message.to_owned()));
+        }
+        Self::of(template, content)
+    }
+
+    /// The template that a file holds, with its parts.
+    ///
+    /// # Errors
+    /// See [`PartFiles::complete`].
+    pub fn read_with_parts(content: &[u8], path: &Path, files: &mut PartFiles) -> Result<Self, SourceError> {
+        Self::of(files.complete(path, content)?, content)
+    }
+
+    fn of(template: Template, content: &[u8]) -> Result<Self, SourceError> {
+        let has_parts = !template.instances.is_empty();
+        Ok(Self { has_parts, rig: Arc::new(template.rig), text: Arc::from(text_of(content)?) })
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> &Arc<Rig> {
+        &self.rig
+    }
+
+    /// Replaces the rig; a save changes the text only where the rig differs from it.
+    pub fn set_rig(&mut self, rig: Rig) {
+        if rig != *self.rig {
+            self.rig = Arc::new(rig);
+            if std::mem::take(&mut self.has_parts) {
+                // Parts are written out: the text does not say what is different about them.
+                self.text = Arc::from("");
+            }
+        }
+    }
+
+    /// The text that the rig was read from; empty for a rig that was made by code.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The text that a save writes: that of the file where it was read from one, changed where the rig differs from it.
+    pub fn saved(&self) -> String {
+        if self.has_parts {
+            return self.text.to_string();
+        }
+        write_template_over(&self.rig, &self.text).unwrap_or_else(|| write_template(&self.rig))
+    }
+
+    /// True if both are the same in memory.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.rig, &other.rig)
+    }
+}
+
+/// Reader of templates for Bevy's asset server.
+#[derive(Debug, Clone, Copy, Default, TypePath)]
+pub struct RigTemplateLoader;
+
+/// Reason for not loading or saving a template.
+#[derive(Debug, thiserror::Error)]
+pub enum RigTemplateError {
+    /// The source of assets cannot be read or written.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    /// The file is no template.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+}
+
+impl AssetLoader for RigTemplateLoader {
+    type Asset = RigTemplate;
+    type Settings = ();
+    type Error = RigTemplateError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        (): &(),
+        _: &mut LoadContext<'_>,
+    ) -> Result<RigTemplate, Self::Error> {
+        let mut content = Vec::new();
+        reader.read_to_end(&mut content).await?;
+        Ok(RigTemplate::read(&content)?)
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["rig.ron"]
+    }
+}
+
+/// Writer of templates for Bevy's asset server: see [`RigTemplate::saved`].
+#[derive(Debug, Clone, Copy, Default, TypePath)]
+pub struct RigTemplateSaver;
+
+impl AssetSaver for RigTemplateSaver {
+    type Asset = RigTemplate;
+    type Settings = ();
+    type OutputLoader = RigTemplateLoader;
+    type Error = RigTemplateError;
+
+    async fn save(
+        &self,
+        writer: &mut Writer,
+        asset: SavedAsset<'_, '_, RigTemplate>,
+        (): &(),
+        _: AssetPath<'_>,
+    ) -> Result<(), Self::Error> {
+        Ok(writer.write_all(asset.get().saved().as_bytes()).await?)
+    }
+}

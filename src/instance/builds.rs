@@ -1,0 +1,319 @@
+//! The thread that builds templates and watches their files.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    path::PathBuf,
+    sync::{
+        Arc, Mutex, PoisonError,
+        mpsc::{Receiver, RecvTimeoutError, Sender, channel},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use bevy::{asset::AssetId, log::error};
+
+use super::{RigTemplate, TemplateError};
+use crate::{
+    files::{FileWatch, PartFiles, RealDisk},
+    processor::{BuildError, Builder, Modules, SourceText},
+    rig::{
+        BuiltRig, Rig, Uid, template,
+        update::{Change, Take, update, with_identities},
+    },
+    solve::program::{CompileOptions, Exposed, Keep, ProgramCache, ProgramError, RigProgram},
+};
+
+/// A template with what its commands make of it.
+#[derive(Debug)]
+pub struct BuiltTemplate {
+    /// The template's rig. What got another name since the template was built first has its first uid.
+    pub rig: Arc<Rig>,
+    /// The rig as the file has it.
+    source: Arc<Rig>,
+    /// Its nodes and constraints.
+    pub built: Arc<BuiltRig>,
+    /// Program with all nodes, for instances in [`InstanceMode::Hierarchy`](crate::plugins::runtime::InstanceMode).
+    pub whole: Arc<RigProgram>,
+    /// Program with joints and controls, for instances in [`InstanceMode::Direct`](crate::plugins::runtime::InstanceMode).
+    pub lean: Arc<RigProgram>,
+    /// Differences from the build before.
+    pub changes: Arc<[Change]>,
+    /// Tags of the commands that ran, in their order.
+    pub ran: Arc<[Uid]>,
+}
+
+type Id = AssetId<RigTemplate>;
+
+/// Something for the thread to do.
+pub(super) enum Work {
+    /// Builds a template.
+    Build { id: Id, template: RigTemplate, modules: Arc<Modules> },
+    /// Reads and builds a template's file, and watches it if so wanted.
+    Open { id: Id, file: PathBuf, modules: Arc<Modules>, is_watched: bool },
+    /// Watches a template's file.
+    Watch { id: Id, file: PathBuf, modules: Arc<Modules> },
+    /// Takes a content for that of a template's file.
+    Content { id: Id, content: Vec<u8>, modules: Arc<Modules> },
+    /// Forgets a template.
+    Forget { id: Id },
+}
+
+/// Result of some work.
+pub(super) struct Outcome {
+    pub id: Id,
+    /// The template, if it was read from its file.
+    pub template: Option<RigTemplate>,
+    pub result: Result<Arc<BuiltTemplate>, TemplateError>,
+}
+
+/// The thread, seen from outside. It ends when this is dropped.
+pub(super) struct Builds {
+    work: Sender<Work>,
+    outcomes: Mutex<Receiver<Outcome>>,
+}
+
+impl Builds {
+    pub fn start(look: Duration, patience: Duration) -> Self {
+        let (work, received) = channel();
+        let (told, outcomes) = channel();
+        let mut thread = BuildThread { templates: BTreeMap::new(), told, look, patience };
+        if let Err(error) = thread::Builder::new().name("rig templates".to_owned()).spawn(move || thread.run(&received))
+        {
+            error!("templates cannot be built, because no thread can be started: {error}");
+        }
+        Self { work, outcomes: Mutex::new(outcomes) }
+    }
+
+    pub fn send(&self, work: Work) {
+        // The thread lives as long as this; without it nothing is built, which was told when it could not be started.
+        let _ = self.work.send(work);
+    }
+
+    /// Results of the work since the last call.
+    pub fn outcomes(&self) -> Vec<Outcome> {
+        self.outcomes.lock().unwrap_or_else(PoisonError::into_inner).try_iter().collect()
+    }
+}
+
+struct BuildThread {
+    templates: BTreeMap<Id, Kept>,
+    told: Sender<Outcome>,
+    look: Duration,
+    patience: Duration,
+}
+
+/// A template that has been built.
+struct Kept {
+    modules: Arc<Modules>,
+    builder: Builder,
+    programs: ProgramCache,
+    /// The last build that succeeded.
+    good: Option<Arc<BuiltTemplate>>,
+    file: Option<PathBuf>,
+    watch: Option<FileWatch>,
+    /// Uids of things that got another name since they were built first, by those of their names now.
+    identities: HashMap<Uid, Uid>,
+    /// The files of its parts.
+    parts: Vec<FileWatch>,
+    /// The file's content that was read last.
+    last: Vec<u8>,
+    /// Reason for which the file's content was not taken over, and since when it has been so.
+    fault: Option<(Instant, TemplateError)>,
+}
+
+/// Share of the time that looks at files may take: the pause is longer with more of them.
+const PAUSE_FOR_EACH: Duration = Duration::from_micros(100);
+
+impl BuildThread {
+    fn run(&mut self, work: &Receiver<Work>) {
+        loop {
+            let watches = self.templates.values().filter(|kept| kept.watch.is_some()).count();
+            let next = if watches == 0 {
+                work.recv().map_err(|_| RecvTimeoutError::Disconnected)
+            } else {
+                work.recv_timeout(self.look.max(PAUSE_FOR_EACH * watches as u32))
+            };
+            match next {
+                Ok(work) => self.carry_out(work),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            let patience = self.patience;
+            for (id, kept) in &mut self.templates {
+                if let Some(outcome) = kept.look(*id, patience) {
+                    let _ = self.told.send(outcome);
+                }
+            }
+        }
+    }
+
+    fn carry_out(&mut self, work: Work) {
+        let outcome = match work {
+            Work::Build { id, template, modules } => Some(self.kept(id, &modules).build(id, template, false)),
+            Work::Open { id, file, modules, is_watched } => {
+                let mut watch = FileWatch::new(&file, template::MAX_BYTES as u64);
+                let kept = self.kept(id, &modules);
+                kept.file = Some(file);
+                let outcome = match watch.read(&RealDisk) {
+                    Ok(content) => kept.content(id, content).unwrap_or_else(|error| refused(id, error)),
+                    Err(error) => refused(id, TemplateError::Load(error.to_string())),
+                };
+                kept.watch = is_watched.then_some(watch);
+                Some(outcome)
+            }
+            Work::Watch { id, file, modules } => {
+                let kept = self.kept(id, &modules);
+                kept.watch = Some(FileWatch::new(&file, template::MAX_BYTES as u64));
+                kept.file = Some(file);
+                None
+            }
+            Work::Content { id, content, modules } => {
+                let kept = self.kept(id, &modules);
+                Some(kept.content(id, &content).unwrap_or_else(|error| refused(id, error)))
+            }
+            Work::Forget { id } => {
+                self.templates.remove(&id);
+                None
+            }
+        };
+        if let Some(outcome) = outcome {
+            let _ = self.told.send(outcome);
+        }
+    }
+
+    fn kept(&mut self, id: Id, modules: &Arc<Modules>) -> &mut Kept {
+        self.templates.entry(id).or_insert_with(|| Kept {
+            modules: modules.clone(),
+            builder: Builder::new(modules.clone()),
+            programs: ProgramCache::default(),
+            good: None,
+            file: None,
+            watch: None,
+            identities: HashMap::new(),
+            parts: Vec::new(),
+            last: Vec::new(),
+            fault: None,
+        })
+    }
+}
+
+fn refused(id: Id, error: TemplateError) -> Outcome {
+    Outcome { id, template: None, result: Err(error) }
+}
+
+impl Kept {
+    /// Looks at the file: takes over a new content, or tells why not once it has been so for a while.
+    fn look(&mut self, id: Id, patience: Duration) -> Option<Outcome> {
+        let own = self.watch.as_mut()?.look(&RealDisk).map(<[u8]>::to_vec);
+        let mut is_part = false;
+        for part in &mut self.parts {
+            is_part |= part.look(&RealDisk).is_some();
+        }
+        let content = own.or_else(|| is_part.then(|| self.last.clone()));
+        let outcome = content.and_then(|content| match self.content(id, &content) {
+            Ok(outcome) => {
+                self.fault = None;
+                Some(outcome)
+            }
+            Err(error) => {
+                self.fault = Some((Instant::now(), error));
+                None
+            }
+        });
+        if outcome.is_none()
+            && let Some((_, error)) = self.fault.take_if(|(since, _)| since.elapsed() >= patience)
+        {
+            return Some(refused(id, error));
+        }
+        outcome
+    }
+
+    /// Reads and builds a content of the file. An error leaves everything as it is; it is told by the caller.
+    fn content(&mut self, id: Id, content: &[u8]) -> Result<Outcome, TemplateError> {
+        self.last = content.to_vec();
+        let mut files = PartFiles::with_modules(&RealDisk, (*self.modules).clone());
+        let read = match &self.file {
+            Some(file) => RigTemplate::read_with_parts(content, file, &mut files),
+            None => RigTemplate::read(content),
+        };
+        self.follow_parts(files.read);
+        let template = read.map_err(|source| TemplateError::Source { file: self.file.clone(), source })?;
+        let outcome = self.build(id, template, true);
+        match outcome.result {
+            Err(error) => Err(error),
+            Ok(_) => Ok(outcome),
+        }
+    }
+
+    /// Watches the files of parts that were read. Those of before stay watched while a part cannot be read.
+    fn follow_parts(&mut self, read: BTreeMap<PathBuf, Vec<u8>>) {
+        for (path, content) in read {
+            if self.parts.iter().all(|part| part.path() != path) {
+                let mut watch = FileWatch::new(&path, template::MAX_BYTES as u64);
+                watch.know(content);
+                self.parts.push(watch);
+            }
+        }
+    }
+
+    /// Builds a template; after a failure everything is as it was before.
+    fn build(&mut self, id: Id, template: RigTemplate, is_of_file: bool) -> Outcome {
+        let result = self.built(&template);
+        if result.is_err()
+            && let Some(good) = &self.good
+        {
+            self.builder.sync(&good.rig);
+            self.builder.run_all();
+        }
+        if let Ok(built) = &result {
+            self.good = Some(built.clone());
+        }
+        Outcome { id, template: is_of_file.then_some(template), result }
+    }
+
+    fn built(&mut self, template: &RigTemplate) -> Result<Arc<BuiltTemplate>, TemplateError> {
+        let source = template.rig();
+        if let Some(good) = self.good.as_ref().filter(|good| good.source == *source) {
+            return Ok(good.clone());
+        }
+        let mut identities = HashMap::new();
+        let (rig, changes) = match &self.good {
+            None => (source.clone(), Vec::new()),
+            Some(good) => {
+                let known = Some(&self.identities).filter(|known| !known.is_empty());
+                let known = known.map(|known| Arc::new(with_identities(source, known)));
+                let file = known.as_ref().unwrap_or(source);
+                let updated = update(Some(&good.rig), &good.rig, file, Take::Theirs);
+                let rig = if updated.identities.is_empty() { file.clone() } else { Arc::new(updated.rig) };
+                identities = updated.identities;
+                (rig, updated.changes)
+            }
+        };
+        self.builder.sync(&rig);
+        let report = self.builder.run_all();
+        if let Some(error) = report.error {
+            // The file knows its places by its own uids.
+            let of_file = if rig == *source { None } else { Builder::build(source, &self.modules).err() };
+            return Err(self.placed(template, &of_file.unwrap_or(error)));
+        }
+        let built = self.builder.shared_built();
+        let mut program = |keep: Keep| {
+            let options = CompileOptions { keep, ..CompileOptions::default() };
+            self.programs.get(&built, &options)
+        };
+        let programs: Result<_, ProgramError> =
+            program(Keep::All).and_then(|whole| Ok((whole, program(Keep::DeformAndExposed(vec![Exposed::Controls]))?)));
+        let (whole, lean) = programs.map_err(|source| TemplateError::CannotRun { file: self.file.clone(), source })?;
+        self.identities.extend(identities);
+        let (source, changes, ran) = (source.clone(), changes.into(), report.executed.into());
+        Ok(Arc::new(BuiltTemplate { rig, source, built, whole, lean, changes, ran }))
+    }
+
+    /// An error of a command at its place in the text.
+    fn placed(&self, template: &RigTemplate, error: &BuildError) -> TemplateError {
+        let explicit = template::explicit(template.text());
+        let source = SourceText::new(&explicit).locate(template.rig(), error);
+        TemplateError::Source { file: self.file.clone(), source }
+    }
+}

@@ -1,0 +1,309 @@
+//! Rigs with documents of their own, which follow their templates by three-way updates.
+
+use std::sync::Arc;
+
+use bevy::{ecs::entity::EntityHashSet, prelude::*};
+
+use super::{BuiltTemplate, RigBuilt, RigFailed, RigTemplate, RigTemplates, RigUpdated, TemplateError};
+use crate::{
+    plugins::{
+        commands::{BuildFailure, BuildRequest, BuildStep, Built, RigModules},
+        document::{Change, EditRefused, EditRequest, Edited},
+        skinning::BindRequest,
+        surface::{RigMesh, RigMeshes},
+    },
+    processor::{PoseNote, keep_poses},
+    rig::{
+        Rig,
+        operations::Operation,
+        step::{Committed, Step},
+        update::{Change as Difference, Take, Update, edits_between, pose_edits, update},
+    },
+};
+
+/// Name of the step that an update is in the history.
+pub const UPDATE: &str = "Update from template";
+
+/// Makes an entity a rig of a template with a document of its own, which people may edit, and which meshes are bound to.
+///
+/// An entity without a [`Rig`] gets the template's, built; meshes of it without weights are bound. When the template changes,
+/// the base (the version accepted last), the rig as it is now and the template are compared: what the template changed is
+/// taken over, what was changed or added here stays. A `live` rig takes it over at once, as one step of its history, unless
+/// both changed the same field to different values; such an update, and every one of a rig that is not live, is an
+/// [`UpdateOffer`] until an [`AcceptUpdate`]. Undoing the step brings the base back, and nothing more is taken over until the
+/// file changes again. An update that cannot be built is taken back and told ([`RigFailed`]).
+#[derive(Component, Debug, Clone)]
+#[require(Transform)]
+pub struct RigSource {
+    /// The template.
+    pub template: Handle<RigTemplate>,
+    /// Takes updates over at once.
+    pub is_live: bool,
+    base: Option<Arc<Rig>>,
+    /// True if the rig has come from the first version that is seen.
+    is_first: bool,
+    /// True if meshes without weights stay so.
+    is_unbound: bool,
+    /// The template that was compared last.
+    seen: Option<Arc<BuiltTemplate>>,
+    /// An update that was requested: the base that it brings.
+    pending: Option<Arc<BuiltTemplate>>,
+    /// An update that was made in this frame.
+    trial: Option<Arc<BuiltTemplate>>,
+    /// Joints that poses could not hold in the update that was requested.
+    notes: Arc<[PoseNote]>,
+    /// True if the build had failed before the update.
+    had_failed: bool,
+    steps: Vec<Accepted>,
+}
+
+/// Step of an update, with the bases before and after it.
+#[derive(Debug, Clone)]
+struct Accepted {
+    step: Arc<Step>,
+    before: Option<Arc<Rig>>,
+    after: Arc<Rig>,
+}
+
+impl RigSource {
+    /// A rig that is asked before it is updated.
+    pub fn new(template: Handle<RigTemplate>) -> Self {
+        Self {
+            template,
+            is_live: false,
+            base: None,
+            is_first: false,
+            is_unbound: false,
+            seen: None,
+            pending: None,
+            trial: None,
+            notes: Arc::default(),
+            had_failed: false,
+            steps: Vec::new(),
+        }
+    }
+
+    /// A rig that takes updates over at once.
+    pub fn live(template: Handle<RigTemplate>) -> Self {
+        Self { is_live: true, ..Self::new(template) }
+    }
+
+    /// The rig has come from this version of the template.
+    pub fn with_base(mut self, base: Arc<Rig>) -> Self {
+        self.base = Some(base);
+        self
+    }
+
+    /// The rig has come from the template as it is when it is seen first.
+    pub fn of_first_version(mut self) -> Self {
+        self.is_first = true;
+        self
+    }
+
+    /// Meshes without weights are left alone.
+    pub fn without_binding(mut self) -> Self {
+        self.is_unbound = true;
+        self
+    }
+
+    /// The version of the template that was accepted last; `None` until it is loaded, or if nobody knows.
+    pub fn base(&self) -> Option<&Arc<Rig>> {
+        self.base.as_ref()
+    }
+}
+
+/// An update that waits for an [`AcceptUpdate`].
+#[derive(Component, Debug, Clone)]
+pub struct UpdateOffer {
+    /// Changes that it would make; conflicts have the value now and that of the template.
+    pub changes: Arc<[Difference]>,
+    /// Joints that would not stand as before in a pose, although nothing but the meaning of the pose changes.
+    pub poses: Arc<[PoseNote]>,
+    built: Arc<BuiltTemplate>,
+}
+
+/// Accepts the [`UpdateOffer`] of a rig.
+#[derive(Message, Debug, Clone, Copy)]
+pub struct AcceptUpdate {
+    /// The rig.
+    pub rig: Entity,
+    /// Side whose value is taken in conflicts.
+    pub take: Take,
+}
+
+pub(super) fn add(app: &mut App) {
+    app.add_message::<AcceptUpdate>()
+        .add_message::<Edited>()
+        .add_message::<EditRefused>()
+        .add_message::<EditRequest>()
+        .add_message::<BuildRequest>()
+        .add_message::<BindRequest>();
+}
+
+/// Follows updates through the history: the base is that of the last one in effect.
+pub(super) fn follow_steps(
+    mut edited: MessageReader<Edited>,
+    mut refused: MessageReader<EditRefused>,
+    mut sources: Query<&mut RigSource>,
+    mut commands: Commands,
+) {
+    for Edited { rig, name, committed, .. } in edited.read() {
+        let (Ok(mut source), Some(committed)) = (sources.get_mut(*rig), committed) else { continue };
+        let known = source.steps.iter().find(|known| Arc::ptr_eq(&known.step, committed.step())).cloned();
+        match (committed, known) {
+            (Committed::Done(step), _) if *name == UPDATE => {
+                let Some(built) = source.pending.take() else { continue };
+                let (before, after) = (source.base.take(), built.rig.clone());
+                source.base = Some(after.clone());
+                source.steps.push(Accepted { step: step.clone(), before, after });
+                source.trial = Some(built);
+            }
+            (Committed::Undone(_), Some(known)) => source.base = known.before,
+            (Committed::Redone(_), Some(known)) => source.base = Some(known.after),
+            _ => {}
+        }
+    }
+    for EditRefused { rig, reason } in refused.read() {
+        if let Ok(mut source) = sources.get_mut(*rig)
+            && source.pending.take().is_some()
+        {
+            commands.trigger(RigFailed { entity: *rig, error: TemplateError::Load(reason.to_string()) });
+        }
+    }
+}
+
+/// Tells updates that were made in this frame, and takes back those that cannot be built.
+pub(super) fn try_updates(
+    mut sources: Query<(Entity, &mut RigSource, Option<&BuildFailure>)>,
+    mut requests: MessageWriter<EditRequest>,
+    mut commands: Commands,
+) {
+    for (entity, mut source, failure) in &mut sources {
+        let Some(built) = source.bypass_change_detection().trial.take() else { continue };
+        match failure.filter(|_| !source.had_failed) {
+            Some(BuildFailure(error)) => {
+                requests.write(EditRequest { rig: entity, change: Change::Undo });
+                commands.trigger(RigFailed { entity, error: TemplateError::Load(error.to_string()) });
+            }
+            None => {
+                let (changes, ran, poses) = (built.changes.clone(), built.ran.clone(), source.notes.clone());
+                commands.trigger(RigUpdated { entity, changes, ran, poses });
+            }
+        }
+    }
+}
+
+/// Compares rigs with their templates where these have changed.
+pub(super) fn compare_templates(
+    templates: Res<RigTemplates>,
+    modules: Res<RigModules>,
+    mut sources: Query<(Entity, &mut RigSource, Option<&Rig>, Has<BuildFailure>)>,
+    mut edits: MessageWriter<EditRequest>,
+    mut builds: MessageWriter<BuildRequest>,
+    mut commands: Commands,
+) {
+    for (entity, mut source, rig, had_failed) in &mut sources {
+        let Some(built) = templates.built.get(&source.template.id()) else { continue };
+        if source.seen.as_ref().is_some_and(|seen| Arc::ptr_eq(seen, built)) {
+            continue;
+        }
+        source.seen = Some(built.clone());
+        let Some(rig) = rig else {
+            source.base = Some(built.rig.clone());
+            commands.entity(entity).try_insert((*built.rig).clone());
+            builds.write(BuildRequest { rig: entity, step: BuildStep::All });
+            continue;
+        };
+        commands.entity(entity).try_remove::<UpdateOffer>();
+        if std::mem::take(&mut source.is_first) {
+            source.base = Some(built.rig.clone());
+            continue;
+        }
+        let (updated, poses) = updated(source.base.as_deref(), rig, &built.rig, Take::Mine, &modules);
+        if updated.changes.is_empty() {
+            source.base = Some(built.rig.clone());
+        } else if source.is_live && updated.conflicts() == 0 {
+            source.had_failed = had_failed;
+            source.notes = poses;
+            take_over(entity, rig, updated, built, &mut source, &mut edits, &mut commands);
+        } else {
+            let offer = UpdateOffer { changes: updated.changes.into(), poses, built: built.clone() };
+            commands.entity(entity).try_insert(offer);
+        }
+    }
+}
+
+/// Carries out accepted offers.
+pub(super) fn accept_offers(
+    mut accepted: MessageReader<AcceptUpdate>,
+    modules: Res<RigModules>,
+    mut sources: Query<(&mut RigSource, &Rig, &UpdateOffer, Has<BuildFailure>)>,
+    mut edits: MessageWriter<EditRequest>,
+    mut commands: Commands,
+) {
+    for AcceptUpdate { rig: entity, take } in accepted.read() {
+        let Ok((mut source, rig, offer, had_failed)) = sources.get_mut(*entity) else {
+            warn!("rig {entity} has no update to accept");
+            continue;
+        };
+        source.had_failed = had_failed;
+        let (updated, poses) = updated(source.base.as_deref(), rig, &offer.built.rig, *take, &modules);
+        source.notes = poses;
+        commands.entity(*entity).try_remove::<UpdateOffer>();
+        take_over(*entity, rig, updated, &offer.built, &mut source, &mut edits, &mut commands);
+    }
+}
+
+/// An update whose poses mean the same, and what they could not hold.
+fn updated(base: Option<&Rig>, rig: &Rig, file: &Rig, take: Take, modules: &RigModules) -> (Update, Arc<[PoseNote]>) {
+    let mut updated = update(base, rig, file, take);
+    let notes = keep_poses(rig, &mut updated.rig, &modules.0).unwrap_or_else(|error| {
+        warn!("poses were not re-expressed: {error}");
+        Vec::new()
+    });
+    (updated, notes.into())
+}
+
+/// Requests the edits of an update.
+fn take_over(
+    entity: Entity,
+    rig: &Rig,
+    updated: Update,
+    built: &Arc<BuiltTemplate>,
+    source: &mut RigSource,
+    requests: &mut MessageWriter<EditRequest>,
+    commands: &mut Commands,
+) {
+    match edits_between(rig, &updated.rig) {
+        // What is taken is there already.
+        Ok(edits) if edits.is_empty() => source.base = Some(built.rig.clone()),
+        Ok(mut edits) => {
+            edits.extend(pose_edits(rig, &updated.rig));
+            source.pending = Some(built.clone());
+            requests.write(EditRequest::operation(entity, Operation::Named { name: UPDATE, edits }));
+        }
+        Err(error) => commands.trigger(RigFailed { entity, error: TemplateError::Load(error.to_string()) }),
+    }
+}
+
+/// Tells rigs that are built for the first time, and binds their meshes that have no weights.
+pub(super) fn bind_meshes(
+    fresh: Query<Entity, (With<RigSource>, Added<Built>)>,
+    rigs: Query<(&Rig, &RigMeshes, &RigSource), With<Built>>,
+    meshes: Query<&RigMesh>,
+    mut asked: Local<EntityHashSet>,
+    mut requests: MessageWriter<BindRequest>,
+    mut commands: Commands,
+) {
+    for entity in &fresh {
+        commands.trigger(RigBuilt { entity });
+    }
+    for (rig, of, _) in rigs.iter().filter(|(.., source)| !source.is_unbound) {
+        for entity in of.iter() {
+            let Ok(mesh) = meshes.get(entity) else { continue };
+            if rig.skin(mesh.uid).is_none() && asked.insert(entity) {
+                requests.write(BindRequest { mesh: entity, settings: default(), rigid: Vec::new() });
+            }
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The examples of the README, run as their users run them, with a picture of what they show.
+
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+    sync::Mutex,
+};
+
+use image::RgbImage;
+use rigsmith::render::adapter;
+
+use crate::prerequisites::skip;
+
+/// One renderer at a time: several on one software adapter take their time from each other.
+static TURN: Mutex<()> = Mutex::new(());
+
+/// Runs an example with `--screenshot`, and returns its pictures, those with the suffixes first; `None` where there is no
+/// adapter or the examples are not built.
+#[track_caller]
+fn run(name: &str, args: &[&str], suffixes: &[&str]) -> Option<Vec<RgbImage>> {
+    if adapter().is_none() {
+        skip("there is no graphics adapter, not even a software one", "RIGSMITH_REQUIRE_GPU");
+        return None;
+    }
+    let folder: PathBuf = std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().join("examples");
+    let program = folder.join(name);
+    if !program.exists() {
+        skip(
+            "the examples are not built: `cargo test` builds them, `cargo test --test it` does not",
+            "RIGSMITH_REQUIRE_GPU",
+        );
+        return None;
+    }
+    let _turn = TURN.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let out = tempfile::tempdir().unwrap();
+    let picture = out.path().join("picture.png");
+    let mut command = Command::new(program);
+    command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR"))).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    let answer = command.args(args).arg("--screenshot").arg(&picture).output().unwrap();
+    let said = String::from_utf8_lossy(&answer.stderr).into_owned() + &String::from_utf8_lossy(&answer.stdout);
+    assert!(answer.status.success(), "{name}: {said}");
+    let files = suffixes.iter().map(|suffix| out.path().join(format!("picture{suffix}.png"))).chain([picture.clone()]);
+    let open = |file: PathBuf| {
+        let image = image::open(&file).unwrap_or_else(|error| panic!("{name}: {}: {error}: {said}", file.display()));
+        image.to_rgb8()
+    };
+    Some(files.map(open).collect())
+}
+
+/// Share of the pixels that two pictures do not have in common.
+fn changed(a: &RgbImage, b: &RgbImage) -> f32 {
+    let far = |(a, b): &(&image::Rgb<u8>, &image::Rgb<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 24);
+    let pixels = a.pixels().zip(b.pixels()).filter(far).count();
+    pixels as f32 / (a.width() * a.height()) as f32
+}
+
+/// Share of the pixels that do not show the background, which the first pixel shows; and their mean height, from 0 at the
+/// lower edge to 1.
+fn shown(image: &RgbImage) -> (f32, f32) {
+    let ground = *image.get_pixel(0, 0);
+    let is_shown = |pixel: &image::Rgb<u8>| pixel.0.iter().zip(ground.0).any(|(a, b)| a.abs_diff(b) > 12);
+    let rows: Vec<u32> = image.enumerate_pixels().filter(|(.., pixel)| is_shown(pixel)).map(|(_, y, _)| y).collect();
+    let count = rows.len().max(1) as f32;
+    let mean = rows.iter().map(|row| *row as f32).sum::<f32>() / count;
+    (rows.len() as f32 / (image.width() * image.height()) as f32, 1.0 - mean / image.height() as f32)
+}
+
+#[test]
+fn embed_shows_a_character() {
+    let Some(pictures) = run("embed", &[], &[]) else { return };
+    let (share, _) = shown(&pictures[0]);
+    assert!((0.03..0.6).contains(&share), "{share}");
+}
+
+#[test]
+fn hot_reload_shows_the_file_before_and_after() {
+    let Some(pictures) = run("hot_reload", &[], &["-before"]) else { return };
+    assert!(shown(&pictures[0]).0 > 0.03 && shown(&pictures[1]).0 > 0.03);
+    let changed = changed(&pictures[0], &pictures[1]);
+    assert!((0.002..0.3).contains(&changed), "{changed}");
+}
+
+#[test]
+fn crowd_shows_many() {
+    // A software renderer takes minutes for a thousand; the instances bench runs them all.
+    let Some(pictures) = run("crowd", &["--count", "16"], &[]) else { return };
+    let (share, _) = shown(&pictures[0]);
+    assert!((0.005..0.95).contains(&share), "{share}");
+}
+
+#[test]
+fn ragdoll_falls_and_gets_up() {
+    let Some(pictures) = run("ragdoll", &[], &["-before", "-after"]) else { return };
+    let [before, after, lying] = [0, 1, 2].map(|at| shown(&pictures[at]));
+    assert!(lying.1 < before.1 - 0.1, "{before:?} {lying:?}");
+    assert!((after.1 - before.1).abs() < 0.02 && (after.0 / before.0 - 1.0).abs() < 0.1, "{before:?} {after:?}");
+}
+
+#[test]
+fn headless_build_writes_a_character() {
+    let out = tempfile::tempdir().unwrap();
+    let file = out.path().join("out.glb");
+    let Some(pictures) = run("headless_build", &[&file.display().to_string()], &[]) else { return };
+    assert!(shown(&pictures[0]).0 > 0.03);
+    let model = rigsmith::files::load_model(&rigsmith::files::RealDisk, &file).unwrap();
+    assert!(model.weights.is_some() && model.nodes.len() > 52);
+}

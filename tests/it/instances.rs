@@ -1,0 +1,502 @@
+//! Characters of a game: instances of templates, and templates whose files are saved while they move.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use bevy::{asset::AssetPlugin, ecs::system::RunSystemOnce, mesh::skinning::SkinnedMesh, prelude::*};
+use rigsmith::{
+    instance::{
+        BoundTo, InstanceNodes, RigBuilt, RigFailed, RigInstance, RigInstancePlugin, RigTemplate, RunningTemplate,
+        SkinBound, TemplateFiles,
+    },
+    plugins::runtime::{ControlPose, HandOver, InstanceMode, OutsideTransform, RigNodes, RigRuntime},
+    rig::{Uid, UidSource, template::read_template},
+};
+
+use super::{
+    bench::HANG,
+    mutate::Mutator,
+    template_text::{CHAIN, Dice},
+};
+
+/// What instances told.
+#[derive(Resource, Default, Debug)]
+struct Told {
+    built: usize,
+    updated: Vec<usize>,
+    ran: usize,
+    failed: Vec<String>,
+}
+
+struct Game {
+    app: App,
+}
+
+impl Game {
+    fn new(plugin: RigInstancePlugin, assets: &Path) -> Self {
+        let mut app = App::new();
+        let files = AssetPlugin { file_path: assets.display().to_string(), ..default() };
+        app.add_plugins((MinimalPlugins, files, TransformPlugin, plugin)).init_resource::<Told>();
+        app.add_observer(|_: On<RigBuilt>, mut told: ResMut<Told>| told.built += 1)
+            .add_observer(|failed: On<RigFailed>, mut told: ResMut<Told>| told.failed.push(failed.error.to_string()))
+            .add_observer(|updated: On<rigsmith::instance::RigUpdated>, mut told: ResMut<Told>| {
+                told.updated.push(updated.changes.len());
+                told.ran = updated.ran.len();
+            });
+        app.finish();
+        app.cleanup();
+        Self { app }
+    }
+
+    fn live() -> Self {
+        Self::new(RigInstancePlugin::live(), Path::new("assets"))
+    }
+
+    fn still() -> Self {
+        Self::new(RigInstancePlugin::default(), Path::new("assets"))
+    }
+
+    fn told(&self) -> &Told {
+        self.app.world().resource::<Told>()
+    }
+
+    /// Updates until something is so.
+    fn until(&mut self, what: &str, is_so: impl Fn(&Told) -> bool) {
+        let start = Instant::now();
+        while !is_so(self.told()) {
+            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.told());
+            self.app.update();
+            sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Updates for a while.
+    fn go_on(&mut self, time: Duration) {
+        let start = Instant::now();
+        while start.elapsed() < time {
+            self.app.update();
+            sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn open(&mut self, file: &Path, mode: InstanceMode) -> Entity {
+        let file = file.to_owned();
+        let handle =
+            self.app.world_mut().run_system_once(move |files: TemplateFiles| files.open(file.clone())).unwrap();
+        self.spawn(handle, mode)
+    }
+
+    fn spawn(&mut self, template: Handle<RigTemplate>, mode: InstanceMode) -> Entity {
+        let built = self.told().built;
+        let instance = self.app.world_mut().spawn((RigInstance(template), mode)).id();
+        self.until("the instance", |told| told.built > built);
+        instance
+    }
+
+    fn node(&mut self, instance: Entity, name: &str) -> Entity {
+        let name = name.to_owned();
+        let found = self.app.world_mut().run_system_once(move |nodes: InstanceNodes| nodes.find(instance, &name));
+        found.unwrap().unwrap()
+    }
+
+    fn offer(&mut self, instance: Entity, content: &[u8]) {
+        let handle = self.app.world().get::<RigInstance>(instance).unwrap().0.clone();
+        let content = content.to_vec();
+        let offer = move |files: TemplateFiles| files.offer(&handle, content.clone());
+        self.app.world_mut().run_system_once(offer).unwrap();
+    }
+
+    /// World places of the nodes of an instance, by uid, and poses of its controls.
+    fn places(&self, instance: Entity) -> BTreeMap<Uid, (GlobalTransform, Option<ControlPose>)> {
+        let world = self.app.world();
+        let nodes = world.get::<RigNodes>(instance).unwrap();
+        let place = |node: Entity| {
+            let of = (*world.get::<GlobalTransform>(node)?, world.get::<ControlPose>(node).copied());
+            Some((*world.get::<Uid>(node)?, of))
+        };
+        nodes.iter().filter_map(place).collect()
+    }
+}
+
+/// A chain of three joints with a control, and another on its own.
+const TWO: &str = r#"(
+    format: 2,
+    name: "two",
+    joints: [
+        (label: "a", translation: (0, 1, 0), tags: [control(creation: (name: "ctl_a"))]),
+        (label: "a_end", parent: "a", translation: (0, 0.5, 0)),
+        (label: "b", translation: (1, 1, 0), tags: [control(creation: (name: "ctl_b"))]),
+        (label: "b_end", parent: "b", translation: (0, 0.5, 0), tags: [control(creation: (name: "ctl_b_end"))]),
+    ],
+)
+"#;
+
+fn saved(folder: &Path, text: &str) -> PathBuf {
+    let path = folder.join("t.rig.ron");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn an_instance_is_built_posed_and_taken_away() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut game = Game::still();
+        let instance = game.open(&saved(folder.path(), TWO), mode);
+        let (control, end) = (game.node(instance, "ctl_a"), game.node(instance, "a_end"));
+        game.app.update();
+        let place = |game: &Game| game.app.world().get::<GlobalTransform>(end).unwrap().translation();
+        assert!(place(&game).distance(Vec3::new(0.0, 1.5, 0.0)) < 1e-6, "{mode:?} {:?}", place(&game));
+        let turned = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
+        let world = game.app.world_mut();
+        match mode {
+            InstanceMode::Hierarchy => world.get_mut::<Transform>(control).unwrap().rotation = turned,
+            InstanceMode::Direct => world.get_mut::<ControlPose>(control).unwrap().rotation = turned,
+        }
+        game.app.update();
+        assert!(place(&game).distance(Vec3::new(-0.5, 1.0, 0.0)) < 1e-5, "{mode:?} {:?}", place(&game));
+        game.app.world_mut().entity_mut(instance).remove::<RigInstance>();
+        game.app.update();
+        assert!(game.app.world().get_entity(end).is_err() && game.app.world().get::<RigRuntime>(instance).is_none());
+    }
+}
+
+#[test]
+fn a_saved_file_reaches_its_instances_and_leaves_the_rest_to_the_bit() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = saved(folder.path(), TWO);
+        let mut game = Game::live();
+        let instance = game.open(&path, mode);
+        let (control, other) = (game.node(instance, "ctl_b_end"), game.node(instance, "b_end"));
+        let turned = Quat::from_rotation_x(0.3);
+        match mode {
+            InstanceMode::Hierarchy => game.app.world_mut().get_mut::<Transform>(control).unwrap().rotation = turned,
+            InstanceMode::Direct => game.app.world_mut().get_mut::<ControlPose>(control).unwrap().rotation = turned,
+        }
+        game.app.update();
+        game.app.update();
+        let before = game.places(instance);
+        fs::write(
+            &path,
+            TWO.replace("parent: \"a\", translation: (0, 0.5, 0)", "parent: \"a\", translation: (0, 0.7, 0)"),
+        )
+        .unwrap();
+        game.until("the update", |told| told.updated.len() == 1);
+        let changed = game.app.world().get::<RunningTemplate>(instance).unwrap().get().rig.find_label("a_end").unwrap();
+        let after = game.places(instance);
+        assert_eq!(before.len(), after.len());
+        for (uid, place) in &before {
+            if *uid == changed {
+                assert!((after[uid].0.translation().y - 1.7).abs() < 1e-6);
+            } else {
+                assert_eq!(place, &after[uid], "{mode:?}");
+            }
+        }
+        assert_eq!(game.node(instance, "b_end"), other, "the entity stays");
+        assert_eq!(game.told().updated, [1]);
+        // A comment is no change.
+        fs::write(&path, fs::read_to_string(&path).unwrap().replace("(\n    format", "( // mine\n    format")).unwrap();
+        game.go_on(Duration::from_millis(100));
+        assert_eq!(game.told().updated, [1]);
+        assert!(game.told().failed.is_empty());
+        let assets = game.app.world().resource::<Assets<RigTemplate>>();
+        assert!(assets.iter().next().unwrap().1.text().contains("// mine"), "and stays in what a save writes");
+    }
+}
+
+#[test]
+fn nodes_come_and_go_and_what_others_hung_on_them_stays() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut game = Game::still();
+        let instance = game.open(&saved(folder.path(), TWO), mode);
+        let (end, gone) = (game.node(instance, "b_end"), game.node(instance, "ctl_a"));
+        let sword = game.app.world_mut().spawn((Transform::default(), ChildOf(gone))).id();
+        let text = TWO.replace(", tags: [control(creation: (name: \"ctl_a\"))]", "").replace(
+            "(label: \"b_end\", parent: \"b\"",
+            "(label: \"between\", parent: \"b\"), (label: \"b_end\", parent: \"between\"",
+        );
+        game.offer(instance, text.as_bytes());
+        game.until("the update", |told| told.updated.len() == 1);
+        game.app.update();
+        assert_eq!(game.node(instance, "b_end"), end);
+        let world = game.app.world();
+        assert!(world.get_entity(gone).is_err());
+        assert_eq!(world.get::<ChildOf>(sword).map(ChildOf::parent), Some(instance));
+        let between = game.node(instance, "between");
+        if mode == InstanceMode::Hierarchy {
+            let above: Vec<Entity> =
+                game.app.world_mut().query::<&ChildOf>().query(game.app.world()).iter_ancestors(end).collect();
+            assert!(above.contains(&between) && above.contains(&instance), "{above:?}");
+        }
+        let nodes = game.places(instance).len();
+        game.offer(instance, TWO.as_bytes());
+        game.until("the way back", |told| told.updated.len() == 2);
+        assert!(game.app.world().get_entity(between).is_err() && nodes > 0);
+        assert_eq!(game.node(instance, "b_end"), end);
+    }
+}
+
+/// Writes in pieces, with a pause after each.
+fn slowly(path: &Path, text: &str, pause: u64) {
+    use std::io::Write as _;
+    let mut file = fs::File::create(path).unwrap();
+    for piece in text.as_bytes().chunks(text.len() / 4 + 1) {
+        sleep(Duration::from_millis(pause));
+        file.write_all(piece).unwrap();
+        file.flush().unwrap();
+    }
+}
+
+#[test]
+fn a_file_is_taken_over_once_however_it_is_saved() {
+    let patterns: [(&str, fn(&Path, &str)); 12] = [
+        ("in place", |path, text| fs::write(path, text).unwrap()),
+        ("emptied, and filled after a pause", |path, text| {
+            fs::write(path, "").unwrap();
+            sleep(Duration::from_millis(120));
+            fs::write(path, text).unwrap();
+        }),
+        ("slowly", |path, text| slowly(path, text, 40)),
+        ("beside and renamed", |path, text| {
+            fs::write(path.with_extension("tmp"), text).unwrap();
+            fs::rename(path.with_extension("tmp"), path).unwrap();
+        }),
+        ("renamed from an old file", |path, text| {
+            let beside = path.with_extension("old");
+            fs::write(&beside, text).unwrap();
+            let old = fs::File::options().write(true).open(&beside).unwrap();
+            old.set_modified(std::time::SystemTime::now() - Duration::from_secs(86_400)).unwrap();
+            sleep(Duration::from_millis(50));
+            fs::rename(beside, path).unwrap();
+        }),
+        ("moved away and written anew, as vim does", |path, text| {
+            let backup = path.with_file_name("t.rig.ron~");
+            fs::rename(path, &backup).unwrap();
+            sleep(Duration::from_millis(15));
+            fs::write(path, text).unwrap();
+            fs::remove_file(backup).unwrap();
+        }),
+        ("with a lock and a backup, as emacs does", |path, text| {
+            let (lock, backup) = (path.with_file_name(".#t.rig.ron"), path.with_file_name("t.rig.ron~"));
+            fs::write(&lock, "").unwrap();
+            fs::copy(path, backup).unwrap();
+            fs::write(path, text).unwrap();
+            fs::remove_file(lock).unwrap();
+        }),
+        ("with a backup that is another template", |path, text| {
+            fs::write(path.with_file_name("t.rig.ron~"), "(format: 2)").unwrap();
+            fs::write(path, text).unwrap();
+        }),
+        ("twenty times in a row", |path, text| {
+            for number in 0..20 {
+                fs::write(path, if number % 2 == 0 { "(format: 2, na" } else { &text[..text.len() - 3] }).unwrap();
+                sleep(Duration::from_millis(3));
+            }
+            fs::write(path, text).unwrap();
+        }),
+        ("deleted and made again", |path, text| {
+            fs::remove_file(path).unwrap();
+            sleep(Duration::from_millis(60));
+            fs::write(path, text).unwrap();
+        }),
+        ("copied over a network", |path, text| {
+            // The time of the file is that of the source, and so it may stand still.
+            let time = fs::metadata(path).unwrap().modified().unwrap();
+            slowly(path, text, 20);
+            fs::File::options().write(true).open(path).unwrap().set_modified(time).unwrap();
+        }),
+        ("broken, then good", |path, text| {
+            fs::write(path, &text[..text.len() / 2]).unwrap();
+            sleep(Duration::from_millis(400));
+            fs::write(path, text).unwrap();
+        }),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let path = saved(folder.path(), TWO);
+    let mut game = Game::live();
+    let instance = game.open(&path, InstanceMode::Hierarchy);
+    let (control, end) = (game.node(instance, "ctl_b"), game.node(instance, "a_end"));
+    game.app.world_mut().get_mut::<Transform>(control).unwrap().translation.x += 0.25;
+    for (number, (name, save)) in patterns.iter().enumerate() {
+        let height = 1.0 + number as f32 * 0.25;
+        let text = TWO.replace("(0, 1, 0)", &format!("(0, {height:?}, 0)"));
+        let text = if number == 0 { text.replace("two", "three") } else { text };
+        let (path, text, save) = (path.clone(), text, *save);
+        let writer = std::thread::spawn(move || save(&path, &text));
+        game.until(name, |told| told.updated.len() == number + 1);
+        writer.join().unwrap();
+        // Nothing comes after it.
+        game.go_on(Duration::from_millis(60));
+        assert_eq!(game.told().updated.len(), number + 1, "{name}");
+        let broken = usize::from(*name == "broken, then good");
+        assert_eq!(game.told().failed.len(), broken, "{name}: {:?}", game.told().failed);
+        let world = game.app.world();
+        let place = world.get::<GlobalTransform>(end).unwrap().translation();
+        assert!((place.y - height - 0.5).abs() < 1e-5, "{name}: {place}");
+        let posed = world.get::<GlobalTransform>(control).unwrap().translation();
+        assert!((posed.x - 1.25).abs() < 1e-5, "{name}: the pose stays, {posed}");
+    }
+    let told = &game.told().failed[0];
+    assert!(told.contains("t.rig.ron") && told.contains("line "), "{told}");
+}
+
+#[test]
+fn a_thousand_broken_saves_change_nothing_and_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut game = Game::still();
+    let instance = game.open(&saved(folder.path(), CHAIN), InstanceMode::Direct);
+    game.app.update();
+    let before = game.places(instance);
+    let mut mutator = Mutator::new(7, &[b"joints", b"(", b"]"], 1 << 16);
+    let dice = &mut Dice(UidSource::seeded(8));
+    let broken = (0..).map(|number: u32| match number % 4 {
+        // Cut short, mutated, a command that fails, another uid twice.
+        0 => CHAIN.as_bytes()[..dice.below(CHAIN.len() as u64 - 3) as usize].to_vec(),
+        1 => mutator.mutate(CHAIN.as_bytes(), TWO.as_bytes()),
+        2 => CHAIN.replace("shape: \"cube\"", &format!("shape: \"no such shape {number}\"")).into_bytes(),
+        _ => CHAIN.replace("parent: \"tail_1\"", &format!("parent: \"tail_{number}\"")).into_bytes(),
+    });
+    let mut count = 0;
+    for content in broken {
+        // A mutation may be a good file after all.
+        if read_template(&content).is_ok() && !content.windows(7).any(|text| text == b"no such") {
+            continue;
+        }
+        game.offer(instance, &content);
+        count += 1;
+        game.until("the report", |told| told.failed.len() == count);
+        if count == 1000 {
+            break;
+        }
+    }
+    assert_eq!(game.told().failed.len(), 1000);
+    assert!(game.told().updated.is_empty());
+    assert!(game.told().failed.iter().all(|told| told.contains("line ")), "each has a place");
+    assert_eq!(game.places(instance), before);
+    game.offer(instance, CHAIN.replace("(0, 1, 0)", "(0, 2, 0)").as_bytes());
+    game.until("the next good save", |told| told.updated.len() == 1);
+    assert_eq!(game.told().failed.len(), 1000);
+    game.app.update();
+    assert_ne!(game.places(instance), before);
+}
+
+#[test]
+fn the_asset_server_loads_templates_and_a_failed_first_load_is_tried_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = saved(folder.path(), "(format: 2, name: ");
+    let mut game = Game::new(RigInstancePlugin::live(), folder.path());
+    let handle = game.app.world().resource::<AssetServer>().load::<RigTemplate>("t.rig.ron");
+    let instance = game.app.world_mut().spawn(RigInstance(handle)).id();
+    game.until("the failure", |told| !told.failed.is_empty());
+    assert!(game.app.world().get::<RigRuntime>(instance).is_none());
+    fs::write(&path, TWO).unwrap();
+    game.until("the first good save", |told| told.built == 1);
+    fs::write(&path, TWO.replace("(0, 1, 0)", "(0, 3, 0)")).unwrap();
+    game.until("the next", |told| told.updated.len() == 1);
+    let place = game.node(instance, "a_end");
+    assert!((game.app.world().get::<GlobalTransform>(place).unwrap().translation().y - 3.5).abs() < 1e-5);
+    // A loaded template is not built twice, and code may change it, too.
+    let good = folder.path().join("good.rig.ron");
+    fs::write(&good, TWO).unwrap();
+    let handle = game.app.world().resource::<AssetServer>().load::<RigTemplate>("good.rig.ron");
+    let other = game.spawn(handle.clone(), InstanceMode::Hierarchy);
+    game.go_on(Duration::from_millis(100));
+    assert_eq!((game.told().built, game.told().updated.len()), (2, 1));
+    let mut assets = game.app.world_mut().resource_mut::<Assets<RigTemplate>>();
+    let mut template = assets.get_mut(&handle).unwrap();
+    let mut rig = (**template.rig()).clone();
+    let tip = rig.find_label("b_end").unwrap();
+    let mut rest = rig.joint(tip).unwrap().data.rest;
+    rest.translation.y = 0.75;
+    rig.apply(&rigsmith::rig::RigEdit::SetRest(tip, rest)).unwrap();
+    template.set_rig(rig);
+    assert!(template.saved().contains("(0, 0.75, 0)") && template.saved().lines().count() == TWO.lines().count());
+    drop(template);
+    game.until("the change by code", |told| told.updated.len() == 2);
+    let place = game.node(other, "b_end");
+    game.app.update();
+    assert!((game.app.world().get::<GlobalTransform>(place).unwrap().translation().y - 1.75).abs() < 1e-5);
+}
+
+/// A skinned mesh as a loaded file has it below an entity: joints with names, and one that the rig does not have.
+fn loaded_skin(app: &mut App, below: Entity) -> (Entity, Vec<Entity>) {
+    let world = app.world_mut();
+    let armature = world.spawn((Name::new("Armature"), Transform::default(), ChildOf(below))).id();
+    let mut joints = Vec::new();
+    let mut above = armature;
+    for name in ["b", "b_end", "feather"] {
+        above = world.spawn((Name::new(name), Transform::from_xyz(0.0, 0.3, 0.0), ChildOf(above))).id();
+        joints.push(above);
+    }
+    let skin = SkinnedMesh { inverse_bindposes: Handle::default(), joints: joints.clone() };
+    (world.spawn((skin, ChildOf(armature))).id(), joints)
+}
+
+/// Skins that were bound, each with the names of joints that the instance does not have.
+#[derive(Resource, Default)]
+struct Bindings(Vec<(Entity, Vec<String>)>);
+
+#[test]
+fn skinned_meshes_of_loaded_files_follow_an_instance() {
+    let folder = tempfile::tempdir().unwrap();
+    for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
+        let mut game = Game::still();
+        game.app.init_resource::<Bindings>();
+        game.app.add_observer(|bound: On<SkinBound>, mut bindings: ResMut<Bindings>| {
+            bindings.0.push((bound.instance, bound.unknown.clone()));
+        });
+        let instance = game.open(&saved(folder.path(), TWO), mode);
+        let (mesh, joints) = loaded_skin(&mut game.app, instance);
+        game.app.update();
+        assert_eq!(game.app.world().resource::<Bindings>().0, [(instance, vec!["feather".to_owned()])]);
+        assert_eq!(game.app.world().get::<BoundTo>(mesh), Some(&BoundTo(instance)));
+        let bound = game.app.world().get::<SkinnedMesh>(mesh).unwrap().joints.clone();
+        assert_eq!(bound[..2], [game.node(instance, "b"), game.node(instance, "b_end")], "{mode:?}");
+        // A joint that the rig does not have hangs on the one above.
+        assert_eq!(bound[2], joints[2]);
+        assert_eq!(game.app.world().get::<ChildOf>(joints[2]).map(|of| of.0), Some(bound[1]));
+    }
+}
+
+#[test]
+fn joints_are_handed_over_and_taken_back() {
+    let folder = tempfile::tempdir().unwrap();
+    for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
+        let mut game = Game::still();
+        let instance = game.open(&saved(folder.path(), TWO), mode);
+        let joints = ["a", "b", "b_end"].map(|name| game.node(instance, name));
+        game.go_on(Duration::from_millis(5));
+        let places = |game: &Game| joints.map(|joint| *game.app.world().get::<GlobalTransform>(joint).unwrap());
+        let before = places(&game);
+        let to = Isometry3d::new(Vec3::new(1.0, 2.0, 3.0), Quat::from_rotation_z(0.5));
+        game.app.world_mut().entity_mut(joints[1]).insert(OutsideTransform(to));
+        game.app.world_mut().entity_mut(instance).insert(HandOver { share: 1.0 });
+        game.app.update();
+        let over = places(&game);
+        assert_eq!(over[0], before[0], "{mode:?}: the other joint is the rig's");
+        let place = Vec3::from(to.translation);
+        assert!(over[1].translation().distance(place) < 1e-6, "{mode:?} {:?}", over[1]);
+        assert!(over[1].rotation().angle_between(to.rotation) < 1e-3);
+        let below = place + to.rotation * Vec3::new(0.0, 0.5, 0.0);
+        assert!(over[2].translation().distance(below) < 1e-5, "{mode:?}: what hangs on it follows");
+        game.app.world_mut().entity_mut(instance).insert(HandOver { share: 0.5 });
+        game.app.update();
+        let half = (before[1].translation() + place) / 2.0;
+        assert!(places(&game)[1].translation().distance(half) < 1e-6);
+        // Taken back, everything stands as before; and so it does when nothing was to be handed over.
+        game.app.world_mut().entity_mut(instance).remove::<HandOver>();
+        for _ in 0..2 {
+            game.app.update();
+            for (now, before) in places(&game).iter().zip(&before) {
+                assert!(now.translation().distance(before.translation()) < 1e-6, "{mode:?}");
+            }
+        }
+    }
+}
