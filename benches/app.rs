@@ -12,23 +12,24 @@ use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use rigsmith::{
+    files::{RealDisk, load_template},
     headless::headless_app,
     plugins::{
         commands::{BuildDone, BuildRequest, BuildStep, Built, BuiltEntities},
         schema::Attributes,
     },
     prelude::*,
-    rig::{Matching, PoseOffset, TagData, TagKind, template::read_template},
+    rig::{Matching, PoseOffset, TagData, TagKind},
 };
 
 const ROUNDS: usize = 400;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let file = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/templates/biped.rig.ron"))?;
+    let file = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/templates/biped.rig.ron"));
     let mut app = headless_app(1);
     app.finish();
     app.cleanup();
-    let rig = app.world_mut().spawn(read_template(&file)?.rig).id();
+    let rig = app.world_mut().spawn(load_template(&RealDisk, file)?.rig).id();
     app.update();
     app.world_mut().write_message(BuildRequest { rig, step: BuildStep::All });
     (0..20).for_each(|_| app.update());

@@ -33,23 +33,29 @@ struct Updates {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/templates/biped.rig.ron"))?;
+    let templates = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/templates"));
     let folder = std::env::temp_dir().join(format!("rigsmith-instances-{}", std::process::id()));
-    fs::create_dir_all(&folder)?;
+    fs::create_dir_all(folder.join("parts"))?;
     let file = folder.join("biped.rig.ron");
     println!("{INSTANCES} instances, milliseconds");
     println!("{:<34} {:>8} {:>8} {:>8} {:>8} {:>8}", "", "saved", "worst", "frame", "worst", "idle");
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
-        for (name, before, after) in [
-            ("size of one control", "relative_size: 0.35", "relative_size: 0.36"),
-            ("stretch of a thumb", "weight: \"ik\")", "weight: \"ik\", max_stretch: 1.4)"),
+        for (name, changed, before, after) in [
+            ("size of one control", "biped.rig.ron", "size: 0.573", "size: 0.6"),
+            ("size in a part of both hands", "parts/hand.rig.ron", "relative_size: 0.35", "relative_size: 0.36"),
+            ("stretch of the thumbs", "parts/hand.rig.ron", "weight: \"ik\"", "weight: \"ik\", max_stretch: 1.4"),
         ] {
+            for file in ["biped.rig.ron", "parts/hand.rig.ron"] {
+                fs::copy(templates.join(file), folder.join(file))?;
+            }
+            let changed = folder.join(changed);
+            let text = fs::read_to_string(&changed)?;
             if !text.contains(before) {
                 println!("{mode:?}, {name}: not in the template");
                 continue;
             }
-            let changed = text.replacen(before, after, 1);
-            let told = measured(&file, &[text.as_str(), changed.as_str()], mode)?;
+            let other = text.replacen(before, after, 1);
+            let told = measured(&file, &changed, &[text.as_str(), other.as_str()], mode)?;
             println!("{:<34} {told}", format!("{mode:?}, {name}"));
         }
     }
@@ -57,8 +63,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn measured(file: &Path, texts: &[&str; 2], mode: InstanceMode) -> Result<String, Box<dyn std::error::Error>> {
-    fs::write(file, texts[0])?;
+/// Times of saves of `changed`, the template's own file or that of a part.
+fn measured(
+    file: &Path,
+    changed: &Path,
+    texts: &[&str; 2],
+    mode: InstanceMode,
+) -> Result<String, Box<dyn std::error::Error>> {
     let mut app = headless_app(1);
     app.add_plugins(RigInstancePlugin::live()).init_resource::<Updates>();
     app.add_observer(|updated: On<RigUpdated>, mut updates: ResMut<Updates>| {
@@ -97,9 +108,9 @@ fn measured(file: &Path, texts: &[&str; 2], mode: InstanceMode) -> Result<String
         std::thread::sleep(Duration::from_millis(60) + Duration::from_micros(700 * round as u64));
         idle.push(frame(&mut app));
         *app.world_mut().resource_mut::<Updates>() = Updates::default();
-        let beside = file.with_extension("tmp");
+        let beside = changed.with_extension("tmp");
         fs::write(&beside, texts[round % 2])?;
-        fs::rename(beside, file)?;
+        fs::rename(beside, changed)?;
         let start = Instant::now();
         loop {
             let frame = frame(&mut app);

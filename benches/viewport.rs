@@ -25,6 +25,7 @@ use bevy::{
 };
 use rigsmith::{
     algo::view::ViewPlane,
+    files::{RealDisk, load_template},
     headless::headless_app,
     mesh::{
         model::{Model, Object, Part, Weights},
@@ -32,7 +33,7 @@ use rigsmith::{
     },
     plugins::{document::JointEntities, stroke::FollowedStroke},
     prelude::*,
-    rig::{SkinData, template::read_template},
+    rig::SkinData,
 };
 
 /// Parts that each side of a triangle is cut into.
@@ -42,7 +43,7 @@ const FRAME: Duration = Duration::from_millis(8);
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let assets = concat!(env!("CARGO_MANIFEST_DIR"), "/assets");
-    let template = read_template(&std::fs::read(format!("{assets}/templates/biped.rig.ron"))?)?;
+    let template = load_template(&RealDisk, format!("{assets}/templates/biped.rig.ron").as_ref())?;
     let obj = std::fs::read(format!("{assets}/models/biped.obj"))?;
     let model = cut(&read_model(obj.as_slice(), "biped", &ObjSettings::default(), &mut |_| None)?);
     println!("{} triangles, {} points", model.parts[0].triangles.len(), model.points.len());

@@ -16,17 +16,11 @@ use rigsmith::prelude::*;
 
 const TEMPLATE: &str = include_str!("../assets/templates/biped.rig.ron");
 
-/// Joints that the file gains, with a control each.
-const TAIL: &str = r#"
-        (uid: "7a11000000000001", parent: "ec3a56602b57e984", label: "tail_1", translation: (0.0, 0.02, -0.1),
-            tags: [Command(uid: "7a11000000000011", module: "control", params: (relative_size: 0.5))]),
-        (uid: "7a11000000000002", parent: "7a11000000000001", label: "tail_2", translation: (0.0, 0.1, -0.2),
-            tags: [Command(uid: "7a11000000000012", module: "control", params: (relative_size: 0.4))]),
-        (uid: "7a11000000000003", parent: "7a11000000000002", label: "tail_3", translation: (0.0, 0.18, -0.14),
-            tags: [Command(uid: "7a11000000000013", module: "control", params: (relative_size: 0.3))]),
-        (uid: "7a11000000000004", parent: "7a11000000000003", label: "tail_4", translation: (0.0, 0.2, 0.02)),
+/// A part that the file gains.
+const TAIL: &str = r#"        (part: "parts/tail.rig.ron", parent: "hips", translation: (0, 0.02, -0.1)),
     ],
-)"#;
+)
+"#;
 
 /// The file, and whether it has been changed.
 #[derive(Resource)]
@@ -71,7 +65,7 @@ fn wave(rigs: Query<Entity, With<RigSource>>, nodes: InstanceNodes, time: Res<Ti
         if let Some(hand) = nodes.find(rig, "hand_ik_l") {
             poses.set(hand, PoseOffset { translation: Vec3::new(0.15 * swing, -0.1, 0.2), ..default() });
         }
-        for joint in ["tail_1_control", "tail_2_control", "tail_3_control"] {
+        for joint in ["tail_fk", "tail_fk_2", "tail_fk_3"] {
             if let Some(tail) = nodes.find(rig, joint) {
                 poses.set(tail, PoseOffset::from_rotation(Quat::from_rotation_z(0.4 * swing)));
             }
@@ -91,7 +85,7 @@ fn save(
         if *since > 2.0 {
             template.is_changed = true;
             let end = TEMPLATE.rfind("    ],").unwrap_or(TEMPLATE.len());
-            fs::write(&template.file, format!("{}{}\n", &TEMPLATE[..end], TAIL.trim_start_matches('\n')))?;
+            fs::write(&template.file, format!("{}{TAIL}", &TEMPLATE[..end]))?;
         }
     }
     Ok(())

@@ -39,7 +39,7 @@ pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
 pub use load::{FileKind, LoadError, load_gestures, load_model, load_rig_text, load_skin, load_template, stem};
-pub use parts::PartFiles;
+pub use parts::{BUNDLED_PARTS, PartFiles};
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote, ProjectToSave,
     load_project, project_files, store_project,
@@ -47,4 +47,4 @@ pub use project::{
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use store::{StoreError, store_model, store_rig, store_rig_over, store_skin};
-pub use watch::{FileWatch, LOOK};
+pub use watch::{FileWatch, LOOK, TemplateWatch};

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report};
 use crate::{
-    files::{Disk, EntryKind, FileKind, RealDisk},
+    files::{Disk, EntryKind, FileKind, RealDisk, load_template},
     rig::template::{self, TemplateHeader},
 };
 
@@ -81,7 +81,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Header of a file: of its beginning if that is enough, else of all of it.
+/// Header of a file: of its beginning if that is enough, else of all of it, else of the template with its parts.
 fn header(path: &Path) -> Result<TemplateHeader, String> {
     let read = |limit: u64| -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
@@ -90,13 +90,19 @@ fn header(path: &Path) -> Result<TemplateHeader, String> {
     };
     let first = read(FIRST_BYTES).map_err(|error| error.to_string())?;
     let is_whole = (first.len() as u64) < FIRST_BYTES;
-    match template::read_header(&first) {
-        Ok(header) if is_whole || header.joint_count > 0 => Ok(header),
+    let mut header = match template::read_header(&first) {
+        Ok(header) if is_whole || header.joint_count > 0 => header,
         _ => {
             let all = read(template::MAX_BYTES as u64).map_err(|error| error.to_string())?;
-            template::read_header(&all).map_err(|error| error.to_string())
+            template::read_header(&all).map_err(|error| error.to_string())?
         }
+    };
+    // What parts bring, and what a part needs, only the whole template tells, unless its author wrote it down.
+    let is_unknown = header.joint_count == 0 || header.kind == "part" && header.needs.is_none();
+    if is_unknown && let Ok(template) = load_template(&RealDisk, path) {
+        header.complete_from(&template.rig);
     }
+    Ok(header)
 }
 
 fn line(path: &Path, header: &TemplateHeader) -> String {

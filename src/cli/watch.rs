@@ -12,10 +12,10 @@ use serde_json::{Value, json};
 
 use super::{ExportArgs, Failure, InPlaceArgs, Report, SEED, WeightArgs, build::character_of, report::print};
 use crate::{
-    files::{FileKind, FileWatch, LOOK, LoadError, PartFiles, RealDisk, store_model},
+    files::{FileKind, LOOK, LoadError, PartFiles, RealDisk, TemplateWatch, store_model},
     headless::{Workbench, posing::PoseError},
     plugins::commands::BuildStep,
-    rig::{Rig, RigEdit, TagKind, Uid, operations::Operation, template, update::edits_between},
+    rig::{Rig, RigEdit, TagKind, Uid, operations::Operation, update::edits_between},
 };
 
 /// Arguments of `rigsmith watch`.
@@ -53,9 +53,9 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     let inputs: Vec<&Path> =
         [Some(&args.template), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, Some(&args.output), &[])?;
-    let mut file = FileWatch::new(&args.template, template::MAX_BYTES as u64);
+    let mut file = TemplateWatch::new(&args.template);
     let first = file.read(&RealDisk).map_err(|error| Failure::Input(Box::new(error)))?;
-    let rig = parsed(&args.template, first)?;
+    let rig = parsed(&mut file, &args.template, &first)?;
     let mut watch = Watch { args, bench: Workbench::with_rig(SEED, rig), is_json };
     let first = Instant::now();
     let all = watch.build(first, &[], None)?;
@@ -64,7 +64,7 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     while is_heard && args.count.is_none_or(|count| builds < count) {
         let bytes = next(&mut file);
         let start = Instant::now();
-        let told = match watch.update(&bytes, start) {
+        let told = match watch.update(&mut file, &bytes, start) {
             Ok(told) => {
                 builds += 1;
                 told
@@ -77,19 +77,22 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     Ok(Report::default())
 }
 
-/// The next content of a file.
-fn next(file: &mut FileWatch) -> Vec<u8> {
+/// The template's content once it or a part has a new one.
+fn next(file: &mut TemplateWatch) -> Vec<u8> {
     loop {
         sleep(LOOK);
         if let Some(content) = file.look(&RealDisk) {
-            return content.to_vec();
+            return content;
         }
     }
 }
 
-fn parsed(path: &Path, bytes: &[u8]) -> Result<Rig, Failure> {
+/// The rig of a template, whose parts are watched from now on.
+fn parsed(file: &mut TemplateWatch, path: &Path, bytes: &[u8]) -> Result<Rig, Failure> {
     let text = String::from_utf8_lossy(bytes).into_owned();
-    let read = PartFiles::new(&RealDisk).complete(path, bytes);
+    let mut files = PartFiles::new(&RealDisk);
+    let read = files.complete(path, bytes);
+    file.follow(files.asked, read.is_ok());
     Ok(read.map_err(|source| LoadError::Source { path: path.into(), text, source })?.rig)
 }
 
@@ -101,8 +104,8 @@ struct Watch<'a> {
 
 impl Watch<'_> {
     /// Takes over a saved file. If it cannot be read or built, the rig stays as it was.
-    fn update(&mut self, bytes: &[u8], start: Instant) -> Result<Value, Failure> {
-        let file = parsed(&self.args.template, bytes)?;
+    fn update(&mut self, file: &mut TemplateWatch, bytes: &[u8], start: Instant) -> Result<Value, Failure> {
+        let file = parsed(file, &self.args.template, bytes)?;
         let (before, runs) = (self.bench.rig().clone(), self.runs());
         self.change(&before, &file)?;
         self.build(start, &runs, Some(&before))

@@ -116,7 +116,7 @@ type Inbox<'w, 's> = (
 );
 
 /// Handles all file actions before this frame's edits, so that the saved state and the journal's count agree.
-fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
+pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
     let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles)) = inbox.get_mut(world) else {
         return;
     };

@@ -1,19 +1,20 @@
 //! The open template's file: when it changes on the disk, the window says what would change, and takes it over.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use bevy::{prelude::*, winit::WinitSettings};
 use bevy_egui::egui;
 
 use super::{
     ActiveRig,
-    files::OpenDocument,
+    files::{OpenDocument, attend},
     notice::Notice,
     panel::{EditorOverlay, PanelApp, Requests},
 };
 use crate::{
     instance::{AcceptUpdate, RigFailed, RigInstancePlugin, RigSource, RigUpdated, TemplateFiles, UpdateOffer},
-    rig::update::Take,
+    plugins::history::RigHistory,
+    rig::{Rig, update::Take},
 };
 
 /// Time between two looks at the file, and between two frames of a window that follows one.
@@ -29,8 +30,7 @@ impl Plugin for FollowPlugin {
             .add_message::<OfferAnswer>()
             .add_message::<Notice>()
             .add_overlay(OfferView)
-            .add_systems(Update, (follow, answer).chain())
-            .add_systems(Update, wake.run_if(resource_exists::<WinitSettings>))
+            .add_systems(Update, (follow, answer, wake.run_if(resource_exists::<WinitSettings>)).chain().after(attend))
             .add_observer(tell_update)
             .add_observer(tell_failure);
     }
@@ -48,12 +48,19 @@ pub enum OfferAnswer {
 }
 
 /// Lets documents that were opened from a template follow its file.
-fn follow(opened: Query<(Entity, &OpenDocument), Without<RigSource>>, files: TemplateFiles, mut commands: Commands) {
-    for (rig, document) in &opened {
+fn follow(
+    opened: Query<(Entity, &OpenDocument, &Rig, &RigHistory), Without<RigSource>>,
+    files: TemplateFiles,
+    mut commands: Commands,
+) {
+    for (entity, document, rig, history) in &opened {
         if let Some(template) = &document.template {
-            // What is open has come from the file as it is now. Meshes are skinned when the user says so.
-            let source = RigSource::new(files.open(template.clone())).of_first_version().without_binding();
-            commands.entity(rig).try_insert(source);
+            // Meshes are skinned when the user says so.
+            let source = RigSource::new(files.open(template.clone())).without_binding();
+            // Recovered work has come from the file too, and nobody knows how the file was then.
+            let is_as_opened = history.last().is_none();
+            let source = if is_as_opened { source.with_base(Arc::new(rig.clone())) } else { source.of_first_version() };
+            commands.entity(entity).try_insert(source);
         }
     }
 }

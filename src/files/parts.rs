@@ -11,21 +11,61 @@ use crate::{
     modules,
     processor::Modules,
     rig::{
-        Rig, SourceError,
+        SourceError,
+        part::Part,
         template::{self, Template, read_template, text_of},
     },
 };
 
+macro_rules! bundled {
+    ($($name:literal),* $(,)?) => {
+        &[$((concat!("parts/", $name, ".rig.ron"), include_str!(concat!("../../assets/templates/parts/", $name, ".rig.ron")))),*]
+    };
+}
+
+/// Parts that come with Rigsmith, by the names that templates call them.
+pub const BUNDLED_PARTS: &[(&str, &str)] = bundled![
+    "arm",
+    "eye",
+    "fk_chain",
+    "front_leg",
+    "hand",
+    "ikfk_chain",
+    "jaw",
+    "leg",
+    "leg_3joint",
+    "neck_head",
+    "single_control",
+    "spine",
+    "spring_chain",
+    "tail",
+    "wing",
+];
+
+/// Text of a part that comes with Rigsmith. It is used where no file has its name.
+fn bundled(name: &str) -> Option<&'static str> {
+    BUNDLED_PARTS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+}
+
 /// Largest depth of parts in parts.
 const DEPTH: usize = 16;
 
-/// Reader of templates with their parts. It notes the files of the parts that it has read.
+/// Where the files of parts are.
+enum Source<'a> {
+    Disk(&'a dyn Disk),
+    /// Contents that are there; `None` for files that there are not.
+    Given(&'a BTreeMap<PathBuf, Option<Vec<u8>>>),
+}
+
+/// Reader of templates with their parts. It notes the files of the parts that it has asked for.
 pub struct PartFiles<'a> {
-    disk: &'a dyn Disk,
+    source: Source<'a>,
     modules: Modules,
-    /// Files of parts, with their content.
-    pub read: BTreeMap<PathBuf, Vec<u8>>,
-    known: BTreeMap<PathBuf, Arc<Rig>>,
+    /// Files of parts, with their content if they could be read.
+    pub asked: BTreeMap<PathBuf, Option<Vec<u8>>>,
+    /// Files of parts that no list has, in the order in which they were asked for.
+    pub missing: Vec<PathBuf>,
+    known: BTreeMap<PathBuf, Arc<Part>>,
     open: Vec<PathBuf>,
 }
 
@@ -37,7 +77,17 @@ impl<'a> PartFiles<'a> {
 
     /// A reader that mirrors the parameters of these modules.
     pub fn with_modules(disk: &'a dyn Disk, modules: Modules) -> Self {
-        Self { disk, modules, read: BTreeMap::new(), known: BTreeMap::new(), open: Vec::new() }
+        Self::of(Source::Disk(disk), modules)
+    }
+
+    /// A reader that takes contents of parts from a list, and parts that come with Rigsmith for those that are not there.
+    /// Files that the list does not have are [`missing`](Self::missing).
+    pub fn given(files: &'a BTreeMap<PathBuf, Option<Vec<u8>>>) -> Self {
+        Self::of(Source::Given(files), modules::all())
+    }
+
+    fn of(source: Source<'a>, modules: Modules) -> Self {
+        Self { source, modules, missing: Vec::new(), asked: BTreeMap::new(), known: BTreeMap::new(), open: Vec::new() }
     }
 
     /// Reads a template with its parts, whose files are relative to the folder of `path`, the template's own file.
@@ -60,22 +110,42 @@ impl<'a> PartFiles<'a> {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let modules = self.modules.clone();
         let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
-        template.with_parts(text, &mut |part| self.part(&folder.join(part)), &mirror)
+        template.with_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
     }
 
-    fn part(&mut self, path: &Path) -> Result<Arc<Rig>, String> {
+    fn part(&mut self, path: &Path, name: &str) -> Result<Arc<Part>, String> {
         if let Some(known) = self.known.get(path) {
             return Ok(known.clone());
         }
         if self.open.iter().any(|open| open == path) || self.open.len() >= DEPTH {
             return Err(format!("`{}` is a part of itself; take it out of one of the files", path.display()));
         }
-        let bytes = read_capped(self.disk, path, template::MAX_BYTES as u64).map_err(|error| error.to_string())?;
+        let (read, is_there) = match self.source {
+            Source::Disk(disk) => {
+                let read = read_capped(disk, path, template::MAX_BYTES as u64);
+                (read.map_err(|error| error.to_string()), disk.entry(path, true).is_ok())
+            }
+            Source::Given(files) => {
+                let known = files.get(path);
+                if known.is_none() {
+                    self.missing.push(path.to_owned());
+                }
+                let read = known.cloned().flatten();
+                let is_there = read.is_some();
+                (read.ok_or_else(|| format!("there is no file `{}`", path.display())), is_there)
+            }
+        };
+        self.asked.insert(path.to_owned(), read.as_ref().ok().cloned());
+        let bytes = match (read, bundled(name)) {
+            (Ok(bytes), _) => bytes,
+            (Err(_), Some(text)) if !is_there => text.as_bytes().to_vec(),
+            (Err(error), _) => return Err(error),
+        };
         self.open.push(path.to_owned());
         let template = self.complete(path, &bytes);
         self.open.pop();
-        self.read.insert(path.to_owned(), bytes);
-        let part = Arc::new(template.map_err(|error| format!("`{}`: {error}", path.display()))?.rig);
+        let template = template.map_err(|error| format!("`{}`: {error}", path.display()))?;
+        let part = Arc::new(Part { rig: template.rig, chains: template.chains });
         self.known.insert(path.to_owned(), part.clone());
         Ok(part)
     }

@@ -5,11 +5,13 @@
 //! content where those changed and every so often anyway.
 
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     time::{Duration, SystemTime},
 };
 
 use super::{Disk, ReadError, read_capped};
+use crate::rig::template;
 
 /// Time between two looks at a file that one should take.
 pub const LOOK: Duration = Duration::from_millis(10);
@@ -75,5 +77,61 @@ impl FileWatch {
     pub fn read(&mut self, disk: &dyn Disk) -> Result<&[u8], ReadError> {
         let content = read_capped(disk, &self.path, self.limit)?;
         Ok(self.known.insert(content))
+    }
+}
+
+/// A template's file and the files of its parts, whose saves are awaited.
+#[derive(Debug, Clone)]
+pub struct TemplateWatch {
+    own: FileWatch,
+    parts: Vec<FileWatch>,
+}
+
+impl TemplateWatch {
+    /// A watch of a template's file. Its parts are followed once they are [told](Self::follow).
+    pub fn new(path: &Path) -> Self {
+        Self { own: FileWatch::new(path, template::MAX_BYTES as u64), parts: Vec::new() }
+    }
+
+    /// Number of files that are watched.
+    pub fn count(&self) -> usize {
+        1 + self.parts.len()
+    }
+
+    /// Reads the template's own file at once, as it is.
+    ///
+    /// # Errors
+    /// See [`read_capped`].
+    pub fn read(&mut self, disk: &dyn Disk) -> Result<Vec<u8>, ReadError> {
+        self.own.read(disk).map(<[u8]>::to_vec)
+    }
+
+    /// Looks at all files, see [`FileWatch::look`]. The content of the template's own file, if one of them has a new one.
+    pub fn look(&mut self, disk: &dyn Disk) -> Option<Vec<u8>> {
+        let own = self.own.look(disk).map(<[u8]>::to_vec);
+        let mut is_part = false;
+        for part in &mut self.parts {
+            is_part |= part.look(disk).is_some();
+        }
+        own.or_else(|| match &self.own.known {
+            _ if !is_part => None,
+            Some(known) => Some(known.clone()),
+            None => self.own.read(disk).ok().map(<[u8]>::to_vec),
+        })
+    }
+
+    /// Takes note of the files of parts that a reader has asked for, with what it got of each. While a template
+    /// cannot be read as a whole, the parts that it had before stay watched as well.
+    pub fn follow(&mut self, asked: BTreeMap<PathBuf, Option<Vec<u8>>>, is_whole: bool) {
+        if is_whole {
+            self.parts.retain(|part| asked.contains_key(&part.path));
+        }
+        for (path, content) in asked {
+            if self.parts.iter().all(|part| part.path != path) {
+                let mut watch = FileWatch::new(&path, template::MAX_BYTES as u64);
+                watch.known = content;
+                self.parts.push(watch);
+            }
+        }
     }
 }

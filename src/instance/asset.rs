@@ -1,6 +1,6 @@
 //! Templates as assets.
 
-use std::{path::Path, sync::Arc};
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use bevy::{
     asset::{
@@ -15,7 +15,7 @@ use crate::{
     files::PartFiles,
     rig::{
         Rig, SourceError,
-        template::{Template, read_template, text_of, write_template, write_template_over},
+        template::{Template, text_of, write_template, write_template_over},
     },
 };
 
@@ -35,18 +35,12 @@ impl RigTemplate {
         Self { has_parts: false, rig: Arc::new(rig), text: Arc::from("") }
     }
 
-    /// The template that a file holds.
+    /// The template that a text holds. Its parts are those that come with Rigsmith.
     ///
     /// # Errors
-    /// See [`read_template`]. A template with parts needs [`read_with_parts`](Self::read_with_parts).
+    /// See [`PartFiles::complete`]. A template with other parts needs [`read_with_parts`](Self::read_with_parts).
     pub fn read(content: &[u8]) -> Result<Self, SourceError> {
-        let template = read_template(content)?;
-        if let Some(part) = template.parts.first() {
-            let message =
-                "a template with parts is opened from its file, which says where they are: `TemplateFiles::open`";
-            return Err(SourceError::at(text_of(content)?, part.offset, message.to_owned()));
-        }
-        Self::of(template, content)
+        Self::read_with_parts(content, Path::new(""), &mut PartFiles::given(&BTreeMap::new()))
     }
 
     /// The template that a file holds, with its parts.
@@ -121,11 +115,26 @@ impl AssetLoader for RigTemplateLoader {
         &self,
         reader: &mut dyn Reader,
         (): &(),
-        _: &mut LoadContext<'_>,
+        context: &mut LoadContext<'_>,
     ) -> Result<RigTemplate, Self::Error> {
         let mut content = Vec::new();
         reader.read_to_end(&mut content).await?;
-        Ok(RigTemplate::read(&content)?)
+        let path = context.path().clone();
+        // The parts that are asked for are read until all are there; the server loads the template again when one changes.
+        let mut parts = BTreeMap::new();
+        loop {
+            let mut files = PartFiles::given(&parts);
+            let template = RigTemplate::read_with_parts(&content, path.path(), &mut files);
+            let missing = files.missing;
+            if missing.is_empty() {
+                return Ok(template?);
+            }
+            for part in missing {
+                let of_source = AssetPath::from_path_buf(part.clone()).with_source(path.source().clone_owned());
+                let content = context.read_asset_bytes(of_source).await.ok();
+                parts.insert(part, content);
+            }
+        }
     }
 
     fn extensions(&self) -> &[&str] {

@@ -15,7 +15,7 @@ use bevy::{asset::AssetId, log::error};
 
 use super::{RigTemplate, TemplateError};
 use crate::{
-    files::{FileWatch, PartFiles, RealDisk},
+    files::{PartFiles, RealDisk, TemplateWatch},
     processor::{BuildError, Builder, Modules, SourceText},
     rig::{
         BuiltRig, Rig, Uid, template,
@@ -111,13 +111,9 @@ struct Kept {
     /// The last build that succeeded.
     good: Option<Arc<BuiltTemplate>>,
     file: Option<PathBuf>,
-    watch: Option<FileWatch>,
+    watch: Option<TemplateWatch>,
     /// Uids of things that got another name since they were built first, by those of their names now.
     identities: HashMap<Uid, Uid>,
-    /// The files of its parts.
-    parts: Vec<FileWatch>,
-    /// The file's content that was read last.
-    last: Vec<u8>,
     /// Reason for which the file's content was not taken over, and since when it has been so.
     fault: Option<(Instant, TemplateError)>,
 }
@@ -128,7 +124,8 @@ const PAUSE_FOR_EACH: Duration = Duration::from_micros(100);
 impl BuildThread {
     fn run(&mut self, work: &Receiver<Work>) {
         loop {
-            let watches = self.templates.values().filter(|kept| kept.watch.is_some()).count();
+            let watches: usize =
+                self.templates.values().filter_map(|kept| kept.watch.as_ref()).map(TemplateWatch::count).sum();
             let next = if watches == 0 {
                 work.recv().map_err(|_| RecvTimeoutError::Disconnected)
             } else {
@@ -152,19 +149,19 @@ impl BuildThread {
         let outcome = match work {
             Work::Build { id, template, modules } => Some(self.kept(id, &modules).build(id, template, false)),
             Work::Open { id, file, modules, is_watched } => {
-                let mut watch = FileWatch::new(&file, template::MAX_BYTES as u64);
+                let mut watch = TemplateWatch::new(&file);
                 let kept = self.kept(id, &modules);
                 kept.file = Some(file);
-                let outcome = match watch.read(&RealDisk) {
-                    Ok(content) => kept.content(id, content).unwrap_or_else(|error| refused(id, error)),
-                    Err(error) => refused(id, TemplateError::Load(error.to_string())),
-                };
+                let content = watch.read(&RealDisk);
                 kept.watch = is_watched.then_some(watch);
-                Some(outcome)
+                Some(match content {
+                    Ok(content) => kept.content(id, &content).unwrap_or_else(|error| refused(id, error)),
+                    Err(error) => refused(id, TemplateError::Load(error.to_string())),
+                })
             }
             Work::Watch { id, file, modules } => {
                 let kept = self.kept(id, &modules);
-                kept.watch = Some(FileWatch::new(&file, template::MAX_BYTES as u64));
+                kept.watch = Some(TemplateWatch::new(&file));
                 kept.file = Some(file);
                 None
             }
@@ -191,8 +188,6 @@ impl BuildThread {
             file: None,
             watch: None,
             identities: HashMap::new(),
-            parts: Vec::new(),
-            last: Vec::new(),
             fault: None,
         })
     }
@@ -205,12 +200,7 @@ fn refused(id: Id, error: TemplateError) -> Outcome {
 impl Kept {
     /// Looks at the file: takes over a new content, or tells why not once it has been so for a while.
     fn look(&mut self, id: Id, patience: Duration) -> Option<Outcome> {
-        let own = self.watch.as_mut()?.look(&RealDisk).map(<[u8]>::to_vec);
-        let mut is_part = false;
-        for part in &mut self.parts {
-            is_part |= part.look(&RealDisk).is_some();
-        }
-        let content = own.or_else(|| is_part.then(|| self.last.clone()));
+        let content = self.watch.as_mut()?.look(&RealDisk);
         let outcome = content.and_then(|content| match self.content(id, &content) {
             Ok(outcome) => {
                 self.fault = None;
@@ -231,29 +221,19 @@ impl Kept {
 
     /// Reads and builds a content of the file. An error leaves everything as it is; it is told by the caller.
     fn content(&mut self, id: Id, content: &[u8]) -> Result<Outcome, TemplateError> {
-        self.last = content.to_vec();
         let mut files = PartFiles::with_modules(&RealDisk, (*self.modules).clone());
         let read = match &self.file {
             Some(file) => RigTemplate::read_with_parts(content, file, &mut files),
             None => RigTemplate::read(content),
         };
-        self.follow_parts(files.read);
+        if let Some(watch) = &mut self.watch {
+            watch.follow(files.asked, read.is_ok());
+        }
         let template = read.map_err(|source| TemplateError::Source { file: self.file.clone(), source })?;
         let outcome = self.build(id, template, true);
         match outcome.result {
             Err(error) => Err(error),
             Ok(_) => Ok(outcome),
-        }
-    }
-
-    /// Watches the files of parts that were read. Those of before stay watched while a part cannot be read.
-    fn follow_parts(&mut self, read: BTreeMap<PathBuf, Vec<u8>>) {
-        for (path, content) in read {
-            if self.parts.iter().all(|part| part.path() != path) {
-                let mut watch = FileWatch::new(&path, template::MAX_BYTES as u64);
-                watch.know(content);
-                self.parts.push(watch);
-            }
         }
     }
 

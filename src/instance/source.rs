@@ -106,6 +106,11 @@ impl RigSource {
         self
     }
 
+    /// Takes note that the template was saved from the rig, as it was then.
+    pub fn rebase(&mut self, saved: Arc<Rig>) {
+        self.base = Some(saved);
+    }
+
     /// The version of the template that was accepted last; `None` until it is loaded, or if nobody knows.
     pub fn base(&self) -> Option<&Arc<Rig>> {
         self.base.as_ref()

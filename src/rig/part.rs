@@ -5,10 +5,13 @@
 //! connected through its sockets.
 
 mod instance;
+mod resize;
 
 use std::{collections::HashMap, fmt};
 
-pub use instance::{MirrorParams, PartChange, PartInstance};
+pub use instance::{MirrorParams, Part, PartChange, PartInstance};
+pub(in crate::rig) use resize::MOST_JOINTS;
+pub use resize::PartChain;
 
 use crate::rig::{
     NodeRef, Rig, RigJoint, TagKind, Uid,

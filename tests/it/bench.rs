@@ -3,10 +3,21 @@
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
-use rigsmith::{plugins::document::JointEntities, prelude::*, test_app::test_app};
+use rigsmith::{
+    files::{RealDisk, load_template},
+    plugins::document::JointEntities,
+    prelude::*,
+    test_app::test_app,
+};
 
 /// Time after which a wait counts as endless, far more than a busy machine needs.
 pub const HANG: Duration = Duration::from_secs(120);
+
+/// A template that comes with the program, such as `biped` or `parts/arm`.
+pub fn shipped(name: &str) -> Rig {
+    let path = format!("{}/assets/templates/{name}.rig.ron", env!("CARGO_MANIFEST_DIR"));
+    load_template(&RealDisk, path.as_ref()).unwrap_or_else(|error| panic!("{error}")).rig
+}
 
 /// Runs frames until something holds, and gives background work some time between them.
 #[track_caller]

@@ -24,7 +24,7 @@ use rigsmith::{
         viewport::{RigViewport, Sight},
     },
     prelude::*,
-    rig::{JointData, NodeKind, RestTransform, RigEdit, operations::MirrorPlane, template::read_template},
+    rig::{JointData, NodeKind, RestTransform, RigEdit, operations::MirrorPlane},
     test_app::strict_app,
 };
 
@@ -397,8 +397,7 @@ fn drawing_app() -> (App, Entity, Entity) {
     let mut app = headless_app(1);
     app.add_plugins(AssetPlugin::default()).init_asset::<Mesh>().add_plugins(DrawingPlugin);
     let mut app = strict_app(app);
-    let template = read_template(include_bytes!("../../assets/templates/biped.rig.ron")).unwrap();
-    let rig = app.world_mut().spawn(template.rig).id();
+    let rig = app.world_mut().spawn(crate::bench::shipped("biped")).id();
     let target = RenderTargetInfo { physical_size: SIZE.as_uvec2(), scale_factor: 1.0 };
     let computed = ComputedCameraValues { target_info: Some(target), ..default() };
     let eye = Transform::from_xyz(0.0, 1.0, 3.0).looking_at(Vec3::Y, Vec3::Y);

@@ -26,7 +26,7 @@ use rigsmith::{
     },
     prelude::*,
     render::bevy_plugins,
-    rig::{operations::MirrorPlane, template::read_template},
+    rig::operations::MirrorPlane,
 };
 
 use crate::prerequisites::skip;
@@ -57,8 +57,7 @@ impl Studio {
         app.finish();
         app.cleanup();
         let world = app.world_mut();
-        let template = read_template(include_bytes!("../../assets/templates/biped.rig.ron")).unwrap();
-        let rig = world.spawn(template.rig).id();
+        let rig = world.spawn(crate::bench::shipped("biped")).id();
         let target = Image::new_target_texture(size().x, size().y, TextureFormat::Rgba8UnormSrgb, None);
         let target = world.resource_mut::<Assets<Image>>().add(target);
         let camera = (

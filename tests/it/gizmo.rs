@@ -484,8 +484,7 @@ fn control_snaps_and_clicks_on_handles_pick_what_is_there() {
 /// of the hand, and the arrow of the gizmo moves control, hand and elbow as one step.
 #[test]
 fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
-    let file = std::fs::read("assets/templates/biped.rig.ron").unwrap();
-    let rig = rigsmith::rig::template::read_template(&file).unwrap().rig;
+    let rig = crate::bench::shipped("biped");
     for sight in sights(Transform::IDENTITY) {
         let mut app = headless_app(1);
         app.add_plugins((ToolsPlugin, BuildingPlugin));

@@ -500,3 +500,31 @@ fn joints_are_handed_over_and_taken_back() {
         }
     }
 }
+
+#[test]
+fn the_asset_server_loads_parts_too() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("limbs")).unwrap();
+    let limb = folder.path().join("limbs/limb.rig.ron");
+    let part = "(format: 2, name: \"limb\", joints: [(label: \"knee\", translation: (0, 1, 0), tags: [control()])])";
+    fs::write(&limb, part).unwrap();
+    // One part of its own, one that comes with the program.
+    let text = "(format: 2, name: \"doll\", joints: [(label: \"hip\")], parts: [(part: \"limbs/limb.rig.ron\", parent: \
+                \"hip\"), (part: \"parts/jaw.rig.ron\", parent: \"hip\")])";
+    saved(folder.path(), text);
+    let mut game = Game::new(RigInstancePlugin::live(), folder.path());
+    let handle = game.app.world().resource::<AssetServer>().load::<RigTemplate>("t.rig.ron");
+    let instance = game.app.world_mut().spawn((RigInstance(handle), InstanceMode::Hierarchy)).id();
+    game.until("the character", |told| told.built == 1);
+    let height = |game: &mut Game| {
+        let knee = game.node(instance, "knee");
+        game.app.world().get::<GlobalTransform>(knee).unwrap().translation().y
+    };
+    game.go_on(Duration::from_millis(50));
+    assert_eq!(height(&mut game), 1.0);
+    game.node(instance, "jaw_tip");
+    fs::write(&limb, part.replace("(0, 1, 0)", "(0, 3, 0)")).unwrap();
+    game.until("the part", |told| !told.updated.is_empty());
+    game.go_on(Duration::from_millis(50));
+    assert_eq!((height(&mut game), game.told().failed.len()), (3.0, 0));
+}

@@ -1,16 +1,13 @@
 //! Poses that mean the same when a rig changes: the bundled biped in a hundred poses, changed in the ways in which riggers
 //! change rigs.
 
-use std::{collections::HashSet, fs, sync::Arc};
+use std::{collections::HashSet, sync::Arc};
 
 use bevy::math::{EulerRot, Quat, Vec3};
 use rigsmith::{
     modules,
     processor::{Builder, PoseNote, keep_poses},
-    rig::{
-        GroupData, JointData, NodeType, PoseOffset, Rig, RigEdit, StoredPose, TagData, TagKind, Uid, UidSource,
-        template::read_template,
-    },
+    rig::{GroupData, JointData, NodeType, PoseOffset, Rig, RigEdit, StoredPose, TagData, TagKind, Uid, UidSource},
     solve::{
         program::{CompileOptions, RigProgram, RigState},
         weights::{multiply, relative},
@@ -24,8 +21,7 @@ const POSES: u64 = 100;
 const NEAR: (f32, f32) = (1e-4, 0.05);
 
 fn biped() -> Rig {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/templates/biped.rig.ron");
-    read_template(&fs::read(file).unwrap()).unwrap().rig
+    crate::bench::shipped("biped")
 }
 
 fn program(rig: &Rig) -> Arc<RigProgram> {
@@ -146,8 +142,8 @@ impl Found {
     }
 }
 
-fn set_params(rig: &mut Rig, tag: u64, change: impl Fn(&str) -> String) {
-    let (joint, found) = rig.find_tag(Uid(tag)).unwrap();
+fn set_params(rig: &mut Rig, tag: Uid, change: impl Fn(&str) -> String) {
+    let (joint, found) = rig.find_tag(tag).unwrap();
     let (joint, mut found) = (joint.data.uid, found.clone());
     let TagKind::Command { params, .. } = &mut found.kind else { panic!() };
     let changed = change(params);
@@ -156,9 +152,9 @@ fn set_params(rig: &mut Rig, tag: u64, change: impl Fn(&str) -> String) {
     apply(rig, RigEdit::SetTag(joint, Box::new(found)));
 }
 
-fn remove_tag(rig: &mut Rig, tag: u64) {
-    let joint = rig.find_tag(Uid(tag)).unwrap().0.data.uid;
-    apply(rig, RigEdit::RemoveTag(joint, Uid(tag)));
+fn remove_tag(rig: &mut Rig, tag: Uid) {
+    let joint = rig.find_tag(tag).unwrap().0.data.uid;
+    apply(rig, RigEdit::RemoveTag(joint, tag));
 }
 
 fn reparent(rig: &mut Rig, joint: Uid, parent: Uid) {
@@ -181,13 +177,50 @@ fn flip(rig: &mut Rig, label: &str, turn: Quat) {
     }
 }
 
-const HAND_IK: u64 = 0x342c_2d08_8251_982c;
-const ELBOW: u64 = 0x9b30_3fc7_3c56_75bd;
-const POLE: u64 = 0x8687_b121_b6e1_13e0;
-const POLE_SPACES: u64 = 0x8157_7675_798d_f8b5;
-const ARM_SWITCH: u64 = 0x8ea9_c24f_26af_8351;
-const ARM_FK: u64 = 0xe480_eb29_a12b_28bb;
-const SPINE_FK: u64 = 0xdb77_82ac_5075_6620;
+/// The command of a module on a joint whose parameters say this.
+fn command(rig: &Rig, joint: &str, module: &str, says: &str) -> Uid {
+    let joint = rig.joint(rig.find_label(joint).unwrap()).unwrap();
+    let is_it = |tag: &&TagData| match &tag.kind {
+        TagKind::Command { module: of, params, .. } => of == module && params.contains(says),
+        TagKind::Feature { .. } => false,
+    };
+    let mut found = joint.data.tags.iter().filter(is_it);
+    let first = found.next().unwrap_or_else(|| panic!("no {module} with {says}")).uid;
+    assert!(found.next().is_none(), "several {module} with {says}");
+    first
+}
+
+/// Those of the left arm and the trunk.
+struct Known {
+    hand_ik: Uid,
+    elbow: Uid,
+    pole: Uid,
+    pole_spaces: Uid,
+    arm_switch: Uid,
+    arm_fk: Uid,
+    spine_fk: Uid,
+    root: Uid,
+    torso: Uid,
+    hips: Uid,
+}
+
+impl Known {
+    fn of(rig: &Rig) -> Self {
+        let elbow = command(rig, "hand_l", "control", "\"elbow_l\"");
+        Self {
+            elbow,
+            hand_ik: command(rig, "hand_l", "control", "\"hand_ik_l\""),
+            pole: command(rig, "hand_l", "pole_vector", ""),
+            pole_spaces: command(rig, "hand_l", "space_switch", &format!("control: \"@command control/hand_l#{elbow}")),
+            arm_switch: command(rig, "hand_l", "ik_fk_switch", ""),
+            arm_fk: command(rig, "upper_arm_l", "control", "arm_fk_l"),
+            spine_fk: command(rig, "spine", "control", "spine_fk"),
+            root: command(rig, "hips", "control", "\"root\""),
+            torso: command(rig, "hips", "control", "\"torso\""),
+            hips: command(rig, "hips", "control", "\"hips\""),
+        }
+    }
+}
 
 #[test]
 fn names_groups_and_values_leave_poses_alone() {
@@ -195,11 +228,12 @@ fn names_groups_and_values_leave_poses_alone() {
     let mut after = before.clone();
     let (arm, hand) = (after.find_label("forearm_l").unwrap(), after.find_label("hand_l").unwrap());
     apply(&mut after, RigEdit::SetLabel(arm, Some("lower_arm_l".into())));
-    set_params(&mut after, ARM_FK, |params| params.replace("arm_fk_l", "forward_l"));
+    let known = Known::of(&before);
+    set_params(&mut after, known.arm_fk, |params| params.replace("arm_fk_l", "forward_l"));
     let group = GroupData { uid: Uid(4711), name: "other".into(), ..after.groups()[0].clone() };
     apply(&mut after, RigEdit::AddLocalGroup(group, usize::MAX));
     apply(&mut after, RigEdit::SetGroup(hand, Some(Uid(4711))));
-    set_params(&mut after, HAND_IK, |params| params.replace("relative_size: 0.5", "relative_size: 0.7"));
+    set_params(&mut after, known.hand_ik, |params| params.replace("relative_size: 0.5", "relative_size: 0.7"));
     let mut kept = after.clone();
     assert!(keep_poses(&before, &mut kept, &Arc::new(modules::all())).unwrap().is_empty());
     assert_eq!(kept, after);
@@ -211,7 +245,8 @@ fn names_groups_and_values_leave_poses_alone() {
 fn controls_below_another_parent_hold_the_joints() {
     let before = posed(biped());
     let mut after = before.clone();
-    set_params(&mut after, SPINE_FK, |params| params.replace("3775f68e9d2f9436", "046eeae1155362d1"));
+    let known = Known::of(&before);
+    set_params(&mut after, known.spine_fk, |params| params.replace(&known.torso.to_string(), &known.hips.to_string()));
     check("a spine below the hips", &before, &after).is_held(0);
     let mut after = before.clone();
     let [clavicle, spine] = ["clavicle_l", "spine_1"].map(|label| after.find_label(label).unwrap());
@@ -239,7 +274,8 @@ fn a_control_that_is_split_holds_the_joints() {
     let mut after = before.clone();
     let spine = after.find_label("spine").unwrap();
     // The torso moved hips and spine; now the spine has a control of its own.
-    let root = "@command control/hips#8dc0d4a04e67283e role:control";
+    let known = Known::of(&before);
+    let root = format!("@command control/hips#{} role:control", known.root);
     let kind = TagKind::Command {
         module: "control".into(),
         params: format!("(parent: \"{root}\", follow: false, creation: (name: \"upper_body\"))"),
@@ -247,9 +283,7 @@ fn a_control_that_is_split_holds_the_joints() {
     };
     let upper = TagData { uid: Uid(0x1234), enabled: true, comment: String::new(), kind };
     apply(&mut after, RigEdit::AddTag { joint: spine, tag: Box::new(upper), index: 0 });
-    set_params(&mut after, SPINE_FK, |params| {
-        params.replace("@command control/hips#3775f68e9d2f9436", "@command control/spine#0000000000001234")
-    });
+    set_params(&mut after, known.spine_fk, |params| params.replace(&known.torso.to_string(), "0000000000001234"));
     check("a control in two", &before, &after).is_held(2);
 }
 
@@ -278,11 +312,14 @@ fn an_inserted_joint_holds_the_others() {
 #[test]
 fn an_added_pole_holds_the_limb() {
     let mut before = biped();
-    for tag in [POLE_SPACES, POLE, ELBOW] {
+    let known = Known::of(&before);
+    for tag in [known.pole_spaces, known.pole, known.elbow] {
         remove_tag(&mut before, tag);
     }
-    set_params(&mut before, ARM_SWITCH, |params| {
-        params.replace("pole: \"@command control/hand_l#9b303fc73c5675bd role:control\", ", "")
+    set_params(&mut before, known.arm_switch, |params| {
+        let start = params.find("pole: ").unwrap();
+        let end = start + params[start..].find("\",").unwrap() + 2;
+        format!("{}{}", &params[..start], &params[end..])
     });
     let before = posed(before);
     let mut after = biped();

@@ -27,6 +27,8 @@ mod drawing_pictures;
 mod edit_text;
 #[cfg(feature = "editor")]
 mod editor_files;
+#[cfg(feature = "editor")]
+mod editor_follow;
 mod edits;
 #[cfg(feature = "editor")]
 mod examples;
@@ -80,6 +82,7 @@ mod obj_torture;
 #[cfg(feature = "editor")]
 mod panels;
 mod part_instances;
+mod part_sizes;
 mod parts;
 mod parts_more;
 mod picking;

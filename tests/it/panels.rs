@@ -514,8 +514,7 @@ fn only_rows_in_view_are_drawn() {
 fn the_controls_panel_poses_resets_and_switches() {
     let mut desk = Desk::new(ControlsPanel::default());
     assert!(desk.says("The rig has no commands yet."));
-    let file = std::fs::read("assets/templates/biped.rig.ron").unwrap();
-    let rig = rigsmith::rig::template::read_template(&file).unwrap().rig;
+    let rig = crate::bench::shipped("biped");
     let entity = desk.rig;
     desk.app.world_mut().entity_mut(entity).insert(rig);
     desk.app.world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });

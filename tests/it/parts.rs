@@ -1,8 +1,6 @@
 //! The templates that come with the crate: they stand as they rest, and move as an animator expects.
 
 mod biped;
-#[path = "../../examples/generate_templates/main.rs"]
-mod generator;
 mod limbs;
 mod off;
 mod switches;
@@ -15,13 +13,14 @@ use std::{
 
 use bevy::math::{Quat, Vec3};
 use rigsmith::{
+    files::BUNDLED_PARTS,
     mesh::model::Trs,
     modules,
     processor::{Builder, Modules, review},
     rig::{
         BuiltNode, BuiltRig, NodeType, PoseOffset, Rig, Uid, UidSource, feature,
         operations::{Operation, TagOperation},
-        template::{read_template, write_template},
+        template::{UidStyle, format_template},
     },
     solve::program::{CompileOptions, RigProgram, RigState},
 };
@@ -45,8 +44,7 @@ fn files() -> Vec<(String, PathBuf)> {
 }
 
 fn template(name: &str) -> Rig {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("assets/templates/{name}.rig.ron"));
-    read_template(&std::fs::read(path).unwrap()).unwrap().rig
+    crate::bench::shipped(name)
 }
 
 fn all_modules() -> Arc<Modules> {
@@ -174,17 +172,22 @@ impl Puppet {
     }
 }
 
+/// What a person would write: no uid, the layout of `rigsmith format`, and as many lines as one can read.
 #[test]
-fn files_are_what_the_generator_writes() {
-    let written = generator::templates().unwrap();
-    let mut names: Vec<String> = written.iter().map(|(path, _)| path.replace(".rig.ron", "")).collect();
-    names.sort();
-    let known: Vec<String> = files().into_iter().map(|(name, _)| name).collect();
-    assert_eq!(names, known);
-    for (path, rig) in written {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates").join(&path);
-        assert!(std::fs::read_to_string(file).unwrap() == write_template(&rig), "{path}: generate the templates again");
+fn files_are_written_by_people() {
+    for (name, path) in files() {
+        let text = std::fs::read_to_string(path).unwrap();
+        assert_eq!(format_template(&text, UidStyle::Derived).unwrap(), text, "{name} has uids");
+        assert!(format_template(&text, UidStyle::Kept).unwrap() == text, "{name}: `rigsmith format` it");
+        let most = if name == "biped" { 300 } else { 550 };
+        assert!(text.lines().count() <= most, "{name} has {} lines", text.lines().count());
     }
+    // Every part comes with the program, so that a template finds it wherever it lies.
+    let parts: Vec<String> =
+        files().into_iter().filter_map(|(name, _)| Some(name.strip_prefix("parts/")?.to_owned())).collect();
+    let bundled: Vec<&str> =
+        BUNDLED_PARTS.iter().map(|(name, _)| &name["parts/".len()..name.len() - ".rig.ron".len()]).collect();
+    assert_eq!(parts, bundled);
 }
 
 #[test]

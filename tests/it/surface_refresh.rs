@@ -18,7 +18,7 @@ use rigsmith::{
     },
     plugins::document::{Hovered, JointEntities},
     prelude::*,
-    rig::{SkinData, template::read_template},
+    rig::SkinData,
 };
 
 use crate::{
@@ -33,7 +33,7 @@ impl RigBench {
     fn biped() -> Self {
         let assets = concat!(env!("CARGO_MANIFEST_DIR"), "/assets");
         let read = |name: &str| std::fs::read(format!("{assets}/{name}")).unwrap();
-        let mut bench = Self::of(read_template(&read("templates/biped.rig.ron")).unwrap().rig);
+        let mut bench = Self::of(crate::bench::shipped("biped"));
         let obj = read("models/biped.obj");
         let model = read_model(obj.as_slice(), "biped", &ObjSettings::default(), &mut |_| None).unwrap();
         let skin = near_weights(bench.rig(), &model.points);

@@ -8,13 +8,13 @@ use std::{path::PathBuf, sync::Arc};
 
 use bevy::prelude::*;
 use rigsmith::{
+    files::{RealDisk, load_template},
     plugins::{
         commands::{BuildRequest, BuildStep, Built, BuiltEntities},
         document::JointEntities,
         runtime::RigRuntime,
     },
     prelude::*,
-    rig::template::read_template,
     solve::program::{CompileOptions, RigProgram, RigState},
     test_app::test_app,
 };
@@ -31,7 +31,7 @@ pub fn shipped() -> Vec<(String, Rig)> {
     assert!(files.len() >= 18, "{files:?}");
     let read = |path: PathBuf| {
         let name = path.file_name().unwrap().to_string_lossy().replace(".rig.ron", "");
-        (name, read_template(&std::fs::read(&path).unwrap()).unwrap().rig)
+        (name, load_template(&RealDisk, &path).unwrap().rig)
     };
     files.into_iter().map(read).collect()
 }

@@ -28,6 +28,7 @@ use crate::{
         journal::{Journal, SaveMark},
         project_files, read_capped, save_atomic, save_set, stem, store_model, store_rig_over, store_skin,
     },
+    instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
     plugins::{commands::Built, history::RigHistory, surface::RigMesh},
     rig::{
@@ -73,8 +74,16 @@ struct Job {
 
 /// Content that was written.
 enum SavedContent {
-    Project { mark: SaveMark, notes: Vec<String>, bundled: Option<PathBuf> },
-    Export { notes: Vec<String> },
+    Project {
+        mark: SaveMark,
+        notes: Vec<String>,
+        bundled: Option<PathBuf>,
+    },
+    /// With the rig if it was saved to the template that was opened.
+    Export {
+        notes: Vec<String>,
+        template: Option<Arc<Rig>>,
+    },
 }
 
 /// Initial path in the dialog.
@@ -229,7 +238,8 @@ fn export(world: &mut World, path: PathBuf) {
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
         }
-        Ok(SavedContent::Export { notes })
+        let template = (template.as_deref() == Some(&path)).then(|| Arc::new(data));
+        Ok(SavedContent::Export { notes, template })
     });
     world.resource_mut::<Saving>().job = Some(Job { name, rig, step, task, then: None });
 }
@@ -288,7 +298,10 @@ pub(super) fn poll(world: &mut World) {
             world.write_message(Notice::done(format!("Saved {name}")));
             tell(world, notes);
         }
-        Ok(SavedContent::Export { notes }) => {
+        Ok(SavedContent::Export { notes, template }) => {
+            if let (Some(template), Some(mut source)) = (template, world.get_mut::<RigSource>(rig)) {
+                source.rebase(template);
+            }
             world.write_message(Notice::done(format!("Exported {name}")));
             tell(world, notes);
         }

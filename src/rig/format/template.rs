@@ -39,7 +39,10 @@ pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{quoted, vector, write_without_poses};
 
-use crate::rig::{Rig, Uid, part::PartInstance};
+use crate::rig::{
+    Rig, Uid,
+    part::{PartChain, PartInstance},
+};
 
 /// The newest format that is read and written. A file that the program writes by itself says the oldest format that holds
 /// what is in it: format 2 where a part says its needs, a feature has a choice, a joint is a placed bone of a face or poses
@@ -117,6 +120,8 @@ pub struct FeatureSummary {
 pub struct Template {
     /// The rig.
     pub rig: Rig,
+    /// Chains that take other numbers of joints where the template is used as a part.
+    pub chains: Vec<PartChain>,
     /// Parts that have not been put into the rig yet: see [`Template::with_parts`].
     pub parts: Vec<PartInstance>,
     /// Parts that have been put into the rig.

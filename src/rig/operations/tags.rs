@@ -240,7 +240,9 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
         TagOperation::Cut(clipboard) => paste::cut(draft, clipboard),
         TagOperation::Paste { clipboard, what, to } => paste::paste(draft, clipboard, *what, to),
         TagOperation::Drop { part, joints, bindings } => {
-            drop_part(draft, part, joints, bindings, &mut |draft, _| draft.next_uid())
+            drop_part(draft, part, joints, bindings, &mut |draft, _| draft.next_uid())?;
+            part::note_left_over(draft, part, joints);
+            Ok(())
         }
         TagOperation::SetFeature(key, on) => apply(draft, feature::set_feature(draft.rig(), key, *on)?),
         TagOperation::SetSwitch(key, switch, on) => apply(draft, feature::set_switch(draft.rig(), key, switch, *on)?),

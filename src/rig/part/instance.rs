@@ -4,7 +4,10 @@
 //! it has uids that follow from those of the instance and of the part's joints and tags, so that a part can be used many times,
 //! and a later version of it changes what it changes and no more: see [`update`](crate::rig::update).
 
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, HashMap},
+};
 
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
@@ -12,9 +15,19 @@ use crate::rig::{
     label::mirrored_label,
     nearest::did_you_mean,
     operations::{Draft, MirrorPlane, drop_part},
-    reference::{given_name, map_text_fields},
+    part::PartChain,
+    reference::{NameKind, NameScope, Names, bind_names, given_name, map_references, map_text_fields},
     remap::mirror_names,
 };
+
+/// A template that others use, with what it lets them vary.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Its joints and tags.
+    pub rig: Rig,
+    /// Chains that take other numbers of joints.
+    pub chains: Vec<PartChain>,
+}
 
 /// A part in a template.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -27,10 +40,16 @@ pub struct PartInstance {
     pub name: String,
     /// Labels of the joints that the part goes onto, in the order of its joints; empty to bring its own.
     pub onto: Vec<String>,
+    /// True to bring its own joints beyond those of `onto`, too.
+    pub adds: bool,
+    /// Number of joints of the part's chains, by the name of the chain; an empty name for its only one.
+    pub counts: Vec<(String, usize)>,
     /// Label of the joint that its own joints hang on.
     pub parent: Option<String>,
     /// Place of its own joints, below `parent`.
     pub rest: RestTransform,
+    /// True if `rest` is a place in the rig's space, instead of one below `parent`.
+    pub is_world: bool,
     /// Text before the labels and names that the part gives.
     pub prefix: String,
     /// True for the other side of the character, x = 0 between them.
@@ -48,7 +67,8 @@ pub struct PartInstance {
 pub struct PartChange {
     /// Label of a joint of the part.
     pub joint: Option<String>,
-    /// A tag of the part: `module/name`, `module/label of its joint`, or its uid.
+    /// A tag of the part: `module/name`, `module/label of its joint`, or its uid; where several are called so, with the
+    /// number of one behind it, as in `point/hand_l#2`.
     pub tag: Option<String>,
     /// Turns the tag on or off.
     pub enabled: Option<bool>,
@@ -81,11 +101,14 @@ impl PartInstance {
     ///
     /// # Errors
     /// A message about what does not fit: joints that are not there, a part that needs more of them, unknown features or tags.
-    pub fn put_into(&self, rig: &mut Rig, part: &Rig, mirror: MirrorParams) -> Result<Vec<String>, String> {
-        let part = &self.prepared(part, mirror);
+    pub fn put_into(&self, rig: &mut Rig, part: &Part, mirror: MirrorParams) -> Result<Vec<String>, String> {
+        let part = &self.prepared(self.resized(part)?, mirror);
         let mut uids = UidSource::seeded(self.uid.0);
         let mut draft = Draft::new(rig, &mut uids, None);
-        let joints = if self.onto.is_empty() { self.own_joints(&mut draft, part) } else { self.known_joints(&draft) }?;
+        let mut joints = self.known_joints(&draft)?;
+        if self.onto.is_empty() || self.adds {
+            self.add_joints(&mut draft, part, &mut joints)?;
+        }
         if joints.len() > part.len() {
             let (given, has) = (joints.len(), part.len());
             return Err(format!("{given} joints are given, and the part has only {has}; take some away"));
@@ -101,9 +124,35 @@ impl PartInstance {
         Ok(draft.finish().notes.into_iter().map(|note| format!("part {}: {note}", self.title())).collect())
     }
 
+    /// The part with as many joints as it has here: as many as it goes onto, where nothing else is said.
+    fn resized(&self, part: &Part) -> Result<Rig, String> {
+        let mut counts = Vec::new();
+        for (name, count) in &self.counts {
+            let chain = match part.chains.as_slice() {
+                [only] if name.is_empty() => Some(only),
+                chains => chains.iter().find(|chain| chain.name == *name),
+            };
+            counts.push((chain.ok_or_else(|| unknown_chain(name, &part.chains))?, *count));
+        }
+        if let ([only], true) = (part.chains.as_slice(), counts.is_empty())
+            && !self.onto.is_empty()
+            && !self.adds
+        {
+            let others = part.rig.len() - only.joints.len();
+            let most = self.onto.len().saturating_sub(others);
+            // What hangs behind the chain may be left out.
+            let count = if (only.min..=only.max).contains(&most) { most } else { self.onto.len().min(only.max) };
+            counts.push((only, count));
+        }
+        let mut rig = part.rig.clone();
+        for (chain, count) in counts {
+            rig = chain.resized(&rig, count)?;
+        }
+        Ok(rig)
+    }
+
     /// The part with the names and, on the other side, the values that it has here.
-    fn prepared(&self, part: &Rig, mirror: MirrorParams) -> Rig {
-        let mut part = part.clone();
+    fn prepared(&self, mut part: Rig, mirror: MirrorParams) -> Rig {
         let plane = MirrorPlane::sagittal(1.0);
         let globals: HashMap<Uid, _> = part.rest_globals().into_iter().collect();
         let order: Vec<Uid> = part.walk().map(|joint| joint.data.uid).collect();
@@ -141,23 +190,27 @@ impl PartInstance {
         self.onto.iter().map(|label| labelled(draft.rig(), label)).collect()
     }
 
-    /// Adds the joints that the part brings.
-    fn own_joints(&self, draft: &mut Draft, part: &Rig) -> Result<Vec<Uid>, String> {
+    /// Adds the joints that the part brings, beyond the first ones, which are there.
+    fn add_joints(&self, draft: &mut Draft, part: &Rig, joints: &mut Vec<Uid>) -> Result<(), String> {
         let parent = self.parent.as_deref().map(|label| labelled(draft.rig(), label)).transpose()?;
-        let mut joints = Vec::with_capacity(part.len());
-        for joint in part.walk() {
+        let globals = draft.rig().rest_globals();
+        let below = globals.into_iter().find(|(uid, _)| self.is_world && parent == Some(*uid));
+        let place = below.map_or(self.rest.affine(), |(_, global)| global.inverse() * self.rest.affine());
+        let mut of: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
+        for joint in part.walk().skip(joints.len()) {
             let (uid, rest) = (self.uid_of(joint.data.uid), joint.data.rest);
             let (above, rest) = match joint.parent {
-                Some(above) => (Some(self.uid_of(above)), rest),
-                None => (parent, RestTransform::from_affine(&(self.rest.affine() * rest.affine()))),
+                Some(above) => (of.get(&above).copied(), rest),
+                None => (parent, RestTransform::from_affine(&(place * rest.affine()))),
             };
+            of.insert(joint.data.uid, uid);
             let mirror = joint.data.mirror.map(|mirror| self.uid_of(mirror));
             let data = JointData { uid, rest, mirror, tags: Vec::new(), group: None, ..joint.data.clone() };
             let edit = RigEdit::AddJoint { joint: Box::new(data), parent: above, index: usize::MAX };
             draft.apply(edit).map_err(|error| error.to_string())?;
             joints.push(uid);
         }
-        Ok(joints)
+        Ok(())
     }
 
     fn turn_off(&self, draft: &mut Draft, part: &Rig) -> Result<(), String> {
@@ -185,12 +238,24 @@ impl PartInstance {
     }
 
     fn change(&self, draft: &mut Draft, part: &Rig, joints: &[Uid], change: &PartChange) -> Result<(), String> {
+        let places: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
         if let Some(name) = &change.tag {
             let tag = self.uid_of(self.find_tag(part, name)?);
             if let Some(enabled) = change.enabled {
                 set_tag(draft, tag, |tag| tag.enabled = enabled)?;
             }
             if let Some(others) = &change.params {
+                // Names are those of the part first, then those of the template.
+                let (bound, _) = bind_names(others, &PartNames { part, host: draft.rig() });
+                let others = &map_references(&bound, |reference| {
+                    for (_, uid) in reference.uids_mut() {
+                        match places.get(uid) {
+                            Some(joint) => *uid = *joint,
+                            None if part.is_taken(*uid) => *uid = self.uid_of(*uid),
+                            None => {}
+                        }
+                    }
+                });
                 set_tag(draft, tag, |tag| {
                     if let TagKind::Command { params, .. } = &mut tag.kind {
                         *params = with_params(params, others);
@@ -237,8 +302,15 @@ impl PartInstance {
                 called.extend(given.into_iter().chain(label).map(|name| (format!("{module}/{name}"), tag.uid)));
             }
         }
-        let mut found: Vec<Uid> = called.iter().filter(|(known, _)| known == name).map(|(_, uid)| *uid).collect();
+        let (plain, number) = match name.rsplit_once('#').map(|(plain, number)| (plain, number.parse::<usize>())) {
+            Some((plain, Ok(number))) => (plain, Some(number)),
+            _ => (name, None),
+        };
+        let mut found: Vec<Uid> = called.iter().filter(|(known, _)| known == plain).map(|(_, uid)| *uid).collect();
         found.dedup();
+        if let Some(number) = number {
+            found = number.checked_sub(1).and_then(|at| found.get(at).copied()).into_iter().collect();
+        }
         match found[..] {
             [tag] => Ok(tag),
             [] => {
@@ -246,10 +318,40 @@ impl PartInstance {
                 Err(format!("the part has no tag \"{name}\"{}", did_you_mean(name, known)))
             }
             _ => {
-                let uids: Vec<String> = found.iter().map(Uid::to_string).collect();
-                Err(format!("the part has {} tags \"{name}\"; write the uid of one: {}", uids.len(), uids.join(", ")))
+                let count = found.len();
+                Err(format!("the part has {count} tags \"{name}\"; say which: \"{name}#1\" to \"{name}#{count}\""))
             }
         }
+    }
+}
+
+/// Names in a part, then those in the template that uses it.
+struct PartNames<'a> {
+    part: &'a Rig,
+    host: &'a Rig,
+}
+
+impl Names for PartNames<'_> {
+    fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
+        self.part.name_of(kind, uid).or_else(|| self.host.name_of(kind, uid))
+    }
+
+    fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
+        let found = self.part.find(scope, kind, name);
+        if found.is_empty() { self.host.find(scope, kind, name) } else { found }
+    }
+
+    fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {
+        self.part.all(scope, kind).into_iter().chain(self.host.all(scope, kind)).collect()
+    }
+}
+
+fn unknown_chain(name: &str, chains: &[PartChain]) -> String {
+    let names: Vec<&str> = chains.iter().map(|chain| chain.name.as_str()).collect();
+    match names[..] {
+        [] => "the part has no chain that takes other numbers of joints".to_owned(),
+        _ if name.is_empty() => format!("the part has several chains; name one of {}", names.join(", ")),
+        _ => format!("the part has no chain \"{name}\"{}", did_you_mean(name, names)),
     }
 }
 

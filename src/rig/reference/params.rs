@@ -61,6 +61,18 @@ pub fn map_references(params: &str, mut change: impl FnMut(&mut NodeRef)) -> Str
     rewritten.into_owned()
 }
 
+/// The parameters with every union of references changed by `change`, see [`map_references`].
+pub fn map_unions(params: &str, mut change: impl FnMut(&mut NodeRefs)) -> String {
+    let rewritten = rewritten(params, literals(params), |text| {
+        let mut places = Vec::new();
+        let before = NodeRefs(read_with(text, None, &mut places).ok()?);
+        let mut after = before.clone();
+        change(&mut after);
+        (after != before).then(|| written(&after.0, Some(&KeptNames::new(text, &places))))
+    });
+    rewritten.into_owned()
+}
+
 /// The parameters with the current name beside every uid. The name beside a uid that does not exist any more stays, as
 /// a hint for people. Names without uids stay unchanged; see [`bind_names`].
 pub fn refresh_names<'a>(params: &'a str, names: &dyn Names) -> Cow<'a, str> {

@@ -44,7 +44,7 @@ fn the_torso_carries_everything() {
 
 #[test]
 fn a_head_turns_with_its_space() {
-    for (name, body, world) in [("parts/neck_head", "neck", 2.0), ("biped", "chest_ik", 2.0)] {
+    for (name, body, world) in [("parts/neck_head", "neck", 2.0), ("biped", "chest_ik", 1.0)] {
         let mut puppet = Puppet::of(name);
         let rest = puppet.axis("head", Vec3::Z);
         puppet.turn(body, Quat::from_rotation_x(0.5));

@@ -5,8 +5,8 @@ use super::*;
 #[test]
 fn an_eye_looks_at_its_control() {
     let mut stage = Stage::new(part("eye"));
-    let (eye, look) = (stage.joint("eye"), stage.control("eye", "eye"));
-    let at = stage.place("eye");
+    let (eye, look) = (stage.joint("eye_l"), stage.control("eye_l", "eye"));
+    let at = stage.place("eye_l");
     assert!(stage.global(look).translation.z > at.z + 0.2, "the control is in front of the eye");
     for shift in [
         Vec3::ZERO,
@@ -20,7 +20,7 @@ fn an_eye_looks_at_its_control() {
         let wanted = (stage.global(look).translation - at).normalize();
         let ahead = axis(stage.global(eye), Vec3::Z);
         assert!(ahead.angle_between(wanted) < 2e-3, "{shift}: it looks along {ahead} and not {wanted}");
-        assert!(stage.place("eye").distance(at) < 1e-6, "{shift}: the eye stays in its socket");
+        assert!(stage.place("eye_l").distance(at) < 1e-6, "{shift}: the eye stays in its socket");
         // By the shortest turn, without rolling.
         let shortest = Quat::from_rotation_arc(Vec3::Z, wanted);
         assert!(stage.global(eye).rotation.angle_between(shortest) < 5e-3, "{shift}: it rolls");
@@ -29,12 +29,12 @@ fn an_eye_looks_at_its_control() {
     stage.shift(look, Vec3::new(0.4, 0.0, 0.0));
     let turned = |stage: &Stage| axis(stage.global(eye), Vec3::Z).angle_between(Vec3::Z).to_degrees();
     let whole = turned(&stage);
-    stage.set("eye", "look", 0.5);
+    stage.set("eye_l", "look", 0.5);
     assert!((turned(&stage) - whole * 0.5).abs() < 0.15 * whole, "{} of {whole}", turned(&stage));
-    stage.set("eye", "look", 0.0);
+    stage.set("eye_l", "look", 0.0);
     assert!(turned(&stage) < 0.1);
     // Without looking it turns by hand.
-    let by_hand = stage.control("eye", "circle");
+    let by_hand = stage.control("eye_l", "circle");
     stage.rotate(by_hand, Quat::from_rotation_y(0.3));
     assert!((turned(&stage) - 0.3_f32.to_degrees()).abs() < 0.1);
 }
@@ -43,19 +43,19 @@ fn an_eye_looks_at_its_control() {
 fn lids_close_over_the_eye() {
     let mut stage = Stage::new(part("eye"));
     let ahead = |stage: &Stage, label: &str| axis(stage.global(stage.joint(label)), Vec3::Z);
-    for label in ["lid_upper", "lid_lower"] {
+    for label in ["lid_upper_l", "lid_lower_l"] {
         assert!(ahead(&stage, label).y.abs() < 1e-3);
     }
-    stage.set("eye", "blink", 1.0);
-    assert!(ahead(&stage, "lid_upper").y < -0.4, "the upper lid goes down");
-    assert!(ahead(&stage, "lid_lower").y > 0.2, "the lower lid goes up");
-    assert!(ahead(&stage, "eye").y.abs() < 1e-3, "the eye does not");
+    stage.set("eye_l", "blink", 1.0);
+    assert!(ahead(&stage, "lid_upper_l").y < -0.4, "the upper lid goes down");
+    assert!(ahead(&stage, "lid_lower_l").y > 0.2, "the lower lid goes up");
+    assert!(ahead(&stage, "eye_l").y.abs() < 1e-3, "the eye does not");
     // It goes no further, and half is between.
-    let closed = ahead(&stage, "lid_upper").y;
-    stage.set("eye", "blink", 4.0);
-    assert_eq!(ahead(&stage, "lid_upper").y, closed);
-    stage.set("eye", "blink", 0.5);
-    assert!(ahead(&stage, "lid_upper").y < -0.2 && ahead(&stage, "lid_upper").y > closed + 0.1);
+    let closed = ahead(&stage, "lid_upper_l").y;
+    stage.set("eye_l", "blink", 4.0);
+    assert_eq!(ahead(&stage, "lid_upper_l").y, closed);
+    stage.set("eye_l", "blink", 0.5);
+    assert!(ahead(&stage, "lid_upper_l").y < -0.2 && ahead(&stage, "lid_upper_l").y > closed + 0.1);
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn an_eye_alone_takes_the_part_without_lids() {
     drop_onto(&mut rig, &part, &joints[..1]);
     let mut stage = Stage::new(rig);
     stage.check_rest("eye alone");
-    let look = stage.control("eye", "eye");
+    let look = stage.control("eye_l", "eye");
     stage.shift(look, Vec3::new(0.2, 0.1, 0.0));
     let eye = stage.global(joints[0]);
     let before = stage.rig.rest_global(joints[0]).to_scale_rotation_translation().1;

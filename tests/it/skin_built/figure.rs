@@ -21,7 +21,6 @@ use rigsmith::{
         BuiltRig, NodeType, PoseOffset, Rig, RigEdit, SkinData, Uid,
         deform::DeformSkeleton,
         feature::{features_named, set_feature},
-        template::read_template,
     },
     solve::program::{CompileOptions, RigProgram, RigState},
 };
@@ -57,7 +56,7 @@ fn asset(path: &str) -> PathBuf {
 }
 
 fn biped() -> Rig {
-    read_template(&std::fs::read(asset("templates/biped.rig.ron")).unwrap()).unwrap().rig
+    crate::bench::shipped("biped")
 }
 
 impl Figure {

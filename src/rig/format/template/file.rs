@@ -35,6 +35,8 @@ pub(super) struct TemplateFile {
     #[serde(default)]
     pub(super) needs: Option<NeedsSummary>,
     #[serde(default)]
+    pub(super) chains: Vec<ChainFile>,
+    #[serde(default)]
     pub(super) groups: Vec<GroupFile>,
     #[serde(default)]
     pub(super) joints: Vec<JointFile>,
@@ -55,6 +57,26 @@ pub(super) struct GroupFile {
     pub(super) enabled: bool,
 }
 
+/// A chain of a part that takes other numbers of joints.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ChainFile {
+    pub(super) name: String,
+    pub(super) joints: Vec<String>,
+    #[serde(default)]
+    pub(super) min: Option<usize>,
+    #[serde(default)]
+    pub(super) max: Option<usize>,
+}
+
+/// Number of joints of a chain of a part.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CountFile {
+    pub(super) chain: String,
+    pub(super) count: usize,
+}
+
 /// A part instance.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,7 +89,15 @@ pub(super) struct PartFile {
     #[serde(default)]
     pub(super) onto: Vec<String>,
     #[serde(default)]
+    pub(super) adds: bool,
+    #[serde(default)]
+    pub(super) count: Option<usize>,
+    #[serde(default)]
+    pub(super) counts: Vec<CountFile>,
+    #[serde(default)]
     pub(super) parent: Option<String>,
+    #[serde(default)]
+    pub(super) world: bool,
     #[serde(default)]
     pub(super) translation: (f32, f32, f32),
     #[serde(default)]
@@ -195,6 +225,7 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "joint_count",
             "features",
             "needs",
+            "chains",
             "groups",
             "joints",
             "parts",
@@ -205,7 +236,11 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "part",
             "name",
             "onto",
+            "adds",
+            "count",
+            "counts",
             "parent",
+            "world",
             "translation",
             "rotation",
             "scale",
@@ -214,6 +249,8 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "off",
             "changes",
         ]),
+        (3, Some("chains")) => Some(&["name", "joints", "min", "max"]),
+        (5, Some("counts")) if above == Some("parts") => Some(&["chain", "count"]),
         (5, Some("changes")) if above == Some("parts") => {
             Some(&["joint", "tag", "enabled", "params", "translation", "rotation", "tags"])
         }

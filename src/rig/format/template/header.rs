@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use super::{
     FeatureSummary, TemplateHeader,
     shorthand::{Declared, TagForm},
+    write::{feature_summaries, needs_summary},
 };
-use crate::rig::Uid;
+use crate::rig::{Rig, Uid};
 
 /// The header with the uid that follows from the name, and, where the file is complete and says none, the number of
-/// joints and the named features.
+/// joints and the named features. What parts bring is in other files: see [`TemplateHeader::complete_from`].
 pub(super) fn complete(mut header: TemplateHeader, text: &str) -> TemplateHeader {
     if header.uid == Uid::default() {
         header.uid = Uid::derived(["rig", &header.name]);
@@ -18,11 +19,25 @@ pub(super) fn complete(mut header: TemplateHeader, text: &str) -> TemplateHeader
         return header;
     }
     let Some(declared) = Declared::find(text) else { return header };
+    let tree = &declared.tree;
+    let parts = tree.field(tree.root(), "parts").map(|parts| &tree.node(parts.value).items);
+    if parts.is_some_and(|parts| !parts.is_empty()) {
+        return header;
+    }
     header.joint_count = declared.joints.len();
     if header.features.is_empty() {
         header.features = features(&declared);
     }
     header
+}
+
+impl TemplateHeader {
+    /// Sets what follows from joints and tags: the number of joints, the named features, and what a part needs.
+    pub fn complete_from(&mut self, rig: &Rig) {
+        self.joint_count = rig.len();
+        self.features = feature_summaries(rig);
+        self.needs = needs_summary(rig);
+    }
 }
 
 /// Named features with their switches, sorted.

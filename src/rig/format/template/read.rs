@@ -1,9 +1,10 @@
 //! Reader of templates: strict, with the place of each error.
 
+mod parts;
+
 use std::{
     borrow::Cow,
     collections::{HashMap, HashSet},
-    sync::Arc,
 };
 
 use bevy::math::{Quat, Vec3};
@@ -11,20 +12,19 @@ use bevy::math::{Quat, Vec3};
 use super::{
     FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader,
     comment_placement::take_placement,
-    file::{FaceFile, JointFile, PartChangeFile, PartFile, TagFile, TemplateFile, known_names},
+    file::{FaceFile, JointFile, TagFile, TemplateFile, known_names},
     header::complete,
-    quoted,
     shorthand::{Explicit, explicit},
     write::{feature_summaries, needs_summary},
 };
 use crate::rig::{
     FacePlacement, GROUP_COLORS, GroupData, JointData, RestTransform, Rig, RigAbout, RigEdit, SourceError, TagData,
-    TagKind, Uid, degrees,
+    TagKind, Uid,
     format::poses::add_poses,
     format::scan::{self, Field},
     format::source::{parse_ron, ron_options, utf8},
     format::version::{Format, blanked},
-    part::{MirrorParams, PartChange, PartInstance},
+    part::{PartChain, PartInstance},
     reference::{bind_names, refresh_names},
 };
 
@@ -74,9 +74,9 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
             return Err(in_source(faults));
         }
     };
-    let (rig, parts) = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
+    let (rig, chains, parts) = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
     let parts = parts_in(&explicit, parts);
-    Ok((Template { rig, parts, instances: Vec::new(), notes }, in_source(faults)))
+    Ok((Template { rig, chains, parts, instances: Vec::new(), notes }, in_source(faults)))
 }
 
 /// Reads a template that stands in another file, where its first line has the number `first_line`.
@@ -94,10 +94,10 @@ fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, Sou
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
     let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
     let mut faults = Vec::new();
-    let (rig, parts) = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
+    let (rig, chains, parts) = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
     match faults.into_iter().next() {
         Some(fault) => Err(fault),
-        None => Ok(Template { rig, parts: parts_in(explicit, parts), instances: Vec::new(), notes }),
+        None => Ok(Template { rig, chains, parts: parts_in(explicit, parts), instances: Vec::new(), notes }),
     }
 }
 
@@ -117,7 +117,8 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
         Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
     };
     let fields = scan::fields(text);
-    let is_list = |field: &&Field| field.depth == 1 && matches!(field.name, "groups" | "joints" | "parts" | "poses");
+    let is_list =
+        |field: &&Field| field.depth == 1 && matches!(field.name, "chains" | "groups" | "joints" | "parts" | "poses");
     let mut passed_over = TEMPLATE.unknown(&fields);
     passed_over.extend(fields.iter().filter(is_list));
     passed_over.sort_unstable_by_key(|field| field.start);
@@ -134,7 +135,7 @@ fn build(
     file: TemplateFile,
     notes: &mut Vec<String>,
     faults: &mut Vec<SourceError>,
-) -> (Rig, Vec<PartInstance>) {
+) -> (Rig, Vec<PartChain>, Vec<PartInstance>) {
     let mut rig = Rig::new(file.uid, file.name.clone());
     rig.about = RigAbout {
         name: file.name,
@@ -159,17 +160,18 @@ fn build(
         rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
     let (format, count) = (file.format, file.joints.len());
-    let parts = part_instances(places, file.parts, faults);
-    if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count && parts.is_empty()) {
+    let instances = parts::instances(places, file.parts, faults);
+    if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count && instances.is_empty()) {
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
     add_joints(&mut rig, format, file.joints, places, &mut seen, faults);
+    let chains = parts::chains(&rig, file.chains, notes);
     add_poses(&mut rig, file.poses, &mut |uid, nth, field, message| {
         faults.push(places.error(uid, nth, field, message));
     });
-    if !parts.is_empty() {
+    if !instances.is_empty() {
         // References may name what parts bring.
-        return (rig, parts);
+        return (rig, chains, instances);
     }
     bind_references(&mut rig, notes);
     if file.features.is_some_and(|features| feature_summaries(&rig) != sorted(features)) {
@@ -178,121 +180,11 @@ fn build(
     if file.needs.is_some() && file.needs != needs_summary(&rig) {
         notes.push("the header says other needs than the part has; saving corrects it".to_owned());
     }
-    (rig, parts)
-}
-
-/// The part instances of a file, with their places in the text.
-fn part_instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<SourceError>) -> Vec<PartInstance> {
-    let is_part = |field: &&Field| {
-        let parent = field.parent.map(|parent| places.fields[parent].name);
-        field.depth == 3 && field.name == "part" && parent == Some("parts")
-    };
-    let mut offsets = places.fields.iter().filter(is_part).map(|field| field.start);
-    let mut seen = HashSet::new();
-    let mut found = Vec::with_capacity(parts.len());
-    for file in parts {
-        let offset = offsets.next().unwrap_or_default();
-        let mut fault = |message: String| faults.push(SourceError::at(places.text, offset, message));
-        let onto = file.onto.join(" ");
-        let title = if file.name.is_empty() { onto.as_str() } else { &file.name };
-        let uid = file.uid.unwrap_or_else(|| Uid::derived(["part instance", file.part.as_str(), title]));
-        if !seen.insert(uid) {
-            fault(format!("two uses of \"{}\" are called the same; give each a `name`", file.part));
-            continue;
-        }
-        if !file.onto.is_empty() && file.parent.is_some() {
-            fault("a part goes onto joints, or below a parent with its own; leave out `onto` or `parent`".to_owned());
-        }
-        let rest = RestTransform {
-            translation: <[f32; 3]>::from(file.translation).into(),
-            rotation: degrees(<[f32; 3]>::from(file.rotation).into()),
-            scale: Vec3::splat(file.scale),
-        };
-        if !rest.is_valid() {
-            fault("the place of the part is not finite; correct the numbers".to_owned());
-            continue;
-        }
-        let mut changes = Vec::with_capacity(file.changes.len());
-        for change in file.changes {
-            match change_of(change) {
-                Ok(change) => changes.push(change),
-                Err(message) => fault(message),
-            }
-        }
-        found.push(PartInstance {
-            uid,
-            part: file.part,
-            name: file.name,
-            onto: file.onto,
-            parent: file.parent,
-            rest,
-            prefix: file.prefix,
-            mirror: file.mirror,
-            off: file.off,
-            changes,
-            offset,
-        });
-    }
-    found
-}
-
-fn change_of(file: PartChangeFile) -> Result<PartChange, String> {
-    if file.joint.is_none() == file.tag.is_none() {
-        return Err("a change of a part is one of a `joint` or of a `tag`; name one of the two".to_owned());
-    }
-    if file.tag.is_some() && (file.translation.is_some() || file.rotation.is_some() || file.tags.is_some()) {
-        return Err("a tag of a part has no place and no tags; change the `joint`".to_owned());
-    }
-    if file.joint.is_some() && (file.enabled.is_some() || file.params.is_some()) {
-        return Err("a joint of a part has no parameters; change the `tag`".to_owned());
-    }
-    let mut tags = Vec::new();
-    if let (Some(text), Some(joint)) = (&file.tags, &file.joint) {
-        let text =
-            format!("(format: 2, name: \"part\", joints: [(label: {}, tags: {})])", quoted(joint), text.get_ron());
-        let read = read_text(&text, 1).map_err(|error| error.message)?;
-        tags = read.rig.walk().next().map(|joint| joint.data.tags.clone()).unwrap_or_default();
-    }
-    Ok(PartChange {
-        joint: file.joint,
-        tag: file.tag,
-        enabled: file.enabled,
-        params: file.params.map(|params| params.trim().get_ron().to_owned()),
-        translation: file.translation.map(Into::into),
-        rotation: file.rotation.map(Into::into),
-        tags,
-    })
-}
-
-impl Template {
-    /// The template with its parts, each of which `part` gives.
-    ///
-    /// # Errors
-    /// A part that cannot be had or does not fit, with its place in `source`, the text of the template.
-    pub fn with_parts(
-        mut self,
-        source: &str,
-        part: &mut dyn FnMut(&str) -> Result<Arc<Rig>, String>,
-        mirror: MirrorParams,
-    ) -> Result<Self, SourceError> {
-        for instance in std::mem::take(&mut self.parts) {
-            let put = part(&instance.part).and_then(|part| instance.put_into(&mut self.rig, &part, mirror));
-            match put {
-                Ok(notes) => self.notes.extend(notes),
-                Err(message) => {
-                    let message = format!("part \"{}\": {message}", instance.title());
-                    return Err(SourceError::at(source, instance.offset, message));
-                }
-            }
-            self.instances.push(instance);
-        }
-        bind_references(&mut self.rig, &mut self.notes);
-        Ok(self)
-    }
+    (rig, chains, instances)
 }
 
 /// Adds uids to references that people wrote as names alone, and updates the names beside uids.
-fn bind_references(rig: &mut Rig, notes: &mut Vec<String>) {
+pub(super) fn bind_references(rig: &mut Rig, notes: &mut Vec<String>) {
     let mut edits = Vec::new();
     for joint in rig.walk() {
         for tag in &joint.data.tags {

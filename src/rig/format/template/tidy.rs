@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::{
     over::{comparable, patch::Patch},
-    read::read_text,
+    read::{bind_references, read_text},
     shorthand::{Called, Declaration, Declared, TAG_FIELDS, TagForm, feature_name},
 };
 use crate::rig::{
@@ -41,8 +41,13 @@ pub fn format_template(source: &str, uids: UidStyle) -> Result<String, SourceErr
         (style, Some(declared)) => Uids::new(&declared, &before.rig, style).text(),
     };
     let text = laid_out(&text)?;
-    let before = comparable(before.rig);
-    match read_text(&text, 1).is_ok_and(|after| comparable(after.rig) == before) {
+    // Names that parts bring are bound once those are there.
+    let said = |mut rig: Rig| {
+        bind_references(&mut rig, &mut Vec::new());
+        comparable(rig)
+    };
+    let before = said(before.rig);
+    match read_text(&text, 1).is_ok_and(|after| said(after.rig) == before) {
         true => Ok(text),
         false => Err(SourceError::at(source, 0, "formatted, the template would say something else; it stays as it is")),
     }

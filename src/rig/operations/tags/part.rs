@@ -70,7 +70,11 @@ pub(in crate::rig) fn drop_part(
             add(draft, *target, copy, usize::MAX)?;
         }
     }
-    refresh_all(draft, &dropped)?;
+    refresh_all(draft, &dropped)
+}
+
+/// Notes which joints were too few or too many for a part that was dropped onto them.
+pub(super) fn note_left_over(draft: &mut Draft, part: &Rig, joints: &[Uid]) {
     let left = part.len().saturating_sub(joints.len());
     if left > 0 {
         let needs = PartNeeds::of(part).joints;
@@ -83,7 +87,6 @@ pub(in crate::rig) fn drop_part(
         let left = joints.len() - part.len();
         draft.note(format!("{left} selected joints are left over: the part has only {}", part.len()));
     }
-    Ok(())
 }
 
 /// Refuses fewer joints than the part needs. What the host has under the same label, or `bindings` name, counts.
@@ -99,7 +102,8 @@ fn check_needs(rig: &Rig, part: &Rig, joints: &[Uid], bindings: &BTreeMap<Uid, U
     Err(TagError::PartNeeds { part, joints: needs.joints, given: joints.len() }.into())
 }
 
-/// Maps each group of the part to the group of its first grouped counterpart, or creates it.
+/// Maps each group of the part to the group of its first grouped counterpart, if half of them have one; else to a group
+/// of the same name that nothing is in, or to one that is created.
 fn groups(
     draft: &mut Draft,
     part: &Rig,
@@ -112,9 +116,12 @@ fn groups(
             pairs.iter().filter(|(joint, _)| joint.group == Some(group.uid)).map(|(_, target)| *target).collect();
         let group_of = |draft: &Draft, joint: Uid| draft.rig().joint(joint).and_then(|joint| joint.data.group);
         let Some(first) = members.iter().map(|joint| group_of(draft, *joint)).reduce(Option::or) else { continue };
-        let target = match first {
-            Some(known) => known,
-            None => {
+        let grouped = members.iter().filter(|joint| group_of(draft, **joint).is_some()).count();
+        let is_empty = |uid: Uid| draft.rig().walk().all(|joint| joint.data.group != Some(uid));
+        let waiting = draft.rig().groups().iter().find(|of| of.name == group.name && is_empty(of.uid));
+        let target = match (first.filter(|_| 2 * grouped >= members.len()), waiting.map(|group| group.uid)) {
+            (Some(known), _) | (None, Some(known)) => known,
+            (None, None) => {
                 let uid = uid_of(draft, group.uid);
                 let group = GroupData { uid, name: free_name(draft.rig(), &group.name), ..group.clone() };
                 let uid = group.uid;

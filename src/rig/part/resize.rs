@@ -1,0 +1,217 @@
+//! Parts of other sizes: chains of a part that take more or fewer joints than its file has.
+
+use std::collections::HashMap;
+
+use bevy::math::{Affine3, Quat, Vec3};
+
+use crate::rig::{
+    EditError, JointData, NodeRef, NodeRefs, RestTransform, Rig, RigEdit, TagKind, Uid,
+    reference::{Source, map_unions},
+};
+
+/// Largest number of joints of a chain of a part.
+pub(in crate::rig) const MOST_JOINTS: usize = 200;
+
+/// Two or more joints of a part, each the child of the one before, of which an instance may have another number.
+///
+/// The first joints and the last one keep their identities, places of the others are taken along the line of the part's own.
+/// References to several joints of the chain name those in between, too.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PartChain {
+    /// Name for people.
+    pub name: String,
+    /// The joints in the part's file, from the base.
+    pub joints: Vec<Uid>,
+    /// Smallest number of joints.
+    pub min: usize,
+    /// Largest number of joints.
+    pub max: usize,
+}
+
+impl PartChain {
+    /// The part with `count` joints in this chain.
+    ///
+    /// # Errors
+    /// A message if the chain does not take so many, or is none in `part`.
+    pub fn resized(&self, part: &Rig, count: usize) -> Result<Rig, String> {
+        let Self { name, joints, min, max } = self;
+        if !(*min..=*max).contains(&count) {
+            return Err(format!("chain \"{name}\" takes {min} to {max} joints, not {count}"));
+        }
+        let mut out = part.clone();
+        if count == joints.len() {
+            return Ok(out);
+        }
+        let places = self.places(part, count)?;
+        let kept = self.change(&mut out, count).map_err(|error| format!("chain \"{name}\": {error}"))?;
+        let mut above = kept.first().and_then(|first| part.joint(*first)?.parent).map_or(Affine3::IDENTITY, |parent| {
+            part.rest_globals().into_iter().find(|(uid, _)| *uid == parent).map_or(Affine3::IDENTITY, |(_, at)| at)
+        });
+        for (joint, place) in kept.iter().zip(places) {
+            let rest = RestTransform::from_affine(&(above.inverse() * place));
+            out.apply(&RigEdit::SetRest(*joint, rest)).map_err(|error| error.to_string())?;
+            above = place;
+        }
+        Ok(out)
+    }
+
+    /// Places of `count` joints along the chain, in the rig's space.
+    fn places(&self, part: &Rig, count: usize) -> Result<Vec<Affine3>, String> {
+        let globals: HashMap<Uid, Affine3> = part.rest_globals().into_iter().collect();
+        let known: Option<Vec<Affine3>> = self.joints.iter().map(|joint| globals.get(joint).copied()).collect();
+        let known = known.filter(|known| !known.is_empty());
+        let known = known.ok_or_else(|| format!("chain \"{}\" names joints that the part does not have", self.name))?;
+        let last = known.len() - 1;
+        let parted = |place: usize| {
+            let share = if count > 1 { place as f32 / (count - 1) as f32 * last as f32 } else { 0.0 };
+            let segment = (share as usize).min(last.saturating_sub(1));
+            (segment, (segment + 1).min(last), share - segment as f32)
+        };
+        let point = |place: usize| {
+            let (from, to, share) = parted(place);
+            Vec3::from(known[from].translation).lerp(known[to].translation.into(), share)
+        };
+        let mut places = Vec::with_capacity(count);
+        for place in 0..count {
+            let (from, to, share) = parted(place);
+            let (_, a, _) = known[from].to_scale_rotation_translation();
+            let (_, b, _) = known[to].to_scale_rotation_translation();
+            let mut turn = (a * (1.0 - share) + (if a.dot(b) < 0.0 { -b } else { b }) * share).normalize();
+            // A joint with one behind it looks at that as its counterpart in the file does.
+            let along = known[from].inverse().transform_point3(known[to].translation.into()).normalize_or_zero();
+            let ahead =
+                if place + 1 < count { (point(place + 1) - point(place)).normalize_or_zero() } else { Vec3::ZERO };
+            if along != Vec3::ZERO && ahead != Vec3::ZERO {
+                turn = Quat::from_rotation_arc(turn * along, ahead) * turn;
+            }
+            places.push(Affine3::from_rotation_translation(turn, point(place)));
+        }
+        // The ends stand as in the file; a chain of one is its base.
+        places[0] = known[0];
+        if count > 1 {
+            places[count - 1] = known[last];
+        }
+        Ok(places)
+    }
+
+    /// Takes joints out of the chain or puts some in, with all that refers to them. Returns the chain's joints.
+    fn change(&self, rig: &mut Rig, count: usize) -> Result<Vec<Uid>, EditError> {
+        let joints = &self.joints;
+        let last = joints.len() - 1;
+        if count <= last {
+            let (kept, gone) = (&joints[..count.max(2) - 1], &joints[count.max(2) - 1..last]);
+            let mut chain = kept.to_vec();
+            // What hung on a joint that goes hangs on the last one before it, as does the end of the chain.
+            let above = kept[kept.len() - 1];
+            let mut leaves = gone.to_vec();
+            if count > 1 {
+                chain.push(joints[last]);
+            } else {
+                leaves.push(joints[last]);
+            }
+            for joint in &leaves {
+                for child in rig.children(Some(*joint)).to_vec() {
+                    if !leaves.contains(&child) {
+                        rig.apply(&RigEdit::SetParent { joint: child, parent: Some(above), index: usize::MAX })?;
+                    }
+                }
+            }
+            refer(rig, &mut |union| without(union, &leaves, above));
+            for joint in leaves.iter().rev() {
+                rig.apply(&RigEdit::RemoveJoint(*joint))?;
+            }
+            self.number(rig, &chain)?;
+            return Ok(chain);
+        }
+        let mut chain = joints[..last].to_vec();
+        let (before, end) = (joints[last - 1], joints[last]);
+        let Some(pattern) = rig.joint(before).map(|joint| joint.data.clone()) else {
+            return Err(EditError::NoJoint(before));
+        };
+        let mut added = Vec::new();
+        for number in last..count - 1 {
+            let uid = Uid::derived(["joint of a chain", &before.to_string(), &number.to_string()]);
+            let data = JointData { uid, label: None, mirror: None, tags: Vec::new(), face: None, ..pattern.clone() };
+            let parent = chain.last().copied();
+            rig.apply(&RigEdit::AddJoint { joint: Box::new(data), parent, index: usize::MAX })?;
+            chain.push(uid);
+            added.push(uid);
+        }
+        rig.apply(&RigEdit::SetParent { joint: end, parent: chain.last().copied(), index: usize::MAX })?;
+        chain.push(end);
+        refer(rig, &mut |union| with(union, joints, before, &added));
+        self.number(rig, &chain)?;
+        Ok(chain)
+    }
+
+    /// Numbers the joints of a chain whose labels have numbers.
+    fn number(&self, rig: &mut Rig, chain: &[Uid]) -> Result<(), EditError> {
+        let label = |rig: &Rig, joint: Uid| rig.joint(joint).and_then(|joint| joint.data.label.clone());
+        let before = self.joints[self.joints.len() - 2];
+        let Some(known) = label(rig, before).or_else(|| label(rig, chain[0])) else { return Ok(()) };
+        let place = chain.iter().position(|joint| *joint == before).unwrap_or_default();
+        let (stem, number, rest) = parted(&known).unwrap_or((known.as_str(), 1, ""));
+        let is_numbered = stem.len() < known.len();
+        for (at, joint) in chain.iter().enumerate().skip(place + 1) {
+            let own = label(rig, *joint);
+            let is_alike = match &own {
+                Some(own) => is_numbered && parted(own).is_some_and(|(other, _, end)| other == stem && end == rest),
+                None => true,
+            };
+            if is_alike {
+                let dash = if is_numbered { "" } else { "_" };
+                let text = format!("{stem}{dash}{}{rest}", number + at - place);
+                rig.apply(&RigEdit::SetLabel(*joint, Some(text)))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A label as the text before its last number, the number, and the text behind.
+fn parted(label: &str) -> Option<(&str, usize, &str)> {
+    let end = label.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let start = label[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
+    // Leading zeros belong to the text.
+    let digits = label[start..end].trim_start_matches('0');
+    let start = end - digits.len().max(1);
+    Some((&label[..start], label[start..end].parse().ok()?, &label[end..]))
+}
+
+/// Changes the unions of references of all commands.
+fn refer(rig: &mut Rig, change: &mut dyn FnMut(&mut NodeRefs)) {
+    for joint in rig.joints.values_mut() {
+        for tag in &mut joint.data.tags {
+            if let TagKind::Command { params, .. } = &mut tag.kind {
+                *params = map_unions(params, &mut *change);
+            }
+        }
+    }
+}
+
+/// A union without joints that are gone; what named only them names the one before.
+fn without(union: &mut NodeRefs, gone: &[Uid], above: Uid) {
+    let is_gone = |reference: &NodeRef| matches!(reference.source, Source::Joint(joint) if gone.contains(&joint));
+    if union.0.iter().all(is_gone) && !union.0.is_empty() {
+        union.0.truncate(1);
+        union.0[0].source = Source::Joint(above);
+    } else {
+        union.0.retain(|reference| !is_gone(reference));
+    }
+}
+
+/// A union with the joints that were added behind `before`, where it names that among others of the chain.
+fn with(union: &mut NodeRefs, chain: &[Uid], before: Uid, added: &[Uid]) {
+    let joint_of = |reference: &NodeRef| match reference.source {
+        Source::Joint(joint) if chain.contains(&joint) => Some(joint),
+        _ => None,
+    };
+    let Some(at) = union.0.iter().position(|reference| joint_of(reference) == Some(before)) else { return };
+    let others = [at.checked_sub(1), Some(at + 1)].into_iter().flatten().filter_map(|at| union.0.get(at));
+    if others.filter_map(joint_of).next().is_none() {
+        return;
+    }
+    let copies = added.iter().map(|joint| NodeRef { source: Source::Joint(*joint), ..union.0[at].clone() });
+    let copies: Vec<NodeRef> = copies.collect();
+    union.0.splice(at + 1..at + 1, copies);
+}

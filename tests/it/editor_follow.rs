@@ -1,0 +1,235 @@
+//! The window's document follows the template that it was opened from: offers, answers, and what it leaves alone.
+
+use std::{
+    fs,
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use bevy::{ecs::message::MessageCursor, prelude::*};
+use rigsmith::{
+    editor::{
+        ActiveRig,
+        actions::{Action, ActionRequest},
+        files::{
+            FilesPlugin, Loading, OpenRequest, Saving, StateFolder,
+            dialog::{Answer, DialogAnswer},
+        },
+        follow::{FollowPlugin, OfferAnswer},
+        notice::{Notice, Severity},
+    },
+    headless::headless_app,
+    instance::{RigSource, UpdateOffer},
+    plugins::document::{Change, EditRequest},
+    prelude::*,
+    rig::{RestTransform, RigEdit, operations::Operation, update::Take},
+    test_app::strict_app,
+};
+
+use super::bench::HANG;
+
+const CHAIN: &str = r#"(
+    format: 2,
+    name: "chain",
+    joints: [
+        (label: "a", translation: (0, 1, 0), tags: [control(size: 0.5)]),
+        (label: "b", parent: "a", translation: (0, 0.3, 0)),
+        (label: "c", parent: "b", translation: (0, 0.4, 0)),
+    ],
+)
+"#;
+
+/// A window without the window, with the chain's template open.
+struct Window {
+    app: App,
+    file: PathBuf,
+    cursor: MessageCursor<Notice>,
+    notices: Vec<Notice>,
+    _folder: tempfile::TempDir,
+}
+
+impl Window {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder for the test");
+        let file = folder.path().join("chain.rig.ron");
+        fs::write(&file, CHAIN).expect("the template is written");
+        let mut app = headless_app(7);
+        app.insert_resource(StateFolder(Some(folder.path().join("state"))))
+            .add_plugins((FilesPlugin, FollowPlugin))
+            .add_message::<AppExit>();
+        let app = strict_app(app);
+        let mut window = Self { app, file, cursor: MessageCursor::default(), notices: Vec::new(), _folder: folder };
+        let path = window.file.clone();
+        window.app.world_mut().write_message(OpenRequest::File(path));
+        window.until("the followed document", |window| window.source().is_some_and(|source| source.base().is_some()));
+        window.settle();
+        window
+    }
+
+    fn rig(&self) -> Entity {
+        self.app.world().resource::<ActiveRig>().0
+    }
+
+    fn source(&self) -> Option<&RigSource> {
+        self.app.world().get::<RigSource>(self.app.world().get_resource::<ActiveRig>()?.0)
+    }
+
+    fn offer(&self) -> Option<&UpdateOffer> {
+        self.app.world().get::<UpdateOffer>(self.rig())
+    }
+
+    fn data(&self) -> &Rig {
+        self.app.world().get::<Rig>(self.rig()).expect("a rig is open")
+    }
+
+    /// Height of the joint with this label above its parent.
+    fn height(&self, label: &str) -> f32 {
+        self.data().joint(self.joint(label)).expect("the joint is there").data.rest.translation.y
+    }
+
+    fn joint(&self, label: &str) -> Uid {
+        self.data().find_label(label).expect("the joint is there")
+    }
+
+    fn frame(&mut self) {
+        self.app.update();
+        let messages = self.app.world().resource::<Messages<Notice>>();
+        self.notices.extend(self.cursor.read(messages).cloned());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+
+    fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
+        let start = Instant::now();
+        while !is_so(self) {
+            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.notices);
+            self.frame();
+        }
+    }
+
+    /// Runs frames until nothing is loaded or saved, and the file was looked at several times.
+    fn settle(&mut self) {
+        self.until("the end of work", |window| {
+            let world = window.app.world();
+            world.resource::<Loading>().what().is_none() && world.resource::<Saving>().what().is_none()
+        });
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_millis(1200) {
+            self.frame();
+        }
+    }
+
+    fn save(&mut self, from: &str, to: &str) {
+        let text = fs::read_to_string(&self.file).expect("the template is there");
+        assert!(text.contains(from), "{text}");
+        fs::write(&self.file, text.replacen(from, to, 1)).expect("the template is written");
+    }
+
+    fn send<M: Message>(&mut self, message: M) {
+        self.app.world_mut().write_message(message);
+        self.frame();
+        self.frame();
+    }
+
+    fn raise(&mut self, label: &str, height: f32) {
+        let (rig, joint) = (self.rig(), self.joint(label));
+        let edit = RigEdit::SetRest(joint, RestTransform::from_translation(Vec3::Y * height));
+        self.send(EditRequest::operation(rig, Operation::Edits(vec![edit])));
+    }
+
+    fn said(&self, severity: Severity, part: &str) -> bool {
+        self.notices.iter().any(|notice| notice.severity == severity && notice.text.contains(part))
+    }
+}
+
+#[test]
+fn a_changed_template_is_offered_and_taken_over_as_one_step() {
+    let mut window = Window::new();
+    assert!(window.offer().is_none(), "what is open is the file");
+    window.save("0.3, 0)", "0.5, 0)");
+    window.until("the offer", |window| window.offer().is_some());
+    let changes: Vec<String> =
+        window.offer().into_iter().flat_map(|offer| offer.changes.iter()).map(|c| c.to_string()).collect();
+    assert!(changes.len() == 1 && changes[0].contains('b'), "{changes:?}");
+    assert_eq!(window.height("b"), 0.3, "nothing happens before the answer");
+    window.send(OfferAnswer::Take(Take::Mine));
+    window.until("the update", |window| window.height("b") == 0.5);
+    window.settle();
+    assert!(window.offer().is_none() && window.said(Severity::Done, "1 change taken over"), "{:?}", window.notices);
+    // Undone, it stays undone until the file changes again; then both changes are offered.
+    let rig = window.rig();
+    window.send(EditRequest { rig, change: Change::Undo });
+    window.settle();
+    assert!(window.height("b") == 0.3 && window.offer().is_none());
+    window.save("0.4, 0)", "0.6, 0)");
+    window.until("the next offer", |window| window.offer().is_some());
+    assert_eq!(window.offer().map(|offer| offer.changes.len()), Some(2));
+}
+
+#[test]
+fn what_is_left_is_left_until_the_file_changes_again() {
+    let mut window = Window::new();
+    window.save("0.3, 0)", "0.5, 0)");
+    window.until("the offer", |window| window.offer().is_some());
+    window.send(OfferAnswer::Leave);
+    window.settle();
+    assert!(window.offer().is_none() && window.height("b") == 0.3);
+    window.save("0.5, 0)", "0.7, 0)");
+    window.until("the next offer", |window| window.offer().is_some());
+    window.send(OfferAnswer::TakeAlways);
+    window.until("the update", |window| window.height("b") == 0.7);
+    // From now on nobody is asked.
+    window.save("0.4, 0)", "0.9, 0)");
+    window.until("the live update", |window| window.height("c") == 0.9);
+    assert!(window.offer().is_none());
+}
+
+#[test]
+fn what_both_sides_changed_is_a_conflict_that_people_decide() {
+    for (take, height) in [(Take::Mine, 0.8), (Take::Theirs, 0.5)] {
+        let mut window = Window::new();
+        window.raise("b", 0.8);
+        window.raise("c", 0.1);
+        window.save("0.3, 0)", "0.5, 0)");
+        window.until("the offer", |window| window.offer().is_some());
+        let conflicts =
+            window.offer().into_iter().flat_map(|offer| offer.changes.iter()).filter(|c| c.conflict).count();
+        assert_eq!(conflicts, 1);
+        window.send(OfferAnswer::Take(take));
+        window.settle();
+        assert_eq!((window.height("b"), window.height("c")), (height, 0.1), "{take:?}");
+        assert!(window.offer().is_none(), "{take:?}");
+    }
+}
+
+#[test]
+fn a_save_of_the_window_itself_is_no_news() {
+    let mut window = Window::new();
+    window.raise("b", 0.8);
+    let path = window.file.clone();
+    window.send(ActionRequest(Action::Export));
+    window.send(DialogAnswer(Answer::Path(path.clone())));
+    // The window asks before it writes over a file.
+    window.send(DialogAnswer(Answer::Save));
+    window
+        .until("the saved template", |window| fs::read_to_string(&window.file).is_ok_and(|text| text.contains("0.8")));
+    window.raise("b", 0.9);
+    window.settle();
+    assert!(window.offer().is_none() && window.height("b") == 0.9, "{:?}", window.offer());
+    // What others save afterwards does not touch it either.
+    window.save("0.4, 0)", "0.6, 0)");
+    window.until("the offer", |window| window.offer().is_some());
+    assert_eq!(window.offer().map(|offer| offer.changes.len()), Some(1));
+    window.send(OfferAnswer::Take(Take::Mine));
+    window.until("the update", |window| window.height("c") == 0.6);
+    assert_eq!(window.height("b"), 0.9);
+}
+
+#[test]
+fn a_broken_save_changes_nothing_and_is_told() {
+    let mut window = Window::new();
+    fs::write(&window.file, "(format: 2, name: \"chain\", joints: [(").expect("the template is written");
+    window.until("the notice", |window| window.said(Severity::Error, "not taken over"));
+    assert!(window.offer().is_none() && window.height("b") == 0.3);
+    fs::write(&window.file, CHAIN.replace("0.3", "0.35")).expect("the template is written");
+    window.until("the offer", |window| window.offer().is_some());
+}

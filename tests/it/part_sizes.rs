@@ -1,0 +1,187 @@
+//! Parts of other sizes: spines of more bones, chains of as many joints as they go onto.
+
+use std::{collections::BTreeMap, fs, path::Path, sync::Arc};
+
+use rigsmith::{
+    files::{RealDisk, load_template},
+    modules,
+    processor::{Builder, review},
+    rig::{Rig, Uid, label::mirrored_label, template::read_template},
+    solve::program::{CompileOptions, RigProgram, RigState},
+};
+
+use super::bench::shipped;
+
+/// A rig whose hips carry a spine with so many joints, the hips and the chest among them.
+fn spine(folder: &Path, count: usize) -> Result<Rig, String> {
+    let text = format!(
+        "(format: 2, name: \"trunk\", joints: [(label: \"hips\", translation: (0, 0.955, -0.006))], parts: [(part: \
+         \"parts/spine.rig.ron\", onto: [\"hips\"], adds: true, count: {count})])"
+    );
+    let path = folder.join("trunk.rig.ron");
+    fs::write(&path, text).unwrap();
+    load_template(&RealDisk, &path).map(|template| template.rig).map_err(|error| error.to_string())
+}
+
+fn labels(rig: &Rig) -> BTreeMap<String, Uid> {
+    rig.walk().map(|joint| (joint.data.label.clone().unwrap(), joint.data.uid)).collect()
+}
+
+/// Builds a rig, whose joints stand as they rest, to `near`. Returns the number of its controls.
+fn controls(rig: &Rig, near: f32) -> usize {
+    assert_eq!(review(rig, &Arc::new(modules::all())), Vec::new(), "{}", rig.about().name);
+    let built = Builder::build(rig, &Arc::new(modules::all())).unwrap();
+    let program = RigProgram::compile(&built, &CompileOptions::default()).unwrap();
+    let mut state = RigState::new(Arc::new(program));
+    state.evaluate(0.0);
+    for joint in rig.walk() {
+        let (rest, now) = (rig.position(joint.data.uid), state.global(joint.data.uid).unwrap().translation);
+        assert!(rest.distance(now) < near, "{:?} rests at {rest} and stands at {now}", joint.data.label);
+    }
+    built.nodes.iter().filter(|node| node.control.is_some()).count()
+}
+
+#[test]
+fn a_spine_has_as_many_joints_as_its_use_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let usual = spine(folder.path(), 4).unwrap();
+    let (known, usual_controls) = (labels(&usual), controls(&usual, 1e-4));
+    let chest = usual.position(known["chest"]);
+    for count in 3..=9 {
+        let rig = spine(folder.path(), count).unwrap();
+        let found = labels(&rig);
+        assert_eq!(found.len(), count, "{found:?}");
+        // The ends stay where they are, what is between lies on the line, each the child of the one before.
+        assert!(rig.position(found["chest"]).distance(chest) < 1e-5, "{count}");
+        let chain: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+        let gaps: Vec<f32> =
+            chain.windows(2).map(|pair| rig.position(pair[0]).distance(rig.position(pair[1]))).collect();
+        let (least, most) = gaps.iter().fold((f32::MAX, 0f32), |(least, most), gap| (least.min(*gap), most.max(*gap)));
+        assert!(most < 1.5 * least, "{count}: {gaps:?}");
+        assert!(chain.windows(2).all(|pair| rig.joint(pair[1]).unwrap().parent == Some(pair[0])));
+        // What stays keeps its identity.
+        for label in ["hips", "spine", "spine_1", "chest"].into_iter().filter(|label| found.contains_key(*label)) {
+            assert_eq!(found[label], known[label], "{count}: {label}");
+        }
+        let tags = |rig: &Rig| -> Vec<Uid> {
+            let all = rig.walk().flat_map(|joint| &joint.data.tags).map(|tag| tag.uid);
+            let mut all: Vec<Uid> = all.collect();
+            all.sort_unstable();
+            all
+        };
+        assert_eq!(tags(&rig), tags(&usual), "{count}");
+        // One forward control a joint.
+        // Joints between the points of the curve stand on it, a little beside the line from point to point.
+        assert_eq!(controls(&rig, 4e-3) + 4, usual_controls + count, "{count}");
+        if count == 7 {
+            let expected = ["chest", "hips", "spine", "spine_1", "spine_2", "spine_3", "spine_4"];
+            assert_eq!(found.keys().map(String::as_str).collect::<Vec<_>>(), expected);
+        }
+    }
+    // The joints of a spine of seven are those of one of nine, as far as both have them.
+    let (seven, nine) = (spine(folder.path(), 7).unwrap(), spine(folder.path(), 9).unwrap());
+    let nine = labels(&nine);
+    assert!(labels(&seven).iter().all(|(label, uid)| nine[label] == *uid));
+    for count in [0, 2, 10, usize::MAX] {
+        let error = spine(folder.path(), count).unwrap_err();
+        assert!(error.contains("takes 3 to 9 joints") && error.contains("trunk.rig.ron"), "{error}");
+    }
+}
+
+#[test]
+fn a_chain_goes_onto_as_many_joints_as_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("snake.rig.ron");
+    for (part, least) in [("fk_chain", 1), ("ikfk_chain", 3), ("spring_chain", 2), ("tail", 3)] {
+        for count in [1, 2, 3, 5, 8] {
+            let joint = |number: usize| {
+                let parent = if number > 1 { format!("parent: \"bone_{}\", ", number - 1) } else { String::new() };
+                format!("(label: \"bone_{number}\", {parent}translation: (0, 0.1, {:?}))", 0.02 * number as f32)
+            };
+            let joints: Vec<String> = (1..=count).map(joint).collect();
+            let onto: Vec<String> = (1..=count).map(|number| format!("\"bone_{number}\"")).collect();
+            let text = format!(
+                "(format: 2, name: \"snake\", joints: [{}], parts: [(part: \"parts/{part}.rig.ron\", onto: [{}])])",
+                joints.join(", "),
+                onto.join(", ")
+            );
+            fs::write(&path, text).unwrap();
+            match load_template(&RealDisk, &path) {
+                Ok(template) if count >= least => {
+                    assert_eq!(template.notes, [""; 0], "{part} onto {count}");
+                    assert!(controls(&template.rig, 1e-4) >= count, "{part} onto {count}");
+                }
+                Err(error) if count < least => assert!(error.to_string().contains("joints"), "{error}"),
+                other => panic!("{part} onto {count}: {:?}", other.map(|template| template.notes)),
+            }
+        }
+    }
+}
+
+#[test]
+fn chains_that_do_not_fit_are_told_and_left_out() {
+    let read = |chains: &str| {
+        let text = format!(
+            "(format: 2, name: \"part\", chains: [{chains}], joints: [(label: \"a\"), (label: \"b\", parent: \"a\", \
+             translation: (0, 1, 0)), (label: \"c\", parent: \"a\", translation: (1, 0, 0))])"
+        );
+        read_template(text.as_bytes()).unwrap()
+    };
+    assert_eq!(read("(name: \"x\", joints: [\"a\", \"b\"])").chains.len(), 1);
+    for (chains, told) in [
+        ("(name: \"x\", joints: [\"a\", \"z\"])", "in the file"),
+        ("(name: \"x\", joints: [\"a\"])", "two joints"),
+        ("(name: \"x\", joints: [\"b\", \"c\"])", "parent of the next"),
+        ("(name: \"x\", joints: [\"a\", \"b\"], min: 3)", "`min` is 1 to 2"),
+        ("(name: \"x\", joints: [\"a\", \"b\"], max: 1)", "`max` 2 to"),
+        ("(name: \"x\", joints: [\"a\", \"b\"]), (name: \"y\", joints: [\"a\", \"c\"])", "one of its joints"),
+    ] {
+        let template = read(chains);
+        assert!(template.notes.len() == 1 && template.notes[0].contains(told), "{chains}: {:?}", template.notes);
+    }
+    // A use that asks for what the part does not have is told with its place.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.rig.ron");
+    for (count, told) in [("count: 3", "no chain"), ("counts: [(chain: \"tail\", count: 3)]", "no chain")] {
+        let text = format!("(format: 2, name: \"a\", parts: [\n    (part: \"parts/jaw.rig.ron\", {count}),\n])");
+        fs::write(&path, text).unwrap();
+        let error = load_template(&RealDisk, &path).unwrap_err().to_string();
+        assert!(error.contains(told) && error.contains("line 2"), "{error}");
+    }
+}
+
+#[test]
+fn both_sides_of_a_character_of_parts_are_partners() {
+    for (name, joints) in [("biped", 52), ("quadruped", 42), ("bird", 48)] {
+        let rig = shipped(name);
+        assert_eq!(rig.len(), joints, "{name}");
+        let mut pairs = 0;
+        for joint in rig.walk() {
+            let label = joint.data.label.as_deref().unwrap();
+            let other = mirrored_label(label).and_then(|label| rig.find_label(&label));
+            if !joint.data.tags.is_empty() && other.is_some() {
+                assert_eq!(joint.data.mirror, other, "{name}: {label}");
+                pairs += 1;
+            }
+        }
+        assert!(pairs > 8, "{name}: {pairs}");
+    }
+}
+
+/// The program's own parts are found wherever a template lies, and a file of the same name beside it counts more.
+#[test]
+fn parts_that_come_with_the_program_are_found_anywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "(format: 2, name: \"a\", parts: [(part: \"parts/single_control.rig.ron\")])";
+    let path = folder.path().join("a.rig.ron");
+    fs::write(&path, text).unwrap();
+    let load = || load_template(&RealDisk, &path).map(|template| template.rig);
+    assert!(load().unwrap().find_label("control").is_some());
+    fs::create_dir(folder.path().join("parts")).unwrap();
+    let own = "(format: 2, name: \"mine\", joints: [(label: \"own\")])";
+    fs::write(folder.path().join("parts/single_control.rig.ron"), own).unwrap();
+    assert!(load().unwrap().find_label("own").is_some());
+    // A broken file is told, not passed over.
+    fs::write(folder.path().join("parts/single_control.rig.ron"), &own[..20]).unwrap();
+    assert!(load().unwrap_err().to_string().contains("single_control.rig.ron"));
+}
