@@ -155,6 +155,8 @@ fn both_sides_of_a_character_of_parts_are_partners() {
     for (name, joints) in [("biped", 52), ("quadruped", 42), ("bird", 48)] {
         let rig = shipped(name);
         assert_eq!(rig.len(), joints, "{name}");
+        assert!(rig.walk().all(|joint| joint.data.group.is_some()), "{name}: every joint is in a group");
+        assert!(rig.groups().iter().all(|group| !group.name.ends_with("_2")), "{name}: {:?}", rig.groups());
         let mut pairs = 0;
         for joint in rig.walk() {
             let label = joint.data.label.as_deref().unwrap();

@@ -438,7 +438,7 @@ fn formatting_is_the_identity_on_formatted_files_and_keeps_the_rig() {
         let rig = whole(text);
         for style in [UidStyle::Kept, UidStyle::Written, UidStyle::Derived] {
             let formatted = format_template(text, style).unwrap_or_else(|error| panic!("{style:?}: {error}\n{text}"));
-            assert_eq!(plain(whole(&formatted)), plain(rig.clone()), "{style:?}\n{text}");
+            assert!(plain(whole(&formatted)) == plain(rig.clone()), "{style:?}\n{text}");
             assert_eq!(format_template(&formatted, style).unwrap(), formatted, "{style:?}: not the identity");
             let code = formatted.lines().map(|line| line.split(" //").next().unwrap().trim_end());
             let of_one = |line: &&str| {
@@ -452,7 +452,7 @@ fn formatting_is_the_identity_on_formatted_files_and_keeps_the_rig() {
         }
         let all = format_template(text, UidStyle::Written).unwrap();
         let none = format_template(&all, UidStyle::Derived).unwrap();
-        assert_eq!(plain(whole(&none)), plain(rig));
+        assert!(plain(whole(&none)) == plain(rig), "uids written and taken out again\n{text}");
     }
     let all = format_template(CHAIN, UidStyle::Written).unwrap();
     assert_eq!(all.matches("uid: \"").count(), 1 + 1 + 3 + 5, "{all}");

@@ -69,7 +69,7 @@ impl PartChain {
         };
         let point = |place: usize| {
             let (from, to, share) = parted(place);
-            Vec3::from(known[from].translation).lerp(known[to].translation.into(), share)
+            known[from].translation.lerp(known[to].translation, share)
         };
         let mut places = Vec::with_capacity(count);
         for place in 0..count {
@@ -78,7 +78,7 @@ impl PartChain {
             let (_, b, _) = known[to].to_scale_rotation_translation();
             let mut turn = (a * (1.0 - share) + (if a.dot(b) < 0.0 { -b } else { b }) * share).normalize();
             // A joint with one behind it looks at that as its counterpart in the file does.
-            let along = known[from].inverse().transform_point3(known[to].translation.into()).normalize_or_zero();
+            let along = known[from].inverse().transform_point3(known[to].translation).normalize_or_zero();
             let ahead =
                 if place + 1 < count { (point(place + 1) - point(place)).normalize_or_zero() } else { Vec3::ZERO };
             if along != Vec3::ZERO && ahead != Vec3::ZERO {

@@ -25,7 +25,7 @@ pub enum UidStyle {
     Kept,
     /// Everything has its uid, and so has every reference.
     Written,
-    /// A uid that follows from names is left out, beside names in references, too.
+    /// A uid that follows from names is left out, beside names in references, too, unless the template has parts.
     Derived,
 }
 
@@ -38,7 +38,7 @@ pub fn format_template(source: &str, uids: UidStyle) -> Result<String, SourceErr
     let before = read_text(source, 1)?;
     let text = match (uids, Declared::find(source)) {
         (UidStyle::Kept, _) | (_, None) => source.to_owned(),
-        (style, Some(declared)) => Uids::new(&declared, &before.rig, style).text(),
+        (style, Some(declared)) => Uids::new(&declared, &before.rig, style, !before.parts.is_empty()).text(),
     };
     let text = laid_out(&text)?;
     // Names that parts bring are bound once those are there.
@@ -57,6 +57,7 @@ struct Uids<'d, 'a> {
     declared: &'d Declared<'a>,
     rig: &'d Rig,
     style: UidStyle,
+    has_parts: bool,
     called: Called<'d, 'a>,
     by_uid: HashMap<Uid, &'d Declaration>,
     /// Uids that the text will not have.
@@ -65,12 +66,12 @@ struct Uids<'d, 'a> {
 }
 
 impl<'d, 'a> Uids<'d, 'a> {
-    fn new(declared: &'d Declared<'a>, rig: &'d Rig, style: UidStyle) -> Self {
+    fn new(declared: &'d Declared<'a>, rig: &'d Rig, style: UidStyle, has_parts: bool) -> Self {
         let follows = |one: &&Declaration| !one.is_written || one.derived == Some(one.uid);
         let derived = declared.all().filter(follows).map(|one| one.uid).collect();
         let (called, patch) = (Called::new(declared), Patch::new(&declared.tree));
         let by_uid = declared.all().map(|one| (one.uid, one)).collect();
-        Self { declared, called, by_uid, rig, style, derived, patch }
+        Self { declared, called, by_uid, rig, style, has_parts, derived, patch }
     }
 
     fn text(mut self) -> String {
@@ -163,6 +164,8 @@ impl<'d, 'a> Uids<'d, 'a> {
             }
             let text = match self.style {
                 UidStyle::Written => bind_names(written, self.rig).0,
+                // A name alone may be that of something that a part brings, too.
+                UidStyle::Derived if self.has_parts => continue,
                 UidStyle::Derived => without_uids(written, self.rig, |uid| self.derived.contains(&uid)),
                 UidStyle::Kept => continue,
             };

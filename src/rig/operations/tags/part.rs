@@ -103,7 +103,7 @@ fn check_needs(rig: &Rig, part: &Rig, joints: &[Uid], bindings: &BTreeMap<Uid, U
 }
 
 /// Maps each group of the part to the group of its first grouped counterpart, if half of them have one; else to a group
-/// of the same name that nothing is in, or to one that is created.
+/// of the same name that nothing else is in, or to one that is created.
 fn groups(
     draft: &mut Draft,
     part: &Rig,
@@ -117,8 +117,11 @@ fn groups(
         let group_of = |draft: &Draft, joint: Uid| draft.rig().joint(joint).and_then(|joint| joint.data.group);
         let Some(first) = members.iter().map(|joint| group_of(draft, *joint)).reduce(Option::or) else { continue };
         let grouped = members.iter().filter(|joint| group_of(draft, **joint).is_some()).count();
-        let is_empty = |uid: Uid| draft.rig().walk().all(|joint| joint.data.group != Some(uid));
-        let waiting = draft.rig().groups().iter().find(|of| of.name == group.name && is_empty(of.uid));
+        let is_own = |uid: Uid| {
+            let mut of_group = draft.rig().walk().filter(|joint| joint.data.group == Some(uid));
+            of_group.all(|joint| members.contains(&joint.data.uid))
+        };
+        let waiting = draft.rig().groups().iter().find(|of| of.name == group.name && is_own(of.uid));
         let target = match (first.filter(|_| 2 * grouped >= members.len()), waiting.map(|group| group.uid)) {
             (Some(known), _) | (None, Some(known)) => known,
             (None, None) => {
