@@ -17,7 +17,7 @@ use rigsmith::prelude::*;
 const TEMPLATE: &str = include_str!("../assets/templates/biped.rig.ron");
 
 /// A part that the file gains.
-const TAIL: &str = r#"        (part: "parts/tail.rig.ron", parent: "hips", translation: (0, 0.02, -0.1)),
+const TAIL: &str = r#"        (part: "parts/tail.rig.ron", parent: "hips", world: true, translation: (0, 0.13, 0.17)),
     ],
 )
 "#;
