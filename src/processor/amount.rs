@@ -5,21 +5,27 @@ use std::ops::RangeInclusive;
 use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
-use super::{BuildScope, ModuleError, world::NodeId};
+use super::{BuildScope, ModuleError, mirror::opposite, world::NodeId};
 use crate::{
     mesh::model::Trs,
     rig::{Attribute, AttributeKind, Scalar},
 };
 
 /// A number, or the name of an attribute that it follows in every frame. In files either is written as it is:
-/// `soft: 0.05` or `soft: "soft"`.
+/// `soft: 0.05` or `soft: "soft"`; `twist: "-twist"` follows the opposite of the attribute, as the other side of a mirrored
+/// limb does.
 #[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Amount {
     /// Always this.
     Value(f32),
-    /// What the attribute of that name says.
+    /// Value of the attribute of that name; its opposite if the name begins with [`OPPOSITE`](Self::OPPOSITE).
     Attribute(String),
+}
+
+impl Amount {
+    /// Sign before the name of an attribute whose opposite counts.
+    pub const OPPOSITE: char = '-';
 }
 
 impl Default for Amount {
@@ -42,7 +48,7 @@ impl From<&str> for Amount {
 
 impl BuildScope<'_> {
     /// A parameter that is a number or an attribute of `control`. An attribute that the control does not have yet is
-    /// added, within `range` (open where that is infinite) and with the value `default`.
+    /// added, so that the number is within `range` (open where that is infinite) and begins as `default`.
     ///
     /// # Errors
     /// A number that is not finite or outside of the range; an attribute without a control to carry it;
@@ -62,8 +68,15 @@ impl BuildScope<'_> {
             }
             (Amount::Attribute(name), Some(control)) => {
                 let end = |end: f32| Some(end).filter(|end| end.is_finite());
-                let kind = AttributeKind::Number { min: end(*range.start()), max: end(*range.end()) };
-                self.ensure_attribute(control, name, kind, default)
+                let (min, max) = (end(*range.start()), end(*range.end()));
+                match name.strip_prefix(Amount::OPPOSITE) {
+                    None => self.ensure_attribute(control, name, AttributeKind::Number { min, max }, default),
+                    Some(name) => {
+                        let kind = AttributeKind::Number { min: max.map(opposite), max: min.map(opposite) };
+                        self.ensure_attribute(control, name, kind, opposite(default))?;
+                        Ok(Scalar::opposite(self.uid(control), name))
+                    }
+                }
             }
             (Amount::Attribute(name), None) => Err(match self.trace.optional_off.clone() {
                 Some((parameter, off)) if parameter == "control" => ModuleError::Off { parameter, off },

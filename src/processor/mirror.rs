@@ -38,11 +38,14 @@ pub fn mirrored_limits([x, y, z]: JointAngles) -> JointAngles {
 }
 
 impl Amount {
-    /// The opposite number. An attribute stays: the one on the other side has the value that moves that side.
+    /// The opposite number: the same value of an attribute moves both sides alike.
     pub fn opposite(&self) -> Self {
         match self {
             Self::Value(value) => Self::Value(opposite(*value)),
-            attribute @ Self::Attribute(_) => attribute.clone(),
+            Self::Attribute(name) => Self::Attribute(match name.strip_prefix(Self::OPPOSITE) {
+                Some(name) => name.to_owned(),
+                None => format!("{}{name}", Self::OPPOSITE),
+            }),
         }
     }
 }

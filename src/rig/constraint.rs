@@ -51,6 +51,11 @@ impl Scalar {
         Self::Attribute { node, name: name.into(), factor: 1.0, add: 0.0 }
     }
 
+    /// The opposite of the value of an attribute.
+    pub fn opposite(node: Uid, name: impl Into<Arc<str>>) -> Self {
+        Self::Attribute { node, name: name.into(), factor: -1.0, add: 0.0 }
+    }
+
     /// Number that is one minus the value of an attribute.
     pub fn inverse(node: Uid, name: impl Into<Arc<str>>) -> Self {
         Self::Attribute { node, name: name.into(), factor: -1.0, add: 1.0 }

@@ -42,6 +42,8 @@ const SIDED: &[(&str, &str, &str)] = &[
         "(text: \"a * 2 + ab\", inputs: [(name: \"a\", node: \"@this\", channel: RotateY)], output_channel: RotateZ)",
         "(text: \"-((-a) * 2 + ab)\", inputs: [(name: \"a\", node: \"@this\", channel: RotateY)], output_channel: RotateZ)",
     ),
+    ("ik_fk_switch", "(twist: \"-turn\", prefer: (0.5, 0.0, -1.0))", "(twist: \"turn\", prefer: (-0.5,0.0,-1.0))"),
+    ("spline_ik", "(twist: \"turn\")", "(twist: \"-turn\")"),
     (
         "ik_fk_switch",
         "(twist: 30.0, prefer: (0.5, 0.0, -1.0), soft: \"soft\")",
@@ -178,6 +180,10 @@ impl Stage {
                     (offset.rotation.y, offset.rotation.z) = (-offset.rotation.y, -offset.rotation.z);
                 }
                 state.set_offset(node.uid, offset).unwrap();
+                // One value of an attribute moves both sides alike.
+                for attribute in node.attributes.iter().filter(|attribute| &*attribute.name == "turn") {
+                    state.set_attribute(node.uid, &attribute.name, 25.0 * t).unwrap();
+                }
             }
             state.evaluate(0.0);
             for uid in &self.left {
@@ -234,6 +240,28 @@ fn both_sides_move_alike() {
             &[
                 ("c_l", "control", goal.into()),
                 ("c_l", "ik_handle", reach("end: \"@this\", twist: 35.0, prefer: (0.4, 0.0, 1.0)")),
+            ],
+        ),
+        (
+            "twist of two bones by an attribute",
+            &[
+                ("c_l", "control", goal.into()),
+                ("c_l", "ik_handle", reach("end: \"@this\", twist: \"turn\", prefer: (0.4, 0.0, 1.0)")),
+            ],
+        ),
+        (
+            "twist of a curve by the opposite of an attribute",
+            &[
+                (
+                    "a_l",
+                    "control",
+                    "(at: \"@joint #2 + @joint #3 + @joint #4\", parent: \"@joint #0000000000000001\", hierarchy: false, follow: false, creation: (name: \"p_l\"))".into(),
+                ),
+                (
+                    "c_l",
+                    "spline_ik",
+                    "(start: \"@joint #2\", end: \"@this\", points: \"@command #c000 role:control\", control: \"@command #c000 role:control pick:START\", twist: \"-turn\")".into(),
+                ),
             ],
         ),
         (
