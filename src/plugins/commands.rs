@@ -4,7 +4,8 @@
 //! A [`BuildRequest`] builds a rig, steps it or rolls it back; a rig that has been built follows every edit from then
 //! on unless [`BuildStep::Follow`] says otherwise. State, error and time of each command are on the entity of its tag
 //! ([`CommandReport`]). Created nodes and constraints are entities with [`CreatedBy`]; a node that is rolled back is
-//! parked: it keeps its entity, without its components and disabled, until it comes back.
+//! parked: it keeps its entity, without its components and disabled, until it comes back, or until its command is deleted and
+//! out of the history.
 
 mod constraints;
 mod nodes;
@@ -42,7 +43,13 @@ impl Plugin for CommandsPlugin {
         app.register_required_components::<Rig, BuiltEntities>();
         app.init_resource::<Programs>().add_message::<BuildRequest>().add_message::<BuildDone>().add_systems(
             Update,
-            (build_rigs, nodes::follow_nodes, constraints::follow_constraints, (run::run_built, report_commands))
+            (
+                build_rigs,
+                nodes::follow_nodes,
+                nodes::despawn_parked,
+                constraints::follow_constraints,
+                (run::run_built, report_commands),
+            )
                 .chain()
                 .in_set(RigSystems::Build)
                 .after(super::document::follow::follow_tags),

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::selection::Selection;
 use crate::rig::{
-    EditError, Rig, RigEdit, UidSource,
+    EditError, Rig, RigEdit, Uid, UidSource,
     operations::{MirrorPlane, Operation, OperationError, Outcome},
     step::{Committed, Step, UndoStacks},
 };
@@ -15,6 +15,8 @@ use crate::rig::{
 #[derive(Component, Default)]
 pub struct RigHistory {
     stacks: UndoStacks,
+    /// Number of times that a new step discarded undone ones.
+    discarded: u64,
     preview: Option<Preview>,
 }
 
@@ -36,7 +38,7 @@ pub struct Recorded {
 }
 
 /// True if edits delete a joint. Created nodes never count as deleted, since their commands may build them again.
-fn removes(edits: &[RigEdit], joint: crate::rig::Uid) -> bool {
+fn removes(edits: &[RigEdit], joint: Uid) -> bool {
     edits.iter().any(|edit| match edit {
         RigEdit::RemoveJoint(removed) => *removed == joint,
         RigEdit::Batch(edits) => removes(edits, joint),
@@ -51,7 +53,7 @@ fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), EditError> {
 impl RigHistory {
     /// A stored history, for a rig in which its steps are already in effect.
     pub fn restored(stacks: &UndoStacks) -> Self {
-        Self { stacks: stacks.clone(), preview: None }
+        Self { stacks: stacks.clone(), ..Self::default() }
     }
 
     /// Runs an operation and records it as one step. Joints that the operation deletes leave the selection. A preview
@@ -129,6 +131,7 @@ impl RigHistory {
         let step = Step { name: name.clone(), forward: outcome.edits, backward: outcome.inverses, before, after };
         let step = Arc::new(step);
         selection.0.clone_from(&step.after);
+        self.discarded += u64::from(self.can_redo());
         self.stacks.follow(&Committed::Done(step.clone()));
         Recorded { name, step: Some(step), notes: outcome.notes }
     }
@@ -160,6 +163,18 @@ impl RigHistory {
     /// True if an undone step can be redone.
     pub fn can_redo(&self) -> bool {
         !self.stacks.undone.is_empty()
+    }
+
+    /// Number of times that a new step discarded undone ones, which can never be redone.
+    pub fn discarded(&self) -> u64 {
+        self.discarded
+    }
+
+    /// True if undoing or redoing some step restores a tag.
+    pub fn holds_tag(&self, tag: Uid) -> bool {
+        let mut edits =
+            self.stacks.done.iter().chain(&self.stacks.undone).flat_map(|step| [&step.forward, &step.backward]);
+        edits.any(|edits| edits.iter().any(|edit| edit.adds_tag(tag)))
     }
 
     /// Names of all steps, oldest first, and how many of them are in effect.

@@ -150,6 +150,18 @@ pub enum EditError {
     BadParams(Uid, String),
 }
 
+impl RigEdit {
+    /// True if the edit puts a tag into the rig.
+    pub fn adds_tag(&self, tag: Uid) -> bool {
+        match self {
+            Self::AddJoint { joint, .. } => joint.tags.iter().any(|known| known.uid == tag),
+            Self::AddTag { tag: added, .. } => added.uid == tag,
+            Self::Batch(edits) => edits.iter().any(|edit| edit.adds_tag(tag)),
+            _ => false,
+        }
+    }
+}
+
 impl Rig {
     /// Applies an edit and returns its exact inverse, order of siblings included.
     pub fn apply(&mut self, edit: &RigEdit) -> Result<RigEdit, EditError> {

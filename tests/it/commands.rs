@@ -144,6 +144,33 @@ fn created_nodes_keep_their_entities_through_rolling_back() {
 }
 
 #[test]
+fn nodes_of_commands_that_left_the_history_are_despawned() {
+    let mut bench = Bench::new();
+    bench.tag(2, 52, "mark", "()", None);
+    bench.step(BuildStep::All);
+    let kept = bench.nodes();
+    bench.tag(1, 51, "mark", "()", None);
+    let added: Vec<_> = bench.nodes().into_iter().filter(|node| !kept.contains(node)).collect();
+    assert_eq!(added.len(), 1);
+    let (uid, entity) = added[0];
+    let is_known = |bench: &Bench| bench.get::<BuiltEntities>(bench.rig).unwrap().any(uid) == Some(entity);
+    // Undone, it can come back; deleted in a step that can be undone, too.
+    bench.change(Change::Undo);
+    assert!(is_known(&bench) && bench.get::<Parked>(entity).is_some());
+    bench.change(Change::Redo);
+    assert!(is_known(&bench) && bench.get::<Parked>(entity).is_none());
+    bench.edit(RigEdit::RemoveTag(Uid(1), Uid(51)));
+    bench.edit(RigEdit::SetLabel(Uid(1), Some("other".into())));
+    assert!(is_known(&bench) && bench.get::<Parked>(entity).is_some());
+    (0..3).for_each(|_| bench.change(Change::Undo));
+    assert!(is_known(&bench), "a redo would restore the command");
+    // A new step discards the undone ones, among them the only one that adds the command.
+    bench.edit(RigEdit::SetLabel(Uid(1), Some("another".into())));
+    assert!(!is_known(&bench) && bench.app.world().get_entity(entity).is_err());
+    assert_eq!(bench.nodes(), kept);
+}
+
+#[test]
 fn states_errors_and_times_are_on_the_tags() {
     let mut bench = Bench::new();
     bench.tag(1, 51, "mark", "()", None);

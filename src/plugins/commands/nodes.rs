@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 
 use bevy::{
-    ecs::{entity_disabling::Disabled, query::Allow},
+    ecs::{entity::EntityHashMap, entity_disabling::Disabled, query::Allow},
     prelude::*,
 };
 
@@ -14,6 +14,7 @@ use crate::{
             GroupEntities, JointEntities, TagEntities,
             entities::{BuiltEntities, EntityIndex, EntityPart, MirroredNode},
         },
+        history::RigHistory,
         runtime::RigRuntime,
         schema::{
             Attributes, Control, CreatedBy, CreatedRole, InGroup, Joint, NodeLabel, NodeLayer, NodeOf, Null, Parked,
@@ -65,15 +66,16 @@ pub(super) fn follow_nodes(
                 }
                 continue;
             };
+            let uid = node.uid;
             let rest = RestTransform::from(node.base);
             let pose = rig.offset(node.uid).copied().unwrap_or_default().on(&rest);
             let Some(mirrored) = known.nodes.get_mut(&node.uid) else {
                 let entity = writer.commands.spawn((node.uid, rest, pose, NodeOf(rig_entity), ChildOf(parent))).id();
                 index.insert(entity, rig_entity, node.uid, EntityPart::Node);
                 writer.describe(entity, rig, node, None);
-                let mirrored =
-                    MirroredNode { entity, is_parked: false, node: Some(node.clone()), parent: Some(parent) };
-                known.nodes.insert(node.uid, mirrored);
+                let (node, parent) = (Some(node.clone()), Some(parent));
+                let mirrored = MirroredNode { entity, command: origin.command, is_parked: false, node, parent };
+                known.nodes.insert(uid, mirrored);
                 continue;
             };
             let entity = mirrored.entity;
@@ -122,6 +124,31 @@ fn park(commands: &mut Commands, known: &mut BuiltEntities, nodes: &[BuiltNode])
             entity.try_remove::<(CreatedBy, CreatedRole, NodeLayer, Attributes)>().try_insert((Parked, Disabled));
         }
     }
+}
+
+/// Despawns parked nodes that no build can bring back: their commands are deleted, and neither undo nor redo restores
+/// them. Commands leave the history only where undone steps are discarded, so nothing is searched at other times.
+pub(super) fn despawn_parked(
+    mut commands: Commands,
+    mut rigs: Query<(Entity, &Rig, Ref<RigHistory>, &mut BuiltEntities)>,
+    mut index: ResMut<EntityIndex>,
+    mut discarded: Local<EntityHashMap<u64>>,
+) {
+    for (entity, rig, history, mut known) in &mut rigs {
+        if discarded.insert(entity, history.discarded()) == Some(history.discarded()) && !history.is_added() {
+            continue;
+        }
+        let is_gone = |command: Uid| rig.find_tag(command).is_none() && !history.holds_tag(command);
+        known.bypass_change_detection().nodes.retain(|_, node| {
+            let stays = !node.is_parked || !is_gone(node.command);
+            if !stays {
+                index.remove(node.entity);
+                commands.entity(node.entity).try_despawn();
+            }
+            stays
+        });
+    }
+    discarded.retain(|entity, _| rigs.contains(*entity));
 }
 
 /// Writes the components of one rig's nodes.

@@ -161,6 +161,8 @@ pub struct BuiltEntities {
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::plugins) struct MirroredNode {
     pub entity: Entity,
+    /// Uid of the command that creates the node.
+    pub command: Uid,
     pub is_parked: bool,
     pub node: Option<BuiltNode>,
     pub parent: Option<Entity>,
@@ -171,6 +173,8 @@ pub(in crate::plugins) struct MirroredNode {
 pub(in crate::plugins) struct MirroredConstraint {
     pub entity: Entity,
     pub constraint: Arc<crate::rig::Constraint>,
+    /// The driven node and the nodes that it reads.
+    pub uids: Vec<Uid>,
     /// Entities of the driven node and of the nodes that it reads, when they were last written.
     pub nodes: Vec<Option<Entity>>,
 }
