@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! cargo bench --bench app --no-default-features
+//! cargo bench --bench app --no-default-features -- ik_handle
 //! ```
 //!
 //! The bundled biped in an app with `RigPlugins` and no window, built and at rest. Each round makes one change and runs one
@@ -33,7 +34,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     app.update();
     app.world_mut().write_message(BuildRequest { rig, step: BuildStep::All });
     (0..20).for_each(|_| app.update());
-    let mut bench = Bench { app, rig };
+    let filter = std::env::args().skip(1).find(|argument| !argument.starts_with("--"));
+    let mut bench = Bench { app, rig, filter };
     let built = bench.app.world().get::<Built>(rig).ok_or("the rig is not built")?.0.clone();
     let goal = built.switches.iter().find_map(|switch| match switch.matching {
         Matching::IkFk { goal, .. } => Some((goal, switch.control, switch.attribute.clone())),
@@ -104,10 +106,15 @@ fn changed(module: &str, params: &str) -> String {
 struct Bench {
     app: App,
     rig: Entity,
+    /// Text that the names of the measured changes contain.
+    filter: Option<String>,
 }
 
 impl Bench {
     fn measure(&mut self, name: &str, mut change: impl FnMut(&mut App, usize)) {
+        if !self.filter.as_ref().is_none_or(|filter| name.contains(filter)) {
+            return;
+        }
         let (mut busy, mut idle) = (Vec::new(), Vec::new());
         let mut commands = 0;
         self.app.world_mut().resource_mut::<Messages<BuildDone>>().clear();

@@ -242,6 +242,8 @@ impl RigRuntime {
     pub fn exchange(&mut self, program: &Arc<RigProgram>, carry: &Carry) {
         if carry.is_aligned() {
             self.state.exchange(program, carry);
+            // Results that no operation computes any more have other values, too.
+            self.all_due = self.mode == InstanceMode::Hierarchy;
             return;
         }
         let mut fresh = Self::new(Arc::clone(program), self.mode);

@@ -1,5 +1,7 @@
 //! Constraints as entities: the node that each drives, the nodes that it reads, and their order of evaluation.
 
+use std::sync::Arc;
+
 use bevy::prelude::*;
 
 use super::Built;
@@ -36,6 +38,13 @@ pub(super) fn follow_constraints(
         let mut is_reordered = false;
         for constraint in constraints {
             let entity_of = |node: Uid| joints.get(node).or_else(|| known.get(node));
+            if !is_reordered
+                && let Some(mirrored) = known.constraints.get(&constraint.uid)
+                && Arc::ptr_eq(&mirrored.constraint, &constraint.constraint)
+                && mirrored.uids.iter().zip(&mirrored.nodes).all(|(uid, entity)| entity_of(*uid) == *entity)
+            {
+                continue;
+            }
             let read = constraint.constraint.reads().into_iter().filter_map(|dependency| match dependency {
                 Dependency::Node(node) => Some(node),
                 Dependency::Attribute(..) => None,
@@ -44,7 +53,8 @@ pub(super) fn follow_constraints(
                 Dependency::Node(node) | Dependency::Attribute(node, _) => *node,
             });
             let read: Vec<Uid> = read.collect();
-            let nodes: Vec<Option<Entity>> = driven.iter().chain(&read).map(|node| entity_of(*node)).collect();
+            let uids: Vec<Uid> = driven.iter().chain(&read).copied().collect();
+            let nodes: Vec<Option<Entity>> = uids.iter().map(|node| entity_of(*node)).collect();
             if !is_reordered
                 && known.constraints.get(&constraint.uid).is_some_and(|known| known.is_same(constraint, &nodes))
             {
@@ -79,7 +89,7 @@ pub(super) fn follow_constraints(
             if let Some(tag) = tags.get(constraint.command) {
                 commands.entity(entity).try_insert(CreatedBy(tag));
             }
-            let mirrored = MirroredConstraint { entity, constraint: constraint.constraint.clone(), nodes };
+            let mirrored = MirroredConstraint { entity, constraint: constraint.constraint.clone(), uids, nodes };
             known.constraints.insert(constraint.uid, mirrored);
         }
     }

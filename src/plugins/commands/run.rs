@@ -11,7 +11,7 @@ use crate::{
         runtime::{InstanceMode, RigRuntime},
     },
     rig::{PoseOffset, RestTransform, Rig},
-    solve::program::{CompileOptions, ProgramCache, ProgramError},
+    solve::program::{Carry, CompileOptions, ProgramCache, ProgramError},
 };
 
 /// Compiled programs of built rigs; rigs with equal programs share one.
@@ -72,12 +72,17 @@ pub(super) fn run_built(
         let mut fresh = None;
         let target = match &mut runtime {
             Some(runtime) if runtime.state().hash() == program.hash() => runtime.bypass_change_detection(),
-            before => {
+            Some(runtime) => {
+                let runtime = runtime.bypass_change_detection();
+                let carry = Carry::between(runtime.state().program(), &program);
+                runtime.exchange(&program, &carry);
+                runtime
+            }
+            None => {
                 let fresh = fresh.insert(RigRuntime::new(Arc::clone(&program), InstanceMode::Hierarchy));
-                match (before, suspended) {
-                    (Some(before), _) => fresh.carry_over(before),
-                    (None, Some(before)) => fresh.carry_over(&before.0),
-                    (None, None) => take_motion(fresh, rig, joints, &transforms),
+                match suspended {
+                    Some(before) => fresh.carry_over(&before.0),
+                    None => take_motion(fresh, rig, joints, &transforms),
                 }
                 fresh
             }
