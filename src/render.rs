@@ -28,13 +28,14 @@ use crate::{
         RigPlugins,
         commands::{BuildRequest, BuildStep},
         display::{DisplayJob, DisplayPlugin, MeshDisplay, ViewportLights},
+        document::EditRequest,
         document::Selection,
         drawing::{BACKGROUND, DrawingPlugin, RigDrawing},
         surface::{RigMesh, RigSurface, SkinOf},
         task_pools,
         viewport::{FIELD_OF_VIEW, RigViewport, framing},
     },
-    rig::{Rig, Uid},
+    rig::{Rig, RigEdit, Uid, operations::Operation},
 };
 
 /// Settings of a picture.
@@ -56,6 +57,8 @@ pub struct PictureSettings {
     pub background: Color,
     /// True to build the rig and let it run before the picture is taken: controls are shown then.
     pub build: bool,
+    /// How the joints of a point are blended.
+    pub deform: Deform,
     /// Least and greatest corner of the box that fills the picture, in the rig's space; the whole character if `None`.
     pub bounds: Option<[Vec3; 2]>,
 }
@@ -71,9 +74,20 @@ impl Default for PictureSettings {
             selected: Vec::new(),
             background: BACKGROUND,
             build: false,
+            deform: Deform::default(),
             bounds: None,
         }
     }
+}
+
+/// How the motions of the joints that move a point are blended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Deform {
+    /// Linear blend skinning: what the window, exports and most engines do.
+    #[default]
+    Linear,
+    /// Dual quaternion skinning: what an engine with it shows.
+    DualQuaternion,
 }
 
 /// Error of taking a picture.
@@ -151,19 +165,24 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
     let deadline = Instant::now() + LIMIT;
     let late = || PictureError::Late(LIMIT.as_secs());
     // The surface gives the size of the posed mesh.
-    loop {
+    let settle = |app: &mut App| loop {
         app.update();
         let world = app.world_mut();
         let loading = world.query::<&DisplayJob>().iter(world).next().is_some();
         let surface = world.get::<RigSurface>(entity);
         let surface = !has_mesh || surface.is_some_and(|surface| surface.ready().is_some() && !surface.is_stale());
         if surface && !loading {
-            break;
+            return Ok(());
         }
         if Instant::now() > deadline {
             return Err(late());
         }
         std::thread::sleep(Duration::from_millis(1));
+    };
+    settle(&mut app)?;
+    if has_mesh && settings.deform == Deform::DualQuaternion {
+        freeze_dual(app.world_mut(), entity);
+        settle(&mut app)?;
     }
     aim(app.world_mut(), entity, camera, settings);
     for _ in 0..SETTLE {
@@ -179,6 +198,20 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
         }
     }
     Err(late())
+}
+
+/// Replaces the meshes of a rig by what dual quaternions make of them in the present pose.
+fn freeze_dual(world: &mut World, rig: Entity) {
+    let Some(models) = world.get::<RigSurface>(rig).map(RigSurface::dual_quaternion_models) else { return };
+    let mut meshes: Vec<(Uid, Entity)> =
+        world.query::<(Entity, &RigMesh)>().iter(world).map(|(entity, mesh)| (mesh.uid, entity)).collect();
+    meshes.sort_unstable();
+    let mut edits = Vec::new();
+    for ((uid, entity), model) in meshes.into_iter().zip(models) {
+        edits.push(RigEdit::SetSkin(uid, None));
+        world.entity_mut(entity).insert(RigMesh::new(uid, model, Vec::new()));
+    }
+    world.write_message(EditRequest::operation(rig, Operation::Edits(edits)));
 }
 
 /// A picture as the bytes of a PNG file, without transparency.

@@ -64,6 +64,9 @@ pub(super) struct PoseArgs {
     weights: WeightArgs,
     #[command(flatten)]
     export: ExportArgs,
+    #[cfg(feature = "render")]
+    #[command(flatten)]
+    deform: super::render::DeformArgs,
 }
 
 impl From<PoseError> for Failure {
@@ -86,6 +89,12 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
         && !matches!(kind, Some(Some(FileKind::Glb | FileKind::Gltf | FileKind::Template)))
     {
         return Err(Failure::Usage(format!("cannot write `{}`; give .glb, .gltf, .rig.ron or .png", output.display())));
+    }
+    #[cfg(feature = "render")]
+    if args.deform.is_for_pictures_only() && !is_picture {
+        let reason = "--deform dqs shows what an engine with dual quaternions does; files have weights, not the way in \
+                      which they are blended: write a .png";
+        return Err(Failure::Usage(reason.to_owned()));
     }
     let writes = parsed(&args.steps)?;
     let mut report = Report::default();
@@ -182,7 +191,7 @@ fn write(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Repor
 
 #[cfg(feature = "render")]
 fn picture(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
-    super::render::picture_of(bench.posed_document()?, args.mesh.as_deref(), &args.weights, output, report)
+    super::render::picture_of(bench.posed_document()?, args.mesh.as_deref(), &args.weights, args.deform, output, report)
 }
 
 #[cfg(not(feature = "render"))]

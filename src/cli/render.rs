@@ -22,7 +22,7 @@ use crate::{
         drawing::{LabelChoice, RigDrawing},
         surface::RigMesh,
     },
-    render::{PictureSettings, adapter, png, take_picture},
+    render::{Deform, PictureSettings, adapter, png, take_picture},
     rig::{
         Rig, RigEdit, Uid, UidSource,
         character::{import_rig_text, import_skeleton},
@@ -73,9 +73,41 @@ pub(super) struct RenderArgs {
     build: bool,
     #[command(flatten)]
     steps: PoseSteps,
+    #[command(flatten)]
+    deform: DeformArgs,
     /// Show weights as colours: those of the joint with this label, or `all`
     #[arg(long, value_name = "JOINT")]
     weights: Option<String>,
+}
+
+/// How skin is bent in a picture; shared with `rigsmith pose`.
+#[derive(Args, Debug, Clone, Copy)]
+pub(super) struct DeformArgs {
+    /// How the motions of joints are blended in a picture
+    #[arg(long, value_enum, default_value_t = DeformArg::Linear)]
+    deform: DeformArg,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+enum DeformArg {
+    /// Linear blend skinning, as in exported files
+    Linear,
+    /// Dual quaternion skinning, as in an engine that has it
+    Dqs,
+}
+
+impl DeformArgs {
+    /// True unless the blend is that of exported files.
+    pub(super) fn is_for_pictures_only(self) -> bool {
+        self.deform == DeformArg::Dqs
+    }
+
+    fn deform(self) -> Deform {
+        match self.deform {
+            DeformArg::Linear => Deform::Linear,
+            DeformArg::Dqs => Deform::DualQuaternion,
+        }
+    }
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy)]
@@ -171,6 +203,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
         },
         selected,
         build: is_built,
+        deform: args.deform.deform(),
         ..PictureSettings::default()
     };
     if let Some((name, true)) = adapter() {
@@ -191,6 +224,7 @@ pub(super) fn picture_of(
     rig: Rig,
     mesh: Option<&Path>,
     weights: &WeightArgs,
+    deform: DeformArgs,
     output: &Path,
     report: &mut Report,
 ) -> Result<(), Failure> {
@@ -207,7 +241,7 @@ pub(super) fn picture_of(
         skin::describe_weights(report, &bound);
         meshes.extend(bench.mesh().cloned());
     }
-    let settings = PictureSettings { build: true, ..PictureSettings::default() };
+    let settings = PictureSettings { build: true, deform: deform.deform(), ..PictureSettings::default() };
     let picture = |error| Failure::Input(Box::new(error));
     let rig = bench.rig().clone();
     let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;

@@ -1,7 +1,11 @@
 //! Linear blend skinning on the CPU, so that rays meet the posed mesh.
 
+mod dual_quaternion;
+
 use glam::{Affine3A, Vec3, Vec3A};
 use rayon::prelude::*;
+
+pub use dual_quaternion::{DualPoint, posed_model, skin_points_dual};
 
 use super::model::Weights;
 

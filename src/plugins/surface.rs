@@ -30,8 +30,9 @@ use super::{
 };
 use crate::{
     mesh::{
-        model::Model,
+        model::{Model, Weights},
         ray::{Hit, Ray},
+        skinning::posed_model,
         surface::Surface,
     },
     rig::{
@@ -162,6 +163,16 @@ impl RigSurface {
     /// Returns `true` if the surface shows that state, or a later one.
     pub fn shows(&self, number: u64) -> bool {
         self.landed.as_ref().is_some_and(|(_, landed)| *landed >= number)
+    }
+
+    /// The meshes in the pose that the surface should show, in the order of their uids, as dual quaternions move them.
+    /// Linear in the size of the meshes.
+    pub fn dual_quaternion_models(&self) -> Vec<Model> {
+        let posed = |mesh: &PosedMesh| match &mesh.bend {
+            Some((skin, matrices)) => posed_model(&mesh.rest, &skin.weights, matrices),
+            None => posed_model(&mesh.rest, &Weights::default(), &[]),
+        };
+        self.wanted.iter().map(posed).collect()
     }
 
     /// The least and greatest corner of the surface; the unit cube if it is empty or not ready.

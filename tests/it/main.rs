@@ -24,6 +24,7 @@ mod display;
 mod drawing;
 #[cfg(feature = "render")]
 mod drawing_pictures;
+mod dual_quaternion;
 mod edit_text;
 #[cfg(feature = "editor")]
 mod editor_files;
