@@ -46,6 +46,7 @@ impl Plugin for FacePlugin {
                 Update,
                 (
                     (pose::adopt, pose::express).chain().after(RigSystems::Gesture).before(RigSystems::Edits),
+                    pose::follow_strengths.after(RigSystems::Edits).before(RigSystems::Build),
                     (job::start, job::land).chain().in_set(RigSystems::Bind),
                 ),
             );
@@ -160,6 +161,8 @@ pub struct Expressed {
 
 /// Current strengths of a face by name, each from 0 to [`MAX_STRENGTH`](crate::algo::face::expression::MAX_STRENGTH);
 /// beside the mesh.
+///
+/// The document holds them as values of attributes of the mesh, so undo, stored poses and projects bring them back.
 ///
 /// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
 /// the answer is an [`Expressed`] message. A value equal to what is shown is no edit.

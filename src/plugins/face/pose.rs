@@ -81,6 +81,29 @@ pub(super) fn adopt(
     }
 }
 
+/// Shows the strengths of the document: after an undo, a stored pose, or the opening of a project.
+pub(super) fn follow_strengths(
+    mut commands: Commands,
+    meshes: Query<(Entity, Ref<RigMesh>, &SkinOf, Option<&Expressions>)>,
+    rigs: Query<Ref<Rig>>,
+) {
+    for (entity, mesh, of, shown) in &meshes {
+        let Ok(rig) = rigs.get(of.0) else { continue };
+        if !rig.is_changed() && !mesh.is_changed() {
+            continue;
+        }
+        let strengths = strengths_of(&rig, mesh.uid);
+        if shown.map_or(!strengths.is_empty(), |shown| shown.0 != strengths) {
+            commands.entity(entity).try_insert((Expressions(strengths.clone()), OwnStrengths(strengths)));
+        }
+    }
+}
+
+/// Strengths of a mesh's face in the document: values of attributes of the mesh, named as expressions and units are.
+fn strengths_of(rig: &Rig, mesh: Uid) -> BTreeMap<String, f32> {
+    rig.attribute_values().get(&mesh).cloned().unwrap_or_default()
+}
+
 pub(super) fn express(
     mut commands: Commands,
     mut requests: MessageReader<ExpressRequest>,
@@ -108,7 +131,8 @@ pub(super) fn express(
             let settled = history.map_or(Cow::Borrowed(rig), |history| history.settled(rig));
             let mix = mixed(&set.0, strengths)?;
             let prepared = PreparedFace::reused(prepared, &settled, mesh, &face.analysis, &set.0)?;
-            let edits = expression_edits(&settled, &prepared, &mix);
+            let mut edits = expression_edits(&settled, &prepared, &mix);
+            edits.extend(strength_edits(&settled, mesh.uid, strengths));
             // An expression that the face shows already adds no step to the history.
             let is_shown = edits.is_empty();
             let operation = Operation::Named { name: "Express", edits };
@@ -120,12 +144,9 @@ pub(super) fn express(
                     commands.write_message(EditRequest { rig: rig_entity, change: Change::Do(operation) });
                 }
             }
-            commands.entity(*entity).insert((
-                Expressions(strengths.clone()),
-                OwnStrengths(strengths.clone()),
-                face,
-                prepared,
-            ));
+            // What is shown is what the document says after the edit: see `follow_strengths`.
+            let shown = (Expressions(strengths.clone()), OwnStrengths(strengths.clone()));
+            commands.entity(*entity).insert((shown, face, prepared));
             Ok(())
         });
         told.write(Expressed { mesh: *entity, result });
@@ -216,6 +237,14 @@ fn expression_edits(rig: &Rig, prepared: &PreparedFace, mix: &Mix) -> Vec<RigEdi
         (rig.offset(bone.uid) != offset.as_ref()).then_some(RigEdit::SetOffset(bone.uid, offset))
     });
     edits.collect()
+}
+
+/// The edits that put strengths into the document, in place of the present ones.
+fn strength_edits(rig: &Rig, mesh: Uid, strengths: &BTreeMap<String, f32>) -> Vec<RigEdit> {
+    let before = strengths_of(rig, mesh);
+    let names = before.keys().chain(strengths.keys().filter(|name| !before.contains_key(*name)));
+    let changed = names.filter(|name| before.get(*name) != strengths.get(*name));
+    changed.map(|name| RigEdit::SetAttributeValue(mesh, name.clone(), strengths.get(name).copied())).collect()
 }
 
 /// Positions of the analysed points of a rig's face, in head space, with expressions by name, each with a strength from

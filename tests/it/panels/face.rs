@@ -8,6 +8,7 @@ use rigsmith::{
     editor::panels::face::FacePanel,
     files::{RealDisk, load_model},
     plugins::{
+        document::{Change, EditRequest},
         face::{Expressions, Face, FaceJob, FaceRig},
         surface::{RigMesh, SkinOf},
     },
@@ -83,6 +84,16 @@ fn a_click_makes_a_face_that_sliders_pose() {
     assert!(shown.0.get("happiness").is_some_and(|strength| *strength > 0.2), "{shown:?}");
     assert!(!desk.rig().pose().is_empty(), "{:?} {:?} {shown:?}", desk.steps(), desk.told());
     assert_eq!(desk.steps().0, 2, "the drag is one step");
+    // The strength is part of the document: undo and redo move the slider with the face.
+    let strengths = |desk: &Desk| desk.app.world().get::<Expressions>(mesh).cloned().unwrap_or_default();
+    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
+    desk.frames(4);
+    assert!(strengths(&desk).0.is_empty() && desk.rig().pose().is_empty(), "{:?}", strengths(&desk));
+    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Redo });
+    desk.frames(4);
+    assert_eq!(strengths(&desk), shown);
+    assert!(!desk.rig().pose().is_empty());
+    assert_eq!(desk.steps(), (2, 2), "showing what the document says is no edit");
     desk.click("Reset");
     desk.frames(4);
     assert!(desk.rig().pose().is_empty(), "back at rest");
