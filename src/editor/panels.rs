@@ -14,6 +14,7 @@ pub mod skinning;
 pub mod toasts;
 
 mod displayed_rig;
+mod features;
 mod fields;
 mod groups;
 mod list;

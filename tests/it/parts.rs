@@ -208,11 +208,12 @@ fn every_template_builds_without_any_one_of_its_features() {
     for (name, _) in files() {
         let whole = template(&name);
         for combined in feature::combined_features(&whole) {
-            let switches = combined.switches.iter().map(|part| Some(part.name.clone()));
+            // Each switch off; of a choice each one on in its turn.
+            let switches = combined.switches.iter().map(|part| Some((part.name.clone(), !part.choice.is_empty())));
             for switch in switches.chain([None]) {
                 let mut rig = whole.clone();
                 let edits = match &switch {
-                    Some(switch) => feature::set_switch(&rig, &combined.key, switch, false),
+                    Some((switch, is_on)) => feature::set_switch(&rig, &combined.key, switch, *is_on),
                     None => feature::set_feature(&rig, &combined.key, false),
                 };
                 for edit in edits.unwrap() {

@@ -1,10 +1,12 @@
-//! Controls panel: the state of the build, the pose and the attributes of the selected control, and the rig's switches.
+//! Controls panel: the state of the build, the rig's features, the pose and the attributes of the selected control, and the
+//! rig's switches.
 
 use bevy::{math::EulerRot, prelude::*};
 use bevy_egui::egui::{self, ComboBox, ScrollArea, Ui};
 
 use super::{
     displayed_rig::DisplayedRig,
+    features::Features,
     fields::{Look, NumberEdit, Numbers, Shared, labelled},
     list,
 };
@@ -27,6 +29,7 @@ use crate::{
 #[derive(Default)]
 pub struct ControlsPanel {
     numbers: Numbers,
+    features: Features,
 }
 
 impl EditorPanel for ControlsPanel {
@@ -42,6 +45,7 @@ impl EditorPanel for ControlsPanel {
         let runtime = world.get::<RigRuntime>(shown.entity);
         ScrollArea::vertical().id_salt("controls").auto_shrink(false).show(ui, |ui| {
             build_state(ui, world, &shown, requests);
+            self.features.show(ui, &shown, requests);
             let (Some(built), Some(runtime)) = (built, runtime) else { return };
             ui.separator();
             let active = shown.selection.active().and_then(|active| built.node(active));

@@ -2,7 +2,9 @@
 
 use bevy::math::{Quat, Vec3};
 
-use super::Puppet;
+use rigsmith::rig::feature::{combined_features, set_switch};
+
+use super::{Puppet, template};
 
 /// Limbs of the left: template, joints, goal, pole, settings.
 const ARM: Limb = Limb { joints: ["upper_arm_l", "forearm_l", "hand_l"], goal: "hand_ik_l", pole: "elbow_l" };
@@ -237,8 +239,19 @@ fn chains_follow_their_controls_or_reach() {
     puppet.turn("chain_2_control", Quat::from_rotation_x(0.4));
     assert!(puppet.place("chain_5").distance(tip) > 0.1 && puppet.place("chain_1").distance(Vec3::Y) < 1e-5);
 
-    let mut puppet = Puppet::of("parts/ikfk_chain");
+    // With either of its two solvers.
     let goal = Vec3::new(0.2, 1.5, 0.3);
-    puppet.move_to("chain_ik", goal);
-    assert!(puppet.place("chain_5").distance(goal) < 1e-3, "{}", puppet.place("chain_5"));
+    let mut middles = Vec::new();
+    for solver in ["fabrik", "ccd"] {
+        let mut rig = template("parts/ikfk_chain");
+        let key = combined_features(&rig)[0].key.clone();
+        for edit in set_switch(&rig, &key, solver, true).unwrap() {
+            rig.apply(&edit).unwrap();
+        }
+        let mut puppet = Puppet::new(rig);
+        puppet.move_to("chain_ik", goal);
+        assert!(puppet.place("chain_5").distance(goal) < 1e-3, "{solver}: {}", puppet.place("chain_5"));
+        middles.push(puppet.place("chain_3"));
+    }
+    assert!(middles[0].distance(middles[1]) > 0.01, "the solvers bend the chain differently: {middles:?}");
 }
