@@ -24,7 +24,7 @@ use crate::{
             FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
         },
         gesture::{Gesture, GestureAnswer, GestureScript},
-        skinning::{BindRequest, Bound, SkinningError, SkinningJob},
+        skinning::{BindRequest, Bound, PartBinding, SkinningError, SkinningJob},
         surface::{RigMesh, SkinOf},
         task_pools,
     },
@@ -136,16 +136,16 @@ impl Workbench {
         self.app.update();
     }
 
-    /// Computes weights for the mesh. `progress` is called with the finished share, 0 to 1, now and then.
+    /// Computes weights for the mesh; `parts` are the objects that a person decided about. `progress` is called with the finished share, 0 to 1, now and then.
     pub fn skin(
         &mut self,
         settings: WeightSettings,
-        rigid: Vec<(usize, Uid)>,
+        parts: Vec<(usize, PartBinding)>,
         progress: &mut dyn FnMut(f32),
     ) -> Result<WeightReport, WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.forget_refusals();
-        self.app.world_mut().write_message(BindRequest { mesh, settings, rigid });
+        self.app.world_mut().write_message(BindRequest { mesh, settings, parts });
         loop {
             self.app.update();
             let bound = self.app.world_mut().resource_mut::<Messages<Bound>>().drain().last();

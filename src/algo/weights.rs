@@ -99,6 +99,8 @@ pub struct WeightSettings {
     /// Parts of the mesh (connected pieces) that one joint holds in nearly their whole size move with that joint alone,
     /// as helmets, swords and eyes do, and small parts move as one; `false` lets them bend.
     pub stiff_parts: bool,
+    /// Ranges of points whose parts bend although [`WeightSettings::stiff_parts`] would hold them stiff.
+    pub bending: Vec<Range<u32>>,
 }
 
 impl Default for WeightSettings {
@@ -110,6 +112,7 @@ impl Default for WeightSettings {
             voxel_resolution: 256,
             prune: 0.002,
             stiff_parts: true,
+            bending: Vec::new(),
         }
     }
 }

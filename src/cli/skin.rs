@@ -19,6 +19,7 @@ use crate::{
     },
     files::{FileKind, RealDisk, load_model, load_rig_text, load_skin, load_template, stem, store_model, store_skin},
     headless::Workbench,
+    plugins::skinning::PartBinding,
     rig::{
         Rig, SkinData, Uid, UidSource,
         character::{import_rig_text, import_skeleton},
@@ -45,6 +46,9 @@ pub(super) struct SkinArgs {
     /// Let an object of the mesh move with one joint only, by their names: OBJECT=JOINT
     #[arg(long, value_name = "OBJECT=JOINT")]
     rigid: Vec<String>,
+    /// Let an object of the mesh bend, by its name, although one joint holds all of it; may be repeated
+    #[arg(long, value_name = "OBJECT")]
+    bend: Vec<String>,
     #[command(flatten)]
     weights: WeightArgs,
     #[command(flatten)]
@@ -79,12 +83,12 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
     }
     let mut bench = Workbench::with_rig(SEED, rig);
     bench.open(model, true)?;
-    let rigid = rigid_parts(args, &bench)?;
+    let parts = chosen_parts(args, &bench)?;
     match &args.weights_from {
         Some(path) => take_weights(&mut bench, path, &mut report)?,
         None => {
             let mut progress = Progress::new("skinning");
-            let weights = bench.skin(args.weights.settings(), rigid, &mut |part| progress.at(part))?;
+            let weights = bench.skin(args.weights.settings(), parts, &mut |part| progress.at(part))?;
             drop(progress);
             describe_weights(&mut report, &weights);
         }
@@ -131,24 +135,28 @@ pub(super) fn load_rig(path: &Path, report: &mut Report) -> Result<Rig, Failure>
     Ok(rig)
 }
 
-fn rigid_parts(args: &SkinArgs, bench: &Workbench) -> Result<Vec<(usize, Uid)>, Failure> {
+/// Objects that `--rigid` and `--bend` decide about.
+fn chosen_parts(args: &SkinArgs, bench: &Workbench) -> Result<Vec<(usize, PartBinding)>, Failure> {
     let Some(mesh) = bench.mesh() else { return Ok(Vec::new()) };
-    let pair = |text: &String| {
+    let number = |option: &str, object: &str| {
+        mesh.rest.objects.iter().position(|known| known.name == object).ok_or_else(|| {
+            let names: Vec<&str> = mesh.rest.objects.iter().map(|object| object.name.as_str()).collect();
+            Failure::Input(
+                format!("{option}: the mesh has no object \"{object}\"; it has: {}", names.join(", ")).into(),
+            )
+        })
+    };
+    let rigid = |text: &String| {
         let (object, joint) = text
             .split_once('=')
             .ok_or_else(|| Failure::Usage(format!("--rigid {text}: write OBJECT=JOINT, both by name")))?;
-        let number = mesh.rest.objects.iter().position(|o| o.name == object).ok_or_else(|| {
-            let names: Vec<&str> = mesh.rest.objects.iter().map(|object| object.name.as_str()).collect();
-            Failure::Input(
-                format!("--rigid {text}: the mesh has no object \"{object}\"; it has: {}", names.join(", ")).into(),
-            )
-        })?;
         let joint = bench.rig().find_label(joint).ok_or_else(|| {
             Failure::Input(format!("--rigid {text}: the rig has no joint with the label \"{joint}\"").into())
         })?;
-        Ok((number, joint))
+        Ok((number(&format!("--rigid {text}"), object)?, PartBinding::Rigid(joint)))
     };
-    args.rigid.iter().map(pair).collect()
+    let bends = |object: &String| Ok((number("--bend", object)?, PartBinding::Bends));
+    args.rigid.iter().map(rigid).chain(args.bend.iter().map(bends)).collect()
 }
 
 /// Weights of the workbench's mesh, for a file.

@@ -53,8 +53,17 @@ pub struct BindRequest {
     pub mesh: Entity,
     /// Settings of the computation.
     pub settings: WeightSettings,
-    /// Objects of the mesh that move with one joint only: the object's number in the model, and the joint.
-    pub rigid: Vec<(usize, Uid)>,
+    /// Objects of the mesh that a person decided about: the object's number in the model, and how it is bound.
+    pub parts: Vec<(usize, PartBinding)>,
+}
+
+/// Binding of one object of a mesh, in place of what the computation would choose for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PartBinding {
+    /// The object moves with one joint only.
+    Rigid(Uid),
+    /// The object bends, also if one joint holds all of it or it hangs on a joint in its file.
+    Bends,
 }
 
 /// The answer to a [`BindRequest`].
@@ -129,12 +138,14 @@ pub struct SkinningInput {
     pub existing: Option<Weights>,
     /// Ranges of points that move with one joint only, each with the joint's index.
     pub rigid: Vec<(Range<u32>, u32)>,
+    /// Ranges of points of objects that bend in any case.
+    pub bending: Vec<Range<u32>>,
 }
 
 impl SkinningInput {
     /// Collects the input for a mesh from a rig and its build. Objects that hang on a joint in their file are rigid,
     /// too; joints that commands created are locked with the node that they were made for.
-    pub fn new(rig: &Rig, built: Option<&BuiltRig>, mesh: &RigMesh, rigid: &[(usize, Uid)]) -> Self {
+    pub fn new(rig: &Rig, built: Option<&BuiltRig>, mesh: &RigMesh, parts: &[(usize, PartBinding)]) -> Self {
         let skeleton = DeformSkeleton::new(rig, built);
         let joints = skeleton.joints().iter().map(|joint| WeightJoint {
             head: joint.rest.translation,
@@ -152,23 +163,23 @@ impl SkinningInput {
             let joint = mesh.nodes.get(data.node?)?;
             Some((object, *joint))
         });
-        let chosen: Vec<(usize, Uid)> = rigid.to_vec();
-        let carried: Vec<(usize, Uid)> =
-            carried.filter(|(object, _)| chosen.iter().all(|(other, _)| other != object)).collect();
-        let mut ranges = Vec::new();
-        for (object, joint) in chosen.into_iter().chain(carried) {
-            let Some(joint) = skeleton.index(joint) else { continue };
-            let points = mesh.rest.parts.iter().filter(|part| part.object == object).flat_map(|part| &part.vertices);
-            let mut points: Vec<u32> = points.copied().collect();
-            points.sort_unstable();
-            points.dedup();
-            for run in points.chunk_by(|a, b| a + 1 == *b) {
-                ranges.push((run[0]..run[run.len() - 1] + 1, joint as u32));
+        let carried = carried
+            .filter(|(object, _)| parts.iter().all(|(other, _)| other != object))
+            .map(|(object, joint)| (object, PartBinding::Rigid(joint)));
+        let (mut ranges, mut bending) = (Vec::new(), Vec::new());
+        for (object, binding) in parts.iter().copied().chain(carried) {
+            let runs = object_points(mesh, object);
+            match binding {
+                PartBinding::Bends => bending.extend(runs),
+                PartBinding::Rigid(joint) => {
+                    let Some(joint) = skeleton.index(joint) else { continue };
+                    ranges.extend(runs.into_iter().map(|run| (run, joint as u32)));
+                }
             }
         }
         let existing = rig.skin(mesh.uid).map(|skin| replaced_joints(&skin.weights, &skeleton.holders(rig, skin)));
         let subjects = skeleton.subjects();
-        Self { joints, uids, subjects, locked, existing, rigid: ranges }
+        Self { joints, uids, subjects, locked, existing, rigid: ranges, bending }
     }
 
     /// Computes the weights of a mesh.
@@ -181,11 +192,38 @@ impl SkinningInput {
         let any_locked = self.locked.iter().any(|locked| *locked);
         let locks = self.existing.as_ref().filter(|_| any_locked);
         let locks = locks.map(|weights| Locks { weights, joints: &self.locked });
+        let settings = &WeightSettings { bending: self.bending.clone(), ..settings.clone() };
         let (weights, report) =
             skin_weights(&mesh.rest.points, &mesh.triangles, &self.joints, &self.rigid, locks, settings, progress)?;
         let (joints, subjects) = (self.uids.clone(), self.subjects.clone());
         Ok((Arc::new(SkinData { joints, weights, at_rest: true, subjects }), report))
     }
+}
+
+/// Points of an object of a mesh, as runs of following numbers.
+fn object_points(mesh: &RigMesh, object: usize) -> Vec<Range<u32>> {
+    let points = mesh.rest.parts.iter().filter(|part| part.object == object).flat_map(|part| &part.vertices);
+    let mut points: Vec<u32> = points.copied().collect();
+    points.sort_unstable();
+    points.dedup();
+    points.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[run.len() - 1] + 1).collect()
+}
+
+/// For each object of a mesh the joint that holds all of its points, if one does: a helmet's head, a sword's hand.
+pub fn held_objects(mesh: &RigMesh, skin: &SkinData) -> Vec<Option<Uid>> {
+    let holder = |object: usize| {
+        let mut holder = None;
+        for point in object_points(mesh, object).into_iter().flatten() {
+            let point = point as usize;
+            let mut influences = (point < skin.weights.len()).then(|| skin.weights.of(point))?;
+            let (joint, _) = influences.next().filter(|_| influences.len() == 0)?;
+            if *holder.get_or_insert(joint) != joint {
+                return None;
+            }
+        }
+        skin.joints.get(holder? as usize).copied()
+    };
+    (0..mesh.rest.objects.len()).map(holder).collect()
 }
 
 fn start_skinning(
@@ -209,7 +247,7 @@ fn start_skinning(
         let cancelled = Arc::new(AtomicBool::new(false));
         let (told, stop) = (progress.clone(), cancelled.clone());
         let task = AsyncComputeTaskPool::get().spawn(async move {
-            let input = SkinningInput::new(&rig, built.as_deref(), &mesh, &request.rigid);
+            let input = SkinningInput::new(&rig, built.as_deref(), &mesh, &request.parts);
             input.compute(&mesh, &request.settings, &|part| {
                 told.store(part.to_bits(), Ordering::Relaxed);
                 !stop.load(Ordering::Relaxed)

@@ -2,6 +2,7 @@
 
 mod desk;
 mod face;
+mod features;
 mod tags;
 
 use std::collections::HashSet;
@@ -21,7 +22,7 @@ use rigsmith::{
             log::{LogBook, LogPanel},
             poses::PosesPanel,
             properties::PropertiesPanel,
-            skinning::SkinningPanel,
+            skinning::{SkinningPanel, SkinningParts},
             toasts::Toasts,
         },
     },
@@ -29,7 +30,7 @@ use rigsmith::{
         commands::{BuildRequest, BuildStep, Built},
         document::Hovered,
         runtime::RigRuntime,
-        skinning::SkinningJob,
+        skinning::{PartBinding, SkinningJob, held_objects},
     },
     prelude::*,
 };
@@ -367,6 +368,33 @@ fn skinning_says_why_not_runs_once_and_can_be_cancelled() {
     wait(&mut desk, small);
     assert!(desk.rig().skin(Uid(98)).is_some());
     assert!(desk.told().last().is_some_and(|told| told.contains("100 %")), "{:?}", desk.told());
+}
+
+#[test]
+fn parts_tell_what_holds_them_and_keep_to_choices() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    desk.resize(320.0, 900.0);
+    let boxes = boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]], [[-0.1, 1.05, -0.1], [0.1, 1.2, 0.1]]]);
+    let mesh = RigMesh::new(Uid(97), boxes, Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(desk.rig))).id();
+    let joints = desk.chain(&["low", "high"]);
+    desk.frames(2);
+    desk.click("Skin");
+    wait(&mut desk, mesh);
+    desk.click("Parts (2)");
+    desk.frames(30);
+    let says =
+        |desk: &Desk, text: &str| desk.seen.iter().any(|seen| seen.value.contains(text) || seen.label.contains(text));
+    assert!(says(&desk, "Automatic: moves with low"), "{:?}", desk.seen);
+    // The joint of a choice holds the object after the next computation.
+    desk.select(&joints[1..]);
+    desk.app.world_mut().resource_mut::<SkinningParts>().0.insert((Uid(97), 0), PartBinding::Rigid(joints[1]));
+    desk.frames(2);
+    assert!(says(&desk, "Moves with high"), "{:?}", desk.seen);
+    desk.click("Skin");
+    wait(&mut desk, mesh);
+    let mesh = desk.app.world().get::<RigMesh>(mesh).unwrap();
+    assert_eq!(held_objects(mesh, desk.rig().skin(Uid(97)).unwrap())[0], Some(joints[1]));
 }
 
 fn wait(desk: &mut Desk, mesh: Entity) {

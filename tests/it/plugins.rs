@@ -209,7 +209,7 @@ fn skinning_runs_in_the_background_and_can_be_stopped() {
     let mut bench = RigBench::new();
     let joints = bench.chain(&[[0.0, 0.1, 0.0], [0.0, 0.9, 0.0]]);
     let mesh = bench.open(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]);
-    let request = || BindRequest { mesh, settings: WeightSettings::default(), rigid: Vec::new() };
+    let request = || BindRequest { mesh, settings: WeightSettings::default(), parts: Vec::new() };
     bench.app.world_mut().write_message(request());
     bench.app.update();
     bench.wait("the weights", |bench| bench.rig().skin(Uid(99)).is_some());
@@ -299,7 +299,7 @@ fn a_late_result_never_cuts_off_undone_steps() {
         bench.app.world_mut().write_message(BindRequest {
             mesh,
             settings: WeightSettings::default(),
-            rigid: Vec::new(),
+            parts: Vec::new(),
         });
         bench.app.update();
         assert!(bench.app.world().get::<SkinningJob>(mesh).is_some(), "so many points are not skinned in a frame");

@@ -540,7 +540,7 @@ fn parts_belong_to_the_bones_inside_of_them() {
     let (mut points, mut triangles) = tube();
     let (body, soft) = (points.len(), triangles.clone());
     // A box around the end of the tube, wide enough for the last bone, and a small one that floats beside the first.
-    let mut add = |low: Vec3, high: Vec3| {
+    let add = |points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>, low: Vec3, high: Vec3| {
         let first = points.len() as u32;
         points.extend((0..8).map(|corner| {
             let pick = |axis: usize| if corner >> axis & 1 == 1 { high[axis] } else { low[axis] };
@@ -551,7 +551,7 @@ fn parts_belong_to_the_bones_inside_of_them() {
         triangles.extend(quads.into_iter().flat_map(split).map(|t| t.map(|corner| first + corner)));
         first as usize..points.len()
     };
-    let helmet = add(Vec3::new(3.2, -0.8, -0.8), Vec3::new(4.4, 0.8, 0.8));
+    let helmet = add(&mut points, &mut triangles, Vec3::new(3.2, -0.8, -0.8), Vec3::new(4.4, 0.8, 0.8));
     let mut joints = tube_joints();
     joints[2].head.x = 3.3;
     joints.push(joint([4.2, 0.0, 0.0], Some(2)));
@@ -565,6 +565,14 @@ fn parts_belong_to_the_bones_inside_of_them() {
     }
     let first: Vec<(u32, f32)> = weights.of(helmet.start).collect();
     assert!(helmet.clone().all(|point| weights.of(point).eq(first.iter().copied())) == (report.stiff > 0));
+    // A pouch on the first bone moves as one, unless a person says that it bends.
+    let pouch = add(&mut points, &mut triangles, Vec3::new(0.4, 1.2, -0.2), Vec3::new(0.6, 1.4, 0.2));
+    let stiff = bind(&points, &triangles, &joints).1.stiff - report.stiff;
+    assert_eq!(stiff, pouch.len());
+    let bending = vec![pouch.start as u32..pouch.start as u32 + 1];
+    let settings = WeightSettings { bending, ..WeightSettings::default() };
+    let bent = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap().1;
+    assert_eq!(bent.stiff, report.stiff);
     // The tube is bound as without the helmet.
     let alone = bind(&points[..body], &soft, &joints).0;
     for point in 0..body {

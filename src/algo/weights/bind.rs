@@ -78,7 +78,9 @@ pub(crate) fn bind(
     if !settings.stiff_parts {
         return Ok(Bound { place, weights, sources, stiff: vec![false; count] });
     }
-    let (weights, stiff) = Islands::new(&places, &triangles).stiffened(&weights);
+    let bending = settings.bending.iter().cloned().flatten();
+    let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
+    let (weights, stiff) = Islands::new(&places, &triangles).stiffened(&weights, &bending);
     Ok(Bound { place, weights, sources, stiff })
 }
 

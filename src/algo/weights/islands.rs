@@ -61,8 +61,8 @@ impl Islands {
 
     /// Weights with which parts stay as stiff as they are: a part that one joint holds in nearly its whole size (helmet,
     /// eye, sword) moves with that joint, and each small part moves as one. Tells for each place whether it is of such
-    /// a part. A surface in one piece stays as it is.
-    pub fn stiffened(&self, weights: &Weights) -> (Weights, Vec<bool>) {
+    /// a part. A surface in one piece stays as it is, and so do the parts that have one of the `bending` places.
+    pub fn stiffened(&self, weights: &Weights, bending: &[u32]) -> (Weights, Vec<bool>) {
         let mut sums: Vec<BTreeMap<u32, f32>> = vec![BTreeMap::new(); self.extents.len()];
         let mut counts = vec![0usize; self.extents.len()];
         for (place, &island) in self.of.iter().enumerate() {
@@ -71,13 +71,15 @@ impl Islands {
                 *sums[island as usize].entry(joint).or_default() += weight;
             }
         }
+        let mut bends = vec![false; self.extents.len()];
+        bending.iter().for_each(|place| bends[self.of[*place as usize] as usize] = true);
         let is_part = counts.iter().filter(|count| **count > 2).count() > 1;
         let rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&counts).enumerate())
             .map(|(island, (sums, count))| {
                 let whole: f32 = sums.values().sum();
                 let first = sums.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))?;
                 match *first.1 >= HELD * whole {
-                    _ if !is_part || *count < 3 => None,
+                    _ if !is_part || *count < 3 || bends[island] => None,
                     true => Some(vec![(*first.0, 1.0)]),
                     false if self.are_small(island) => {
                         Some(sums.iter().map(|(joint, sum)| (*joint, sum / whole)).collect())

@@ -1,9 +1,13 @@
 //! Skinning panel: a button that computes weights for every mesh, and a report of the results.
 
+mod parts;
+
 use bevy::prelude::*;
 use bevy_egui::egui::{
     self, Button, Checkbox, CollapsingHeader, ComboBox, DragValue, ProgressBar, RichText, ScrollArea, Slider, Ui,
 };
+
+pub use parts::SkinningParts;
 
 use super::{
     displayed_rig::{DisplayedRig, joint_name},
@@ -34,6 +38,7 @@ impl Plugin for SkinningPanelPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<SkinningSettings>()
             .init_resource::<SkinningResults>()
+            .init_resource::<SkinningParts>()
             .add_message::<ActionRequest>()
             .add_message::<CancelSkinning>()
             .add_message::<Notice>()
@@ -69,7 +74,8 @@ fn skin(
     active: Option<Res<ActiveRig>>,
     rigs: Query<(&Rig, Option<&RigMeshes>)>,
     jobs: Query<&SkinningJob>,
-    settings: Res<SkinningSettings>,
+    models: Query<&RigMesh>,
+    (settings, parts): (Res<SkinningSettings>, Res<SkinningParts>),
     mut commands: Commands,
 ) {
     if !actions.read().any(|request| request.0 == Action::Skin) {
@@ -88,7 +94,8 @@ fn skin(
         return;
     }
     for mesh in meshes {
-        commands.write_message(BindRequest { mesh, settings: settings.0.clone(), rigid: Vec::new() });
+        let parts = models.get(mesh).map(|model| parts.of(model.uid)).unwrap_or_default();
+        commands.write_message(BindRequest { mesh, settings: settings.0.clone(), parts });
     }
 }
 
@@ -175,6 +182,7 @@ fn covered(points: usize, without: usize) -> String {
 pub struct SkinningPanel {
     /// Number of points without weights, for each counted set of weights.
     counted: Vec<(Uid, std::sync::Weak<SkinData>, usize)>,
+    held: Vec<parts::HeldObjects>,
 }
 
 impl EditorPanel for SkinningPanel {
@@ -196,6 +204,9 @@ impl EditorPanel for SkinningPanel {
             for mesh in &meshes {
                 ui.add_space(6.0);
                 self.mesh(ui, world, *mesh, &shown);
+                if let Some(mesh) = world.get::<RigMesh>(*mesh) {
+                    parts::show(ui, world, mesh, &shown, &mut self.held, requests);
+                }
             }
         });
     }

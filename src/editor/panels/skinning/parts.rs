@@ -1,0 +1,111 @@
+//! Objects of a mesh: how each is bound, and a choice for each of them.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Weak},
+};
+
+use bevy::prelude::*;
+use bevy_egui::egui::{CollapsingHeader, ComboBox, Ui};
+
+use crate::{
+    editor::{
+        panel::Requests,
+        panels::{displayed_rig::DisplayedRig, fields::labelled},
+    },
+    plugins::{
+        skinning::{PartBinding, held_objects},
+        surface::RigMesh,
+    },
+    rig::{SkinData, Uid},
+};
+
+/// Bindings that a person chose for objects of meshes, by the mesh's uid and the object's number; the next computation of
+/// weights keeps to them.
+#[derive(Resource, Debug, Clone, PartialEq, Default)]
+pub struct SkinningParts(pub BTreeMap<(Uid, usize), PartBinding>);
+
+impl SkinningParts {
+    /// Choices for the objects of one mesh.
+    pub fn of(&self, mesh: Uid) -> Vec<(usize, PartBinding)> {
+        let range = self.0.range((mesh, 0)..=(mesh, usize::MAX));
+        range.map(|((_, object), binding)| (*object, *binding)).collect()
+    }
+}
+
+/// For one mesh the joint that holds each object, and the weights that say so.
+pub(super) struct HeldObjects {
+    mesh: Uid,
+    skin: Weak<SkinData>,
+    joints: Vec<Option<Uid>>,
+}
+
+/// Draws the objects of a mesh, folded, each with the joint that holds all of it and a choice. A mesh of one object has none.
+pub(super) fn show(
+    ui: &mut Ui,
+    world: &World,
+    mesh: &RigMesh,
+    shown: &DisplayedRig,
+    known: &mut Vec<HeldObjects>,
+    requests: &mut Requests,
+) {
+    let objects = &mesh.rest.objects;
+    if objects.len() < 2 {
+        return;
+    }
+    let choices = world.get_resource::<SkinningParts>().cloned().unwrap_or_default();
+    let mut next = choices.clone();
+    let held = shown.rig.skin(mesh.uid).map(|skin| held_by(known, mesh, skin));
+    CollapsingHeader::new(format!("Parts ({})", objects.len())).id_salt(("parts", mesh.uid)).show(ui, |ui| {
+        for (number, object) in objects.iter().enumerate() {
+            let key = (mesh.uid, number);
+            let holder = held.and_then(|held| held.get(number).copied().flatten());
+            let automatic = match holder {
+                Some(joint) => format!("Automatic: moves with {}", shown.name(joint)),
+                None => "Automatic".to_owned(),
+            };
+            let mut options = vec![(None, automatic), (Some(PartBinding::Bends), "Bends".to_owned())];
+            let chosen = next.0.get(&key).copied();
+            let chosen_joint = match chosen {
+                Some(PartBinding::Rigid(joint)) => Some(joint),
+                _ => None,
+            };
+            let mut joints: Vec<Uid> = [chosen_joint, shown.selection.active(), holder].into_iter().flatten().collect();
+            joints.dedup();
+            for joint in joints.into_iter().filter(|joint| shown.rig.joint(*joint).is_some()) {
+                options.push((Some(PartBinding::Rigid(joint)), format!("Moves with {}", shown.name(joint))));
+            }
+            let mut choice = chosen;
+            let text = options.iter().find(|(option, _)| *option == chosen).map_or("", |(_, text)| text.as_str());
+            let name = if object.name.is_empty() { format!("object {}", number + 1) } else { object.name.clone() };
+            labelled(ui, &name, |ui| {
+                let combo = ComboBox::from_id_salt(("part", key)).selected_text(text).width(ui.available_width());
+                combo.truncate().show_ui(ui, |ui| {
+                    for (option, text) in &options {
+                        ui.selectable_value(&mut choice, *option, text);
+                    }
+                });
+            });
+            if choice != chosen {
+                match choice {
+                    Some(binding) => next.0.insert(key, binding),
+                    None => next.0.remove(&key),
+                };
+            }
+        }
+        ui.weak("Choices count when the mesh is skinned again.");
+    });
+    if next != choices {
+        requests.set(next);
+    }
+}
+
+/// Joints that hold the objects of a mesh, found once for each set of weights.
+fn held_by<'a>(known: &'a mut Vec<HeldObjects>, mesh: &RigMesh, skin: &Arc<SkinData>) -> &'a [Option<Uid>] {
+    let is_same = |held: &HeldObjects| held.mesh == mesh.uid && std::ptr::eq(held.skin.as_ptr(), Arc::as_ptr(skin));
+    if !known.iter().any(is_same) {
+        known.retain(|held| held.mesh != mesh.uid && held.skin.strong_count() > 0);
+        known.push(HeldObjects { mesh: mesh.uid, skin: Arc::downgrade(skin), joints: held_objects(mesh, skin) });
+    }
+    known.iter().find(|held| is_same(held)).map_or(&[], |held| &held.joints)
+}
