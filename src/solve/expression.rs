@@ -66,7 +66,7 @@ pub enum ExpressionProblem {
     #[error("`{0}` is not a number that can be held; write it like 12.5 or 1e-3")]
     Number(String),
     /// An unknown name.
-    #[error("`{name}` is not known here{}", known(.nearest))]
+    #[error("`{name}` is not known here{}", suggestion(.nearest))]
     Unknown {
         /// The name.
         name: String,
@@ -106,7 +106,7 @@ pub enum ExpressionProblem {
     Evaluator(String),
 }
 
-fn known(nearest: &[String]) -> String {
+fn suggestion(nearest: &[String]) -> String {
     let list: Vec<String> = nearest.iter().map(|name| format!("`{name}`")).collect();
     if list.is_empty() { "; check its spelling".to_owned() } else { format!("; is {} meant?", list.join(" or ")) }
 }

@@ -238,7 +238,7 @@ impl Sampler<'_> {
                         continue;
                     }
                     let cell = cell.map(|c| c as usize);
-                    let known = self.voxels.solid_index(cell).is_some_and(|i| self.field.known(i));
+                    let known = self.voxels.solid_index(cell).is_some_and(|i| self.field.is_reached(i));
                     let far: f64 = (0..3).map(|a| (cell[a] as f64 + 0.5 - at[a]).powi(2)).sum();
                     if known && best.is_none_or(|(least, _)| far < least) {
                         best = Some((far, cell));
@@ -251,7 +251,7 @@ impl Sampler<'_> {
 
     /// Adds what a cell knows; returns its weight, 0 if it knows nothing.
     fn add(&mut self, cell: [usize; 3], share: f32) -> f32 {
-        let Some(index) = self.voxels.solid_index(cell).filter(|&i| self.field.known(i)) else { return 0.0 };
+        let Some(index) = self.voxels.solid_index(cell).filter(|&i| self.field.is_reached(i)) else { return 0.0 };
         let share = if self.voxels.is_core(cell) { share } else { share * SHELL_SHARE };
         let center = self.voxels.center(cell);
         for (joint, cost) in self.field.of(index) {

@@ -79,7 +79,7 @@ fn tell_results(
     for FacePlaced { mesh, result } in placed.read() {
         match result {
             Ok(report) => {
-                commands.write_message(Notice::done(told(report)));
+                commands.write_message(Notice::done(summary(report)));
                 if report.is_part {
                     let text = "The mesh is more than a head: the face was placed in its head part. \
                                 Tick \"Whole mesh\" in the Face panel to take all of it for a head.";
@@ -107,7 +107,7 @@ fn tell_results(
     }
 }
 
-fn told(report: &FaceReport) -> String {
+fn summary(report: &FaceReport) -> String {
     let skin = report.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
     let sum: f64 = report.times.iter().map(|(_, time)| time.as_secs_f64() * 1000.0).sum();
     let kept = match report.kept {

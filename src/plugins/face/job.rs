@@ -95,7 +95,7 @@ impl Drop for FaceJob {
 }
 
 impl Progress {
-    fn told(&self, step: FaceStep, part: f32) -> bool {
+    fn report(&self, step: FaceStep, part: f32) -> bool {
         self.part.store(part.to_bits(), Ordering::Relaxed);
         let mut steps = self.steps.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if steps.last().is_none_or(|(last, _)| *last != step) {
@@ -164,10 +164,10 @@ struct JobInput {
 impl JobInput {
     fn run(self, progress: &Progress) -> Result<JobResult, FaceError> {
         let Self { rig, mesh, settings, shapes, expressions, ready } = self;
-        let told = |step: FaceStep, part: f32| progress.told(step, part);
+        let report = |step: FaceStep, part: f32| progress.report(step, part);
         let analysis = match ready {
             Some(analysis) => analysis,
-            None => Arc::new(FaceAnalysis::new(&mesh.rest.points, &mesh.triangles, &settings, &told)?),
+            None => Arc::new(FaceAnalysis::new(&mesh.rest.points, &mesh.triangles, &settings, &report)?),
         };
         let known = FaceRig::read(&rig);
         let turn = analysis.axes.rotation();
@@ -182,7 +182,7 @@ impl JobInput {
             _ => settings.bones,
         };
         let how = AutoSettings { bones, ..settings.clone() };
-        let mut face = analysis.rig(&fixed, &how, &expressions, &told)?;
+        let mut face = analysis.rig(&fixed, &how, &expressions, &report)?;
         let fit = match &shapes {
             None => None,
             Some(shapes) => {
@@ -191,7 +191,7 @@ impl JobInput {
                     joint.is_some_and(|joint| joint.data.locked)
                 };
                 let locked: Vec<bool> = face.bones.iter().map(locked).collect();
-                let fit = analysis.refit(&face, &shapes.displacements, &locked, settings.influences, &told)?;
+                let fit = analysis.refit(&face, &shapes.displacements, &locked, settings.influences, &report)?;
                 face = fit.face.clone();
                 Some(fit)
             }

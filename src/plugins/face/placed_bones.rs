@@ -92,7 +92,7 @@ impl FaceRig {
         };
         let around = head.map(|head| rig.children(Some(head))).unwrap_or_default();
         let joints = around.iter().filter_map(|uid| rig.joint(*uid));
-        let bones = joints.filter(is_facial).map(|joint| known(rig, joint)).collect();
+        let bones = joints.filter(is_facial).map(|joint| placed_bone(rig, joint)).collect();
         Self { head, neck, group, feature, bones }
     }
 
@@ -117,7 +117,7 @@ impl FaceRig {
     }
 }
 
-fn known(rig: &Rig, joint: &RigJoint) -> PlacedBone {
+fn placed_bone(rig: &Rig, joint: &RigJoint) -> PlacedBone {
     let data = &joint.data;
     let label = data.label.clone().unwrap_or_default();
     let position = rig.position(data.uid);

@@ -178,8 +178,8 @@ impl Field {
         Some(field)
     }
 
-    /// True if some joint reaches the voxel.
-    pub(super) fn known(&self, cell: usize) -> bool {
+    /// `true` if a joint reaches the voxel.
+    pub(super) fn is_reached(&self, cell: usize) -> bool {
         self.entries[cell * self.labels].1 != u32::MAX
     }
 
