@@ -2,6 +2,7 @@
 
 pub mod face;
 pub mod fit;
+pub mod fit_template;
 pub mod kmeans;
 pub mod linkage;
 pub mod picking;

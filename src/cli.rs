@@ -12,6 +12,7 @@ mod demo;
 #[cfg(feature = "render")]
 mod device_selection;
 mod face;
+mod fit;
 mod format;
 mod info;
 mod list;
@@ -63,6 +64,8 @@ enum Command {
     Sketch(sketch::SketchArgs),
     /// Bind a mesh to a skeleton and save the character
     Skin(skin::SkinArgs),
+    /// Move the skeleton of a template into a mesh by itself
+    Fit(fit::FitArgs),
     /// Place a face in a head: bones, weights and expressions
     Face(face::FaceArgs),
     /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where possible
@@ -213,6 +216,7 @@ pub fn main(window: OpenWindow) -> ExitCode {
         },
         Some(Command::Sketch(args)) => sketch::run(&args),
         Some(Command::Skin(args)) => skin::run(&args),
+        Some(Command::Fit(args)) => fit::run(&args),
         Some(Command::Face(args)) => face::run(&args),
         Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Info(args)) => info::run(&args),

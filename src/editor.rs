@@ -9,6 +9,7 @@ pub mod building;
 pub mod camera;
 pub mod dock;
 pub mod files;
+pub mod fitting;
 pub mod follow;
 pub mod help;
 pub mod keys;

@@ -23,6 +23,7 @@ use crate::{
             ExpressError, ExpressRequest, Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport,
             FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
         },
+        fit::{FitFailure, FitJob, FitReport, FitRequest, FitTemplates, Fitted},
         gesture::{Gesture, GestureAnswer, GestureScript},
         skinning::{BindRequest, Bound, PartBinding, SkinningError, SkinningJob},
         surface::{RigMesh, SkinOf},
@@ -65,6 +66,9 @@ pub enum WorkbenchError {
     /// The face shows no expression.
     #[error(transparent)]
     Expression(#[from] ExpressError),
+    /// The template was not fitted.
+    #[error(transparent)]
+    Fit(#[from] FitFailure),
     /// The workbench has no mesh.
     #[error("no mesh is open; open one first")]
     NoMesh,
@@ -156,6 +160,41 @@ impl Workbench {
                 return self.refused().map_or(Ok(report), Err);
             }
             if let Some(job) = self.app.world().get::<SkinningJob>(mesh) {
+                progress(job.progress());
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Offers templates that fits may choose.
+    pub fn offer_templates(&mut self, templates: FitTemplates) {
+        self.app.insert_resource(templates);
+    }
+
+    /// Fits a template to the mesh. `ask` completes the request; `progress` is called with the finished share, 0 to 1.
+    ///
+    /// # Errors
+    /// See [`FitFailure`].
+    pub fn fit(
+        &mut self,
+        ask: impl FnOnce(&mut FitRequest),
+        progress: &mut dyn FnMut(f32),
+    ) -> Result<Arc<FitReport>, WorkbenchError> {
+        let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
+        self.forget_refusals();
+        let mut request = FitRequest::new(mesh);
+        ask(&mut request);
+        self.app.world_mut().write_message(request);
+        loop {
+            self.app.update();
+            let fitted = self.app.world_mut().resource_mut::<Messages<Fitted>>().drain().last();
+            if let Some(fitted) = fitted {
+                // The edit that moves the joints is applied in the same frame or in the next one.
+                self.app.update();
+                let report = fitted.result?;
+                return self.refused().map_or(Ok(report), Err);
+            }
+            if let Some(job) = self.app.world().get::<FitJob>(mesh) {
                 progress(job.progress());
             }
             std::thread::sleep(Duration::from_millis(1));

@@ -28,6 +28,7 @@ pub mod document;
 #[cfg(feature = "draw")]
 pub mod drawing;
 pub mod face;
+pub mod fit;
 pub mod gesture;
 pub mod history;
 pub mod journal;
@@ -63,6 +64,7 @@ use bevy::{
 /// | [`gesture::GesturePlugin`] | lists of gestures that drive all of the above |
 /// | [`skinning::SkinningPlugin`] | automatic weights in the background |
 /// | [`face::FacePlugin`] | faces: bones, weights and expressions |
+/// | [`fit::FitPlugin`] | templates moved into meshes |
 /// | [`runtime::RuntimePlugin`] | compiled rigs that run each frame |
 /// | [`journal::JournalPlugin`] | every change stored at once, for rigs that request it |
 pub struct RigPlugins;
@@ -80,6 +82,7 @@ impl PluginGroup for RigPlugins {
             .add(gesture::GesturePlugin)
             .add(skinning::SkinningPlugin)
             .add(face::FacePlugin)
+            .add(fit::FitPlugin)
             .add(runtime::RuntimePlugin)
             .add(journal::JournalPlugin)
     }

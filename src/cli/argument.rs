@@ -11,6 +11,9 @@ pub(super) enum ArgumentError {
     /// The value has to name an axis.
     #[error("write x, y or z, or -x, -y or -z")]
     NoAxis,
+    /// The value has to name a joint and its place.
+    #[error("write LABEL=X,Y,Z, such as hand_l=0.5,1.1,0.2")]
+    NoMarker,
     /// The value has to name an expression and its strength.
     #[error("write NAME=STRENGTH, such as happiness=0.8")]
     NoStrength,

@@ -76,7 +76,7 @@ pub(super) struct FaceArgs {
     in_place: InPlaceArgs,
 }
 
-fn axis(text: &str) -> Result<Vec3, ArgumentError> {
+pub(super) fn axis(text: &str) -> Result<Vec3, ArgumentError> {
     let (sign, letter) = match text.strip_prefix('-') {
         Some(letter) => (-1.0, letter),
         None => (1.0, text.strip_prefix('+').unwrap_or(text)),

@@ -248,6 +248,16 @@ pub(super) fn picture_of(
     save_atomic(&RealDisk, output, &png(image).map_err(picture)?).map_err(|error| Failure::Input(Box::new(error)))
 }
 
+/// Draws the rig and the mesh of a workbench as they are at rest, the mesh half transparent.
+pub(super) fn picture_of_bench(bench: &Workbench, output: &Path) -> Result<(), Failure> {
+    let display = MeshDisplay { xray: true, ..MeshDisplay::default() };
+    let settings = PictureSettings { display, ..PictureSettings::default() };
+    let picture = |error| Failure::Input(Box::new(error));
+    let (rig, meshes) = (bench.rig().clone(), bench.mesh().cloned().into_iter().collect());
+    let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;
+    save_atomic(&RealDisk, output, &png(image).map_err(picture)?).map_err(|error| Failure::Input(Box::new(error)))
+}
+
 fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
     let path = &args.file;
     let mut uids = UidSource::seeded(SEED);

@@ -1,6 +1,9 @@
 //! `rigsmith sketch`: a skeleton from gestures on a mesh.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -10,8 +13,9 @@ use super::{
     progress::{Progress, spinning},
 };
 use crate::{
-    files::{FileKind, RealDisk, load_gestures, load_model, stem, store_model, store_rig},
+    files::{FileKind, RealDisk, bundled_characters, load_gestures, load_model, stem, store_model, store_rig},
     headless::Workbench,
+    plugins::fit::FitTemplates,
     rig::Rig,
 };
 
@@ -45,6 +49,7 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
     report.notes(model.notes.iter().cloned());
     let mut bench = Workbench::new(SEED, &stem(&args.mesh));
     bench.open(model, args.mesh_only)?;
+    bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
     let answers = spinning("sketching", || bench.gestures(gestures));
     let missed = answers.iter().filter(|answer| !answer.done).count();
     for answer in &answers {

@@ -49,6 +49,8 @@ pub enum Action {
     Cancel,
     /// Takes the next volume under the pointer.
     NextVolume,
+    /// Puts a template into the mesh by itself.
+    Fit,
     /// Computes weights for all meshes.
     Skin,
     /// Resets the pose of the selected joints, or of all if none is selected.

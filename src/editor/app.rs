@@ -139,6 +139,7 @@ impl Plugin for EditorPlugin {
             ReportPlugin,
             FilesPlugin,
             super::building::BuildingPlugin,
+            super::fitting::FittingPlugin,
             super::follow::FollowPlugin,
             super::render_errors::RenderErrorsPlugin,
         ))

@@ -66,6 +66,7 @@ pub fn describe(action: Action) -> String {
         Action::Accept => "Accept what is drawn",
         Action::Cancel => "Drop what is drawn",
         Action::NextVolume => "Next volume under the pointer",
+        Action::Fit => "Fit a skeleton into the mesh",
         Action::Skin => "Skin",
         Action::ResetPose => "Reset pose",
         Action::StorePose => "Store pose",

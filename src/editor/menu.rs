@@ -106,6 +106,7 @@ pub(super) fn show(
                     Some(("Next command", Action::StepForward)),
                     Some(("Last command back", Action::StepBack)),
                     None,
+                    Some(("Fit", Action::Fit)),
                     Some(("Skin", Action::Skin)),
                     None,
                     Some(("Reset pose", Action::ResetPose)),

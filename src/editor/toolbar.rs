@@ -44,6 +44,11 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
             }
         }
         ui.separator();
+        let what = "Put a skeleton into the mesh: the template whose limbs it shows, or the rig's own joints";
+        if ui.button("Fit").on_hover_text(tip(what, Action::Fit)).clicked() {
+            requests.send(ActionRequest(Action::Fit));
+        }
+        ui.separator();
         let mut switch = |ui: &mut egui::Ui, on: bool, name: &str, what: &str, action: Action| {
             if ui.selectable_label(on, name).on_hover_text(tip(what, action)).clicked() {
                 requests.send(ActionRequest(action));

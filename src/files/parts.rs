@@ -11,7 +11,7 @@ use crate::{
     modules,
     processor::Modules,
     rig::{
-        SourceError,
+        Rig, SourceError,
         part::Part,
         template::{self, Template, read_template, text_of},
     },
@@ -41,6 +41,24 @@ pub const BUNDLED_PARTS: &[(&str, &str)] = bundled![
     "tail",
     "wing",
 ];
+
+/// Characters that come with Rigsmith, by name.
+pub const BUNDLED_CHARACTERS: &[(&str, &str)] = &[
+    ("biped", include_str!("../../assets/templates/biped.rig.ron")),
+    ("bird", include_str!("../../assets/templates/bird.rig.ron")),
+    ("hand", include_str!("../../assets/templates/hand.rig.ron")),
+    ("quadruped", include_str!("../../assets/templates/quadruped.rig.ron")),
+];
+
+/// The characters that come with Rigsmith, with their parts.
+pub fn bundled_characters() -> Vec<Arc<Rig>> {
+    let none = BTreeMap::new();
+    let read = |(name, text): &(&str, &str)| {
+        let template = PartFiles::given(&none).complete(Path::new(name), text.as_bytes());
+        template.ok().map(|template| Arc::new(template.rig))
+    };
+    BUNDLED_CHARACTERS.iter().filter_map(read).collect()
+}
 
 /// Text of a part that comes with Rigsmith. It is used where no file has its name.
 fn bundled(name: &str) -> Option<&'static str> {

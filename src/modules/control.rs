@@ -8,8 +8,8 @@ use crate::{
     mesh::model::Trs,
     parameters,
     processor::{
-        BuildScope, Creation, ModuleError, NodeId, RigModule, Side, check_finite, check_limits, mirrored_angles,
-        mirrored_direction,
+        BuildScope, Creation, ModuleError, NodeId, Resize, RigModule, Side, check_finite, check_limits,
+        mirrored_angles, mirrored_direction,
     },
     rig::{
         Channels, Constraint, ControlData, Limits, NodeType, Scalar, Target, degrees,
@@ -124,6 +124,12 @@ impl RigModule for ControlModule {
             controls.push(control);
         }
         Ok(())
+    }
+
+    fn resize(&mut self, change: &Resize) {
+        self.size = self.size.map(|size| size * change.factor);
+        self.shape_translate *= change.factor;
+        self.limits = self.limits.resized(change.factor);
     }
 
     fn mirror(&mut self) {

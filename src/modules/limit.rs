@@ -2,7 +2,7 @@
 
 use crate::{
     parameters,
-    processor::{BuildScope, ModuleError, RigModule, check_limits},
+    processor::{BuildScope, ModuleError, Resize, RigModule, check_limits},
     rig::{
         Constraint, Limits,
         reference::{NodeRef, NodeRefs},
@@ -43,6 +43,10 @@ impl RigModule for LimitModule {
             scope.constrain("constraint", node, 0, constraint)?;
         }
         Ok(())
+    }
+
+    fn resize(&mut self, change: &Resize) {
+        self.limits = self.limits.resized(change.factor);
     }
 
     fn mirror(&mut self) {

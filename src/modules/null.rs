@@ -5,7 +5,9 @@ use glam::Vec3;
 use crate::{
     mesh::model::Trs,
     parameters,
-    processor::{BuildScope, Creation, ModuleError, RigModule, check_finite, mirrored_angles, mirrored_direction},
+    processor::{
+        BuildScope, Creation, ModuleError, Resize, RigModule, check_finite, mirrored_angles, mirrored_direction,
+    },
     rig::{
         NodeType, degrees,
         reference::{NodeRef, NodeRefs},
@@ -79,6 +81,13 @@ impl RigModule for NullModule {
             }
         }
         Ok(())
+    }
+
+    fn resize(&mut self, change: &Resize) {
+        self.translate *= if self.world { change.floor_factor } else { change.factor };
+        if self.translate != Vec3::ZERO && !self.orient {
+            self.translate = change.turn * self.translate;
+        }
     }
 
     fn mirror(&mut self) {

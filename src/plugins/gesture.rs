@@ -107,6 +107,13 @@ pub enum Gesture {
     Group(String, Option<(f32, f32, f32)>),
     /// Locks the selected joints' weights against skinning, or unlocks them.
     Lock(bool),
+    /// Fits a template to the first mesh of the rig: the one with that name, or the one whose limbs the mesh shows. A rig
+    /// that has joints has those moved. Joints that are moved afterwards correct the fit.
+    Fit {
+        /// Name of the template.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        template: Option<String>,
+    },
     /// Undoes the last change.
     Undo,
     /// Redoes the last undone change.

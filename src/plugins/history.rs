@@ -183,6 +183,12 @@ impl RigHistory {
         (done.iter().chain(undone.iter().rev()).map(|step| step.name.as_ref()).collect(), done.len())
     }
 
+    /// Number of steps in effect after a step, all of them for `None`; 0 if the step itself is not in effect.
+    pub fn steps_since(&self, step: Option<&Arc<Step>>) -> usize {
+        let Some(step) = step else { return self.stacks.done.len() };
+        self.stacks.done.iter().rev().position(|known| Arc::ptr_eq(known, step)).unwrap_or(0)
+    }
+
     /// Last step in effect. The same step again means that nothing happened in between but its undo and redo.
     pub fn last(&self) -> Option<&Arc<Step>> {
         self.stacks.done.last()

@@ -3,6 +3,7 @@
 use std::{any::TypeId, collections::BTreeMap, sync::Arc};
 
 use bevy::reflect::{Reflect, TypeInfo, Typed};
+use glam::Quat;
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::{BuildProblem, BuildScope, ModuleError, mirror};
@@ -38,6 +39,21 @@ pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + 
     /// that are pasted mirrored: those of [`RigModule::SIDED`] and no others. Twice gives the first values back.
     /// References are mirrored already.
     fn mirror(&mut self) {}
+
+    /// Brings lengths in the rig's units, and directions along the rig's axes, to a body of another size: for templates that
+    /// are fitted to a mesh. Lengths that follow from joints need nothing.
+    fn resize(&mut self, _change: &Resize) {}
+}
+
+/// Difference between the body that a command was written for and another one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resize {
+    /// Factor of lengths.
+    pub factor: f32,
+    /// Factor of heights above the floor: of the joint's own if it is a root, else as `factor`.
+    pub floor_factor: f32,
+    /// Rotation of the rig's axes.
+    pub turn: Quat,
 }
 
 /// A [`RigModule`] whose type is not known: parameters, ready to be carried out.
@@ -72,6 +88,7 @@ pub struct Parameter {
 
 type Parse = fn(&str) -> Result<Arc<dyn DynModule>, SourceError>;
 type Mirror = fn(&str) -> Result<String, SourceError>;
+type ResizeText = fn(&str, &Resize) -> Result<String, SourceError>;
 
 /// A registered module.
 #[derive(Debug, Clone)]
@@ -92,6 +109,7 @@ pub struct ModuleInfo {
     pub type_info: &'static TypeInfo,
     parse: Parse,
     mirror: Mirror,
+    resize: ResizeText,
 }
 
 impl ModuleInfo {
@@ -110,6 +128,14 @@ impl ModuleInfo {
     /// [`SourceError`] with line and column in the text.
     pub fn mirrored(&self, params: &str) -> Result<String, SourceError> {
         (self.mirror)(params)
+    }
+
+    /// The parameters for a body of another size, as they are written, with other values where those are lengths.
+    ///
+    /// # Errors
+    /// [`SourceError`] with line and column in the text.
+    pub fn resized(&self, params: &str, change: &Resize) -> Result<String, SourceError> {
+        (self.resize)(params, change)
     }
 }
 
@@ -158,6 +184,12 @@ impl Modules {
                 let before = written(&read::<M>(text)?);
                 let mut module = read::<M>(text)?;
                 module.mirror();
+                Ok(mirror::with_changes(text, &before, &written(&module)))
+            },
+            resize: |text, change| {
+                let before = written(&read::<M>(text)?);
+                let mut module = read::<M>(text)?;
+                module.resize(change);
                 Ok(mirror::with_changes(text, &before, &written(&module)))
             },
         };

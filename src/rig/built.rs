@@ -174,6 +174,14 @@ pub struct Limits {
 }
 
 impl Limits {
+    /// The limits with lengths multiplied by a factor.
+    pub fn resized(mut self, factor: f32) -> Self {
+        for (low, high) in &mut self.translate {
+            (*low, *high) = (low.map(|end| end * factor), high.map(|end| end * factor));
+        }
+        self
+    }
+
     /// The limits on the other side of the character: translation along X and rotations about Y and Z with swapped,
     /// negated ends.
     pub fn mirrored(mut self) -> Self {

@@ -49,6 +49,7 @@ mod files_kill;
 mod files_read;
 mod files_set;
 mod fill;
+mod fit;
 mod fuzz_gestures;
 mod fuzz_gltf;
 mod fuzz_journal;

@@ -1,6 +1,6 @@
 //! Reasons why gestures have no effect.
 
-use crate::plugins::{document::ChangeError, stroke::NothingDrawn};
+use crate::plugins::{document::ChangeError, fit::FitFailure, stroke::NothingDrawn};
 
 /// Reason why a gesture had no effect; a sentence for people without its full stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -25,6 +25,12 @@ pub(super) enum GestureError {
         /// Number of joints.
         joints: usize,
     },
+    /// The rig has no mesh.
+    #[error("there is no mesh to fit a template into; open one first")]
+    NoMesh,
+    /// The template was not fitted.
+    #[error(transparent)]
+    Fit(#[from] FitFailure),
     /// The gesture is no operation on joints.
     #[error("this gesture changes no joint")]
     NoOperation,

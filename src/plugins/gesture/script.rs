@@ -13,10 +13,11 @@ use crate::{
     },
     plugins::{
         document::{Change, EditRefused, EditRequest, Edited, Selection, Symmetry},
+        fit::{FIT_AROUND, FitRequest, FitTemplate, Fitted},
         picking::{Pick, PickRequest, Picked},
         placement::{PlaceRequest, Placed},
         stroke::{StrokeDone, StrokeParent, StrokeRequest, StrokeResult},
-        surface::{RigMeshes, RigSurface},
+        surface::{RigMeshes, RigSurface, SkinOf},
     },
     rig::{
         Rig, Uid,
@@ -88,6 +89,7 @@ pub(super) struct Requests<'w> {
     picks: MessageWriter<'w, PickRequest>,
     places: MessageWriter<'w, PlaceRequest>,
     strokes: MessageWriter<'w, StrokeRequest>,
+    fits: MessageWriter<'w, FitRequest>,
 }
 
 /// Readers of the answers.
@@ -98,16 +100,28 @@ pub(super) struct Answers<'w, 's> {
     picked: MessageReader<'w, 's, Picked>,
     placed: MessageReader<'w, 's, Placed>,
     drawn: MessageReader<'w, 's, StrokeDone>,
+    fitted: MessageReader<'w, 's, Fitted>,
+    meshes: Query<'w, 's, &'static SkinOf>,
 }
 
-type Scripted<'a> =
-    (Entity, &'a mut GestureScript, &'a Rig, &'a Selection, &'a mut Symmetry, Option<&'a RigSurface>, Has<RigMeshes>);
+type Scripted<'a> = (
+    Entity,
+    &'a mut GestureScript,
+    &'a Rig,
+    &'a Selection,
+    &'a mut Symmetry,
+    Option<&'a RigSurface>,
+    Option<&'a RigMeshes>,
+);
 
 /// Reads the answers to the last gesture of each script and carries out the next one.
 pub(super) fn run_scripts(mut scripts: Query<Scripted>, mut requests: Requests, mut answers: Answers) {
     answers.collect(&mut scripts);
-    for (entity, mut script, rig, selection, mut symmetry, surface, has_mesh) in &mut scripts {
-        if script.pending || script.waiting.is_empty() || (has_mesh && surface.and_then(RigSurface::ready).is_none()) {
+    for (entity, mut script, rig, selection, mut symmetry, surface, meshes) in &mut scripts {
+        if script.pending
+            || script.waiting.is_empty()
+            || (meshes.is_some() && surface.and_then(RigSurface::ready).is_none())
+        {
             continue;
         }
         script.state.joints_before = rig.len();
@@ -117,7 +131,9 @@ pub(super) fn run_scripts(mut scripts: Query<Scripted>, mut requests: Requests, 
         let name = name.split(['(', ' ', '{']).next().unwrap_or_default().to_owned();
         script.answers.push(GestureAnswer { number, gesture: name, done: true, ..Default::default() });
         let bounds = surface.map_or([Vec3::splat(-0.5), Vec3::splat(0.5)], RigSurface::bounds);
-        let mut act = GestureRun { entity, rig, selection, bounds, state: &mut script.state, symmetry: &mut symmetry };
+        let mesh = meshes.and_then(|meshes| meshes.iter().next());
+        let (state, symmetry) = (&mut script.state, &mut symmetry);
+        let mut act = GestureRun { entity, mesh, rig, selection, bounds, state, symmetry };
         match act.make(gesture, &mut requests) {
             Ok(pending) => script.pending = pending,
             Err(error) => script.fail(&error),
@@ -188,7 +204,18 @@ impl Answers<'_, '_> {
             }
             script.pending = false;
         }
-        for Edited { rig: entity, name, .. } in self.edited.read().filter(|edited| !edited.preview) {
+        for Fitted { mesh, result } in self.fitted.read() {
+            let Ok(SkinOf(rig)) = self.meshes.get(*mesh) else { continue };
+            let Ok((_, mut script, ..)) = scripts.get_mut(*rig) else { continue };
+            // The edit of a fit answers for it.
+            if let Err(failure) = result {
+                script.fail(&failure.clone().into());
+                script.pending = false;
+            }
+        }
+        // Joints around a moved one are fitted again by themselves, in answer to no gesture.
+        let own = |edited: &&Edited| !edited.preview && edited.name != FIT_AROUND;
+        for Edited { rig: entity, name, .. } in self.edited.read().filter(own) {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             if script.pending {
                 script.note_added(rig);
@@ -225,6 +252,7 @@ fn point(position: Vec3) -> String {
 /// Execution of one gesture.
 struct GestureRun<'a, 'w> {
     entity: Entity,
+    mesh: Option<Entity>,
     rig: &'a Rig,
     selection: &'a Selection,
     bounds: [Vec3; 2],
@@ -289,6 +317,12 @@ impl GestureRun<'_, '_> {
             Gesture::SelectAll => pick = Some((Pick::All, false)),
             Gesture::Deselect => {
                 requests.picks.write(PickRequest { rig, what: Pick::None, add: false });
+            }
+            Gesture::Fit { template } => {
+                let mesh = self.mesh.ok_or(GestureError::NoMesh)?;
+                let template = template.map_or(FitTemplate::Choose, FitTemplate::Named);
+                requests.fits.write(FitRequest { template, ..FitRequest::new(mesh) });
+                return Ok(true);
             }
             Gesture::Undo => {
                 requests.edits.write(EditRequest { rig, change: Change::Undo });

@@ -1,0 +1,92 @@
+//! Draws a sheet of meshes, each with the template that was fitted into it and, beside it, the skinned figure with that skeleton
+//! posed.
+//!
+//! `cargo run --release --example fit_sheet -- SHEET.png MESH...`; without meshes, the bundled body.
+
+use std::{error::Error, path::PathBuf, sync::Arc};
+
+use bevy::math::{Quat, UVec2};
+use rigsmith::{
+    algo::view::View,
+    files::{RealDisk, bundled_characters, load_model, save_atomic},
+    headless::Workbench,
+    plugins::{display::MeshDisplay, drawing::RigDrawing, fit::FitTemplates},
+    render::{PictureSettings, png, take_picture},
+    rig::{PoseOffset, operations::Operation},
+};
+
+/// Width and height of one picture in pixels, and the number of figures in a row.
+const TILE: UVec2 = UVec2::new(300, 400);
+const COLUMNS: u32 = 4;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1).map(PathBuf::from);
+    let sheet = arguments.next().unwrap_or_else(|| PathBuf::from("docs/fit.png"));
+    let mut meshes: Vec<PathBuf> = arguments.collect();
+    if meshes.is_empty() {
+        meshes.push(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.obj").into());
+    }
+    let mut tiles = Vec::new();
+    for mesh in &meshes {
+        match pictures(mesh) {
+            Ok(pictures) => tiles.extend(pictures),
+            Err(error) => eprintln!("{}: {error}", mesh.display()),
+        }
+    }
+    let columns = (2 * COLUMNS).min(tiles.len() as u32);
+    let rows = (tiles.len() as u32).div_ceil(columns.max(1));
+    let mut all = image::RgbImage::new(columns * TILE.x, rows * TILE.y);
+    for (tile, number) in tiles.iter().zip(0..) {
+        let (x, y) = (number % columns * TILE.x, number / columns * TILE.y);
+        image::imageops::replace(&mut all, tile, i64::from(x), i64::from(y));
+    }
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    all.write_to(&mut bytes, image::ImageFormat::Png)?;
+    save_atomic(&RealDisk, &sheet, &bytes.into_inner())?;
+    println!("wrote {}: {} figures", sheet.display(), tiles.len() / 2);
+    Ok(())
+}
+
+/// The fitted skeleton in a mesh, and the mesh in a pose of it.
+fn pictures(mesh: &PathBuf) -> Result<[image::RgbImage; 2], Box<dyn Error>> {
+    let mut bench = Workbench::new(1, "fit");
+    bench.open(load_model(&RealDisk, mesh)?, true)?;
+    bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
+    let report = bench.fit(|_| (), &mut |_| ())?;
+    let doubtful: Vec<_> = report.doubtful().collect();
+    println!("{}: {} with confidence {:.2}", mesh.display(), report.template, report.fit.confidence);
+    let settings = PictureSettings {
+        size: TILE,
+        view: View::Orbit(20.0, 8.0),
+        display: MeshDisplay { xray: true, ..MeshDisplay::default() },
+        drawing: RigDrawing { grid: false, ..RigDrawing::default() },
+        selected: doubtful,
+        ..PictureSettings::default()
+    };
+    let take = |bench: &Workbench, settings: &PictureSettings| -> Result<image::RgbImage, Box<dyn Error>> {
+        let image = take_picture(bench.rig().clone(), bench.mesh().cloned().into_iter().collect(), settings)?;
+        Ok(image::load_from_memory(&png(image)?)?.to_rgb8())
+    };
+    let fitted = take(&bench, &settings)?;
+    bench.skin(Default::default(), Vec::new(), &mut |_| {})?;
+    // Elbows, knees and the head bend, whatever the template.
+    let bends =
+        [("forearm", 50.0), ("shin", 40.0), ("upper_arm", -25.0), ("thigh", -30.0), ("head", 20.0), ("carpus", 30.0)];
+    let mut pose = Vec::new();
+    for joint in bench.rig().walk() {
+        let label = joint.data.label.as_deref().unwrap_or_default();
+        let bend = bends.iter().find(|(name, _)| label.starts_with(name) && !label.ends_with("_r"));
+        if let Some((_, degrees)) = bend {
+            let rotation = Quat::from_rotation_x(f32::to_radians(*degrees));
+            pose.push((joint.data.uid, PoseOffset { rotation, ..PoseOffset::default() }));
+        }
+    }
+    bench.operate(Operation::Pose(pose))?;
+    let settings = PictureSettings {
+        display: MeshDisplay::default(),
+        drawing: RigDrawing { rig: false, grid: false, ..RigDrawing::default() },
+        selected: Vec::new(),
+        ..settings
+    };
+    Ok([fitted, take(&bench, &settings)?])
+}

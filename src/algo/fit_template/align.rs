@@ -1,0 +1,142 @@
+//! Alignment: the similarity that brings one set of points nearest to another (Horn 1987), and a stretch along its axes.
+
+use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
+
+/// A rotation, a scale and an offset: `rotation * (scale * p) + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Similarity {
+    pub(super) rotation: Quat,
+    pub(super) scale: f32,
+    pub(super) offset: Vec3,
+}
+
+impl Similarity {
+    /// Maps a position.
+    pub(super) fn apply(&self, p: Vec3) -> Vec3 {
+        self.rotation * (p * self.scale) + self.offset
+    }
+}
+
+/// Pairs of points with weights: (from, to, weight).
+pub(super) type Pairs = [(Vec3, Vec3, f32)];
+
+/// The best similarity from the first to the second points, and the root mean square of what remains.
+pub(super) fn similarity(pairs: &Pairs) -> Option<(Similarity, f32)> {
+    let weight: f64 = pairs.iter().map(|p| f64::from(p.2)).sum();
+    if pairs.len() < 3 || !(weight > 0.0) {
+        return None;
+    }
+    let mean = |pick: &dyn Fn(&(Vec3, Vec3, f32)) -> Vec3| {
+        pairs.iter().map(|p| pick(p).as_dvec3() * f64::from(p.2)).sum::<DVec3>() / weight
+    };
+    let (a0, b0) = (mean(&|p| p.0), mean(&|p| p.1));
+    let mut cross = DMat3::ZERO;
+    let (mut va, mut vb) = (0.0, 0.0);
+    for &(a, b, w) in pairs {
+        let (a, b, w) = (a.as_dvec3() - a0, b.as_dvec3() - b0, f64::from(w));
+        cross += DMat3::from_cols(a * b.x * w, a * b.y * w, a * b.z * w);
+        va += w * a.length_squared();
+        vb += w * b.length_squared();
+    }
+    if !(va > 0.0) || !(vb > 0.0) {
+        return None;
+    }
+    let rotation = best_rotation(cross);
+    let turn = DMat3::from_quat(rotation);
+    let gain: f64 =
+        pairs.iter().map(|&(a, b, w)| (turn * (a.as_dvec3() - a0)).dot(b.as_dvec3() - b0) * f64::from(w)).sum();
+    let scale = (gain / va).max(1e-6);
+    let offset = b0 - turn * a0 * scale;
+    let rest = (vb - 2.0 * scale * gain + scale * scale * va).max(0.0) / weight;
+    let found = Similarity { rotation: rotation.as_quat(), scale: scale as f32, offset: offset.as_vec3() };
+    Some((found, rest.sqrt() as f32))
+}
+
+/// The rotation that maximises the trace with a matrix of products, `cross = Σ a bᵀ` (columns by `b`).
+pub(super) fn best_rotation(cross: DMat3) -> DQuat {
+    let m = |i: usize, j: usize| cross.col(j)[i];
+    let n = [
+        [m(0, 0) + m(1, 1) + m(2, 2), m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0)],
+        [m(1, 2) - m(2, 1), m(0, 0) - m(1, 1) - m(2, 2), m(0, 1) + m(1, 0), m(2, 0) + m(0, 2)],
+        [m(2, 0) - m(0, 2), m(0, 1) + m(1, 0), m(1, 1) - m(0, 0) - m(2, 2), m(1, 2) + m(2, 1)],
+        [m(0, 1) - m(1, 0), m(2, 0) + m(0, 2), m(1, 2) + m(2, 1), m(2, 2) - m(0, 0) - m(1, 1)],
+    ];
+    let (values, vectors) = eigen4(n);
+    let best = (0..4).fold(0, |best, i| if values[i] > values[best] { i } else { best });
+    let [w, x, y, z] = [0, 1, 2, 3].map(|k| vectors[k][best]);
+    DQuat::from_xyzw(x, y, z, w).normalize()
+}
+
+/// Eigenvalues and eigenvectors (in columns) of a symmetric matrix, by cyclic Jacobi rotations.
+fn eigen4(mut m: [[f64; 4]; 4]) -> ([f64; 4], [[f64; 4]; 4]) {
+    let mut v = [[0.0f64; 4]; 4];
+    (0..4).for_each(|i| v[i][i] = 1.0);
+    for _ in 0..30 {
+        for p in 0..3 {
+            for q in p + 1..4 {
+                if m[p][q].abs() < 1e-300 {
+                    continue;
+                }
+                let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
+                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+                let t = if theta == 0.0 { 1.0 } else { t };
+                let c = 1.0 / (t * t + 1.0).sqrt();
+                let s = t * c;
+                for row in &mut m {
+                    let (a, b) = (row[p], row[q]);
+                    (row[p], row[q]) = (c * a - s * b, s * a + c * b);
+                }
+                let (a, b) = (m[p], m[q]);
+                for k in 0..4 {
+                    (m[p][k], m[q][k]) = (c * a[k] - s * b[k], s * a[k] + c * b[k]);
+                }
+                for row in &mut v {
+                    let (a, b) = (row[p], row[q]);
+                    (row[p], row[q]) = (c * a - s * b, s * a + c * b);
+                }
+            }
+        }
+    }
+    ([m[0][0], m[1][1], m[2][2], m[3][3]], v)
+}
+
+/// A similarity with a stretch along the three axes of the points that are mapped.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    rotation: Quat,
+    scale: Vec3,
+    offset: Vec3,
+}
+
+impl Stretch {
+    /// Fits the stretch to pairs, drawn towards the similarity where an axis has little extent.
+    pub(super) fn fit(pairs: &Pairs, similarity: &Similarity) -> Self {
+        let back = Mat3::from_quat(similarity.rotation).transpose();
+        let weight: f32 = pairs.iter().map(|p| p.2).sum::<f32>().max(1e-9);
+        let a0 = pairs.iter().map(|p| p.0 * p.2).sum::<Vec3>() / weight;
+        let b0 = pairs.iter().map(|p| (back * p.1) * p.2).sum::<Vec3>() / weight;
+        let spread = pairs.iter().map(|p| (p.0 - a0).length_squared() * p.2).sum::<f32>().max(1e-12);
+        let hold = 0.08 * spread;
+        let mut scale = [0.0f32; 3];
+        for (axis, scale) in scale.iter_mut().enumerate() {
+            let (mut top, mut bottom) = (hold * similarity.scale, hold);
+            for &(a, b, w) in pairs {
+                let (x, y) = ((a - a0)[axis], (back * b - b0)[axis]);
+                top += w * x * y;
+                bottom += w * x * x;
+            }
+            *scale = (top / bottom).clamp(0.4 * similarity.scale, 2.5 * similarity.scale);
+        }
+        let scale = Vec3::from_array(scale);
+        Self { rotation: similarity.rotation, scale, offset: similarity.rotation * (b0 - a0 * scale) }
+    }
+
+    pub(super) fn apply(&self, p: Vec3) -> Vec3 {
+        self.rotation * (p * self.scale) + self.offset
+    }
+
+    /// Maps a difference of positions.
+    pub(super) fn turn(&self, v: Vec3) -> Vec3 {
+        self.rotation * (v * self.scale)
+    }
+}

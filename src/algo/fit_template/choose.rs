@@ -1,0 +1,88 @@
+//! Choice of a template: the one whose limbs the mesh shows.
+
+use std::fmt;
+
+use super::{
+    FitError, MeshAnalysis, TemplateJoint,
+    assign::{self, Hypothesis},
+    limbs::{LimbKind, limbs},
+};
+
+/// How well a template suits a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TemplateChoice {
+    /// Index into the templates given.
+    pub index: usize,
+    /// Penalty; smaller is better.
+    pub cost: f32,
+    /// Limbs of each kind that the template has, and that the mesh shows.
+    pub limbs: Vec<(LimbKind, usize, usize)>,
+    /// Branches of the mesh that no limb took.
+    pub unused: usize,
+}
+
+impl fmt::Display for TemplateChoice {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (i, (kind, wanted, found)) in self.limbs.iter().enumerate() {
+            let (before, plural) = (if i > 0 { ", " } else { "" }, if *wanted == 1 { "" } else { "s" });
+            write!(f, "{before}{found} of {wanted} {kind}{plural}")?;
+        }
+        if self.unused > 0 {
+            write!(f, ", {} branches unused", self.unused)?;
+        }
+        Ok(())
+    }
+}
+
+/// Weight of what remains of the alignment: figures may be posed, but a lying trunk is no standing one.
+const REST: f32 = 2.0;
+
+/// Penalty of a template without sides, whose chains fit much.
+const ANY_SHAPE: f32 = 0.2;
+
+/// A penalty that can be compared between templates: those without sides are searched with another weight.
+fn comparable(best: &Hypothesis, free: bool) -> f32 {
+    let (weight, more) = if free { (assign::RIGID, ANY_SHAPE) } else { (assign::POSED, 0.0) };
+    best.cost + (REST - weight) * best.rest + more
+}
+
+/// Ranks templates for a mesh, best first. Templates that cannot be fitted at all are left out.
+///
+/// # Errors
+/// [`FitError::TooFewLimbs`] or another error of the last template if none can be fitted.
+pub fn choose_template(
+    analysis: &MeshAnalysis,
+    templates: &[(&str, &[TemplateJoint])],
+) -> Result<Vec<TemplateChoice>, FitError> {
+    let mut choices = Vec::new();
+    let mut problem = FitError::NoChain;
+    for (index, (_, joints)) in templates.iter().enumerate() {
+        let Some(template) = limbs(joints).filter(|t| !t.limbs.is_empty()) else { continue };
+        let hypotheses = match analysis.hypotheses(&template, &Default::default(), &[]) {
+            Ok(hypotheses) => hypotheses,
+            Err(error) => {
+                problem = error;
+                continue;
+            }
+        };
+        let best = &hypotheses[0];
+        let mut kinds: Vec<LimbKind> = template.limbs.iter().map(|l| l.kind).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        let of_kind = |kind: LimbKind| {
+            let with_leaves = template.limbs.iter().zip(&best.leaves).filter(|(l, _)| l.kind == kind);
+            with_leaves.fold((kind, 0, 0), |(k, wanted, found), (_, leaf)| {
+                (k, wanted + 1, found + usize::from(leaf.is_some()))
+            })
+        };
+        let shown = best.leaves.iter().filter(|l| l.is_some()).count();
+        choices.push(TemplateChoice {
+            index,
+            cost: comparable(best, template.limbs.iter().all(|l| l.kind == LimbKind::Free)),
+            limbs: kinds.into_iter().map(of_kind).collect(),
+            unused: analysis.trees[best.tree].branches.leaves.len() - shown,
+        });
+    }
+    choices.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.index.cmp(&b.index)));
+    if choices.is_empty() { Err(problem) } else { Ok(choices) }
+}

@@ -1,0 +1,85 @@
+//! Confidence: how far a fit is to be trusted, joint by joint and as a whole.
+
+use glam::Vec3;
+
+use super::{
+    assign::Hypothesis, human::FittedBody, limbs::TemplateLimbs, place::Placement, report::FitReason,
+    volume::VoxelGraph,
+};
+use crate::mesh::voxels::Voxels;
+
+/// Distance between body model and surface, as a share of the height, at which trust is one half.
+const HALF_TRUST: f32 = 0.026;
+/// Penalty of an assignment at which trust is one half.
+const HALF_COST: f32 = 0.6;
+/// How much the length of a limb may differ from the template's, as a logarithm, until trust is one half.
+const HALF_STRAIN: f32 = 0.55;
+
+fn trust(value: f32, half: f32) -> f32 {
+    let q = value / half;
+    1.0 / (1.0 + q * q)
+}
+
+/// Confidence of each joint with its reason.
+pub(super) fn joints(
+    placement: &Placement,
+    body: Option<(&FittedBody, &[Option<f32>])>,
+    best: &Hypothesis,
+    voxels: &Voxels,
+    graph: &VoxelGraph,
+    places: &[Vec3],
+) -> Vec<(f32, FitReason)> {
+    let inside = |place: Vec3| {
+        let reach = 2.0 * graph.cell;
+        let around = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
+        around.iter().any(|&d| {
+            let cell = voxels.cell_at(voxels.to_grid(place + d * reach));
+            cell.is_some_and(|c| voxels.solid_index(c).is_some())
+        })
+    };
+    (0..places.len())
+        .map(|joint| {
+            let (mut confidence, mut reason) = match body {
+                Some((_, near)) => match near[joint] {
+                    Some(residual) => (trust(residual, HALF_TRUST), FitReason::Surface),
+                    None => (0.8, FitReason::Proportion),
+                },
+                None => {
+                    let base = match placement.reasons[joint] {
+                        FitReason::NoLimb => 0.2,
+                        FitReason::CentreLine => 0.95,
+                        _ => 0.85,
+                    };
+                    (
+                        base * trust(placement.strain[joint], HALF_STRAIN) * trust(best.cost, HALF_COST),
+                        placement.reasons[joint],
+                    )
+                }
+            };
+            if confidence < 0.5 && reason == FitReason::Surface {
+                reason = FitReason::UnlikeSurface;
+            }
+            if !inside(places[joint]) {
+                confidence = confidence.min(0.3);
+                reason = FitReason::Outside;
+            }
+            (confidence, reason)
+        })
+        .collect()
+}
+
+/// Confidence in the whole fit.
+pub(super) fn whole(
+    template: &TemplateLimbs,
+    best: &Hypothesis,
+    body: Option<&FittedBody>,
+    joints: &[(f32, FitReason)],
+) -> f32 {
+    let found = best.leaves.iter().filter(|l| l.is_some()).count() as f32 / template.limbs.len().max(1) as f32;
+    let mean = joints.iter().map(|j| j.0).sum::<f32>() / joints.len().max(1) as f32;
+    let match_trust = match body {
+        Some(body) => trust(body.residual, HALF_TRUST),
+        None => trust(best.cost, HALF_COST),
+    };
+    (mean * match_trust.sqrt() * found * found).clamp(0.0, 1.0)
+}

@@ -1,0 +1,286 @@
+//! Fitting: the steps of one fit, from the assignment of limbs to the report.
+
+use glam::Vec3;
+
+use super::{
+    FitError, FitNote, FitReason, FitSettings, FitSymmetry, FittedSkeleton, HypothesisSummary, JointFit, MeshAnalysis,
+    TemplateJoint, align,
+    assign::Hypothesis,
+    confidence,
+    human::{self, Role},
+    limbs::{self, TemplateLimbs},
+    markers::{self, Marker},
+    place, symmetry,
+};
+
+/// Angle (its cosine) within which up and forward are taken to be an axis of the file.
+const SNAP: f32 = 0.9;
+/// Difference of the residuals of two starts below which the front is uncertain, as a share.
+const UNCERTAIN: f32 = 0.06;
+/// Distance between body model and surface, as a share of the height, above which the model is not used.
+const UNLIKE: f32 = 0.025;
+
+/// A fit at work.
+pub(super) struct Fit<'a> {
+    analysis: &'a MeshAnalysis,
+    joints: &'a [TemplateJoint<'a>],
+    settings: &'a FitSettings,
+    template: TemplateLimbs,
+    markers: Vec<Marker>,
+}
+
+impl<'a> Fit<'a> {
+    pub(super) fn new(
+        analysis: &'a MeshAnalysis,
+        joints: &'a [TemplateJoint<'a>],
+        settings: &'a FitSettings,
+    ) -> Result<Self, FitError> {
+        if let Some(joint) = joints.iter().position(|j| !j.position.is_finite()) {
+            return Err(FitError::Joint { joint });
+        }
+        for (direction, name) in [(settings.up, "up"), (settings.forward, "forward")] {
+            if direction.is_some_and(|d| d.normalize_or_zero() == Vec3::ZERO) {
+                return Err(FitError::Direction(name));
+            }
+        }
+        let bad = |&(joint, position): &(usize, Vec3)| joint >= joints.len() || !position.is_finite();
+        if let Some(marker) = settings.markers.iter().position(bad) {
+            return Err(FitError::Marker { marker, joint: settings.markers[marker].0, joints: joints.len() });
+        }
+        let template = limbs::limbs(joints).filter(|t| !t.limbs.is_empty()).ok_or(FitError::NoChain)?;
+        let space = &analysis.mesh.space;
+        let markers = settings.markers.iter().map(|&(joint, p)| Marker { joint, place: space.to_unit(p) }).collect();
+        Ok(Self { analysis, joints, settings, template, markers })
+    }
+
+    /// Runs the fit, starting from an earlier one if it still holds.
+    pub(super) fn run(
+        &self,
+        before: Option<&FittedSkeleton>,
+        progress: &(dyn Fn(f32) -> bool + Sync),
+    ) -> Result<FittedSkeleton, FitError> {
+        let analysis = self.analysis;
+        let step = |share: f32| if progress(share) { Ok(()) } else { Err(FitError::Cancelled) };
+        step(0.0)?;
+        let before = before.filter(|b| self.still_holds(&b.assignments));
+        let hypotheses = match before {
+            Some(before) => before.assignments.clone(),
+            None => analysis.hypotheses(&self.template, self.settings, &self.markers)?,
+        };
+        let best = &hypotheses[0];
+        let tree = &analysis.trees[best.tree];
+        let placement = place::place(&self.template, tree, &analysis.graph, best);
+        let mut places = placement.places.clone();
+        let human = human::is_human(&self.template) && !self.settings.without_body_model;
+        let roles = human.then(|| human::roles(self.joints, &self.template));
+        let mut body = None;
+        if let Some(roles) = &roles {
+            body = match before.map(|b| b.body.as_ref()) {
+                Some(Some(body)) => Some(self.refitted_body(body, roles)),
+                // The figure was unlike all bodies before.
+                Some(None) => None,
+                None => {
+                    let anchor = |(role, &position): (&Option<Role>, &Vec3)| match role {
+                        Some(Role::Bone(b)) => {
+                            Some(human::Anchor { place: human::Place::Joint(*b), position, weight: 1.0 })
+                        }
+                        _ => None,
+                    };
+                    let plain: Vec<human::Anchor> = roles.iter().zip(&places).filter_map(anchor).collect();
+                    let found = human::fit(
+                        &analysis.surface,
+                        &analysis.target,
+                        &self.template,
+                        &analysis.trees,
+                        &hypotheses,
+                        &plain,
+                        &step,
+                    )?;
+                    match found {
+                        Some(body) if !self.markers.is_empty() => Some(self.refitted_body(&body, roles)),
+                        found => found,
+                    }
+                }
+            };
+            // A figure that is unlike all bodies is left to its centre lines.
+            let unlike = body.as_ref().is_some_and(|b| b.residual > UNLIKE);
+            if unlike {
+                body = None;
+            }
+            if let Some(body) = &body {
+                places = self.by_roles(body, roles, best);
+            }
+        }
+        step(0.95)?;
+        let plane = self.make_symmetric(&mut places);
+        markers::warp(&self.template, &mut places, &self.markers, body.is_some());
+        let near: Vec<Option<f32>> = match (&body, &roles) {
+            (Some(body), Some(roles)) => roles.iter().map(|r| r.map(|r| body.place(r).1)).collect(),
+            _ => vec![None; places.len()],
+        };
+        let with_body = body.as_ref().map(|b| (b, near.as_slice()));
+        let mut trusted = confidence::joints(&placement, with_body, best, &analysis.voxels, &analysis.graph, &places);
+        let confidence = confidence::whole(&self.template, best, body.as_ref(), &trusted);
+        for marker in &self.markers {
+            trusted[marker.joint] = (1.0, FitReason::Marker);
+        }
+        let (up, forward) = self.directions(best, body.as_ref());
+        let space = &analysis.mesh.space;
+        let position = |joint: usize| {
+            let marker = self.settings.markers.iter().rev().find(|m| m.0 == joint);
+            marker.map_or_else(|| space.to_file(places[joint]), |m| m.1)
+        };
+        let fits = trusted.iter().enumerate().map(|(joint, &(confidence, reason))| JointFit {
+            position: position(joint),
+            confidence,
+            reason,
+        });
+        Ok(FittedSkeleton {
+            up,
+            forward,
+            symmetry: plane.map(|(p, n)| (space.to_file(p), space.direction_to_file(n))),
+            height: analysis.height(space.direction_to_unit(up)),
+            confidence,
+            joints: fits.collect(),
+            hypotheses: hypotheses.iter().map(|h| self.summary(h)).collect(),
+            notes: self.notes(best, body.as_ref(), plane.is_some()),
+            body,
+            assignments: hypotheses,
+        })
+    }
+
+    /// True if each marker on a limb lies nearest to the branch that the limb has.
+    fn still_holds(&self, assignments: &[Hypothesis]) -> bool {
+        let Some(best) = assignments.first().filter(|b| b.leaves.len() == self.template.limbs.len()) else {
+            return false;
+        };
+        let Some(tree) = self.analysis.trees.get(best.tree) else { return false };
+        let slack = 4.0 * self.analysis.graph.cell;
+        self.markers.iter().all(|marker| {
+            let Some(limb) = self.template.limbs.iter().position(|l| l.joints.contains(&marker.joint)) else {
+                return true;
+            };
+            let Some(leaf) = best.leaves[limb] else { return true };
+            let distance = |leaf: usize| tree.lines[leaf].distance(marker.place);
+            let taken = best.leaves.iter().flatten().copied();
+            taken.filter(|&l| l != leaf).all(|other| distance(other) > slack || distance(leaf) < 2.0 * slack)
+        })
+    }
+
+    fn refitted_body(&self, body: &human::FittedBody, roles: &[Option<Role>]) -> human::FittedBody {
+        // A person's idea of the spine and of clavicles, which the surface hides, must not bend the body.
+        let of_bone = |m: &Marker| match roles[m.joint] {
+            Some(Role::Bone(bone)) if human::is_shown(bone) => Some((bone, m.place)),
+            _ => None,
+        };
+        let kept: Vec<(usize, Vec3)> = self.markers.iter().filter_map(of_bone).collect();
+        if kept.is_empty() {
+            return body.clone();
+        }
+        human::refit(&self.analysis.surface, &self.analysis.target, body, &kept)
+    }
+
+    /// Places by the registered body; joints without a role lie between those with one, or follow their parents.
+    fn by_roles(&self, body: &human::FittedBody, roles: &[Option<Role>], best: &Hypothesis) -> Vec<Vec3> {
+        let template = &self.template;
+        let mut places: Vec<Option<Vec3>> = roles.iter().map(|r| r.map(|r| body.place(r).0)).collect();
+        let known = places.clone();
+        for &joint in &template.order {
+            if known[joint].is_some() {
+                continue;
+            }
+            let mut above = template.parents[joint];
+            while let Some(a) = above.filter(|&a| known[a].is_none()) {
+                above = template.parents[a];
+            }
+            // The nearest joint below with a role.
+            let mut below = None;
+            for &other in &template.order {
+                let mut up = Some(other);
+                while let Some(u) = up.filter(|&u| u != joint) {
+                    up = template.parents[u];
+                }
+                if known[other].is_some() && up.is_some() && below.is_none() {
+                    below = Some(other);
+                }
+            }
+            if let (Some(a), Some(b)) = (above, below) {
+                let share = template.length(a, joint) / template.length(a, b).max(1e-9);
+                if let (Some(from), Some(to)) = (known[a], known[b]) {
+                    places[joint] = Some(from.lerp(to, share.clamp(0.0, 1.0)));
+                }
+            }
+        }
+        let pairs: Vec<(Vec3, Vec3, f32)> =
+            known.iter().zip(&template.positions).filter_map(|(k, &p)| k.map(|k| (p, k, 1.0))).collect();
+        let similarity = align::similarity(&pairs).map_or(best.alignment, |s| s.0);
+        place::follow(template, &align::Stretch::fit(&pairs, &similarity), &places)
+    }
+
+    fn make_symmetric(&self, places: &mut [Vec3]) -> Option<(Vec3, Vec3)> {
+        let analysis = self.analysis;
+        let found = symmetry::find(&self.template, places, &analysis.graph, &analysis.voxels);
+        let plane = match self.settings.symmetry {
+            FitSymmetry::Off => None,
+            FitSymmetry::Auto => found,
+            FitSymmetry::On => found.or_else(|| symmetry::plane(&self.template, places)),
+        };
+        if let Some(plane) = plane {
+            symmetry::make_symmetric(&self.template, places, plane);
+        }
+        found
+    }
+
+    /// Up and forward in the mesh's space: the file's axes where they are near.
+    fn directions(&self, best: &Hypothesis, body: Option<&human::FittedBody>) -> (Vec3, Vec3) {
+        let rotation = body.map_or(best.alignment.rotation, |b| b.trunk);
+        let space = &self.analysis.mesh.space;
+        let snapped = |d: Vec3, not: Vec3| {
+            let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
+            axes.into_iter().find(|a| a.dot(d) > SNAP && a.dot(not).abs() < 0.5).unwrap_or(d)
+        };
+        let up = snapped(space.direction_to_file(rotation * Vec3::Y), Vec3::ZERO);
+        let up = self.settings.up.map_or(up, |u| u.normalize_or_zero());
+        let forward = space.direction_to_file(rotation * Vec3::Z);
+        let level = (forward - up * forward.dot(up)).normalize_or_zero();
+        let forward = snapped(level, up);
+        (up, self.settings.forward.map_or(forward, |f| f.normalize_or_zero()))
+    }
+
+    fn summary(&self, hypothesis: &Hypothesis) -> HypothesisSummary {
+        let lines = &self.analysis.trees[hypothesis.tree].lines;
+        let end = |leaf: &Option<usize>| leaf.map(|l| self.analysis.mesh.space.to_file(lines[l].at(0.0)));
+        let limbs = self.template.limbs.iter().zip(&hypothesis.leaves).map(|(l, leaf)| (l.kind, end(leaf))).collect();
+        HypothesisSummary { cost: hypothesis.cost, limbs }
+    }
+
+    fn notes(&self, best: &Hypothesis, body: Option<&human::FittedBody>, symmetric: bool) -> Vec<FitNote> {
+        let analysis = self.analysis;
+        let mut notes = Vec::new();
+        let mut counted = |count: usize, note: fn(usize) -> FitNote| {
+            if count > 0 {
+                notes.push(note(count));
+            }
+        };
+        counted(analysis.mesh.specks, FitNote::Specks);
+        counted(analysis.graph.tied, FitNote::Tied);
+        counted(analysis.graph.loose, FitNote::Loose);
+        let used = best.leaves.iter().filter(|l| l.is_some()).count();
+        counted(analysis.trees[best.tree].branches.leaves.len() - used, FitNote::UnusedBranches);
+        for (limb, leaf) in self.template.limbs.iter().zip(&best.leaves) {
+            if leaf.is_none() {
+                notes.push(FitNote::MissingLimb(limb.kind));
+            }
+        }
+        if let Some(body) = body {
+            notes.push(FitNote::BodyModel);
+            if body.backwards.is_some_and(|backwards| backwards - body.start < UNCERTAIN * body.start) {
+                notes.push(FitNote::UncertainFront);
+            }
+        }
+        if symmetric && self.settings.symmetry != FitSymmetry::Off {
+            notes.push(FitNote::MadeSymmetric);
+        }
+        notes
+    }
+}

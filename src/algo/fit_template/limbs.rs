@@ -1,0 +1,333 @@
+//! Limbs of a template: its trunk, its long chains, and what hangs on them.
+//!
+//! Only the hierarchy and the rest pose decide; labels are hints (`head`, `wing`, a side's suffix).
+
+use glam::Vec3;
+
+use super::TemplateJoint;
+
+/// Length of a chain that makes it a limb, as a share of the template's largest side.
+const LIMB_LENGTH: f32 = 0.2;
+/// Distance from the plane of symmetry within which a joint is on it, as a share of the largest side.
+const ON_PLANE: f32 = 0.02;
+
+/// What a limb is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LimbKind {
+    /// The neck with the head.
+    Head,
+    /// An arm, which does not reach the ground.
+    Arm,
+    /// A leg, which stands on the ground.
+    Leg,
+    /// A wing.
+    Wing,
+    /// A tail.
+    Tail,
+    /// A chain of a template without a plane of symmetry.
+    Free,
+}
+
+/// A chain of joints from the trunk to an end.
+#[derive(Debug, Clone)]
+pub(super) struct Limb {
+    pub(super) kind: LimbKind,
+    /// Joints from the trunk outwards; the joint on the trunk is not one of them.
+    pub(super) joints: Vec<usize>,
+    /// The joint of the trunk that carries it.
+    pub(super) attach: usize,
+    /// The limb on the other side.
+    pub(super) partner: Option<usize>,
+    /// True for what leads to the rest of a body: the wrist of a hand. How much of it a mesh has is open.
+    pub(super) stem: bool,
+    /// Length of the flesh beyond the last joint.
+    pub(super) beyond: f32,
+}
+
+/// A template taken apart.
+#[derive(Debug, Clone)]
+pub(super) struct TemplateLimbs {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) parents: Vec<Option<usize>>,
+    /// Parents before children.
+    pub(super) order: Vec<usize>,
+    /// Joints from the root to where the head's limb begins.
+    pub(super) trunk: Vec<usize>,
+    pub(super) limbs: Vec<Limb>,
+    /// The mirrored joint of each joint on a side.
+    pub(super) mirror: Vec<Option<usize>>,
+    pub(super) size: f32,
+}
+
+impl TemplateLimbs {
+    /// Length of the chain between two joints of one path.
+    pub(super) fn length(&self, from: usize, to: usize) -> f32 {
+        let (mut joint, mut length) = (to, 0.0);
+        while joint != from {
+            let Some(parent) = self.parents[joint] else { return length };
+            length += self.positions[joint].distance(self.positions[parent]);
+            joint = parent;
+        }
+        length
+    }
+
+    /// Where the flesh of a limb ends: beyond the last joint, in the direction of the last bone.
+    pub(super) fn tip(&self, limb: &Limb) -> Vec3 {
+        let end = limb.joints[limb.joints.len() - 1];
+        let parent = self.parents[end].unwrap_or(end);
+        let direction = (self.positions[end] - self.positions[parent]).normalize_or_zero();
+        self.positions[end] + direction * limb.beyond
+    }
+
+    /// Number of limbs of a kind.
+    pub(super) fn count(&self, kind: LimbKind) -> usize {
+        self.limbs.iter().filter(|l| l.kind == kind).count()
+    }
+
+    /// Length between the ends of two limbs along the skeleton, flesh included.
+    pub(super) fn way(&self, a: usize, b: usize) -> f32 {
+        let path = |limb: &Limb| {
+            let mut joint = limb.joints.last().copied();
+            let mut path = Vec::new();
+            while let Some(j) = joint {
+                path.push(j);
+                joint = self.parents[j];
+            }
+            path
+        };
+        let (a, b) = (&self.limbs[a], &self.limbs[b]);
+        let (pa, pb) = (path(a), path(b));
+        let Some(&join) = pa.iter().find(|j| pb.contains(j)) else { return 0.0 };
+        self.length(join, pa[0]) + self.length(join, pb[0]) + a.beyond + b.beyond
+    }
+}
+
+/// Takes a template apart; `None` without joints.
+pub(super) fn limbs(joints: &[TemplateJoint]) -> Option<TemplateLimbs> {
+    let positions: Vec<Vec3> = joints.iter().map(|j| j.position).collect();
+    let mut parents: Vec<Option<usize>> =
+        joints.iter().enumerate().map(|(i, j)| j.parent.filter(|&p| p < joints.len() && p != i)).collect();
+    let mut children = vec![Vec::new(); joints.len()];
+    for (joint, parent) in parents.iter().enumerate() {
+        if let Some(parent) = parent {
+            children[*parent].push(joint);
+        }
+    }
+    let roots: Vec<usize> = (0..joints.len()).filter(|&j| parents[j].is_none()).collect();
+    let mut order = roots.clone();
+    let mut next = 0;
+    while next < order.len() {
+        order.extend(children[order[next]].iter().copied());
+        next += 1;
+    }
+    // A joint in a circle of parents hangs on nothing.
+    for joint in 0..joints.len() {
+        if !order.contains(&joint) {
+            parents[joint] = None;
+            children[joint].clear();
+            order.push(joint);
+        }
+    }
+    // Length of the longest chain below each joint, and the number of joints below.
+    let mut below = lengths_below(&order, &parents, &positions);
+    let mut count = vec![1usize; joints.len()];
+    for &joint in order.iter().rev() {
+        if let Some(parent) = parents[joint] {
+            count[parent] += count[joint];
+        }
+    }
+    let root = roots.into_iter().max_by_key(|&r| (count[r], std::cmp::Reverse(r)))?;
+    let (low, high) = positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
+    let size = (high - low).max_element();
+    let mirror = mirrored(&positions, size);
+    let symmetric = mirror.iter().any(Option::is_some);
+    let central =
+        |j: usize| if symmetric { positions[j].x.abs() < ON_PLANE * size && mirror[j].is_none() } else { true };
+    let mut limbs = Vec::new();
+    let mut trunk = vec![root];
+    if symmetric {
+        let segment = |j: usize| parents[j].map_or(0.0, |p| positions[j].distance(positions[p]));
+        let head = head_joint(joints, &order, &central, &parents, root);
+        let mut path = vec![head];
+        while let Some(parent) = parents[path[path.len() - 1]] {
+            path.push(parent);
+        }
+        path.reverse();
+        // The trunk ends where the last pair of limbs is carried.
+        let carries = |j: usize| children[j].iter().any(|&c| !central(c) && below[c] + segment(c) > LIMB_LENGTH * size);
+        let from = path.iter().position(|&j| j == root).unwrap_or(0);
+        let last = (from..path.len()).rev().find(|&i| carries(path[i])).unwrap_or(from);
+        trunk = path[from..=last].to_vec();
+        let head_joints = path[last + 1..].to_vec();
+        if !head_joints.is_empty() {
+            // A snout or a beak has joints of its own.
+            let snout = order.iter().filter(|&&j| parents[j] == Some(head) && central(j));
+            let snout = snout.map(|&j| below[j] + segment(j)).fold(0.0, f32::max);
+            let beyond = if snout > 0.0 { snout } else { (0.085 * size).max(segment(head) * 0.8) };
+            limbs.push(Limb {
+                kind: LimbKind::Head,
+                joints: head_joints,
+                attach: path[last],
+                partner: None,
+                stem: false,
+                beyond,
+            });
+        }
+        for &attach in &trunk {
+            for &child in &children[attach] {
+                if trunk.contains(&child) || path.contains(&child) {
+                    continue;
+                }
+                let length = below[child] + segment(child);
+                let chain = longest_chain(child, &children, &below, &positions);
+                if central(child) {
+                    if length > LIMB_LENGTH * size || joints[child].label.contains("tail") {
+                        let beyond = chain.last().map_or(0.0, |&j| segment(j));
+                        limbs.push(Limb {
+                            kind: LimbKind::Tail,
+                            joints: chain,
+                            attach,
+                            partner: None,
+                            stem: false,
+                            beyond,
+                        });
+                    }
+                } else if length > LIMB_LENGTH * size {
+                    let end = chain[chain.len() - 1];
+                    let lowest = chain.iter().map(|&j| positions[j].y).fold(f32::INFINITY, f32::min);
+                    let winged = chain.iter().any(|&j| joints[j].label.contains("wing"));
+                    let kind = match (winged, lowest < low.y + 0.12 * (high.y - low.y)) {
+                        (true, _) => LimbKind::Wing,
+                        (_, true) => LimbKind::Leg,
+                        _ => LimbKind::Arm,
+                    };
+                    limbs.push(Limb {
+                        kind,
+                        joints: chain,
+                        attach,
+                        partner: None,
+                        stem: false,
+                        beyond: segment(end) * 0.9,
+                    });
+                }
+            }
+        }
+    } else {
+        // A hand: the joint with the most chains becomes the root, and the wrist another chain.
+        let busiest = order.iter().copied().max_by_key(|&j| (children[j].len(), std::cmp::Reverse(j))).unwrap_or(root);
+        let attach = if children[busiest].len() > 1 { busiest } else { root };
+        reroot(attach, &mut parents, &mut children);
+        (order, below) = ordered(attach, &parents, &children, &positions);
+        trunk = vec![attach];
+        let segment = |j: usize| parents[j].map_or(0.0, |p| positions[j].distance(positions[p]));
+        for &child in &children[attach] {
+            let chain = longest_chain(child, &children, &below, &positions);
+            let beyond = chain.last().map_or(0.0, |&j| segment(j) * 0.8);
+            let stem = chain.contains(&root);
+            limbs.push(Limb { kind: LimbKind::Free, joints: chain, attach, partner: None, stem, beyond });
+        }
+    }
+    for a in 0..limbs.len() {
+        let other = mirror[limbs[a].joints[0]];
+        limbs[a].partner = limbs.iter().position(|l| Some(l.joints[0]) == other);
+    }
+    Some(TemplateLimbs { positions, parents, order, trunk, limbs, mirror, size })
+}
+
+/// The joint at the other side of the plane `x = 0` for each joint that has one.
+fn mirrored(positions: &[Vec3], size: f32) -> Vec<Option<usize>> {
+    let near = (1e-3 * size).max(f32::MIN_POSITIVE);
+    let other = |joint: usize| {
+        let p = positions[joint];
+        if p.x.abs() <= near {
+            return None;
+        }
+        let image = Vec3::new(-p.x, p.y, p.z);
+        (0..positions.len()).find(|&o| positions[o].distance(image) < near)
+    };
+    (0..positions.len()).map(other).collect()
+}
+
+/// The last central joint with the hint `head` in its label, else the highest and foremost central end.
+fn head_joint(
+    joints: &[TemplateJoint],
+    order: &[usize],
+    central: &dyn Fn(usize) -> bool,
+    parents: &[Option<usize>],
+    root: usize,
+) -> usize {
+    let in_tree = |mut j: usize| {
+        loop {
+            if j == root {
+                return true;
+            }
+            match parents[j] {
+                Some(p) if central(j) => j = p,
+                _ => return false,
+            }
+        }
+    };
+    let candidates: Vec<usize> = order.iter().copied().filter(|&j| central(j) && in_tree(j)).collect();
+    let lower = |j: usize| joints[j].label.to_lowercase();
+    let named = candidates.iter().copied().find(|&j| lower(j).contains("head") || lower(j).contains("skull"));
+    named.unwrap_or_else(|| {
+        let high = |j: usize| joints[j].position.y + 0.5 * joints[j].position.z;
+        candidates.iter().copied().fold(root, |best, j| if high(j) > high(best) { j } else { best })
+    })
+}
+
+/// The longest chain from a joint to an end.
+fn longest_chain(from: usize, children: &[Vec<usize>], below: &[f32], positions: &[Vec3]) -> Vec<usize> {
+    let mut chain = vec![from];
+    loop {
+        let here = chain[chain.len() - 1];
+        let reach = |c: usize| below[c] + positions[c].distance(positions[here]);
+        let Some(next) = children[here].iter().copied().reduce(|a, b| if reach(b) > reach(a) + 1e-6 { b } else { a })
+        else {
+            return chain;
+        };
+        chain.push(next);
+    }
+}
+
+/// Length of the longest chain below each joint.
+fn lengths_below(order: &[usize], parents: &[Option<usize>], positions: &[Vec3]) -> Vec<f32> {
+    let mut below = vec![0.0f32; positions.len()];
+    for &joint in order.iter().rev() {
+        if let Some(parent) = parents[joint] {
+            below[parent] = below[parent].max(below[joint] + positions[joint].distance(positions[parent]));
+        }
+    }
+    below
+}
+
+/// Makes `root` the root of its tree by turning round the links above it.
+fn reroot(root: usize, parents: &mut [Option<usize>], children: &mut [Vec<usize>]) {
+    let (mut joint, mut above) = (root, parents[root]);
+    parents[root] = None;
+    while let Some(parent) = above {
+        above = parents[parent];
+        children[parent].retain(|&c| c != joint);
+        children[joint].push(parent);
+        parents[parent] = Some(joint);
+        joint = parent;
+    }
+}
+
+/// The joints below `root`, parents first, then all others, with the lengths of chains below them.
+fn ordered(
+    root: usize,
+    parents: &[Option<usize>],
+    children: &[Vec<usize>],
+    positions: &[Vec3],
+) -> (Vec<usize>, Vec<f32>) {
+    let mut order = vec![root];
+    order.extend((0..parents.len()).filter(|&j| j != root && parents[j].is_none()));
+    let mut next = 0;
+    while next < order.len() {
+        order.extend(children[order[next]].iter().copied());
+        next += 1;
+    }
+    let below = lengths_below(&order, parents, positions);
+    (order, below)
+}

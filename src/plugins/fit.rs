@@ -1,0 +1,463 @@
+//! Fit: a template's skeleton moved into a mesh in the background, as one undoable edit, and corrected by moving joints.
+//!
+//! A [`FitRequest`] analyses a mesh in a task. An empty rig gets the template whose limbs the mesh shows; a rig that has joints
+//! has them moved. From then on the rig has a [`FittedRig`]: a joint that is moved at rest is a marker, and the joints around it
+//! are fitted again, until the fit is accepted or cancelled ([`EndFit`]).
+
+mod refit;
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU32, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use bevy::{
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
+
+use super::{
+    RigSystems,
+    commands::RigModules,
+    configure_sets,
+    document::EditRequest,
+    history::RigHistory,
+    surface::{RigMesh, SkinOf},
+};
+use crate::{
+    algo::fit_template::{
+        FitError, FitSettings, FitSymmetry, FittedSkeleton, MeshAnalysis, TemplateJoint, choose_template, fit_template,
+    },
+    processor::{Fitting, Modules, fitted_rig},
+    rig::{
+        EditError, NodeKind, Rig, Uid, nearest::did_you_mean, operations::Operation, step::Step, update::edits_between,
+    },
+};
+
+/// Name of the step of a fit.
+pub const FIT: &str = "Fit";
+/// Name of the step that fits the joints around a moved one again.
+pub const FIT_AROUND: &str = "Fit around";
+
+/// Plugin that fits templates to meshes.
+pub struct FitPlugin;
+
+impl Plugin for FitPlugin {
+    fn build(&self, app: &mut App) {
+        configure_sets(app);
+        app.init_resource::<FitTemplates>()
+            .add_message::<FitRequest>()
+            .add_message::<Fitted>()
+            .add_message::<EndFit>()
+            .add_message::<super::document::Edited>()
+            .add_message::<EditRequest>()
+            .add_systems(
+                Update,
+                (
+                    (start, land, refit::end).chain().in_set(RigSystems::Gesture),
+                    refit::follow_moves.after(RigSystems::Edits).before(RigSystems::Build),
+                ),
+            );
+    }
+}
+
+/// Request to fit a template to a mesh of a rig.
+#[derive(Message, Debug, Clone)]
+pub struct FitRequest {
+    /// The entity with the [`RigMesh`].
+    pub mesh: Entity,
+    /// The template, if the rig has no joints; a rig that has joints has those moved.
+    pub template: FitTemplate,
+    /// Up in the mesh's space; found if `None`.
+    pub up: Option<Vec3>,
+    /// Direction in which the figure faces; found if `None`.
+    pub forward: Option<Vec3>,
+    /// Symmetry of the result.
+    pub symmetry: FitSymmetry,
+    /// Positions of joints, by their labels.
+    pub markers: Vec<(String, Vec3)>,
+    /// Objects of the mesh to fit into; all of it if empty.
+    pub objects: Vec<usize>,
+}
+
+impl FitRequest {
+    /// A request that leaves everything to the fit.
+    pub fn new(mesh: Entity) -> Self {
+        Self {
+            mesh,
+            template: FitTemplate::Choose,
+            up: None,
+            forward: None,
+            symmetry: FitSymmetry::Auto,
+            markers: Vec::new(),
+            objects: Vec::new(),
+        }
+    }
+}
+
+/// Template of a fit.
+#[derive(Debug, Clone)]
+pub enum FitTemplate {
+    /// The one of [`FitTemplates`] whose limbs the mesh shows.
+    Choose,
+    /// The one of [`FitTemplates`] with this name.
+    Named(String),
+    /// This one.
+    Given(Arc<Rig>),
+}
+
+/// Function that gives the templates that a fit may choose; it is called in the task of the fit.
+#[derive(Resource, Clone)]
+pub struct FitTemplates(pub Arc<dyn Fn() -> Vec<Arc<Rig>> + Send + Sync>);
+
+impl Default for FitTemplates {
+    fn default() -> Self {
+        Self(Arc::new(Vec::new))
+    }
+}
+
+/// Answer to a [`FitRequest`].
+#[derive(Message, Debug, Clone)]
+pub struct Fitted {
+    /// The mesh.
+    pub mesh: Entity,
+    /// Report of the fit, or the reason why there is none.
+    pub result: Result<Arc<FitReport>, FitFailure>,
+}
+
+/// Report of a fit.
+#[derive(Debug, Clone)]
+pub struct FitReport {
+    /// Name of the template; of the rig if its own joints were moved.
+    pub template: String,
+    /// Limbs that the chosen template has and that the mesh shows, in words; empty if there was no choice.
+    pub choice: String,
+    /// Uid and label of each joint, in the order of the fit.
+    pub joints: Vec<(Uid, String)>,
+    /// The fit, in the space of the mesh.
+    pub fit: FittedSkeleton,
+    /// Duration of analysis and fit.
+    pub time: Duration,
+}
+
+impl FitReport {
+    /// Confidence below which a joint is doubtful.
+    pub const DOUBTFUL: f32 = 0.5;
+
+    /// Joints that the fit is not sure of.
+    pub fn doubtful(&self) -> impl Iterator<Item = Uid> + '_ {
+        let pairs = self.joints.iter().zip(&self.fit.joints);
+        pairs.filter(|(_, joint)| joint.confidence < Self::DOUBTFUL).map(|((uid, _), _)| *uid)
+    }
+}
+
+/// Reason why a template was not fitted; a sentence for people without its full stop.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FitFailure {
+    /// The entity of the request has no mesh, or its mesh no rig.
+    #[error("the mesh belongs to no rig; it may have been closed")]
+    NoRig,
+    /// Neither the rig nor the request has joints.
+    #[error("there is no skeleton to fit: name a template")]
+    NoTemplate,
+    /// There is no template with the name.
+    #[error("there is no template \"{name}\"{nearest}")]
+    NoName {
+        /// Requested name.
+        name: String,
+        /// Nearest names, as the rest of a sentence.
+        nearest: String,
+    },
+    /// A marker names no joint.
+    #[error("no joint of \"{template}\" is called \"{label}\"{nearest}")]
+    NoJoint {
+        /// Name of the template.
+        template: String,
+        /// Requested label.
+        label: String,
+        /// Nearest labels, as the rest of a sentence.
+        nearest: String,
+    },
+    /// The mesh does not show the template.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The joints cannot be put there.
+    #[error(transparent)]
+    Edit(#[from] EditError),
+    /// The rig was changed meanwhile.
+    #[error("the joints were changed while the template was fitted; fit again")]
+    Changed,
+}
+
+/// Running fit of a mesh; remove the component or call [`FitJob::cancel`] to stop it.
+#[derive(Component)]
+pub struct FitJob {
+    progress: Arc<AtomicU32>,
+    cancelled: Arc<AtomicBool>,
+    task: Task<Result<Finished, FitFailure>>,
+    /// The rig that the fit started from.
+    from: Arc<Rig>,
+}
+
+impl FitJob {
+    /// Finished share, 0 to 1.
+    pub fn progress(&self) -> f32 {
+        f32::from_bits(self.progress.load(Ordering::Relaxed))
+    }
+
+    /// Stops the fit; the rig stays as it was.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for FitJob {
+    fn drop(&mut self) {
+        self.cancel();
+    }
+}
+
+/// Fit that can still be corrected, on the rig's entity: moving a joint at rest fits the joints around it again.
+#[derive(Component, Clone)]
+pub struct FittedRig {
+    /// Report of the present fit.
+    pub report: Arc<FitReport>,
+    /// Places that a person chose, by joint.
+    pub markers: BTreeMap<Uid, Vec3>,
+    analysis: Arc<MeshAnalysis>,
+    settings: FitSettings,
+    /// Skeleton of the template at rest, before it was fitted.
+    template: Arc<Rig>,
+    floor: f32,
+    /// Last step before the fit.
+    before: Option<Arc<Step>>,
+}
+
+/// Request to end a fit: joints that are moved from then on move alone.
+#[derive(Message, Debug, Clone, Copy)]
+pub struct EndFit {
+    /// The rig.
+    pub rig: Entity,
+    /// True to undo the fit with all corrections.
+    pub cancel: bool,
+}
+
+struct Finished {
+    fitted: FittedRig,
+    target: Rig,
+}
+
+/// Work of a fit: plain data for a task.
+struct Work {
+    from: Arc<Rig>,
+    mesh: RigMesh,
+    request: FitRequest,
+    modules: Arc<Modules>,
+    templates: FitTemplates,
+}
+
+fn start(
+    mut commands: Commands,
+    mut requests: MessageReader<FitRequest>,
+    meshes: Query<(&RigMesh, &SkinOf)>,
+    rigs: Query<&Rig>,
+    (modules, templates): (Res<RigModules>, Res<FitTemplates>),
+    mut fitted: MessageWriter<Fitted>,
+) {
+    for request in requests.read() {
+        let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
+        let Some((mesh, rig)) = found else {
+            fitted.write(Fitted { mesh: request.mesh, result: Err(FitFailure::NoRig) });
+            continue;
+        };
+        let from = Arc::new(rig.clone());
+        let work = Work {
+            from: from.clone(),
+            mesh: mesh.clone(),
+            request: request.clone(),
+            modules: modules.0.clone(),
+            templates: templates.clone(),
+        };
+        let progress = Arc::new(AtomicU32::new(0));
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let (share, stop) = (progress.clone(), cancelled.clone());
+        let task = AsyncComputeTaskPool::get().spawn(async move {
+            work.run(&|part| {
+                share.store(part.to_bits(), Ordering::Relaxed);
+                !stop.load(Ordering::Relaxed)
+            })
+        });
+        commands.entity(request.mesh).insert(FitJob { progress, cancelled, task, from });
+    }
+}
+
+fn land(
+    mut commands: Commands,
+    mut jobs: Query<(Entity, &mut FitJob, &SkinOf)>,
+    rigs: Query<(&Rig, &RigHistory)>,
+    mut answers: MessageWriter<Fitted>,
+) {
+    for (entity, mut job, of) in &mut jobs {
+        let Some(result) = check_ready(&mut job.task) else { continue };
+        let result = match (result, rigs.get(of.0)) {
+            (Err(error), _) => Err(error),
+            (Ok(_), Err(_)) => Err(FitFailure::NoRig),
+            (Ok(_), Ok((rig, _))) if !is_same_skeleton(rig, &job.from) => Err(FitFailure::Changed),
+            (Ok(Finished { mut fitted, target }), Ok((rig, history))) => match edits_between(rig, &target) {
+                Ok(changes) => {
+                    let report = fitted.report.clone();
+                    fitted.before = history.last().cloned();
+                    let operation = Operation::Named { name: FIT, edits: changes };
+                    commands.write_message(EditRequest::operation(of.0, operation));
+                    commands.entity(of.0).try_insert(fitted);
+                    Ok(report)
+                }
+                Err(error) => Err(error.into()),
+            },
+        };
+        answers.write(Fitted { mesh: entity, result });
+        commands.entity(entity).try_remove::<FitJob>();
+    }
+}
+
+/// True if two rigs have the same joints at the same places.
+fn is_same_skeleton(a: &Rig, b: &Rig) -> bool {
+    a.len() == b.len()
+        && a.walk()
+            .zip(b.walk())
+            .all(|(a, b)| (a.data.uid, a.parent, a.data.rest) == (b.data.uid, b.parent, b.data.rest))
+}
+
+/// Joints of a rig as the fit takes them, with their uids. Nulls are no part of the body.
+fn skeleton(rig: &Rig) -> (Vec<Uid>, Vec<String>, Vec<Option<usize>>, Vec<Vec3>) {
+    let joints: Vec<Uid> =
+        rig.walk().filter(|joint| joint.data.kind == NodeKind::Joint).map(|joint| joint.data.uid).collect();
+    let label = |uid: &Uid| rig.joint(*uid).and_then(|joint| joint.data.label.clone()).unwrap_or_default();
+    let parent = |uid: &Uid| rig.ancestors(*uid).find_map(|above| joints.iter().position(|j| *j == above.data.uid));
+    let labels = joints.iter().map(label).collect();
+    let parents = joints.iter().map(parent).collect();
+    let places = joints.iter().map(|uid| rig.position(*uid)).collect();
+    (joints, labels, parents, places)
+}
+
+/// Parameters of [`fit_template`] for a skeleton.
+fn template_joints<'a>(labels: &'a [String], parents: &[Option<usize>], places: &[Vec3]) -> Vec<TemplateJoint<'a>> {
+    let joints = labels.iter().zip(parents).zip(places);
+    joints.map(|((label, parent), position)| TemplateJoint { label, parent: *parent, position: *position }).collect()
+}
+
+impl Work {
+    /// Rigs whose joints may be fitted.
+    fn candidates(&self) -> Result<Vec<Arc<Rig>>, FitFailure> {
+        if self.from.walk().any(|joint| joint.data.kind == NodeKind::Joint) {
+            return Ok(vec![self.from.clone()]);
+        }
+        match &self.request.template {
+            FitTemplate::Given(template) => Ok(vec![template.clone()]),
+            FitTemplate::Choose => Ok((self.templates.0)()),
+            FitTemplate::Named(name) => {
+                let known = (self.templates.0)();
+                let nearest = || did_you_mean(name, known.iter().map(|rig| rig.about().name.clone()));
+                let found = known.iter().find(|rig| rig.about().name == *name).cloned();
+                let found = found.ok_or_else(|| FitFailure::NoName { name: name.clone(), nearest: nearest() })?;
+                Ok(vec![found])
+            }
+        }
+    }
+
+    fn run(self, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<Finished, FitFailure> {
+        let begin = Instant::now();
+        let candidates = self.candidates()?;
+        let Self { from: _, mesh, request, modules, .. } = self;
+        let region = region(&mesh, &request.objects);
+        let points = &mesh.rest.points;
+        let analysis = MeshAnalysis::new(points, &mesh.triangles, region.as_deref(), &|part| progress(0.5 * part))?;
+        let skeletons: Vec<_> = candidates.iter().map(|rig| skeleton(rig)).collect();
+        let joints: Vec<Vec<TemplateJoint>> =
+            skeletons.iter().map(|(_, labels, parents, places)| template_joints(labels, parents, places)).collect();
+        let (chosen, choice) = match joints.len() {
+            0 => return Err(FitFailure::NoTemplate),
+            1 => (0, String::new()),
+            _ => {
+                let named: Vec<(&str, &[TemplateJoint])> = candidates
+                    .iter()
+                    .zip(&joints)
+                    .map(|(rig, joints)| (rig.about().name.as_str(), &joints[..]))
+                    .collect();
+                let ranked = choose_template(&analysis, &named)?;
+                let best = ranked.first().ok_or(FitFailure::NoTemplate)?;
+                (best.index, best.to_string())
+            }
+        };
+        let (uids, labels, ..) = &skeletons[chosen];
+        let template = candidates[chosen].clone();
+        let name = template.about().name.clone();
+        let marker = |(label, place): &(String, Vec3)| match labels.iter().position(|known| known == label) {
+            Some(joint) => Ok((joint, *place)),
+            None => {
+                let nearest = did_you_mean(label, labels.iter());
+                Err(FitFailure::NoJoint { template: name.clone(), label: label.clone(), nearest })
+            }
+        };
+        let markers = request.markers.iter().map(marker).collect::<Result<Vec<_>, _>>()?;
+        let settings = FitSettings {
+            up: request.up,
+            forward: request.forward,
+            symmetry: request.symmetry,
+            markers: markers.clone(),
+            ..FitSettings::default()
+        };
+        let fit = fit_template(&analysis, &joints[chosen], &settings, &|part| progress(0.5 + 0.5 * part))?;
+        let floor = points.iter().filter(|p| p.is_finite()).map(|p| p.dot(fit.up)).fold(f32::INFINITY, f32::min);
+        let report = FitReport {
+            template: name,
+            choice,
+            joints: uids.iter().copied().zip(labels.iter().cloned()).collect(),
+            fit,
+            time: begin.elapsed(),
+        };
+        let fitted = FittedRig {
+            report: Arc::new(report),
+            markers: markers.iter().map(|(joint, place)| (uids[*joint], *place)).collect(),
+            analysis: Arc::new(analysis),
+            settings,
+            template,
+            floor,
+            before: None,
+        };
+        let target = fitted.target(&modules)?;
+        Ok(Finished { fitted, target })
+    }
+}
+
+impl FittedRig {
+    /// The template in the body.
+    fn target(&self, modules: &Modules) -> Result<Rig, EditError> {
+        let FittedSkeleton { up, forward, joints, .. } = &self.report.fit;
+        let places = self.report.joints.iter().zip(joints).map(|((uid, _), joint)| (*uid, joint.position)).collect();
+        let left = up.cross(*forward).normalize_or(Vec3::X);
+        let turn = Quat::from_mat3(&Mat3::from_cols(left, *up, left.cross(*up))).normalize();
+        fitted_rig(&self.template, &Fitting { places, turn, floor: self.floor }, modules)
+    }
+}
+
+/// Numbers of the triangles of some objects; `None` for all.
+fn region(mesh: &RigMesh, objects: &[usize]) -> Option<Vec<u32>> {
+    if objects.is_empty() {
+        return None;
+    }
+    let mut first = 0;
+    let mut triangles = Vec::new();
+    for part in &mesh.rest.parts {
+        let count = part.triangles.len() as u32;
+        if objects.contains(&part.object) {
+            triangles.extend(first..first + count);
+        }
+        first += count;
+    }
+    Some(triangles)
+}

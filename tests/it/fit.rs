@@ -1,0 +1,232 @@
+//! Fit in an app: templates move into meshes, through the request, the command and gestures, and are corrected by moving joints.
+
+use std::{collections::BTreeMap, path::Path, sync::Arc};
+
+use bevy::{math::Vec3, prelude::*};
+use rigsmith::{
+    algo::fit_template::FitError,
+    files::{RealDisk, bundled_characters, load_model},
+    headless::{Workbench, WorkbenchError},
+    mesh::model::Model,
+    plugins::{
+        commands::BuildStep,
+        fit::{FitFailure, FitReport, FitTemplate, FitTemplates},
+        gesture::Gesture,
+    },
+    rig::{NodeType, Rig, operations::Operation, template::write_template},
+};
+
+use crate::prerequisites::{BODIES, test_data};
+
+/// Labels of the biped's joints, and the bones of the bodies' `game_engine` rig that begin there.
+const JOINTS: [(&str, &str); 13] = [
+    ("hips", "pelvis"),
+    ("neck", "neck_01"),
+    ("head", "head"),
+    ("upper_arm_l", "upperarm_l"),
+    ("forearm_l", "lowerarm_l"),
+    ("hand_l", "hand_l"),
+    ("thigh_l", "thigh_l"),
+    ("shin_l", "calf_l"),
+    ("foot_l", "foot_l"),
+    ("upper_arm_r", "upperarm_r"),
+    ("hand_r", "hand_r"),
+    ("shin_r", "calf_r"),
+    ("foot_r", "foot_r"),
+];
+
+fn model(path: &Path) -> Model {
+    load_model(&RealDisk, path).unwrap()
+}
+
+fn bundled_body() -> Model {
+    model(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/biped.obj"))
+}
+
+fn character(name: &str) -> Arc<Rig> {
+    bundled_characters().into_iter().find(|rig| rig.about().name == name).unwrap()
+}
+
+fn bench(model: Model) -> Workbench {
+    let mut bench = Workbench::new(7, "fit");
+    bench.open(model, true).unwrap();
+    bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
+    bench
+}
+
+fn fit(bench: &mut Workbench) -> Result<Arc<FitReport>, WorkbenchError> {
+    bench.fit(|_| (), &mut |_| ())
+}
+
+fn at(rig: &Rig, label: &str) -> Vec3 {
+    rig.position(rig.find_label(label).unwrap_or_else(|| panic!("no joint {label}")))
+}
+
+/// Every joint of the template is in the body that it was made for, and everything else of the template is as it was.
+#[test]
+fn the_biped_fits_the_body_it_was_made_for() {
+    let mut bench = bench(bundled_body());
+    let report = fit(&mut bench).unwrap();
+    assert_eq!(report.template, "biped", "{}", report.choice);
+    let (template, rig) = (character("biped"), bench.rig().clone());
+    let height = report.fit.height;
+    let mut sum = 0.0;
+    for (label, _) in JOINTS {
+        let off = at(&rig, label).distance(at(&template, label)) / height;
+        assert!(off < 0.04, "{label} is off by {off} of the height");
+        sum += off;
+    }
+    assert!(sum / (JOINTS.len() as f32) < 0.015, "the mean is {}", sum / JOINTS.len() as f32);
+    assert_eq!(rig.len(), template.len());
+    for (is, was) in rig.walk().zip(template.walk()) {
+        assert_eq!((is.data.uid, &is.data.label, is.parent), (was.data.uid, &was.data.label, was.parent));
+        assert_eq!((is.data.group, is.data.mirror), (was.data.group, was.data.mirror));
+        let tags = |joint: &rigsmith::rig::RigJoint| joint.data.tags.iter().map(|tag| tag.uid).collect::<Vec<_>>();
+        assert_eq!(tags(is), tags(was));
+    }
+    // It builds, binds and moves.
+    assert_eq!(bench.build(BuildStep::All).error, None);
+    bench.skin(Default::default(), Vec::new(), &mut |_| {}).unwrap();
+    bench.pose(&["hand_l.translate=(0,0.2,0.1)".parse().unwrap()]).unwrap();
+    let nodes = bench.nodes().unwrap();
+    let goal = nodes.iter().find(|node| &*node.node.name == "hand_ik_l").unwrap().entity.translation;
+    let hand =
+        nodes.iter().find(|node| node.node.label.as_deref() == Some("hand_l") && node.node.kind == NodeType::Joint);
+    assert!(hand.unwrap().entity.translation.distance(goal) < 1e-3 * height);
+}
+
+/// One step of the history; undone, the rig has the first bytes again. The same input gives the same bytes.
+#[test]
+fn a_fit_is_one_step_and_repeats_exactly() {
+    let texts: Vec<String> = (0..2)
+        .map(|_| {
+            let mut bench = bench(bundled_body());
+            let before = write_template(bench.rig());
+            fit(&mut bench).unwrap();
+            let text = write_template(bench.rig());
+            let answers = bench.gestures(vec![Gesture::Undo]);
+            assert!(answers[0].done, "{answers:?}");
+            assert_eq!(write_template(bench.rig()), before);
+            text
+        })
+        .collect();
+    assert_eq!(texts[0], texts[1]);
+}
+
+/// A joint that is moved stays where it was put, the others of its limb follow, and the legs stay where they are.
+#[test]
+fn a_moved_joint_is_a_marker() {
+    let mut bench = bench(bundled_body());
+    fit(&mut bench).unwrap();
+    let before = bench.rig().clone();
+    let elbow = before.find_label("forearm_l").unwrap();
+    let to = before.position(elbow) + Vec3::new(0.03, 0.04, 0.0);
+    bench.operate(Operation::Move { to: vec![(elbow, to)], with_children: false }).unwrap();
+    bench.operate(Operation::Edits(Vec::new())).unwrap();
+    let after = bench.rig().clone();
+    assert!(after.position(elbow).distance(to) < 1e-4, "{} is not {to}", after.position(elbow));
+    for label in ["shin_l", "shin_r", "foot_r"] {
+        let moved = at(&after, label).distance(at(&before, label));
+        assert!(moved < 0.01, "{label} moved by {moved}");
+    }
+}
+
+/// Gestures fit as the window does, by name or by choice; a template that does not exist is told with the nearest name.
+#[test]
+fn gestures_fit() {
+    let mut bench = bench(bundled_body());
+    let answers = bench.gestures(vec![
+        Gesture::Fit { template: Some("biqed".into()) },
+        Gesture::Fit { template: Some("biped".into()) },
+        Gesture::SelectLabel("hand_l".into()),
+    ]);
+    assert!(!answers[0].done && answers[0].message.contains("\"biped\""), "{answers:?}");
+    assert!(answers[1].done && answers[1].joints_added == character("biped").len(), "{answers:?}");
+    assert!(answers[2].done, "{answers:?}");
+}
+
+/// A rig with joints of its own has those moved: a template that a person opened and changed stays what it is.
+#[test]
+fn own_joints_are_moved() {
+    let mut bench = Workbench::with_rig(7, (*character("biped")).clone());
+    let mut body = bundled_body();
+    body.points.iter_mut().for_each(|point| *point = *point * 0.5 + Vec3::new(3.0, 1.0, 0.0));
+    bench.open(body, true).unwrap();
+    let report = fit(&mut bench).unwrap();
+    let template = character("biped");
+    for (label, _) in JOINTS {
+        let wanted = at(&template, label) * 0.5 + Vec3::new(3.0, 1.0, 0.0);
+        let off = at(bench.rig(), label).distance(wanted) / report.fit.height;
+        assert!(off < 0.04, "{label} is off by {off} of the height");
+    }
+    // Lengths in commands follow: the root's control stands on the floor below the figure.
+    assert_eq!(bench.build(BuildStep::All).error, None);
+    let nodes = bench.nodes().unwrap();
+    let root = nodes.iter().find(|node| &*node.node.name == "root").unwrap().entity.translation;
+    assert!((root.y - 1.0).abs() < 0.02 * report.fit.height, "the root stands at {root}");
+}
+
+/// What cannot be fitted is refused with a reason, and changes nothing.
+#[test]
+fn meshes_without_a_figure_are_refused() {
+    let triangle = crate::gestures::boxes(&[[[0.0; 3], [1.0, 1.0, 1.0]]]);
+    let mut flat = triangle.clone();
+    flat.points.iter_mut().for_each(|point| point.z = 0.0);
+    for (name, model) in [("a plane", flat), ("nothing", Model::default())] {
+        let mut bench = bench(model);
+        let result = fit(&mut bench);
+        let is_told =
+            matches!(&result, Err(WorkbenchError::Fit(FitFailure::Fit(FitError::Flat | FitError::NoSurface))));
+        assert!(is_told, "{name}: {:?}", result.map(|report| report.template.clone()));
+        assert!(bench.rig().is_empty(), "{name}");
+    }
+    // A box shows no limbs: refused, or fitted without confidence.
+    let mut bench = bench(triangle);
+    match fit(&mut bench) {
+        Ok(report) => {
+            assert!(report.fit.confidence < 0.5, "a box is a {} with {}", report.template, report.fit.confidence)
+        }
+        Err(error) => assert!(bench.rig().is_empty(), "{error}"),
+    }
+}
+
+/// The bodies of the test data, whose joints are known.
+#[test]
+fn bodies_are_fitted() {
+    let Some(data) = test_data() else { return };
+    let mut table = BTreeMap::new();
+    for name in BODIES {
+        let folder = data.join("bodies").join(name);
+        let truth: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(folder.join("joints.json")).unwrap()).unwrap();
+        let mut bench = bench(model(&folder.join("body.obj")));
+        let report = fit(&mut bench).unwrap();
+        assert_eq!(report.template, "biped", "{name}: {}", report.choice);
+        let (mut sum, mut worst) = (0.0, (0.0, ""));
+        for (label, bone) in JOINTS {
+            let head: Vec<f32> = serde_json::from_value(truth["game_engine"][bone]["head"].clone()).unwrap();
+            let off = at(bench.rig(), label).distance(Vec3::new(head[0], head[1], head[2])) / report.fit.height;
+            sum += off;
+            if off > worst.0 {
+                worst = (off, label);
+            }
+        }
+        let mean = sum / JOINTS.len() as f32;
+        println!("{name}: mean {:.2} %, worst {} {:.2} %", mean * 100.0, worst.1, worst.0 * 100.0);
+        table.insert(name, (mean, worst));
+    }
+    for (name, (mean, (worst, label))) in table {
+        assert!(mean <= 0.015 && worst <= 0.04, "{name}: mean {mean}, {label} {worst}");
+    }
+}
+
+/// A request for a template that the mesh cannot be is answered with what the mesh shows.
+#[test]
+fn a_given_template_is_taken() {
+    let mut bench = bench(bundled_body());
+    let hand = character("hand");
+    let result = bench.fit(|request| request.template = FitTemplate::Given(hand), &mut |_| ());
+    if let Ok(report) = result {
+        assert_eq!(report.template, "hand");
+    }
+}
