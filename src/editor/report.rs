@@ -19,6 +19,7 @@ use super::{
 use crate::{
     plugins::{
         document::{JointEntities, Selection},
+        fit::FitJob,
         history::RigHistory,
         skinning::SkinningJob,
         surface::{RigMeshes, RigSurface},
@@ -43,7 +44,7 @@ impl Plugin for ReportPlugin {
 pub struct WindowReport {
     /// The mode's name.
     pub mode: String,
-    /// Marks that a file is being opened, weights are computed or the surface is being prepared.
+    /// Marks that a file is being opened, weights are computed, a template is fitted or the surface is being prepared.
     pub busy: bool,
     /// Marks an open question: a file to save to, or unsaved work.
     pub asked: bool,
@@ -82,7 +83,7 @@ fn write(
     rig: Option<Res<ActiveRig>>,
     rigs: Query<(&Rig, &Selection, &RigHistory, &JointEntities, Option<&RigMeshes>, Option<&RigSurface>)>,
     places: Query<&GlobalTransform>,
-    jobs: Query<(), With<SkinningJob>>,
+    jobs: Query<(), Or<(With<SkinningJob>, With<FitJob>)>>,
     (mode, loading, status): (Res<Mode>, Res<Loading>, Res<StatusLine>),
     (area, sight, dialog): (Res<ViewportArea>, Res<ViewportSight>, Res<Dialog>),
 ) {

@@ -267,6 +267,45 @@ fn pixel(report: &WindowReport, place: [f32; 3]) -> [f32; 2] {
     at
 }
 
+/// Fitted, skinned and posed in six gestures: a key, a key, a key, a click, a drag; and all of a fit taken back with one key.
+#[test]
+fn a_body_is_fitted_by_a_key_on_a_display_and_gpu() {
+    if let Some(reason) = missing() {
+        skip(reason, "RIGSMITH_REQUIRE_GPU");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let display = Display::start().expect("Xvfb did not start");
+    let (mesh, _) = subject(folder);
+    let hands = Hands::open(&display, folder, &mesh);
+    hands.rests();
+
+    hands.key("f");
+    let fitted = hands.until("a skeleton is fitted", |report| report.joints > 40 && !report.busy);
+    assert_eq!((fitted.steps.len(), fitted.mode.as_str()), (1, "Move"));
+    hands.shot("fitted");
+    hands.key("Escape");
+    hands.until("the fit is taken back", |report| report.joints == 0 && report.head == 0);
+
+    hands.key("f");
+    let fitted =
+        hands.until("a skeleton is fitted again", |report| report.joints > 40 && report.head == 1 && !report.busy);
+    // A joint near the middle of the picture is moved: the joints around it follow as a step of their own.
+    let elbow = *fitted.places.values().max_by(|a, b| a[0].total_cmp(&b[0])).unwrap();
+    hands.click(elbow);
+    hands.until("a joint is selected", |report| report.selected == 1);
+    hands.drag(&[elbow, [elbow[0] + 6.0, elbow[1] + 6.0]]);
+    let corrected = hands.until("the fit is corrected", |report| report.steps.len() >= 3 && !report.busy);
+    assert_eq!(corrected.steps[0], "Fit");
+    assert_eq!(corrected.steps.last().map(String::as_str), Some("Fit around"), "{:?}", corrected.steps);
+    hands.shot("corrected");
+    hands.key("Return");
+    hands.key("b");
+    hands.until("it is skinned", |report| report.skinned == 1 && !report.busy);
+    hands.shot("fitted_and_skinned");
+}
+
 #[test]
 fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
     if let Some(reason) = missing() {
