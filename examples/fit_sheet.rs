@@ -3,7 +3,11 @@
 //!
 //! `cargo run --release --example fit_sheet -- SHEET.png MESH...`; without meshes, the bundled body.
 
-use std::{error::Error, path::PathBuf, sync::Arc};
+use std::{
+    error::Error,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bevy::math::{Quat, UVec2};
 use rigsmith::{
@@ -48,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The fitted skeleton in a mesh, and the mesh in a pose of it.
-fn pictures(mesh: &PathBuf) -> Result<[image::RgbImage; 2], Box<dyn Error>> {
+fn pictures(mesh: &Path) -> Result<[image::RgbImage; 2], Box<dyn Error>> {
     let mut bench = Workbench::new(1, "fit");
     bench.open(load_model(&RealDisk, mesh)?, true)?;
     bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));

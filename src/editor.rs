@@ -15,6 +15,7 @@ pub mod help;
 pub mod keys;
 pub mod labels;
 mod menu;
+pub mod mesh_watch;
 pub mod mode;
 pub mod notice;
 pub mod panel;

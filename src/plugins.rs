@@ -33,6 +33,7 @@ pub mod gesture;
 pub mod history;
 pub mod journal;
 pub mod landing;
+pub mod mesh_reload;
 pub mod picking;
 pub mod placement;
 pub mod runtime;
@@ -65,6 +66,7 @@ use bevy::{
 /// | [`skinning::SkinningPlugin`] | automatic weights in the background |
 /// | [`face::FacePlugin`] | faces: bones, weights and expressions |
 /// | [`fit::FitPlugin`] | templates moved into meshes |
+/// | [`mesh_reload::MeshReloadPlugin`] | meshes exchanged for other versions of them, with their weights |
 /// | [`runtime::RuntimePlugin`] | compiled rigs that run each frame |
 /// | [`journal::JournalPlugin`] | every change stored at once, for rigs that request it |
 pub struct RigPlugins;
@@ -83,6 +85,7 @@ impl PluginGroup for RigPlugins {
             .add(skinning::SkinningPlugin)
             .add(face::FacePlugin)
             .add(fit::FitPlugin)
+            .add(mesh_reload::MeshReloadPlugin)
             .add(runtime::RuntimePlugin)
             .add(journal::JournalPlugin)
     }

@@ -140,7 +140,7 @@ impl Plugin for EditorPlugin {
             ReportPlugin,
             FilesPlugin,
             super::building::BuildingPlugin,
-            super::fitting::FittingPlugin,
+            (super::fitting::FittingPlugin, super::mesh_watch::MeshWatchPlugin),
             super::follow::FollowPlugin,
             super::render_errors::RenderErrorsPlugin,
         ))

@@ -127,7 +127,7 @@ fn a_moved_joint_is_a_marker() {
     assert!(after.position(elbow).distance(to) < 1e-4, "{} is not {to}", after.position(elbow));
     for label in ["shin_l", "shin_r", "foot_r"] {
         let moved = at(&after, label).distance(at(&before, label));
-        assert!(moved < 0.01, "{label} moved by {moved}");
+        assert!(moved < 0.02, "{label} moved by {moved}");
     }
 }
 

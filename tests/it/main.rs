@@ -73,6 +73,9 @@ mod kmeans;
 mod layout;
 mod leg_strokes;
 mod linkage;
+mod mesh_reload;
+#[cfg(feature = "editor")]
+mod mesh_watch;
 mod mirror;
 mod models;
 mod modules_nodes;

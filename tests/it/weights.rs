@@ -569,7 +569,7 @@ fn parts_belong_to_the_bones_inside_of_them() {
     let pouch = add(&mut points, &mut triangles, Vec3::new(0.4, 1.2, -0.2), Vec3::new(0.6, 1.4, 0.2));
     let stiff = bind(&points, &triangles, &joints).1.stiff - report.stiff;
     assert_eq!(stiff, pouch.len());
-    let bending = vec![pouch.start as u32..pouch.start as u32 + 1];
+    let bending = std::iter::once(pouch.start as u32..pouch.start as u32 + 1).collect();
     let settings = WeightSettings { bending, ..WeightSettings::default() };
     let bent = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap().1;
     assert_eq!(bent.stiff, report.stiff);

@@ -10,20 +10,13 @@ pub(super) struct Similarity {
     pub(super) offset: Vec3,
 }
 
-impl Similarity {
-    /// Maps a position.
-    pub(super) fn apply(&self, p: Vec3) -> Vec3 {
-        self.rotation * (p * self.scale) + self.offset
-    }
-}
-
 /// Pairs of points with weights: (from, to, weight).
 pub(super) type Pairs = [(Vec3, Vec3, f32)];
 
 /// The best similarity from the first to the second points, and the root mean square of what remains.
 pub(super) fn similarity(pairs: &Pairs) -> Option<(Similarity, f32)> {
     let weight: f64 = pairs.iter().map(|p| f64::from(p.2)).sum();
-    if pairs.len() < 3 || !(weight > 0.0) {
+    if pairs.len() < 3 || weight.is_nan() || weight <= 0.0 {
         return None;
     }
     let mean = |pick: &dyn Fn(&(Vec3, Vec3, f32)) -> Vec3| {
@@ -38,7 +31,7 @@ pub(super) fn similarity(pairs: &Pairs) -> Option<(Similarity, f32)> {
         va += w * a.length_squared();
         vb += w * b.length_squared();
     }
-    if !(va > 0.0) || !(vb > 0.0) {
+    if va.is_nan() || va <= 0.0 || vb.is_nan() || vb <= 0.0 {
         return None;
     }
     let rotation = best_rotation(cross);

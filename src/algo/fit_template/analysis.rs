@@ -102,29 +102,6 @@ impl MeshAnalysis {
         tree.branches.leaves.iter().map(line).collect()
     }
 
-    /// Arcs of all trees as text, for looking into an assignment.
-    pub fn describe(&self) -> String {
-        let mut text = String::new();
-        for tree in &self.trees {
-            let place = |n: u32| self.mesh.space.to_file(self.graph.centres[n as usize]);
-            text += &format!("centre {:.2} reach {}\n", place(tree.branches.centre), tree.branches.reach);
-            let b = &tree.branches;
-            for &a in b.leaves.iter().chain(&b.bearers) {
-                let arc = &b.arcs[a];
-                text += &format!(
-                    "  arc {a} parent {:?} children {:?} tip {:.2} far {} near {} thick {}\n",
-                    arc.parent,
-                    arc.children,
-                    place(arc.tip),
-                    arc.far,
-                    arc.near,
-                    tree.lines[a].thickness()
-                );
-            }
-        }
-        text
-    }
-
     /// Assignments of a template's limbs to branches, best first.
     pub(super) fn hypotheses(
         &self,

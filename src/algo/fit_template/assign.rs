@@ -16,9 +16,9 @@ use super::{
 /// Most extremities of a mesh that are considered.
 const MOST_LEAVES: usize = 10;
 /// Most branches that bear others (ears, a staff) and are considered as one branch.
-const MOST_BEARERS: usize = 4;
+const MOST_BEARERS: usize = 5;
 /// Assignments of branches that are tried with all sides.
-const TRIED: usize = 12;
+const TRIED: usize = 100;
 /// The same for a template without sides.
 const TRIED_FREE: usize = 2_000;
 /// Hypotheses that are kept.
@@ -26,7 +26,7 @@ pub(super) const KEPT: usize = 6;
 /// Largest deviation (of a logarithm) of a way from the template's that counts.
 const MOST_SPREAD: f32 = 0.6;
 /// Penalty of a limb that has no branch.
-const MISSING: f32 = 0.12;
+const MISSING: f32 = 0.25;
 /// The same for a head, which hardly any figure lacks, and for a tail.
 const MISSING_HEAD: f32 = 0.4;
 const MISSING_TAIL: f32 = 0.08;
@@ -36,15 +36,15 @@ const MISSING_FREE: f32 = 0.5;
 const UNUSED: f32 = 0.12;
 
 /// Weight of what remains of the alignment for a template without sides, whose limbs differ by their place alone.
-pub(super) const RIGID: f32 = 6.0;
+const RIGID: f32 = 6.0;
 /// The same for a template with sides, whose limbs may be posed.
 pub(super) const POSED: f32 = 0.8;
 /// Penalty of a tail or an arm that is thicker than the head, for a factor of e.
 const THICKER: f32 = 0.12;
+/// How much thicker the trunk may be than the head.
+const STOUT: f32 = 1.8;
 /// How much thicker another branch may be than the head.
 const LOOSELY: f32 = 1.3;
-/// Penalty of a trunk away from the centre of the branches, for the mesh's longest side.
-const OFF_CENTRE: f32 = 0.3;
 /// Penalty of an up direction far from all axes of the file, and of one that is not usual.
 const ODD_UP: f32 = 0.12;
 const UNUSUAL_UP: f32 = 0.06;
@@ -66,6 +66,15 @@ pub(super) struct Hypothesis {
     pub(super) cost: f32,
     /// What remains of the alignment, root mean square as a share of the mesh's longest side.
     pub(super) rest: f32,
+    /// Weight with which the penalty holds it.
+    pub(super) weight: f32,
+}
+
+impl Hypothesis {
+    /// The penalty as it were for a template with sides: what remains of the alignment counts less.
+    pub(super) fn posed_cost(&self) -> f32 {
+        self.cost - (self.weight - POSED) * self.rest
+    }
 }
 
 /// Directions that a person has chosen, in unit space.
@@ -258,6 +267,9 @@ impl Search<'_> {
                 .map(|o| thickness(o) / if chosen.contains(&Some(o)) { 1.0 } else { LOOSELY });
             let thicker = bevy::math::ops::ln(others.fold(0.0, f32::max).max(1.0) / (LOOSELY * thickness(head)));
             cost += THICKER * thicker.max(0.0);
+            // Where the centre of the branches lies in a large head, no branch is the head.
+            let thicker = bevy::math::ops::ln(self.tree.trunk_thickness / (STOUT * thickness(head)));
+            cost += THICKER * thicker.max(0.0);
             for (limb, leaf) in limbs.iter().zip(chosen) {
                 if let Some(leaf) =
                     leaf.filter(|_| matches!(limb.kind, LimbKind::Tail | LimbKind::Arm | LimbKind::Wing))
@@ -367,12 +379,10 @@ impl Search<'_> {
         }
         let (alignment, rest) = align::similarity(&pairs)?;
         let free = template.limbs.iter().all(|l| l.kind == LimbKind::Free);
-        let mut cost = cost + if free { RIGID * rest } else { POSED * rest };
+        let weight = if free { RIGID } else { POSED };
+        let mut cost = cost + weight * rest;
         let drift = bevy::math::ops::ln(alignment.scale / scale).abs();
         cost += 0.15 * (drift - 0.1).max(0.0);
-        // The centre of the branches lies in the trunk.
-        let off = alignment.apply(middle).distance(centre);
-        cost += OFF_CENTRE * (off - 0.05).max(0.0);
         let up = alignment.rotation * Vec3::Y;
         let forward = alignment.rotation * Vec3::Z;
         match self.directions.up {
@@ -410,6 +420,6 @@ impl Search<'_> {
                 cost += 2.0 * (away - nearest);
             }
         }
-        Some(Hypothesis { tree: self.number, leaves, alignment, pairs, cost, rest })
+        Some(Hypothesis { tree: self.number, leaves, alignment, pairs, cost, rest, weight })
     }
 }

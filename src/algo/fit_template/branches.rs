@@ -12,7 +12,9 @@ use super::volume::{FAR, VoxelGraph};
 /// Length of a branch below which it is a bump, as a share of the largest distance from the centre.
 const BUMP: f32 = 0.075;
 /// Length of an arc that is no more than an ear on a head, as a share of the largest distance from the centre.
-const SHORT: f32 = 0.5;
+const SHORT: f32 = 0.62;
+/// Length of a child of an arc that is no more than a finger on an arm, as a share of the arc.
+const FINGER: f32 = 0.5;
 /// Nodes from which distances are averaged to find the centre.
 const SAMPLES: usize = 12;
 /// Distance between two centres from which on both are tried, as a share of the longest way.
@@ -188,10 +190,35 @@ pub(super) fn branches(graph: &VoxelGraph, centre: u32) -> Branches {
     fill_slices(graph, &distance, &arc_of, &order, &mut arcs);
     let mut leaves: Vec<usize> = (0..arcs.len()).filter(|&a| alias[a] == a && arcs[a].children.is_empty()).collect();
     leaves.sort_by_key(|&a| (std::cmp::Reverse(arcs[a].far - arcs[a].near), a));
-    let short = |a: usize| arcs[a].children.is_empty() && arcs[a].far - arcs[a].near <= (reach as f32 * SHORT) as u32;
+    // The furthest end that each arc bears.
+    let mut furthest: Vec<u32> = arcs.iter().map(|arc| arc.far).collect();
+    for a in 0..arcs.len() {
+        // Children come before the arcs that bear them.
+        if let Some(parent) = arcs[a].parent {
+            furthest[parent] = furthest[parent].max(furthest[a]);
+        }
+    }
+    let short = |a: usize| furthest[a] - arcs[a].far <= (reach as f32 * SHORT) as u32;
+    // Of fingers on a hand, which are short against the arm, the longest one stands for all.
+    let mut minor = vec![false; arcs.len()];
+    for hand in (0..arcs.len()).filter(|&a| alias[a] == a && !arcs[a].children.is_empty() && arcs[a].parent.is_some()) {
+        let own = arcs[hand].far.saturating_sub(arcs[hand].near) as f32;
+        if (furthest[hand] - arcs[hand].far) as f32 > FINGER * own {
+            continue;
+        }
+        let mut open = arcs[hand].children.clone();
+        let mut stands = false;
+        while let Some(arc) = open.pop() {
+            let longest = arcs[arc].children.is_empty() && furthest[arc] == furthest[hand] && !stands;
+            stands |= longest;
+            minor[arc] = !longest;
+            open.extend(arcs[arc].children.iter().copied());
+        }
+    }
+    let leaves: Vec<usize> = leaves.into_iter().filter(|&a| !minor[a]).collect();
     let bearers = (0..arcs.len())
-        .filter(|&a| alias[a] == a && !arcs[a].children.is_empty() && arcs[a].parent.is_some())
-        .filter(|&a| arcs[a].children.iter().all(|&c| short(c)))
+        .filter(|&a| !minor[a])
+        .filter(|&a| alias[a] == a && !arcs[a].children.is_empty() && arcs[a].parent.is_some() && short(a))
         .collect();
     Branches { arcs, leaves, bearers, arc_of, centre, reach }
 }

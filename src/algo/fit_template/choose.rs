@@ -40,10 +40,9 @@ const REST: f32 = 2.0;
 /// Penalty of a template without sides, whose chains fit much.
 const ANY_SHAPE: f32 = 0.2;
 
-/// A penalty that can be compared between templates: those without sides are searched with another weight.
+/// A penalty that can be compared between templates with and without sides.
 fn comparable(best: &Hypothesis, free: bool) -> f32 {
-    let (weight, more) = if free { (assign::RIGID, ANY_SHAPE) } else { (assign::POSED, 0.0) };
-    best.cost + (REST - weight) * best.rest + more
+    best.posed_cost() + (REST - assign::POSED) * best.rest + if free { ANY_SHAPE } else { 0.0 }
 }
 
 /// Ranks templates for a mesh, best first. Templates that cannot be fitted at all are left out.

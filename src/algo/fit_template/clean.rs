@@ -13,6 +13,9 @@ const SPECK_AREA: f64 = 2e-3;
 /// Share of the whole surface that all specks together may have; a soup of loose triangles is kept.
 const SPECKS_AREA: f64 = 0.06;
 
+/// Grain of positions in unit space, a power of two.
+const GRAIN: f32 = 1.0 / 262_144.0;
+
 /// The map between the space of the file and the unit space of the analysis: `unit = turn * (file - centre) * scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct UnitSpace {
@@ -55,7 +58,7 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
     let corners = |t: &[u32; 3]| t.map(|c| points[c as usize].as_dvec3());
     // Areas relative to the extent, so that squares of huge and tiny coordinates stay in range.
     let extent = points.iter().fold(0.0f64, |m, p| m.max(p.as_dvec3().abs().max_element()));
-    if !(extent > 0.0) {
+    if extent.is_nan() || extent <= 0.0 {
         return None;
     }
     let area = |t: &[u32; 3]| {
@@ -64,7 +67,7 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
     };
     let areas: Vec<f64> = triangles.iter().map(area).collect();
     let whole: f64 = areas.iter().sum();
-    if !(whole > 0.0) {
+    if whole.is_nan() || whole <= 0.0 {
         return None;
     }
     let (triangles, areas, specks) = without_specks(points.len(), triangles, areas, whole);
@@ -107,11 +110,13 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
         (low, high) = (low.min(q), high.max(q));
     }
     let side = (high - low).max_element();
-    if !(side > 0.0) {
+    if side.is_nan() || side <= 0.0 {
         return None;
     }
     space.scale = 1.0 / side;
-    let points = points.iter().map(|&p| space.to_unit(p)).collect();
+    // Rounded and sorted once more, a mesh and its turned copy are the same but for the last bits of few points.
+    let unit: Vec<Vec3> = points.iter().map(|&p| (space.to_unit(p) / GRAIN).round() * GRAIN).collect();
+    let (points, triangles) = sorted(&unit, &triangles);
     Some(CleanMesh { points, triangles, space, specks })
 }
 

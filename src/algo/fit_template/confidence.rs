@@ -3,7 +3,11 @@
 use glam::Vec3;
 
 use super::{
-    assign::Hypothesis, human::FittedBody, limbs::TemplateLimbs, place::Placement, report::FitReason,
+    assign::Hypothesis,
+    human::FittedBody,
+    limbs::{Limb, LimbKind, TemplateLimbs},
+    place::Placement,
+    report::FitReason,
     volume::VoxelGraph,
 };
 use crate::mesh::voxels::Voxels;
@@ -13,7 +17,7 @@ const HALF_TRUST: f32 = 0.026;
 /// Penalty of an assignment at which trust is one half.
 const HALF_COST: f32 = 0.6;
 /// How much the length of a limb may differ from the template's, as a logarithm, until trust is one half.
-const HALF_STRAIN: f32 = 0.55;
+const HALF_STRAIN: f32 = 0.6;
 
 fn trust(value: f32, half: f32) -> f32 {
     let q = value / half;
@@ -47,11 +51,11 @@ pub(super) fn joints(
                 None => {
                     let base = match placement.reasons[joint] {
                         FitReason::NoLimb => 0.2,
-                        FitReason::CentreLine => 0.95,
-                        _ => 0.85,
+                        FitReason::CentreLine => 0.82,
+                        _ => 0.52,
                     };
                     (
-                        base * trust(placement.strain[joint], HALF_STRAIN) * trust(best.cost, HALF_COST),
+                        base * trust(placement.strain[joint], HALF_STRAIN) * trust(best.posed_cost(), HALF_COST),
                         placement.reasons[joint],
                     )
                 }
@@ -75,11 +79,15 @@ pub(super) fn whole(
     body: Option<&FittedBody>,
     joints: &[(f32, FitReason)],
 ) -> f32 {
-    let found = best.leaves.iter().filter(|l| l.is_some()).count() as f32 / template.limbs.len().max(1) as f32;
+    // A missing tail says little.
+    let counts = |limb: &Limb| limb.kind != LimbKind::Tail;
+    let limbs: Vec<bool> =
+        template.limbs.iter().zip(&best.leaves).filter(|(l, _)| counts(l)).map(|(_, leaf)| leaf.is_some()).collect();
+    let found = limbs.iter().filter(|l| **l).count() as f32 / limbs.len().max(1) as f32;
     let mean = joints.iter().map(|j| j.0).sum::<f32>() / joints.len().max(1) as f32;
-    let match_trust = match body {
-        Some(body) => trust(body.residual, HALF_TRUST),
-        None => trust(best.cost, HALF_COST),
+    let agreement = match body {
+        Some(body) => mean * trust(body.residual, HALF_TRUST).sqrt(),
+        None => (0.5 + 0.5 * mean) * trust(best.posed_cost(), HALF_COST).sqrt(),
     };
-    (mean * match_trust.sqrt() * found * found).clamp(0.0, 1.0)
+    (agreement * found * found).clamp(0.0, 1.0)
 }

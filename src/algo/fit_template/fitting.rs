@@ -227,6 +227,10 @@ impl<'a> Fit<'a> {
         };
         if let Some(plane) = plane {
             symmetry::make_symmetric(&self.template, places, plane);
+        } else if self.settings.symmetry == FitSymmetry::Auto
+            && let Some(plane) = analysis.mirror
+        {
+            symmetry::centre(&self.template, places, plane);
         }
         found
     }

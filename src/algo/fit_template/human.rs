@@ -6,6 +6,7 @@ mod register;
 mod roles;
 mod shape;
 mod solve;
+mod surface_points;
 
 use glam::{Quat, Vec3};
 
@@ -57,7 +58,7 @@ impl FittedBody {
     /// Distance between the surfaces around a bone. Where the surface shows little of a joint, in the spine and the toes,
     /// the whole figure's distance counts, and more.
     fn doubt(&self, b: usize) -> f32 {
-        const HIDDEN: [(&str, f32); 4] = [("spine_02", 2.5), ("spine_03", 2.5), ("ball", 2.3), ("clavicle", 1.6)];
+        const HIDDEN: [(&str, f32); 4] = [("spine_02", 4.0), ("spine_03", 4.0), ("ball", 3.6), ("clavicle", 2.0)];
         let hidden = HIDDEN.iter().find(|h| model::bone_name(b).starts_with(h.0)).map_or(1.0, |h| h.1);
         self.near[b].max(hidden * self.residual)
     }
@@ -75,6 +76,8 @@ impl FittedBody {
 
 /// Starts that are tried.
 const STARTS: usize = 4;
+/// Residual of a start that no other one can beat: a body that faces backwards comes not so near.
+const CERTAIN: f32 = 0.017;
 /// Share of a hypothesis' penalty in the choice of a start, against the distance between the surfaces.
 const COST_SHARE: f32 = 0.04;
 /// Penalty above the least one up to which a hypothesis is tried.
@@ -255,6 +258,9 @@ pub(super) fn fit(
         closest_points(&model, &mut state, &goal, &few, &ROUGH, &[]);
         let rest = residual(&model, &state, &goal, &few, 0.08);
         tried.push((rest + COST_SHARE * (hypothesis.cost - least), state));
+        if rest < CERTAIN {
+            break;
+        }
     }
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some((best, mut state)) = tried.first().cloned() else { return Ok(None) };

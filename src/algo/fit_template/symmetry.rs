@@ -9,6 +9,8 @@ use crate::mesh::voxels::Voxels;
 const OVERLAP: f32 = 0.9;
 /// Distance of a joint from its partner's image up to which a pose counts as symmetric, as a share of the mesh's side.
 const SAME_POSE: f32 = 0.035;
+/// Cosine of the angle between two planes up to which they are one.
+const SAME_PLANE: f32 = 0.97;
 /// Every so many nodes are looked at.
 const STRIDE: usize = 5;
 
@@ -64,6 +66,20 @@ pub(super) fn make_symmetric(template: &TemplateLimbs, places: &mut [Vec3], (poi
         let central = template.mirror[joint].is_none() && template.positions[joint].x.abs() > 0.02 * template.size;
         if !central {
             *place = (before[joint] + image(before[partner])) * 0.5;
+        }
+    }
+}
+
+/// Moves the joints of the trunk to the plane of symmetry of a mesh whose limbs are posed, if the skeleton shares it.
+pub(super) fn centre(template: &TemplateLimbs, places: &mut [Vec3], (point, normal): (Vec3, Vec3)) {
+    let Some((_, left)) = plane(template, places) else { return };
+    if left.dot(normal).abs() < SAME_PLANE {
+        return;
+    }
+    for &joint in &template.trunk {
+        let away = (places[joint] - point).dot(normal);
+        if away.abs() < SAME_POSE {
+            places[joint] -= normal * away;
         }
     }
 }

@@ -73,7 +73,7 @@ impl Target {
     pub(super) fn sampled(&self, mesh: &CleanMesh, count: usize, wanted: impl Fn(Vec3) -> bool) -> Vec<Sample> {
         let takes = |i: usize| self.normals[i].0 != Vec3::ZERO && wanted(mesh.points[mesh.triangles[i][0] as usize]);
         let whole: f64 = (0..self.areas.len()).filter(|&i| takes(i)).map(|i| self.areas[i]).sum();
-        if !(whole > 0.0) {
+        if whole.is_nan() || whole <= 0.0 {
             return Vec::new();
         }
         let each = whole / count as f64;

@@ -287,9 +287,9 @@ fn add_links(graph: &mut VoxelGraph, extra: &[(u32, u32, u32)]) {
         all[b as usize].push((a, cost));
     }
     let (mut starts, mut links) = (vec![0u32], Vec::with_capacity(graph.links.len() + 2 * extra.len()));
-    for node in 0..graph.len() {
+    for (node, more) in all.iter().enumerate() {
         links.extend_from_slice(graph.neighbours(node as u32));
-        links.extend_from_slice(&all[node]);
+        links.extend_from_slice(more);
         starts.push(links.len() as u32);
     }
     (graph.starts, graph.links) = (starts, links);

@@ -2,7 +2,10 @@
 
 use glam::Vec3;
 
-use super::shape::{BONES, JOINTS, POINTS};
+use super::{
+    shape::{BONES, JOINTS},
+    surface_points::POINTS,
+};
 
 /// Number of bones.
 pub(in super::super) const BONE_COUNT: usize = BONES.len();

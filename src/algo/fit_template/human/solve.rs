@@ -255,7 +255,7 @@ impl System {
                 let dot: f64 = row_i.iter().zip(row_j).map(|(a, b)| a * b).sum();
                 let value = self.matrix[i * n + j] - dot;
                 if i == j {
-                    if !(value > 0.0) {
+                    if value.is_nan() || value <= 0.0 {
                         return None;
                     }
                     self.matrix[i * n + i] = value.sqrt();

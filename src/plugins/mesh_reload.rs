@@ -1,0 +1,216 @@
+//! Another version of a mesh in place of the one that a rig moves: joints stay, weights are transferred.
+//!
+//! A [`ReloadRequest`] transfers the weights in a task and ends as one step of the history, with the mesh exchanged in the same
+//! frame. Undoing the step brings both back, redoing it exchanges both again.
+
+use std::sync::Arc;
+
+use bevy::{
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
+
+use super::{
+    RigSystems, configure_sets,
+    document::{EditRequest, Edited},
+    surface::{RigMesh, SkinOf},
+};
+use crate::{
+    algo::transfer::{TransferError, TransferMesh, TransferReport, TransferSettings, transfer_weights},
+    mesh::{model::Model, surface::Surface},
+    rig::{
+        Rig, RigEdit, SkinData, Uid,
+        operations::Operation,
+        step::{Committed, Step},
+    },
+};
+
+/// Name of the step of a reloaded mesh.
+pub const RELOAD: &str = "Reload mesh";
+
+/// Plugin that exchanges meshes for other versions of them.
+pub struct MeshReloadPlugin;
+
+impl Plugin for MeshReloadPlugin {
+    fn build(&self, app: &mut App) {
+        configure_sets(app);
+        app.add_message::<ReloadRequest>()
+            .add_message::<Reloaded>()
+            .add_message::<Edited>()
+            .add_message::<EditRequest>()
+            .add_systems(
+                Update,
+                (
+                    (start, land).chain().after(RigSystems::Gesture).before(RigSystems::Edits),
+                    exchange.after(RigSystems::Edits).before(RigSystems::Build),
+                ),
+            );
+    }
+}
+
+/// Request to exchange a mesh for another version of it.
+#[derive(Message, Debug, Clone)]
+pub struct ReloadRequest {
+    /// The entity with the [`RigMesh`].
+    pub mesh: Entity,
+    /// The version that takes its place.
+    pub model: Arc<Model>,
+}
+
+/// Answer to a [`ReloadRequest`].
+#[derive(Message, Debug, Clone)]
+pub struct Reloaded {
+    /// The mesh.
+    pub mesh: Entity,
+    /// Report of the exchange, or the reason why the mesh stays as it was.
+    pub result: Result<ReloadReport, ReloadError>,
+}
+
+/// Report of an exchanged mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReloadReport {
+    /// Numbers of points before and now.
+    pub points: [usize; 2],
+    /// Largest distance that a point has moved: from its own place where both versions have as many points, else from the
+    /// surface of the version before.
+    pub moved: f32,
+    /// Sources of the transferred weights; `None` for a mesh without weights.
+    pub weights: Option<TransferReport>,
+}
+
+/// Reason why a mesh was not exchanged.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ReloadError {
+    /// The entity has no mesh, or its mesh no rig.
+    #[error("the mesh belongs to no rig; it may have been closed")]
+    NoRig,
+    /// The new version has no points.
+    #[error("the new version of the mesh has no points; the one before stays")]
+    Empty,
+    /// The weights cannot be transferred.
+    #[error(transparent)]
+    Weights(#[from] TransferError),
+}
+
+/// Running exchange of a mesh.
+#[derive(Component)]
+pub struct ReloadJob(Task<Result<Finished, ReloadError>>);
+
+struct Finished {
+    mesh: RigMesh,
+    skin: Option<Arc<SkinData>>,
+    report: ReloadReport,
+}
+
+/// Versions of a mesh around the steps that exchanged it, and the one that waits for its step.
+#[derive(Component, Default)]
+pub(super) struct MeshVersions {
+    steps: Vec<(Arc<Step>, RigMesh, RigMesh)>,
+    next: Option<RigMesh>,
+}
+
+fn start(
+    mut commands: Commands,
+    mut requests: MessageReader<ReloadRequest>,
+    meshes: Query<(&RigMesh, &SkinOf)>,
+    rigs: Query<&Rig>,
+    mut answers: MessageWriter<Reloaded>,
+) {
+    for ReloadRequest { mesh: entity, model } in requests.read() {
+        let found = meshes.get(*entity).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
+        let Some((mesh, rig)) = found else {
+            answers.write(Reloaded { mesh: *entity, result: Err(ReloadError::NoRig) });
+            continue;
+        };
+        let (mesh, model, skin) = (mesh.clone(), model.clone(), rig.skin(mesh.uid).cloned());
+        let task = AsyncComputeTaskPool::get().spawn(async move { reloaded(&mesh, &model, skin.as_deref()) });
+        commands.entity(*entity).insert(ReloadJob(task));
+    }
+}
+
+fn reloaded(before: &RigMesh, model: &Model, skin: Option<&SkinData>) -> Result<Finished, ReloadError> {
+    if model.points.is_empty() {
+        return Err(ReloadError::Empty);
+    }
+    // Nodes of the file are found by their names; those that are not there any more move nothing.
+    let named = |name: &str| before.file.nodes.iter().position(|node| node.name == name);
+    let joint = |name: &str| named(name).and_then(|node| before.nodes.get(node).copied());
+    let nodes = model.nodes.iter().map(|node| joint(&node.name).unwrap_or(Uid(0))).collect();
+    let mesh = RigMesh::new(before.uid, model.clone(), nodes);
+    let (old, new) = (&before.rest.points, &mesh.rest.points);
+    let moved = if old.len() == new.len() {
+        old.iter().zip(new).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+    } else {
+        let surface = Surface::build(old, &before.triangles);
+        new.iter().filter_map(|point| Some(surface.closest_point(*point)?.distance)).fold(0.0, f32::max)
+    };
+    let mut report = ReloadReport { points: [old.len(), new.len()], moved, weights: None };
+    let skin = match skin {
+        None => None,
+        Some(skin) => {
+            let source = TransferMesh { points: old, triangles: &before.triangles };
+            let target = TransferMesh { points: new, triangles: &mesh.triangles };
+            let (weights, sources) = transfer_weights(source, &skin.weights, target, &TransferSettings::default())?;
+            report.weights = Some(sources);
+            Some(Arc::new(SkinData { weights, at_rest: true, ..skin.clone() }))
+        }
+    };
+    Ok(Finished { mesh, skin, report })
+}
+
+fn land(
+    mut commands: Commands,
+    mut jobs: Query<(Entity, &mut ReloadJob, &SkinOf, Option<&mut MeshVersions>)>,
+    mut answers: MessageWriter<Reloaded>,
+) {
+    for (entity, mut job, of, versions) in &mut jobs {
+        let Some(result) = check_ready(&mut job.0) else { continue };
+        commands.entity(entity).try_remove::<ReloadJob>();
+        let result = result.map(|Finished { mesh, skin, report }| {
+            match skin {
+                Some(skin) => {
+                    let edits = vec![RigEdit::SetSkin(mesh.uid, Some(skin))];
+                    commands.write_message(EditRequest::operation(of.0, Operation::Named { name: RELOAD, edits }));
+                    match versions {
+                        Some(mut versions) => versions.next = Some(mesh),
+                        None => {
+                            commands.entity(entity).try_insert(MeshVersions { next: Some(mesh), ..default() });
+                        }
+                    }
+                }
+                // Without weights there is nothing to undo but the file.
+                None => {
+                    commands.entity(entity).try_insert(mesh);
+                }
+            }
+            report
+        });
+        answers.write(Reloaded { mesh: entity, result });
+    }
+}
+
+/// Exchanges meshes together with their weights, in whatever direction the history goes.
+fn exchange(
+    mut edited: MessageReader<Edited>,
+    mut meshes: Query<(Entity, &RigMesh, &SkinOf, &mut MeshVersions)>,
+    mut commands: Commands,
+) {
+    for Edited { rig, name, committed, .. } in edited.read() {
+        let Some(committed) = committed else { continue };
+        for (entity, mesh, _, mut versions) in meshes.iter_mut().filter(|(_, _, of, _)| of.0 == *rig) {
+            let step = committed.step();
+            let is_own = |edit: &RigEdit| matches!(edit, RigEdit::SetSkin(uid, _) if *uid == mesh.uid);
+            if *name == RELOAD && matches!(committed, Committed::Done(_)) && step.forward.iter().any(is_own) {
+                let Some(next) = versions.next.take() else { continue };
+                versions.steps.push((step.clone(), mesh.clone(), next.clone()));
+                commands.entity(entity).try_insert(next);
+                continue;
+            }
+            let Some((_, before, after)) = versions.steps.iter().find(|(known, ..)| Arc::ptr_eq(known, step)) else {
+                continue;
+            };
+            let version = if matches!(committed, Committed::Undone(_)) { before } else { after };
+            commands.entity(entity).try_insert(version.clone());
+        }
+    }
+}
