@@ -3,9 +3,9 @@
 //! [`MeshAnalysis`] holds all that depends on the mesh alone: voxels of its volume, branches of the volume with their
 //! centre lines, and the surface. [`fit_template`] assigns the template's limbs to branches by a penalty search (the
 //! idea of Baran and Popović 2007, "Automatic rigging and animation of 3D characters") and places joints on centre
-//! lines. For a human figure a body model learned from scans' statistics is then registered to the surface, and its
-//! joints are taken. [`FitSettings::markers`] are places that a person gave; [`refit_template`] starts from an earlier
-//! fit and is fast enough for a drag.
+//! lines. For a human figure a body model with statistics learned from bodies is then registered to the surface
+//! (closest points on an articulated model), and its joints are taken. [`FitSettings::markers`] are places that a
+//! person gave; [`refit_template`] starts from an earlier fit and is fast enough for a drag.
 //!
 //! The mesh may be open, inside out, in many shells, in any unit, and turned in any way. The result depends on neither
 //! the order of points and faces nor the number of threads.
@@ -79,12 +79,12 @@ pub struct FitSettings {
 /// Moves the joints of a template into a mesh.
 ///
 /// `progress` is called with a share of the work done, 0 to 1, and cancels with `false`. The result has one entry for
-/// each joint in the template's order, in the mesh's space and unit. Time: some milliseconds, and about 0.4 s more for a
-/// human figure.
+/// each joint in the template's order, in the mesh's space and unit. Time: some milliseconds, and about 0.4 s more for
+/// a human figure.
 ///
 /// # Errors
-/// [`FitError`]: a template without chains, a marker or direction that cannot be used, a mesh that shows fewer than half
-/// of the template's limbs, or cancelled.
+/// [`FitError`]: a template without chains, a marker or direction that cannot be used, a mesh that shows fewer than
+/// half of the template's limbs, or cancelled.
 pub fn fit_template(
     analysis: &MeshAnalysis,
     joints: &[TemplateJoint],

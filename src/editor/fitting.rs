@@ -109,8 +109,12 @@ fn show_result(
         };
         let doubtful: Vec<_> = report.doubtful().collect();
         let choice = if report.choice.is_empty() { String::new() } else { format!(" ({})", report.choice) };
-        let text = format!("{} fitted{choice} in {} ms.", report.template, report.time.as_millis());
-        commands.write_message(Notice::done(text));
+        let text = format!("{} fitted{choice} in {} ms", report.template, report.time.as_millis());
+        commands.write_message(if report.fit.confidence < FitReport::DOUBTFUL {
+            Notice::warning(format!("{text}, but the mesh may be something else: look at the ringed joints."))
+        } else {
+            Notice::done(format!("{text}."))
+        });
         if let Ok(SkinOf(rig)) = meshes.get(*mesh)
             && selections.contains(*rig)
             && !doubtful.is_empty()

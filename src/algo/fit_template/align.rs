@@ -1,4 +1,4 @@
-//! Alignment: the similarity that brings one set of points nearest to another (Horn 1987), and a stretch along its axes.
+//! Alignment: the similarity that brings one set of points nearest to another (Horn 1987), and a stretch along axes.
 
 use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
 
@@ -131,5 +131,21 @@ impl Stretch {
     /// Maps a difference of positions.
     pub(super) fn turn(&self, v: Vec3) -> Vec3 {
         self.rotation * (v * self.scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn similarity_finds_turn_scale_and_offset() {
+        let turn = Quat::from_xyzw(0.2, -0.4, 0.1, 0.7).normalize();
+        let points = [Vec3::X, Vec3::Y * 2.0, Vec3::Z * 3.0, Vec3::new(1.0, -1.0, 0.5), Vec3::NEG_X];
+        let pairs: Vec<_> = points.iter().map(|&p| (p, turn * (p * 1.7) + Vec3::new(3.0, 2.0, 1.0), 1.0)).collect();
+        let (found, rest) = similarity(&pairs).unwrap();
+        assert!(found.rotation.angle_between(turn) < 1e-3, "{found:?}");
+        assert!((found.scale - 1.7).abs() < 1e-4 && rest < 1e-3, "{found:?} {rest}");
+        assert!(similarity(&pairs[..2]).is_none());
     }
 }

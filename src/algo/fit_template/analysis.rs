@@ -37,8 +37,8 @@ pub struct MeshAnalysis {
 impl MeshAnalysis {
     /// Analyses a mesh, or only the triangles with the numbers `region`.
     ///
-    /// `progress` is called with a share of the work done, 0 to 1, and cancels with `false`. Triangles with corners that
-    /// do not exist or are not finite are left out. Time: about 0.15 s for a body.
+    /// `progress` is called with a share of the work done, 0 to 1, and cancels with `false`. Triangles with corners
+    /// that do not exist or are not finite are left out. Time: about 0.15 s for a body.
     ///
     /// # Errors
     /// [`FitError::NoSurface`], [`FitError::Flat`], [`FitError::Cancelled`].

@@ -266,8 +266,8 @@ fn fill_slices(graph: &VoxelGraph, distance: &[u32], arc_of: &[u32], order: &[u3
     }
 }
 
-/// Nodes that may be the centre of the body: the one with the least mean distance to all of the volume and, where that is
-/// elsewhere (a large head), the middle of the longest way through the volume.
+/// Nodes that may be the centre of the body: the one with the least mean distance to all of the volume and, where that
+/// is elsewhere (a large head), the middle of the longest way through the volume.
 pub(super) fn centres(graph: &VoxelGraph) -> Vec<u32> {
     let body: Vec<u32> = (0..graph.len() as u32).filter(|&n| graph.body[n as usize]).collect();
     if body.is_empty() {

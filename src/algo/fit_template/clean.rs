@@ -1,8 +1,8 @@
 //! Cleaning: the triangles of a file in an order and a frame that depend on its shape alone.
 //!
-//! Points are welded by position and sorted, triangles are sorted, and everything is turned to the principal axes of the
-//! surface. So the order of points and faces changes no byte of a fit, and turns and scales of the file change it by no
-//! more than rounding.
+//! Points are welded by position and sorted, triangles are sorted, and everything is turned to the principal axes of
+//! the surface. So the order of points and faces changes no byte of a fit, and turns and scales of the file change it
+//! by no more than rounding.
 
 use glam::{DMat3, DVec3, Vec3};
 

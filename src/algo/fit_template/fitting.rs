@@ -73,43 +73,12 @@ impl<'a> Fit<'a> {
         let mut places = placement.places.clone();
         let human = human::is_human(&self.template) && !self.settings.without_body_model;
         let roles = human.then(|| human::roles(self.joints, &self.template));
-        let mut body = None;
-        if let Some(roles) = &roles {
-            body = match before.map(|b| b.body.as_ref()) {
-                Some(Some(body)) => Some(self.refitted_body(body, roles)),
-                // The figure was unlike all bodies before.
-                Some(None) => None,
-                None => {
-                    let anchor = |(role, &position): (&Option<Role>, &Vec3)| match role {
-                        Some(Role::Bone(b)) => {
-                            Some(human::Anchor { place: human::Place::Joint(*b), position, weight: 1.0 })
-                        }
-                        _ => None,
-                    };
-                    let plain: Vec<human::Anchor> = roles.iter().zip(&places).filter_map(anchor).collect();
-                    let found = human::fit(
-                        &analysis.surface,
-                        &analysis.target,
-                        &self.template,
-                        &analysis.trees,
-                        &hypotheses,
-                        &plain,
-                        &step,
-                    )?;
-                    match found {
-                        Some(body) if !self.markers.is_empty() => Some(self.refitted_body(&body, roles)),
-                        found => found,
-                    }
-                }
-            };
-            // A figure that is unlike all bodies is left to its centre lines.
-            let unlike = body.as_ref().is_some_and(|b| b.residual > UNLIKE);
-            if unlike {
-                body = None;
-            }
-            if let Some(body) = &body {
-                places = self.by_roles(body, roles, best);
-            }
+        let body = match &roles {
+            Some(roles) => self.registered_body(roles, &hypotheses, &places, before, &step)?,
+            None => None,
+        };
+        if let (Some(body), Some(roles)) = (&body, &roles) {
+            places = self.by_roles(body, roles, best);
         }
         step(0.95)?;
         let plane = self.make_symmetric(&mut places);
@@ -147,6 +116,31 @@ impl<'a> Fit<'a> {
             body,
             assignments: hypotheses,
         })
+    }
+
+    /// The body model on the mesh; `None` for a figure that is unlike all bodies and is left to its centre lines.
+    /// `plain` are the joints on centre lines.
+    fn registered_body(
+        &self,
+        roles: &[Option<Role>],
+        hypotheses: &[Hypothesis],
+        plain: &[Vec3],
+        before: Option<&FittedSkeleton>,
+        step: &dyn Fn(f32) -> Result<(), FitError>,
+    ) -> Result<Option<human::FittedBody>, FitError> {
+        let analysis = self.analysis;
+        if let Some(before) = before {
+            return Ok(before.body.as_ref().map(|body| self.refitted_body(body, roles)));
+        }
+        let anchor = |(role, &position): (&Option<Role>, &Vec3)| match role {
+            Some(Role::Bone(b)) => Some(human::Anchor { place: human::Place::Joint(*b), position, weight: 1.0 }),
+            _ => None,
+        };
+        let anchors: Vec<human::Anchor> = roles.iter().zip(plain).filter_map(anchor).collect();
+        let (surface, target) = (&analysis.surface, &analysis.target);
+        let body = human::fit(surface, target, &self.template, &analysis.trees, hypotheses, &anchors, step)?;
+        let body = body.filter(|body| body.residual <= UNLIKE);
+        Ok(body.map(|body| self.refitted_body(&body, roles)))
     }
 
     /// True if each marker on a limb lies nearest to the branch that the limb has.

@@ -55,8 +55,8 @@ impl FittedBody {
         Self { state, joints, trunk, residual, near, start: starts.0, backwards: starts.1 }
     }
 
-    /// Distance between the surfaces around a bone. Where the surface shows little of a joint, in the spine and the toes,
-    /// the whole figure's distance counts, and more.
+    /// Distance between the surfaces around a bone. Where the surface shows little of a joint, in the spine and the
+    /// toes, the whole figure's distance counts, and more.
     fn doubt(&self, b: usize) -> f32 {
         const HIDDEN: [(&str, f32); 4] = [("spine_02", 4.0), ("spine_03", 4.0), ("ball", 3.6), ("clavicle", 2.0)];
         let hidden = HIDDEN.iter().find(|h| model::bone_name(b).starts_with(h.0)).map_or(1.0, |h| h.1);
@@ -82,6 +82,7 @@ const CERTAIN: f32 = 0.017;
 const COST_SHARE: f32 = 0.04;
 /// Penalty above the least one up to which a hypothesis is tried.
 const WORTH_TRYING: f32 = 0.12;
+/// Stages from far to near: rough with the mean body, loose for unusual proportions, then with all freedom.
 const ROUGH: Stage = Stage {
     steps: 12,
     from: 0.08,
@@ -129,7 +130,7 @@ const REFIT: Stage = Stage {
     from: 0.02,
     to: 0.012,
     components: 1e-6,
-    lengths: 4e-4,
+    lengths: 2e-4,
     girths: 2e-4,
     turns: 4e-6,
     fingers: true,
@@ -255,7 +256,7 @@ pub(super) fn fit(
     for hypothesis in hypotheses.iter().filter(worth).take(STARTS) {
         step(0.1 * tried.len() as f32)?;
         let Some(mut state) = start(&model, template, &trees[hypothesis.tree], hypothesis) else { continue };
-        closest_points(&model, &mut state, &goal, &few, &ROUGH, &[]);
+        closest_points(&model, &mut state, &goal, &few, &ROUGH, &[], None);
         let rest = residual(&model, &state, &goal, &few, 0.08);
         tried.push((rest + COST_SHARE * (hypothesis.cost - least), state));
         if rest < CERTAIN {
@@ -272,15 +273,15 @@ pub(super) fn fit(
         let mut other = state.clone();
         pose_by_anchors(&model, &mut other, plain, 1e-3, 14);
         let rest = |state: &State| residual(&model, state, &goal, samples, 0.08);
-        closest_points(&model, &mut state, &goal, samples, &LOOSE, &[]);
-        closest_points(&model, &mut other, &goal, samples, &LOOSE, &[]);
+        closest_points(&model, &mut state, &goal, samples, &LOOSE, &[], None);
+        closest_points(&model, &mut other, &goal, samples, &LOOSE, &[], None);
         if rest(&other) < rest(&state) {
             state = other;
         }
     }
     for (i, stage) in [MIDDLE, FINE].iter().enumerate() {
         step(0.4 + 0.3 * i as f32)?;
-        closest_points(&model, &mut state, &goal, samples, stage, &[]);
+        closest_points(&model, &mut state, &goal, samples, stage, &[], None);
     }
     Ok(Some(FittedBody::new(&model, state, &goal, samples, (best, elsewhere))))
 }
@@ -293,6 +294,6 @@ pub(super) fn refit(surface: &Surface, target: &Target, body: &FittedBody, place
     let kept: Vec<Anchor> =
         places.iter().map(|&(bone, position)| Anchor { place: Place::Joint(bone), position, weight: 0.3 }).collect();
     let mut state = body.state.clone();
-    closest_points(&model, &mut state, &goal, &few, &REFIT, &kept);
+    closest_points(&model, &mut state, &goal, &few, &REFIT, &kept, Some(&body.state));
     FittedBody::new(&model, state, &goal, &few, (body.start, body.backwards))
 }

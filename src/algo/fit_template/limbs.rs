@@ -331,3 +331,45 @@ fn ordered(
     let below = lengths_below(&order, parents, positions);
     (order, below)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn joint(label: &str, parent: Option<usize>, position: [f32; 3]) -> TemplateJoint<'_> {
+        TemplateJoint { label, parent, position: Vec3::from_array(position) }
+    }
+
+    #[test]
+    fn a_figure_has_a_head_two_arms_and_two_legs() {
+        let mut joints = vec![
+            joint("hips", None, [0.0, 1.0, 0.0]),
+            joint("chest", Some(0), [0.0, 1.4, 0.0]),
+            joint("head", Some(1), [0.0, 1.6, 0.0]),
+        ];
+        for (side, upper, hand, thigh, foot) in
+            [(1.0, "arm_l", "hand_l", "leg_l", "foot_l"), (-1.0, "arm_r", "hand_r", "leg_r", "foot_r")]
+        {
+            let at = joints.len();
+            joints.push(joint(upper, Some(1), [0.2 * side, 1.4, 0.0]));
+            joints.push(joint(hand, Some(at), [0.7 * side, 1.0, 0.0]));
+            joints.push(joint(thigh, Some(0), [0.1 * side, 0.9, 0.0]));
+            joints.push(joint(foot, Some(at + 2), [0.1 * side, 0.0, 0.0]));
+        }
+        let found = limbs(&joints).unwrap();
+        assert_eq!(found.trunk, [0, 1]);
+        assert_eq!(
+            [LimbKind::Head, LimbKind::Arm, LimbKind::Leg, LimbKind::Tail].map(|k| found.count(k)),
+            [1, 2, 2, 0]
+        );
+        assert!(found.limbs.iter().all(|l| l.kind == LimbKind::Head || l.partner.is_some()));
+    }
+
+    #[test]
+    fn circles_of_parents_and_lone_joints_are_no_limbs() {
+        let circle = [joint("a", Some(1), [0.0; 3]), joint("b", Some(0), [0.0, 1.0, 0.0])];
+        assert!(limbs(&circle).is_none_or(|t| t.limbs.is_empty()));
+        assert!(limbs(&[]).is_none());
+        assert!(limbs(&circle[..1]).is_none_or(|t| t.limbs.is_empty()));
+    }
+}

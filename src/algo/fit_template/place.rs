@@ -24,8 +24,11 @@ const BENT: f32 = 0.04;
 /// Cosine of the angle between the trunk and up above which the trunk stands upright.
 const UPRIGHT: f32 = 0.6;
 
-/// Shoulder, elbow and wrist of a spread wing with feathers, as shares of the way from the shoulder to the feathers' end.
+/// Shoulder, elbow and wrist of a spread wing with feathers, as shares of the way from shoulder to feathers' end.
 const WING: [f32; 3] = [0.0, 0.17, 0.38];
+
+/// Where a wing begins on the way from the middle of the trunk to where the wing leaves it.
+const WING_ROOT: f32 = 0.4;
 
 /// The joints of a template in the mesh.
 #[derive(Debug, Clone)]
@@ -45,12 +48,14 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
     let mut strain = vec![0.0; count];
     let line = |leaf: &Option<usize>| leaf.map(|l| tree.lines[l].among(&tree.branches, &hypothesis.leaves));
     let lines: Vec<Option<CentreLine>> = hypothesis.leaves.iter().map(line).collect();
-    let work = Work { template, tree, graph, hypothesis, stretch, lines };
+    let standing = hypothesis.alignment.scale;
+    let mut work = Work { template, tree, graph, hypothesis, stretch, lines, standing };
     let mut places: Vec<Option<Vec3>> = vec![None; count];
     let trunk = work.trunk_places();
     for (&joint, &place) in template.trunk.iter().zip(&trunk) {
         places[joint] = Some(place);
     }
+    work.standing = work.standing_scale(&places);
     for (limb, line) in template.limbs.iter().zip(&work.lines) {
         let Some(line) = line else {
             for &joint in &limb.joints {
@@ -100,9 +105,24 @@ struct Work<'a> {
     stretch: Stretch,
     /// The centre line of each limb.
     lines: Vec<Option<CentreLine>>,
+    /// Scale of the figure's height: how high the trunk stands over the ends of legs.
+    standing: f32,
 }
 
 impl Work<'_> {
+    /// Height of the trunk over the ends of its legs against the template's.
+    fn standing_scale(&self, places: &[Option<Vec3>]) -> f32 {
+        let (mut mesh, mut rest) = (0.0, 0.0);
+        for (limb, line) in self.template.limbs.iter().zip(&self.lines) {
+            let (Some(line), Some(attach)) = (line, places[limb.attach]) else { continue };
+            if limb.kind == LimbKind::Leg {
+                mesh += line.at(0.0).distance(attach);
+                rest += self.template.tip(limb).distance(self.template.positions[limb.attach]);
+            }
+        }
+        if rest > 0.0 { mesh / rest } else { self.hypothesis.alignment.scale }
+    }
+
     /// Finds how a limb's joints lie along its line.
     fn reach(&self, limb: &Limb, line: &CentreLine, attach: Vec3) -> Reach {
         let template = self.template;
@@ -110,11 +130,10 @@ impl Work<'_> {
         let scale = self.hypothesis.alignment.scale;
         // A long body has no longer shoulders: the limb's place at its joint of the trunk keeps the template's shape.
         let beside = template.positions[first] - template.positions[limb.attach];
-        let mut root = attach + self.hypothesis.alignment.rotation * (beside * scale);
-        if limb.partner.is_some() && !self.upright() {
-            // Legs go straight up into the trunk, wings to its side.
+        let mut root = attach + self.hypothesis.alignment.rotation * (beside * self.standing);
+        if limb.kind == LimbKind::Wing {
             let left = self.hypothesis.alignment.rotation * Vec3::X;
-            let out = (line.at(line.free) - attach).dot(left) * if limb.kind == LimbKind::Wing { 0.4 } else { 1.0 };
+            let out = (line.at(line.free) - attach).dot(left) * WING_ROOT;
             root += left * (out - (root - attach).dot(left));
         }
         let rest: Vec<f32> = limb.joints.iter().map(|&j| template.length(j, end) + limb.beyond).collect();
@@ -224,7 +243,8 @@ impl Work<'_> {
         at + back * (behind * radius).min(0.4 * line.free)
     }
 
-    /// Lengths of the joints of neck and head and of the chest from the crown: the head turns where the neck is narrowest.
+    /// Lengths of the joints of neck and head and of the chest from the crown: the head turns where the neck is
+    /// narrowest.
     fn neck_lengths(&self, limb: &Limb, line: &CentreLine, chest: Vec3) -> (Vec<f32>, f32) {
         let from = line.lengths.partition_point(|&l| l < 0.3 * line.free).min(line.free_count - 1);
         let narrow =

@@ -183,7 +183,7 @@ pub enum FitError {
     Direction(&'static str),
     /// The mesh shows too few limbs.
     #[error(
-        "the mesh shows {found} limbs where the template has {wanted}: choose another template, or fit a part of the mesh"
+        "the mesh shows {found} limbs where the template has {wanted}: choose another template or a part of the mesh"
     )]
     TooFewLimbs {
         /// Ends of branches in the mesh.

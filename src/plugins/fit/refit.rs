@@ -26,6 +26,11 @@ pub(super) fn follow_moves(
     mut commands: Commands,
 ) {
     for Edited { rig: entity, name, committed, .. } in edited.read() {
+        // A fit that is undone can no longer be corrected.
+        if *name == FIT && matches!(committed, Some(Committed::Undone(_))) {
+            commands.entity(*entity).try_remove::<FittedRig>();
+            continue;
+        }
         let (Ok((rig, mut fitted)), Some(Committed::Done(_))) = (rigs.get_mut(*entity), committed) else { continue };
         if *name == FIT || *name == FIT_AROUND {
             continue;

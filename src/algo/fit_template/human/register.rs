@@ -106,7 +106,8 @@ pub(super) struct Stage {
     pub(super) fingers: bool,
 }
 
-/// Brings the model onto the goal; `kept` are wishes that stay, such as markers.
+/// Brings the model onto the goal; `kept` are wishes that stay, such as markers. The state is held to the mean body at
+/// rest, or to `near`.
 pub(super) fn closest_points(
     model: &HumanModel,
     state: &mut State,
@@ -114,8 +115,12 @@ pub(super) fn closest_points(
     samples: &[Sample],
     stage: &Stage,
     kept: &[Anchor],
+    near: Option<&State>,
 ) {
-    let holds = holds(stage.components, stage.lengths, stage.girths, stage.turns, stage.fingers, model);
+    let mut holds = holds(stage.components, stage.lengths, stage.girths, stage.turns, stage.fingers, model);
+    if let Some(near) = near {
+        (holds.rest_shape, holds.rest_turns) = (near.shape, near.turns);
+    }
     for i in 0..stage.steps {
         let share = i as f32 / (stage.steps.max(2) - 1) as f32;
         let reach = stage.from * bevy::math::ops::powf(stage.to / stage.from, share);

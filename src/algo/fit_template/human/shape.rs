@@ -62,7 +62,7 @@ pub(super) const BONES: [(&str, usize); 52] = [
 
 /// Head of each bone: mean and four components.
 #[rustfmt::skip]
-pub(super) const JOINTS: [[i16; 15]; 52] = [
+pub(super) static JOINTS: [[i16; 15]; 52] = [
     [0,0,0,0,0,0,0,0,0,0,0,0,0,0,0],
     [0,450,-221,0,-340,18,0,153,379,0,-46,-47,0,16,55],
     [0,883,-119,0,93,-100,0,203,148,0,19,-147,0,25,39],
