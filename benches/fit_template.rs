@@ -280,7 +280,7 @@ fn measured(figure: &Figure, joints: &[TemplateJoint]) -> Result<(), Box<dyn Err
             worst = (off, joints[at].label);
         }
     }
-    let mean = |list: &[f32]| list.iter().sum::<f32>() / list.len().max(1) as f32;
+    let mean = |list: &[f32]| list.iter().fold(0.0, |sum, off| sum + off) / list.len().max(1) as f32;
     let doubtful = fit.joints.iter().filter(|joint| joint.confidence < 0.5).count();
     let (body, fingers) = (mean(&body), mean(&fingers));
     let name = &figure.name;

@@ -181,6 +181,13 @@ fn describe(report: &mut Report, fitted: &FitReport) {
         }
     }
     report.notes(fit.notes.iter().map(ToString::to_string));
+    if fit.confidence < FitReport::DOUBTFUL {
+        let text = format!(
+            "the fit is a guess (confidence {:.2}): the mesh may be no {}; look at it, name another --template, or give --marker",
+            fit.confidence, fitted.template
+        );
+        report.notes.push(text);
+    }
     report.set("template", fitted.template.as_str());
     report.set("choice", fitted.choice.as_str());
     report.set("up", json!(fit.up.to_array()));
