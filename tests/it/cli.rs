@@ -165,6 +165,55 @@ fn an_object_can_be_rigid() {
     assert!(wrong.err.contains("box"), "names the objects there are: {}", wrong.err);
 }
 
+/// A template is fitted into the bundled body: what was found is told joint by joint, the file builds, and what a person knows
+/// holds.
+#[test]
+fn a_template_is_fitted() {
+    let folder = folder();
+    let run = |args: &[&str]| rigsmith(folder.path(), args);
+    let body = asset("models/biped.obj");
+    let fitted = run(&["--json", "fit", &body, "-o", "body.rig.ron", "--marker", "hand_l=0.60,1.05,0.05"]);
+    assert_eq!(fitted.code, 0, "{}", fitted.err);
+    let json = fitted.json();
+    assert_eq!((json["template"].as_str(), json["symmetric"].is_boolean()), (Some("biped"), true));
+    for key in ["up", "forward", "height", "confidence", "hypotheses", "notes", "millis"] {
+        assert!(!json[key].is_null(), "{key} is missing");
+    }
+    let joints = json["joints"].as_array().unwrap();
+    let hand = joints.iter().find(|joint| joint["label"] == "hand_l").unwrap();
+    let place: Vec<f64> = hand["position"].as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect();
+    assert!((place[0] - 0.60).abs() < 1e-4 && (place[1] - 1.05).abs() < 1e-4, "{place:?}");
+    assert!(joints.iter().all(|joint| joint["confidence"].is_number() && joint["reason"].is_string()));
+    let built = run(&["--json", "build", "body.rig.ron"]);
+    assert_eq!(built.code, 0, "{}", built.err);
+
+    let wrong = run(&["fit", &body, "-o", "x.rig.ron", "--marker", "hand_q=0,1,0"]);
+    assert!(wrong.code == 1 && wrong.err.contains("hand_"), "names the nearest joints: {}", wrong.err);
+    for args in [["--up", "w"], ["--marker", "hand_l"], ["--marker", "hand_l=1,2"]] {
+        assert_eq!(run(&["fit", &body, "-o", "x.rig.ron", args[0], args[1]]).code, 2, "{args:?}");
+    }
+    assert_eq!(run(&["fit", &body, "-o", "x.obj"]).code, 2);
+    fs::write(folder.path().join("plane.obj"), "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n").unwrap();
+    let flat = run(&["fit", "plane.obj", "-o", "x.rig.ron"]);
+    assert!(flat.code == 1 && flat.err.contains("flat"), "{}", flat.err);
+    assert!(!folder.path().join("x.rig.ron").exists());
+}
+
+#[test]
+fn what_bends_and_how_is_said_by_options() {
+    let folder = with_box();
+    let run = |args: &[&str]| rigsmith(folder.path(), args);
+    assert_eq!(run(&["sketch", "box.obj", "spine.ron", "-o", "a.rig.ron"]).code, 0);
+    assert_eq!(run(&["skin", "a.rig.ron", "box.obj", "-o", "a.glb", "--bend", "box"]).code, 0);
+    let wrong = run(&["skin", "a.rig.ron", "box.obj", "-o", "a.glb", "--bend", "hat"]);
+    assert!(wrong.code == 1 && wrong.err.contains("box"), "names the objects there are: {}", wrong.err);
+    #[cfg(feature = "render")]
+    {
+        let file = run(&["pose", "a.rig.ron", "--deform", "dqs", "-o", "a.glb"]);
+        assert!(file.code == 2 && file.err.contains(".png"), "{}", file.err);
+    }
+}
+
 #[test]
 fn bad_input_is_said_and_exits_with_1() {
     let folder = with_box();

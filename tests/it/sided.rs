@@ -371,3 +371,24 @@ fn both_sides_move_alike() {
         Stage::new().tagged(&tags).check(what);
     }
 }
+
+/// Lengths in parameters follow the size of a body; what is no length, and what is left out, stays as it is written.
+#[test]
+fn lengths_follow_the_body_that_a_template_is_fitted_to() {
+    let modules = modules::all();
+    let change = rigsmith::processor::Resize { factor: 0.5, floor_factor: 0.25, turn: Quat::from_rotation_x(1.0) };
+    let cases = [
+        ("control", "( size: 0.5, /* wide */ relative_size: 0.4 )", "( size: 0.25, /* wide */ relative_size: 0.4 )"),
+        ("control", "(shape_translate: (0.0, 1.0, 0.0))", "(shape_translate: (0.0,0.5,0.0))"),
+        ("null", "(translate: (0.0, 0.0, 2.0))", "(translate: (0.0,0.0,1.0))"),
+        ("null", "(world: true, translate: (0.0, 0.0, 2.0))", "(world: true, translate: (0.0,0.0,0.5))"),
+        ("twist", "(count: 3)", "(count: 3)"),
+        ("control", "()", "()"),
+    ];
+    for (name, params, expected) in cases {
+        let resized = modules.get(name).unwrap().resized(params, &change).unwrap();
+        assert_eq!(resized, expected, "{name}");
+    }
+    let turned = modules.get("null").unwrap().resized("(orient: false, translate: (0.0, 1.0, 0.0))", &change).unwrap();
+    assert!(turned.contains("0.27") && turned.contains("0.42"), "along the rig's axes, with them: {turned}");
+}
