@@ -43,6 +43,9 @@ pub const FIT: &str = "Fit";
 /// Name of the step that fits the joints around a moved one again.
 pub const FIT_AROUND: &str = "Fit around";
 
+/// Distance from the plane of symmetry, as a share of the body's height, up to which a joint is on it.
+const CENTRE: f32 = 0.003;
+
 /// Plugin that fits templates to meshes.
 pub struct FitPlugin;
 
@@ -411,7 +414,8 @@ impl Work {
             markers: markers.clone(),
             ..FitSettings::default()
         };
-        let fit = fit_template(&analysis, &joints[chosen], &settings, &|part| progress(0.5 + 0.5 * part))?;
+        let mut fit = fit_template(&analysis, &joints[chosen], &settings, &|part| progress(0.5 + 0.5 * part))?;
+        centre(&mut fit, labels, &markers);
         let floor = points.iter().filter(|p| p.is_finite()).map(|p| p.dot(fit.up)).fold(f32::INFINITY, f32::min);
         let report = FitReport {
             template: name,
@@ -442,6 +446,22 @@ impl FittedRig {
         let left = up.cross(*forward).normalize_or(Vec3::X);
         let turn = Quat::from_mat3(&Mat3::from_cols(left, *up, left.cross(*up))).normalize();
         fitted_rig(&self.template, &Fitting { places, turn, floor: self.floor }, modules)
+    }
+}
+
+/// Puts joints of neither side that lie beside the rig's plane of symmetry by rounding of the mesh onto it, where mesh and pose
+/// are symmetric about that plane: commands ask on which side of it a joint is.
+fn centre(fit: &mut FittedSkeleton, labels: &[String], markers: &[(usize, Vec3)]) {
+    let tolerance = CENTRE * fit.height;
+    let is_sagittal = |(point, normal): (Vec3, Vec3)| normal.x.abs() > 0.999 && point.dot(normal).abs() < tolerance;
+    if !fit.symmetry.is_some_and(is_sagittal) {
+        return;
+    }
+    for (number, (joint, label)) in fit.joints.iter_mut().zip(labels).enumerate() {
+        let is_marked = markers.iter().any(|(marked, _)| *marked == number);
+        if crate::rig::label::label_side(label) == 0 && joint.position.x.abs() < tolerance && !is_marked {
+            joint.position.x = 0.0;
+        }
     }
 }
 

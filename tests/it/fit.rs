@@ -77,6 +77,9 @@ fn the_biped_fits_the_body_it_was_made_for() {
         sum += off;
     }
     assert!(sum / (JOINTS.len() as f32) < 0.015, "the mean is {}", sum / JOINTS.len() as f32);
+    for label in ["hips", "chest", "head"] {
+        assert!(at(&rig, label).x.abs() < 1e-6, "{label} is on neither side");
+    }
     assert_eq!(rig.len(), template.len());
     for (is, was) in rig.walk().zip(template.walk()) {
         assert_eq!((is.data.uid, &is.data.label, is.parent), (was.data.uid, &was.data.label, was.parent));

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use super::{EndFit, FIT, FIT_AROUND, FitReport, FittedRig, skeleton, template_joints};
+use super::{EndFit, FIT, FIT_AROUND, FitReport, FittedRig, centre, skeleton, template_joints};
 use crate::{
     algo::fit_template::refit_template,
     plugins::{
@@ -65,7 +65,8 @@ fn refitted(rig: &Rig, fitted: &mut FittedRig, modules: &RigModules) -> Option<O
     let joints = template_joints(&labels, &parents, &places);
     let index = |uid: &Uid| uids.iter().position(|known| known == uid);
     fitted.settings.markers = fitted.markers.iter().filter_map(|(uid, place)| Some((index(uid)?, *place))).collect();
-    let fit = refit_template(&fitted.analysis, &joints, &fitted.settings, &fitted.report.fit).ok()?;
+    let mut fit = refit_template(&fitted.analysis, &joints, &fitted.settings, &fitted.report.fit).ok()?;
+    centre(&mut fit, &labels, &fitted.settings.markers);
     fitted.report = Arc::new(FitReport { fit, ..(*fitted.report).clone() });
     let target = fitted.target(&modules.0).ok()?;
     let edits = edits_between(rig, &target).ok()?;
