@@ -8,6 +8,7 @@ use bevy_egui::egui;
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
+    help::{HelpShown, toggle_help},
     mode::Mode,
     notice::Notice,
     panel::{PanelApp, Requests, ViewportPainter},
@@ -37,7 +38,10 @@ impl Plugin for FittingPlugin {
             .add_message::<Fitted>()
             .add_message::<PickRequest>()
             .add_painter(FitBar)
-            .add_systems(Update, (act.before(RigSystems::Script), show_result.after(RigSystems::Bind)));
+            .add_systems(
+                Update,
+                (act.before(RigSystems::Script).before(toggle_help), show_result.after(RigSystems::Bind)),
+            );
     }
 }
 
@@ -48,12 +52,16 @@ fn act(
     rigs: Query<(Option<&RigMeshes>, Has<FittedRig>, &RigHistory)>,
     meshes: Query<&RigMesh>,
     jobs: Query<(Entity, &FitJob)>,
+    (mode, help): (Option<Res<Mode>>, Option<Res<HelpShown>>),
     mut commands: Commands,
 ) {
     let Some((rig, (own, is_fitted, history))) = active.and_then(|active| Some((active.0, rigs.get(active.0).ok()?)))
     else {
         return;
     };
+    // A stroke that is drawn, a ghost that is placed and the list of keys take the key for themselves.
+    let is_free = !help.is_some_and(|help| help.0)
+        && mode.is_none_or(|mode| matches!(*mode, Mode::Select | Mode::Move | Mode::Rotate | Mode::Scale));
     for ActionRequest(action) in actions.read() {
         match action {
             Action::Fit => {
@@ -76,7 +84,7 @@ fn act(
             // A drag under way takes the key for itself.
             Action::Cancel if !history.is_previewing() => {
                 jobs.iter().for_each(|(_, job)| job.cancel());
-                if is_fitted {
+                if is_fitted && is_free {
                     commands.write_message(EndFit { rig, cancel: true });
                 }
             }
@@ -155,7 +163,7 @@ impl ViewportPainter for FitBar {
                             }
                             ui.ctx().request_repaint_after_secs(0.1);
                         }
-                        (None, Some(fitted)) => corrections(ui, fitted, requests),
+                        (None, Some(fitted)) => corrections(ui, active.0, fitted, requests),
                         (None, None) => {}
                     });
                 });
@@ -163,7 +171,7 @@ impl ViewportPainter for FitBar {
     }
 }
 
-fn corrections(ui: &mut egui::Ui, fitted: &FittedRig, requests: &mut Requests) {
+fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, requests: &mut Requests) {
     let doubtful = fitted.report.doubtful().count();
     let doubt = match doubtful {
         0 => "no doubt".to_owned(),
@@ -182,10 +190,9 @@ fn corrections(ui: &mut egui::Ui, fitted: &FittedRig, requests: &mut Requests) {
     ui.separator();
     ui.weak("Move a joint: the others of its limb follow");
     ui.separator();
-    if ui.button("Accept").on_hover_text("Enter").clicked() {
-        requests.send(ActionRequest(Action::Accept));
-    }
-    if ui.button("Cancel").on_hover_text("Esc").clicked() {
-        requests.send(ActionRequest(Action::Cancel));
+    for (text, key, cancel) in [("Accept", "Enter", false), ("Cancel", "Esc", true)] {
+        if ui.button(text).on_hover_text(key).clicked() {
+            requests.send(EndFit { rig, cancel });
+        }
     }
 }

@@ -15,7 +15,7 @@ pub struct HelpPlugin;
 
 impl Plugin for HelpPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<HelpShown>().add_overlay(Help).add_systems(Update, toggle);
+        app.init_resource::<HelpShown>().add_overlay(Help).add_systems(Update, toggle_help);
     }
 }
 
@@ -34,7 +34,7 @@ const POINTER: &[(&str, &str)] = &[
     ("Trackpad: two fingers / Shift / Ctrl", "orbit / pan / zoom"),
 ];
 
-fn toggle(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<HelpShown>) {
+pub(super) fn toggle_help(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<HelpShown>) {
     for ActionRequest(action) in actions.read() {
         match action {
             Action::Help => shown.0 = !shown.0,

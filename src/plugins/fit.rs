@@ -26,6 +26,7 @@ use super::{
     configure_sets,
     document::EditRequest,
     history::RigHistory,
+    landing::{HeldResult, ResultHeld},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
@@ -34,7 +35,8 @@ use crate::{
     },
     processor::{Fitting, Modules, fitted_rig},
     rig::{
-        EditError, NodeKind, Rig, Uid, nearest::did_you_mean, operations::Operation, step::Step, update::edits_between,
+        EditError, NodeKind, Rig, RigEdit, Uid, nearest::did_you_mean, operations::Operation, step::Step,
+        update::edits_between,
     },
 };
 
@@ -56,6 +58,7 @@ impl Plugin for FitPlugin {
             .add_message::<FitRequest>()
             .add_message::<Fitted>()
             .add_message::<EndFit>()
+            .add_message::<ResultHeld>()
             .add_message::<super::document::Edited>()
             .add_message::<EditRequest>()
             .add_systems(
@@ -204,6 +207,25 @@ pub struct FitJob {
     task: Task<Result<Finished, FitFailure>>,
     /// The rig that the fit started from.
     from: Arc<Rig>,
+    /// Last step and number of undone steps when the fit was asked for.
+    history: HistoryState,
+    /// Finished fit that waits to be committed.
+    held: Option<Finished>,
+}
+
+/// Last step of a history and its number of undone steps: a new step discards those.
+type HistoryState = (Option<Arc<Step>>, usize);
+
+fn state_of(history: &RigHistory) -> HistoryState {
+    (history.last().cloned(), history.undone())
+}
+
+fn is_same_state(a: &HistoryState, b: &HistoryState) -> bool {
+    let is_same = match (&a.0, &b.0) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    is_same && a.1 == b.1
 }
 
 impl FitJob {
@@ -235,6 +257,10 @@ pub struct FittedRig {
     settings: FitSettings,
     /// Skeleton of the template at rest, before it was fitted.
     template: Arc<Rig>,
+    /// Report of the fit before corrections, from which every correction starts.
+    first: Arc<FitReport>,
+    /// Positions of the joints after the last edit, in the order of the report.
+    places: Vec<Option<Vec3>>,
     floor: f32,
     /// Last step before the fit.
     before: Option<Arc<Step>>,
@@ -267,13 +293,13 @@ fn start(
     mut commands: Commands,
     mut requests: MessageReader<FitRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
-    rigs: Query<&Rig>,
+    rigs: Query<(&Rig, &RigHistory)>,
     (modules, templates): (Res<RigModules>, Res<FitTemplates>),
     mut fitted: MessageWriter<Fitted>,
 ) {
     for request in requests.read() {
         let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
-        let Some((mesh, rig)) = found else {
+        let Some((mesh, (rig, history))) = found else {
             fitted.write(Fitted { mesh: request.mesh, result: Err(FitFailure::NoRig) });
             continue;
         };
@@ -294,7 +320,14 @@ fn start(
                 !stop.load(Ordering::Relaxed)
             })
         });
-        commands.entity(request.mesh).insert(FitJob { progress, cancelled, task, from });
+        commands.entity(request.mesh).insert(FitJob {
+            progress,
+            cancelled,
+            task,
+            from,
+            history: state_of(history),
+            held: None,
+        });
     }
 }
 
@@ -302,15 +335,29 @@ fn land(
     mut commands: Commands,
     mut jobs: Query<(Entity, &mut FitJob, &SkinOf)>,
     rigs: Query<(&Rig, &RigHistory)>,
+    modules: Res<RigModules>,
     mut answers: MessageWriter<Fitted>,
 ) {
     for (entity, mut job, of) in &mut jobs {
-        let Some(result) = check_ready(&mut job.task) else { continue };
+        let was_held = job.held.is_some();
+        let finished = if was_held { job.held.take().map(Ok) } else { check_ready(&mut job.task) };
+        let Some(result) = finished else { continue };
         let result = match (result, rigs.get(of.0)) {
             (Err(error), _) => Err(error),
             (Ok(_), Err(_)) => Err(FitFailure::NoRig),
+            // Steps that were undone while the fit ran are not lost to it; those from before are, as to any other edit.
+            (Ok(finished), Ok((_, history)))
+                if history.is_previewing()
+                    || history.can_redo() && !is_same_state(&job.history, &state_of(history)) =>
+            {
+                job.held = Some(finished);
+                if !was_held && history.can_redo() {
+                    commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Fit });
+                }
+                continue;
+            }
             (Ok(_), Ok((rig, _))) if !is_same_skeleton(rig, &job.from) => Err(FitFailure::Changed),
-            (Ok(Finished { mut fitted, target }), Ok((rig, history))) => match edits_between(rig, &target) {
+            (Ok(Finished { mut fitted, target }), Ok((rig, history))) => match fitted.edits(rig, &target, &modules.0) {
                 Ok(changes) => {
                     let report = fitted.report.clone();
                     fitted.before = history.last().cloned();
@@ -358,6 +405,9 @@ impl Work {
     fn candidates(&self) -> Result<Vec<Arc<Rig>>, FitFailure> {
         if self.from.walk().any(|joint| joint.data.kind == NodeKind::Joint) {
             return Ok(vec![self.from.clone()]);
+        }
+        if !self.from.is_empty() {
+            return Err(FitFailure::NoTemplate);
         }
         match &self.request.template {
             FitTemplate::Given(template) => Ok(vec![template.clone()]),
@@ -424,8 +474,11 @@ impl Work {
             fit,
             time: begin.elapsed(),
         };
+        let report = Arc::new(report);
         let fitted = FittedRig {
-            report: Arc::new(report),
+            first: report.clone(),
+            places: report.fit.joints.iter().map(|joint| Some(joint.position)).collect(),
+            report,
             markers: markers.iter().map(|(joint, place)| (uids[*joint], *place)).collect(),
             analysis: Arc::new(analysis),
             settings,
@@ -441,11 +494,26 @@ impl Work {
 impl FittedRig {
     /// The template in the body.
     fn target(&self, modules: &Modules) -> Result<Rig, EditError> {
+        self.placed(&self.template, modules)
+    }
+
+    /// The edits that put the template into a rig without joints, or the rig's own joints to their places. Whatever else
+    /// the rig has, or has got while the fit ran, stays.
+    fn edits(&self, rig: &Rig, target: &Rig, modules: &Modules) -> Result<Vec<RigEdit>, EditError> {
+        if !rig.is_empty() {
+            return edits_between(rig, &self.placed(rig, modules)?);
+        }
+        let mut edits = edits_between(rig, target)?;
+        edits.retain(|edit| !matches!(edit, RigEdit::RemoveLocalGroup(_) | RigEdit::RemoveStoredPose(_)));
+        Ok(edits)
+    }
+
+    fn placed(&self, rig: &Rig, modules: &Modules) -> Result<Rig, EditError> {
         let FittedSkeleton { up, forward, joints, .. } = &self.report.fit;
         let places = self.report.joints.iter().zip(joints).map(|((uid, _), joint)| (*uid, joint.position)).collect();
         let left = up.cross(*forward).normalize_or(Vec3::X);
         let turn = Quat::from_mat3(&Mat3::from_cols(left, *up, left.cross(*up))).normalize();
-        fitted_rig(&self.template, &Fitting { places, turn, floor: self.floor }, modules)
+        fitted_rig(rig, &Fitting { places, turn, floor: self.floor }, modules)
     }
 }
 

@@ -183,6 +183,11 @@ impl RigHistory {
         (done.iter().chain(undone.iter().rev()).map(|step| step.name.as_ref()).collect(), done.len())
     }
 
+    /// Number of undone steps.
+    pub fn undone(&self) -> usize {
+        self.stacks.undone.len()
+    }
+
     /// Number of steps in effect after a step, all of them for `None`; 0 if the step itself is not in effect.
     pub fn steps_since(&self, step: Option<&Arc<Step>>) -> usize {
         let Some(step) = step else { return self.stacks.done.len() };

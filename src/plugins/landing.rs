@@ -34,6 +34,18 @@ pub enum HeldResult {
          the face follows if it still fits"
     )]
     Face,
+    /// A fitted template.
+    #[error(
+        "the skeleton is fitted, but placing it now would lose the steps that were undone; redo them, or go on editing, \
+         and it follows if it still fits"
+    )]
+    Fit,
+    /// Another version of a mesh.
+    #[error(
+        "the mesh has changed on the disk, but taking it now would lose the steps that were undone; redo them, or go on \
+         editing, and it follows"
+    )]
+    Mesh,
 }
 
 /// Hash of everything in a document that a job on one mesh depends on: the joints with their rest poses and, if any

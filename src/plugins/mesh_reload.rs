@@ -13,6 +13,8 @@ use bevy::{
 use super::{
     RigSystems, configure_sets,
     document::{EditRequest, Edited},
+    history::RigHistory,
+    landing::{HeldResult, ResultHeld},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
@@ -36,6 +38,7 @@ impl Plugin for MeshReloadPlugin {
         configure_sets(app);
         app.add_message::<ReloadRequest>()
             .add_message::<Reloaded>()
+            .add_message::<ResultHeld>()
             .add_message::<Edited>()
             .add_message::<EditRequest>()
             .add_systems(
@@ -94,8 +97,16 @@ pub enum ReloadError {
 
 /// Running exchange of a mesh.
 #[derive(Component)]
-pub struct ReloadJob(Task<Result<Finished, ReloadError>>);
+pub struct ReloadJob {
+    task: Task<Result<Finished, ReloadError>>,
+    /// The version, and the weights that are transferred to it.
+    model: Arc<Model>,
+    from: Option<Arc<SkinData>>,
+    /// Finished exchange that waits to be committed.
+    held: Option<Finished>,
+}
 
+#[derive(Clone)]
 struct Finished {
     mesh: RigMesh,
     skin: Option<Arc<SkinData>>,
@@ -122,9 +133,10 @@ fn start(
             answers.write(Reloaded { mesh: *entity, result: Err(ReloadError::NoRig) });
             continue;
         };
-        let (mesh, model, skin) = (mesh.clone(), model.clone(), rig.skin(mesh.uid).cloned());
-        let task = AsyncComputeTaskPool::get().spawn(async move { reloaded(&mesh, &model, skin.as_deref()) });
-        commands.entity(*entity).insert(ReloadJob(task));
+        let from = rig.skin(mesh.uid).cloned();
+        let (mesh, next, skin) = (mesh.clone(), model.clone(), from.clone());
+        let task = AsyncComputeTaskPool::get().spawn(async move { reloaded(&mesh, &next, skin.as_deref()) });
+        commands.entity(*entity).insert(ReloadJob { task, model: model.clone(), from, held: None });
     }
 }
 
@@ -160,11 +172,33 @@ fn reloaded(before: &RigMesh, model: &Model, skin: Option<&SkinData>) -> Result<
 
 fn land(
     mut commands: Commands,
-    mut jobs: Query<(Entity, &mut ReloadJob, &SkinOf, Option<&mut MeshVersions>)>,
+    mut jobs: Query<(Entity, &mut ReloadJob, &RigMesh, &SkinOf, Option<&mut MeshVersions>)>,
+    rigs: Query<(&Rig, &RigHistory)>,
     mut answers: MessageWriter<Reloaded>,
 ) {
-    for (entity, mut job, of, versions) in &mut jobs {
-        let Some(result) = check_ready(&mut job.0) else { continue };
+    for (entity, mut job, mesh, of, versions) in &mut jobs {
+        let was_held = job.held.is_some();
+        let finished = if was_held { job.held.take().map(Ok) } else { check_ready(&mut job.task) };
+        let Some(mut result) = finished else { continue };
+        if let Ok((rig, history)) = rigs.get(of.0) {
+            // The step of the exchange would discard steps that can be redone.
+            if let (Ok(finished), true) = (&mut result, history.is_previewing() || history.can_redo()) {
+                job.held = Some(finished.clone());
+                if !was_held && history.can_redo() {
+                    commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Mesh });
+                }
+                continue;
+            }
+            // Weights that were computed or painted meanwhile are transferred instead.
+            let is_same = match (rig.skin(mesh.uid), &job.from) {
+                (Some(now), Some(then)) => Arc::ptr_eq(now, then),
+                (now, then) => now.is_none() && then.is_none(),
+            };
+            if !is_same {
+                commands.write_message(ReloadRequest { mesh: entity, model: job.model.clone() });
+                continue;
+            }
+        }
         commands.entity(entity).try_remove::<ReloadJob>();
         let result = result.map(|Finished { mesh, skin, report }| {
             match skin {

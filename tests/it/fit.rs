@@ -134,6 +134,42 @@ fn a_moved_joint_is_a_marker() {
     }
 }
 
+/// Whatever a person adds after a fit stays: other edits accept the fit, and joints that are moved then move alone. Of
+/// corrections that were undone nothing comes back.
+#[test]
+fn corrections_take_nothing_back() {
+    let mut bench = bench(bundled_body());
+    fit(&mut bench).unwrap();
+    let fitted = bench.rig().clone();
+    let (elbow, knee) = (fitted.find_label("forearm_l").unwrap(), fitted.find_label("shin_r").unwrap());
+    let moved = |rig: &Rig, joint| rig.position(joint) + Vec3::new(0.02, 0.03, 0.0);
+    let shift = |joint, to| Operation::Move { to: vec![(joint, to)], with_children: false };
+    let settle = |bench: &mut Workbench| bench.operate(Operation::Edits(Vec::new())).unwrap();
+    bench.operate(shift(elbow, moved(&fitted, elbow))).unwrap();
+    settle(&mut bench);
+    assert!(bench.gestures(vec![Gesture::Undo, Gesture::Undo]).iter().all(|answer| answer.done));
+    assert!(bench.rig().position(elbow).distance(fitted.position(elbow)) < 1e-5, "both steps are undone");
+    let to = moved(&fitted, knee);
+    bench.operate(shift(knee, to)).unwrap();
+    settle(&mut bench);
+    assert!(bench.rig().position(knee).distance(to) < 1e-4);
+    let back = bench.rig().position(elbow).distance(moved(&fitted, elbow));
+    assert!(back > 0.02, "the undone marker is {back} away");
+
+    // A joint and a tag of one's own, and then a move: nothing follows any more, and both stay.
+    let own =
+        rigsmith::rig::JointData { uid: rigsmith::rig::Uid(0x77), label: Some("tip".into()), ..Default::default() };
+    let add = rigsmith::rig::RigEdit::AddJoint { joint: Box::new(own), parent: Some(elbow), index: usize::MAX };
+    bench.operate(Operation::Edits(vec![add])).unwrap();
+    settle(&mut bench);
+    let before = bench.rig().clone();
+    bench.operate(shift(elbow, moved(&before, elbow))).unwrap();
+    settle(&mut bench);
+    assert!(bench.rig().find_label("tip").is_some());
+    let hand = before.find_label("hand_l").unwrap();
+    assert!(bench.rig().position(hand).distance(before.position(hand)) < 1e-5, "the fit was accepted");
+}
+
 /// Gestures fit as the window does, by name or by choice; a template that does not exist is told with the nearest name.
 #[test]
 fn gestures_fit() {

@@ -112,6 +112,27 @@ fn weights_follow_the_next_version_and_the_history() {
     }
 }
 
+/// The exchange waits while steps can be redone, and takes the weights that are there when it comes.
+#[test]
+fn a_late_version_never_cuts_off_undone_steps() {
+    let mut bench = Bench::new();
+    let points = bench.points();
+    bench.change(Change::Do(Operation::Place { position: Vec3::Y * 3.0, parent: None }));
+    let joints = bench.rig().len();
+    bench.change(Change::Undo);
+    let mut more = tower(1.0);
+    more.points.push(Vec3::Y);
+    bench.app.world_mut().write_message(ReloadRequest { mesh: bench.mesh, model: Arc::new(more) });
+    bench.until::<rigsmith::plugins::landing::ResultHeld>();
+    (0..5).for_each(|_| bench.app.update());
+    assert_eq!(bench.points(), points, "it waits");
+    bench.change(Change::Redo);
+    assert_eq!(bench.rig().len(), joints, "the step was not lost");
+    bench.until::<Reloaded>();
+    (0..2).for_each(|_| bench.app.update());
+    assert_eq!((bench.points(), bench.skin()), (points + 1, Some(points + 1)));
+}
+
 #[test]
 fn a_version_that_is_none_changes_nothing() {
     let mut bench = Bench::new();
