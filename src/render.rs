@@ -57,7 +57,7 @@ pub struct PictureSettings {
     pub background: Color,
     /// True to build the rig and let it run before the picture is taken: controls are shown then.
     pub build: bool,
-    /// How the joints of a point are blended.
+    /// Blend of the joints of a point.
     pub deform: Deform,
     /// Least and greatest corner of the box that fills the picture, in the rig's space; the whole character if `None`.
     pub bounds: Option<[Vec3; 2]>,
@@ -80,7 +80,7 @@ impl Default for PictureSettings {
     }
 }
 
-/// How the motions of the joints that move a point are blended.
+/// Blend of the motions of the joints that move a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Deform {
     /// Linear blend skinning: what the window, exports and most engines do.

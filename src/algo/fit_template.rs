@@ -17,6 +17,7 @@ mod branches;
 mod choose;
 mod clean;
 mod confidence;
+mod eigen;
 mod fitting;
 mod human;
 mod limbs;
@@ -61,12 +62,12 @@ pub enum FitSymmetry {
     Off,
 }
 
-/// What a person asks of a fit; directions and positions are in the mesh's space.
+/// Wishes of a person for a fit; directions and positions are in the mesh's space.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FitSettings {
     /// Up; found if not given.
     pub up: Option<Vec3>,
-    /// Where the figure faces; found if not given.
+    /// Direction in which the figure faces; found if not given.
     pub forward: Option<Vec3>,
     /// Symmetry of the result.
     pub symmetry: FitSymmetry,

@@ -80,10 +80,10 @@ pub(super) struct RenderArgs {
     weights: Option<String>,
 }
 
-/// How skin is bent in a picture; shared with `rigsmith pose`.
+/// Skinning of a picture; shared with `rigsmith pose`.
 #[derive(Args, Debug, Clone, Copy)]
 pub(super) struct DeformArgs {
-    /// How the motions of joints are blended in a picture
+    /// Blend of the motions of joints in a picture
     #[arg(long, value_enum, default_value_t = DeformArg::Linear)]
     deform: DeformArg,
 }

@@ -2,6 +2,8 @@
 
 use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
 
+use super::eigen::eigen;
+
 /// A rotation, a scale and an offset: `rotation * (scale * p) + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Similarity {
@@ -54,43 +56,10 @@ pub(super) fn best_rotation(cross: DMat3) -> DQuat {
         [m(2, 0) - m(0, 2), m(0, 1) + m(1, 0), m(1, 1) - m(0, 0) - m(2, 2), m(1, 2) + m(2, 1)],
         [m(0, 1) - m(1, 0), m(2, 0) + m(0, 2), m(1, 2) + m(2, 1), m(2, 2) - m(0, 0) - m(1, 1)],
     ];
-    let (values, vectors) = eigen4(n);
+    let (values, vectors) = eigen(n);
     let best = (0..4).fold(0, |best, i| if values[i] > values[best] { i } else { best });
     let [w, x, y, z] = [0, 1, 2, 3].map(|k| vectors[k][best]);
     DQuat::from_xyzw(x, y, z, w).normalize()
-}
-
-/// Eigenvalues and eigenvectors (in columns) of a symmetric matrix, by cyclic Jacobi rotations.
-fn eigen4(mut m: [[f64; 4]; 4]) -> ([f64; 4], [[f64; 4]; 4]) {
-    let mut v = [[0.0f64; 4]; 4];
-    (0..4).for_each(|i| v[i][i] = 1.0);
-    for _ in 0..30 {
-        for p in 0..3 {
-            for q in p + 1..4 {
-                if m[p][q].abs() < 1e-300 {
-                    continue;
-                }
-                let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-                let t = if theta == 0.0 { 1.0 } else { t };
-                let c = 1.0 / (t * t + 1.0).sqrt();
-                let s = t * c;
-                for row in &mut m {
-                    let (a, b) = (row[p], row[q]);
-                    (row[p], row[q]) = (c * a - s * b, s * a + c * b);
-                }
-                let (a, b) = (m[p], m[q]);
-                for k in 0..4 {
-                    (m[p][k], m[q][k]) = (c * a[k] - s * b[k], s * a[k] + c * b[k]);
-                }
-                for row in &mut v {
-                    let (a, b) = (row[p], row[q]);
-                    (row[p], row[q]) = (c * a - s * b, s * a + c * b);
-                }
-            }
-        }
-    }
-    ([m[0][0], m[1][1], m[2][2], m[3][3]], v)
 }
 
 /// A similarity with a stretch along the three axes of the points that are mapped.

@@ -21,7 +21,7 @@ const COARSE: usize = 64;
 /// Extent of a mesh along its thinnest axis below which it is flat, as a share of the longest.
 const FLAT: f32 = 0.004;
 
-/// What depends on the mesh alone; several fits may use it.
+/// Analysis of a mesh, independent of any template; several fits may use it.
 #[derive(Debug, Clone)]
 pub struct MeshAnalysis {
     pub(super) mesh: clean::CleanMesh,

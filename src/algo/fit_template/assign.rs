@@ -41,9 +41,9 @@ const RIGID: f32 = 6.0;
 pub(super) const POSED: f32 = 0.8;
 /// Penalty of a tail or an arm that is thicker than the head, for a factor of e.
 const THICKER: f32 = 0.12;
-/// How much thicker the trunk may be than the head.
+/// Thickness that the trunk may have, as a factor of the head's.
 const STOUT: f32 = 1.8;
-/// How much thicker another branch may be than the head.
+/// Thickness that another branch may have, as a factor of the head's.
 const LOOSELY: f32 = 1.3;
 /// Penalty of an up direction far from all axes of the file, and of one that is not usual.
 const ODD_UP: f32 = 0.12;
@@ -64,7 +64,7 @@ pub(super) struct Hypothesis {
     pub(super) pairs: Vec<(Vec3, Vec3, f32)>,
     /// Penalty; smaller is better.
     pub(super) cost: f32,
-    /// What remains of the alignment, root mean square as a share of the mesh's longest side.
+    /// Residual of the alignment, root mean square as a share of the mesh's longest side.
     pub(super) rest: f32,
     /// Weight with which the penalty holds it.
     pub(super) weight: f32,
@@ -282,7 +282,7 @@ impl Search<'_> {
         cost
     }
 
-    /// How much two leaves differ as the two sides of a pair.
+    /// Difference of two leaves as the two sides of a pair.
     fn unlikeness(&self, a: usize, b: usize) -> f32 {
         let arcs = &self.tree.branches.arcs;
         let (la, lb) = (self.leaves[a], self.leaves[b]);

@@ -8,7 +8,7 @@ use super::{
     limbs::{LimbKind, limbs},
 };
 
-/// How well a template suits a mesh.
+/// Penalty of a template for a mesh, with the limbs that it is made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TemplateChoice {
     /// Index into the templates given.

@@ -6,6 +6,7 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
+use super::eigen::eigen;
 use crate::mesh::adjacency;
 
 /// Share of the whole surface below which a loose island may be a speck.
@@ -183,33 +184,10 @@ fn without_specks(
     (triangles, areas, specks)
 }
 
-/// Unit eigenvectors of a symmetric matrix, that of the largest eigenvalue first (cyclic Jacobi).
-pub(super) fn principal_axes(mut m: [[f64; 3]; 3]) -> [DVec3; 3] {
-    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f64]];
-    for _ in 0..24 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if m[p][q].abs() < 1e-300 {
-                continue;
-            }
-            let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let c = 1.0 / (t * t + 1.0).sqrt();
-            let s = t * c;
-            for row in &mut m {
-                let (a, b) = (row[p], row[q]);
-                (row[p], row[q]) = (c * a - s * b, s * a + c * b);
-            }
-            let (a, b) = (m[p], m[q]);
-            for k in 0..3 {
-                (m[p][k], m[q][k]) = (c * a[k] - s * b[k], s * a[k] + c * b[k]);
-            }
-            for row in &mut v {
-                let (a, b) = (row[p], row[q]);
-                (row[p], row[q]) = (c * a - s * b, s * a + c * b);
-            }
-        }
-    }
+/// Unit eigenvectors of a symmetric matrix, that of the largest eigenvalue first.
+pub(super) fn principal_axes(matrix: [[f64; 3]; 3]) -> [DVec3; 3] {
+    let (values, vectors) = eigen(matrix);
     let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| m[b][b].total_cmp(&m[a][a]));
-    order.map(|i| DVec3::new(v[0][i], v[1][i], v[2][i]).normalize_or_zero())
+    order.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+    order.map(|i| DVec3::new(vectors[0][i], vectors[1][i], vectors[2][i]).normalize_or_zero())
 }

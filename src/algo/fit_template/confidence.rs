@@ -16,7 +16,7 @@ use crate::mesh::voxels::Voxels;
 const HALF_TRUST: f32 = 0.026;
 /// Penalty of an assignment at which trust is one half.
 const HALF_COST: f32 = 0.6;
-/// How much the length of a limb may differ from the template's, as a logarithm, until trust is one half.
+/// Difference of a limb's length from the template's, as a logarithm, at which trust is one half.
 const HALF_STRAIN: f32 = 0.6;
 
 fn trust(value: f32, half: f32) -> f32 {

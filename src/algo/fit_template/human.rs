@@ -136,13 +136,13 @@ const REFIT: Stage = Stage {
     fingers: true,
 };
 
-/// True if the surface shows where a bone begins.
+/// `true` if the surface shows where a bone begins.
 pub(super) fn is_shown(b: usize) -> bool {
     let name = model::bone_name(b);
     !["spine", "pelvis", "clavicle"].iter().any(|hidden| name.starts_with(hidden))
 }
 
-/// True if a template has the limbs of a human figure.
+/// `true` if a template has the limbs of a human figure.
 pub(super) fn is_human(template: &TemplateLimbs) -> bool {
     template.count(LimbKind::Arm) == 2 && template.count(LimbKind::Leg) == 2 && template.count(LimbKind::Head) == 1
 }

@@ -11,7 +11,7 @@ const LIMB_LENGTH: f32 = 0.2;
 /// Distance from the plane of symmetry within which a joint is on it, as a share of the largest side.
 const ON_PLANE: f32 = 0.02;
 
-/// What a limb is.
+/// Kind of a limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LimbKind {
     /// The neck with the head.

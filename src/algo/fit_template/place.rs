@@ -85,7 +85,7 @@ fn beyond_line(line: &CentreLine, along: f32, root: Vec3, whole: f32) -> Vec3 {
     line.at(line.free).lerp(root, ((along - line.free) / rest).clamp(0.0, 1.0))
 }
 
-/// How a limb's joints lie along its line.
+/// Places of a limb's joints along its line.
 struct Reach {
     /// Length of each joint from the end.
     lengths: Vec<f32>,

@@ -1,4 +1,4 @@
-//! What a fit reports: places, confidences with their reasons, notes and errors.
+//! Report of a fit: places, confidences with their reasons, notes and errors.
 
 use std::fmt;
 
@@ -24,7 +24,7 @@ pub struct FittedSkeleton {
     pub joints: Vec<JointFit>,
     /// Assignments of limbs that were weighed, best first.
     pub hypotheses: Vec<HypothesisSummary>,
-    /// What a person should know.
+    /// Facts that a person should know.
     pub notes: Vec<FitNote>,
     /// The registered body and the assignments, for fits that follow.
     pub(super) body: Option<FittedBody>,
@@ -50,11 +50,11 @@ pub struct JointFit {
     pub position: Vec3,
     /// Confidence, 0 to 1; below one half the joint is doubtful.
     pub confidence: f32,
-    /// What the position and the confidence rest on.
+    /// Basis of the position and the confidence.
     pub reason: FitReason,
 }
 
-/// What a joint's position or doubt rests on.
+/// Basis of a joint's position, or of its doubt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FitReason {
     /// A person put it there.
@@ -69,7 +69,7 @@ pub enum FitReason {
     UnlikeSurface,
     /// The mesh shows no limb for it.
     NoLimb,
-    /// It lies outside of the mesh.
+    /// The joint lies outside of the mesh.
     Outside,
     /// Another assignment of limbs is nearly as good.
     Ambiguous,

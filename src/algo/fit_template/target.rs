@@ -7,10 +7,10 @@ use crate::mesh::voxels::Voxels;
 
 /// Samples of the whole surface.
 const SAMPLES: usize = 2200;
-/// How far from the surface its two sides are looked at, in cells.
+/// Distance from the surface at which its two sides are looked at, in cells.
 const LOOK: f32 = 1.3;
 
-/// What lies on the two sides of a triangle.
+/// Sides of a triangle: inside or outside of the volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Facing {
     /// The winding's normal points out.

@@ -4,7 +4,10 @@ use std::{collections::HashMap, sync::Arc};
 
 use bevy::prelude::*;
 
-use super::{EndFit, FIT, FIT_AROUND, FitReport, FittedRig, centre, skeleton, template_joints};
+use super::{
+    EndFit, FIT, FIT_AROUND, FitReport, FittedRig,
+    work::{centre, skeleton, template_joints},
+};
 use crate::{
     algo::fit_template::refit_template,
     plugins::{

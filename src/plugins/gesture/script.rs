@@ -22,6 +22,7 @@ use crate::{
     rig::{
         Rig, Uid,
         operations::{MirrorPlane, Operation},
+        step::Committed,
     },
 };
 
@@ -214,7 +215,9 @@ impl Answers<'_, '_> {
             }
         }
         // Joints around a moved one are fitted again by themselves, in answer to no gesture.
-        let own = |edited: &&Edited| !edited.preview && edited.name != FIT_AROUND;
+        let follows =
+            |edited: &Edited| edited.name == FIT_AROUND && matches!(edited.committed, Some(Committed::Done(_)));
+        let own = |edited: &&Edited| !edited.preview && !follows(edited);
         for Edited { rig: entity, name, .. } in self.edited.read().filter(own) {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             if script.pending {

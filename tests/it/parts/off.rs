@@ -50,9 +50,9 @@ fn switches(rig: &Rig) -> Vec<Switch> {
         let group = feature.key.group.and_then(|group| rig.group(group)).map_or("", |group| &group.name);
         let name = format!("{group}:{}", feature.key.name);
         all.push(Switch::new(rig, name.clone(), set_feature(rig, &feature.key, false).unwrap()));
-        // A switch of a choice is turned off by another one of it, which all tags alone below do not.
-        for switch in feature.switches.iter().filter(|switch| switch.choice.is_empty()) {
-            let edits = set_switch(rig, &feature.key, &switch.name, false).unwrap();
+        for switch in &feature.switches {
+            // A switch of a choice is turned off by turning another one of the choice on.
+            let edits = set_switch(rig, &feature.key, &switch.name, !switch.choice.is_empty()).unwrap();
             all.push(Switch::new(rig, format!("{name}:{}", switch.name), edits));
         }
     }

@@ -15,7 +15,7 @@ const STEP: f32 = 1e-2;
 pub(super) struct Row {
     pub(super) place: Place,
     pub(super) direction: Vec3,
-    /// How far it should move.
+    /// Distance that it should move.
     pub(super) distance: f32,
     pub(super) weight: f32,
 }
@@ -27,7 +27,7 @@ pub(in super::super) enum Place {
     Joint(usize),
 }
 
-/// How strongly parameters are held back.
+/// Strengths with which parameters are held back.
 #[derive(Debug, Clone)]
 pub(super) struct Holds {
     pub(super) components: f32,
