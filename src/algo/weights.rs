@@ -13,6 +13,7 @@
 //! one joint holds stay stiff; large meshes are solved on a coarser surface.
 
 mod anatomy;
+pub mod bends;
 mod bind;
 pub mod bone;
 mod bone_tree;

@@ -32,6 +32,8 @@ parameters! {
         /// Length by which each joint moves outwards, like the tip of an elbow, as a share of the bone that begins there: at
         /// an angle, and with a share of 0.5, by this times the sine of half the angle.
         pub push: f32 = 0.0,
+        /// `true` lets the binding of a mesh set `push`, so that the mesh keeps its volume in the bend.
+        pub fit_push: bool = true,
         /// Name, groups and label of the joints that are made; by default those of each joint.
         pub creation: Creation = Creation::default(),
     }
@@ -44,6 +46,13 @@ impl RigModule for HalfJoint {
     const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/half_joint.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/half_joint.svg"));
+
+    fn set_push(&mut self, push: f32) -> bool {
+        if self.fit_push {
+            self.push = push;
+        }
+        self.fit_push
+    }
 
     fn construct(&self, scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
         scope.in_range("share", self.share, 0.0..=1.0)?;

@@ -1,5 +1,7 @@
 //! Automatic weights, computed in the background and bound as one undoable edit.
 
+mod bends;
+
 use std::{
     collections::BTreeMap,
     ops::Range,
@@ -14,9 +16,11 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
+pub use self::bends::FittedPush;
+use self::bends::{TriedBend, push_edits, tried_bends};
 use super::{
     RigSystems,
-    commands::Built,
+    commands::{Built, RigModules},
     configure_sets,
     document::EditRequest,
     history::RigHistory,
@@ -26,6 +30,7 @@ use super::{
 use crate::{
     algo::weights::{Locks, TwistBone, WeightError, WeightJoint, WeightReport, WeightSettings, skin_weights},
     mesh::model::Weights,
+    processor::Modules,
     rig::{
         BuiltRig, Rig, RigEdit, SkinData, Uid,
         deform::{DeformSkeleton, replaced_joints},
@@ -104,7 +109,18 @@ pub struct SkinningJob {
     held: Option<Computed>,
 }
 
-type Computed = Result<(Arc<SkinData>, WeightReport), WeightError>;
+type Computed = Result<BoundSkin, WeightError>;
+
+/// Weights of a mesh, and what binding it showed.
+#[derive(Debug, Clone)]
+pub struct BoundSkin {
+    /// Weights over the joints of the rig.
+    pub skin: Arc<SkinData>,
+    /// Report of the computation.
+    pub report: WeightReport,
+    /// Lengths by which half joints have to leave a bend so that the mesh keeps its volume.
+    pub pushes: Vec<FittedPush>,
+}
 
 impl SkinningJob {
     /// Finished share, 0 to 1.
@@ -140,12 +156,21 @@ pub struct SkinningInput {
     pub rigid: Vec<(Range<u32>, u32)>,
     /// Ranges of points of objects that bend in any case.
     pub bending: Vec<Range<u32>>,
+    bends: Vec<TriedBend>,
 }
 
 impl SkinningInput {
     /// Collects the input for a mesh from a rig and its build. Objects that hang on a joint in their file are rigid,
     /// too; joints that commands created are locked with the node that they were made for.
-    pub fn new(rig: &Rig, built: Option<&BuiltRig>, mesh: &RigMesh, parts: &[(usize, PartBinding)]) -> Self {
+    ///
+    /// `modules` tells which commands take lengths that follow from the mesh; without it none does.
+    pub fn new(
+        rig: &Rig,
+        built: Option<&BuiltRig>,
+        modules: Option<&Modules>,
+        mesh: &RigMesh,
+        parts: &[(usize, PartBinding)],
+    ) -> Self {
         let skeleton = DeformSkeleton::new(rig, built);
         let joints = skeleton.joints().iter().map(|joint| WeightJoint {
             head: joint.rest.translation,
@@ -179,7 +204,8 @@ impl SkinningInput {
         }
         let existing = rig.skin(mesh.uid).map(|skin| replaced_joints(&skin.weights, &skeleton.holders(rig, skin)));
         let subjects = skeleton.subjects();
-        Self { joints, uids, subjects, locked, existing, rigid: ranges, bending }
+        let bends = built.map_or_else(Vec::new, |built| tried_bends(rig, built, &skeleton, modules));
+        Self { joints, uids, subjects, locked, existing, rigid: ranges, bending, bends }
     }
 
     /// Computes the weights of a mesh.
@@ -188,15 +214,17 @@ impl SkinningInput {
         mesh: &RigMesh,
         settings: &WeightSettings,
         progress: &(dyn Fn(f32) -> bool + Sync),
-    ) -> Result<(Arc<SkinData>, WeightReport), WeightError> {
+    ) -> Result<BoundSkin, WeightError> {
         let any_locked = self.locked.iter().any(|locked| *locked);
         let locks = self.existing.as_ref().filter(|_| any_locked);
         let locks = locks.map(|weights| Locks { weights, joints: &self.locked });
         let settings = &WeightSettings { bending: self.bending.clone(), ..settings.clone() };
         let (weights, report) =
             skin_weights(&mesh.rest.points, &mesh.triangles, &self.joints, &self.rigid, locks, settings, progress)?;
+        let (weights, pushes) = self.try_bends(mesh, weights, settings);
         let (joints, subjects) = (self.uids.clone(), self.subjects.clone());
-        Ok((Arc::new(SkinData { joints, weights, at_rest: true, subjects }), report))
+        let skin = Arc::new(SkinData { joints, weights, at_rest: true, subjects });
+        Ok(BoundSkin { skin, report, pushes })
     }
 }
 
@@ -231,6 +259,7 @@ fn start_skinning(
     mut requests: MessageReader<BindRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
     rigs: Query<(&Rig, Option<&Built>)>,
+    modules: Option<Res<RigModules>>,
     mut bound: MessageWriter<Bound>,
 ) {
     for request in requests.read() {
@@ -242,12 +271,13 @@ fn start_skinning(
         let basis = JobBasis::of(rig, mesh.uid);
         let (rig, mesh, request) = (rig.clone(), mesh.clone(), request.clone());
         let built = built.map(|built| built.0.clone());
+        let modules = modules.as_deref().map(|modules| modules.0.clone());
         let entity = request.mesh;
         let progress = Arc::new(AtomicU32::new(0));
         let cancelled = Arc::new(AtomicBool::new(false));
         let (told, stop) = (progress.clone(), cancelled.clone());
         let task = AsyncComputeTaskPool::get().spawn(async move {
-            let input = SkinningInput::new(&rig, built.as_deref(), &mesh, &request.parts);
+            let input = SkinningInput::new(&rig, built.as_deref(), modules.as_deref(), &mesh, &request.parts);
             input.compute(&mesh, &request.settings, &|part| {
                 told.store(part.to_bits(), Ordering::Relaxed);
                 !stop.load(Ordering::Relaxed)
@@ -261,6 +291,7 @@ fn land_skinning(
     mut commands: Commands,
     mut jobs: Query<(Entity, &mut SkinningJob, &RigMesh, &SkinOf)>,
     rigs: Query<(&Rig, &RigHistory)>,
+    modules: Option<Res<RigModules>>,
     mut edits: MessageWriter<EditRequest>,
     mut bound: MessageWriter<Bound>,
     mut held: MessageWriter<ResultHeld>,
@@ -272,9 +303,9 @@ fn land_skinning(
         let result = match (result, rigs.get(of.0)) {
             (Err(error), _) => Err(error.into()),
             (Ok(_), Err(_)) => Err(SkinningError::Closed),
-            (Ok((skin, report)), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
+            (Ok(computed), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
                 JobOutcome::Hold => {
-                    job.held = Some(Ok((skin, report)));
+                    job.held = Some(Ok(computed));
                     if !was_held && history.can_redo() {
                         held.write(ResultHeld { mesh: entity, reason: HeldResult::Weights });
                     }
@@ -282,9 +313,13 @@ fn land_skinning(
                 }
                 JobOutcome::Drop => Err(SkinningError::Changed),
                 JobOutcome::Commit => {
-                    let edit = RigEdit::SetSkin(mesh.uid, Some(skin));
-                    edits.write(EditRequest::operation(of.0, Operation::Edits(vec![edit])));
-                    Ok(report)
+                    let mut changes = Vec::new();
+                    if let Some(modules) = &modules {
+                        changes = push_edits(rig, &modules.0, mesh.uid, &computed);
+                    }
+                    changes.push(RigEdit::SetSkin(mesh.uid, Some(computed.skin)));
+                    edits.write(EditRequest::operation(of.0, Operation::Edits(changes)));
+                    Ok(computed.report)
                 }
             },
         };

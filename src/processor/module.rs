@@ -43,6 +43,12 @@ pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + 
     /// Brings lengths in the rig's units, and directions along the rig's axes, to a body of another size: for templates that
     /// are fitted to a mesh. Lengths that follow from joints need nothing.
     fn resize(&mut self, _change: &Resize) {}
+
+    /// Takes the length by which its half joints leave a bend, as a share of the bone below, so that the mesh that was bound
+    /// keeps its volume. Returns `false` if the module has no such length, or a person set it.
+    fn set_push(&mut self, _push: f32) -> bool {
+        false
+    }
 }
 
 /// Difference between the body that a command was written for and another one.
@@ -89,6 +95,7 @@ pub struct Parameter {
 type Parse = fn(&str) -> Result<Arc<dyn DynModule>, SourceError>;
 type Mirror = fn(&str) -> Result<String, SourceError>;
 type ResizeText = fn(&str, &Resize) -> Result<String, SourceError>;
+type PushText = fn(&str, f32) -> Result<Option<String>, SourceError>;
 
 /// A registered module.
 #[derive(Debug, Clone)]
@@ -110,6 +117,7 @@ pub struct ModuleInfo {
     parse: Parse,
     mirror: Mirror,
     resize: ResizeText,
+    push: PushText,
 }
 
 impl ModuleInfo {
@@ -136,6 +144,15 @@ impl ModuleInfo {
     /// [`SourceError`] with line and column in the text.
     pub fn resized(&self, params: &str, change: &Resize) -> Result<String, SourceError> {
         (self.resize)(params, change)
+    }
+
+    /// The parameters with the length by which half joints leave a bend, as they are written otherwise; `None` where
+    /// [`RigModule::set_push`] declines.
+    ///
+    /// # Errors
+    /// [`SourceError`] with line and column in the text.
+    pub fn pushed(&self, params: &str, push: f32) -> Result<Option<String>, SourceError> {
+        (self.push)(params, push)
     }
 }
 
@@ -191,6 +208,12 @@ impl Modules {
                 let mut module = read::<M>(text)?;
                 module.resize(change);
                 Ok(mirror::with_changes(text, &before, &written(&module)))
+            },
+            push: |text, push| {
+                let before = written(&read::<M>(text)?);
+                let mut module = read::<M>(text)?;
+                let takes_it = module.set_push(push);
+                Ok(takes_it.then(|| mirror::with_changes(text, &before, &written(&module))))
             },
         };
         self.by_name.insert(M::NAME, info);

@@ -5,11 +5,19 @@ mod figure;
 mod measure;
 mod places;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::prerequisites::BODIES;
 use bevy::math::{Affine3A, Vec3};
-use rigsmith::rig::{Uid, deform::DeformSkeleton};
+use rigsmith::{
+    algo::weights::WeightSettings,
+    headless::Workbench,
+    plugins::{
+        commands::{BuildRequest, BuildStep},
+        document::{Change, EditRequest},
+    },
+    rig::{BuiltRig, Constraint, Rig, RigEdit, TagKind, Uid, deform::DeformSkeleton},
+};
 
 use figure::{Figure, carry};
 use measure::Joint;
@@ -197,4 +205,67 @@ fn hands_and_feet_reach_their_goals() {
             }
         }
     }
+}
+
+/// Lengths of half joints in a rig, by the name that their command gives them.
+fn pushes(rig: &Rig) -> BTreeMap<String, f32> {
+    let tags = rig.walk().flat_map(|joint| &joint.data.tags).collect::<Vec<_>>();
+    let found = tags.into_iter().filter_map(|tag| match &tag.kind {
+        TagKind::Command { module, params, .. } if *module == "half_joint" => {
+            let after = |key: &str| params.split_once(key).map(|(_, rest)| rest.trim_start());
+            let name = after("name:")?.split('"').nth(1)?.to_owned();
+            let number = after("push:")?.split([',', ')']).next()?.trim().parse().ok()?;
+            Some((name, number))
+        }
+        _ => None,
+    });
+    found.collect()
+}
+
+/// Binding gives half joints the lengths that the mesh asks for, in the same step as the weights, unless a command says that
+/// its length stays.
+#[test]
+fn binding_sets_the_lengths_of_half_joints() {
+    let figure = Figure::bundled();
+    let before = crate::bench::shipped("biped");
+    let [was, is] = [pushes(&before), pushes(&figure.rig)];
+    assert_eq!(is.len(), 8, "{is:?}");
+    assert!(is["shin_half_l"] > 0.01 && is["thigh_half_l"] > 0.1, "{is:?}");
+    assert!(was.get("shin_half_l") != is.get("shin_half_l"), "{was:?}");
+
+    let mut rig = before.clone();
+    let (joint, mut tag) = rig
+        .walk()
+        .flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.clone())).collect::<Vec<_>>())
+        .find(|(_, tag)| matches!(&tag.kind, TagKind::Command { params, .. } if params.contains("shin_half_l")))
+        .unwrap();
+    if let TagKind::Command { params, .. } = &mut tag.kind {
+        *params = params.replacen('(', "(fit_push: false, ", 1);
+    }
+    rig.apply(&RigEdit::SetTag(joint, Box::new(tag))).unwrap();
+    let mut bench = Workbench::with_rig(1, rig.clone());
+    bench.open(figure.model.clone(), true).unwrap();
+    let entity = bench.rig_entity();
+    bench.app_mut().world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });
+    bench.app_mut().update();
+    let opened = bench.rig().clone();
+    bench.skin(WeightSettings::default(), Vec::new(), &mut |_| {}).unwrap();
+    let bound = pushes(bench.rig());
+    assert_eq!(bound["shin_half_l"], pushes(&rig)["shin_half_l"]);
+    assert_eq!(bound["shin_half_r"], is["shin_half_r"]);
+    // The limbs run with what was bound, and one undo takes back all of it.
+    bench.app_mut().update();
+    let length = |built: &BuiltRig| {
+        let half = built.nodes.iter().find(|node| &*node.name == "shin_half_r").unwrap().uid;
+        built.constraints.iter().find_map(|constraint| match &*constraint.constraint {
+            Constraint::Transform { driven, targets, .. } if *driven == half => {
+                Some(targets[1].offset.translation.length())
+            }
+            _ => None,
+        })
+    };
+    assert_eq!(length(bench.built().unwrap()), length(&figure.built));
+    bench.app_mut().world_mut().write_message(EditRequest { rig: entity, change: Change::Undo });
+    bench.app_mut().update();
+    assert_eq!(bench.rig(), &opened);
 }

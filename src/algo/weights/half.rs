@@ -23,6 +23,7 @@ pub(crate) struct Halves(Vec<Half>);
 struct Half {
     joint: u32,
     contrast: f32,
+    is_hinge: bool,
     /// For each joint of the skeleton, the side of the bend that it is on.
     sides: Vec<Option<Side>>,
 }
@@ -50,8 +51,9 @@ impl Halves {
         let half = |(joint, data): (usize, &WeightJoint)| {
             let bent = data.halves.filter(|_| is_free[joint])?;
             let sides = (0..joints.len()).map(|joint| side(bent, joint)).collect();
-            let contrast = if is_hinge(joints, bent) { HINGE } else { SOCKET };
-            Some(Half { joint: joint as u32, contrast, sides })
+            let is_hinge = is_hinge(joints, bent);
+            let contrast = if is_hinge { HINGE } else { SOCKET };
+            Some(Half { joint: joint as u32, contrast, is_hinge, sides })
         };
         Self(joints.iter().enumerate().filter_map(half).collect())
     }
@@ -67,17 +69,26 @@ impl Halves {
                 continue;
             }
             let share = odds::shifted(lower / both, half.contrast, 0.0);
-            let common = both * share.min(1.0 - share);
+            let taken = both * half.taken(share);
             for (joint, weight) in row.iter_mut() {
                 match side(*joint) {
-                    Some(Side::Upper) => *weight *= (both * (1.0 - share) - common) / upper,
-                    Some(Side::Lower) => *weight *= (both * share - common) / lower,
+                    Some(Side::Upper) => *weight *= (both * (1.0 - share) - 0.5 * taken) / upper,
+                    Some(Side::Lower) => *weight *= (both * share - 0.5 * taken) / lower,
                     None => {}
                 }
             }
             row.retain(|(_, weight)| *weight > 0.0);
-            row.push((half.joint, 2.0 * common));
+            row.push((half.joint, taken));
         }
+    }
+}
+
+impl Half {
+    /// Share of the half joint where the lower side holds `share` of both.
+    fn taken(&self, share: f32) -> f32 {
+        let lesser = share.min(1.0 - share);
+        // Around a socket the peak of twice the lesser share would stand out as a corner: the parabola has none.
+        if self.is_hinge { 2.0 * lesser } else { 2.0 * share * (1.0 - share) }
     }
 }
 

@@ -79,7 +79,12 @@ impl Figure {
         let built = Arc::new(Builder::build(&rig, &Arc::new(modules::all())).unwrap());
         let triangles = model.point_triangles();
         let mut figure = Self { name: name.to_owned(), rig, built, model, triangles, skin: SkinData::default() };
-        figure.skin = figure.skinned(Some(&figure.built));
+        let mut bench = figure.bench(Some(&figure.built));
+        bench.skin(WeightSettings::default(), Vec::new(), &mut |_| {}).unwrap();
+        figure.skin = bench.weights().unwrap().clone();
+        // Binding sets lengths in commands.
+        figure.rig = bench.rig().clone();
+        figure.built = Arc::new(Builder::build(&figure.rig, &Arc::new(modules::all())).unwrap());
         figure
     }
 

@@ -52,9 +52,20 @@ impl Joint {
             carry(&mut state, goal, about(mid, turn));
         } else {
             let from = (mid - root).normalize();
-            let turn = Quat::from_rotation_arc(from, (Vec3::Z - from * from.z).normalize());
-            carry(&mut state, pole, about(root, turn));
-            carry(&mut state, goal, about(root, turn));
+            return self.swing(figure, side, Vec3::Z - from * from.z);
+        }
+        state
+    }
+
+    /// The rig with the limb of a hip or shoulder turned so that its first bone points in a direction.
+    pub fn swing(self, figure: &Figure, side: &str, to: Vec3) -> RigState {
+        let (joints, controls) = self.limb(side);
+        let [root, mid, _] = joints.map(|label| figure.at(&label));
+        let mut state = figure.state();
+        let turn = Quat::from_rotation_arc((mid - root).normalize(), to.normalize());
+        let about = Affine3A::from_translation(root) * Affine3A::from_quat(turn) * Affine3A::from_translation(-root);
+        for name in controls.iter().rev() {
+            carry(&mut state, figure.control(name), about);
         }
         state
     }

@@ -31,9 +31,10 @@ fn library_and_app_bind_to_the_same_joints() {
     bench.skin(WeightSettings::default(), Vec::new(), &mut |_| {}).unwrap();
     assert_eq!(bench.weights(), Some(&figure.skin));
     let mesh = bench.mesh().unwrap().clone();
-    let input = SkinningInput::new(&figure.rig, Some(&figure.built), &mesh, &[]);
-    let (skin, _) = input.compute(&mesh, &WeightSettings::default(), &|_| true).unwrap();
-    assert_eq!(*skin, figure.skin);
+    let modules = rigsmith::modules::all();
+    let input = SkinningInput::new(&figure.rig, Some(&figure.built), Some(&modules), &mesh, &[]);
+    let bound = input.compute(&mesh, &WeightSettings::default(), &|_| true).unwrap();
+    assert_eq!(*bound.skin, figure.skin);
 }
 
 #[cfg(feature = "cli")]
