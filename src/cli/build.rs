@@ -21,7 +21,7 @@ use crate::{
     },
     plugins::commands::BuildStep,
     processor::{Builder, CommandState},
-    rig::{BuiltRig, Rig, Uid, bake::baked},
+    rig::{BuiltRig, Rig, Uid, bake::baked, operations::Operation, update::edits_between},
 };
 
 /// Arguments of `rigsmith build`.
@@ -93,9 +93,9 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
         return Ok(report);
     }
     // Checked even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
-    let posed = bench.posed_nodes()?;
+    bench.posed_nodes()?;
     if let Some(output) = &args.output {
-        let notes = write(args, output, rig, built, &posed, &mut report)?;
+        let notes = write(args, output, &mut bench, &mut report)?;
         report.notes(notes);
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -140,47 +140,54 @@ fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) ->
 fn write(
     args: &BuildArgs,
     output: &Output,
-    rig: &Rig,
-    built: &BuiltRig,
-    posed: &[Trs],
+    bench: &mut Workbench,
     report: &mut Report,
 ) -> Result<Vec<String>, Failure> {
     if FileKind::of(output) == Some(FileKind::Template) {
-        return Ok(store_rig(&RealDisk, output, &baked(rig, built))?);
+        let built = bench.built().ok_or(PoseError::NotBuilt)?;
+        return Ok(store_rig(&RealDisk, output, &baked(bench.rig(), built))?);
     }
-    let (model, settings) = character_of(rig, built, posed, args.mesh.as_deref(), &args.weights, &args.export, report)?;
+    let (model, settings) = character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?;
     Ok(store_model(&RealDisk, output, &model, &settings)?)
 }
 
-/// Built skeleton as posed, with a mesh skinned to it if there is one, and the settings for writing it. `posed` holds
-/// the transform of each built node relative to its parent.
+/// Built skeleton of a workbench as posed, with a mesh skinned to it if there is one, and the settings for writing it.
+/// Binding the mesh may change commands: the rig is built, and posed, as it is afterwards.
 pub(super) fn character_of(
-    rig: &Rig,
-    built: &BuiltRig,
-    posed: &[Trs],
+    bench: &mut Workbench,
     mesh: Option<&Path>,
     weights: &WeightArgs,
     export: &ExportArgs,
     report: &mut Report,
 ) -> Result<(Model, GltfWriteSettings), Failure> {
-    let skeleton = baked(rig, built);
-    let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
-    let mut bench = Workbench::with_rig(SEED, rig.clone());
-    bench.set_built(Arc::new(built.clone()));
+    // The mesh is bound elsewhere, so that no time passes for the pose.
+    let mut own = Workbench::with_rig(SEED, bench.rig().clone());
+    if let Some(built) = bench.built() {
+        own.set_built(Arc::new(built.clone()));
+    }
     if let Some(mesh) = mesh {
         let model = load_model(&RealDisk, mesh)?;
         report.notes(model.notes.iter().cloned());
-        bench.open(model, true)?;
+        own.open(model, true)?;
         let mut progress = Progress::new("skinning");
-        let bound = bench.skin(weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
+        let bound = own.skin(weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
         drop(progress);
         skin::describe_weights(report, &bound);
+        let edits = edits_between(bench.rig(), own.rig()).map_err(|error| Failure::Input(Box::new(error)))?;
+        if !edits.is_empty() {
+            bench.operate(Operation::Edits(edits))?;
+        }
     }
-    let mut model = bench.character();
+    let posed = bench.posed_nodes()?;
+    let built = bench.built().ok_or(PoseError::NotBuilt)?;
+    let skeleton = baked(bench.rig(), built);
+    let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
+    own.set_built(Arc::new(built.clone()));
+    let mut model = own.character();
     if mesh.is_none() {
         mark_joints(&mut model, &skeleton);
     }
-    pose(&mut model, &joints, built, posed);
+    pose(&mut model, &joints, built, &posed);
     let mut settings = export.settings();
     settings.all_joints |= mesh.is_none();
     Ok((model, settings))

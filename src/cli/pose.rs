@@ -111,7 +111,7 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
         if is_picture {
             picture(args, output, &bench, &mut report)?;
         } else {
-            write(args, output, &bench, &mut report)?;
+            write(args, output, &mut bench, &mut report)?;
         }
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -167,10 +167,10 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<Rig, Failure> {
 }
 
 /// Writes the character, or the skeleton, in the pose of the entities.
-fn write(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
-    let built = bench.built().ok_or(PoseError::NotBuilt)?;
-    let posed = bench.posed_nodes()?;
+fn write(args: &PoseArgs, output: &Output, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
     if FileKind::of(output) == Some(FileKind::Template) {
+        let built = bench.built().ok_or(PoseError::NotBuilt)?;
+        let posed = bench.posed_nodes()?;
         let mut skeleton = baked(bench.rig(), built);
         let joints: Vec<_> = skeleton.walk().map(|joint| joint.data.uid).collect();
         let index = built.index();
@@ -183,8 +183,7 @@ fn write(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Repor
         report.notes(store_rig(&RealDisk, output, &skeleton)?);
         return Ok(());
     }
-    let (model, settings) =
-        build::character_of(bench.rig(), built, &posed, args.mesh.as_deref(), &args.weights, &args.export, report)?;
+    let (model, settings) = build::character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?;
     report.notes(store_model(&RealDisk, output, &model, &settings)?);
     Ok(())
 }

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use super::{ExportArgs, Failure, InPlaceArgs, Report, SEED, WeightArgs, build::character_of, report::print};
 use crate::{
     files::{FileKind, LOOK, LoadError, PartFiles, RealDisk, TemplateWatch, store_model},
-    headless::{Workbench, posing::PoseError},
+    headless::Workbench,
     plugins::commands::BuildStep,
     rig::{Rig, RigEdit, TagKind, Uid, operations::Operation, update::edits_between},
 };
@@ -138,16 +138,21 @@ impl Watch<'_> {
         }
         let built_in = start.elapsed();
         let mut report = Report::default();
-        let posed = self.bench.posed_nodes()?;
-        let (rig, built) = (self.bench.rig(), self.bench.built().ok_or(PoseError::NotBuilt)?);
         let args = self.args;
-        let (model, settings) =
-            character_of(rig, built, &posed, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?;
+        let mesh = args.mesh.as_deref();
+        // Binding a mesh may change commands, and the rig here stays as its file has it.
+        let mut bound = mesh.map(|_| {
+            let mut bench = Workbench::with_rig(SEED, self.bench.rig().clone());
+            bench.build(BuildStep::All);
+            bench
+        });
+        let bench = bound.as_mut().unwrap_or(&mut self.bench);
+        let (model, settings) = character_of(bench, mesh, &args.weights, &args.export, &mut report)?;
         store_model(&RealDisk, &args.output, &model, &settings)?;
         let runs: HashMap<Uid, u32> = runs.iter().copied().collect();
         let is_newer = |(tag, count): &(Uid, u32)| *count > runs.get(tag).copied().unwrap_or_default();
         let ran: Vec<String> =
-            self.runs().iter().filter(|run| is_newer(run)).map(|(tag, _)| named(rig, *tag)).collect();
+            self.runs().iter().filter(|run| is_newer(run)).map(|(tag, _)| named(self.bench.rig(), *tag)).collect();
         let milliseconds = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
         Ok(json!({
             "ok": true,

@@ -26,7 +26,6 @@ mod run;
 mod state;
 
 use std::{
-    collections::BTreeMap,
     fmt,
     sync::{
         Arc,
@@ -216,7 +215,7 @@ impl RigProgram {
                     name: attribute.name.clone(),
                     kind: attribute.kind.clone(),
                     default: attribute.clamp(attribute.default),
-                    is_settable: graph.attributes.iter().any(|known| (known.0, known.1) == (*node, number)),
+                    is_settable: graph.is_settable(*node, number),
                 });
             }
         }
@@ -224,12 +223,8 @@ impl RigProgram {
         let results: Vec<X> = kept.iter().map(|node| graph.global(*node)).collect();
         let morphs: Vec<N> = graph.morphs.iter().map(|morph| morph.1).collect();
         let numbers: Vec<N> = attribute_registers.iter().chain(&morphs).copied().collect();
-        order::prune(&mut graph, &results, &numbers);
-        let fixed = order::split_fixed(&mut graph, &settable);
+        let (fixed, settings) = order::split(&mut graph, &results, &numbers, &settable);
         run_fixed(&mut graph, &fixed);
-        let settled = order::split_fixed(&mut graph, &[]);
-        let settings = settled.len();
-        graph.steps.splice(0..0, settled);
 
         let mut numbering = Numbering::new(&mut graph);
         for register in results.iter().chain(&graph.inputs) {
@@ -276,7 +271,7 @@ impl RigProgram {
         };
         program.number(&mut numbering);
         program.connect(numbering.transforms.len(), numbering.numbers.len());
-        (program.x, program.n, program.poses) = (numbering.transforms, numbering.numbers, numbering.pose.len());
+        (program.x, program.n, program.poses) = (numbering.transforms, numbering.numbers, numbering.poses as usize);
         Ok(program)
     }
 
@@ -429,7 +424,8 @@ struct Numbering {
     old_n: Vec<f32>,
     new_x: Vec<Option<X>>,
     new_n: Vec<Option<N>>,
-    pose: BTreeMap<u32, u32>,
+    new_pose: Vec<Option<Pose>>,
+    poses: u32,
     transforms: Vec<Trs>,
     numbers: Vec<f32>,
 }
@@ -443,7 +439,8 @@ impl Numbering {
             new_n: vec![None; old_n.len()],
             old_x,
             old_n,
-            pose: BTreeMap::new(),
+            new_pose: vec![None; graph.rig.nodes.len()],
+            poses: 0,
             transforms: Vec::new(),
             numbers: Vec::new(),
         };
@@ -471,8 +468,10 @@ impl Numbering {
         if pose == Pose::NONE {
             return pose;
         }
-        let next = self.pose.len() as u32;
-        Pose(*self.pose.entry(pose.0).or_insert(next))
+        *self.new_pose[pose.0 as usize].get_or_insert_with(|| {
+            self.poses += 1;
+            Pose(self.poses - 1)
+        })
     }
 }
 

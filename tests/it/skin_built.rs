@@ -25,18 +25,17 @@ use measure::Joint;
 /// The volume that bent knees, elbows, hips and shoulders lose at most, in hundredths of a section, and the triangles that
 /// fold. Weights painted by hand for the same bodies lose 21 to 34, 33 to 60, 23 to 59 and 94 to 160, and fold 3 to 53.
 ///
-/// Weights alone cannot keep more than the place of the joint allows: sections that turn about an axis beside their
-/// centre, by a share of the radius, lose 0.785 of that share, and the elbows of the bodies lie up to 0.45 of the radius
-/// off. Half joints of knees, elbows and shoulders move outwards, as far as no body folds more by it.
+/// Half joints move outwards by what each body asks for. Shoulders are pushed no further than an arm raised to the side
+/// allows, where the same length swells: an arm that hangs down at rest and is raised to the front loses most.
 const KNOWN: [(&str, [(i32, usize); 4]); 8] = [
-    ("biped", [(7, 0), (15, 0), (12, 40), (70, 0)]),
-    ("baby", [(29, 0), (41, 9), (19, 39), (71, 7)]),
-    ("female_heavy_tpose", [(9, 0), (2, 0), (29, 28), (31, 0)]),
-    ("female_young", [(14, 0), (2, 0), (32, 20), (51, 2)]),
-    ("female_young_armsdown", [(14, 0), (2, 0), (31, 21), (66, 5)]),
-    ("male_child_tpose", [(38, 0), (44, 6), (45, 35), (43, 0)]),
-    ("male_muscular_action", [(39, 0), (42, 8), (50, 29), (2, 0)]),
-    ("male_young", [(43, 0), (42, 6), (47, 39), (53, 2)]),
+    ("biped", [(10, 0), (12, 0), (5, 26), (18, 2)]),
+    ("baby", [(11, 0), (11, 7), (4, 21), (13, 2)]),
+    ("female_heavy_tpose", [(11, 0), (-5, 0), (9, 14), (11, 0)]),
+    ("female_young", [(11, 0), (8, 0), (8, 8), (32, 1)]),
+    ("female_young_armsdown", [(11, 0), (8, 0), (8, 8), (90, 2)]),
+    ("male_child_tpose", [(11, 0), (11, 4), (27, 20), (12, 0)]),
+    ("male_muscular_action", [(11, 0), (11, 0), (24, 13), (10, 0)]),
+    ("male_young", [(10, 0), (11, 4), (24, 25), (11, 1)]),
 ];
 
 /// The bundled biped, and the seven bodies where there is data.
@@ -212,6 +211,7 @@ fn pushes(rig: &Rig) -> BTreeMap<String, f32> {
     let tags = rig.walk().flat_map(|joint| &joint.data.tags).collect::<Vec<_>>();
     let found = tags.into_iter().filter_map(|tag| match &tag.kind {
         TagKind::Command { module, params, .. } if *module == "half_joint" => {
+            let params = params.replace("fit_push:", "fitted:");
             let after = |key: &str| params.split_once(key).map(|(_, rest)| rest.trim_start());
             let name = after("name:")?.split('"').nth(1)?.to_owned();
             let number = after("push:")?.split([',', ')']).next()?.trim().parse().ok()?;

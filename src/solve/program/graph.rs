@@ -442,6 +442,11 @@ impl<'a> Graph<'a> {
         Ok(register)
     }
 
+    /// True if people may set an attribute: no constraint drives it.
+    pub fn is_settable(&self, node: usize, number: usize) -> bool {
+        self.attributes.binary_search_by_key(&(node, number), |known| (known.0, known.1)).is_ok()
+    }
+
     /// Register from which constraints read an attribute.
     pub fn attribute(&self, node: usize, number: usize) -> N {
         self.nodes[node].attributes[number]

@@ -8,7 +8,7 @@ use super::{
     graph::{Graph, Step},
     lists::Lists,
     name,
-    op::{N, Operand, Tables, X},
+    op::{N, Op, Operand, Pose, Tables, X},
 };
 use crate::rig::Uid;
 
@@ -20,6 +20,9 @@ struct Wires {
     /// Registers that all operations read, and where each operation's begin.
     reads: Vec<u32>,
     starts: Vec<u32>,
+    /// The same of registers that operations write.
+    writes: Vec<u32>,
+    write_starts: Vec<u32>,
     /// The operation that writes each register.
     writer: Vec<u32>,
     is_posed: Vec<bool>,
@@ -29,26 +32,38 @@ impl Wires {
     fn of(steps: &mut [Step], tables: &mut Tables, transforms: usize, numbers: usize) -> Self {
         let mut reads = Vec::with_capacity(4 * steps.len());
         let mut starts = Vec::with_capacity(steps.len() + 1);
+        let mut writes = Vec::with_capacity(2 * steps.len());
+        let mut write_starts = Vec::with_capacity(steps.len() + 1);
         let mut writer = vec![NONE; transforms + numbers];
         let mut is_posed = vec![false; steps.len()];
         for (at, step) in steps.iter_mut().enumerate() {
             starts.push(reads.len() as u32);
+            write_starts.push(writes.len() as u32);
             step.op.visit(tables, |operand| match operand {
                 Operand::ReadX(X(register)) => reads.push(*register),
                 Operand::ReadN(N(register)) => reads.push(transforms as u32 + *register),
-                Operand::WriteX(X(register)) => writer[*register as usize] = at as u32,
-                Operand::WriteN(N(register)) => writer[transforms + *register as usize] = at as u32,
-                Operand::Pose(pose) => is_posed[at] |= *pose != super::op::Pose::NONE,
+                Operand::WriteX(X(register)) => writes.push(*register),
+                Operand::WriteN(N(register)) => writes.push(transforms as u32 + *register),
+                Operand::Pose(pose) => is_posed[at] |= *pose != Pose::NONE,
             });
+            let start = write_starts[at] as usize;
+            writes[start..].iter().for_each(|register| writer[*register as usize] = at as u32);
         }
         starts.push(reads.len() as u32);
-        Self { reads, starts, writer, is_posed }
+        write_starts.push(writes.len() as u32);
+        Self { reads, starts, writes, write_starts, writer, is_posed }
     }
 
     /// Registers that an operation reads.
     fn reads(&self, step: usize) -> impl Iterator<Item = usize> {
         let range = self.starts[step] as usize..self.starts[step + 1] as usize;
         self.reads[range].iter().map(|register| *register as usize)
+    }
+
+    /// Registers that an operation writes.
+    fn writes(&self, step: usize) -> impl Iterator<Item = usize> {
+        let range = self.write_starts[step] as usize..self.write_starts[step + 1] as usize;
+        self.writes[range].iter().map(|register| *register as usize)
     }
 
     /// Operations that must run before another.
@@ -139,60 +154,48 @@ fn cycle(graph: &Graph<'_>, wires: &Wires, waits: &[usize]) -> ProgramError {
     ProgramError::Cycle { loop_text, constraints, commands, nodes }
 }
 
-/// Drops operations whose results no register in `results` or `numbers` depends on.
-pub(super) fn prune(graph: &mut Graph<'_>, results: &[X], numbers: &[N]) {
-    let transforms = graph.x.len();
+/// Drops operations on which no register in `results` or `numbers` depends, and splits off and returns those that depend on
+/// no input, on no pose, and on no attribute in `settable`. Those that depend on attributes only are put first; their
+/// number is returned, too.
+pub(super) fn split(graph: &mut Graph<'_>, results: &[X], numbers: &[N], settable: &[N]) -> (Vec<Step>, usize) {
+    let (transforms, count) = (graph.x.len(), graph.steps.len());
     let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, graph.n.len());
-    let mut needed = vec![false; transforms + graph.n.len()];
-    results.iter().for_each(|X(register)| needed[*register as usize] = true);
-    numbers.iter().for_each(|N(register)| needed[transforms + *register as usize] = true);
-    // Registers without a writer belong to a list that does not exist.
-    let written: Vec<_> = wires.writer.iter().enumerate().map(|(register, at)| (*at, register as u32)).collect();
-    let writes = Lists::new(graph.steps.len(), &written);
-    let mut live = vec![false; graph.steps.len()];
-    for at in (0..graph.steps.len()).rev() {
-        live[at] = writes.get(at).iter().any(|register| needed[*register as usize]);
-        if live[at] {
+    let registers = |list: &[X], numbers: &[N]| {
+        let mut marks = vec![false; transforms + graph.n.len()];
+        list.iter().for_each(|X(register)| marks[*register as usize] = true);
+        numbers.iter().for_each(|N(register)| marks[transforms + *register as usize] = true);
+        marks
+    };
+    let mut needed = registers(results, numbers);
+    let mut is_live = vec![false; count];
+    for at in (0..count).rev() {
+        is_live[at] = wires.writes(at).any(|register| needed[register]);
+        if is_live[at] {
             wires.reads(at).for_each(|register| needed[register] = true);
         }
     }
-    let mut at = 0;
-    graph.steps.retain(|_| {
-        at += 1;
-        live[at - 1]
-    });
-}
-
-/// Splits off the operations that depend on no input, on no pose, and on none of the registers in `numbers`.
-pub(super) fn split_fixed(graph: &mut Graph<'_>, numbers: &[N]) -> Vec<Step> {
-    let transforms = graph.x.len();
-    let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, graph.n.len());
-    let mut moves = vec![false; transforms + graph.n.len()];
-    graph.inputs.iter().for_each(|X(register)| moves[*register as usize] = true);
-    numbers.iter().for_each(|N(register)| moves[transforms + *register as usize] = true);
-    let mut changes = vec![false; graph.steps.len()];
-    for (at, change) in changes.iter_mut().enumerate() {
-        // A spring changes with time alone.
-        *change = wires.is_posed[at]
-            || matches!(graph.steps[at].op, super::op::Op::Spring(_))
-            || wires.reads(at).any(|register| moves[register]);
-        if *change {
-            let tables = &mut graph.tables;
-            graph.steps[at].op.visit(tables, |operand| match operand {
-                Operand::WriteX(X(register)) => moves[*register as usize] = true,
-                Operand::WriteN(N(register)) => moves[transforms + *register as usize] = true,
-                _ => {}
-            });
-        }
-    }
-    let mut at = 0;
-    let mut fixed = Vec::new();
-    graph.steps.retain(|step| {
-        at += 1;
-        if !changes[at - 1] {
-            fixed.push(*step);
-        }
-        changes[at - 1]
-    });
-    fixed
+    let moving = |settable: &[N]| -> Vec<bool> {
+        let mut moves = registers(&graph.inputs, settable);
+        let moves_one = |at: usize| {
+            // A spring changes with time alone.
+            let is_spring = matches!(graph.steps[at].op, Op::Spring(_));
+            let is_moved = wires.is_posed[at] || is_spring || wires.reads(at).any(|register| moves[register]);
+            if is_moved {
+                wires.writes(at).for_each(|register| moves[register] = true);
+            }
+            is_moved
+        };
+        (0..count).map(moves_one).collect()
+    };
+    let (changes, plays) = (moving(settable), moving(&[]));
+    let steps = std::mem::take(&mut graph.steps);
+    let of = |wanted: [bool; 2]| {
+        let is_wanted = |at: &usize| is_live[*at] && [changes[*at], plays[*at]] == wanted;
+        (0..count).filter(is_wanted).map(|at| steps[at]).collect::<Vec<_>>()
+    };
+    let fixed = of([false, false]);
+    graph.steps.extend(of([true, false]));
+    let settings = graph.steps.len();
+    graph.steps.extend(of([true, true]));
+    (fixed, settings)
 }
