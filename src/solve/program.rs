@@ -39,6 +39,7 @@ pub use hash::ContentHash;
 pub use state::{Carry, LANES, Memory, RigState};
 
 use self::{
+    cache::ByConstraint,
     freedom::Freedom,
     graph::{Driven, Graph, Step},
     lists::Lists,
@@ -49,6 +50,7 @@ use self::{
 use crate::{
     mesh::model::Trs,
     rig::{AttributeKind, BuiltRig, NodeType, Uid},
+    solve::expression::Expression,
 };
 
 /// Options of [`RigProgram::compile`].
@@ -191,13 +193,18 @@ impl RigProgram {
     ///
     /// See [`ProgramError`]: references to missing nodes, joints that form no chain, cycles.
     pub fn compile(rig: &BuiltRig, options: &CompileOptions) -> Result<Self, ProgramError> {
-        Self::compile_hashed(rig, options, ContentHash::of(rig, options))
+        Self::compile_hashed(rig, options, ContentHash::of(rig, options), &mut ByConstraint::default())
     }
 
-    /// Compiles a built rig whose hash is known.
-    fn compile_hashed(rig: &BuiltRig, options: &CompileOptions, hash: ContentHash) -> Result<Self, ProgramError> {
+    /// Compiles a built rig whose hash is known. Expressions are read once for each constraint.
+    fn compile_hashed(
+        rig: &BuiltRig,
+        options: &CompileOptions,
+        hash: ContentHash,
+        expressions: &mut ByConstraint<Arc<Expression>>,
+    ) -> Result<Self, ProgramError> {
         let mut graph = Graph::new(rig, &options.keep, &options.inputs)?;
-        lower::lower(&mut graph)?;
+        lower::lower(&mut graph, expressions)?;
         let driven = graph.finish();
         order::sort(&mut graph)?;
         skip_empty(&mut graph);

@@ -5,14 +5,20 @@ use std::{
     sync::{Arc, Weak},
 };
 
-use super::{CompileOptions, ContentHash, ProgramError, RigProgram, hash::ConstraintHashes};
-use crate::rig::BuiltRig;
+use bevy::platform::collections::HashMap;
+
+use super::{CompileOptions, ContentHash, ProgramError, RigProgram, hash::of_constraint};
+use crate::{
+    rig::{BuiltRig, Constraint},
+    solve::expression::Expression,
+};
 
 /// Programs that are in use, by the hash of their content.
 #[derive(Debug, Default)]
 pub struct ProgramCache {
     programs: BTreeMap<ContentHash, Weak<RigProgram>>,
-    hashes: ConstraintHashes,
+    hashes: ByConstraint<u128>,
+    expressions: ByConstraint<Arc<Expression>>,
 }
 
 impl ProgramCache {
@@ -23,12 +29,15 @@ impl ProgramCache {
     ///
     /// See [`RigProgram::compile`].
     pub fn get(&mut self, rig: &BuiltRig, options: &CompileOptions) -> Result<Arc<RigProgram>, ProgramError> {
-        let hash = self.hashes.of(rig, options);
+        let hash =
+            ContentHash::with(rig, options, |constraint| self.hashes.of(constraint, || of_constraint(constraint)));
+        self.hashes.forget_unused();
         if let Some(program) = self.programs.get(&hash).and_then(Weak::upgrade) {
             return Ok(program);
         }
         self.programs.retain(|_, program| program.strong_count() > 0);
-        let program = Arc::new(RigProgram::compile_hashed(rig, options, hash)?);
+        let program = Arc::new(RigProgram::compile_hashed(rig, options, hash, &mut self.expressions)?);
+        self.expressions.forget_unused();
         self.programs.insert(hash, Arc::downgrade(&program));
         Ok(program)
     }
@@ -41,5 +50,44 @@ impl ProgramCache {
     /// Returns `true` if no program is in use.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+}
+
+/// What follows from constraints that are in use, so that a change of one constraint does not make it for the others again.
+#[derive(Debug)]
+pub(super) struct ByConstraint<T> {
+    /// By address. The weak reference keeps the address from being given to another constraint.
+    known: HashMap<usize, (Weak<Constraint>, T)>,
+    /// Number of entries after the last removal of those out of use.
+    kept: usize,
+}
+
+impl<T> Default for ByConstraint<T> {
+    fn default() -> Self {
+        Self { known: HashMap::default(), kept: 0 }
+    }
+}
+
+impl<T: Clone> ByConstraint<T> {
+    /// What is known of a constraint, or what `make` gives.
+    pub fn of(&mut self, constraint: &Arc<Constraint>, make: impl FnOnce() -> T) -> T {
+        let known = self.known.entry(Arc::as_ptr(constraint).addr());
+        known.or_insert_with(|| (Arc::downgrade(constraint), make())).1.clone()
+    }
+
+    /// The same where making it may fail; nothing is kept of a failure.
+    pub fn try_of<E>(&mut self, constraint: &Arc<Constraint>, make: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+        match self.known.get(&Arc::as_ptr(constraint).addr()) {
+            Some((_, known)) => Ok(known.clone()),
+            None => make().map(|made| self.of(constraint, || made)),
+        }
+    }
+
+    /// Drops entries of constraints that are no longer in use, once they are many.
+    pub fn forget_unused(&mut self) {
+        if self.known.len() > 2 * self.kept + 64 {
+            self.known.retain(|_, (constraint, _)| constraint.strong_count() > 0);
+            self.kept = self.known.len();
+        }
     }
 }

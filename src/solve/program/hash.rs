@@ -2,10 +2,8 @@
 
 use std::{
     fmt::{self, Write},
-    sync::{Arc, Weak},
+    sync::Arc,
 };
-
-use bevy::platform::collections::HashMap;
 
 use super::{CompileOptions, Keep};
 use crate::{
@@ -33,7 +31,8 @@ impl ContentHash {
         Self::with(rig, options, |constraint| of_constraint(constraint))
     }
 
-    fn with(rig: &BuiltRig, options: &CompileOptions, mut of: impl FnMut(&Arc<Constraint>) -> u128) -> Self {
+    /// The same with hashes of constraints that may be known: `of` gives what [`of_constraint`] does.
+    pub(super) fn with(rig: &BuiltRig, options: &CompileOptions, mut of: impl FnMut(&Arc<Constraint>) -> u128) -> Self {
         let mut hasher = Hasher::default();
         hasher.word(rig.nodes.len() as u64);
         for node in &rig.nodes {
@@ -88,35 +87,12 @@ impl ContentHash {
     }
 }
 
-fn of_constraint(constraint: &Constraint) -> u128 {
+/// The hash of one constraint.
+pub(super) fn of_constraint(constraint: &Constraint) -> u128 {
     let mut hasher = Hasher::default();
     // The text of a constraint holds all of its fields, also fields added later, and is exact.
     hasher.debug(constraint);
     hasher.finish().0
-}
-
-/// Hashes of constraints that are in use, so that a change of one constraint does not hash the others again.
-#[derive(Debug, Default)]
-pub(super) struct ConstraintHashes {
-    /// By address. The weak reference keeps the address from being given to another constraint.
-    known: HashMap<usize, (Weak<Constraint>, u128)>,
-    /// Number of entries after the last removal of those out of use.
-    kept: usize,
-}
-
-impl ConstraintHashes {
-    /// Equal to [`ContentHash::of`].
-    pub fn of(&mut self, rig: &BuiltRig, options: &CompileOptions) -> ContentHash {
-        let hash = ContentHash::with(rig, options, |constraint| {
-            let entry = self.known.entry(Arc::as_ptr(constraint).addr());
-            entry.or_insert_with(|| (Arc::downgrade(constraint), of_constraint(constraint))).1
-        });
-        if self.known.len() > 2 * self.kept + 64 {
-            self.known.retain(|_, (constraint, _)| constraint.strong_count() > 0);
-            self.kept = self.known.len();
-        }
-        hash
-    }
 }
 
 /// Two lanes of multiply and fold.

@@ -2,10 +2,13 @@
 
 mod chains;
 
+use std::sync::Arc;
+
 use glam::{Quat, Vec3};
 
 use super::{
     ProgramError,
+    cache::ByConstraint,
     error::describe,
     graph::Graph,
     name,
@@ -27,9 +30,12 @@ use crate::{
 };
 
 /// Adds the operations of all constraints in list order.
-pub(super) fn lower(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
+pub(super) fn lower(
+    graph: &mut Graph<'_>,
+    expressions: &mut ByConstraint<Arc<Expression>>,
+) -> Result<(), ProgramError> {
     for at in 0..graph.rig.constraints.len() {
-        Lower { at, graph }.constraint()?;
+        Lower { at, graph, expressions }.constraint()?;
     }
     Ok(())
 }
@@ -38,6 +44,7 @@ pub(super) fn lower(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
 struct Lower<'g, 'a> {
     at: usize,
     graph: &'g mut Graph<'a>,
+    expressions: &'g mut ByConstraint<Arc<Expression>>,
 }
 
 impl Lower<'_, '_> {
@@ -122,8 +129,12 @@ impl Lower<'_, '_> {
                 self.output(Op::Key(at as u32), output, out)
             }
             Constraint::Expression { text, inputs, output } => {
-                let names: Vec<&str> = inputs.iter().map(|(name, _)| name.as_str()).collect();
-                let expression = Expression::new(text, &names).map_err(|error| self.bad(error.to_string()))?;
+                let read = || {
+                    let names: Vec<&str> = inputs.iter().map(|(name, _)| name.as_str()).collect();
+                    Expression::new(text, &names).map(Arc::new)
+                };
+                let expression = self.expressions.try_of(&rig.constraints[self.at].constraint, read);
+                let expression = expression.map_err(|error| self.bad(error.to_string()))?;
                 let inputs = inputs.iter().map(|(_, scalar)| self.scalar(scalar)).collect::<Result<Vec<N>, _>>()?;
                 let inputs = self.numbers(inputs);
                 let out = self.graph.new_n(0.0);

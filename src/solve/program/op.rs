@@ -8,6 +8,8 @@ mod operands;
 
 pub(super) use operands::Operand;
 
+use std::sync::Arc;
+
 use glam::{Quat, Vec3};
 
 use crate::{
@@ -202,7 +204,7 @@ pub(super) struct KeyOp {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ExpressionOp {
-    pub expression: Expression,
+    pub expression: Arc<Expression>,
     pub inputs: Span,
     pub out: N,
 }
