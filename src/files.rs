@@ -39,7 +39,7 @@ pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
 pub use load::{FileKind, LoadError, load_gestures, load_model, load_rig_text, load_skin, load_template, stem};
-pub use parts::{BUNDLED_CHARACTERS, BUNDLED_PARTS, PartFiles, bundled_characters};
+pub use parts::{BUNDLED_CHARACTERS, BUNDLED_PARTS, PartFiles, bundled_characters, bundled_parts};
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote, ProjectToSave,
     load_project, project_files, store_project,

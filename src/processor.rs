@@ -30,6 +30,7 @@ mod review;
 mod scope;
 mod signal;
 mod snapshot;
+mod values;
 mod visibility;
 mod world;
 
@@ -49,4 +50,5 @@ pub use module::{BuildLimits, DynModule, ModuleInfo, Modules, Parameter, Resize,
 pub use off::{Off, SkipReason};
 pub use review::{SourceText, review};
 pub use scope::{BuildScope, Side};
+pub use values::ParameterValues;
 pub use world::{Aspect, NodeId, Value};

@@ -99,6 +99,61 @@ pub enum Action {
     Controls,
     /// Shows or hides the list of keys.
     Help,
+    /// Shows or hides the palette of all actions.
+    Palette,
+}
+
+impl Action {
+    /// All actions, modes first.
+    pub fn all() -> Vec<Self> {
+        let others = [
+            Self::New,
+            Self::Open,
+            Self::Save,
+            Self::SaveAs,
+            Self::Export,
+            Self::Quit,
+            Self::Undo,
+            Self::Redo,
+            Self::Delete,
+            Self::DeleteHierarchy,
+            Self::SelectAll,
+            Self::SelectNone,
+            Self::MirrorSelected,
+            Self::Symmetry,
+            Self::MoveChildren,
+            Self::Accept,
+            Self::Cancel,
+            Self::NextVolume,
+            Self::Fit,
+            Self::Skin,
+            Self::ResetPose,
+            Self::StorePose,
+            Self::Build,
+            Self::RollBack,
+            Self::StepForward,
+            Self::StepBack,
+            Self::GizmoSpace,
+            Self::FrameSelected,
+            Self::FrameAll,
+            Self::ViewFront,
+            Self::ViewBack,
+            Self::ViewLeft,
+            Self::ViewRight,
+            Self::ViewTop,
+            Self::ViewBottom,
+            Self::Projection,
+            Self::XRay,
+            Self::Wireframe,
+            Self::Labels,
+            Self::LocalAxes,
+            Self::Grid,
+            Self::Controls,
+            Self::Help,
+            Self::Palette,
+        ];
+        Mode::ALL.into_iter().map(Self::Mode).chain(others).collect()
+    }
 }
 
 /// Request for an action.

@@ -135,7 +135,7 @@ impl Plugin for EditorPlugin {
             DockPlugin,
             CameraPlugin,
             ScreenPlugin,
-            HelpPlugin,
+            (HelpPlugin, super::palette::PalettePlugin),
             LabelsPlugin,
             ReportPlugin,
             FilesPlugin,

@@ -91,6 +91,7 @@ pub fn describe(action: Action) -> String {
         Action::Grid => "Grid",
         Action::Controls => "Controls",
         Action::Help => "Keys",
+        Action::Palette => "All actions",
     };
     text.to_owned()
 }

@@ -151,7 +151,9 @@ pub(super) fn show(
                 ui.close();
             }
         });
-        ui.menu_button("Help", |ui| entries(ui, &[Some(("Keys", Action::Help))]));
+        ui.menu_button("Help", |ui| {
+            entries(ui, &[Some(("All actions", Action::Palette)), Some(("Keys", Action::Help))])
+        });
     });
     if let Some(path) = recent {
         requests.send(OpenRequest::File(path));

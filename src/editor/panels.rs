@@ -7,10 +7,13 @@ pub mod controls;
 pub mod face;
 pub mod hierarchy;
 pub mod history;
+pub mod local_groups;
 pub mod log;
 pub mod poses;
+pub mod process;
 pub mod properties;
 pub mod skinning;
+pub mod tags;
 pub mod toasts;
 
 mod displayed_rig;
@@ -39,7 +42,10 @@ impl Plugin for PanelsPlugin {
         ))
         .add_panel(hierarchy::HierarchyPanel::default())
         .add_panel(properties::PropertiesPanel::default())
+        .add_panel(tags::TagsPanel::default())
         .add_panel(controls::ControlsPanel::default())
+        .add_panel(process::ProcessPanel::default())
+        .add_panel(local_groups::GroupsPanel::default())
         .add_panel(skinning::SkinningPanel::default())
         .add_panel(face::FacePanel::default())
         .add_panel(poses::PosesPanel::default())

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_egui::egui;
 
-use super::{ActiveRig, files::Loading, notice::StatusLine, style};
+use super::{ActiveRig, files::Loading, next_step::next_step, notice::StatusLine, style};
 use crate::{
     plugins::{
         document::Selection,
@@ -18,7 +18,10 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World) {
     ui.horizontal(|ui| {
         ui.set_min_height(18.0);
         let status = world.get_resource::<StatusLine>().cloned().unwrap_or_default();
-        let counts = counts(world);
+        let counts = match next_step(world) {
+            Some(next) => format!("Next: {next}  ·  {}", counts(world)),
+            None => counts(world),
+        };
         let room = ui.available_width();
         let right =
             ui.painter().layout_no_wrap(counts.clone(), egui::FontId::proportional(12.0), style::QUIET).size().x;

@@ -60,6 +60,16 @@ pub fn bundled_characters() -> Vec<Arc<Rig>> {
     BUNDLED_CHARACTERS.iter().filter_map(read).collect()
 }
 
+/// Parts that come with Rigsmith, by name.
+pub fn bundled_parts() -> Vec<(&'static str, Arc<Rig>)> {
+    let none = BTreeMap::new();
+    let read = |(name, text): &(&'static str, &'static str)| {
+        let template = PartFiles::given(&none).complete(Path::new(name), text.as_bytes()).ok()?;
+        Some((*name, Arc::new(template.rig)))
+    };
+    BUNDLED_PARTS.iter().filter_map(read).collect()
+}
+
 /// Text of a part that comes with Rigsmith. It is used where no file has its name.
 fn bundled(name: &str) -> Option<&'static str> {
     BUNDLED_PARTS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)

@@ -4,7 +4,7 @@
 //! right-handed: a direction `(x, y, z)` in a joint's axes becomes `(-x, y, z)`, as one in the rig's axes does, and an
 //! angle about X stays while those about Y and Z change their sign.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, ops::Range};
 
 use glam::Vec3;
 
@@ -72,24 +72,33 @@ pub(super) fn with_changes(params: &str, before: &str, after: &str) -> String {
             None => whole.extend(path.first().map(|(name, _)| name.as_str()).filter(|name| !whole.contains(name))),
         }
     }
-    for name in whole {
-        let all = fields(after);
-        let Some(field) = all.iter().find(|field| field.depth == 1 && field.name == name) else { continue };
-        let value = after[field.value..field.end].trim().trim_end_matches(',').to_owned();
-        let known = fields(&out).into_iter().find(|field| field.depth == 1 && field.name == name);
-        match known.map(|known| value_range(&out, known.value, known.end)) {
-            Some(range) => out.replace_range(range, &value),
-            None => match out.find('(') {
-                Some(open) => {
-                    let is_empty = out[open + 1..].trim_start().starts_with(')');
-                    let comma = if is_empty { "" } else { ", " };
-                    out.insert_str(open + 1, &format!("{name}: {value}{comma}"));
-                }
-                None => out = format!("({name}: {value})"),
-            },
-        }
-    }
+    whole.into_iter().for_each(|name| write_whole(&mut out, after, name));
     out
+}
+
+/// Writes one parameter as a whole, as it is in complete ones, `after`.
+pub(super) fn write_whole(params: &mut String, after: &str, name: &str) {
+    let Some(value) = place_of(after, name).map(|place| after[place].to_owned()) else { return };
+    match (place_of(params, name), params.find('(')) {
+        (Some(place), _) => params.replace_range(place, &value),
+        (None, Some(open)) => {
+            let is_empty = params[open + 1..].trim_start().starts_with(')');
+            let comma = if is_empty { "" } else { ", " };
+            params.insert_str(open + 1, &format!("{name}: {value}{comma}"));
+        }
+        (None, None) => *params = format!("({name}: {value})"),
+    }
+}
+
+/// Place of the value of a parameter, or of a part of one: `creation.label`.
+pub(super) fn place_of(params: &str, path: &str) -> Option<Range<usize>> {
+    let fields = fields(params);
+    let mut found = None;
+    for name in path.split('.') {
+        found = Some(fields.iter().position(|field| field.parent == found && field.name == name)?);
+    }
+    let field = &fields[found?];
+    Some(value_range(params, field.value, field.end))
 }
 
 /// Names of fields from the outside in, each with its number among those of its name in the same value.
@@ -124,7 +133,7 @@ fn values_with_places(text: &str) -> Vec<(Path, usize, usize)> {
 }
 
 /// A value without the blanks around it and the comma after it.
-fn value_range(text: &str, start: usize, end: usize) -> std::ops::Range<usize> {
+fn value_range(text: &str, start: usize, end: usize) -> Range<usize> {
     let value = &text[start..end];
     let trimmed = value.trim().trim_end_matches(',').trim_end();
     let start = start + value.len() - value.trim_start().len();

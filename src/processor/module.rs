@@ -95,6 +95,7 @@ pub struct Parameter {
 type Parse = fn(&str) -> Result<Arc<dyn DynModule>, SourceError>;
 type Mirror = fn(&str) -> Result<String, SourceError>;
 type ResizeText = fn(&str, &Resize) -> Result<String, SourceError>;
+type CompleteText = fn(&str) -> Result<String, SourceError>;
 type PushText = fn(&str, f32) -> Result<Option<String>, SourceError>;
 
 /// A registered module.
@@ -118,6 +119,8 @@ pub struct ModuleInfo {
     mirror: Mirror,
     resize: ResizeText,
     push: PushText,
+    /// Gives parameters with all values, those that are left out, too.
+    pub(super) complete: CompleteText,
 }
 
 impl ModuleInfo {
@@ -215,6 +218,7 @@ impl Modules {
                 let takes_it = module.set_push(push);
                 Ok(takes_it.then(|| mirror::with_changes(text, &before, &written(&module))))
             },
+            complete: |text| Ok(written(&read::<M>(text)?)),
         };
         self.by_name.insert(M::NAME, info);
         self

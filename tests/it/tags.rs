@@ -143,10 +143,10 @@ fn tags_are_added_changed_and_deleted() {
     let error =
         desk.refused(TagOperation::Add { joints: vec![HIPS], kind: aim("(t: \"@joint hnad_r\")"), index: None });
     assert!(error.to_string().contains("byte 4") && error.to_string().contains("did you mean \"hand_r\""), "{error}");
-    let error = desk.refused(TagOperation::Params(first, "(".into()));
+    let error = desk.refused(TagOperation::Params(vec![(first, "(".into())]));
     assert!(matches!(error, OperationError::Edit(EditError::BadParams(..))), "{error}");
 
-    desk.run(TagOperation::Params(first, "(1, \"@command control\")".into()));
+    desk.run(TagOperation::Params(vec![(first, "(1, \"@command control\")".into())]));
     assert_eq!(desk.params(first), "(1, \"@command control/hand_l#0000000000000022\")");
     desk.run(TagOperation::Comment(first, "looks".into()));
     desk.run(TagOperation::Enable(vec![first, IK_L], false));
@@ -165,7 +165,7 @@ fn tags_are_added_changed_and_deleted() {
     for (operation, error) in [
         (TagOperation::Delete(vec![HANDLE_L, GRIP_L]), TagError::NoTag(GRIP_L)),
         (TagOperation::Comment(Uid(9), String::new()), TagError::NoTag(Uid(9))),
-        (TagOperation::Params(IK_L, "()".into()), TagError::NotCommand(IK_L)),
+        (TagOperation::Params(vec![(IK_L, "()".into())]), TagError::NotCommand(IK_L)),
         (TagOperation::Attach(vec![IK_L], Some(IK_L)), TagError::NotCommand(IK_L)),
         (TagOperation::Attach(vec![HANDLE_L], Some(SPACE_R)), TagError::NotFeature(SPACE_R)),
         (
@@ -428,7 +428,7 @@ fn the_other_side_gets_mirrored_references_and_names() {
     assert!(desk.params(second).contains(&format!("control/hand_r#{grip}")), "{}", desk.params(second));
     assert_eq!(desk.feature_of(second), Some(IK_R));
     // Values only.
-    desk.run(TagOperation::Params(GRIP_L, "(name: \"Left paw\", t: \"@joint arm_r + @joint arm_l\")".into()));
+    desk.run(TagOperation::Params(vec![(GRIP_L, "(name: \"Left paw\", t: \"@joint arm_r + @joint arm_l\")".into())]));
     let alone = TagClipboard::copy_tags(&desk.rig, &[GRIP_L]).unwrap();
     desk.paste(&alone, PasteWhat::Values, PasteTo::Mirror);
     let expected = "(name: \"Right paw\", t: \"@joint arm_l#0000000000000002 + @joint arm_r#0000000000000004\")";
@@ -574,7 +574,7 @@ fn random_operation(rig: &Rig, copied: &mut TagClipboard, (kind, a, b, c): (u8, 
         3 => TagOperation::Delete(vec![tag(a)]),
         4 => TagOperation::Enable(vec![tag(a), tag(b)], odd),
         5 => TagOperation::Move { tags: vec![tag(a), tag(b)], joint: joint(c), before: odd.then(|| tag(c)) },
-        6 => TagOperation::Params(tag(a), params),
+        6 => TagOperation::Params(vec![(tag(a), params)]),
         7 => TagOperation::Attach(vec![tag(a)], odd.then(|| tag(b))),
         8 => {
             let scope = match a % 3 {

@@ -18,6 +18,12 @@ pub(super) struct Shared<T> {
     pub mixed: bool,
 }
 
+impl<T> From<T> for Shared<T> {
+    fn from(value: T) -> Self {
+        Self { value, mixed: false }
+    }
+}
+
 impl<T: PartialEq> Shared<T> {
     /// The last of `values` is the active one's; `None` if there is none.
     pub fn of(values: impl DoubleEndedIterator<Item = T>) -> Option<Self> {
@@ -154,10 +160,10 @@ impl Numbers {
     }
 
     /// One number beside its name.
-    pub fn number(&mut self, ui: &mut Ui, name: &str, shown: f32, look: Look) -> Option<NumberEdit> {
+    pub fn number(&mut self, ui: &mut Ui, name: &str, shown: impl Into<Shared<f32>>, look: Look) -> Option<NumberEdit> {
         labelled(ui, name, |ui| {
             let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
-            self.field(ui, name, RichText::new(""), Shared { value: shown, mixed: false }, look, size)
+            self.field(ui, name, RichText::new(""), shown.into(), look, size)
         })
     }
 

@@ -3,7 +3,7 @@
 //!
 //! A typed or dragged value is one step of the history. The rig shows a number while it is dragged.
 
-mod tags;
+pub(super) mod tags;
 mod values;
 
 use bevy::prelude::*;

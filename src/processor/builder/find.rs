@@ -2,6 +2,7 @@
 
 use super::{
     super::{
+        NodeId,
         off::Off,
         resolve::{self, Asker},
     },
@@ -42,15 +43,34 @@ impl Builder {
     /// See [`FindError`].
     pub fn find(&self, rig: &Rig, text: &str) -> Result<Vec<Uid>, FindError> {
         let references = NodeRefs::parse(text, rig)?;
-        let joint = *self.world.joints.first().ok_or(FindError::Empty)?;
+        self.find_all(*self.world.joints.first().ok_or(FindError::Empty)?, text, &references)
+    }
+
+    /// The same for a tag of a joint, which is `@this`.
+    ///
+    /// # Errors
+    /// See [`FindError`].
+    pub fn find_from(&self, rig: &Rig, joint: Uid, text: &str) -> Result<Vec<Uid>, FindError> {
+        let references = NodeRefs::parse(text, rig)?;
+        self.find_all(self.world.id(joint).ok_or(FindError::Empty)?, text, &references)
+    }
+
+    /// Name of a node that is built so far, for people.
+    pub fn name_of(&self, node: Uid) -> Option<String> {
+        let (node, place) = (self.world.id(node)?, self.cursor() as u32);
+        self.world.exists(node, place).then(|| self.world.name(node, place))
+    }
+
+    fn find_all(&self, joint: NodeId, text: &str, references: &NodeRefs) -> Result<Vec<Uid>, FindError> {
         let asker = Asker { rig: self.rig, joint, place: self.cursor() as u32 };
         let found =
-            resolve::resolve(&self.world, asker, &references).map_err(|error| FindError::Meaning(error.to_string()))?;
+            resolve::resolve(&self.world, asker, references).map_err(|error| FindError::Meaning(error.to_string()))?;
         match found.gaps.into_iter().next() {
             Some(gap) if found.nodes.is_empty() => Err(FindError::Off { text: text.to_owned(), off: gap.off }),
             _ => Ok(found.nodes.into_iter().map(|node| self.world.uid(node)).collect()),
         }
     }
+
     /// What is off of a joint with that label, or of the nodes that a command makes under that name; `None` if nothing
     /// is, or nothing is called so.
     pub fn off_named(&self, name: &str) -> Option<Off> {

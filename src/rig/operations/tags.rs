@@ -46,8 +46,8 @@ pub enum TagOperation {
     },
     /// Gives a tag a comment.
     Comment(Uid, String),
-    /// Gives a command other parameters. Names without a uid in its references are bound.
-    Params(Uid, String),
+    /// Gives commands other parameters. Names without a uid in their references are bound.
+    Params(Vec<(Uid, String)>),
     /// Makes a feature tag another feature: kind, name, switch.
     Feature {
         /// Tag to change.
@@ -207,13 +207,13 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
         }
         TagOperation::Move { tags, joint, before } => relocate(draft, tags, *joint, *before),
         TagOperation::Comment(tag, comment) => change(draft, *tag, |tag| tag.comment.clone_from(comment)),
-        TagOperation::Params(uid, text) => {
+        TagOperation::Params(tags) => tags.iter().try_for_each(|(uid, text)| {
             let (joint, mut tag) = found(draft, *uid)?;
             let TagKind::Command { params, .. } = &mut tag.kind else { return Err(TagError::NotCommand(*uid).into()) };
             params.clone_from(text);
             let tag = bound(draft, tag)?;
             set(draft, joint, tag)
-        }
+        }),
         TagOperation::Feature { tag, kind, name, switch } => {
             feature_tag(draft, *tag)?;
             change(draft, *tag, |tag| {

@@ -65,7 +65,8 @@ fn about(tag: &TagData) -> String {
     if tag.comment.is_empty() { data } else { format!("{}\n{data}", tag.comment) }
 }
 
-fn state(ui: &Ui, status: &CommandStatus) -> (&'static str, Color32) {
+/// Word and colour of what became of a command.
+pub(in crate::editor::panels) fn state(ui: &Ui, status: &CommandStatus) -> (&'static str, Color32) {
     match status.state {
         CommandState::Done => ("built", ui.visuals().weak_text_color()),
         CommandState::Pending => ("not built yet", ui.visuals().weak_text_color()),
@@ -75,7 +76,7 @@ fn state(ui: &Ui, status: &CommandStatus) -> (&'static str, Color32) {
 }
 
 /// The reason why a command failed or is passed over.
-fn reason(status: &CommandStatus) -> Option<String> {
+pub(in crate::editor::panels) fn reason(status: &CommandStatus) -> Option<String> {
     let failed = status.error.as_ref().map(ToString::to_string);
     failed.or_else(|| status.skipped.as_ref().map(ToString::to_string))
 }

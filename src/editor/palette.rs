@@ -1,0 +1,168 @@
+//! Command palette: every action by words, with its key, and the reason if it can do nothing at present.
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Key, RichText, TextEdit, WidgetInfo, WidgetType};
+
+use super::{
+    ActiveRig,
+    actions::{Action, ActionRequest},
+    help::describe,
+    keys::KeyBindings,
+    panel::{EditorOverlay, PanelApp, Requests},
+    style,
+};
+use crate::{
+    plugins::{commands::Processor, document::Selection, history::RigHistory, surface::RigMeshes},
+    rig::{Rig, TagKind},
+};
+
+/// Plugin of the command palette.
+pub struct PalettePlugin;
+
+impl Plugin for PalettePlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<PaletteShown>().add_overlay(Palette::default()).add_systems(Update, toggle_palette);
+    }
+}
+
+/// Visibility of the palette.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PaletteShown(pub bool);
+
+fn toggle_palette(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<PaletteShown>) {
+    for ActionRequest(action) in actions.read() {
+        match action {
+            Action::Palette => shown.0 = !shown.0,
+            Action::Cancel if shown.0 => shown.0 = false,
+            _ => {}
+        }
+    }
+}
+
+/// The reason why an action can do nothing at present, in a few words; `None` if it can.
+pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
+    let Some(entity) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else { return Some("no rig is open") };
+    let rig = world.get::<Rig>(entity)?;
+    let history = world.get::<RigHistory>(entity);
+    let selected = world.get::<Selection>(entity).is_some_and(|selection| !selection.0.is_empty());
+    let has_mesh = world.get::<RigMeshes>(entity).is_some_and(|meshes| !meshes.is_empty());
+    let commands = rig.walk().flat_map(|joint| &joint.data.tags);
+    let has_commands = || commands.into_iter().any(|tag| matches!(tag.kind, TagKind::Command { .. }));
+    let place = world.get::<Processor>(entity).map(|processor| processor.builder());
+    match action {
+        Action::Undo => history.is_some_and(|history| history.steps().1 == 0).then_some("there is no step to undo"),
+        Action::Redo => history.is_some_and(|history| !history.can_redo()).then_some("nothing was undone"),
+        Action::Delete | Action::DeleteHierarchy | Action::MirrorSelected => {
+            (!selected).then_some("no joint is selected")
+        }
+        Action::SelectAll | Action::StorePose | Action::ResetPose => rig.is_empty().then_some("there are no joints"),
+        Action::Fit => (!has_mesh).then_some("no mesh is open"),
+        Action::Skin if !has_mesh => Some("no mesh is open"),
+        Action::Skin => rig.is_empty().then_some("there are no joints"),
+        Action::Build => (!has_commands()).then_some("no joint has commands: add tags, or a part"),
+        Action::RollBack | Action::StepBack => {
+            place.is_none_or(|builder| builder.cursor() == 0).then_some("no command is carried out")
+        }
+        Action::StepForward => {
+            place.is_none_or(|builder| builder.cursor() == builder.len()).then_some("all commands are carried out")
+        }
+        _ => None,
+    }
+}
+
+/// Actions whose descriptions contain all words; those that begin with the first word come first.
+pub fn found(words: &str) -> Vec<Action> {
+    let words: Vec<String> = words.split_whitespace().map(str::to_lowercase).collect();
+    let begins = |text: &str| words.first().is_some_and(|word| text.starts_with(word.as_str()));
+    let mut list: Vec<(Action, String)> =
+        Action::all().into_iter().map(|action| (action, describe(action).to_lowercase())).collect();
+    list.retain(|(_, text)| words.iter().all(|word| text.contains(word.as_str())));
+    list.sort_by_key(|(_, text)| !begins(text));
+    list.into_iter().map(|(action, _)| action).collect()
+}
+
+#[derive(Default)]
+struct Palette {
+    words: String,
+    /// Place in the list that `Enter` takes.
+    place: usize,
+    was_shown: bool,
+}
+
+impl EditorOverlay for Palette {
+    fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
+        let is_shown = world.get_resource::<PaletteShown>().is_some_and(|shown| shown.0);
+        let opened = is_shown && !self.was_shown;
+        self.was_shown = is_shown;
+        if !is_shown {
+            return;
+        }
+        if opened {
+            (self.words, self.place) = (String::new(), 0);
+        }
+        let list = found(&self.words);
+        let moved = ctx.input_mut(|input| {
+            let down = input.consume_key(egui::Modifiers::NONE, Key::ArrowDown);
+            let up = input.consume_key(egui::Modifiers::NONE, Key::ArrowUp);
+            i32::from(down) - i32::from(up)
+        });
+        let last = list.len().saturating_sub(1);
+        self.place = self.place.saturating_add_signed(moved as isize).min(last);
+        let mut chosen = None;
+        let mut is_open = true;
+        let frame = egui::Window::new("Actions")
+            .open(&mut is_open)
+            .collapsible(false)
+            .resizable(false)
+            .anchor(egui::Align2::CENTER_TOP, [0.0, 60.0]);
+        frame.show(ctx, |ui| {
+            ui.set_width(440.0);
+            let field = TextEdit::singleline(&mut self.words).hint_text("What do you want to do?").desired_width(440.0);
+            let field = ui.add(field);
+            field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Search actions"));
+            if field.changed() {
+                self.place = 0;
+            }
+            if field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter)) {
+                chosen = list.get(self.place).copied();
+            } else if opened || !field.has_focus() {
+                field.request_focus();
+            }
+            let height = (ctx.viewport_rect().height() - 220.0).clamp(120.0, 420.0);
+            egui::ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+                let keys = world.get_resource::<KeyBindings>();
+                for (number, action) in list.iter().enumerate() {
+                    let why_not = obstacle(world, *action);
+                    ui.horizontal(|ui| {
+                        let text = RichText::new(describe(*action));
+                        let text = if why_not.is_some() { text.color(style::QUIET) } else { text };
+                        let row = ui.selectable_label(number == self.place, text);
+                        if moved != 0 && number == self.place {
+                            row.scroll_to_me(None);
+                        }
+                        if row.clicked() {
+                            chosen = Some(*action);
+                        }
+                        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                            if let Some(key) = keys.and_then(|keys| keys.key(*action)) {
+                                ui.label(RichText::new(key.to_string()).small().color(style::ACCENT));
+                            }
+                            if let Some(why_not) = why_not {
+                                ui.label(RichText::new(why_not).small().color(style::QUIET));
+                            }
+                        });
+                    });
+                }
+                if list.is_empty() {
+                    ui.weak("No action is called so.");
+                }
+            });
+        });
+        if let Some(action) = chosen.filter(|action| obstacle(world, *action).is_none()) {
+            requests.set(PaletteShown(false));
+            requests.send(ActionRequest(action));
+        } else if !is_open || ctx.input(|input| input.key_pressed(Key::Escape)) {
+            requests.set(PaletteShown(false));
+        }
+    }
+}

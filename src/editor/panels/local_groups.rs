@@ -1,0 +1,239 @@
+//! Groups panel: the local groups of a rig with their colours and joints; create, rename, recolour, assign, merge, remove.
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Checkbox, Key, ScrollArea, TextEdit, Ui, WidgetInfo, WidgetType};
+
+use super::{
+    displayed_rig::{DisplayedRig, color},
+    list,
+};
+use crate::{
+    editor::panel::{EditorPanel, Requests},
+    plugins::{
+        document::{Change, EditRequest},
+        picking::{Pick, PickRequest},
+    },
+    rig::{
+        GroupData, RigEdit, Uid,
+        operations::{Operation, TagOperation, TagScope},
+    },
+};
+
+/// The panel.
+#[derive(Default)]
+pub struct GroupsPanel {
+    /// Name of a group that is being made.
+    draft: String,
+    /// Group whose name is being typed, with the text.
+    renamed: Option<(Uid, String)>,
+    /// Group whose colour is being chosen.
+    colored: Option<(Uid, [f32; 3])>,
+}
+
+/// Colours of new groups in turn: far apart, and all readable on dark and light ground.
+const COLORS: [[f32; 3]; 8] = [
+    [0.85, 0.35, 0.30],
+    [0.30, 0.55, 0.90],
+    [0.35, 0.70, 0.35],
+    [0.90, 0.65, 0.20],
+    [0.65, 0.45, 0.85],
+    [0.20, 0.70, 0.70],
+    [0.85, 0.45, 0.70],
+    [0.60, 0.55, 0.35],
+];
+
+/// What a row asks for.
+enum RowRequest {
+    Edits(Vec<RigEdit>),
+    Preview(Vec<RigEdit>),
+    Operation(Operation),
+    Select,
+}
+
+impl EditorPanel for GroupsPanel {
+    fn title(&self) -> &'static str {
+        "Groups"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let Some(shown) = DisplayedRig::of(world) else {
+            return list::nothing(ui, "No rig is open.");
+        };
+        let selected: Vec<Uid> =
+            shown.selection.0.iter().copied().filter(|joint| shown.rig.joint(*joint).is_some()).collect();
+        self.create(ui, &shown, &selected, requests);
+        ui.separator();
+        let empty: Vec<Uid> =
+            shown.rig.groups().iter().map(|group| group.uid).filter(|uid| members(&shown, *uid).is_empty()).collect();
+        if !empty.is_empty() {
+            let text = format!("Remove {} empty", empty.len());
+            if ui.button(text).on_hover_text("Groups without joints").clicked() {
+                send(empty.iter().map(|uid| RigEdit::RemoveLocalGroup(*uid)).collect(), &shown, requests);
+            }
+        }
+        if shown.rig.groups().is_empty() {
+            list::nothing(ui, "No groups. A group turns its joints on and off together, and gives them a colour.");
+        }
+        ScrollArea::vertical().id_salt("groups").auto_shrink(false).show(ui, |ui| {
+            for group in shown.rig.groups() {
+                match self.row(ui, group, &shown, &selected) {
+                    Some(RowRequest::Edits(edits)) => send(edits, &shown, requests),
+                    Some(RowRequest::Preview(edits)) => {
+                        let change = Change::Preview(Operation::Edits(edits));
+                        requests.send(EditRequest { rig: shown.entity, change });
+                    }
+                    Some(RowRequest::Operation(operation)) => {
+                        requests.send(EditRequest::operation(shown.entity, operation));
+                    }
+                    Some(RowRequest::Select) => {
+                        let what = Pick::Joints(members(&shown, group.uid));
+                        requests.send(PickRequest { rig: shown.entity, what, add: false });
+                    }
+                    None => {}
+                }
+            }
+        });
+    }
+}
+
+fn send(edits: Vec<RigEdit>, shown: &DisplayedRig, requests: &mut Requests) {
+    requests.send(EditRequest::operation(shown.entity, Operation::Edits(edits)));
+}
+
+fn members(shown: &DisplayedRig, group: Uid) -> Vec<Uid> {
+    TagScope::Group(group).joints(&shown.rig).unwrap_or_default()
+}
+
+impl GroupsPanel {
+    /// A field for the name of a new group, which takes the selected joints.
+    fn create(&mut self, ui: &mut Ui, shown: &DisplayedRig, selected: &[Uid], requests: &mut Requests) {
+        ui.horizontal(|ui| {
+            let width = (ui.available_width() - 70.0).max(60.0);
+            let field = ui.add(TextEdit::singleline(&mut self.draft).hint_text("New group").desired_width(width));
+            field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "New group"));
+            let name = self.draft.trim().to_owned();
+            let is_free = shown.rig.groups().iter().all(|group| group.name != name);
+            let can = !name.is_empty() && is_free && !selected.is_empty();
+            let tip = if selected.is_empty() {
+                "Select the joints that go into it first"
+            } else if !is_free {
+                "There is a group of this name"
+            } else {
+                "Puts the selected joints into a new group"
+            };
+            let button =
+                ui.add_enabled(can, egui::Button::new("Create")).on_hover_text(tip).on_disabled_hover_text(tip);
+            let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+            if can && (button.clicked() || entered) {
+                let color = Some(COLORS[shown.rig.groups().len() % COLORS.len()]);
+                let operation = Operation::Group { joints: selected.to_vec(), name, color };
+                requests.send(EditRequest::operation(shown.entity, operation));
+                self.draft.clear();
+            }
+        });
+    }
+
+    fn row(&mut self, ui: &mut Ui, group: &GroupData, shown: &DisplayedRig, selected: &[Uid]) -> Option<RowRequest> {
+        let joints = members(shown, group.uid);
+        let mut request = None;
+        ui.horizontal(|ui| {
+            let mut rgb = match self.colored {
+                Some((uid, rgb)) if uid == group.uid => rgb,
+                _ => group.color,
+            };
+            let color_field = ui.color_edit_button_rgb(&mut rgb);
+            if color_field.on_hover_text("Colour").changed() {
+                self.colored = Some((group.uid, rgb));
+                request =
+                    Some(RowRequest::Preview(vec![RigEdit::SetLocalGroup(GroupData { color: rgb, ..group.clone() })]));
+            }
+            let holding = ui.input(|input| input.pointer.any_down());
+            if let Some((_, rgb)) = self.colored.take_if(|(uid, _)| *uid == group.uid && !holding) {
+                request =
+                    Some(RowRequest::Edits(vec![RigEdit::SetLocalGroup(GroupData { color: rgb, ..group.clone() })]));
+            }
+            let mut enabled = group.enabled;
+            let field = ui.add(Checkbox::new(&mut enabled, ""));
+            let said = format!("Build {}", group.name);
+            field.widget_info(move || WidgetInfo::selected(WidgetType::Checkbox, true, enabled, &said));
+            if field.on_hover_text("Builds the joints of this group").clicked() {
+                request = Some(RowRequest::Operation(Operation::Tags(TagOperation::EnableGroup(group.uid, enabled))));
+            }
+            self.name(ui, group, &mut request);
+            ui.weak(format!("{}", joints.len()));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let menu = ui.menu_button("⋮", |ui| menu(ui, group, shown, selected, &joints));
+                let said = format!("Menu of {}", group.name);
+                menu.response.widget_info(move || WidgetInfo::labeled(WidgetType::Button, true, &said));
+                request = request.take().or(menu.inner.flatten());
+            });
+        });
+        request
+    }
+
+    /// The name; a double click edits it.
+    fn name(&mut self, ui: &mut Ui, group: &GroupData, request: &mut Option<RowRequest>) {
+        let Some((_, text)) = self.renamed.as_mut().filter(|(uid, _)| *uid == group.uid) else {
+            let text = egui::RichText::new(&group.name).color(color(group.color));
+            let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
+            let label = label.on_hover_text("Click selects its joints, a double click renames it");
+            if label.double_clicked() {
+                self.renamed = Some((group.uid, group.name.clone()));
+            } else if label.clicked() {
+                *request = Some(RowRequest::Select);
+            }
+            return;
+        };
+        let field = ui.add(TextEdit::singleline(text).desired_width(100.0));
+        field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Group name"));
+        if field.lost_focus() {
+            let name = text.trim().to_owned();
+            self.renamed = None;
+            let dropped = ui.input(|input| input.key_pressed(Key::Escape));
+            if !dropped && !name.is_empty() && name != group.name {
+                *request = Some(RowRequest::Edits(vec![RigEdit::SetLocalGroup(GroupData { name, ..group.clone() })]));
+            }
+        } else if !field.has_focus() {
+            field.request_focus();
+        }
+    }
+}
+
+fn menu(ui: &mut Ui, group: &GroupData, shown: &DisplayedRig, selected: &[Uid], joints: &[Uid]) -> Option<RowRequest> {
+    let mut chosen = None;
+    let mut item = |ui: &mut Ui, name: &str, enabled: bool, request: &dyn Fn() -> RowRequest| {
+        if ui.add_enabled(enabled, egui::Button::new(name)).clicked() {
+            chosen = Some(request());
+            ui.close();
+        }
+    };
+    let put = |joints: Vec<Uid>, name: &str| {
+        RowRequest::Operation(Operation::Group { joints, name: name.to_owned(), color: None })
+    };
+    let below = || TagScope::Hierarchy(selected.to_vec()).joints(&shown.rig).unwrap_or_default();
+    let all = || TagScope::Rig.joints(&shown.rig).unwrap_or_default();
+    let any = !selected.is_empty();
+    item(ui, "Assign selected", any, &|| put(selected.to_vec(), &group.name));
+    item(ui, "Assign selected and below", any, &|| put(below(), &group.name));
+    item(ui, "Assign all joints", !shown.rig.is_empty(), &|| put(all(), &group.name));
+    ui.separator();
+    item(ui, "Take selected out", any, &|| put(selected.iter().copied().filter(|j| joints.contains(j)).collect(), ""));
+    item(ui, "Clear", !joints.is_empty(), &|| put(joints.to_vec(), ""));
+    ui.menu_button("Merge into", |ui| {
+        for other in shown.rig.groups().iter().filter(|other| other.uid != group.uid) {
+            item(ui, &other.name, true, &|| {
+                let mut edits: Vec<RigEdit> =
+                    joints.iter().map(|joint| RigEdit::SetGroup(*joint, Some(other.uid))).collect();
+                edits.push(RigEdit::RemoveLocalGroup(group.uid));
+                RowRequest::Edits(edits)
+            });
+        }
+    });
+    ui.separator();
+    item(ui, "Remove", true, &|| {
+        let mut edits: Vec<RigEdit> = joints.iter().map(|joint| RigEdit::SetGroup(*joint, None)).collect();
+        edits.push(RigEdit::RemoveLocalGroup(group.uid));
+        RowRequest::Edits(edits)
+    });
+    chosen
+}

@@ -1,0 +1,275 @@
+//! Process panel: the list of commands with what became of each, steps in both directions, breakpoints.
+
+use bevy::{ecs::change_detection::Tick, prelude::*};
+use bevy_egui::egui::{self, Color32, Rect, RichText, Sense, Ui, WidgetInfo, WidgetType, pos2, vec2};
+
+use super::{
+    displayed_rig::{DisplayedRig, Stamp},
+    list::{self, List},
+};
+use crate::{
+    editor::panel::{EditorPanel, Requests},
+    plugins::{
+        commands::{BuildRequest, BuildStep, Processor},
+        picking::{Pick, PickRequest},
+    },
+    processor::{BuildRange, Builder, CommandState, CommandStatus, ListEntry},
+    rig::{TagKind, Uid},
+};
+
+/// The panel.
+#[derive(Default)]
+pub struct ProcessPanel {
+    made_from: Option<(Stamp, Tick)>,
+    rows: Vec<Row>,
+    /// Words that rows have to contain.
+    filter: String,
+    /// Rows that contain them.
+    shown: Vec<usize>,
+    filtered: Option<String>,
+    /// Scrolls to the next command after each step.
+    follow: bool,
+    cursor: usize,
+    in_range: bool,
+}
+
+/// A command of the list.
+struct Row {
+    entry: ListEntry,
+    joint: String,
+    name: String,
+    status: Option<CommandStatus>,
+    is_breakpoint: bool,
+}
+
+impl EditorPanel for ProcessPanel {
+    fn title(&self) -> &'static str {
+        "Process"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let Some(shown) = DisplayedRig::of(world) else {
+            return list::nothing(ui, "No rig is open.");
+        };
+        let processor = world.get_entity(shown.entity).ok().and_then(|rig| rig.get_ref::<Processor>());
+        let Some(processor) = processor else {
+            list::nothing(ui, "The rig has no commands yet: add tags to its joints, or drop a part.");
+            return;
+        };
+        let builder = processor.builder();
+        self.refresh(&shown, processor.last_changed(), builder);
+        self.steps(ui, &shown, processor.follows(), builder, requests);
+        self.find();
+        let reveal = (self.follow && self.cursor != builder.cursor())
+            .then(|| self.shown.iter().position(|row| *row + 1 >= builder.cursor()))
+            .flatten();
+        self.cursor = builder.cursor();
+        let height = list::row_height(ui);
+        let rows = List { id: "commands", count: self.shown.len(), height, reveal, follow: false };
+        let mut clicked = None;
+        rows.show(ui, |ui, range, place| {
+            for number in range {
+                let at = self.shown[number];
+                if let Some(click) = self.row(ui, place(number), at, builder.cursor()) {
+                    clicked = Some((at, click));
+                }
+            }
+        });
+        if let Some((at, click)) = clicked {
+            self.carry_out(at, click, &shown, requests);
+        }
+    }
+}
+
+/// What a click on a row asks for.
+enum Click {
+    Select,
+    RunTo,
+    Breakpoint,
+}
+
+impl ProcessPanel {
+    fn refresh(&mut self, shown: &DisplayedRig, changed: Tick, builder: &Builder) {
+        let made_from = Some((shown.stamp(), changed));
+        if self.made_from == made_from {
+            return;
+        }
+        let breakpoints = builder.breakpoints();
+        let row = |entry: ListEntry| Row {
+            joint: shown.name(entry.joint).into_owned(),
+            name: name(shown, &entry),
+            status: builder.status(entry.command),
+            is_breakpoint: breakpoints.contains(&entry.command),
+            entry,
+        };
+        self.rows = builder.list().into_iter().map(row).collect();
+        self.made_from = made_from;
+        self.filtered = None;
+    }
+
+    fn find(&mut self) {
+        if self.filtered.as_ref() == Some(&self.filter) {
+            return;
+        }
+        let words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
+        let fits = |row: &Row| {
+            let text = format!("{} {} {}", row.joint, row.entry.module, state_word(row.status.as_ref())).to_lowercase();
+            words.iter().all(|word| text.contains(word.as_str()))
+        };
+        self.shown = (0..self.rows.len()).filter(|row| fits(&self.rows[*row])).collect();
+        self.filtered = Some(self.filter.clone());
+    }
+
+    fn steps(&mut self, ui: &mut Ui, shown: &DisplayedRig, follows: bool, builder: &Builder, requests: &mut Requests) {
+        let (done, total) = (builder.cursor(), builder.len());
+        let mut ask = |step: BuildStep| requests.send(BuildRequest { rig: shown.entity, step });
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            let steps = [
+                ("⏮", "Roll all back", BuildStep::RollBack, done > 0),
+                ("⏪", "Roll the last joint back", BuildStep::JointBack, done > 0),
+                ("⏴", "Take the last command back", BuildStep::Back, done > 0),
+                ("⏵", "Carry out the next command", BuildStep::Forward, done < total),
+                ("⏩", "Carry out the next joint", BuildStep::JointForward, done < total),
+                ("⏭", "Run to the next breakpoint, or to the end", BuildStep::Run, done < total),
+            ];
+            for (symbol, tip, step, enabled) in steps {
+                ui.add_enabled_ui(enabled, |ui| {
+                    if list::symbol_button(ui, symbol, tip) {
+                        ask(step);
+                    }
+                });
+            }
+            ui.label(format!("{done} of {total}"));
+            let micros: f32 = self.rows.iter().filter_map(|row| Some(row.status.as_ref()?.micros)).sum();
+            ui.weak(format!("{:.1} ms", micros / 1000.0))
+                .on_hover_text("Time of the last run of each command, together");
+        });
+        ui.horizontal_wrapped(|ui| {
+            let mut live = follows;
+            if ui.checkbox(&mut live, "Live").on_hover_text("Edits rebuild what depends on them at once").clicked() {
+                ask(BuildStep::Follow(live));
+            }
+            ui.checkbox(&mut self.follow, "Follow").on_hover_text("Scrolls to the command that was carried out last");
+            let selected = &shown.selection.0;
+            let tip = "Only commands of the selected joints and of those below them";
+            let field = ui.add_enabled(
+                self.in_range || !selected.is_empty(),
+                egui::Checkbox::new(&mut self.in_range, "Selection only"),
+            );
+            if field.on_hover_text(tip).clicked() {
+                ask(BuildStep::Range(match self.in_range {
+                    true => BuildRange::Hierarchy(selected.iter().copied().collect()),
+                    false => BuildRange::Rig,
+                }));
+            }
+        });
+        list::search_bar(ui, "Filter commands", "Words of joint, module and state", &mut self.filter, |_| {});
+    }
+
+    fn row(&self, ui: &mut Ui, rect: Rect, number: usize, cursor: usize) -> Option<Click> {
+        let row = &self.rows[number];
+        let id = ui.id().with(row.entry.command.0);
+        let response = ui.interact(rect, id, Sense::click());
+        let state = state_word(row.status.as_ref());
+        let said = format!("{} {} {state}", row.joint, row.name);
+        response.widget_info(move || WidgetInfo::labeled(WidgetType::SelectableLabel, true, &said));
+        let painter = ui.painter();
+        if response.hovered() {
+            painter.rect_filled(rect, 2.0, ui.visuals().widgets.hovered.weak_bg_fill);
+        }
+        let size = rect.height();
+        let dot = Rect::from_min_size(rect.min, vec2(size, size));
+        let color = color(ui, row.status.as_ref());
+        painter.circle_filled(dot.center(), 4.0, color);
+        if row.is_breakpoint {
+            painter.circle_stroke(dot.center(), 6.0, (2.0, ui.visuals().error_fg_color));
+        }
+        // The next command to be carried out.
+        if number == cursor {
+            painter.hline(rect.x_range(), rect.top(), (1.5, ui.visuals().selection.stroke.color));
+        }
+        let time =
+            row.status.as_ref().filter(|status| status.runs > 0).map_or_else(String::new, |status| time(status.micros));
+        let right = if rect.width() > 180.0 { 62.0 } else { 0.0 };
+        let middle = rect.left() + size + (rect.width() - size - right) * 0.45;
+        let text = |from: f32, to: f32| Rect::from_min_max(pos2(from, rect.top()), pos2(to, rect.bottom()));
+        let quiet = ui.visuals().weak_text_color();
+        let is_off = matches!(row.status.as_ref().map(|status| status.state), Some(CommandState::Skipped));
+        let strong = if is_off { quiet } else { ui.visuals().text_color() };
+        list::line(ui, text(rect.left() + size, middle - 4.0), &row.joint, quiet);
+        list::line(ui, text(middle, rect.right() - right), &row.name, strong);
+        if right > 0.0 {
+            list::line(ui, text(rect.right() - right + 4.0, rect.right()), &time, quiet);
+        }
+        let mut click = response.clicked().then_some(Click::Select);
+        response.context_menu(|ui| {
+            let label = if row.is_breakpoint { "Remove breakpoint" } else { "Stop before it" };
+            for (name, asked) in [("Run to here", Click::RunTo), (label, Click::Breakpoint)] {
+                if ui.button(name).clicked() {
+                    click = Some(asked);
+                    ui.close();
+                }
+            }
+        });
+        let reason = row.status.as_ref().and_then(reason);
+        if let Some(reason) = reason {
+            response.on_hover_ui(|ui| {
+                ui.label(RichText::new(reason).color(color));
+            });
+        }
+        click
+    }
+
+    fn carry_out(&self, number: usize, click: Click, shown: &DisplayedRig, requests: &mut Requests) {
+        let row = &self.rows[number];
+        let ask = |step| BuildRequest { rig: shown.entity, step };
+        match click {
+            Click::Select => {
+                let what = Pick::Joints(vec![row.entry.joint]);
+                requests.send(PickRequest { rig: shown.entity, what, add: false });
+            }
+            Click::RunTo => requests.send(ask(BuildStep::To(number + 1))),
+            Click::Breakpoint => requests.send(ask(BuildStep::Breakpoint(row.entry.command, !row.is_breakpoint))),
+        }
+    }
+}
+
+/// Module of a command, with the name that it gives.
+fn name(shown: &DisplayedRig, entry: &ListEntry) -> String {
+    let comment = |uid: Uid| {
+        let (_, tag) = shown.rig.find_tag(uid)?;
+        let is_command = matches!(tag.kind, TagKind::Command { .. });
+        (is_command && !tag.comment.is_empty()).then(|| tag.comment.clone())
+    };
+    match comment(entry.command) {
+        Some(comment) => format!("{} · {comment}", entry.module),
+        None => entry.module.to_string(),
+    }
+}
+
+fn state_word(status: Option<&CommandStatus>) -> &'static str {
+    match status.map(|status| status.state) {
+        Some(CommandState::Done) => "built",
+        Some(CommandState::Skipped) => "passed over",
+        Some(CommandState::Failed) => "failed",
+        Some(CommandState::Pending) | None => "not built yet",
+    }
+}
+
+fn color(ui: &Ui, status: Option<&CommandStatus>) -> Color32 {
+    match status.map(|status| status.state) {
+        Some(CommandState::Done) => Color32::from_rgb(96, 176, 96),
+        Some(CommandState::Skipped) => ui.visuals().warn_fg_color,
+        Some(CommandState::Failed) => ui.visuals().error_fg_color,
+        Some(CommandState::Pending) | None => ui.visuals().weak_text_color(),
+    }
+}
+
+fn reason(status: &CommandStatus) -> Option<String> {
+    super::properties::tags::reason(status)
+}
+
+fn time(micros: f32) -> String {
+    if micros < 1000.0 { format!("{micros:.0} µs") } else { format!("{:.2} ms", micros / 1000.0) }
+}

@@ -1,0 +1,371 @@
+//! Tags panel: the stack of tags of the selected joints, as cards with their values, and the library of modules.
+//!
+//! Tags that several selected joints have alike are one card and are changed together.
+
+mod library;
+mod parts;
+mod references;
+mod stack;
+mod values;
+
+use std::{collections::HashSet, sync::Arc};
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Checkbox, RichText, ScrollArea, Sense, Ui, WidgetInfo, WidgetType};
+
+use super::{
+    displayed_rig::DisplayedRig,
+    fields::MIXED,
+    list,
+    properties::tags::{reason, state},
+};
+use crate::{
+    editor::{
+        notice::Notice,
+        panel::{EditorPanel, Requests},
+    },
+    plugins::{
+        commands::{CommandReport, Processor, RigModules, TagEntities},
+        document::{Change, EditRequest},
+    },
+    processor::Modules,
+    rig::{
+        TagKind, Uid,
+        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation},
+    },
+};
+use stack::{Entry, Stack};
+use values::{ValueEdit, Values};
+
+/// The panel.
+#[derive(Default)]
+pub struct TagsPanel {
+    stack: Stack,
+    values: Values,
+    /// Tags whose cards are open.
+    open: HashSet<Uid>,
+    words: String,
+    clipboard: Option<Arc<TagClipboard>>,
+    parts: parts::PartList,
+}
+
+/// Request of a card.
+enum CardRequest {
+    Operation(TagOperation),
+    Value(ValueEdit),
+    Copy,
+    Cut,
+    Mirror,
+}
+
+impl EditorPanel for TagsPanel {
+    fn title(&self) -> &'static str {
+        "Tags"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let Some(shown) = DisplayedRig::of(world) else {
+            return list::nothing(ui, "No rig is open.");
+        };
+        self.stack.refresh(&shown);
+        if self.stack.joints.is_empty() {
+            return list::nothing(ui, "Select a joint to see its tags: what the rig builds on it.");
+        }
+        let Some(modules) = world.get_resource::<RigModules>() else { return };
+        self.header(ui, &modules.0, &shown, requests);
+        ui.separator();
+        let entries = std::mem::take(&mut self.stack.entries);
+        ScrollArea::vertical().id_salt("tags").auto_shrink(false).show(ui, |ui| {
+            if entries.is_empty() {
+                ui.weak("Nothing is built here. Add a control, an IK handle, a spring …");
+            }
+            for (number, entry) in entries.iter().enumerate() {
+                let request = self.card(ui, world, &shown, &modules.0, &entries, number);
+                if let Some(request) = request {
+                    self.carry_out(request, entry, &modules.0, &shown, requests);
+                }
+            }
+        });
+        self.stack.entries = entries;
+    }
+}
+
+fn send(operation: TagOperation, shown: &DisplayedRig, requests: &mut Requests) {
+    requests.send(EditRequest::operation(shown.entity, Operation::Tags(operation)));
+}
+
+impl TagsPanel {
+    fn header(&mut self, ui: &mut Ui, modules: &Modules, shown: &DisplayedRig, requests: &mut Requests) {
+        ui.horizontal_wrapped(|ui| {
+            let joints = &self.stack.joints;
+            let name = match joints[..] {
+                [joint] => shown.name(joint).into_owned(),
+                _ => format!("{} joints", joints.len()),
+            };
+            ui.strong(name);
+            let to = joints.clone();
+            ui.menu_button("＋ Add", |ui| {
+                if let Some(module) = library::library(ui, modules, &mut self.words) {
+                    let kind = TagKind::Command { module: module.to_owned(), feature: None, params: "()".to_owned() };
+                    send(TagOperation::Add { joints: to.clone(), kind, index: None }, shown, requests);
+                }
+                ui.separator();
+                if ui.button("Feature").on_hover_text("A switch that other tags can be put into").clicked() {
+                    let kind = TagKind::Feature {
+                        kind: "feature".to_owned(),
+                        name: "feature".to_owned(),
+                        switch: String::new(),
+                        choice: String::new(),
+                    };
+                    send(TagOperation::Add { joints: to.clone(), kind, index: Some(0) }, shown, requests);
+                    ui.close();
+                }
+            });
+            ui.menu_button("Part", |ui| {
+                if let Some(part) = self.parts.menu(ui) {
+                    let joints = parts::chain(&shown.rig, &self.stack.joints, part.len());
+                    let bindings = std::collections::BTreeMap::new();
+                    send(TagOperation::Drop { part, joints, bindings }, shown, requests);
+                }
+            });
+            if ui.button("Copy all").on_hover_text("Copies all tags of the selected joints").clicked() {
+                let tags = self.stack.entries.iter().flat_map(Entry::uids).collect::<Vec<_>>();
+                self.copied(TagClipboard::copy_tags(&shown.rig, &tags), requests);
+            }
+            let clipboard = self.clipboard.clone();
+            ui.add_enabled_ui(clipboard.is_some(), |ui| {
+                ui.menu_button("Paste", |ui| {
+                    let Some(clipboard) = &clipboard else { return };
+                    let both = [
+                        ("Tags", PasteWhat::Tags),
+                        ("Values", PasteWhat::Values),
+                        ("Tags and values", PasteWhat::Both),
+                    ];
+                    for (name, what) in both {
+                        if ui.button(name).clicked() {
+                            let to = PasteTo::Joints(self.stack.joints.clone());
+                            let clipboard = Arc::clone(clipboard);
+                            send(TagOperation::Paste { clipboard, what, to }, shown, requests);
+                            ui.close();
+                        }
+                    }
+                });
+            });
+        });
+    }
+
+    fn copied(&mut self, clipboard: Result<TagClipboard, TagError>, requests: &mut Requests) {
+        match clipboard {
+            Ok(clipboard) => {
+                let count: usize = clipboard.joints.iter().map(|joint| joint.tags.len()).sum();
+                requests.send(Notice::done(format!("Copied {count} tags.")).quiet());
+                self.clipboard = Some(Arc::new(clipboard));
+            }
+            Err(error) => requests.send(Notice::error(format!("Nothing was copied: {error}."))),
+        }
+    }
+
+    fn carry_out(
+        &mut self,
+        request: CardRequest,
+        entry: &Entry,
+        modules: &Modules,
+        shown: &DisplayedRig,
+        requests: &mut Requests,
+    ) {
+        let params = |list| Operation::Tags(TagOperation::Params(list));
+        match request {
+            CardRequest::Operation(operation) => send(operation, shown, requests),
+            CardRequest::Copy => self.copied(TagClipboard::copy_tags(&shown.rig, &entry.uids()), requests),
+            CardRequest::Cut => {
+                let clipboard = TagClipboard::copy_tags(&shown.rig, &entry.uids());
+                self.copied(clipboard.clone(), requests);
+                if let Ok(clipboard) = clipboard {
+                    send(TagOperation::Cut(Arc::new(clipboard)), shown, requests);
+                }
+            }
+            CardRequest::Mirror => match TagClipboard::copy_tags(&shown.rig, &entry.uids()) {
+                Ok(copied) => {
+                    let mirrored = copied.map_params(|module, params| modules.get(module)?.mirrored(params).ok());
+                    let (clipboard, what) = (Arc::new(mirrored), PasteWhat::Both);
+                    send(TagOperation::Paste { clipboard, what, to: PasteTo::Mirror }, shown, requests);
+                }
+                Err(error) => requests.send(Notice::error(format!("Nothing was mirrored: {error}."))),
+            },
+            CardRequest::Value(edit) => {
+                let change = match edit {
+                    ValueEdit::Set(list) => Change::Do(params(list)),
+                    ValueEdit::Preview(list) => Change::Preview(params(list)),
+                    ValueEdit::Commit => Change::Commit,
+                    ValueEdit::Cancel => Change::CancelPreview,
+                    ValueEdit::Refused(reason) => return requests.send(Notice::error(format!("{reason}."))),
+                };
+                requests.send(EditRequest { rig: shown.entity, change });
+            }
+        }
+    }
+
+    fn card(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        modules: &Modules,
+        entries: &[Entry],
+        number: usize,
+    ) -> Option<CardRequest> {
+        let entry = entries.get(number)?;
+        let tag = entry.first.uid;
+        let mut request = None;
+        let frame = egui::Frame::group(ui.style()).inner_margin(4.0).outer_margin(egui::Margin::symmetric(0, 1));
+        let card = frame.show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            ui.horizontal(|ui| {
+                let handle = ui.add(egui::Label::new(RichText::new("⠿").weak()).sense(Sense::drag()));
+                handle.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, format!("Drag {}", entry.title())));
+                handle.dnd_set_drag_payload(number);
+                let is_open = self.open.contains(&tag);
+                let title = entry.title();
+                if list::symbol_button(ui, if is_open { "⏷" } else { "⏵" }, &format!("Values of {title}")) {
+                    if is_open {
+                        self.open.remove(&tag)
+                    } else {
+                        self.open.insert(tag)
+                    };
+                }
+                request = enabled(ui, shown, entry);
+                state_of(ui, world, shown, entry);
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    let menu = ui.menu_button("⋮", |ui| card_menu(ui, shown, entries, number));
+                    let said = format!("Menu of {title}");
+                    menu.response.widget_info(move || WidgetInfo::labeled(WidgetType::Button, true, &said));
+                    request = request.take().or(menu.inner.flatten());
+                });
+            });
+            let summary = entry.summary();
+            if !self.open.contains(&tag) {
+                if !summary.is_empty() {
+                    ui.add(egui::Label::new(RichText::new(summary).small().weak()).truncate());
+                }
+                return;
+            }
+            let Some(name) = entry.module() else {
+                request = request.take().or(feature_fields(ui, entry));
+                return;
+            };
+            let builder = world.get::<Processor>(shown.entity).map(Processor::builder);
+            match modules.get(name) {
+                Some(module) => {
+                    ui.weak(module.doc);
+                    let edit = self.values.show(ui, shown, builder, module, entry);
+                    request = request.take().or(edit.map(CardRequest::Value));
+                }
+                None => {
+                    let reason = format!("There is no module \"{name}\".");
+                    ui.colored_label(ui.visuals().error_fg_color, reason);
+                }
+            }
+        });
+        // A card that was dragged here goes before this one.
+        if let Some(dragged) = card.response.dnd_release_payload::<usize>() {
+            request = request.or(moved(entries, *dragged, number));
+        }
+        request
+    }
+}
+
+/// Puts the tags of an entry before those of another.
+fn moved(entries: &[Entry], dragged: usize, before: usize) -> Option<CardRequest> {
+    let [(joint, tag)] = entries.get(dragged)?.tags[..] else { return None };
+    let before = entries.get(before).and_then(|entry| entry.tags.first()).map(|(_, tag)| *tag);
+    (before != Some(tag)).then_some(CardRequest::Operation(TagOperation::Move { tags: vec![tag], joint, before }))
+}
+
+fn enabled(ui: &mut Ui, shown: &DisplayedRig, entry: &Entry) -> Option<CardRequest> {
+    let on = |tag: &Uid| shown.rig.find_tag(*tag).is_some_and(|(_, tag)| tag.enabled);
+    let tags = entry.uids();
+    let count = tags.iter().filter(|tag| on(tag)).count();
+    let mut value = count > 0;
+    let mixed = count > 0 && count < tags.len();
+    let title = entry.title();
+    let several = if tags.len() > 1 { format!("{title} ({})", tags.len()) } else { title };
+    let field = Checkbox::new(&mut value, RichText::new(several).strong()).indeterminate(mixed);
+    let about = if entry.first.comment.is_empty() { "On or off" } else { &entry.first.comment };
+    let clicked = ui.add(field).on_hover_text(about).clicked();
+    clicked.then(|| CardRequest::Operation(TagOperation::Enable(tags, mixed || value)))
+}
+
+/// Draws what became of the commands in the build: the worst of them.
+fn state_of(ui: &mut Ui, world: &World, shown: &DisplayedRig, entry: &Entry) {
+    let Some(entities) = world.get::<TagEntities>(shown.entity) else { return };
+    let reports = entry.tags.iter().filter_map(|(_, tag)| world.get::<CommandReport>(entities.get(*tag)?));
+    let Some(CommandReport(status)) = reports.max_by_key(|report| report.0.state as usize) else { return };
+    let (word, color) = state(ui, status);
+    let text =
+        if status.micros >= 1000.0 { format!("{word} · {:.1} ms", status.micros / 1000.0) } else { word.to_owned() };
+    let label = ui.add(egui::Label::new(RichText::new(text).small().color(color)).truncate());
+    if let Some(reason) = reason(status) {
+        label.on_hover_text(reason);
+    }
+}
+
+fn card_menu(ui: &mut Ui, shown: &DisplayedRig, entries: &[Entry], number: usize) -> Option<CardRequest> {
+    let entry = entries.get(number)?;
+    let mut chosen = None;
+    let mut item = |ui: &mut Ui, name: &str, enabled: bool, request: &dyn Fn() -> Option<CardRequest>| {
+        if ui.add_enabled(enabled, egui::Button::new(name)).clicked() {
+            chosen = request();
+            ui.close();
+        }
+    };
+    let is_one = entry.tags.len() == 1;
+    item(ui, "Move up", is_one && number > 0, &|| moved(entries, number, number.checked_sub(1)?));
+    item(ui, "Move down", is_one && number + 1 < entries.len(), &|| moved(entries, number, number + 2));
+    ui.separator();
+    item(ui, "Copy", true, &|| Some(CardRequest::Copy));
+    item(ui, "Cut", true, &|| Some(CardRequest::Cut));
+    item(ui, "Mirror to the other side", true, &|| Some(CardRequest::Mirror));
+    ui.separator();
+    item(ui, "Delete", true, &|| Some(CardRequest::Operation(TagOperation::Delete(entry.uids()))));
+    if entry.module().is_some() {
+        ui.menu_button("Put into feature", |ui| {
+            let commands = entry.uids();
+            item(ui, "None", true, &|| Some(CardRequest::Operation(TagOperation::Attach(commands.clone(), None))));
+            let joint = entry.tags.first().and_then(|(joint, _)| shown.rig.joint(*joint));
+            for tag in joint.into_iter().flat_map(|joint| &joint.data.tags) {
+                let TagKind::Feature { name, switch, .. } = &tag.kind else { continue };
+                let name = if switch.is_empty() { name.clone() } else { format!("{name}, {switch}") };
+                let attach = || Some(CardRequest::Operation(TagOperation::Attach(commands.clone(), Some(tag.uid))));
+                item(ui, &name, true, &attach);
+            }
+        });
+    }
+    chosen
+}
+
+/// Name and switch of a feature.
+fn feature_fields(ui: &mut Ui, entry: &Entry) -> Option<CardRequest> {
+    let TagKind::Feature { kind, name, switch, .. } = &entry.first.kind else { return None };
+    let mut parts = [kind.clone(), name.clone(), switch.clone()];
+    let mut changed = false;
+    for (part, label) in parts.iter_mut().zip(["Kind", "Name", "Switch"]) {
+        let id = ui.make_persistent_id((entry.first.uid, label));
+        let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| part.clone());
+        let response = super::fields::labelled(ui, label, |ui| {
+            let response = ui.add(egui::TextEdit::singleline(&mut text).desired_width(ui.available_width()));
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, label));
+            response
+        });
+        if response.changed() {
+            ui.data_mut(|data| data.insert_temp(id, text.clone()));
+        }
+        if response.lost_focus() {
+            ui.data_mut(|data| data.remove_temp::<String>(id));
+            changed |= text != *part && !ui.input(|input| input.key_pressed(egui::Key::Escape));
+            *part = text;
+        }
+    }
+    let [kind, name, switch] = parts;
+    let tag = entry.first.uid;
+    changed.then_some(CardRequest::Operation(TagOperation::Feature { tag, kind, name, switch }))
+}

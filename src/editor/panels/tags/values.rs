@@ -1,0 +1,494 @@
+//! Values of commands: the form of their module, an element a row.
+
+use std::collections::HashMap;
+
+use bevy_egui::egui::{
+    Checkbox, CollapsingHeader, ComboBox, Key, RichText, TextEdit, TextStyle, Ui, WidgetInfo, WidgetType,
+};
+
+use super::{references, stack::Entry};
+use crate::{
+    editor::panels::{
+        displayed_rig::DisplayedRig,
+        fields::{Look, MIXED, NumberEdit, Numbers, Shared, labelled},
+        list,
+    },
+    processor::{
+        Builder, ModuleInfo, ParameterValues,
+        form::{Form, FormElement, read_module_form},
+    },
+    rig::Uid,
+};
+
+/// Change of a value.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum ValueEdit {
+    /// Other parameters of tags.
+    Set(Vec<(Uid, String)>),
+    /// The same while a number is dragged.
+    Preview(Vec<(Uid, String)>),
+    /// End of a drag.
+    Commit,
+    /// End of a drag whose value is dropped.
+    Cancel,
+    /// A value that the module does not take, with the reason.
+    Refused(String),
+}
+
+/// Forms, and what is being typed into them.
+#[derive(Default)]
+pub(super) struct Values {
+    numbers: Numbers,
+    draft: Option<Draft>,
+    forms: HashMap<&'static str, Form>,
+}
+
+/// A text being typed.
+struct Draft {
+    tag: Uid,
+    path: String,
+    text: String,
+}
+
+/// The commands whose values are shown, with what is needed to show them.
+pub(super) struct Subject<'a> {
+    pub shown: &'a DisplayedRig<'a>,
+    pub builder: Option<&'a Builder>,
+    pub module: &'a ModuleInfo,
+    pub entry: &'a Entry,
+    values: Vec<ParameterValues>,
+}
+
+impl Subject<'_> {
+    fn tag(&self) -> Uid {
+        self.entry.first.uid
+    }
+
+    /// RON of a value in the last command, and whether the others have another.
+    fn value(&self, path: &str) -> Shared<&str> {
+        let values = self.values.iter().map(|values| values.get(path).unwrap_or("None"));
+        Shared::of(values).unwrap_or_default()
+    }
+
+    /// Three numbers of all commands.
+    fn vector(&self, path: &str) -> Option<[Shared<f32>; 3]> {
+        let all = self.values.iter().map(|values| numbers(values.get(path)?));
+        let all = all.collect::<Option<Vec<[f32; 3]>>>()?;
+        Some([0, 1, 2].map(|axis| Shared::of(all.iter().map(|numbers| numbers[axis])).unwrap_or_default()))
+    }
+
+    /// Parameters of all commands with the first of some texts that the module takes as the value.
+    fn set(&self, path: &str, texts: &[String]) -> ValueEdit {
+        match self.changed(path, texts) {
+            Ok(changed) => ValueEdit::Set(changed),
+            Err(reason) => ValueEdit::Refused(reason),
+        }
+    }
+
+    fn changed(&self, path: &str, texts: &[String]) -> Result<Vec<(Uid, String)>, String> {
+        let mut refused = "there is no value".to_owned();
+        'texts: for text in texts {
+            let mut changed = Vec::new();
+            for ((_, tag), params) in self.entry.tags.iter().zip(&self.entry.params) {
+                match self.module.with_value(params, path, text) {
+                    Ok(params) => changed.push((*tag, params)),
+                    Err(error) => {
+                        refused = format!("`{path}` cannot be {text}: {}", error.message);
+                        continue 'texts;
+                    }
+                }
+            }
+            return Ok(changed);
+        }
+        Err(refused)
+    }
+
+    fn reset(&self, path: &str) -> ValueEdit {
+        let commands = self.entry.tags.iter().zip(&self.entry.params);
+        let changed = commands.map(|((_, tag), params)| Ok((*tag, self.module.with_default(params, path)?)));
+        match changed.collect::<Result<Vec<_>, crate::rig::SourceError>>() {
+            Ok(changed) => ValueEdit::Set(changed),
+            Err(error) => ValueEdit::Refused(error.message),
+        }
+    }
+
+    fn number(&self, path: &str, edit: NumberEdit) -> ValueEdit {
+        let texts = |number: f32| [format!("{number:?}"), format!("{}", number.round() as i64)];
+        match edit {
+            NumberEdit::Set(number) => self.set(path, &texts(number)),
+            NumberEdit::Preview(number) => match self.changed(path, &texts(number)) {
+                Ok(changed) => ValueEdit::Preview(changed),
+                Err(reason) => ValueEdit::Refused(reason),
+            },
+            NumberEdit::Commit => ValueEdit::Commit,
+            NumberEdit::Cancel => ValueEdit::Cancel,
+        }
+    }
+}
+
+impl Values {
+    /// Draws the form of an entry. Where its parameters cannot be read, their text and the reason.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        shown: &DisplayedRig,
+        builder: Option<&Builder>,
+        module: &ModuleInfo,
+        entry: &Entry,
+    ) -> Option<ValueEdit> {
+        let values: Result<Vec<_>, _> = entry.params.iter().map(|params| module.values(params)).collect();
+        let values = match values {
+            Ok(values) => values,
+            Err(error) => {
+                let reason = format!("line {}, column {}: {}", error.line, error.column, error.message);
+                ui.colored_label(ui.visuals().error_fg_color, reason);
+                return self.source(ui, entry);
+            }
+        };
+        let subject = Subject { shown, builder, module, entry, values };
+        let form = self.forms.remove(module.name).unwrap_or_else(|| form_of(module));
+        let edit = self.elements(ui, &subject, &form.content);
+        self.forms.insert(module.name, form);
+        let source = CollapsingHeader::new("As text")
+            .id_salt((entry.first.uid, "text"))
+            .show(ui, |ui| if entry.tags.len() == 1 { self.source(ui, entry) } else { None });
+        edit.or(source.body_returned.flatten())
+    }
+
+    /// The parameters as they are written.
+    fn source(&mut self, ui: &mut Ui, entry: &Entry) -> Option<ValueEdit> {
+        let params = entry.params.first()?;
+        let text = self.text(ui, entry.first.uid, "", "Parameters", params, true)?;
+        Some(ValueEdit::Set(vec![(entry.first.uid, text)]))
+    }
+
+    fn elements(&mut self, ui: &mut Ui, subject: &Subject, elements: &[FormElement]) -> Option<ValueEdit> {
+        let mut edit = None;
+        for element in elements {
+            let changed = match element {
+                FormElement::Frame { label, open, content } => {
+                    let frame = CollapsingHeader::new(RichText::new(label).strong())
+                        .id_salt((subject.tag(), label))
+                        .default_open(*open);
+                    frame.show(ui, |ui| self.elements(ui, subject, content)).body_returned.flatten()
+                }
+                FormElement::Separator => {
+                    ui.separator();
+                    None
+                }
+                FormElement::Comment(text) => {
+                    ui.weak(text);
+                    None
+                }
+                bound => bound.bound().and_then(|(path, _)| self.bound(ui, subject, bound, path)),
+            };
+            edit = edit.or(changed);
+        }
+        edit
+    }
+
+    /// Draws an element, and a button that resets its value if it is not the default.
+    fn bound(&mut self, ui: &mut Ui, subject: &Subject, element: &FormElement, path: &str) -> Option<ValueEdit> {
+        let name = path.split('.').next().unwrap_or(path);
+        let about = subject.module.parameters.iter().find(|parameter| parameter.name == name);
+        let row = ui.scope(|ui| self.element(ui, subject, element, path));
+        if let Some(about) = about.filter(|about| !about.doc.is_empty()) {
+            row.response.clone().on_hover_text(about.doc);
+        }
+        if subject.values.iter().any(|values| !values.is_default(path)) {
+            let mut reset = false;
+            row.response.context_menu(|ui| {
+                reset = ui.button("Reset to default").clicked();
+            });
+            if reset {
+                ui.close();
+                return Some(subject.reset(path));
+            }
+        }
+        row.inner
+    }
+
+    fn element(&mut self, ui: &mut Ui, subject: &Subject, element: &FormElement, path: &str) -> Option<ValueEdit> {
+        let label = element.label();
+        let Shared { value, mixed } = subject.value(path);
+        match element {
+            FormElement::Check(_) => {
+                let mut on = value == "true";
+                let clicked = ui.add(Checkbox::new(&mut on, &label).indeterminate(mixed)).clicked();
+                clicked.then(|| subject.set(path, &[(mixed || on).to_string()]))
+            }
+            FormElement::Menu { options, .. } => {
+                let shown = if mixed { MIXED.to_owned() } else { plain(value) };
+                let shown = if shown == "None" { "—".to_owned() } else { shown.replace('_', " ") };
+                let mut chosen = None;
+                labelled(ui, &label, |ui| {
+                    let combo = ComboBox::from_id_salt((subject.tag(), path)).selected_text(shown).truncate();
+                    let response = combo.width(ui.available_width()).show_ui(ui, |ui| {
+                        for option in options {
+                            let is_it = !mixed && plain(value) == *option;
+                            if ui.selectable_label(is_it, option.replace('_', " ")).clicked() {
+                                chosen = Some(option.clone());
+                            }
+                        }
+                    });
+                    let said = label.clone();
+                    response.response.widget_info(move || WidgetInfo::labeled(WidgetType::ComboBox, true, &said));
+                });
+                chosen.map(|option| subject.set(path, &[format!("{option:?}"), option]))
+            }
+            FormElement::Slider { step, unit, .. } | FormElement::Number { step, unit, .. } => {
+                let label = if unit.is_empty() { label } else { format!("{label} ({unit})") };
+                match value.parse::<f32>() {
+                    Ok(number) => {
+                        let look = Look { speed: f64::from(*step), decimals: 4, suffix: "" };
+                        let edit = self.numbers.number(ui, &label, Shared { value: number, mixed }, look)?;
+                        Some(subject.number(path, edit))
+                    }
+                    Err(_) => self.optional_number(ui, subject, path, &label),
+                }
+            }
+            FormElement::Vector(_) => match subject.vector(path) {
+                Some(shown) => {
+                    let look = Look { speed: 0.01, decimals: 4, suffix: "" };
+                    let (axis, edit) = self.numbers.vector(ui, &label, shown, look)?;
+                    Some(axis_edit(subject, path, axis, edit))
+                }
+                None => boxes(ui, subject, path, &label),
+            },
+            FormElement::Limits(_) => self.limits(ui, subject, path, &label),
+            FormElement::Color(_) => self.color(ui, subject, path, &label),
+            FormElement::Node(_) => {
+                let text = plain(if mixed { "\"\"" } else { value });
+                let typed = self.text(ui, subject.tag(), path, &label, &text, false);
+                let picked = references::about(ui, subject, &label, (!mixed).then_some(text.as_str()));
+                typed.or(picked).map(|text| subject.set(path, &[format!("{text:?}")]))
+            }
+            FormElement::Text(_) | FormElement::Amount(_) => {
+                let shown = if mixed || value == "None" { String::new() } else { plain(value) };
+                let text = self.text(ui, subject.tag(), path, &label, &shown, false)?;
+                let text = text.trim();
+                Some(match (element, text.parse::<f32>()) {
+                    (FormElement::Amount(_), Ok(number)) => subject.set(path, &[format!("{number:?}")]),
+                    _ if text.is_empty() => subject.reset(path),
+                    _ => subject.set(path, &[format!("{text:?}")]),
+                })
+            }
+            FormElement::Curve(_) | FormElement::List(_) => {
+                let text = self.text(ui, subject.tag(), path, &label, if mixed { "" } else { value }, true)?;
+                Some(subject.set(path, &[text]))
+            }
+            FormElement::Frame { .. } | FormElement::Separator | FormElement::Comment(_) => None,
+        }
+    }
+
+    /// A number that may be left out.
+    fn optional_number(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
+        let text = self.text(ui, subject.tag(), path, label, "", false)?;
+        let number = text.trim().replace(',', ".").parse::<f32>();
+        Some(match number {
+            Ok(number) => subject.number(path, NumberEdit::Set(number)),
+            Err(_) => ValueEdit::Refused(format!("\"{}\" is no number", text.trim())),
+        })
+    }
+
+    /// Three pairs of lowest and highest values; empty fields are open.
+    fn limits(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
+        let axes = parts(subject.value(path).value);
+        let mut pairs: Vec<[String; 2]> = axes
+            .iter()
+            .map(|axis| {
+                let ends = parts(axis);
+                let end = |at: usize| ends.get(at).filter(|end| **end != "None").map_or("", |end| *end).to_owned();
+                [end(0), end(1)]
+            })
+            .collect();
+        ui.label(label);
+        let mut changed = false;
+        for (pair, axis) in pairs.iter_mut().zip(["X", "Y", "Z"]) {
+            for (end, side) in pair.iter_mut().zip(["from", "to"]) {
+                let said = format!("{label} {axis} {side}");
+                let path = format!("{path}.{axis}.{side}");
+                let row = format!("{axis} {side}");
+                if let Some(text) = self.named_text(ui, (subject.tag(), &path), (&row, &said), end, false) {
+                    *end = text.trim().replace(',', ".");
+                    changed = true;
+                }
+            }
+        }
+        let end = |text: &String| if text.is_empty() { "None".to_owned() } else { text.clone() };
+        let pairs: Vec<String> = pairs.iter().map(|[low, high]| format!("({}, {})", end(low), end(high))).collect();
+        changed.then(|| subject.set(path, &[format!("({})", pairs.join(", "))]))
+    }
+
+    fn color(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
+        let id = ui.make_persistent_id((subject.tag(), path, "colour"));
+        let stored = numbers(subject.value(path).value);
+        let kept: Option<[f32; 3]> = ui.data(|data| data.get_temp(id));
+        let mut edit = None;
+        labelled(ui, label, |ui| {
+            let Some(mut rgb) = kept.or(stored) else {
+                if ui.button("Choose").clicked() {
+                    edit = Some(subject.set(path, &["(1.0, 0.8, 0.1)".to_owned()]));
+                }
+                return;
+            };
+            if ui.color_edit_button_rgb(&mut rgb).changed() {
+                ui.data_mut(|data| data.insert_temp(id, rgb));
+            }
+            let holding = ui.input(|input| input.pointer.any_down());
+            if let Some(rgb) = ui.data(|data| data.get_temp::<[f32; 3]>(id)).filter(|_| !holding) {
+                ui.data_mut(|data| data.remove_temp::<[f32; 3]>(id));
+                edit = Some(subject.set(path, &[tuple(rgb)]));
+            }
+        });
+        edit
+    }
+
+    /// A line or several lines of text; the text once it is entered.
+    fn text(&mut self, ui: &mut Ui, tag: Uid, path: &str, name: &str, now: &str, lines: bool) -> Option<String> {
+        self.named_text(ui, (tag, path), (name, name), now, lines)
+    }
+
+    fn named_text(
+        &mut self,
+        ui: &mut Ui,
+        (tag, path): (Uid, &str),
+        (label, said): (&str, &str),
+        now: &str,
+        lines: bool,
+    ) -> Option<String> {
+        let is_own = |draft: &&Draft| draft.tag == tag && draft.path == path;
+        let mut text = self.draft.as_ref().filter(is_own).map_or_else(|| now.to_owned(), |draft| draft.text.clone());
+        let mut field = |ui: &mut Ui| {
+            let width = ui.available_width();
+            let response = if lines {
+                let rows = text.lines().count().clamp(1, 12);
+                ui.add(
+                    TextEdit::multiline(&mut text).font(TextStyle::Monospace).desired_rows(rows).desired_width(width),
+                )
+            } else {
+                ui.add(TextEdit::singleline(&mut text).desired_width(width))
+            };
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, said));
+            response
+        };
+        let response = if lines {
+            ui.label(label);
+            field(ui)
+        } else {
+            labelled(ui, label, field)
+        };
+        if response.changed() {
+            self.draft = Some(Draft { tag, path: path.to_owned(), text });
+        }
+        if response.has_focus() {
+            return None;
+        }
+        let draft = self.draft.take_if(|draft| draft.tag == tag && draft.path == path)?;
+        let dropped = ui.input(|input| input.key_pressed(Key::Escape));
+        (!dropped && draft.text != now).then_some(draft.text)
+    }
+}
+
+/// The form of a module; one made of its parameters if it has none, or none that can be read.
+fn form_of(module: &ModuleInfo) -> Form {
+    let form = module.form.and_then(|form| read_module_form(form.as_bytes(), module).ok());
+    form.unwrap_or_else(|| made_form(module))
+}
+
+fn made_form(module: &ModuleInfo) -> Form {
+    let element = |name: &str, kind: &str| {
+        let bound = crate::processor::form::Bound { param: name.to_owned(), label: String::new() };
+        match kind {
+            "bool" => FormElement::Check(bound),
+            "f32" => {
+                FormElement::Number { param: name.to_owned(), label: String::new(), step: 0.01, unit: String::new() }
+            }
+            "Vec3" => FormElement::Vector(bound),
+            "NodeRef" | "NodeRefs" => FormElement::Node(bound),
+            "String" => FormElement::Text(bound),
+            "Amount" => FormElement::Amount(bound),
+            _ => FormElement::List(bound),
+        }
+    };
+    let content = module.parameters.iter().map(|parameter| element(parameter.name, &parameter.kind)).collect();
+    Form { title: module.name.to_owned(), content }
+}
+
+fn axis_edit(subject: &Subject, path: &str, axis: usize, edit: NumberEdit) -> ValueEdit {
+    let each = |number: f32| -> Result<Vec<(Uid, String)>, String> {
+        let mut changed = Vec::new();
+        for (((_, tag), params), values) in subject.entry.tags.iter().zip(&subject.entry.params).zip(&subject.values) {
+            let mut vector = values.get(path).and_then(numbers).unwrap_or_default();
+            vector[axis] = number;
+            let text = subject.module.with_value(params, path, &tuple(vector));
+            changed.push((*tag, text.map_err(|error| error.message)?));
+        }
+        Ok(changed)
+    };
+    match edit {
+        NumberEdit::Set(number) => each(number).map_or_else(ValueEdit::Refused, ValueEdit::Set),
+        NumberEdit::Preview(number) => each(number).map_or_else(ValueEdit::Refused, ValueEdit::Preview),
+        NumberEdit::Commit => ValueEdit::Commit,
+        NumberEdit::Cancel => ValueEdit::Cancel,
+    }
+}
+
+/// Three boxes, or a text field for what is no vector.
+fn boxes(ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
+    let text = subject.value(path).value;
+    let mut on: Vec<bool> = parts(text).into_iter().map(|part| part == "true").collect();
+    let mut changed = false;
+    labelled(ui, label, |ui| {
+        for (on, axis) in on.iter_mut().zip(["X", "Y", "Z"]) {
+            let response = ui.checkbox(on, axis);
+            changed |= response.clicked();
+        }
+        if on.len() != 3 {
+            let row = ui.available_rect_before_wrap();
+            list::line(ui, row, text, ui.visuals().weak_text_color());
+        }
+    });
+    let on: Vec<String> = on.iter().map(ToString::to_string).collect();
+    changed.then(|| subject.set(path, &[format!("({})", on.join(", "))]))
+}
+
+/// A value without quotation marks.
+fn plain(value: &str) -> String {
+    ron::from_str::<String>(value).unwrap_or_else(|_| value.to_owned())
+}
+
+/// Parts of a tuple or list.
+fn parts(text: &str) -> Vec<&str> {
+    let text = text.trim();
+    let inner = text.strip_prefix("Some(").unwrap_or(text).trim();
+    let Some(inner) = inner.strip_prefix(['(', '[']) else { return Vec::new() };
+    let (mut depth, mut start, mut list) = (0, 0, Vec::new());
+    for (at, letter) in inner.char_indices() {
+        match letter {
+            '(' | '[' => depth += 1,
+            ')' | ']' if depth == 0 => {
+                list.push(inner[start..at].trim());
+                break;
+            }
+            ')' | ']' => depth -= 1,
+            ',' if depth == 0 => {
+                list.push(inner[start..at].trim());
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    list.retain(|part| !part.is_empty());
+    list
+}
+
+/// Three numbers of a tuple.
+fn numbers(text: &str) -> Option<[f32; 3]> {
+    let numbers: Vec<f32> = parts(text).into_iter().map(|part| part.parse().ok()).collect::<Option<_>>()?;
+    numbers.try_into().ok()
+}
+
+fn tuple([x, y, z]: [f32; 3]) -> String {
+    format!("({x:?}, {y:?}, {z:?})")
+}

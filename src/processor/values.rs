@@ -1,0 +1,79 @@
+//! Values of a command's parameters, one at a time: for forms, which change one and leave the rest as it is written.
+
+use super::{
+    ModuleInfo,
+    mirror::{place_of, with_changes, write_whole},
+};
+use crate::rig::{SourceError, fields};
+
+/// Values of a command's parameters, those that it leaves out, too.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterValues {
+    complete: String,
+    default: String,
+}
+
+impl ParameterValues {
+    /// The value of a parameter, or of a part of one (`creation.label`), as RON; `None` if the path names none, or lies in
+    /// an optional value that is left out.
+    pub fn get(&self, path: &str) -> Option<&str> {
+        place_of(&self.complete, path).map(|place| &self.complete[place])
+    }
+
+    /// True if the value is the one that the module has for tags that leave it out.
+    pub fn is_default(&self, path: &str) -> bool {
+        self.get(path) == place_of(&self.default, path).map(|place| &self.default[place])
+    }
+}
+
+impl ModuleInfo {
+    /// The values of a tag's parameters.
+    ///
+    /// # Errors
+    /// [`SourceError`] with line and column in the text.
+    pub fn values(&self, params: &str) -> Result<ParameterValues, SourceError> {
+        Ok(ParameterValues { complete: (self.complete)(params)?, default: (self.complete)("()")? })
+    }
+
+    /// The parameters as they are written, with another value of one, or of a part of one (`creation.label`). `value` is
+    /// RON.
+    ///
+    /// # Errors
+    /// A path that names nothing, or a value that the module does not take.
+    pub fn with_value(&self, params: &str, path: &str, value: &str) -> Result<String, SourceError> {
+        let before = (self.complete)(params)?;
+        let place = place_of(&before, path)
+            .ok_or_else(|| SourceError::at(params, 0, format!("the module {} has no parameter `{path}`", self.name)))?;
+        let mut after = before.clone();
+        after.replace_range(place, value);
+        let after = (self.complete)(&after)?;
+        let mut text = with_changes(params, &before, &after);
+        if !(self.complete)(&text).is_ok_and(|written| written == after) {
+            // Lists become shorter, values with names become others: all of the parameter is written.
+            write_whole(&mut text, &after, path.split('.').next().unwrap_or(path));
+        }
+        self.parse(&text)?;
+        Ok(text)
+    }
+
+    /// The parameters as they are written, but for one that gets the value which it has where tags leave it out. A whole
+    /// parameter is left out then.
+    ///
+    /// # Errors
+    /// A path that names nothing.
+    pub fn with_default(&self, params: &str, path: &str) -> Result<String, SourceError> {
+        let found = fields(params).into_iter().find(|field| field.depth == 1 && field.name == path);
+        if let Some(field) = found {
+            let mut text = params.to_owned();
+            let rest = text[field.end..].trim_start().len();
+            text.replace_range(field.start..text.len() - rest, "");
+            self.parse(&text)?;
+            return Ok(text);
+        }
+        let default = (self.complete)("()")?;
+        match place_of(&default, path) {
+            Some(place) => self.with_value(params, path, &default[place]),
+            None => self.with_value(params, path, ""),
+        }
+    }
+}
