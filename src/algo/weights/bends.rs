@@ -366,9 +366,9 @@ impl Part {
         let joints = flesh.joints;
         let mut lower = vec![false; joints.len()];
         // Parents need not come before their children.
-        for joint in 0..joints.len() {
-            let chain = std::iter::successors(Some(joint), |joint| joints[*joint].parent).take(joints.len());
-            lower[joint] = chain.into_iter().any(|above| above == bend.joint);
+        for (joint, below) in lower.iter_mut().enumerate() {
+            let mut chain = std::iter::successors(Some(joint), |joint| joints[*joint].parent).take(joints.len());
+            *below = chain.any(|above| above == bend.joint);
         }
         lower[bend.half] = false;
         let at = joints[bend.joint].head;

@@ -292,7 +292,7 @@ fn enabled(ui: &mut Ui, shown: &DisplayedRig, entry: &Entry) -> Option<CardReque
     let field = Checkbox::new(&mut value, RichText::new(several).strong()).indeterminate(mixed);
     let about = if entry.first.comment.is_empty() { "On or off" } else { &entry.first.comment };
     let clicked = ui.add(field).on_hover_text(about).clicked();
-    clicked.then(|| CardRequest::Operation(TagOperation::Enable(tags, mixed || value)))
+    clicked.then_some(CardRequest::Operation(TagOperation::Enable(tags, mixed || value)))
 }
 
 /// Draws what became of the commands in the build: the worst of them.
