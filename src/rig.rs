@@ -2,6 +2,7 @@
 //!
 //! [`Rig`] is the whole document; [`RigEdit`] is the only way it changes, each edit with its exact inverse.
 
+pub mod animation;
 pub mod bake;
 mod built;
 pub mod character;

@@ -1,0 +1,143 @@
+//! Values of tracks and clips between keys.
+
+use std::collections::BTreeMap;
+
+use bevy::prelude::*;
+
+use super::{ClipLayer, Ease, Key, LayerMode, PoseOffset, Property, RigClip, Track, TrackTarget};
+use crate::rig::{AttributeValues, Uid};
+
+/// Pose of a clip at one moment: offsets and attributes of the animated nodes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SampledPose {
+    /// Offsets of nodes with a track for at least one of translation, rotation and scale.
+    pub offsets: BTreeMap<Uid, PoseOffset>,
+    /// Animated attributes.
+    pub values: AttributeValues,
+}
+
+impl Track {
+    /// Value at a second, held before the first and after the last key; `None` without keys.
+    pub fn sample(&self, property: &Property, time: f32) -> Option<[f32; 4]> {
+        let (first, last) = (self.keys.first()?, self.keys.last()?);
+        if time <= first.time {
+            return Some(first.value);
+        }
+        if time >= last.time {
+            return Some(last.value);
+        }
+        let next = self.keys.partition_point(|key| key.time <= time);
+        Some(between(&self.keys[next - 1], &self.keys[next], property, time))
+    }
+}
+
+/// Value between two neighbouring keys.
+fn between(from: &Key, to: &Key, property: &Property, time: f32) -> [f32; 4] {
+    let span = to.time - from.time;
+    let share = (time - from.time) / span;
+    match from.ease {
+        Ease::Stepped => from.value,
+        Ease::Linear if *property == Property::Rotation => {
+            let (a, b) = (Quat::from_array(from.value), Quat::from_array(to.value));
+            slerp(a, b, share).to_array()
+        }
+        Ease::Linear => std::array::from_fn(|axis| from.value[axis] + (to.value[axis] - from.value[axis]) * share),
+        Ease::Cubic { leave, .. } => {
+            let arrive = match to.ease {
+                Ease::Cubic { arrive, .. } => arrive,
+                Ease::Stepped | Ease::Linear => [0.0; 4],
+            };
+            let (square, cube) = (share * share, share * share * share);
+            let value = std::array::from_fn(|axis| {
+                (2.0 * cube - 3.0 * square + 1.0) * from.value[axis]
+                    + (cube - 2.0 * square + share) * span * leave[axis]
+                    + (-2.0 * cube + 3.0 * square) * to.value[axis]
+                    + (cube - square) * span * arrive[axis]
+            });
+            if *property == Property::Rotation { normalized(value) } else { value }
+        }
+    }
+}
+
+/// Rotation between two, on the shorter way.
+fn slerp(from: Quat, to: Quat, share: f32) -> Quat {
+    let to = if from.dot(to) < 0.0 { -to } else { to };
+    let cosine = from.dot(to).min(1.0);
+    if cosine > 0.9995 {
+        return (from * (1.0 - share) + to * share).normalize();
+    }
+    let angle = bevy::math::ops::acos(cosine);
+    let by = 1.0 / bevy::math::ops::sin(angle);
+    let (a, b) = (bevy::math::ops::sin((1.0 - share) * angle) * by, bevy::math::ops::sin(share * angle) * by);
+    (from * a + to * b).normalize()
+}
+
+fn normalized(value: [f32; 4]) -> [f32; 4] {
+    let quat = Quat::from_array(value);
+    if quat.length_squared() > 1e-12 { quat.normalize().to_array() } else { Quat::IDENTITY.to_array() }
+}
+
+impl RigClip {
+    /// Pose at a second, all layers mixed.
+    pub fn sample(&self, time: f32) -> SampledPose {
+        let mut mixed: BTreeMap<TrackTarget, [f32; 4]> = BTreeMap::new();
+        for layer in self.layers.iter().filter(|layer| !layer.muted && layer.weight > 0.0) {
+            layer.mix_into(time, &mut mixed);
+        }
+        let mut pose = SampledPose::default();
+        for (target, value) in mixed {
+            let vector = Vec3::new(value[0], value[1], value[2]);
+            match target.property {
+                Property::Translation => pose.offsets.entry(target.node).or_default().translation = vector,
+                Property::Rotation => pose.offsets.entry(target.node).or_default().rotation = Quat::from_array(value),
+                Property::Scale => pose.offsets.entry(target.node).or_default().scale = vector,
+                Property::Attribute(name) => {
+                    pose.values.entry(target.node).or_default().insert(name, value[0]);
+                }
+            }
+        }
+        pose
+    }
+}
+
+impl ClipLayer {
+    fn mix_into(&self, time: f32, mixed: &mut BTreeMap<TrackTarget, [f32; 4]>) {
+        for (target, track) in self.tracks.iter().filter(|(target, _)| self.concerns(target.node)) {
+            let Some(value) = track.sample(&target.property, time) else { continue };
+            let below = mixed.get(target).copied();
+            let mix = match (self.mode, below) {
+                (LayerMode::Override, None) if self.weight >= 1.0 => value,
+                (LayerMode::Override, below) => {
+                    let below = below.unwrap_or_else(|| target.property.rest());
+                    blend(&target.property, below, value, self.weight)
+                }
+                (LayerMode::Additive, below) => {
+                    let below = below.unwrap_or_else(|| target.property.rest());
+                    let added = blend(&target.property, target.property.rest(), value, self.weight);
+                    add(&target.property, below, added)
+                }
+            };
+            mixed.insert(target.clone(), mix);
+        }
+    }
+}
+
+/// Value between two, by a weight.
+fn blend(property: &Property, from: [f32; 4], to: [f32; 4], weight: f32) -> [f32; 4] {
+    if weight >= 1.0 {
+        return to;
+    }
+    if *property == Property::Rotation {
+        return slerp(Quat::from_array(from), Quat::from_array(to), weight).to_array();
+    }
+    std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * weight)
+}
+
+/// Offset on top of another one.
+fn add(property: &Property, below: [f32; 4], added: [f32; 4]) -> [f32; 4] {
+    match property {
+        Property::Rotation => (Quat::from_array(below) * Quat::from_array(added)).normalize().to_array(),
+        Property::Scale => std::array::from_fn(|axis| below[axis] * added[axis]),
+        Property::Translation | Property::Attribute(_) => std::array::from_fn(|axis| below[axis] + added[axis]),
+    }
+}
