@@ -110,7 +110,7 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
                 }
             }
             if let (true, Some(list)) = (json, &report.list) {
-                let is_written = print([list.to_string().as_str()]);
+                let is_written = print_json(list);
                 return ExitCode::from(if is_written { code } else { code.max(1) });
             }
             let mut answer = Map::from_iter([("ok".to_owned(), Value::from(!report.at_fault))]);
@@ -133,7 +133,7 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
             (1, failed(&error.to_string()))
         }
     };
-    let is_written = !json || print([Value::Object(answer).to_string().as_str()]);
+    let is_written = !json || print_json(&Value::Object(answer));
     ExitCode::from(if is_written { code } else { code.max(1) })
 }
 
@@ -141,6 +141,33 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
 pub(super) fn print<'a>(lines: impl IntoIterator<Item = &'a str>) -> bool {
     let mut out = std::io::stdout().lock();
     lines.into_iter().all(|line| writeln!(out, "{}", printable(line)).is_ok()) && out.flush().is_ok()
+}
+
+/// Prints a value as one line of JSON; `false` if standard output is closed or full.
+pub(super) fn print_json(value: &Value) -> bool {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", json_line(value)).is_ok() && out.flush().is_ok()
+}
+
+/// JSON of a value without what a terminal obeys: such characters stand in strings only, where JSON has escapes for
+/// them.
+fn json_line(value: &Value) -> String {
+    let text = value.to_string();
+    if !has_obeyed(&text) {
+        return text;
+    }
+    let mut line = String::with_capacity(text.len() + 16);
+    let mut units = [0; 2];
+    for c in text.chars() {
+        if is_obeyed(c) {
+            for unit in c.encode_utf16(&mut units) {
+                let _ = write!(line, "\\u{unit:04x}");
+            }
+        } else {
+            line.push(c);
+        }
+    }
+    line
 }
 
 /// Prints to standard error; nobody can be told if that is closed, too.
@@ -243,6 +270,14 @@ mod tests {
     fn terminals_obey_nothing_in_names() {
         assert_eq!(printable("arm\u{1b}[31m\u{202e}_l\n"), "arm\\u{1b}[31m\\u{202e}_l\n");
         assert!(matches!(printable("Kopf_ä"), Cow::Borrowed("Kopf_ä")));
+    }
+
+    #[test]
+    fn json_with_obeyed_characters_stays_json() {
+        let value = json!({ "label\u{9b}": "arm\u{202e}_l\u{7f}\u{1b}[31m ä" });
+        let line = json_line(&value);
+        assert!(!has_obeyed(&line), "{line:?}");
+        assert_eq!(serde_json::from_str::<Value>(&line).unwrap(), value);
     }
 
     #[test]

@@ -9,6 +9,8 @@ use std::{
 
 /// Bytes that are read back at a time.
 const BLOCK: usize = 1 << 16;
+/// Number of names of a folder that are held before those beyond the limit are dropped.
+const LISTED: usize = 1 << 16;
 
 /// Number of attempts to lock a folder, and the pause between them: 30 seconds in all.
 #[cfg(unix)]
@@ -159,11 +161,17 @@ impl Disk for RealDisk {
     }
 
     fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
+        // File systems list names in any order, so which ones are the first is known only when all have been listed.
         let mut names = Vec::new();
-        for entry in fs::read_dir(folder)?.take(limit) {
+        for entry in fs::read_dir(folder)? {
             names.push(entry?.file_name());
+            if names.len() >= limit.saturating_add(LISTED) {
+                names.sort();
+                names.truncate(limit);
+            }
         }
         names.sort();
+        names.truncate(limit);
         Ok(names)
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Disk, ModelFolder, PartFiles, ReadError, open, read_capped};
 use crate::{
     mesh::{
-        gltf::{self, ExternalError, GltfError, read_gltf},
+        gltf::{self, ExternalError, ExternalFile, GltfError, read_gltf},
         model::Model,
         obj::{self, ObjError, ObjSettings},
     },
@@ -162,7 +162,8 @@ fn load_obj(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
 fn load_gltf(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
     let bytes = read_capped(disk, path, MAX_GLTF_BYTES)?;
     let folder = ModelFolder::of(disk, path)?;
-    let mut external = |uri: &str| folder.read(uri, MAX_GLTF_BYTES).map_err(ExternalError::new);
+    let mut external =
+        |file: ExternalFile| folder.read(file.path, file.limit.min(MAX_GLTF_BYTES)).map_err(ExternalError::new);
     Ok(read_gltf(&bytes, &path.display().to_string(), &mut external)?)
 }
 

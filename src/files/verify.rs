@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     mesh::{
-        gltf::{ExternalError, read_gltf},
+        gltf::{ExternalError, ExternalFile, read_gltf},
         model::Model,
         obj::{self, ObjSettings},
     },
@@ -30,7 +30,7 @@ pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
                 .map_err(|source| LoadError::Obj { path: path.into(), source })
         } else {
             let none = || ExternalError::new("it is not among the companions");
-            let mut external = |name: &str| set.companion(name).map(<[u8]>::to_vec).ok_or_else(none);
+            let mut external = |file: ExternalFile| set.companion(file.path).map(<[u8]>::to_vec).ok_or_else(none);
             Ok(read_gltf(set.bytes(), &path.display().to_string(), &mut external)?)
         }
     };

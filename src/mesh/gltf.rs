@@ -26,7 +26,7 @@ mod skin;
 mod uri;
 mod write;
 
-pub use uri::{ExternalError, GltfUriError};
+pub use uri::{ExternalError, ExternalFile, ExternalKind, GltfUriError};
 pub use write::{GltfWriteSettings, write_glb, write_gltf};
 
 use crate::mesh::model::Model;
@@ -158,8 +158,8 @@ impl GltfError {
 /// Reads a `.gltf` or `.glb` file (distinguished by its content).
 ///
 /// `name` is the file's name or path; errors begin with it and [`Model::name`] is its stem. `external` loads the files
-/// that it refers to: it is called with a path that has been percent-decoded and checked to be relative, with `/`
-/// between its parts, and below the file's folder; its error text becomes part of the returned error. The bytes it
+/// that it refers to, each buffer's file once: it is called with a path that has been percent-decoded and checked to be
+/// relative, with `/` between its parts, and below the file's folder; its error text becomes part of the returned error. The bytes it
 /// returns count as part of the file; it has to limit how many it reads. A buffer that cannot be loaded is an error, an
 /// image that cannot be loaded a note.
 ///
@@ -177,7 +177,7 @@ impl GltfError {
 pub fn read_gltf(
     bytes: &[u8],
     name: &str,
-    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
+    external: &mut dyn FnMut(ExternalFile) -> Result<Vec<u8>, ExternalError>,
 ) -> Result<Model, GltfError> {
     read(bytes, name, external).map_err(|error| error.in_file(name))
 }
@@ -185,7 +185,7 @@ pub fn read_gltf(
 fn read(
     bytes: &[u8],
     name: &str,
-    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
+    external: &mut dyn FnMut(ExternalFile) -> Result<Vec<u8>, ExternalError>,
 ) -> Result<Model, GltfError> {
     let budget = Budget::new(bytes.len() as u64);
     let notes = Notes::default();

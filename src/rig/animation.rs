@@ -16,7 +16,7 @@ pub use self::sample::SampledPose;
 use crate::rig::{PoseOffset, Uid};
 
 /// Clip of a rig: layers of tracks over a range of time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RigClip {
     /// Identity.
     pub uid: Uid,
@@ -44,7 +44,7 @@ pub struct Marker {
 }
 
 /// Layer of a clip: tracks that are mixed into the layers below.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ClipLayer {
     /// Identity.
     pub uid: Uid,

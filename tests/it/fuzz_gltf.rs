@@ -8,7 +8,7 @@ use super::{
 };
 use glam::Vec3;
 use rigsmith::mesh::{
-    gltf::{ExternalError, GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
+    gltf::{ExternalError, ExternalFile, GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
     model::{ChannelTarget, Interpolation, Model},
 };
 
@@ -94,7 +94,7 @@ fn check_promises(model: &Model) {
 
 fn check(bytes: &[u8], bins: &[Vec<u8>]) {
     // JSON refers to the binary part of a seed by number, so that bent JSON still finds bytes.
-    let mut load = |uri: &str| {
+    let mut load = |ExternalFile { path: uri, .. }: ExternalFile| {
         let missing = || ExternalError::new(format!("there is no {uri}"));
         let number: usize = uri.trim_end_matches(".bin").parse().map_err(|_| missing())?;
         bins.get(number).cloned().ok_or_else(missing)
@@ -111,7 +111,9 @@ fn check(bytes: &[u8], bins: &[Vec<u8>]) {
                     Err(GltfError::Model { .. } | GltfError::Unweighted { .. }) => {}
                     Err(error) => panic!("{error}"),
                     Ok(glb) => {
-                        let mut none = |uri: &str| Err(ExternalError::new(format!("{uri} is outside")));
+                        let mut none = |ExternalFile { path: uri, .. }: ExternalFile| {
+                            Err(ExternalError::new(format!("{uri} is outside")))
+                        };
                         match read_gltf(&glb, "again.glb", &mut none) {
                             Ok(again) => check_promises(&again),
                             Err(GltfError::TooLarge { limit, .. }) => assert_eq!(limit, memory_limit(glb.len() as u64)),

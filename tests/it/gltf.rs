@@ -3,12 +3,13 @@
 pub mod compose;
 pub mod data;
 mod errors;
+mod external;
 mod writing;
 
 use compose::{Composed, PNG, character, triangle};
 use glam::{Vec2, Vec3, Vec4};
 use rigsmith::mesh::{
-    gltf::{ExternalError, GltfWriteSettings, read_gltf, write_glb, write_gltf},
+    gltf::{ExternalError, ExternalFile, GltfWriteSettings, read_gltf, write_glb, write_gltf},
     model::{ChannelTarget, Image, Interpolation, Model},
 };
 use serde_json::{Value, json};
@@ -351,7 +352,7 @@ fn outside_buffers_and_images() {
     image.insert("uri".into(), "textures/my%20skin%C3%A9.png".into());
     let bytes = file.gltf("./a b.bin");
     let mut asked = Vec::new();
-    let mut load = |uri: &str| {
+    let mut load = |ExternalFile { path: uri, .. }: ExternalFile| {
         asked.push(uri.to_owned());
         if uri.ends_with(".bin") { Ok(file.bin.clone()) } else { Ok(PNG.to_vec()) }
     };
@@ -360,8 +361,9 @@ fn outside_buffers_and_images() {
     assert_eq!(model.material_set.images[0].bytes, PNG);
 
     // A missing image is a pity, a missing buffer an error.
-    let mut load =
-        |uri: &str| if uri.ends_with(".bin") { Ok(file.bin.clone()) } else { Err(ExternalError::new("not found")) };
+    let mut load = |ExternalFile { path: uri, .. }: ExternalFile| {
+        if uri.ends_with(".bin") { Ok(file.bin.clone()) } else { Err(ExternalError::new("not found")) }
+    };
     let model = read_gltf(&bytes, "test.gltf", &mut load).unwrap();
     assert!(has_note(&model, "(not found)"), "{:?}", model.notes);
     let again = compose::read(&write_glb(&model, &GltfWriteSettings::default()).unwrap()).unwrap();
@@ -408,7 +410,7 @@ fn several_files() {
     let json = write_gltf(&model, &settings, "my character", &mut companion).unwrap();
     assert_eq!(files[0], ("skin.png".to_owned(), PNG.to_vec()));
     assert_eq!((files.len(), files[1].0.as_str()), (2, "my character.bin"));
-    let mut load = |uri: &str| match uri {
+    let mut load = |ExternalFile { path: uri, .. }: ExternalFile| match uri {
         "1 my character.bin" => Ok(files[1].1.clone()),
         "1 skin.png" => Ok(PNG.to_vec()),
         _ => Err(ExternalError::new(format!("asked for {uri}"))),

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use rigsmith::mesh::{
-    gltf::{ExternalError, GltfError, GltfWriteSettings, read_gltf, write_glb},
+    gltf::{ExternalError, ExternalFile, GltfError, GltfWriteSettings, read_gltf, write_glb},
     model::Model,
 };
 use serde_json::{Value, json};
@@ -35,7 +35,8 @@ fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
 fn read(path: &Path) -> Result<Model, String> {
     let folder = path.parent().unwrap();
     let name = path.file_name().unwrap().to_str().unwrap();
-    let mut load = |uri: &str| std::fs::read(folder.join(uri)).map_err(ExternalError::new);
+    let mut load =
+        |ExternalFile { path: uri, .. }: ExternalFile| std::fs::read(folder.join(uri)).map_err(ExternalError::new);
     match read_gltf(&std::fs::read(path).unwrap(), name, &mut load) {
         Ok(model) => Ok(model),
         Err(error) => {
@@ -133,7 +134,9 @@ fn use_meshes(path: &Path) {
     };
     json["nodes"] = (0..meshes.len()).map(|mesh| json!({"mesh": mesh})).collect();
     let name = path.file_name().unwrap().to_str().unwrap();
-    let mut load = |uri: &str| std::fs::read(path.with_file_name(uri)).map_err(ExternalError::new);
+    let mut load = |ExternalFile { path: uri, .. }: ExternalFile| {
+        std::fs::read(path.with_file_name(uri)).map_err(ExternalError::new)
+    };
     match read_gltf(json.to_string().as_bytes(), name, &mut load) {
         Ok(model) => check_model(path, &model),
         Err(error) => assert!(error.to_string().starts_with(&format!("{name}: /")), "{error}"),

@@ -5,7 +5,10 @@ use std::{collections::BTreeMap, path::Path};
 use glam::{Quat, Vec3};
 use rigsmith::{
     algo::weights::{WeightJoint, WeightReport, WeightSettings, skin_weights},
-    mesh::{gltf::read_gltf, model::Weights},
+    mesh::{
+        gltf::{ExternalFile, read_gltf},
+        model::Weights,
+    },
 };
 use serde_json::Value;
 
@@ -184,7 +187,7 @@ struct Character {
 
 impl Character {
     fn bind(path: &Path, with_helpers: bool) -> Self {
-        let no_files = &mut |_: &str| -> Result<Vec<u8>, _> { unreachable!("the file is in one piece") };
+        let no_files = &mut |_: ExternalFile| -> Result<Vec<u8>, _> { unreachable!("the file is in one piece") };
         let model = read_gltf(&std::fs::read(path).unwrap(), "character.glb", no_files).unwrap();
         let rest = model.at_rest();
         let truth = model.weights.clone().unwrap();

@@ -1,10 +1,15 @@
 //! Accessors: typed elements in buffers (section 3.6), with strides, normalised integers and sparse substitution.
 
-use std::{borrow::Cow, mem::size_of};
+use std::mem::size_of;
 
 use glam::Mat4;
 
-use super::{GltfError, budget::Budget, document::Document, json::At};
+use super::{
+    GltfError,
+    budget::Budget,
+    document::{BufferBytes, Document},
+    json::At,
+};
 
 /// A range of a buffer; checked to lie inside it.
 #[derive(Clone, Copy)]
@@ -195,12 +200,12 @@ fn sparse(at: &At, layout: Layout, views: &[View]) -> Result<Sparse, GltfError> 
 /// The document with the bytes of its buffers.
 pub(super) struct Source<'a> {
     pub(super) document: &'a Document<'a>,
-    buffers: &'a [Option<Cow<'a, [u8]>>],
+    buffers: &'a [Option<BufferBytes<'a>>],
     pub(super) budget: &'a Budget,
 }
 
 impl<'a> Source<'a> {
-    pub(super) fn new(document: &'a Document<'a>, buffers: &'a [Option<Cow<'a, [u8]>>], budget: &'a Budget) -> Self {
+    pub(super) fn new(document: &'a Document<'a>, buffers: &'a [Option<BufferBytes<'a>>], budget: &'a Budget) -> Self {
         Self { document, buffers, budget }
     }
 

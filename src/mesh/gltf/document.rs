@@ -1,11 +1,11 @@
 //! The document: the content of the JSON, typed, with every reference and every range of bytes checked.
 
-use std::{borrow::Cow, mem::size_of};
+use std::{collections::BTreeMap, mem::size_of, ops::Deref, rc::Rc};
 
 use serde_json::Value;
 
 use super::{
-    ExternalError, GltfError,
+    ExternalError, ExternalFile, ExternalKind, GltfError,
     accessor::{Accessor, View},
     budget::{Budget, Notes},
     json::At,
@@ -17,6 +17,25 @@ use super::{
 pub(super) struct BufferEntry<'a> {
     length: usize,
     uri: Option<&'a str>,
+}
+
+/// The bytes of a buffer.
+pub(super) enum BufferBytes<'b> {
+    /// The binary chunk of a GLB.
+    Chunk(&'b [u8]),
+    /// A file, or decoded data; several buffers may share one.
+    Shared(Rc<Vec<u8>>),
+}
+
+impl Deref for BufferBytes<'_> {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Chunk(bytes) => bytes,
+            Self::Shared(bytes) => bytes,
+        }
+    }
 }
 
 /// A node as declared; its transform is read where it is needed.
@@ -160,13 +179,15 @@ impl<'a> Document<'a> {
         &self,
         bin: Option<&'b [u8]>,
         budget: &Budget,
-        external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
-    ) -> Result<Vec<Option<Cow<'b, [u8]>>>, GltfError> {
+        external: &mut dyn FnMut(ExternalFile) -> Result<Vec<u8>, ExternalError>,
+    ) -> Result<Vec<Option<BufferBytes<'b>>>, GltfError> {
         let mut loaded = Vec::with_capacity(self.buffers.len());
+        // Several buffers may name one file.
+        let mut files: BTreeMap<String, Rc<Vec<u8>>> = BTreeMap::new();
         for (i, buffer) in self.buffers.iter().enumerate() {
             let place = format!("/buffers/{i}");
-            let bytes: Cow<'b, [u8]> = match (buffer.uri, bin) {
-                (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
+            let bytes = match (buffer.uri, bin) {
+                (None, Some(bin)) if i == 0 => BufferBytes::Chunk(bin),
                 (None, _) => {
                     loaded.push(None);
                     continue;
@@ -175,12 +196,18 @@ impl<'a> Document<'a> {
                     let place = format!("{place}/uri");
                     budget.take(text.len(), 1, &place)?;
                     match uri::resolve(text, &place)? {
-                        uri::Resolved::Data { bytes, .. } => Cow::Owned(bytes),
-                        uri::Resolved::File(path) => {
-                            let bytes = external(&path).map_err(|error| uri::fault(&place, text, error))?;
-                            budget.add_input(bytes.len() as u64);
-                            Cow::Owned(bytes)
-                        }
+                        uri::Resolved::Data { bytes, .. } => BufferBytes::Shared(Rc::new(bytes)),
+                        uri::Resolved::File(path) => match files.get(&path) {
+                            Some(bytes) => BufferBytes::Shared(bytes.clone()),
+                            None => {
+                                let file = ExternalFile { path: &path, kind: ExternalKind::Buffer, limit: u64::MAX };
+                                let bytes = external(file).map_err(|error| uri::fault(&place, text, error))?;
+                                budget.add_input(bytes.len() as u64);
+                                let bytes = Rc::new(bytes);
+                                files.insert(path, bytes.clone());
+                                BufferBytes::Shared(bytes)
+                            }
+                        },
                     }
                 }
             };

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::{Map, Value};
 
 use super::{
-    ExternalError, GltfError, MAX_IMAGE_BYTES,
+    ExternalError, ExternalFile, ExternalKind, GltfError, MAX_IMAGE_BYTES,
     accessor::Source,
     budget::{Budget, Notes},
     json::{At, copy, whole},
@@ -19,7 +19,7 @@ pub(super) const OWN_FIELDS: [&str; 4] = ["name", "uri", "mimeType", "bufferView
 /// Reads materials, textures, samplers and images.
 pub(super) fn read(
     source: &Source,
-    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
+    external: &mut dyn FnMut(ExternalFile) -> Result<Vec<u8>, ExternalError>,
     notes: &Notes,
 ) -> Result<MaterialSet, GltfError> {
     let document = source.document;
@@ -127,7 +127,7 @@ fn find_extension_names<'a>(extensions: Option<&'a Value>, found: &mut BTreeSet<
 
 fn images(
     source: &Source,
-    external: &mut dyn FnMut(&str) -> Result<Vec<u8>, ExternalError>,
+    external: &mut dyn FnMut(ExternalFile) -> Result<Vec<u8>, ExternalError>,
     notes: &Notes,
 ) -> Result<Vec<Image>, GltfError> {
     let mut images = Vec::new();
@@ -148,7 +148,11 @@ fn images(
                     image.bytes = bytes;
                     mime = if mime.is_empty() { of_uri } else { mime };
                 }
-                uri::Resolved::File(path) => match external(&path) {
+                uri::Resolved::File(path) => match external(ExternalFile {
+                    path: &path,
+                    kind: ExternalKind::Image,
+                    limit: MAX_IMAGE_BYTES - total,
+                }) {
                     Ok(bytes) => {
                         let file = path.rsplit('/').next().unwrap_or_default();
                         image.bytes = bytes;

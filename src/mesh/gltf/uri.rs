@@ -1,6 +1,6 @@
 //! URIs of buffers and images: data in the URI itself, or a file below the model's folder and nowhere else.
 
-use std::{error::Error, sync::Arc};
+use std::{error::Error, fmt, sync::Arc};
 
 use super::GltfError;
 
@@ -53,6 +53,32 @@ pub enum GltfUriError {
     /// The file cannot be loaded.
     #[error(transparent)]
     External(#[from] ExternalError),
+}
+
+/// File that a glTF file refers to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExternalFile<'a> {
+    /// Path relative to the folder of the glTF file, decoded, with `/` between its parts.
+    pub path: &'a str,
+    /// Use of the file.
+    pub kind: ExternalKind,
+    /// Largest number of bytes that the reader can use; a longer file is refused in any case.
+    pub limit: u64,
+}
+
+impl fmt::Display for ExternalFile<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.path)
+    }
+}
+
+/// Use of a file that a glTF file refers to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExternalKind {
+    /// Data of accessors.
+    Buffer,
+    /// An encoded image.
+    Image,
 }
 
 /// Reason why a file that a glTF file refers to cannot be loaded: an error of the caller's own type. Two are equal if

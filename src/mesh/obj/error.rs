@@ -88,6 +88,14 @@ pub enum LineProblem {
         /// Number of elements in the file.
         count: u64,
     },
+    /// An index is beyond all that a file can hold.
+    #[error("a face names {list} {text}, but a file holds at most {MAX_ELEMENTS}; the file may be damaged")]
+    HugeIndex {
+        /// `vertex`, `texture coordinate` or `normal`.
+        list: &'static str,
+        /// The index as the file has it, shortened.
+        text: String,
+    },
     /// A negative index counts back to before the first element.
     #[error("a face counts back to {missing} before the first {list}; the lines may be out of order")]
     BeforeFirst {

@@ -129,18 +129,19 @@ impl Parsed {
     fn corner_index(&mut self, list: usize, field: &[u8], corner: &[u8]) -> Result<(), LineProblem> {
         let at = self.corners[0].len() - usize::from(list > 0);
         let count = [self.positions.len(), self.texcoords.len(), self.normals.len()][list];
+        let huge = || LineProblem::HugeIndex { list: LISTS[list], text: excerpt(field) };
         let value = match whole(field).ok_or_else(|| LineProblem::BadCorner { text: excerpt(corner) })? {
             0 => return Err(LineProblem::ZeroIndex { list: LISTS[list] }),
             // The block's place in the file is not known yet; the index is checked when the block is appended.
             index @ 1.. => {
-                let index = u32::try_from(index).unwrap_or(NONE);
+                let index = u32::try_from(index).map_err(|_| huge())?;
                 self.largest[list] = self.largest[list].max(index);
                 index - 1
             }
             back => {
+                let back = i32::try_from(back).map_err(|_| huge())?;
                 self.relative.push(Relative { corner: at as u32, list: list as u8 });
-                // Below the lowest possible index all values are equal: out of range.
-                (count as i64 + back.max(i64::from(i32::MIN))) as u32
+                (count as i64 + i64::from(back)) as u32
             }
         };
         let values = &mut self.corners[list];

@@ -42,7 +42,13 @@ impl SourceError {
             ron::Error::Eof => "; the file is cut short: take a backup",
             _ => "",
         };
-        Self::at(text, byte_offset(text, error.span.start), format!("{}{hint}", error.code))
+        let message = match &error.code {
+            ron::Error::ExceededRecursionLimit => {
+                "brackets are nested too deeply for a file of this kind; close some of them".to_owned()
+            }
+            code => format!("{code}{hint}"),
+        };
+        Self::at(text, byte_offset(text, error.span.start), message)
     }
 }
 

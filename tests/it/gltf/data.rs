@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::writing::there_and_back;
 use glam::{Affine3A, Quat, Vec3, Vec4};
 use rigsmith::mesh::{
-    gltf::{ExternalError, GltfWriteSettings, read_gltf, write_glb},
+    gltf::{ExternalError, ExternalFile, GltfWriteSettings, read_gltf, write_glb},
     model::{Channel, ChannelTarget, Clip, Interpolation, Model},
 };
 
@@ -29,7 +29,8 @@ pub fn skinned_files(data: PathBuf) -> Vec<PathBuf> {
 
 pub fn read_file(path: &Path) -> Model {
     let folder = path.parent().unwrap();
-    let mut load = |uri: &str| std::fs::read(folder.join(uri)).map_err(ExternalError::new);
+    let mut load =
+        |ExternalFile { path: uri, .. }: ExternalFile| std::fs::read(folder.join(uri)).map_err(ExternalError::new);
     read_gltf(&std::fs::read(path).unwrap(), &path.display().to_string(), &mut load).unwrap()
 }
 

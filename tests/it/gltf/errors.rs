@@ -1,7 +1,7 @@
 //! What is wrong with a file is said with the file's name and the place, before anything is built on it.
 
 use super::compose::{Composed, character, glb, read, triangle};
-use rigsmith::mesh::gltf::{ExternalError, MAX_IMAGE_BYTES, memory_limit, read_gltf};
+use rigsmith::mesh::gltf::{ExternalError, ExternalFile, MAX_IMAGE_BYTES, memory_limit, read_gltf};
 use serde_json::{Value, json};
 
 fn error(bytes: &[u8]) -> String {
@@ -167,7 +167,7 @@ fn uris() {
     let check = |uri: &str, text: &str| {
         let file = triangle();
         let error =
-            read_gltf(&file.gltf(uri), "m.gltf", &mut |path| panic!("{path} was opened")).unwrap_err().to_string();
+            read_gltf(&file.gltf(uri), "m.gltf", &mut |file| panic!("{file} was opened")).unwrap_err().to_string();
         assert!(error.starts_with("m.gltf: /buffers/0/uri: ") && error.contains(text), "{uri}: {error}");
     };
     check("file:///etc/passwd", "scheme or a drive");
@@ -199,7 +199,7 @@ fn uris() {
 
     let check = |uri: &str, path: &str| {
         let file = triangle();
-        let mut load = |asked: &str| {
+        let mut load = |ExternalFile { path: asked, .. }: ExternalFile| {
             if asked == path { Ok(file.bin.clone()) } else { Err(ExternalError::new(format!("{asked} was opened"))) }
         };
         let model = read_gltf(&file.gltf(uri), "m.gltf", &mut load);
