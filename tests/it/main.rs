@@ -50,6 +50,7 @@ mod files_read;
 mod files_set;
 mod fill;
 mod fit;
+mod fit_data;
 mod fuzz_gestures;
 mod fuzz_gltf;
 mod fuzz_journal;

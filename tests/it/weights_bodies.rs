@@ -15,12 +15,12 @@ use serde_json::Value;
 use crate::prerequisites::{BODIES, test_data};
 
 /// A body with the joints of one of its rigs and the weights painted for them.
-struct Body {
-    points: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-    names: Vec<String>,
-    joints: Vec<WeightJoint>,
-    truth: Weights,
+pub struct Body {
+    pub points: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+    pub names: Vec<String>,
+    pub joints: Vec<WeightJoint>,
+    pub truth: Weights,
 }
 
 fn json(path: &Path) -> Value {
@@ -32,7 +32,7 @@ fn vector(value: &Value) -> Vec3 {
 }
 
 impl Body {
-    fn read(bodies: &Path, body: &str, rig: &str) -> Self {
+    pub fn read(bodies: &Path, body: &str, rig: &str) -> Self {
         let text = std::fs::read_to_string(bodies.join(body).join("body.obj")).unwrap();
         let (mut points, mut triangles) = (Vec::new(), Vec::new());
         for line in text.lines() {
@@ -99,7 +99,7 @@ impl Body {
 }
 
 /// The mean over the points of half the sum of absolute differences of weights.
-fn difference(a: &Weights, b: &Weights, points: impl Iterator<Item = usize>) -> f64 {
+pub fn difference(a: &Weights, b: &Weights, points: impl Iterator<Item = usize>) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for point in points {
         let mut row: BTreeMap<u32, f32> = a.of(point).collect();
