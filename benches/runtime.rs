@@ -158,7 +158,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// What Bevy's example `many_foxes` does, without drawing: a thousand foxes play a clip of their file through Bevy's own
+/// Peer: Bevy's example `many_foxes` without drawing. A thousand foxes play a clip of their file through Bevy's own
 /// animation, their transforms propagate, and skinning matrices are made. Joints of a fox, and seconds a frame.
 fn foxes(fox: &Model) -> Option<(usize, [f64; 2])> {
     let clip = fox.clips.first()?;

@@ -1,4 +1,4 @@
-//! How close a stroke's joints come to the middle of a limb, on real bodies.
+//! Distance of a stroke's joints from the middle of a limb, on real bodies.
 //!
 //! `RIGSMITH_DATA=../shared/data cargo bench --bench stroke [-- FILTER]` prints, for each body, limb and view, the mean
 //! distance of the joints to the line of the limb's section centroids in parts of the local radius, and, for bent limbs
@@ -220,7 +220,7 @@ impl Random {
     }
 }
 
-/// How a hand strays from the line it means to draw, by at most `reach`.
+/// Deviation of a hand from the line that it means to draw, by at most `reach`.
 #[derive(Clone, Copy, PartialEq)]
 enum Jitter {
     /// Every point on its own.
@@ -445,7 +445,7 @@ fn from_bone(p: Vec3, a: Vec3, b: Vec3) -> f32 {
     (p - a).reject_from(b - a).length()
 }
 
-/// How far along a polyline the nearest point to `p` lies, and its distance.
+/// Length along a polyline to the point nearest to `p`, and its distance.
 fn along(line: &[Vec3], p: Vec3) -> (f32, f32) {
     let mut best = (0.0, f32::INFINITY);
     let mut before = 0.0;

@@ -1,4 +1,4 @@
-//! What a frame costs while somebody works on a mesh of a million triangles.
+//! Time of a frame while somebody works on a mesh of a million triangles.
 //!
 //! ```text
 //! cargo bench --bench viewport --no-default-features [--features draw]

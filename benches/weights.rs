@@ -152,7 +152,7 @@ fn error(mesh: &Mesh, skeleton: &Skeleton, weights: &Weights) -> f64 {
     met.clone().map(|s| s.0 / f64::from(s.1)).sum::<f64>() / met.count() as f64
 }
 
-/// How much the volume of the limb around a bend changes when the joint below `upper` turns by 90 degrees towards a
+/// Change of the limb's volume around a bend when the joint below `upper` turns by 90 degrees towards a
 /// side.
 ///
 /// The limb is where the true weights of both joints hold most; its openings are closed with fans.

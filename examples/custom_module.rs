@@ -23,7 +23,7 @@ rigsmith::parameters! {
     pub struct Pendulum {
         /// The nodes that carry a weight.
         pub at: NodeRefs = NodeRef::this().into(),
-        /// How far below them it hangs, above 0, in the rig's units.
+        /// Distance below them, above 0, in the rig's units.
         pub length: f32 = 0.3,
         /// Name, groups and label; by default those of the node.
         pub creation: Creation = Creation::default(),

@@ -35,7 +35,7 @@ use rigsmith::{
     rig::character::import_skeleton,
 };
 
-/// What the command line asks for.
+/// Settings from the command line.
 #[derive(Resource, Clone, Default)]
 struct Wanted {
     out: Option<String>,

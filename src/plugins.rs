@@ -1,6 +1,6 @@
 //! The engine as Bevy plugins: one plugin a file, each public, replaceable and usable alone where that makes sense.
 //!
-//! # Who writes what
+//! # Writers of components
 //!
 //! A rig is told by components ([`schema`]). The document ([`Rig`](crate::rig::Rig)) stays the truth; the entities follow
 //! it, and what somebody else writes to them is taken up in the next frame.
@@ -9,13 +9,21 @@
 //! | --- | --- | --- |
 //! | `Rig` | the edit path ([`document`]) | only with [`document::EditRequest`]; a replaced component is another document without its history |
 //! | [`NodeLabel`](schema::NodeLabel), [`InGroup`](schema::InGroup), [`RestTransform`](crate::rig::RestTransform), `ChildOf` of a joint | the document | an edit, one step of the history a frame; a value that the document refuses is put back and told once |
-//! | [`LocalGroup`](schema::LocalGroup), [`Tag`](schema::Tag), [`CommandTag`](schema::CommandTag), [`FeatureTag`](schema::FeatureTag), [`TagOf`](schema::TagOf), the order of [`Tags`](schema::Tags), [`InFeature`](schema::InFeature) | the document | an edit, as above |
+//! | [`LocalGroup`](schema::LocalGroup), [`Tag`](schema::Tag), [`CommandTag`](schema::CommandTag), [`FeatureTag`](schema::FeatureTag), [`TagOf`](schema::TagOf), [`GroupOf`](schema::GroupOf), the order of [`Tags`](schema::Tags), [`InFeature`](schema::InFeature) | the document | an edit, as above |
 //! | a spawned [`Joint`](schema::Joint) below a rig or joint, a tag on a joint, a group of a rig | | added to the document; the entity stays the same and gets a [`Uid`](crate::rig::Uid) |
 //! | a despawned joint, tag or group | | deleted, joints with their subtree; undoing spawns others |
 //! | `Transform` of a joint or created node | the program, and the document where its pose changes | becomes the node's pose in the same frame, within the channels and limits of a control; a driven node answers with what its constraints make of it |
 //! | [`Attributes`](schema::Attributes) | the program, and the document where its values change | drives the rig in the same frame; a driven value is put back |
 //! | `GlobalTransform` of a node | propagation, corrected where Bevy would shear | overwritten |
-//! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`commands::CommandReport`], [`commands::Built`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; an inserted `Uid` is put back and told, the others stand until the build writes them |
+//! | [`Null`](schema::Null) | the document, for joints without weights, and the build, for created nulls | on a spawned joint: a joint without weights; elsewhere it stands until the document or the build writes it |
+//! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`Parked`](schema::Parked), [`commands::CommandReport`], [`commands::Built`], [`commands::BuildFailure`], [`commands::RunFailure`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; an inserted `Uid` is put back and told, the others stand until the build writes them |
+//! | [`CreatedBy`](schema::CreatedBy), [`Constrains`](schema::Constrains), [`NodeOf`](schema::NodeOf) | the build, and the document for its joints | stands until the build or the document writes it; nothing else follows from it |
+//! | [`RigNodes`](schema::RigNodes), [`LocalGroups`](schema::LocalGroups), [`GroupMembers`](schema::GroupMembers), [`FeatureCommands`](schema::FeatureCommands), [`CreatedNodes`](schema::CreatedNodes), [`NodeConstraints`](schema::NodeConstraints) | Bevy, as the other side of a relation | write the relation instead |
+//! | [`NodeSlot`](schema::NodeSlot) | the instance of a game | immutable |
+//! | [`ControlPose`](schema::ControlPose) | games and animations, of instances without a hierarchy | drives the node in the same frame, within the channels and limits of a control |
+//! | [`runtime::InstanceMode`], [`runtime::HandOver`], [`runtime::OutsideTransform`] | games | takes effect in the same frame |
+//! | [`surface::RigMesh`], [`surface::SkinOf`] | whoever loads a mesh | the mesh is bound, shown and found by rays anew |
+//! | [`selection::Selection`] | picking, gestures, edits, undo | stands until one of them writes it |
 //! | label, group, rest and parent of a created node, and the node itself | the build | put back and told: change the command instead |
 //! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame; what is shown already is none; unknown names are told by [`face::Expressed`] |
 //! | `Name` of joints, groups and nodes | the label or name | stands until that changes |

@@ -137,7 +137,7 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
         .insert_resource(settings.display)
         .insert_resource(settings.drawing.clone())
         .insert_resource(ClearColor(settings.background))
-        .init_resource::<Taken>();
+        .init_resource::<CapturedPicture>();
     app.finish();
     app.cleanup();
 
@@ -190,10 +190,10 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
     }
     app.world_mut()
         .spawn(Screenshot::image(target))
-        .observe(|shot: On<ScreenshotCaptured>, mut taken: ResMut<Taken>| taken.0 = Some(shot.image.clone()));
+        .observe(|shot: On<ScreenshotCaptured>, mut taken: ResMut<CapturedPicture>| taken.0 = Some(shot.image.clone()));
     while Instant::now() < deadline {
         app.update();
-        if let Some(image) = app.world_mut().resource_mut::<Taken>().0.take() {
+        if let Some(image) = app.world_mut().resource_mut::<CapturedPicture>().0.take() {
             return Ok(image);
         }
     }
@@ -271,7 +271,7 @@ pub fn bevy_plugins() -> PluginGroupBuilder {
 
 /// The picture, once the renderer has returned it.
 #[derive(Resource, Default)]
-struct Taken(Option<Image>);
+struct CapturedPicture(Option<Image>);
 
 /// Points the camera so that the whole character is visible.
 fn aim(world: &mut World, rig: Entity, camera: Entity, settings: &PictureSettings) {

@@ -41,7 +41,8 @@ pub use format::source::SourceError;
 pub use format::{project, skin, template, text};
 pub(crate) use format::{
     scan::{Field, elements, fields, same_place},
-    source::{parse_ron, ron_options, utf8},
+    source::{parse_ron, ron_options, ron_text, utf8},
+    tree::with_field,
 };
 pub use group::{GROUP_COLORS, GroupData};
 pub use joint::{FaceBonePart, FacePlacement, JointData, NodeKind, RestTransform, RigJoint, degrees};

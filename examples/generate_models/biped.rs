@@ -29,7 +29,7 @@ const HIP: DVec3 = dvec3(0.090, 0.925, -0.004);
 const KNEE: DVec3 = dvec3(0.112, 0.498, 0.004);
 const ANKLE: DVec3 = dvec3(0.124, 0.080, -0.018);
 
-/// How far the feet point outwards, degrees.
+/// Angle by which the feet point outwards, degrees.
 const TOE_OUT: f64 = 7.0;
 
 /// The pose of arms and hands; degrees.
@@ -311,7 +311,7 @@ impl Biped {
         union(d, toes, 0.014)
     }
 
-    /// Where a point near this body goes when the body takes the pose of another.
+    /// Target of a point near this body when the body takes the pose of another.
     pub fn carry(&self, to: &Self, p: DVec3) -> DVec3 {
         let share = ease(0.125, 0.215, p.x) * ease(1.20, 1.28, p.y);
         if share == 0.0 {
@@ -347,7 +347,7 @@ impl Biped {
     }
 }
 
-/// Where a node of the grid lies: small cells around the head, the hands and the feet.
+/// Position of a node of the grid: small cells around the head, the hands and the feet.
 pub fn warp(u: DVec3) -> DVec3 {
     // Along the arm, up the neck and down the shin the cross-section shrinks about the limb's axis.
     let arm = 1.0 - 0.30 * ease(0.24, 0.40, u.x) - 0.43 * ease(0.56, 0.69, u.x);

@@ -162,11 +162,11 @@ pub const fn section(s: f64, u: [f64; 2], v: [f64; 2]) -> Section {
 #[derive(Debug, Clone)]
 pub struct Loft {
     sections: Vec<Section>,
-    /// Where the widest line of a section lies between its ends, for `u` and `v` (0.5 is the middle).
+    /// Place of the widest line of a section between its ends, for `u` and `v` (0.5 is the middle).
     middle: [f64; 2],
     /// 0: ellipses; 1: rounded squares.
     boxy: f64,
-    /// How quickly it closes beyond its ends.
+    /// Rate at which it closes beyond its ends.
     closing: f64,
 }
 

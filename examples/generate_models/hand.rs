@@ -15,7 +15,7 @@ use crate::{
 /// Names of the fingers, thumb first.
 pub const FINGERS: [&str; 5] = ["thumb", "index", "middle", "ring", "pinky"];
 
-/// Where each finger begins: the thumb at its root in the wrist, the others at their knuckles.
+/// Root of each finger: the thumb at its root in the wrist, the others at their knuckles.
 const ROOTS: [DVec3; 5] = [
     dvec3(0.018, -0.008, 0.022),
     dvec3(0.089, 0.001, 0.0275),
@@ -24,7 +24,7 @@ const ROOTS: [DVec3; 5] = [
     dvec3(0.079, -0.003, -0.0355),
 ];
 
-/// Where the metacarpals of the four fingers begin.
+/// Roots of the metacarpals of the four fingers.
 const CARPALS: [DVec3; 4] =
     [dvec3(0.020, 0.002, 0.013), dvec3(0.021, 0.003, 0.004), dvec3(0.020, 0.002, -0.006), dvec3(0.019, 0.0, -0.015)];
 
@@ -49,9 +49,9 @@ const RADII: [[f64; 4]; 5] = [
 /// Angles of the fingers in degrees.
 #[derive(Debug, Clone, Copy)]
 pub struct HandPose {
-    /// How far each finger leans towards the thumb's side.
+    /// Angle by which each finger leans towards the thumb's side.
     pub spread: [f64; 5],
-    /// How far each joint bends towards the palm.
+    /// Angle by which each joint bends towards the palm.
     pub curl: [[f64; 3]; 5],
 }
 
@@ -153,7 +153,7 @@ impl Hand {
         d
     }
 
-    /// Where a point near this hand goes when the hand takes the pose of another.
+    /// Target of a point near this hand when the hand takes the pose of another.
     pub fn carry(&self, to: &Self, p: DVec3) -> DVec3 {
         let chain = |f: usize| {
             let n = &self.fingers[f].map(|x| x.at);
@@ -208,7 +208,7 @@ pub struct HandModel {
     forearm: Loft,
 }
 
-/// How long the piece of forearm is.
+/// Length of the piece of forearm.
 pub const STUB: f64 = 0.10;
 
 impl HandModel {

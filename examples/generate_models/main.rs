@@ -102,7 +102,7 @@ fn make_hand(folder: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Where the forearm joint lies below the wrist of the single hand.
+/// Distance of the forearm joint below the wrist of the single hand.
 const STUB_ROOT: f64 = 0.085;
 
 fn make_head(folder: &Path) -> Result<(), Box<dyn Error>> {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::{field::gradient, surface_nets::Quads};
 
-/// How [`settle`] moves vertices.
+/// Settings of [`settle`].
 #[derive(Debug, Clone, Copy)]
 pub struct Settle {
     /// Rounds of spreading and projecting.
@@ -87,7 +87,7 @@ impl Ring {
         Self { lists, size, on_plane: quads.on_plane.clone() }
     }
 
-    /// Where the neighbours of a vertex pull it.
+    /// Mean place of the neighbours of a vertex, which pull it there.
     fn mean(&self, points: &[DVec3], i: usize) -> DVec3 {
         let (mut sum, mut total) = (DVec3::ZERO, 0.0);
         for &j in &self.lists[i] {
@@ -183,7 +183,7 @@ pub fn largest_shell(quads: &mut Quads) -> usize {
     sizes.len() - 1
 }
 
-/// What keeps a surface from being a closed manifold; empty if nothing does.
+/// Faults that keep a surface from being a closed manifold; empty if there are none.
 pub fn faults(quads: &Quads) -> Vec<String> {
     let mut edges: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     let mut fans: Vec<Vec<(u32, u32)>> = vec![Vec::new(); quads.points.len()];

@@ -50,10 +50,10 @@ pub struct TemplateJoint<'a> {
     pub position: Vec3,
 }
 
-/// Whether left and right are made alike.
+/// Symmetry of a fit: left and right made alike.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FitSymmetry {
-    /// Where mesh and pose are symmetric.
+    /// Symmetric if mesh and pose are.
     #[default]
     Auto,
     /// Always.

@@ -46,11 +46,11 @@ use twist::Limbs;
 /// A joint as the binding sees it, in the space of the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightJoint {
-    /// Where the joint is.
+    /// Position of the joint.
     pub head: Vec3,
     /// Index of the parent; `None` for a root.
     pub parent: Option<usize>,
-    /// Where the bone of a joint without children ends; estimated from the surface if `None`.
+    /// End of the bone of a joint without children; estimated from the surface if `None`.
     pub tail: Option<Vec3>,
     /// False for joints that must not move points; what they hold goes to the nearest ancestor that deforms.
     pub deforms: bool,
@@ -68,11 +68,11 @@ pub struct TwistBone {
     /// Index of the joint that the bone begins at, no twist joint itself. It holds what is not twisted against it: the
     /// start of the bone, or the end if there is a twist joint at the start.
     pub joint: usize,
-    /// Where the bone ends.
+    /// End of the bone.
     pub end: Vec3,
 }
 
-/// Which method binds.
+/// Method of binding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
     /// Heat on the surface where it can be trusted, voxels elsewhere.
@@ -84,14 +84,14 @@ pub enum Method {
     Voxel,
 }
 
-/// How [`skin_weights`] works.
+/// Settings of [`skin_weights`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightSettings {
     /// The largest number of joints that move one point, at least 1.
     pub max_influences: usize,
     /// Width of the blend between neighbouring joints: 1 is usual, 0.25 nearly rigid, 4 very soft.
     pub smoothing: f32,
-    /// Which method binds.
+    /// Method of binding.
     pub method: Method,
     /// Cells along the longest side where voxels are used.
     pub voxel_resolution: usize,
@@ -125,7 +125,7 @@ impl WeightSettings {
     }
 }
 
-/// How the points got their weights; the counts but `stiff` add up to `points`.
+/// Numbers of points by the origin of their weights; the counts but `stiff` add up to `points`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WeightReport {
     /// By heat on the surface.
@@ -206,9 +206,9 @@ pub enum WeightError {
         "the locked weights are for {points} points and {joints} joints, the mesh and rig have others: bind without locks"
     )]
     Locks {
-        /// How many points they have.
+        /// Number of points of the locked weights.
         points: usize,
-        /// How many joints they have.
+        /// Number of joints of the locked weights.
         joints: usize,
     },
     /// The mesh is too large.

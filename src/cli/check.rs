@@ -20,7 +20,7 @@ use crate::{
     modules,
     processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, SourceText, review},
     rig::{
-        Rig, SourceError, TagData, TagKind, Uid,
+        Rig, SourceError, TagData, TagKind,
         feature::{FeatureKinds, undecided_choices},
         template,
     },
@@ -206,18 +206,17 @@ fn problems_of_commands(rig: &Rig, places: &SourceText) -> (Vec<SourceError>, us
 /// placed at the first command that it names.
 fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, places: &SourceText) -> Option<SourceError> {
     let built = Builder::build(rig, modules).ok()?;
-    let problem = RigProgram::compile(&built, &CompileOptions::default()).err()?.to_string();
-    let named = problem.split("command ").skip(1).filter_map(|rest| rest.get(..16)?.parse::<Uid>().ok());
-    let found = named.filter_map(|uid| rig.find_tag(uid)).next();
+    let problem = RigProgram::compile(&built, &CompileOptions::default()).err()?;
+    let found = problem.commands().iter().find_map(|command| rig.find_tag(*command));
     let Some((joint, TagData { uid, kind: TagKind::Command { module, .. }, .. })) = found else {
-        return Some(places.beginning(problem));
+        return Some(places.beginning(problem.to_string()));
     };
     let error = BuildError {
         command: *uid,
         joint: joint.data.uid,
         joint_label: joint.data.label.clone().unwrap_or_default().into(),
         module: module.as_str().into(),
-        problem: BuildProblem::Module(ModuleError::other(problem)),
+        problem: BuildProblem::Module(ModuleError::other(problem.to_string())),
     };
     Some(places.locate(rig, &error))
 }

@@ -1,6 +1,6 @@
 //! `rigsmith face`: bones, weights and expressions for a head mesh.
 
-mod written;
+mod fit_error;
 
 use std::{
     collections::BTreeMap,
@@ -166,7 +166,8 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
             if let (Some(shapes), Some(mesh), Some(face)) = (&fitted, bench.mesh(), placed_face) {
                 let rest = &mesh.rest.points;
                 let head: Vec<usize> = (0..placed.points[0]).map(|point| face.analysis.mesh_point(point)).collect();
-                let error = spinning("reading back", || written::fit_error(&args.output, &model, rest, shapes, &head))?;
+                let error =
+                    spinning("reading back", || fit_error::fit_error(&args.output, &model, rest, shapes, &head))?;
                 report_written_error(&mut report, error);
             }
         }

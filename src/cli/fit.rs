@@ -63,7 +63,7 @@ pub(super) struct FitArgs {
 
 #[derive(ValueEnum, Debug, Clone, Copy)]
 enum SymmetryArg {
-    /// Where mesh and pose are symmetric
+    /// Symmetric if mesh and pose are
     Auto,
     /// Always
     On,
@@ -150,7 +150,7 @@ fn template(args: &FitArgs, report: &mut Report) -> Result<FitTemplate, Failure>
     }
     let template = load_template(&RealDisk, file)?;
     report.notes(template.notes);
-    Ok(FitTemplate::Given(Arc::new(template.rig)))
+    Ok(FitTemplate::Rig(Arc::new(template.rig)))
 }
 
 fn objects(args: &FitArgs, model: &crate::mesh::model::Model) -> Result<Vec<usize>, Failure> {

@@ -20,7 +20,7 @@ pub(super) struct FormatArgs {
     /// Change nothing, and fail if a file is not in its layout
     #[arg(long)]
     check: bool,
-    /// What becomes of uids
+    /// Treatment of uids
     #[arg(long, value_enum, default_value_t = UidsArg::Keep)]
     uids: UidsArg,
 }

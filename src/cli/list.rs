@@ -11,7 +11,10 @@ use serde_json::{Value, json};
 use super::{Failure, Report};
 use crate::{
     files::{Disk, EntryKind, FileKind, RealDisk, load_template},
-    rig::template::{self, TemplateHeader},
+    rig::{
+        SourceError,
+        template::{self, TemplateHeader},
+    },
 };
 
 /// Arguments of `rigsmith list`.
@@ -70,7 +73,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
             }
             Err(error) => {
                 report.line(format!("{}: {error}", path.display()));
-                list.push(json!({ "file": path.display().to_string(), "error": error }));
+                list.push(json!({ "file": path.display().to_string(), "error": error.to_string() }));
             }
         }
     }
@@ -81,20 +84,31 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
+/// Reason why a template of a folder cannot be listed.
+#[derive(Debug, thiserror::Error)]
+enum HeaderError {
+    /// A file that cannot be read.
+    #[error(transparent)]
+    Read(#[from] std::io::Error),
+    /// A file that is no template.
+    #[error(transparent)]
+    Template(#[from] SourceError),
+}
+
 /// Header of a file: of its beginning if that is enough, else of all of it, else of the template with its parts.
-fn header(path: &Path) -> Result<TemplateHeader, String> {
+fn header(path: &Path) -> Result<TemplateHeader, HeaderError> {
     let read = |limit: u64| -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         RealDisk.open(path)?.take(limit).read_to_end(&mut bytes)?;
         Ok(bytes)
     };
-    let first = read(FIRST_BYTES).map_err(|error| error.to_string())?;
+    let first = read(FIRST_BYTES)?;
     let is_whole = (first.len() as u64) < FIRST_BYTES;
     let mut header = match template::read_header(&first) {
         Ok(header) if is_whole || header.joint_count > 0 => header,
         _ => {
-            let all = read(template::MAX_BYTES as u64).map_err(|error| error.to_string())?;
-            template::read_header(&all).map_err(|error| error.to_string())?
+            let all = read(template::MAX_BYTES as u64)?;
+            template::read_header(&all)?
         }
     };
     // What parts bring, and what a part needs, only the whole template tells, unless its author wrote it down.

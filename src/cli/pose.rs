@@ -17,7 +17,7 @@ use crate::{
     rig::{Rig, RigEdit, bake::baked, operations::Operation},
 };
 
-/// What is posed, and how; shared with `rigsmith render`.
+/// Pose of a rig on the command line; shared with `rigsmith render`.
 #[derive(Args, Debug, Clone, Default)]
 pub(super) struct PoseSteps {
     /// Writes one value: CONTROL.translate=(x,y,z), CONTROL.rotate=(x,y,z) in degrees, CONTROL.scale=(x,y,z), all

@@ -34,7 +34,7 @@ pub(super) struct SkinArgs {
     rig: PathBuf,
     /// The mesh: .obj, .gltf or .glb. A skeleton in it is left aside
     mesh: PathBuf,
-    /// What to write: .glb or .gltf, or only the weights as .skin
+    /// Output file: .glb or .gltf, or only the weights as .skin
     #[arg(short, long)]
     output: Output,
     /// Take the weights from a .skin file: as they are if the mesh is the same, transferred if it has changed

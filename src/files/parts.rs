@@ -6,13 +6,13 @@ use std::{
     sync::Arc,
 };
 
-use super::{Disk, read_capped};
+use super::{Disk, ReadError, read_capped};
 use crate::{
     modules,
     processor::Modules,
     rig::{
         Rig, SourceError,
-        part::Part,
+        part::{Part, PartError},
         template::{self, Template, read_template, text_of},
     },
 };
@@ -78,11 +78,31 @@ fn bundled(name: &str) -> Option<&'static str> {
 /// Largest depth of parts in parts.
 const DEPTH: usize = 16;
 
-/// Where the files of parts are.
+/// Source of the files of parts.
 enum Source<'a> {
     Disk(&'a dyn Disk),
     /// Contents that are there; `None` for files that there are not.
-    Given(&'a BTreeMap<PathBuf, Option<Vec<u8>>>),
+    Contents(&'a BTreeMap<PathBuf, Option<Vec<u8>>>),
+}
+
+/// Reason why a part of a template cannot be used.
+#[derive(Debug, thiserror::Error)]
+enum PartFileError {
+    /// A part that uses itself, at any depth.
+    #[error("`{}` is a part of itself; take it out of one of the files", path.display())]
+    Cycle { path: PathBuf },
+    /// A file that the list of contents does not have.
+    #[error("there is no file `{}`", path.display())]
+    Missing { path: PathBuf },
+    /// A file that cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A file that is no template, or has such a part itself.
+    #[error("`{}`: {source}", path.display())]
+    Template { path: PathBuf, source: SourceError },
+    /// A part that does not fit.
+    #[error(transparent)]
+    Part(#[from] PartError),
 }
 
 /// Reader of templates with their parts. It notes the files of the parts that it has asked for.
@@ -111,7 +131,7 @@ impl<'a> PartFiles<'a> {
     /// A reader that takes contents of parts from a list, and parts that come with Rigsmith for those that are not there.
     /// Files that the list does not have are [`missing`](Self::missing).
     pub fn given(files: &'a BTreeMap<PathBuf, Option<Vec<u8>>>) -> Self {
-        Self::of(Source::Given(files), modules::all())
+        Self::of(Source::Contents(files), modules::all())
     }
 
     fn of(source: Source<'a>, modules: Modules) -> Self {
@@ -141,26 +161,26 @@ impl<'a> PartFiles<'a> {
         template.with_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
     }
 
-    fn part(&mut self, path: &Path, name: &str) -> Result<Arc<Part>, String> {
+    fn part(&mut self, path: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
         if let Some(known) = self.known.get(path) {
             return Ok(known.clone());
         }
         if self.open.iter().any(|open| open == path) || self.open.len() >= DEPTH {
-            return Err(format!("`{}` is a part of itself; take it out of one of the files", path.display()));
+            return Err(PartFileError::Cycle { path: path.to_owned() });
         }
         let (read, is_there) = match self.source {
             Source::Disk(disk) => {
                 let read = read_capped(disk, path, template::MAX_BYTES as u64);
-                (read.map_err(|error| error.to_string()), disk.entry(path, true).is_ok())
+                (read.map_err(PartFileError::from), disk.entry(path, true).is_ok())
             }
-            Source::Given(files) => {
+            Source::Contents(files) => {
                 let known = files.get(path);
                 if known.is_none() {
                     self.missing.push(path.to_owned());
                 }
                 let read = known.cloned().flatten();
                 let is_there = read.is_some();
-                (read.ok_or_else(|| format!("there is no file `{}`", path.display())), is_there)
+                (read.ok_or_else(|| PartFileError::Missing { path: path.to_owned() }), is_there)
             }
         };
         self.asked.insert(path.to_owned(), read.as_ref().ok().cloned());
@@ -172,7 +192,7 @@ impl<'a> PartFiles<'a> {
         self.open.push(path.to_owned());
         let template = self.complete(path, &bytes);
         self.open.pop();
-        let template = template.map_err(|error| format!("`{}`: {error}", path.display()))?;
+        let template = template.map_err(|source| PartFileError::Template { path: path.to_owned(), source })?;
         let part = Arc::new(Part { rig: template.rig, chains: template.chains });
         self.known.insert(path.to_owned(), part.clone());
         Ok(part)

@@ -15,7 +15,7 @@ use crate::{
         runtime::{RigRuntime, is_near},
         schema::Attributes,
     },
-    processor::{FindError, Off, RunReport},
+    processor::{Exclusion, FindError, RunReport},
     rig::{BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::did_you_mean},
     solve::program::ProgramError,
 };
@@ -71,7 +71,7 @@ pub enum PoseError {
         /// Requested name.
         name: String,
         /// Switch that is off.
-        off: Off,
+        off: Exclusion,
     },
     /// Several nodes have that name.
     #[error("\"{name}\" may be any of {candidates}; write one of these names")]

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use bevy::{ecs::entity::EntityHashMap, prelude::*, transform::components::TransformTreeChanged};
 use rayon::prelude::*;
 
 use super::{
@@ -11,10 +11,10 @@ use super::{
 use crate::{
     plugins::{
         runtime::{ControlPose, InstanceMode, RigNodes, RigRuntime, furnish_instance, spawn_instance},
-        schema::NodeLabel,
+        schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
     },
     processor::PoseNote,
-    rig::{AttributeValues, PoseOffset, Uid},
+    rig::{AttributeValues, BuiltNode, BuiltRig, PoseOffset, RestTransform, Uid},
     solve::{
         keep_pose::{KeptPose, PoseKeeper},
         program::{Carry, ProgramNode, RigProgram, RigState},
@@ -100,8 +100,10 @@ pub(super) fn update_instances(world: &mut World) {
         world.entity_mut(*entity).insert(RunningTemplate(built.clone()));
     }
     let (changed_nodes, mut kept) = exchange(world, &going);
-    for (entity, built) in changed_nodes {
-        furnish_instance(world, entity);
+    for (entity, built, has_other_nodes) in changed_nodes {
+        if has_other_nodes {
+            furnish_instance(world, entity);
+        }
         describe(world, entity, &built);
     }
     for (entity, kept) in &kept {
@@ -124,24 +126,34 @@ fn program(built: &BuiltTemplate, mode: InstanceMode) -> &Arc<RigProgram> {
     }
 }
 
-/// Lets instances go on with the programs of their templates. Returns those whose nodes are others now, and the poses of
-/// those whose offsets are others now.
+/// Lets instances go on with the programs of their templates. Returns instances whose nodes are described otherwise now, with
+/// `true` if the nodes themselves are others, and the poses of instances whose offsets are others now.
 fn exchange(
     world: &mut World,
     going: &[(Entity, Arc<BuiltTemplate>, InstanceMode, bool)],
-) -> (Vec<(Entity, Arc<BuiltTemplate>)>, EntityHashMap<KeptPose>) {
+) -> (Vec<(Entity, Arc<BuiltTemplate>, bool)>, EntityHashMap<KeptPose>) {
     let wanted: EntityHashMap<(&Arc<BuiltTemplate>, InstanceMode)> =
         going.iter().map(|(entity, built, mode, _)| (*entity, (built, *mode))).collect();
     let mut query = world.query::<(Entity, &mut RigRuntime, &mut RunningTemplate)>();
     let mut exchanges: Vec<Exchange> = Vec::new();
+    let mut descriptions: Vec<(Arc<BuiltTemplate>, Arc<BuiltTemplate>, bool)> = Vec::new();
     let (mut steps, mut others) = (Vec::new(), Vec::new());
     for (entity, runtime, mut running) in query.iter_mut(world) {
         let Some((built, mode)) = wanted.get(&entity) else { continue };
-        running.0 = (*built).clone();
+        let before = std::mem::replace(&mut running.0, (*built).clone());
+        let known = descriptions.iter().find(|(from, to, _)| Arc::ptr_eq(from, &before) && Arc::ptr_eq(to, built));
+        let is_alike = known.map(|(.., is_alike)| *is_alike).unwrap_or_else(|| {
+            let is_alike = has_same_description(&before.built, &built.built);
+            descriptions.push((before, (*built).clone(), is_alike));
+            is_alike
+        });
         let to = program(built, *mode);
         let from = runtime.state().program();
         // The rest of the document may have changed, and the program not.
         if Arc::ptr_eq(from, to) {
+            if !is_alike {
+                others.push((entity, (*built).clone(), false));
+            }
             continue;
         }
         let known = exchanges.iter().position(|known| Arc::ptr_eq(&known.from, from) && Arc::ptr_eq(&known.to, to));
@@ -155,8 +167,8 @@ fn exchange(
             });
             exchanges.len() - 1
         });
-        if exchanges[number].is_other {
-            others.push((entity, (*built).clone()));
+        if exchanges[number].is_other || !is_alike {
+            others.push((entity, (*built).clone(), exchanges[number].is_other));
         }
         steps.push(Step { entity, runtime, program: to, exchange: number, kept: None });
     }
@@ -213,7 +225,16 @@ fn has_same_nodes(a: &RigProgram, b: &RigProgram) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(same)
 }
 
-/// Writes labels and names to the entities of nodes.
+/// True if the nodes of two builds get the same components from [`describe`].
+fn has_same_description(a: &BuiltRig, b: &BuiltRig) -> bool {
+    let same = |(a, b): (&BuiltNode, &BuiltNode)| {
+        (a.uid, a.base, &a.name, &a.label, &a.control, &a.layer, &a.origin)
+            == (b.uid, b.base, &b.name, &b.label, &b.control, &b.layer, &b.origin)
+    };
+    a.nodes.len() == b.nodes.len() && a.nodes.iter().zip(&b.nodes).all(same)
+}
+
+/// Writes the components that describe built nodes to the entities that an instance has of them.
 fn describe(world: &mut World, instance: Entity, built: &BuiltTemplate) {
     let Some(runtime) = world.get::<RigRuntime>(instance) else { return };
     let program = runtime.state().program().clone();
@@ -224,14 +245,39 @@ fn describe(world: &mut World, instance: Entity, built: &BuiltTemplate) {
         if entity.get::<Name>().map(Name::as_str) != Some(&*node.name) {
             entity.insert(Name::new(node.name.to_string()));
         }
-        let label = node.label.as_deref();
-        if entity.get::<NodeLabel>().map(|label| label.0.as_str()) != label {
-            match label {
-                Some(label) => entity.insert(NodeLabel(label.to_owned())),
-                None => entity.remove::<NodeLabel>(),
-            };
+        set(&mut entity, node.label.as_deref().map(|label| NodeLabel(label.to_owned())));
+        if node.origin.is_none() && !entity.contains::<Joint>() {
+            // A joint of the document without weights.
+            let is_local = entity.contains::<Transform>();
+            entity.insert(Joint);
+            if !is_local {
+                entity.remove::<(Transform, TransformTreeChanged)>();
+            }
         }
+        // A program without a hierarchy has other parents for some nodes.
+        set(&mut entity, Some(RestTransform::from(node.base)));
+        set(&mut entity, node.control.as_deref().map(|control| Control(control.clone())));
+        set(&mut entity, node.layer.as_deref().map(|layer| NodeLayer(layer.clone())));
+        set(
+            &mut entity,
+            node.origin.as_ref().map(|origin| CreatedRole {
+                role: origin.role.to_string(),
+                subject: origin.subject,
+                number: origin.number,
+            }),
+        );
     }
+}
+
+/// Writes a component where it differs; takes it off for `None`.
+fn set<C: Component + PartialEq>(entity: &mut EntityWorldMut, wanted: Option<C>) {
+    if entity.get::<C>() == wanted.as_ref() {
+        return;
+    }
+    match wanted {
+        Some(wanted) => entity.insert(wanted),
+        None => entity.remove::<C>(),
+    };
 }
 
 /// Despawns the nodes of an entity that is no instance any more.

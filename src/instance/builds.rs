@@ -97,14 +97,14 @@ impl Builds {
 }
 
 struct BuildThread {
-    templates: BTreeMap<Id, Kept>,
+    templates: BTreeMap<Id, TemplateBuild>,
     told: Sender<Outcome>,
     look: Duration,
     patience: Duration,
 }
 
 /// A template that has been built.
-struct Kept {
+struct TemplateBuild {
     modules: Arc<Modules>,
     builder: Builder,
     programs: ProgramCache,
@@ -179,8 +179,8 @@ impl BuildThread {
         }
     }
 
-    fn kept(&mut self, id: Id, modules: &Arc<Modules>) -> &mut Kept {
-        self.templates.entry(id).or_insert_with(|| Kept {
+    fn kept(&mut self, id: Id, modules: &Arc<Modules>) -> &mut TemplateBuild {
+        self.templates.entry(id).or_insert_with(|| TemplateBuild {
             modules: modules.clone(),
             builder: Builder::new(modules.clone()),
             programs: ProgramCache::default(),
@@ -197,7 +197,7 @@ fn refused(id: Id, error: TemplateError) -> Outcome {
     Outcome { id, template: None, result: Err(error) }
 }
 
-impl Kept {
+impl TemplateBuild {
     /// Looks at the file: takes over a new content, or tells why not once it has been so for a while.
     fn look(&mut self, id: Id, patience: Duration) -> Option<Outcome> {
         let content = self.watch.as_mut()?.look(&RealDisk);

@@ -56,7 +56,7 @@ parameters! {
         pub up_node: NodeRefs = NodeRefs::NONE,
         /// True: the nodes stay turned as they are, and only what the targets do counts.
         pub keep_offset: bool = true,
-        /// How much the nodes turn, a number from 0 to 1 or the name of an attribute of the control.
+        /// Weight of the turn, a number from 0 to 1 or the name of an attribute of the control.
         pub weight: Amount = Amount::Value(1.0),
     }
 }

@@ -27,19 +27,19 @@ parameters! {
     pub struct BlendModule {
         /// The nodes that are driven.
         pub nodes: NodeRefs = NodeRef::this().into(),
-        /// What they follow at 0: as many nodes, in the same order.
+        /// Targets at 0: as many nodes, in the same order.
         pub a: NodeRefs = NodeRefs::NONE,
-        /// What they follow at 1: as many nodes, in the same order.
+        /// Targets at 1: as many nodes, in the same order.
         pub b: NodeRefs = NodeRefs::NONE,
         /// 0 for a, 1 for b: a number, or the name of an attribute of the control.
         pub blend: Amount = Amount::Value(0.0),
         /// The node that has the attribute; it is added if it lacks it.
         pub control: NodeRefs = NodeRefs::NONE,
-        /// Which axes of the translation follow, in the parent's space.
+        /// Axes of the translation that follow, in the parent's space.
         pub translate: [bool; 3] = [true; 3],
-        /// Which angles about X, Y and Z follow, in the parent's space.
+        /// Angles about X, Y and Z that follow, in the parent's space.
         pub rotate: [bool; 3] = [true; 3],
-        /// Which factors along X, Y and Z follow.
+        /// Factors along X, Y and Z that follow.
         pub scale: [bool; 3] = [false; 3],
         /// Keep where the nodes stand now, in the space of each of the others; false: they lie on them.
         pub keep_offset: bool = true,

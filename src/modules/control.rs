@@ -58,7 +58,7 @@ parameters! {
     pub struct ControlModule {
         /// The nodes that get one.
         pub at: NodeRefs = NodeRef::this().into(),
-        /// What the controls stand on; the parent of each node if left out.
+        /// Parent of the controls; the parent of each node if left out.
         pub parent: NodeRefs = NodeRefs::NONE,
         /// True: each stands below the control of the nearest node above it in the list.
         pub hierarchy: bool = true,
@@ -80,7 +80,7 @@ parameters! {
         pub relative_size: f32 = 0.35,
         /// bone: the shape's Y lies along the bone; control: along the control's Y; rig: along the rig's.
         pub shape_axes: ShapeAxes = ShapeAxes::Bone,
-        /// Where the shape lies, along its own axes, in the rig's units.
+        /// Offset of the shape along its own axes, in the rig's units.
         pub shape_translate: Vec3 = Vec3::ZERO,
         /// Turn of the shape about X, Y and Z, in degrees.
         pub shape_rotate: Vec3 = Vec3::ZERO,
@@ -88,7 +88,7 @@ parameters! {
         pub shape_scale: Vec3 = Vec3::ONE,
         /// sRGB colour, 0 to 1 each; by the side of the body if left out.
         pub color: Option<[f32; 3]> = None,
-        /// Which axes of translation, rotation and scale people move and keys are set on.
+        /// Axes of translation, rotation and scale that people move and keys are set on.
         pub channels: Channels = Channels::default(),
         /// Lowest and highest values of these; rotation in degrees.
         pub limits: Limits = Limits::default(),

@@ -34,11 +34,11 @@ parameters! {
     pub struct DuplicateChainModule {
         /// The nodes to copy; this joint and all below it if left out.
         pub joints: NodeRefs = Source::Hierarchy(Top::This).into(),
-        /// What the uppermost copies stand on; the parent of each node if left out.
+        /// Parent of the uppermost copies; the parent of each node if left out.
         pub parent: NodeRefs = NodeRefs::NONE,
         /// null: the copies move no mesh; joint: they are joints.
         pub kind: CopyKind = CopyKind::Null,
-        /// What the names of the copies end in.
+        /// Ending of the names of the copies.
         pub suffix: String = "copy".to_owned(),
         /// Name, groups and label; by default those of each node.
         pub creation: Creation = Creation::default(),

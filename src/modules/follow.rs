@@ -30,7 +30,7 @@ macro_rules! follow_module {
                 pub keep_offset: bool = true,
                 /// True: the node's own pose comes on top, so that people can still move it.
                 pub keep_pose: bool = false,
-                /// How much the nodes follow, a number from 0 to 1 or the name of an attribute of the control.
+                /// Weight of the constraint, a number from 0 to 1 or the name of an attribute of the control.
                 pub weight: Amount = Amount::Value(1.0),
             }
         }
@@ -70,7 +70,7 @@ follow_module! {
     /// # assert!(rigsmith::modules::all().load(OrientModule::NAME, params).is_ok());
     /// ```
     OrientModule, "orient", "Lets nodes turn like weighted targets.",
-    /// Which angles about X, Y and Z follow, in the parent's space.
+    /// Angles about X, Y and Z that follow, in the parent's space.
     rotate: [true; 3]
 }
 
@@ -83,7 +83,7 @@ follow_module! {
     /// # assert!(rigsmith::modules::all().load(PointModule::NAME, params).is_ok());
     /// ```
     PointModule, "point", "Lets nodes follow the place of weighted targets.",
-    /// Which axes of the translation follow, in the parent's space.
+    /// Axes of the translation that follow, in the parent's space.
     translate: [true; 3]
 }
 
@@ -96,7 +96,7 @@ follow_module! {
     /// # assert!(rigsmith::modules::all().load(ScaleModule::NAME, params).is_ok());
     /// ```
     ScaleModule, "scale", "Lets nodes scale like weighted targets.",
-    /// Which factors along X, Y and Z follow.
+    /// Factors along X, Y and Z that follow.
     scale: [true; 3]
 }
 
@@ -109,10 +109,10 @@ follow_module! {
     /// # assert!(rigsmith::modules::all().load(ParentModule::NAME, params).is_ok());
     /// ```
     ParentModule, "parent", "Lets nodes follow weighted targets as if they stood on them.",
-    /// Which axes of the translation follow, in the parent's space.
+    /// Axes of the translation that follow, in the parent's space.
     translate: [true; 3],
-    /// Which angles about X, Y and Z follow, in the parent's space.
+    /// Angles about X, Y and Z that follow, in the parent's space.
     rotate: [true; 3],
-    /// Which factors along X, Y and Z follow.
+    /// Factors along X, Y and Z that follow.
     scale: [false; 3]
 }

@@ -26,7 +26,7 @@ parameters! {
         pub joint: NodeRefs = NodeRef::this().into(),
         /// The lower joint, a child of the upper; its only child joint if left out.
         pub child: NodeRefs = NodeRefs::NONE,
-        /// How many joints, 1 to 64.
+        /// Number of joints, 1 to 64.
         pub count: u32 = 1,
         /// Name, groups and label; by default those of the upper joint.
         pub creation: Creation = Creation::default(),

@@ -28,7 +28,7 @@ parameters! {
     pub struct MirrorJointsModule {
         /// The joints to mirror; this joint and all below it if left out.
         pub joints: NodeRefs = Source::Hierarchy(Top::This).into(),
-        /// What the uppermost copies stand on; the parent of each joint if left out.
+        /// Parent of the uppermost copies; the parent of each joint if left out.
         pub parent: NodeRefs = NodeRefs::NONE,
         /// A point of the mirror plane, in the rig's units.
         pub point: Vec3 = Vec3::ZERO,

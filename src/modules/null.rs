@@ -25,7 +25,7 @@ parameters! {
     pub struct NullModule {
         /// The nodes that get one.
         pub at: NodeRefs = NodeRef::this().into(),
-        /// What the nulls stand on; the parent of each node if left out.
+        /// Parent of the nulls; the parent of each node if left out.
         pub parent: NodeRefs = NodeRefs::NONE,
         /// True: they stand below the rig itself, on no parent.
         pub world: bool = false,

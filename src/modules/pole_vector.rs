@@ -23,11 +23,11 @@ parameters! {
         pub chain: NodeRefs = NodeRefs::NONE,
         /// The control or null that is put in place; a null is made if left out.
         pub pole: NodeRefs = NodeRefs::NONE,
-        /// How far the pole is from the bend, as a share of the chain's length, above 0.
+        /// Distance of the pole from the bend, as a share of the chain's length, above 0.
         pub distance: f32 = 0.75,
-        /// Where a straight chain bends to, in the rig's space.
+        /// Direction in which a straight chain bends, in the rig's space.
         pub prefer: Vec3 = Vec3::Z,
-        /// What a null that is made stands on; below the rig if left out.
+        /// Parent of a null that is made; the rig if left out.
         pub parent: NodeRefs = NodeRefs::NONE,
         /// Nodes whose place the pole follows from where it is; none to leave it where its parent takes it.
         pub targets: NodeRefs = NodeRefs::NONE,
@@ -35,7 +35,7 @@ parameters! {
         pub weights: Vec<Amount> = Vec::new(),
         /// The node that has the attributes; those that it lacks are added.
         pub control: NodeRefs = NodeRefs::NONE,
-        /// How much the pole follows, a number from 0 to 1 or the name of an attribute of the control.
+        /// Weight with which the pole follows, a number from 0 to 1 or the name of an attribute of the control.
         pub weight: Amount = Amount::Value(1.0),
         /// Name, groups and label of a null that is made.
         pub creation: Creation = Creation::default(),

@@ -34,7 +34,7 @@ parameters! {
         pub reference: NodeRefs = NodeRefs::NONE,
         /// Joints that take shares, from start to end; they are made if left out.
         pub driven: NodeRefs = NodeRefs::NONE,
-        /// How many joints are made, 1 to 64; spread evenly along the bone.
+        /// Number of joints, 1 to 64, spread evenly along the bone.
         pub count: u32 = 2,
         /// The share of the twist of each joint; evenly from start to end if left out.
         pub shares: Vec<f32> = Vec::new(),

@@ -145,19 +145,25 @@ impl Processor {
 }
 
 /// Result of the commands that a rig has run so far (nodes, constraints, switches); replaced only when it differs.
-#[derive(Component, Debug, Clone, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
 #[component(immutable)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct Built(pub Arc<BuiltRig>);
 
 /// Error that stopped a rig's build; absent if the build has no error.
-#[derive(Component, Debug, Clone, PartialEq)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq)]
 #[component(immutable)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, PartialEq)]
 pub struct BuildFailure(pub BuildError);
 
 /// State of a command, duration of its last run and error, if any; on the entity of the command's tag, for rigs that
 /// are built.
-#[derive(Component, Debug, Clone, PartialEq)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq)]
 #[component(immutable)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, PartialEq)]
 pub struct CommandReport(pub CommandStatus);
 
 fn build_rigs(

@@ -106,8 +106,8 @@ pub enum FitTemplate {
     Choose,
     /// The one of [`FitTemplates`] with this name.
     Named(String),
-    /// The given rig.
-    Given(Arc<Rig>),
+    /// This rig.
+    Rig(Arc<Rig>),
 }
 
 /// Function that gives the templates that a fit may choose; it is called in the task of the fit.

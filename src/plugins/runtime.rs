@@ -23,7 +23,7 @@ pub use self::{
     hand_over::{HandOver, OutsideTransform},
     spawn::{furnish_instance, spawn_instance},
 };
-pub use super::schema::{NodeOf, RigNodes};
+pub use super::schema::{ControlPose, NodeOf, NodeSlot, RigNodes};
 use super::{RigSystems, configure_sets};
 use crate::{
     rig::{AttributeValues, PoseOffset, Rig, Uid},
@@ -57,7 +57,8 @@ impl Plugin for RuntimePlugin {
 }
 
 /// Output mode of an instance: the entities that its results are written to.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Component, Default)]
 pub enum InstanceMode {
     /// Every node is an entity in the same hierarchy as in the rig. Controls are posed by their `Transform`; that of
     /// driven nodes is written before Bevy propagates.
@@ -255,46 +256,11 @@ impl RigRuntime {
 /// Marker for a slot whose entity has not been written yet; no entity has this transform.
 const UNSEEN: Transform = Transform { translation: Vec3::NAN, rotation: Quat::IDENTITY, scale: Vec3::ONE };
 
-/// Slot of a program that an entity represents.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
-#[component(immutable)]
-#[reflect(Component)]
-pub struct NodeSlot(pub u32);
-
-/// Pose of an exposed node of an instance in [`InstanceMode::Direct`], written by people, code or an animation curve.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Component)]
-pub struct ControlPose {
-    /// Translation in the node's space at rest.
-    pub translation: Vec3,
-    /// Rotation about the node's own axes, a unit quaternion.
-    pub rotation: Quat,
-    /// Factors along the node's own axes.
-    pub scale: Vec3,
-}
-
-impl Default for ControlPose {
-    fn default() -> Self {
-        PoseOffset::IDENTITY.into()
-    }
-}
-
-impl From<PoseOffset> for ControlPose {
-    fn from(PoseOffset { translation, rotation, scale }: PoseOffset) -> Self {
-        Self { translation, rotation, scale }
-    }
-}
-
-impl From<ControlPose> for PoseOffset {
-    fn from(ControlPose { translation, rotation, scale }: ControlPose) -> Self {
-        Self { translation, rotation, scale }
-    }
-}
-
 /// Morph targets of a mesh that a running rig drives, with their weights; on the mesh's entity.
 ///
 /// With the feature `draw`, the weights are copied to the mesh's `MeshMorphWeights`.
-#[derive(Component, Debug, Clone, PartialEq)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq)]
+#[reflect(Component)]
 pub struct DrivenMorphs {
     /// The running rig.
     pub rig: Entity,

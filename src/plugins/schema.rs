@@ -11,13 +11,14 @@
 //! | joint | [`Joint`], `Uid`, `RestTransform`, `Transform`, [`NodeOf`] the rig, `ChildOf`; [`NodeLabel`], [`InGroup`], [`Null`] |
 //! | tag | [`Tag`], `Uid`, [`TagOf`] a joint, and [`CommandTag`] or [`FeatureTag`]; [`InFeature`] |
 //! | created node | [`CreatedBy`] a command, [`CreatedRole`], `Uid`, `RestTransform`, `Transform`, [`NodeOf`], `ChildOf`, and [`Control`], [`Null`] or [`Joint`]; [`NodeLabel`], [`InGroup`], [`NodeLayer`], [`Attributes`] |
+//! | node of a game's instance | [`NodeSlot`], `Uid`, [`NodeOf`] the instance, `RestTransform`, and [`Joint`], [`Null`] or [`Control`]; [`NodeLabel`], [`NodeLayer`], [`CreatedRole`]. With a hierarchy: `Transform`, `ChildOf`; without one: the `GlobalTransform` of joints, and the [`ControlPose`] of nodes that can be posed |
 //! | constraint | [`Constrains`] a node, [`ConstraintKind`], [`ConstraintTargets`], [`CreatedBy`] a command, `Uid` |
 
 use std::collections::BTreeMap;
 
 use bevy::prelude::*;
 
-use crate::rig::{ControlData, LayerData, RestTransform, Uid};
+use crate::rig::{ControlData, LayerData, PoseOffset, RestTransform, Uid};
 
 /// Joint of the document, or one that a command created. Its [`Transform`] is the pose and its [`RestTransform`] the
 /// rest pose, both relative to its parent.
@@ -235,4 +236,40 @@ pub struct ConstraintTarget {
     pub node: Entity,
     /// Weight of the node; `None` where an attribute gives it.
     pub weight: Option<f32>,
+}
+
+/// Number of a node in the program that a game's instance runs.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[component(immutable)]
+#[reflect(Component)]
+pub struct NodeSlot(pub u32);
+
+/// Pose of an exposed node of an instance in [`InstanceMode::Direct`](super::runtime::InstanceMode::Direct), written by people, code or an animation curve.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
+#[reflect(Component)]
+pub struct ControlPose {
+    /// Translation in the node's space at rest.
+    pub translation: Vec3,
+    /// Rotation about the node's own axes, a unit quaternion.
+    pub rotation: Quat,
+    /// Factors along the node's own axes.
+    pub scale: Vec3,
+}
+
+impl Default for ControlPose {
+    fn default() -> Self {
+        PoseOffset::IDENTITY.into()
+    }
+}
+
+impl From<PoseOffset> for ControlPose {
+    fn from(PoseOffset { translation, rotation, scale }: PoseOffset) -> Self {
+        Self { translation, rotation, scale }
+    }
+}
+
+impl From<ControlPose> for PoseOffset {
+    fn from(ControlPose { translation, rotation, scale }: ControlPose) -> Self {
+        Self { translation, rotation, scale }
+    }
 }

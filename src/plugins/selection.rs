@@ -5,7 +5,8 @@ use bevy::prelude::*;
 use crate::rig::Uid;
 
 /// Selected joints of a rig; the last one is active: the parent of the next placed joint.
-#[derive(Component, Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq, Default)]
+#[reflect(Component, Default)]
 pub struct Selection(pub Vec<Uid>);
 
 impl Selection {
@@ -16,5 +17,6 @@ impl Selection {
 }
 
 /// The joint under the pointer, which a click would pick.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Component, Default)]
 pub struct Hovered(pub Option<Uid>);

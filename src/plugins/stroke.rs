@@ -221,8 +221,8 @@ fn act(
     let known = found.or_else(|| request.chain.clone().map(Ok));
     let plan = match plan_stroke(request, scene, known) {
         StrokePlan::NeedsChain => match find_chain(request, scene.surface, scene.symmetry.0) {
-            Found::Now(chain) => plan_stroke(request, scene, Some(chain)),
-            Found::Later(task) => return StrokeOutcome::Follows(task),
+            ChainSearch::Now(chain) => plan_stroke(request, scene, Some(chain)),
+            ChainSearch::Later(task) => return StrokeOutcome::Follows(task),
         },
         ready => ready,
     };
@@ -235,7 +235,7 @@ fn act(
     }
 }
 
-enum Found {
+enum ChainSearch {
     Now(FoundChain),
     Later(Task<FoundChain>),
 }
@@ -243,7 +243,7 @@ enum Found {
 /// Largest number of triangles of a surface that answers the rays of a stroke in less than a millisecond.
 const FEW_TRIANGLES: usize = 4096;
 
-fn find_chain(request: &StrokeRequest, surface: &RigSurface, symmetry: Option<MirrorPlane>) -> Found {
+fn find_chain(request: &StrokeRequest, surface: &RigSurface, symmetry: Option<MirrorPlane>) -> ChainSearch {
     let surface = surface.shared().unwrap_or_default();
     let is_small = surface.triangle_count() <= FEW_TRIANGLES;
     let StrokeRequest { plane, settings, choice, .. } = *request;
@@ -252,7 +252,11 @@ fn find_chain(request: &StrokeRequest, surface: &RigSurface, symmetry: Option<Mi
         let followed = FollowedStroke::with_symmetry(surface, &plane, &points, settings, symmetry);
         followed.map(|stroke| stroke.chain(choice))
     };
-    if is_small { Found::Now(find()) } else { Found::Later(AsyncComputeTaskPool::get().spawn(async move { find() })) }
+    if is_small {
+        ChainSearch::Now(find())
+    } else {
+        ChainSearch::Later(AsyncComputeTaskPool::get().spawn(async move { find() }))
+    }
 }
 
 /// Records the joints that strokes left selected, until a person picks them.

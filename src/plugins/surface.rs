@@ -55,7 +55,9 @@ impl Plugin for SurfacePlugin {
 }
 
 /// A mesh that a rig moves; its entity also has [`SkinOf`].
-#[derive(Component, Debug, Clone)]
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Clone)]
 pub struct RigMesh {
     /// Identity, by which the rig names the mesh's weights.
     pub uid: Uid,
@@ -94,13 +96,15 @@ impl Drop for RigMesh {
 }
 
 /// The rig that moves a mesh.
-#[derive(Component, Debug, Clone, Copy)]
+#[derive(Component, Reflect, Debug, Clone, Copy)]
 #[relationship(relationship_target = RigMeshes)]
+#[reflect(Component)]
 pub struct SkinOf(pub Entity);
 
 /// The meshes that a rig moves.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Default)]
 #[relationship_target(relationship = SkinOf, linked_spawn)]
+#[reflect(Component)]
 pub struct RigMeshes(Vec<Entity>);
 
 /// The surface of all meshes of a rig in their current pose, in the rig's space.

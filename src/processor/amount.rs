@@ -124,7 +124,7 @@ impl BuildScope<'_> {
         }
         Ok(Scalar::attribute(self.uid(node), name))
     }
-    /// Where a node stands in the space of another one, as built so far: the offset of a [`Target`](crate::rig::Target)
+    /// Transform of a node in the space of another one, as built so far: the offset of a [`Target`](crate::rig::Target)
     /// that keeps the node where it is.
     pub fn kept_offset(&mut self, node: NodeId, target: NodeId) -> Trs {
         let target = self.global(target);

@@ -1,4 +1,4 @@
-//! What many modules need, in one place each: names of several nodes, bones, chains, limits, layers.
+//! Helpers of modules: names of several nodes, bones, chains, limits, layers.
 
 use std::sync::Arc;
 
@@ -151,7 +151,7 @@ impl BuildScope<'_> {
         is_offset.then_some(parent)
     }
 
-    /// Where a pole lies for a chain: in the plane in which it bends, beside its middle, `distance` times its length
+    /// Position of a pole for a chain: in the plane in which it bends, beside its middle, `distance` times its length
     /// away. A straight chain bends towards `prefer` (rig space).
     pub fn pole_position(&mut self, chain: &[NodeId], distance: f32, prefer: Vec3) -> Vec3 {
         let places: Vec<Vec3> = chain.iter().map(|node| self.position(*node)).collect();

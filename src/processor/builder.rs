@@ -17,7 +17,7 @@ pub use status::{CommandState, CommandStatus};
 
 use super::{
     BuildError, BuildProblem, BuildRange, BuildScope, DynModule, ListEntry, ModuleError, Modules, error_references,
-    off::{OffCommand, SkipReason},
+    exclusion::{CommandExclusion, SkipReason},
     resolve::Asker,
     scope::Trace,
     snapshot::{self, BuiltCache},
@@ -193,7 +193,7 @@ impl Builder {
         self.list.is_empty()
     }
 
-    /// How many commands are in effect: those before this place in the list. After a change of the document that may be
+    /// Number of commands in effect: the ones before this place in the list. After a change of the document that may be
     /// fewer than before, until the next run.
     pub fn cursor(&self) -> usize {
         let waiting = |Reverse((place, number)): &Reverse<(u32, u32)>| {
@@ -351,7 +351,7 @@ impl Builder {
             Err(BuildProblem::Module(ModuleError::Off { parameter, off })) => {
                 let module = self.commands[number as usize].module.clone();
                 let reason = SkipReason::Reference { parameter: parameter.into(), off };
-                self.set_command_off(number, Some(OffCommand { module, reason, above }));
+                self.set_command_off(number, Some(CommandExclusion { module, reason, above }));
                 Ok(())
             }
             outcome => {

@@ -1,4 +1,4 @@
-//! What every module that makes nodes lets people say about them.
+//! Parameters that all modules share that make nodes: names, labels, groups.
 
 use serde::{Deserialize, Serialize};
 

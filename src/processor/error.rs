@@ -1,6 +1,6 @@
-//! What goes wrong in a build: which tag, what, and what to do.
+//! Errors of a build: the tag at fault, the problem, and the remedy.
 
-use super::off::Off;
+use super::exclusion::Exclusion;
 use crate::rig::{SourceError, Uid, reference::NodeRefs};
 
 /// Why a module could not do its work.
@@ -31,7 +31,7 @@ pub enum ModuleError {
         /// The parameter.
         parameter: String,
         /// Switch that is off.
-        off: Off,
+        off: Exclusion,
     },
     /// Anything else.
     #[error("{0}")]

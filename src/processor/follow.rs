@@ -1,4 +1,4 @@
-//! What constraint modules share: weighted targets, kept offsets, weights that follow attributes.
+//! Helpers of constraint modules: weighted targets, kept offsets, weights that follow attributes.
 
 use super::{Amount, BuildScope, ModuleError, NodeId};
 use crate::{

@@ -24,7 +24,7 @@ use bevy::reflect::TypeInfo;
 use serde::{Deserialize, Serialize};
 
 use super::ModuleInfo;
-use crate::rig::{SourceError, fields, nearest::did_you_mean, ron_options, utf8};
+use crate::rig::{SourceError, fields, nearest::did_you_mean, ron_options, ron_text, utf8, with_field};
 
 /// The longest form that is read, in bytes.
 pub const MAX_BYTES: usize = 1 << 20;
@@ -33,7 +33,7 @@ pub const MAX_BYTES: usize = 1 << 20;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Form {
-    /// What people read at the top.
+    /// Title above the elements.
     pub title: String,
     /// The elements from top to bottom.
     pub content: Vec<FormElement>,
@@ -45,7 +45,7 @@ pub struct Form {
 pub enum FormElement {
     /// Elements that belong together, to fold away.
     Frame {
-        /// What stands above them.
+        /// Title of the frame.
         label: String,
         /// Folded out at first.
         #[serde(default = "yes")]
@@ -78,7 +78,7 @@ pub enum FormElement {
         min: f32,
         /// The highest.
         max: f32,
-        /// What it moves by.
+        /// Step of the slider.
         #[serde(default = "hundredth")]
         step: f32,
         /// Text after the number, such as a unit.
@@ -119,13 +119,13 @@ pub enum FormElement {
     Comment(String),
 }
 
-/// What every element with nothing else to say is bound to.
+/// Binding of an element that has no settings of its own.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bound {
     /// The parameter, or a path into it.
     pub param: String,
-    /// What stands beside it; the last name of the path, with blanks, if empty.
+    /// Label beside the element; the last name of the path, with blanks, if empty.
     #[serde(default)]
     pub label: String,
 }
@@ -158,7 +158,7 @@ impl FormElement {
         }
     }
 
-    /// What stands beside it: as written, or the last name of the parameter's path with blanks.
+    /// Label beside the element: as written, or the last name of the parameter's path with blanks.
     pub fn label(&self) -> String {
         match self.bound() {
             Some((param, "")) => {
@@ -222,7 +222,7 @@ pub fn read_form(bytes: &[u8]) -> Result<Form, SourceError> {
     parse(utf8(bytes, MAX_BYTES, "form")?)
 }
 
-/// What an element is bound to stands in the element's own brackets.
+/// Reads a form; the binding of an element stands in the element's own brackets.
 fn parse(text: &str) -> Result<Form, SourceError> {
     let options = ron_options().with_default_extension(ron::extensions::Extensions::UNWRAP_VARIANT_NEWTYPES);
     options.from_str(text).map_err(|error| SourceError::from_ron(text, &error))
@@ -255,8 +255,8 @@ pub fn read_module_form(bytes: &[u8], module: &ModuleInfo) -> Result<Form, Sourc
         if let FormElement::Menu { options, .. } = element {
             let quoted = info.bare().short_path() == "String";
             for option in options {
-                let value = if quoted { format!("{option:?}") } else { option.clone() };
-                let set = param.rsplit('.').fold(value, |value, name| format!("({name}: {value})"));
+                let value = if quoted { ron_text(option) } else { option.clone() };
+                let set = param.rsplit('.').fold(value, |value, name| with_field("()", name, &value));
                 let known = module.parse(&set);
                 known.map_err(|error| wrong(format!("`{param}` cannot be \"{option}\": {}", error.message)))?;
             }
@@ -331,8 +331,25 @@ fn type_at(module: &ModuleInfo, path: &str) -> Result<TypeAt, NoParameter> {
     Ok(at)
 }
 
-/// Says what to write instead if an element cannot edit a type.
-fn check(element: &FormElement, at: TypeAt) -> Result<(), &'static str> {
+/// Reason why an element of a form cannot edit its parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum ElementError {
+    /// Menu without options.
+    #[error("list the `options`")]
+    NoOptions,
+    /// Slider whose ends are equal or swapped.
+    #[error("`min` has to be below `max`")]
+    EmptyRange,
+    /// Parameter for which another element is made.
+    #[error("use {0}")]
+    Use(&'static str),
+    /// Parameter with fields, for which no element is made.
+    #[error("name the parts of it one by one")]
+    UseParts,
+}
+
+/// Checks that an element can edit a type.
+fn check(element: &FormElement, at: TypeAt) -> Result<(), ElementError> {
     let bare = at.bare();
     let path = bare.short_path();
     let is_enum = matches!(bare.info, Some(TypeInfo::Enum(_)));
@@ -343,13 +360,13 @@ fn check(element: &FormElement, at: TypeAt) -> Result<(), &'static str> {
         FormElement::Check(_) => path == "bool",
         FormElement::Menu { options, .. } => {
             if options.is_empty() {
-                return Err("list the `options`");
+                return Err(ElementError::NoOptions);
             }
             path == "String" || is_enum
         }
         FormElement::Slider { min, max, .. } => {
             if min >= max {
-                return Err("`min` has to be below `max`");
+                return Err(ElementError::EmptyRange);
             }
             is_number
         }
@@ -367,17 +384,17 @@ fn check(element: &FormElement, at: TypeAt) -> Result<(), &'static str> {
         return Ok(());
     }
     Err(match path {
-        "bool" => "use Check",
-        "NodeRef" | "NodeRefs" => "use Node",
-        "String" | "Uid" => "use Text or Menu",
-        "Vec3" | "[bool; 3]" => "use Vector",
-        "[f32; 3]" => "use Color or Vector",
-        "Vec<(f32, f32)>" => "use Curve or List",
-        _ if path.starts_with("[(Option<f32>") => "use Limits",
-        _ if is_number => "use Slider or Number",
-        "Amount" => "use Amount",
-        _ if is_enum => "use Menu",
-        _ if is_list => "use List",
-        _ => "name the parts of it one by one",
+        "bool" => ElementError::Use("Check"),
+        "NodeRef" | "NodeRefs" => ElementError::Use("Node"),
+        "String" | "Uid" => ElementError::Use("Text or Menu"),
+        "Vec3" | "[bool; 3]" => ElementError::Use("Vector"),
+        "[f32; 3]" => ElementError::Use("Color or Vector"),
+        "Vec<(f32, f32)>" => ElementError::Use("Curve or List"),
+        _ if path.starts_with("[(Option<f32>") => ElementError::Use("Limits"),
+        _ if is_number => ElementError::Use("Slider or Number"),
+        "Amount" => ElementError::Use("Amount"),
+        _ if is_enum => ElementError::Use("Menu"),
+        _ if is_list => ElementError::Use("List"),
+        _ => ElementError::UseParts,
     })
 }

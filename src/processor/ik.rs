@@ -26,7 +26,7 @@ pub enum IkSolver {
     Ccd,
 }
 
-/// What a chain of joints shall reach, and how; see [`BuildScope::add_ik`].
+/// Inverse kinematics of a chain of joints: its goal and solver; see [`BuildScope::add_ik`].
 #[derive(Debug, Clone)]
 pub struct Ik {
     /// Joints from the root to the end, each a child of the one before.
@@ -37,7 +37,7 @@ pub struct Ik {
     pub pole: Option<NodeId>,
     /// The control whose attributes [`Amount`]s name; the goal if there is none.
     pub control: Option<NodeId>,
-    /// How.
+    /// Solver of the chain.
     pub solver: IkSolver,
     /// The direction in which a straight chain bends, in the rig's space; from the joints and the pole if `None`.
     pub prefer: Option<Vec3>,
@@ -57,7 +57,7 @@ pub struct Ik {
     pub limits: Vec<JointAngles>,
     /// Rounds of the solvers for longer chains, at most.
     pub iterations: u32,
-    /// How near those come to the goal, as a share of the chain's length.
+    /// Largest distance to the goal at which the iterations end, as a share of the chain's length.
     pub tolerance: f32,
 }
 

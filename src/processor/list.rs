@@ -4,7 +4,7 @@ use std::{collections::HashSet, sync::Arc};
 
 use bevy::platform::collections::HashMap;
 
-use super::off::Off;
+use super::exclusion::Exclusion;
 use crate::rig::{JointData, Rig, TagData, TagKind, Uid};
 
 /// Joints whose commands are built.
@@ -15,7 +15,7 @@ pub enum BuildRange {
     Rig,
     /// Only those of these joints.
     Joints(HashSet<Uid>),
-    /// Those of these joints and of all below them.
+    /// Commands of these joints and of all joints below them.
     Hierarchy(HashSet<Uid>),
 }
 
@@ -52,20 +52,20 @@ impl Switches {
     }
 
     /// The group of a joint, if it is off.
-    pub fn joint(&self, joint: &JointData) -> Option<Off> {
+    pub fn joint(&self, joint: &JointData) -> Option<Exclusion> {
         let group = self.groups.get(&joint.group?)?.clone();
-        Some(Off::Joint { joint: joint_name(joint).into(), group })
+        Some(Exclusion::Joint { joint: joint_name(joint).into(), group })
     }
 
-    /// What keeps a command of a joint from being carried out: the joint's group, its feature or its own switch.
-    pub fn command(&self, joint: &JointData, tag: &TagData) -> Option<Off> {
+    /// Exclusion of a command of a joint: by the joint's group, its feature or its own switch.
+    pub fn command(&self, joint: &JointData, tag: &TagData) -> Option<Exclusion> {
         let TagKind::Command { module, feature, .. } = &tag.kind else { return None };
         let command = || Arc::from(format!("{module}/{}", joint_name(joint)));
         let feature = feature.and_then(|feature| self.features.get(&feature));
         match (self.joint(joint), feature) {
             (Some(off), _) => Some(off),
-            (None, _) if !tag.enabled => Some(Off::Tag(command())),
-            (None, Some(feature)) => Some(Off::Feature { command: command(), feature: feature.clone() }),
+            (None, _) if !tag.enabled => Some(Exclusion::Tag(command())),
+            (None, Some(feature)) => Some(Exclusion::Feature { command: command(), feature: feature.clone() }),
             (None, None) => None,
         }
     }
@@ -75,7 +75,7 @@ fn joint_name(joint: &JointData) -> String {
     joint.label.clone().unwrap_or_else(|| joint.uid.to_string())
 }
 
-/// How a feature tag is called in messages; `None` for a command.
+/// Name of a feature tag in messages; `None` for a command.
 fn feature_name(tag: &TagData) -> Option<Arc<str>> {
     match &tag.kind {
         TagKind::Feature { name, switch, .. } if switch.is_empty() && !name.is_empty() => Some(name.as_str().into()),

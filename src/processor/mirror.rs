@@ -9,7 +9,7 @@ use std::{collections::HashMap, ops::Range};
 use glam::Vec3;
 
 use super::{Amount, ik::JointAngles};
-use crate::rig::fields;
+use crate::rig::{fields, with_field};
 
 /// A number of the opposite sign, without a negative zero.
 pub fn opposite(value: f32) -> f32 {
@@ -78,16 +78,8 @@ pub(super) fn with_changes(params: &str, before: &str, after: &str) -> String {
 
 /// Writes one parameter as a whole, as it is in complete ones, `after`.
 pub(super) fn write_whole(params: &mut String, after: &str, name: &str) {
-    let Some(value) = place_of(after, name).map(|place| after[place].to_owned()) else { return };
-    match (place_of(params, name), params.find('(')) {
-        (Some(place), _) => params.replace_range(place, &value),
-        (None, Some(open)) => {
-            let is_empty = params[open + 1..].trim_start().starts_with(')');
-            let comma = if is_empty { "" } else { ", " };
-            params.insert_str(open + 1, &format!("{name}: {value}{comma}"));
-        }
-        (None, None) => *params = format!("({name}: {value})"),
-    }
+    let Some(value) = place_of(after, name).map(|place| &after[place]) else { return };
+    *params = with_field(params, name, value);
 }
 
 /// Place of the value of a parameter, or of a part of one: `creation.label`.

@@ -7,9 +7,9 @@ use glam::Quat;
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::{BuildProblem, BuildScope, ModuleError, mirror};
-use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_options};
+use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_text};
 
-/// What a command does: its fields are the parameters of the tag, [`RigModule::construct`] is the work.
+/// Module of commands: its fields are the parameters of the tag, [`RigModule::construct`] is the work.
 ///
 /// [`parameters!`](crate::parameters) declares the type with its parameters, their words and defaults. A type written by
 /// hand needs `#[serde(default, deny_unknown_fields)]`, so that tags may leave parameters out and misspelt ones are
@@ -201,24 +201,24 @@ impl Modules {
             type_info: M::type_info(),
             parse: |text| Ok(Arc::new(read::<M>(text)?)),
             mirror: |text| {
-                let before = written(&read::<M>(text)?);
+                let before = ron_text(&read::<M>(text)?);
                 let mut module = read::<M>(text)?;
                 module.mirror();
-                Ok(mirror::with_changes(text, &before, &written(&module)))
+                Ok(mirror::with_changes(text, &before, &ron_text(&module)))
             },
             resize: |text, change| {
-                let before = written(&read::<M>(text)?);
+                let before = ron_text(&read::<M>(text)?);
                 let mut module = read::<M>(text)?;
                 module.resize(change);
-                Ok(mirror::with_changes(text, &before, &written(&module)))
+                Ok(mirror::with_changes(text, &before, &ron_text(&module)))
             },
             push: |text, push| {
-                let before = written(&read::<M>(text)?);
+                let before = ron_text(&read::<M>(text)?);
                 let mut module = read::<M>(text)?;
                 let takes_it = module.set_push(push);
-                Ok(takes_it.then(|| mirror::with_changes(text, &before, &written(&module))))
+                Ok(takes_it.then(|| mirror::with_changes(text, &before, &ron_text(&module))))
             },
-            complete: |text| Ok(written(&read::<M>(text)?)),
+            complete: |text| Ok(ron_text(&read::<M>(text)?)),
         };
         self.by_name.insert(M::NAME, info);
         self
@@ -251,11 +251,6 @@ fn read<M: RigModule>(text: &str) -> Result<M, SourceError> {
     parse_ron(if text.trim().is_empty() { "()" } else { text })
 }
 
-/// Never fails for the types that parameters have.
-fn written<M: RigModule>(module: &M) -> String {
-    ron_options().to_string(module).unwrap_or_default()
-}
-
 fn parameters<M: RigModule>() -> Vec<Parameter> {
     let TypeInfo::Struct(info) = M::type_info() else { return Vec::new() };
     let default = M::default();
@@ -270,7 +265,7 @@ fn parameters<M: RigModule>() -> Vec<Parameter> {
 
 /// The default of one field as RON, as it may stand in a tag.
 fn default_text<M: RigModule>(default: &M, field: &str) -> String {
-    let text = written(default);
+    let text = ron_text(default);
     let fields = crate::rig::fields(&text);
     let found = fields.iter().find(|known| known.depth == 1 && known.name == field);
     found.map_or_else(String::new, |found| text[found.value..found.end].trim().trim_end_matches(',').to_owned())

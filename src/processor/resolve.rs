@@ -3,16 +3,16 @@
 use std::collections::HashSet;
 
 use super::{
-    off::{Gap, Off},
+    exclusion::{Exclusion, Gap},
     world::{Birth, NodeId, World},
 };
 use crate::rig::{
     NodeType, Uid,
     nearest::did_you_mean,
-    reference::{GroupScope, NodeRef, NodeRefs, NodeTypes, Pick, PickAt, RigScope, Source, Top},
+    reference::{GroupScope, NodeRef, NodeRefs, NodeTypes, Pick, PickAt, PickError, RigScope, Source, Top},
 };
 
-/// Who asks: whose joint `this` is, and which rig is its own.
+/// Command that refers to nodes: the joint that `this` means, and its rig.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asker {
     pub rig: Uid,
@@ -21,21 +21,44 @@ pub(super) struct Asker {
     pub place: u32,
 }
 
-/// Why a reference has no meaning, as the rest of a sentence.
-pub(super) type Refusal = String;
+/// Reason why a reference has no meaning.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ResolveError {
+    /// A node of another rig.
+    #[error(
+        "rig {0} is another rig than that of the tag; a command works on one rig: merge the two, or declare the node as \
+         an input of this one"
+    )]
+    OtherRig(Uid),
+    /// A command that does not exist or runs later.
+    #[error("no command has the uid {0} and has run before this one; move it up, or refer to another")]
+    NoCommand(Uid),
+    /// A joint that does not exist.
+    #[error("there is no joint {0} in the rig; it was deleted: refer to another")]
+    NoJoint(Uid),
+    /// The label of a joint or command that has none.
+    #[error("the joint or command {0}, whose label is meant, has no label; give it one")]
+    NoLabel(Uid),
+    /// The label of a joint or command that does not exist.
+    #[error("the joint or command {0}, whose label is meant, is not there; refer to another")]
+    NoBearer(Uid),
+    /// A pick of places that the list does not have.
+    #[error(transparent)]
+    Pick(#[from] PickError),
+}
 
-/// What references stand for.
+/// Nodes that references find, and their gaps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Resolution {
     pub nodes: Vec<NodeId>,
-    /// What they mean besides, which is off.
+    /// Excluded nodes that the references mean besides.
     pub gaps: Vec<Gap>,
 }
 
 /// Why a reference finds nothing.
 enum Missing {
     Off(Box<Gap>),
-    Wrong(Refusal),
+    Wrong(ResolveError),
 }
 
 impl From<Gap> for Missing {
@@ -44,13 +67,13 @@ impl From<Gap> for Missing {
     }
 }
 
-pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Result<Resolution, Refusal> {
+pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Result<Resolution, ResolveError> {
     let mut all = Resolution::default();
     for reference in references {
         let mut gaps = Vec::new();
         let found = match resolve_one(world, asker, reference, &mut gaps) {
             Ok(found) => found,
-            Err(Missing::Wrong(refusal)) => return Err(refusal),
+            Err(Missing::Wrong(error)) => return Err(error),
             Err(Missing::Off(gap)) => {
                 gaps = vec![*gap];
                 Vec::new()
@@ -72,10 +95,7 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
     if let RigScope::Rig(rig) = reference.rig
         && rig != asker.rig
     {
-        return Err(Missing::Wrong(format!(
-            "rig {rig} is another rig than that of the tag; a command works on one rig: merge the two, or declare the \
-             node as an input of this one"
-        )));
+        return Err(Missing::Wrong(ResolveError::OtherRig(rig)));
     }
     let place = asker.place;
     let label = reference.label.map(|bearer| label_of(world, bearer, place)).transpose()?;
@@ -114,11 +134,8 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
             (0..world.slots.len() as u32).map(NodeId).filter(alive).filter(joints).filter(below).collect()
         }
         Source::Command(uid) => {
-            let command = world.creator_of(*uid).filter(|command| before(*command)).ok_or_else(|| {
-                Missing::Wrong(format!(
-                    "no command has the uid {uid} and has run before this one; move it up, or refer to another"
-                ))
-            })?;
+            let command = world.creator_of(*uid).filter(|command| before(*command));
+            let command = command.ok_or(Missing::Wrong(ResolveError::NoCommand(*uid)))?;
             if let Some(gap) = world.off.command(command) {
                 return Err(gap.into());
             }
@@ -138,7 +155,7 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
     if let (true, GroupScope::Group(group)) = (found.is_empty(), reference.group)
         && let Some(name) = world.off.groups.get(&group)
     {
-        incomplete.get_or_insert(Gap { at: 0, off: Off::Group(name.clone()), above: None });
+        incomplete.get_or_insert(Gap { at: 0, off: Exclusion::Group(name.clone()), above: None });
     }
     if let Some(gap) = incomplete
         && (found.is_empty() || picks_numbers(&reference.pick))
@@ -146,7 +163,7 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
         return Err(gap.into());
     }
     sort(world, &mut found, place);
-    let picked = reference.pick.indices(found.len()).map_err(|error| Missing::Wrong(error.to_string()))?;
+    let picked = reference.pick.indices(found.len()).map_err(|error| Missing::Wrong(error.into()))?;
     if reference.pick != Pick::All {
         // Of the first or the last of a list nothing is missing.
         gaps.clear();
@@ -197,16 +214,13 @@ fn joint(world: &World, uid: Uid, place: u32) -> Result<NodeId, Missing> {
     match (world.id(uid).filter(|node| world.exists(*node, place)), world.off.joint(uid)) {
         (Some(node), _) => Ok(node),
         (None, Some(gap)) => Err(gap.into()),
-        (None, None) => {
-            Err(Missing::Wrong(format!("there is no joint {uid} in the rig; it was deleted: refer to another")))
-        }
+        (None, None) => Err(Missing::Wrong(ResolveError::NoJoint(uid))),
     }
 }
 
 /// The text of a label that is known by who bears it.
 fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, Missing> {
-    let bare =
-        || Missing::Wrong(format!("the joint or command {bearer}, whose label is meant, has no label; give it one"));
+    let bare = || Missing::Wrong(ResolveError::NoLabel(bearer));
     let before = |command: &u32| world.places[*command as usize] < place;
     if let Some(command) = world.creator_of(bearer).filter(before) {
         if let Some(gap) = world.off.command(command) {
@@ -218,14 +232,7 @@ fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, Missing> {
     }
     match world.id(bearer).filter(|node| world.exists(*node, place)) {
         Some(node) => world.label(node, place).map(|label| label.to_string()).ok_or_else(bare),
-        None => Err(world.off.joint(bearer).map_or_else(
-            || {
-                Missing::Wrong(format!(
-                    "the joint or command {bearer}, whose label is meant, is not there; refer to another"
-                ))
-            },
-            Missing::from,
-        )),
+        None => Err(world.off.joint(bearer).map_or(Missing::Wrong(ResolveError::NoBearer(bearer)), Missing::from)),
     }
 }
 
@@ -262,7 +269,7 @@ fn path(world: &World, node: NodeId, place: u32) -> Vec<(u32, u32)> {
     keys
 }
 
-/// What might have been meant where a reference finds nothing, as the rest of a sentence.
+/// Similar names for a reference that finds nothing, as the rest of a sentence.
 pub(super) fn nearest(world: &World, asker: Asker, references: &NodeRefs) -> String {
     let place = asker.place;
     let all = (0..world.slots.len() as u32).map(NodeId);

@@ -10,7 +10,7 @@ use crate::rig::{
     template::Explicit,
 };
 
-/// How many failing commands are looked for.
+/// Largest number of failing commands that a review looks for.
 const MOST: usize = 200;
 
 /// The problems of all commands of a rig, in the order of the build list: those whose module or parameters are wrong,

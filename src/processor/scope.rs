@@ -1,4 +1,4 @@
-//! What a module may do: the only way it touches the built world.
+//! Scope of a command: the only way in which a module reads and changes the built world.
 
 mod references;
 mod trace;

@@ -31,7 +31,7 @@ impl BuildScope<'_> {
         }
     }
 
-    /// What a command drives: an attribute or a channel of each node that `references` finds, or a morph target.
+    /// Numbers that a command drives: an attribute or a channel of each node that `references` finds, or a morph target.
     ///
     /// # Errors
     /// None or several of them; no such node or attribute, with the nearest names.

@@ -1,10 +1,10 @@
 //! Values of a command's parameters, one at a time: for forms, which change one and leave the rest as it is written.
 
 use super::{
-    ModuleInfo,
+    ModuleInfo, RigModule,
     mirror::{place_of, with_changes, write_whole},
 };
-use crate::rig::{SourceError, fields};
+use crate::rig::{SourceError, fields, ron_text, with_field};
 
 /// Values of a command's parameters, those that it leaves out, too.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +24,20 @@ impl ParameterValues {
     pub fn is_default(&self, path: &str) -> bool {
         self.get(path) == place_of(&self.default, path).map(|place| &self.default[place])
     }
+}
+
+/// Parameters of a module as RON, without those that have their default value.
+pub fn differing_params<M: RigModule>(module: &M) -> String {
+    let (own, default) = (ron_text(module), ron_text(&M::default()));
+    let mut params = "()".to_owned();
+    // Each comes before those that are there already.
+    for field in fields(&own).into_iter().rev().filter(|field| field.depth == 1) {
+        let value = |text| place_of(text, field.name).map(|place| &text[place]);
+        if let Some(value) = value(&own).filter(|own| value(&default) != Some(own)) {
+            params = with_field(&params, field.name, value);
+        }
+    }
+    params
 }
 
 impl ModuleInfo {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::platform::collections::HashMap;
 
-use super::{module::BuildLimits, off::OffParts};
+use super::{exclusion::Exclusions, module::BuildLimits};
 use crate::{
     mesh::model::Trs,
     rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, SwitchData, Uid},
@@ -14,7 +14,7 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NodeId(pub(super) u32);
 
-/// What of a node is written and read as one.
+/// Aspect of a node: the unit of reading and writing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum Aspect {
@@ -49,7 +49,7 @@ impl Aspect {
     }
 }
 
-/// What a node is from its creation on.
+/// Facts about a node that hold from its creation on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Birth {
     /// Joint, null or control.
@@ -141,7 +141,7 @@ pub(super) struct Slot {
     pub cells: [Cell; Aspect::COUNT],
 }
 
-/// Where a command that is not in the list stands.
+/// Place of a command that is not in the list.
 pub(super) const NOWHERE: u32 = u32::MAX;
 
 #[derive(Debug, Clone, Default)]
@@ -160,7 +160,7 @@ pub(super) struct World {
     /// The document's joints, in its order.
     pub joints: Vec<NodeId>,
     /// Switch that is off.
-    pub off: OffParts,
+    pub off: Exclusions,
     /// Limits of what commands make.
     pub limits: BuildLimits,
     /// Number of slots for what commands make.
@@ -309,8 +309,8 @@ impl World {
         }
     }
 
-    /// Where a node stands among all others without regard to parents: the document's joints in their order, then what
-    /// commands created, in the order of commands.
+    /// Key of a node's place among all others without regard to parents: the document's joints in their order, then
+    /// created nodes in the order of commands.
     pub fn order_key(&self, node: NodeId, birth: &Birth) -> (u32, u32) {
         match self.slots[node.0 as usize].creator {
             None => (0, birth.order),

@@ -50,7 +50,7 @@ pub struct ClipLayer {
     pub uid: Uid,
     /// The name people see.
     pub name: String,
-    /// How the layer's values meet those below.
+    /// Combination of the layer's values with the ones below.
     pub mode: LayerMode,
     /// Weight of the layer from 0 to 1.
     pub weight: f32,

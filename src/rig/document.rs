@@ -13,7 +13,11 @@ use crate::{
 };
 
 /// A rig (= global group). All data can be read; only [`Rig::apply`](crate::rig::edit) changes them.
-#[derive(Component, Debug, Clone, PartialEq, Default)]
+///
+/// Reflection names it and shows its text, and leaves its content to edits.
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, PartialEq, Default)]
 pub struct Rig {
     pub(super) uid: Uid,
     pub(super) about: RigAbout,

@@ -5,7 +5,7 @@
 //! edits.
 
 mod poses;
-mod shared;
+mod skin_weights;
 
 use std::{collections::HashSet, sync::Arc};
 
@@ -77,7 +77,7 @@ pub enum RigEdit {
     /// Changes name, version, author and the like.
     SetAbout(Box<RigAbout>),
     /// Binds a mesh with weights, replaces them, or unbinds the mesh.
-    SetSkin(Uid, #[serde(with = "shared")] Option<Arc<SkinData>>),
+    SetSkin(Uid, #[serde(with = "skin_weights")] Option<Arc<SkinData>>),
     /// Poses a joint or a created node by an offset on top of its rest transform or built base; `None` resets it. A
     /// node that is not built at the moment keeps its offset.
     SetOffset(Uid, Option<PoseOffset>),
@@ -115,7 +115,7 @@ pub enum EditError {
     NoPose(Uid),
     /// A uid that is taken.
     #[error("uid {0} is already used in the rig; give the added thing another uid")]
-    Taken(Uid),
+    UidInUse(Uid),
     /// A joint that has children.
     #[error("joint {0} has children; delete or reparent them first")]
     HasChildren(Uid),
@@ -278,7 +278,7 @@ impl Rig {
     }
 
     fn check_free(&self, uid: Uid) -> Result<(), EditError> {
-        if self.is_taken(uid) { Err(EditError::Taken(uid)) } else { Ok(()) }
+        if self.is_taken(uid) { Err(EditError::UidInUse(uid)) } else { Ok(()) }
     }
 
     fn check_group(&self, group: Option<Uid>) -> Result<(), EditError> {
@@ -310,7 +310,7 @@ impl Rig {
         for tag in &data.tags {
             self.check_free(tag.uid)?;
             if !own.insert(tag.uid) {
-                return Err(EditError::Taken(tag.uid));
+                return Err(EditError::UidInUse(tag.uid));
             }
         }
         let tags = data.tags.iter().map(checked).collect::<Result<_, _>>()?;

@@ -149,7 +149,7 @@ pub enum Operation {
     Merge {
         /// The other rig.
         other: Arc<Rig>,
-        /// What its roots hang on, where they are now; they stay roots without one.
+        /// Parent of its roots, which keep their places; they stay roots without one.
         parent: Option<Uid>,
     },
     /// Applies edits.

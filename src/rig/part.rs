@@ -1,14 +1,16 @@
-//! Parts: what a template needs of the rig that it is dropped into.
+//! Parts: the needs of a template from the rig that it is dropped into.
 //!
 //! The joints of a part go onto joints of the host in the order of the part's document. A joint is needed if commands
 //! of other joints refer to it or to its commands; the joints behind the last one needed are extras. Besides, a part is
 //! connected through its sockets.
 
+mod error;
 mod instance;
 mod resize;
 
 use std::{collections::HashMap, fmt};
 
+pub use error::PartError;
 pub use instance::{MirrorParams, Part, PartChange, PartInstance};
 pub(in crate::rig) use resize::MOST_JOINTS;
 pub use resize::PartChain;
@@ -18,7 +20,7 @@ use crate::rig::{
     reference::{NameKind, Source, references_in},
 };
 
-/// What a part needs of its host.
+/// Needs of a part from its host.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PartNeeds {
     /// Labels of the joints that make it whole, in the order in which they are put onto joints of the host. A joint
@@ -47,7 +49,7 @@ impl fmt::Display for Socket {
 }
 
 impl PartNeeds {
-    /// What a template needs.
+    /// Needs of a template.
     pub fn of(part: &Rig) -> Self {
         let places = places(part);
         let of_others = part.walk().enumerate().flat_map(|(place, joint)| {

@@ -9,7 +9,7 @@
 mod edits;
 mod fields;
 mod order;
-mod renamed;
+mod rename_detection;
 
 use std::{
     collections::{BTreeMap, HashMap, HashSet},
@@ -109,7 +109,7 @@ impl Update {
 pub fn with_identities(file: &Rig, identities: &HashMap<Uid, Uid>) -> Rig {
     let is_there = |uid: &Uid| file.is_taken(*uid);
     let uids = identities.iter().filter(|(from, to)| is_there(from) && !is_there(to)).map(|(from, to)| (*from, *to));
-    renamed::with_uids(file, uids.collect())
+    rename_detection::with_uids(file, uids.collect())
 }
 
 /// Differences of two rigs, from the first to the second.
@@ -122,9 +122,9 @@ pub fn diff(from: &Rig, to: &Rig) -> Vec<Change> {
 pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
     let mut changes = Vec::new();
     // What was renamed by an earlier update has the name of the base here, and an older uid.
-    let known = base.and_then(|base| renamed::renamed(now, base, &mut Vec::new()));
+    let known = base.and_then(|base| rename_detection::renamed(now, base, &mut Vec::new()));
     let base = known.as_ref().map(|(known, _)| known).or(base);
-    let renamed = renamed::renamed(base.unwrap_or(now), file, &mut changes);
+    let renamed = rename_detection::renamed(base.unwrap_or(now), file, &mut changes);
     changes.retain(|change: &Change| change.from != change.to);
     let file = renamed.as_ref().map_or(file, |(renamed, _)| renamed);
     let told = changes.iter().map(|change| change.uid).collect();
@@ -138,7 +138,7 @@ pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
     Update { rig, changes, identities }
 }
 
-/// What becomes of something that two of three sides may have.
+/// Outcome for a thing that two of three sides may have.
 enum Fate<T> {
     Absent,
     Kept(T),
@@ -331,7 +331,7 @@ impl Merge<'_> {
         order.into_iter().filter_map(|uid| kept.remove(&uid)).collect()
     }
 
-    /// Whether something is there afterwards, and with which content.
+    /// Presence of a thing after the update, and its content.
     fn fate<T: Clone>(
         &mut self,
         fields: &[Field<T>],
@@ -403,7 +403,7 @@ impl Merge<'_> {
     }
 }
 
-/// What changes are told about.
+/// Subject of the notes about changes.
 struct Named<'a> {
     uid: Uid,
     joint: Option<&'a str>,

@@ -295,7 +295,7 @@ impl PoseKeeper {
         }
     }
 
-    /// How far the joints are off, as one number; zero if all are near.
+    /// Distance of the joints from their targets, as one number; zero if all are near.
     fn error(&self, state: &RigState, targets: &[Trs]) -> f32 {
         let off = |(pair, target): (&Pair, &Trs)| {
             let now = state.global_at(pair.after);

@@ -34,7 +34,7 @@ use std::{
 };
 
 pub use cache::ProgramCache;
-pub use error::{ProgramError, StateError};
+pub use error::{ConstraintName, NumberPlace, ProgramError, StateError};
 pub use hash::ContentHash;
 pub use state::{Carry, LANES, Memory, RigState};
 

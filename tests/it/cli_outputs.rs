@@ -1,4 +1,4 @@
-//! What commands write over: what they were told to, and nothing else.
+//! Outputs of commands: they write over the files that they were told to, and nothing else.
 
 use std::{
     fs,

@@ -1,4 +1,4 @@
-//! What is drawn of a rig's meshes: pieces, weights, edges, colours, materials. No renderer is needed to look at it.
+//! Meshes of a rig as they are drawn: pieces, weights, edges, colours, materials. No renderer is needed to look at it.
 
 use std::{
     collections::{BTreeSet, HashSet},

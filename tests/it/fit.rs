@@ -264,7 +264,7 @@ fn bodies_are_fitted() {
 fn a_given_template_is_taken() {
     let mut bench = bench(bundled_body());
     let hand = character("hand");
-    let result = bench.fit(|request| request.template = FitTemplate::Given(hand), &mut |_| ());
+    let result = bench.fit(|request| request.template = FitTemplate::Rig(hand), &mut |_| ());
     if let Ok(report) = result {
         assert_eq!(report.template, "hand");
     }

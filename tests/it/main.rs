@@ -103,6 +103,7 @@ mod references;
 mod render;
 mod rig_text;
 mod runtime;
+mod schema;
 mod sided;
 mod skin_built;
 mod skin_file;

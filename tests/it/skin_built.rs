@@ -1,5 +1,4 @@
-//! What is skinned is what is built: weights of the built joints, wherever they are computed, and how limbs bend with
-//! them.
+//! Weights of built joints, wherever they are computed, and limbs that bend with them.
 
 mod figure;
 mod measure;

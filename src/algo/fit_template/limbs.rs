@@ -71,7 +71,7 @@ impl TemplateLimbs {
         length
     }
 
-    /// Where the flesh of a limb ends: beyond the last joint, in the direction of the last bone.
+    /// End of the flesh of a limb: beyond the last joint, in the direction of the last bone.
     pub(super) fn tip(&self, limb: &Limb) -> Vec3 {
         let end = limb.joints[limb.joints.len() - 1];
         let parent = self.parents[end].unwrap_or(end);

@@ -27,7 +27,7 @@ const UPRIGHT: f32 = 0.6;
 /// Shoulder, elbow and wrist of a spread wing with feathers, as shares of the way from shoulder to feathers' end.
 const WING: [f32; 3] = [0.0, 0.17, 0.38];
 
-/// Where a wing begins on the way from the middle of the trunk to where the wing leaves it.
+/// Root of a wing, as a share of the way from the middle of the trunk to the place at which the wing leaves it.
 const WING_ROOT: f32 = 0.4;
 
 /// The joints of a template in the mesh.
@@ -89,7 +89,7 @@ fn beyond_line(line: &CentreLine, along: f32, root: Vec3, whole: f32) -> Vec3 {
 struct Reach {
     /// Length of each joint from the end.
     lengths: Vec<f32>,
-    /// Where the limb begins in the trunk, and the length from the end to there.
+    /// Root of the limb in the trunk.
     root: Vec3,
     whole: f32,
     /// Scale of the limb against the template.

@@ -12,7 +12,7 @@ use super::{assign::Hypothesis, human::FittedBody, limbs::LimbKind};
 pub struct FittedSkeleton {
     /// Up in the mesh's space, unit length.
     pub up: Vec3,
-    /// Where the figure faces in the mesh's space, unit length.
+    /// Direction that the figure faces in the mesh's space, unit length.
     pub forward: Vec3,
     /// Plane of symmetry of mesh and pose, where they have one: a point and the unit normal to the figure's left.
     pub symmetry: Option<(Vec3, Vec3)>,

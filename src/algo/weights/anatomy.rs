@@ -21,7 +21,7 @@ const LIMB: usize = 3;
 const FORWARD: f32 = 0.3;
 /// The cosine of the largest angle between the trunk and the legs of a body that stands upright.
 const UPRIGHT: f32 = 0.7;
-/// How a joint shares flesh with the joint above it: the logarithm of the odds of the lower one, `x`, becomes
+/// Share of flesh between a joint and the joint above it: the logarithm of the odds of the lower one, `x`, becomes
 /// `contrast * x + shift + tilt * side`, where `side` runs from -1 in front of the joint to 1 behind it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Share {

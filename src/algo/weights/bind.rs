@@ -17,7 +17,7 @@ use super::{
 };
 use crate::mesh::{adjacency, model::Weights};
 
-/// Where a place's weights come from.
+/// Origin of a place's weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Source {
     Surface,
@@ -34,7 +34,7 @@ pub(crate) struct Bound {
     pub place: Vec<u32>,
     /// Weights of each place.
     pub weights: Weights,
-    /// Where they come from.
+    /// Origin of the weights of each place.
     pub sources: Vec<Source>,
     /// True for places of parts that move as one.
     pub stiff: Vec<bool>,
@@ -84,7 +84,7 @@ pub(crate) fn bind(
     Ok(Bound { place, weights, sources, stiff })
 }
 
-/// What is the same for a mesh and its coarse stand-in.
+/// Input of a binding that a mesh and its coarse stand-in share.
 struct Job<'a> {
     joints: &'a [WeightJoint],
     takes_part: &'a [bool],

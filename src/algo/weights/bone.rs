@@ -8,8 +8,8 @@ use glam::Vec3;
 pub struct BoneSegment {
     /// Index of the joint that moves this bone.
     pub joint: u32,
-    /// Where the joint sits.
+    /// Position of the joint.
     pub head: Vec3,
-    /// Where the bone ends; equal to `head` for a joint without extent.
+    /// End of the bone; equal to `head` for a joint without extent.
     pub tail: Vec3,
 }

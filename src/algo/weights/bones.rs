@@ -15,7 +15,7 @@ use super::{
     sight::Sight,
 };
 
-/// How far a last bone runs through the flesh beyond its joint, as a share of the reach of that flesh.
+/// Length of a last bone in the flesh beyond its joint, as a share of the reach of that flesh.
 const LEAF_REACH: f32 = 0.8;
 /// About how many points measure the girth of bones.
 const SAMPLES: usize = 8192;
@@ -30,7 +30,7 @@ const FEW: usize = 4;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bones {
     pub segments: Vec<BoneSegment>,
-    /// How far the flesh around each bone usually reaches.
+    /// Usual reach of the flesh around each bone.
     pub girths: Vec<f32>,
     pub tree: BoneTree,
     homes: Homes,
@@ -126,7 +126,7 @@ fn is_behind(joints: &[WeightJoint], carries: &[bool], joint: usize) -> bool {
     carries[parent] && onwards.dot(arriving) < TURN
 }
 
-/// Which joint carries the flesh of each: itself, or the nearest ancestor that deforms. All deform if none does.
+/// Joint that carries the flesh of each joint: itself, or the nearest ancestor that deforms. All deform if none does.
 fn owners(joints: &[WeightJoint]) -> Vec<Option<u32>> {
     if !joints.iter().any(|j| j.deforms) {
         return (0..joints.len() as u32).map(Some).collect();
@@ -260,7 +260,7 @@ fn incoming_direction(joints: &[WeightJoint], joint: usize) -> Option<Vec3> {
     None
 }
 
-/// How far the surface around each bone usually reaches: a high quantile, by area, of the distances of the points that
+/// Usual reach of the surface around each bone: a high quantile, by area, of the distances of the points that
 /// are nearest to the bone and see it.
 fn girths(segments: &[BoneSegment], tree: &BoneTree, points: &[Vec3], areas: &[f32], sight: &Sight) -> Vec<f32> {
     let stride = points.len().div_ceil(SAMPLES).max(1);

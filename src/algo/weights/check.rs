@@ -1,4 +1,4 @@
-//! What must hold of the input before anything is computed.
+//! Validation of joints, meshes and settings before weights are computed.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Which bones a point of the surface belongs to before the heat spreads.
+//! Claims of bones on points of the surface, before the heat spreads.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ const SEEN: f32 = 0.25;
 /// Points handled at a time by one thread.
 const CHUNK: usize = 256;
 
-/// What holds one point: how strongly, and the joints that share it.
+/// Claim on one point: its strength, and the joints that share it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Claim {
     /// The heat coefficient `c / d²` (Baran and Popović 2007, section 4); zero if no bone claims the point.
@@ -108,7 +108,7 @@ fn patches(
     patches
 }
 
-/// How far a bone of this girth has to reach for a point: the distance, and more beyond its own girth, where another
+/// Reach that a bone of this girth needs for a point: the distance, and more beyond its own girth, where another
 /// bone's flesh is likelier. The chin lies nearer to the neck than to the skull, and the chest to the collarbones.
 fn reach(distance: f32, girth: f32) -> f32 {
     distance * (distance / girth).max(1.0)

@@ -10,7 +10,7 @@ use crate::mesh::model::Weights;
 pub(crate) const LIMIT: usize = 40_000;
 /// About how many clusters a larger mesh becomes.
 const CLUSTERS: usize = 20_000;
-/// How many times weights are averaged with their neighbours while they are spread back.
+/// Number of times that weights are averaged with their neighbours while they are spread back.
 const STEPS: usize = 5;
 
 /// Connected clusters of vertices, each standing for one coarse vertex.

@@ -23,10 +23,10 @@ pub(crate) use unit::Unit;
 const SMALL: f32 = 0.05;
 /// Weighted points further than this share of their box's diagonal say nothing about an island.
 const REACH: f32 = 0.1;
-/// How many weighted points an island's vertex is tied to.
+/// Number of weighted points that an island's vertex is tied to.
 const TIES: usize = 4;
 
-/// How vertices without influences were filled.
+/// Numbers of vertices without influences, by the source of the weights that fill them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct FillReport {
     /// Points that took weights from weighted points, through the sparse solve or as a small rigid island.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::{Locks, WeightJoint, WeightSettings};
 use crate::mesh::{influences::keep_strongest, model::Weights};
 
-/// What the caller fixed, and how many influences a point may have.
+/// Constraints of the caller on the weights: locks, and the number of influences of a point.
 pub(crate) struct Shaping<'a> {
     /// The joint that moves each point alone, or `NONE`; empty without rigid parts.
     rigid: Vec<u32>,

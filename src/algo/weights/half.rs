@@ -7,7 +7,7 @@
 
 use super::{WeightJoint, odds};
 
-/// How far the blend across a hinge is drawn out: the factor of the logarithm of the odds. Skin on the inside of a right
+/// Width of the blend across a hinge: the factor of the logarithm of the odds. Skin on the inside of a right
 /// angle folds unless the blend is at least as long as a quarter of a circle around the joint; without a half joint so
 /// long a blend would thin the limb.
 const HINGE: f32 = 0.5;

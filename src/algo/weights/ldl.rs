@@ -8,7 +8,7 @@ use faer::{
     sparse::{SymbolicSparseColMatRef, linalg::amd},
 };
 
-/// How many right-hand sides a block has.
+/// Number of right-hand sides of a block.
 pub(crate) const LANES: usize = 8;
 
 /// One row of a block of right-hand sides.

@@ -1,5 +1,5 @@
-//! Which joints hold flesh, and of which body part: roots, targets and slots hang in the air, and an arm holds no flesh
-//! of a head that is a part of its own.
+//! Joints without flesh, and the body part of each bone: roots, targets and slots hang in the air, and an arm holds no
+//! flesh of a head that is a part of its own.
 
 use glam::Vec3;
 

@@ -16,9 +16,9 @@ const AT_START: f32 = 0.01;
 pub(crate) struct Limbs {
     /// The joints without twist and half joints; with half joints if nothing else takes part.
     pub joints: Vec<WeightJoint>,
-    /// Those of them that take part.
+    /// Indices of the joints that take part.
     pub free: Vec<u32>,
-    /// The index of each of them among all joints.
+    /// Index of each of `joints` among all joints of the rig.
     places: Vec<u32>,
     /// The bones with twist joints of each of them.
     bones: Vec<Vec<Bone>>,
@@ -122,7 +122,7 @@ fn bones(joints: &[WeightJoint], owner: u32, twists: &[u32], is_free: &[bool]) -
     bones.into_iter().map(complete).collect()
 }
 
-/// How far along a bone a point lies, 0 at the start and 1 at the end.
+/// Position of a point along a bone, 0 at the start and 1 at the end.
 fn place(point: Vec3, along: Vec3) -> f32 {
     // Divided first: squares of small or large units leave the range of numbers.
     let length = along.length();

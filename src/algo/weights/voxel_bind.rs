@@ -21,22 +21,22 @@ use labels::{Field, Joints, Limits};
 const CHUNK: usize = 1024;
 /// More solid cells than this are made fewer and larger, for time and memory.
 const MOST_SOLID: usize = 400_000;
-/// How far from a point, in cells, a solid cell is looked for when none of the eight around it is solid.
+/// Radius around a point, in cells, in which a solid cell is looked for when none of the eight nearest is solid.
 const SEARCH: isize = 3;
-/// What a cell of the surface layer whose centre lies outside counts, against one inside: it may belong to a
+/// Share that a cell of the surface layer counts if its centre lies outside, against one inside: it may belong to a
 /// neighbouring finger.
 const SHELL_SHARE: f32 = 0.25;
 /// Weights below this are left out.
 const LEAST: f32 = 1e-3;
 
-/// How [`geodesic_voxel_weights`] works.
+/// Settings of [`geodesic_voxel_weights`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoxelSettings {
     /// Cells along the longest side of the body (8 to 1024); coarser where memory or time call for it.
     pub resolution: usize,
-    /// How many of the nearest joints each voxel keeps (1 to 16).
+    /// Number of the nearest joints that each voxel keeps (1 to 16).
     pub labels: usize,
-    /// How fast weights fall off with distance: λ in `w = (1 / ((1 - λ) d + λ d²))²`, from 0 (soft) to 1 (rigid).
+    /// Falloff of weights with distance: λ in `w = (1 / ((1 - λ) d + λ d²))²`, from 0 (soft) to 1 (rigid).
     pub falloff: f32,
     /// `d` in [`VoxelSettings::falloff`] is the distance over that of the nearest bone, raised to this power (1 to
     /// 8). Relative distances are what makes weights independent of units and limb thickness, but they grow slowly,
@@ -150,7 +150,7 @@ pub fn geodesic_voxel_weights(
 
 /// A joint near a point.
 #[derive(Debug, Clone, Copy)]
-struct Found {
+struct NearJoint {
     joint: u32,
     /// Share of the cells around the point that know the joint.
     share: f32,
@@ -164,12 +164,12 @@ struct Sampler<'a> {
     field: &'a Field,
     joints: &'a Joints,
     settings: &'a VoxelSettings,
-    found: Vec<Found>,
+    found: Vec<NearJoint>,
 }
 
 impl Sampler<'_> {
     /// The influences of a point, strongest first, summing to one, or none.
-    fn weights(&mut self, point: Vec3) -> &[Found] {
+    fn weights(&mut self, point: Vec3) -> &[NearJoint] {
         self.found.clear();
         if !point.is_finite() {
             return &self.found;
@@ -261,7 +261,7 @@ impl Sampler<'_> {
                     found.share += share;
                     found.value += share * detour;
                 }
-                None => self.found.push(Found { joint, share, value: share * detour }),
+                None => self.found.push(NearJoint { joint, share, value: share * detour }),
             }
         }
         share

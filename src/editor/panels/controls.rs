@@ -7,7 +7,7 @@ use bevy_egui::egui::{self, ComboBox, ScrollArea, Ui};
 use super::{
     displayed_rig::DisplayedRig,
     features::Features,
-    fields::{Look, NumberEdit, Numbers, Shared, labelled},
+    fields::{CommonValue, Look, NumberEdit, Numbers, labelled},
     list,
 };
 use crate::{
@@ -60,7 +60,7 @@ impl EditorPanel for ControlsPanel {
     }
 }
 
-/// How far the build has come, what stopped it, and its buttons.
+/// State of the build, the error that stopped it, and its buttons.
 fn build_state(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
     let Some(processor) = world.get::<Processor>(shown.entity) else {
         ui.weak("The rig has no commands yet.");
@@ -138,7 +138,7 @@ impl ControlsPanel {
             if !free.contains(&true) {
                 continue;
             }
-            let fields = values.to_array().map(|value| Shared { value, mixed: false });
+            let fields = values.to_array().map(|value| CommonValue { value, mixed: false });
             let Some((axis, edit)) = self.numbers.vector(ui, name, fields, look) else { continue };
             let set = |value: f32| {
                 let mut values = values;

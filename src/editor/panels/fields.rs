@@ -13,18 +13,18 @@ use super::list;
 
 /// A value of several joints: that of the active one, and whether it differs among them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Shared<T> {
+pub(super) struct CommonValue<T> {
     pub value: T,
     pub mixed: bool,
 }
 
-impl<T> From<T> for Shared<T> {
+impl<T> From<T> for CommonValue<T> {
     fn from(value: T) -> Self {
         Self { value, mixed: false }
     }
 }
 
-impl<T: PartialEq> Shared<T> {
+impl<T: PartialEq> CommonValue<T> {
     /// The last of `values` is the active one's; `None` if there is none.
     pub fn of(values: impl DoubleEndedIterator<Item = T>) -> Option<Self> {
         let mut values = values.rev();
@@ -132,7 +132,7 @@ impl Numbers {
         &mut self,
         ui: &mut Ui,
         name: &str,
-        shown: [Shared<f32>; 3],
+        shown: [CommonValue<f32>; 3],
         look: Look,
     ) -> Option<(usize, NumberEdit)> {
         ui.label(name);
@@ -160,7 +160,13 @@ impl Numbers {
     }
 
     /// One number beside its name.
-    pub fn number(&mut self, ui: &mut Ui, name: &str, shown: impl Into<Shared<f32>>, look: Look) -> Option<NumberEdit> {
+    pub fn number(
+        &mut self,
+        ui: &mut Ui,
+        name: &str,
+        shown: impl Into<CommonValue<f32>>,
+        look: Look,
+    ) -> Option<NumberEdit> {
         labelled(ui, name, |ui| {
             let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
             self.field(ui, name, RichText::new(""), shown.into(), look, size)
@@ -173,7 +179,7 @@ impl Numbers {
         ui: &mut Ui,
         said: &str,
         prefix: RichText,
-        shown: Shared<f32>,
+        shown: CommonValue<f32>,
         look: Look,
         size: egui::Vec2,
     ) -> Option<NumberEdit> {

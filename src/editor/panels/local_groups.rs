@@ -42,7 +42,7 @@ const COLORS: [[f32; 3]; 8] = [
     [0.60, 0.55, 0.35],
 ];
 
-/// What a row asks for.
+/// Request of a row.
 enum RowRequest {
     Edits(Vec<RigEdit>),
     Preview(Vec<RigEdit>),

@@ -81,7 +81,7 @@ impl EditorPanel for ProcessPanel {
     }
 }
 
-/// What a click on a row asks for.
+/// Request of a click on a row.
 enum Click {
     Select,
     RunTo,

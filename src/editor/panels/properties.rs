@@ -11,7 +11,7 @@ use bevy_egui::egui::{self, Checkbox, ComboBox, Key, ScrollArea, TextEdit, Ui, W
 
 use super::{
     displayed_rig::{DisplayedRig, color},
-    fields::{Look, MIXED, NumberEdit, Numbers, Shared, labelled, short},
+    fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled, short},
     groups, list,
 };
 use crate::{
@@ -102,7 +102,7 @@ impl PropertiesPanel {
 
     fn label_field(&mut self, ui: &mut Ui, shown: &DisplayedRig, requests: &mut Requests) {
         let several = self.values.joints.len() > 1;
-        let Shared { value, mixed } = self.values.label.clone();
+        let CommonValue { value, mixed } = self.values.label.clone();
         let kept = self.label.as_ref().map(|draft| draft.text.clone());
         let mut text = kept.unwrap_or(if mixed { String::new() } else { value });
         let hint = if mixed { MIXED.to_owned() } else { shown.name(self.values.joints[0]).into_owned() };
@@ -129,7 +129,7 @@ impl PropertiesPanel {
     }
 
     fn group_field(&mut self, ui: &mut Ui, shown: &DisplayedRig, requests: &mut Requests) {
-        let Shared { value, mixed } = self.values.group;
+        let CommonValue { value, mixed } = self.values.group;
         let group = value.filter(|_| !mixed).and_then(|uid| shown.rig.group(uid)).cloned();
         let text = match &group {
             Some(group) => group.name.as_str(),
@@ -195,7 +195,7 @@ impl PropertiesPanel {
     }
 
     fn lock_field(&self, ui: &mut Ui, shown: &DisplayedRig, requests: &mut Requests) {
-        let Shared { mut value, mixed } = self.values.locked;
+        let CommonValue { mut value, mixed } = self.values.locked;
         let field = Checkbox::new(&mut value, "Lock weights").indeterminate(mixed);
         if ui.add(field).on_hover_text("Skinning leaves the weights of these joints as they are").clicked() {
             let lock = mixed || value;

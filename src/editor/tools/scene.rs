@@ -57,7 +57,7 @@ pub struct EditedRig<'a> {
     pub has_mesh: bool,
     /// The running program of a built rig.
     pub runtime: Option<Ref<'a, RigRuntime>>,
-    /// What its commands have built.
+    /// Result of its commands.
     pub built: Option<&'a Built>,
 }
 

@@ -36,7 +36,7 @@ pub enum JournalWriteError {
     Text(#[from] ron::Error),
     /// The journal of another window or of a crash has the same path.
     #[error("another journal lies there")]
-    Taken,
+    PathInUse,
     /// The journal has no place to try.
     #[error("there is no place for it")]
     NoPlace,

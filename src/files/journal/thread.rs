@@ -13,7 +13,7 @@ use super::{
     Content, JournalPlaces, JournalWriteError, SaveMark,
     encode::Encoder,
     sync::{Synced, Syncer},
-    writer::{Order, Shared},
+    writer::{Order, WriterState},
 };
 use crate::files::{
     Disk, DiskFile,
@@ -28,7 +28,7 @@ const BLOCK: usize = 1 << 20;
 /// Data of the thread.
 pub(super) struct Writer {
     pub disk: Arc<dyn Disk>,
-    pub shared: Arc<Shared>,
+    pub shared: Arc<WriterState>,
     /// Sender to this thread's own inbox, for messages of the syncing thread.
     pub orders: Sender<Order>,
     pub session: u64,
@@ -295,7 +295,7 @@ fn create_somewhere(
         let taken = !own && !replaced && writer.disk.entry(&path, false).is_ok();
         let created = if taken {
             // Another window works on this project, or unsaved work waits to be recovered.
-            Err(JournalWriteError::Taken)
+            Err(JournalWriteError::PathInUse)
         } else {
             create(writer.disk.as_ref(), &path, writer.session, content)
         };

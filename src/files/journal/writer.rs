@@ -73,7 +73,7 @@ pub(super) enum Order {
 
 /// State that the thread publishes.
 #[derive(Default)]
-pub(super) struct Shared {
+pub(super) struct WriterState {
     state: Mutex<State>,
     troubled: AtomicBool,
 }
@@ -84,7 +84,7 @@ struct State {
     trouble: Option<Arc<JournalWriteError>>,
 }
 
-impl Shared {
+impl WriterState {
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -118,7 +118,7 @@ impl Shared {
 
 struct Inner {
     orders: Sender<Order>,
-    shared: Arc<Shared>,
+    shared: Arc<WriterState>,
     position: AtomicU64,
     closed: AtomicBool,
 }
@@ -179,7 +179,7 @@ impl Journal {
         replaces: Option<PathBuf>,
     ) -> Self {
         let (orders, inbox) = channel();
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(WriterState::default());
         let position = AtomicU64::new(content.first.saturating_add(content.changes.len() as u64));
         let writer =
             Writer { disk, shared: shared.clone(), orders: orders.clone(), session, places, content, replaces };

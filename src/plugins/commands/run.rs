@@ -19,8 +19,10 @@ use crate::{
 pub struct Programs(pub ProgramCache);
 
 /// Reason why the built rig cannot run. The rig then stands still in its built pose.
-#[derive(Component, Debug, Clone, PartialEq)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq)]
 #[component(immutable)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, PartialEq)]
 pub struct RunFailure(pub ProgramError);
 
 type BuiltRigs<'a> = (

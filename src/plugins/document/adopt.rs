@@ -6,9 +6,9 @@
 //! was despawned. Each write is tried on the document by itself. Writes that the document accepts become one step of
 //! the history; the others are reverted on the entities, with one message each.
 
-mod despawned;
 mod groups;
 mod joints;
+mod removal;
 mod sorting;
 mod tags;
 mod trial;
@@ -32,8 +32,8 @@ use super::{
 };
 use crate::{
     plugins::schema::{
-        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, Null, Tag,
-        TagOf, Tags,
+        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf, Null,
+        Tag, TagOf, Tags,
     },
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
 };
@@ -52,6 +52,7 @@ pub(super) struct View {
     rest: Option<&'static RestTransform>,
     transform: Option<&'static Transform>,
     child_of: Option<&'static ChildOf>,
+    node_of: Option<&'static NodeOf>,
     uid: Option<&'static Uid>,
     tag: Option<&'static Tag>,
     command: Option<&'static CommandTag>,

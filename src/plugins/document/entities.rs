@@ -11,7 +11,7 @@ use std::{
 
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
-use crate::rig::{BuiltConstraint, BuiltNode, GroupData, PoseOffset, RestTransform, TagData, Uid};
+use crate::rig::{BuiltConstraint, BuiltNode, GroupData, NodeKind, PoseOffset, RestTransform, TagData, Uid};
 
 /// The parts of a rig that have entities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,6 +87,7 @@ pub(in crate::plugins) struct MirroredJoint {
     pub rest: RestTransform,
     /// Parent entity; `None` until the joint has been placed.
     pub parent: Option<Entity>,
+    pub kind: NodeKind,
     /// Uids of the joint's tags, in order.
     pub tags: Vec<Uid>,
 }

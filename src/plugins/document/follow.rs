@@ -83,6 +83,7 @@ pub(in crate::plugins) fn follow_rigs(
                     group: None,
                     rest: data.rest,
                     parent: Some(parent),
+                    kind: data.kind,
                     tags: Vec::new(),
                 };
                 describe(
@@ -100,6 +101,13 @@ pub(in crate::plugins) fn follow_rigs(
             };
             let entity = mirrored.entity;
             let old_rest = std::mem::replace(&mut mirrored.rest, data.rest);
+            if mirrored.kind != data.kind {
+                mirrored.kind = data.kind;
+                match data.kind {
+                    NodeKind::Null => commands.entity(entity).try_insert(Null),
+                    NodeKind::Joint => commands.entity(entity).try_remove::<Null>(),
+                };
+            }
             describe(&mut commands, mirrored, data.label.as_deref(), data.group, groups.bypass_change_detection());
             let is_posed_otherwise = known.posed.get(&data.uid) != offset;
             let Ok((mut pose, mut rest)) = places.get_mut(entity) else { continue };

@@ -12,9 +12,10 @@ use crate::{
     },
     mesh::{influences::keep_strongest, model::Weights},
     modules::control::{ControlModule, ShapeAxes},
+    processor::differing_params,
     rig::{
         GroupData, JointData, Limits, NodeKind, RestTransform, Rig, RigEdit, RigJoint, SkinData, TagData, TagKind, Uid,
-        UidSource, fields, ron_options,
+        UidSource,
     },
 };
 
@@ -76,7 +77,7 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
         let global = Affine3A::from_rotation_translation(to_rig, position);
         let kind = TagKind::Command {
             module: "control".to_owned(),
-            params: control_params(&control(bone, eye)),
+            params: differing_params(&control(bone, eye)),
             feature: Some(feature),
         };
         let tag = TagData { uid: uids.next_uid(), enabled: true, comment: comment(bone), kind };
@@ -196,20 +197,6 @@ fn control(bone: &FaceBone, eye: f32) -> ControlModule {
         },
         ..ControlModule::default()
     }
-}
-
-/// The parameters of a control as RON, without those that have their default value.
-fn control_params(control: &ControlModule) -> String {
-    // Serialisation never fails for the types that parameters have.
-    let written = |control: &ControlModule| ron_options().to_string(control).unwrap_or_default();
-    let (own, default) = (written(control), written(&ControlModule::default()));
-    let params = |text: &str| -> Vec<String> {
-        let own = fields(text).into_iter().filter(|field| field.depth == 1);
-        own.map(|field| text[field.start..field.end].trim_end_matches([',', ' ']).to_owned()).collect()
-    };
-    let default = params(&default);
-    let differing: Vec<String> = params(&own).into_iter().filter(|param| !default.contains(param)).collect();
-    format!("({})", differing.join(", "))
 }
 
 /// The number with four significant digits.

@@ -56,7 +56,7 @@ impl Work {
             return Err(FitFailure::NoTemplate);
         }
         match &self.request.template {
-            FitTemplate::Given(template) => Ok(vec![template.clone()]),
+            FitTemplate::Rig(template) => Ok(vec![template.clone()]),
             FitTemplate::Choose => Ok((self.templates.0)()),
             FitTemplate::Named(name) => {
                 let known = (self.templates.0)();

@@ -7,14 +7,16 @@ use super::RigRuntime;
 /// Hands the joints of a running rig over to something else, on the rig's entity: joints with an [`OutsideTransform`] go
 /// there, and what hangs on them follows. Controls and constraints run on beneath, so that the rig can take over again at any
 /// time: change the share little by little.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Component, Default)]
 pub struct HandOver {
     /// Share of the outside transforms, 0 (the rig alone) to 1.
     pub share: f32,
 }
 
 /// Transform, in the world, to which something outside the rig moves a joint.
-#[derive(Component, Debug, Clone, Copy, PartialEq)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
+#[reflect(Component)]
 pub struct OutsideTransform(pub Isometry3d);
 
 /// A rig whose nodes do not stand where its program puts them.

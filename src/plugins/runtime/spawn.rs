@@ -2,13 +2,18 @@
 
 use std::{collections::HashSet, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{prelude::*, transform::components::TransformTreeChanged};
 
 use super::{ControlPose, InstanceMode, NodeOf, NodeSlot, RigNodes, RigRuntime};
-use crate::{mesh::model::Trs, rig::NodeType, solve::program::RigProgram};
+use crate::{
+    mesh::model::Trs,
+    plugins::schema::{Joint, NodeLabel, Null},
+    rig::{NodeType, RestTransform},
+    solve::program::{ProgramNode, RigProgram},
+};
 
-/// Makes an entity an instance of a program: spawns the entities of its nodes that the mode needs, and inserts a
-/// [`RigRuntime`] and, if it is missing, a `Transform`.
+/// Makes an entity an instance of a program: spawns the entities of its nodes that the mode needs, with the components of
+/// the [`schema`](crate::plugins::schema) that a program knows, and inserts a [`RigRuntime`] and, if it is missing, a `Transform`.
 pub fn spawn_instance(world: &mut World, rig: Entity, program: &Arc<RigProgram>, mode: InstanceMode) {
     let runtime = RigRuntime::new(Arc::clone(program), mode);
     world.entity_mut(rig).insert_if_new(Transform::IDENTITY).insert(runtime);
@@ -32,24 +37,32 @@ pub fn furnish_instance(world: &mut World, rig: Entity) {
                     if world.get::<ChildOf>(entity).map(ChildOf::parent) != Some(parent) {
                         world.entity_mut(entity).insert(ChildOf(parent));
                     }
-                    world.entity_mut(entity).insert(NodeSlot(slot as u32));
+                    let mut entity = world.entity_mut(entity);
+                    entity.insert(NodeSlot(slot as u32));
+                    describe_node(&mut entity, node, mode);
                     continue;
                 }
-                let own = (NodeSlot(slot as u32), NodeOf(rig), node.uid);
-                world.spawn((own, transform(&node.base), ChildOf(parent))).id()
+                let own = (NodeSlot(slot as u32), NodeOf(rig), node.uid, RestTransform::from(node.base));
+                let mut entity = world.spawn((own, transform(&node.base), ChildOf(parent)));
+                describe_node(&mut entity, node, mode);
+                entity.id()
             }
             InstanceMode::Direct => {
                 let is_joint = node.kind == NodeType::Joint;
                 if let Some(entity) = known {
-                    world.entity_mut(entity).insert(NodeSlot(slot as u32));
+                    let mut entity = world.entity_mut(entity);
+                    entity.insert(NodeSlot(slot as u32));
+                    describe_node(&mut entity, node, mode);
                     continue;
                 }
                 if !is_joint && !node.is_posable() {
                     continue;
                 }
-                let mut entity = world.spawn((NodeSlot(slot as u32), NodeOf(rig), node.uid));
+                let own = (NodeSlot(slot as u32), NodeOf(rig), node.uid, RestTransform::from(node.base));
+                let mut entity = world.spawn(own);
+                describe_node(&mut entity, node, mode);
                 if is_joint {
-                    entity.insert(GlobalTransform::IDENTITY);
+                    entity.insert_if_new(GlobalTransform::IDENTITY);
                 }
                 if node.is_posable() {
                     entity.insert(ControlPose::default());
@@ -76,6 +89,43 @@ pub fn furnish_instance(world: &mut World, rig: Entity) {
     }
     if let Some(mut found) = world.get_mut::<RigRuntime>(rig) {
         *found = runtime;
+    }
+}
+
+/// Writes the components that describe a node where they differ.
+fn describe_node(entity: &mut EntityWorldMut, node: &ProgramNode, mode: InstanceMode) {
+    let (is_joint, is_null) = (node.kind == NodeType::Joint, node.kind == NodeType::Null);
+    if entity.contains::<Joint>() != is_joint {
+        if is_joint {
+            entity.insert(Joint);
+        } else {
+            entity.remove::<Joint>();
+        }
+    }
+    if mode == InstanceMode::Direct && entity.contains::<Transform>() {
+        // World transforms are written at once, so that joints need no local ones.
+        entity.remove::<(Transform, TransformTreeChanged)>();
+    }
+    if entity.contains::<Null>() != is_null {
+        if is_null {
+            entity.insert(Null);
+        } else {
+            entity.remove::<Null>();
+        }
+    }
+    let rest = RestTransform::from(node.base);
+    if entity.get::<RestTransform>() != Some(&rest) {
+        entity.insert(rest);
+    }
+    let label = entity.get::<NodeLabel>().map(|label| label.0.as_str());
+    match &node.label {
+        known if known.as_deref() == label => {}
+        Some(label) => {
+            entity.insert(NodeLabel(label.to_string()));
+        }
+        None => {
+            entity.remove::<NodeLabel>();
+        }
     }
 }
 

@@ -3,8 +3,8 @@
 use super::{
     super::{
         NodeId,
-        off::Off,
-        resolve::{self, Asker},
+        exclusion::Exclusion,
+        resolve::{self, Asker, ResolveError},
     },
     Builder,
 };
@@ -20,15 +20,15 @@ pub enum FindError {
     #[error(transparent)]
     Text(#[from] ReferenceError),
     /// The reference means something that is not built.
-    #[error("{0}")]
-    Meaning(String),
+    #[error(transparent)]
+    Meaning(#[from] ResolveError),
     /// The reference means something that is off.
     #[error("{text}: {off}; turn it on, or refer to something else")]
     Off {
         /// The reference.
         text: String,
         /// Switch that is off.
-        off: Off,
+        off: Exclusion,
     },
     /// There is no joint that could ask.
     #[error("the rig has no joints, so references find nothing")]
@@ -63,20 +63,19 @@ impl Builder {
 
     fn find_all(&self, joint: NodeId, text: &str, references: &NodeRefs) -> Result<Vec<Uid>, FindError> {
         let asker = Asker { rig: self.rig, joint, place: self.cursor() as u32 };
-        let found =
-            resolve::resolve(&self.world, asker, references).map_err(|error| FindError::Meaning(error.to_string()))?;
+        let found = resolve::resolve(&self.world, asker, references)?;
         match found.gaps.into_iter().next() {
             Some(gap) if found.nodes.is_empty() => Err(FindError::Off { text: text.to_owned(), off: gap.off }),
             _ => Ok(found.nodes.into_iter().map(|node| self.world.uid(node)).collect()),
         }
     }
 
-    /// What is off of a joint with that label, or of the nodes that a command makes under that name; `None` if nothing
-    /// is, or nothing is called so.
-    pub fn off_named(&self, name: &str) -> Option<Off> {
+    /// Exclusion of the joint with that label, or of the command that makes nodes under that name; `None` if neither is
+    /// excluded, or nothing is called so.
+    pub fn off_named(&self, name: &str) -> Option<Exclusion> {
         let off = &self.world.off;
         let of_joint =
-            off.joints.values().find(|joint| matches!(&joint.off, Off::Joint { joint, .. } if **joint == *name));
+            off.joints.values().find(|joint| matches!(&joint.off, Exclusion::Joint { joint, .. } if **joint == *name));
         if let Some(joint) = of_joint {
             return Some(joint.off.clone());
         }

@@ -8,8 +8,8 @@ use super::{Builder, Command, Due};
 use crate::{
     mesh::model::Trs,
     processor::{
+        exclusion::{CommandExclusion, Gap, JointExclusion, SkipReason},
         list::{Switches, joints_in},
-        off::{Gap, OffCommand, OffJoint, SkipReason},
         scope::Trace,
         world::{Aspect, Birth, NOWHERE, NodeId, Value, same},
     },
@@ -78,7 +78,7 @@ impl Builder {
                 None => (None, rest),
             };
             if let Some(reason) = switches.joint(data) {
-                off.insert(data.uid, OffJoint { off: reason, above: parent });
+                off.insert(data.uid, JointExclusion { off: reason, above: parent });
                 left_out.insert(data.uid, (parent, base));
                 continue;
             }
@@ -106,7 +106,7 @@ impl Builder {
     }
 
     /// Notes which joints and groups are off.
-    fn set_joints_off(&mut self, joints: HashMap<Uid, OffJoint>, groups: &HashMap<Uid, Arc<str>>) {
+    fn set_joints_off(&mut self, joints: HashMap<Uid, JointExclusion>, groups: &HashMap<Uid, Arc<str>>) {
         let off = &mut self.world.off;
         if off.joints != joints || off.groups != *groups {
             (off.joints, off.groups) = (joints, groups.clone());
@@ -116,7 +116,7 @@ impl Builder {
 
     /// Notes whether a command is passed over, and why. Those that look for its nodes have to look again if that
     /// changes.
-    pub(super) fn set_command_off(&mut self, number: u32, off: Option<OffCommand>) {
+    pub(super) fn set_command_off(&mut self, number: u32, off: Option<CommandExclusion>) {
         let commands = &mut self.world.off.commands;
         if commands.get(&number) == off.as_ref() {
             return;
@@ -172,9 +172,9 @@ impl Builder {
                 self.world.bearers[number as usize] = uid;
                 if let Some(off) = off {
                     let above = self.world.off.joint(uid).and_then(|gap| gap.above);
-                    let off = OffCommand { module: module.as_str().into(), reason: SkipReason::Own(off), above };
+                    let off = CommandExclusion { module: module.as_str().into(), reason: SkipReason::Own(off), above };
                     self.set_command_off(number, Some(off));
-                } else if self.world.off.commands.get(&number).is_some_and(OffCommand::is_own) {
+                } else if self.world.off.commands.get(&number).is_some_and(CommandExclusion::is_own) {
                     self.set_command_off(number, None);
                 }
                 if number as usize == self.commands.len() {

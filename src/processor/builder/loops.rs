@@ -62,7 +62,7 @@ impl Builder {
         Ok(())
     }
 
-    /// What decides where something is: its parent, and what the constraints that drive it read.
+    /// Dependencies of a place: its parent, and everything that the constraints that drive it read.
     fn depends_on(&self, at: &Dependency, except: NodeId, place: u32) -> Vec<Dependency> {
         let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = at;
         let Some(node) = self.world.id(*uid) else { return Vec::new() };

@@ -1,4 +1,4 @@
-//! How far commands have come.
+//! Progress of commands.
 
 use super::Builder;
 use crate::{

@@ -1,4 +1,4 @@
-//! What references of parameters find, and what becomes of those that mean something that is off.
+//! References of parameters: the nodes that they find, and the treatment of nodes that are off.
 //!
 //! | accessor | where nodes are off |
 //! | --- | --- |
@@ -14,7 +14,7 @@ use super::{BuildScope, Read};
 use crate::{
     processor::{
         ModuleError,
-        off::Gap,
+        exclusion::Gap,
         resolve::{self, Resolution},
         world::NodeId,
     },
@@ -144,7 +144,7 @@ impl BuildScope<'_> {
     fn resolution(&mut self, parameter: &str, references: &NodeRefs) -> Result<Resolution, ModuleError> {
         let found = resolve::resolve(self.world, self.asker, references);
         self.trace.reads.push(Read::References(references.clone(), found.clone().ok()));
-        found.map_err(|problem| ModuleError::reference(parameter, references, problem))
+        found.map_err(|error| ModuleError::reference(parameter, references, error.to_string()))
     }
 
     /// Notes that a list is shorter than it would be.

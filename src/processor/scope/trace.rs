@@ -1,8 +1,8 @@
-//! What a command read and wrote, and who it makes.
+//! Traces of commands: the cells that a command reads and writes, and the nodes that it makes.
 
 use crate::{
     processor::{
-        off::{Gap, Off},
+        exclusion::{Exclusion, Gap},
         resolve::{self, Asker, Resolution},
         world::{Aspect, NodeId, Value, World, same},
     },
@@ -24,10 +24,10 @@ pub(in crate::processor) struct Trace {
     pub writes: Vec<(NodeId, Aspect)>,
     /// Number of nodes and constraints that the command made.
     pub made: u32,
-    /// What is off of a list that it goes through, if anything is.
+    /// First gap of a list that the command goes through.
     pub partial: Option<Gap>,
     /// The parameter that was read last as if it were left out, because what it means is off.
-    pub optional_off: Option<(String, Off)>,
+    pub optional_off: Option<(String, Exclusion)>,
     /// The nearest node that is built above what it cannot do without.
     pub above: Option<NodeId>,
 }

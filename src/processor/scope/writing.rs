@@ -1,4 +1,4 @@
-//! What a module changes on nodes: places, parents, looks, labels, attributes.
+//! Changes of nodes by modules: places, parents, looks, labels, attributes.
 
 use std::sync::Arc;
 

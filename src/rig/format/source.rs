@@ -1,7 +1,7 @@
 //! RON texts, and errors with their place in the text.
 
 use ron::{Options, extensions::Extensions};
-use serde::de::DeserializeOwned;
+use serde::{Serialize, de::DeserializeOwned};
 
 /// Error in a text file, with its place.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -77,6 +77,11 @@ pub(crate) fn utf8<'a>(bytes: &'a [u8], limit: usize, what: &str) -> Result<&'a 
         return Err(SourceError::at(text, 0, format!("the {what} is empty; save it again or take a backup")));
     }
     Ok(text)
+}
+
+/// RON text of a value on one line. Values without maps of unusual keys, such as parameters, always have one.
+pub(crate) fn ron_text<T: Serialize + ?Sized>(value: &T) -> String {
+    ron_options().to_string(value).unwrap_or_default()
 }
 
 /// Reads a value from RON text.

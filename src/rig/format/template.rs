@@ -22,19 +22,19 @@
 mod comment_placement;
 mod file;
 mod header;
-mod over;
 mod read;
 mod shorthand;
+mod text_patch;
 mod tidy;
 mod write;
 
 use serde::{Deserialize, Serialize};
 
-pub use over::write_template_over;
-pub(crate) use over::{says_the_same, write_own_over};
 pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};
+pub use text_patch::write_template_over;
+pub(crate) use text_patch::{says_the_same, write_own_over};
 pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{quoted, vector, write_without_poses};
@@ -83,12 +83,12 @@ pub struct TemplateHeader {
     /// Named features and their switches, for listings.
     #[serde(default)]
     pub features: Vec<FeatureSummary>,
-    /// What a part needs of the rig that it is dropped into; `None` for other templates.
+    /// Needs of a part from the rig that it is dropped into; `None` for other templates.
     #[serde(default)]
     pub needs: Option<NeedsSummary>,
 }
 
-/// What a part needs of its host, in a template's header: see [`PartNeeds`](crate::rig::part::PartNeeds).
+/// Needs of a part from its host, in a template's header: see [`PartNeeds`](crate::rig::part::PartNeeds).
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct NeedsSummary {
     /// Labels of the joints that make it whole, in their order.

@@ -35,7 +35,7 @@ pub(in crate::rig) struct Node<'a> {
     pub range: Range<usize>,
     /// Place behind the opening bracket.
     pub inside: usize,
-    /// What stands between the brackets.
+    /// Items between the brackets.
     pub items: Vec<Item<'a>>,
 }
 
@@ -191,6 +191,23 @@ impl<'a> Pending<'a> {
     }
 }
 
+/// The text of a RON struct with another value of one of its fields. The rest stays as it is written; a field that is left
+/// out comes first. A text that is no RON stays.
+pub(crate) fn with_field(text: &str, name: &str, value: &str) -> String {
+    let text = if text.trim().is_empty() { "()" } else { text };
+    let Some(tree) = Tree::parse(text) else { return text.to_owned() };
+    let root = tree.node(tree.root());
+    let (place, written) = match (tree.field(tree.root(), name), root.bracket) {
+        (Some(field), _) => (tree.node(field.value).range.clone(), value.to_owned()),
+        (None, Some(_)) => {
+            let comma = if root.items.is_empty() { "" } else { ", " };
+            (root.inside..root.inside, format!("{name}: {value}{comma}"))
+        }
+        (None, None) => (root.range.clone(), format!("({name}: {value})")),
+    };
+    [&text[..place.start], &written, &text[place.end..]].concat()
+}
+
 /// Number of the tokens of an attribute of the file, such as `#![enable(implicit_some)]`.
 fn attribute(text: &str) -> usize {
     let is_there = tokens(text).map(|token| token.text).take(3).eq(["#", "!", "["]);
@@ -223,6 +240,15 @@ mod tests {
         assert_eq!(tree.string(elements[0].value, "y").as_deref(), Some("q"));
         assert_eq!(tree.written(elements[1].value), "r#\"(\"#");
         assert_eq!(&text[root.items[2].start..root.items[2].end], "c: {\"k\": 2},");
+    }
+
+    #[test]
+    fn fields_are_set_in_place_or_come_first() {
+        assert_eq!(with_field("(a: 1, /* two */ b: [2] )", "b", "[3]"), "(a: 1, /* two */ b: [3] )");
+        assert_eq!(with_field("(a: (b: 1))", "b", "2"), "(b: 2, a: (b: 1))");
+        assert_eq!(with_field("", "b", "2"), "(b: 2)");
+        assert_eq!(with_field("Named()", "b", "2"), "Named(b: 2)");
+        assert_eq!(with_field("(a: [1)", "b", "2"), "(a: [1)");
     }
 
     #[test]

@@ -11,11 +11,11 @@ use std::{
 
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
-    format::tree::Tree,
+    format::tree::{Tree, with_field},
     label::mirrored_label,
     nearest::did_you_mean,
     operations::{Draft, MirrorPlane, drop_part},
-    part::PartChain,
+    part::{PartChain, PartError},
     reference::{NameKind, NameScope, Names, bind_names, given_name, map_references, map_text_fields},
     remap::mirror_names,
 };
@@ -100,8 +100,8 @@ impl PartInstance {
     /// Puts the part into a rig. Returns notes.
     ///
     /// # Errors
-    /// A message about what does not fit: joints that are not there, a part that needs more of them, unknown features or tags.
-    pub fn put_into(&self, rig: &mut Rig, part: &Part, mirror: MirrorParams) -> Result<Vec<String>, String> {
+    /// Joints that are not there, a part that needs more of them, unknown features or tags.
+    pub fn put_into(&self, rig: &mut Rig, part: &Part, mirror: MirrorParams) -> Result<Vec<String>, PartError> {
         let part = &self.prepared(self.resized(part)?, mirror);
         let mut uids = UidSource::seeded(self.uid.0);
         let mut draft = Draft::new(rig, &mut uids, None);
@@ -110,13 +110,10 @@ impl PartInstance {
             self.add_joints(&mut draft, part, &mut joints)?;
         }
         if joints.len() > part.len() {
-            let (given, has) = (joints.len(), part.len());
-            return Err(format!("{given} joints are given, and the part has only {has}; take some away"));
+            return Err(PartError::TooManyJoints { given: joints.len(), count: part.len() });
         }
-        let said = |error: &dyn std::fmt::Display| error.to_string();
         let bindings = BTreeMap::new();
-        drop_part(&mut draft, part, &joints, &bindings, &mut |_, uid| self.uid_of(uid))
-            .map_err(|error| said(&error))?;
+        drop_part(&mut draft, part, &joints, &bindings, &mut |_, uid| self.uid_of(uid))?;
         self.turn_off(&mut draft, part)?;
         for change in &self.changes {
             self.change(&mut draft, part, &joints, change)?;
@@ -125,7 +122,7 @@ impl PartInstance {
     }
 
     /// The part with as many joints as it has here: as many as it goes onto, where nothing else is said.
-    fn resized(&self, part: &Part) -> Result<Rig, String> {
+    fn resized(&self, part: &Part) -> Result<Rig, PartError> {
         let mut counts = Vec::new();
         for (name, count) in &self.counts {
             let chain = match part.chains.as_slice() {
@@ -186,12 +183,12 @@ impl PartInstance {
         part
     }
 
-    fn known_joints(&self, draft: &Draft) -> Result<Vec<Uid>, String> {
+    fn known_joints(&self, draft: &Draft) -> Result<Vec<Uid>, PartError> {
         self.onto.iter().map(|label| labelled(draft.rig(), label)).collect()
     }
 
     /// Adds the joints that the part brings, beyond the first ones, which are there.
-    fn add_joints(&self, draft: &mut Draft, part: &Rig, joints: &mut Vec<Uid>) -> Result<(), String> {
+    fn add_joints(&self, draft: &mut Draft, part: &Rig, joints: &mut Vec<Uid>) -> Result<(), PartError> {
         let parent = self.parent.as_deref().map(|label| labelled(draft.rig(), label)).transpose()?;
         let globals = draft.rig().rest_globals();
         let below = globals.into_iter().find(|(uid, _)| self.is_world && parent == Some(*uid));
@@ -207,13 +204,13 @@ impl PartInstance {
             let mirror = joint.data.mirror.map(|mirror| self.uid_of(mirror));
             let data = JointData { uid, rest, mirror, tags: Vec::new(), group: None, ..joint.data.clone() };
             let edit = RigEdit::AddJoint { joint: Box::new(data), parent: above, index: usize::MAX };
-            draft.apply(edit).map_err(|error| error.to_string())?;
+            draft.apply(edit)?;
             joints.push(uid);
         }
         Ok(())
     }
 
-    fn turn_off(&self, draft: &mut Draft, part: &Rig) -> Result<(), String> {
+    fn turn_off(&self, draft: &mut Draft, part: &Rig) -> Result<(), PartError> {
         let names = |tag: &TagData| match &tag.kind {
             TagKind::Feature { kind, name, switch, .. } => {
                 let name = if name.is_empty() { kind } else { name };
@@ -227,8 +224,7 @@ impl PartInstance {
                 tags().filter(|tag| names(tag).as_ref() == Some(off)).map(|tag| self.uid_of(tag.uid)).collect();
             if found.is_empty() {
                 let known: Vec<String> = tags().filter_map(names).collect();
-                let near = did_you_mean(off, known);
-                return Err(format!("the part has no feature \"{off}\"{near}"));
+                return Err(PartError::UnknownFeature { name: off.clone(), nearest: did_you_mean(off, known) });
             }
             for tag in found {
                 set_tag(draft, tag, |tag| tag.enabled = false)?;
@@ -237,7 +233,7 @@ impl PartInstance {
         Ok(())
     }
 
-    fn change(&self, draft: &mut Draft, part: &Rig, joints: &[Uid], change: &PartChange) -> Result<(), String> {
+    fn change(&self, draft: &mut Draft, part: &Rig, joints: &[Uid], change: &PartChange) -> Result<(), PartError> {
         let places: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
         if let Some(name) = &change.tag {
             let tag = self.uid_of(self.find_tag(part, name)?);
@@ -271,26 +267,26 @@ impl PartInstance {
         let walked: Vec<_> = part.walk().enumerate().collect();
         let Some((place, _)) = walked.iter().find(is_called) else {
             let known: Vec<&str> = walked.iter().filter_map(|(_, joint)| joint.data.label.as_deref()).collect();
-            return Err(format!("the part has no joint \"{label}\"{}", did_you_mean(label, known)));
+            return Err(PartError::UnknownJoint { label: label.clone(), nearest: did_you_mean(label, known) });
         };
         let Some(joint) = joints.get(*place).copied() else {
-            return Err(format!("joint \"{label}\" of the part is not used here"));
+            return Err(PartError::UnusedJoint { label: label.clone() });
         };
         if let Some(mut rest) = draft.rig().joint(joint).map(|joint| joint.data.rest) {
             rest.translation = change.translation.map_or(rest.translation, Into::into);
             rest.rotation = change.rotation.map_or(rest.rotation, |angles| crate::rig::degrees(angles.into()));
-            draft.apply(RigEdit::SetRest(joint, rest)).map_err(|error| error.to_string())?;
+            draft.apply(RigEdit::SetRest(joint, rest))?;
         }
         for tag in &change.tags {
             let tag = Box::new(TagData { uid: self.uid_of(tag.uid), ..tag.clone() });
             let edit = RigEdit::AddTag { joint, tag, index: usize::MAX };
-            draft.apply(edit).map_err(|error| error.to_string())?;
+            draft.apply(edit)?;
         }
         Ok(())
     }
 
     /// The tag of the part that is called so.
-    fn find_tag(&self, part: &Rig, name: &str) -> Result<Uid, String> {
+    fn find_tag(&self, part: &Rig, name: &str) -> Result<Uid, PartError> {
         let mut called: Vec<(String, Uid)> = Vec::new();
         for joint in part.walk() {
             for tag in &joint.data.tags {
@@ -315,12 +311,9 @@ impl PartInstance {
             [tag] => Ok(tag),
             [] => {
                 let known: Vec<&str> = called.iter().map(|(known, _)| known.as_str()).collect();
-                Err(format!("the part has no tag \"{name}\"{}", did_you_mean(name, known)))
+                Err(PartError::UnknownTag { name: name.to_owned(), nearest: did_you_mean(name, known) })
             }
-            _ => {
-                let count = found.len();
-                Err(format!("the part has {count} tags \"{name}\"; say which: \"{name}#1\" to \"{name}#{count}\""))
-            }
+            _ => Err(PartError::AmbiguousTag { name: name.to_owned(), count: found.len() }),
         }
     }
 }
@@ -346,29 +339,29 @@ impl Names for PartNames<'_> {
     }
 }
 
-fn unknown_chain(name: &str, chains: &[PartChain]) -> String {
-    let names: Vec<&str> = chains.iter().map(|chain| chain.name.as_str()).collect();
-    match names[..] {
-        [] => "the part has no chain that takes other numbers of joints".to_owned(),
-        _ if name.is_empty() => format!("the part has several chains; name one of {}", names.join(", ")),
-        _ => format!("the part has no chain \"{name}\"{}", did_you_mean(name, names)),
+fn unknown_chain(name: &str, chains: &[PartChain]) -> PartError {
+    let known: Vec<String> = chains.iter().map(|chain| chain.name.clone()).collect();
+    match known[..] {
+        [] => PartError::NoChains,
+        _ if name.is_empty() => PartError::UnnamedChain { known },
+        _ => PartError::UnknownChain { name: name.to_owned(), nearest: did_you_mean(name, known) },
     }
 }
 
-fn labelled(rig: &Rig, label: &str) -> Result<Uid, String> {
+fn labelled(rig: &Rig, label: &str) -> Result<Uid, PartError> {
     rig.find_label(label).ok_or_else(|| {
         let known: Vec<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
-        format!("there is no joint \"{label}\"{}", did_you_mean(label, known))
+        PartError::UnknownHostJoint { label: label.to_owned(), nearest: did_you_mean(label, known) }
     })
 }
 
-fn set_tag(draft: &mut Draft, tag: Uid, change: impl FnOnce(&mut TagData)) -> Result<(), String> {
+fn set_tag(draft: &mut Draft, tag: Uid, change: impl FnOnce(&mut TagData)) -> Result<(), PartError> {
     let Some((joint, found)) = draft.rig().find_tag(tag) else {
-        return Err(format!("tag {tag} is on a joint that is not used here"));
+        return Err(PartError::UnusedTag { tag });
     };
     let (joint, mut found) = (joint.data.uid, found.clone());
     change(&mut found);
-    draft.apply(RigEdit::SetTag(joint, Box::new(found))).map_err(|error| error.to_string())
+    Ok(draft.apply(RigEdit::SetTag(joint, Box::new(found)))?)
 }
 
 /// Parameters with other values for some of them.
@@ -377,20 +370,7 @@ fn with_params(params: &str, others: &str) -> String {
     let Some(others) = Tree::parse(others) else { return out };
     for item in &others.node(others.root()).items {
         let Some(key) = item.key else { continue };
-        let value = others.written(item.value);
-        let Some(tree) = Tree::parse(&out) else { return out };
-        let next = match tree.field(tree.root(), key) {
-            Some(known) => {
-                let range = tree.node(known.value).range.clone();
-                format!("{}{value}{}", &out[..range.start], &out[range.end..])
-            }
-            None => {
-                let inside = tree.node(tree.root()).inside;
-                let comma = if tree.node(tree.root()).items.is_empty() { "" } else { ", " };
-                format!("{}{key}: {value}{comma}{}", &out[..inside], &out[inside..])
-            }
-        };
-        out = next;
+        out = with_field(&out, key, others.written(item.value));
     }
     out
 }

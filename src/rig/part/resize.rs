@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use bevy::math::{Affine3, Quat, Vec3};
 
+use super::PartError;
 use crate::rig::{
     EditError, JointData, NodeRef, NodeRefs, RestTransform, Rig, RigEdit, TagKind, Uid,
     reference::{Source, map_unions},
@@ -32,35 +33,36 @@ impl PartChain {
     /// The part with `count` joints in this chain.
     ///
     /// # Errors
-    /// A message if the chain does not take so many, or is none in `part`.
-    pub fn resized(&self, part: &Rig, count: usize) -> Result<Rig, String> {
+    /// A chain that does not take so many joints, or is none of `part`.
+    pub fn resized(&self, part: &Rig, count: usize) -> Result<Rig, PartError> {
         let Self { name, joints, min, max } = self;
         if !(*min..=*max).contains(&count) {
-            return Err(format!("chain \"{name}\" takes {min} to {max} joints, not {count}"));
+            return Err(PartError::ChainLength { chain: name.clone(), min: *min, max: *max, count });
         }
         let mut out = part.clone();
         if count == joints.len() {
             return Ok(out);
         }
         let places = self.places(part, count)?;
-        let kept = self.change(&mut out, count).map_err(|error| format!("chain \"{name}\": {error}"))?;
+        let kept =
+            self.change(&mut out, count).map_err(|source| PartError::ChainEdit { chain: name.clone(), source })?;
         let mut above = kept.first().and_then(|first| part.joint(*first)?.parent).map_or(Affine3::IDENTITY, |parent| {
             part.rest_globals().into_iter().find(|(uid, _)| *uid == parent).map_or(Affine3::IDENTITY, |(_, at)| at)
         });
         for (joint, place) in kept.iter().zip(places) {
             let rest = RestTransform::from_affine(&(above.inverse() * place));
-            out.apply(&RigEdit::SetRest(*joint, rest)).map_err(|error| error.to_string())?;
+            out.apply(&RigEdit::SetRest(*joint, rest))?;
             above = place;
         }
         Ok(out)
     }
 
     /// Places of `count` joints along the chain, in the rig's space.
-    fn places(&self, part: &Rig, count: usize) -> Result<Vec<Affine3>, String> {
+    fn places(&self, part: &Rig, count: usize) -> Result<Vec<Affine3>, PartError> {
         let globals: HashMap<Uid, Affine3> = part.rest_globals().into_iter().collect();
         let known: Option<Vec<Affine3>> = self.joints.iter().map(|joint| globals.get(joint).copied()).collect();
         let known = known.filter(|known| !known.is_empty());
-        let known = known.ok_or_else(|| format!("chain \"{}\" names joints that the part does not have", self.name))?;
+        let known = known.ok_or_else(|| PartError::ForeignChain { chain: self.name.clone() })?;
         let last = known.len() - 1;
         let parted = |place: usize| {
             let share = if count > 1 { place as f32 / (count - 1) as f32 * last as f32 } else { 0.0 };

@@ -7,7 +7,7 @@ use std::{borrow::Cow, collections::HashMap, ops::Range};
 
 use super::{
     NameKind, NameScope, Names, NodeRef, NodeRefs, ReferenceError, ReferenceProblem, Source,
-    text::{Written, read_with},
+    text::{NamedUid, read_with},
     write::{name_text, written},
 };
 use crate::rig::{
@@ -261,8 +261,8 @@ fn rewritten(
 }
 
 /// The text with current names at these places, and a uid beside each.
-fn renamed(text: &str, places: &[Written], names: &dyn Names) -> Option<String> {
-    let mut places: Vec<&Written> = places.iter().collect();
+fn renamed(text: &str, places: &[NamedUid], names: &dyn Names) -> Option<String> {
+    let mut places: Vec<&NamedUid> = places.iter().collect();
     places.sort_unstable_by_key(|place| place.name.start);
     let mut out = String::with_capacity(text.len());
     let mut at = 0;
@@ -285,7 +285,7 @@ fn renamed(text: &str, places: &[Written], names: &dyn Names) -> Option<String> 
 struct KeptNames(HashMap<(NameKind, Uid), String>);
 
 impl KeptNames {
-    fn new(text: &str, places: &[Written]) -> Self {
+    fn new(text: &str, places: &[NamedUid]) -> Self {
         let named = places.iter().filter(|place| !place.name.is_empty());
         Self(named.filter_map(|place| Some(((place.kind, place.uid), unquoted(&text[place.name.clone()])?))).collect())
     }

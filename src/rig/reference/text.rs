@@ -22,7 +22,7 @@ const TYPES: [&str; NodeTypes::NAMES.len()] = {
 const PLACES: [&str; 5] = ["all", "none", "START", "MIDDLE", "END"];
 
 /// A uid with the name beside it, as written in a text.
-pub(super) struct Written {
+pub(super) struct NamedUid {
     pub kind: NameKind,
     pub uid: Uid,
     /// Byte range of the name; empty, before the `#`, without one.
@@ -40,7 +40,7 @@ pub(super) fn read(text: &str, names: Option<&dyn Names>) -> Result<Vec<NodeRef>
 pub(super) fn read_with(
     text: &str,
     names: Option<&dyn Names>,
-    written: &mut Vec<Written>,
+    written: &mut Vec<NamedUid>,
 ) -> Result<Vec<NodeRef>, ReferenceError> {
     let mut reader = Reader { text, at: 0, names, written };
     reader.union()
@@ -55,7 +55,7 @@ struct Reader<'a, 'o> {
     text: &'a str,
     at: usize,
     names: Option<&'o dyn Names>,
-    written: &'o mut Vec<Written>,
+    written: &'o mut Vec<NamedUid>,
 }
 
 /// A name with or without a uid, not looked up yet.
@@ -234,7 +234,7 @@ impl<'a> Reader<'a, '_> {
         let Named { name, uid, place } = named;
         let start = place.start;
         if let Some(uid) = uid {
-            self.written.push(Written { kind, uid, name: place, has_uid: true });
+            self.written.push(NamedUid { kind, uid, name: place, has_uid: true });
             return Ok(uid);
         }
         let name = name.unwrap_or_default();
@@ -243,7 +243,7 @@ impl<'a> Reader<'a, '_> {
         };
         let mut candidates = names.find(scope, kind, &name);
         if let (Some(uid), true) = (candidates.pop(), candidates.is_empty()) {
-            self.written.push(Written { kind, uid, name: place, has_uid: false });
+            self.written.push(NamedUid { kind, uid, name: place, has_uid: false });
             return Ok(uid);
         }
         candidates = names.find(scope, kind, &name);

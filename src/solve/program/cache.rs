@@ -53,7 +53,7 @@ impl ProgramCache {
     }
 }
 
-/// What follows from constraints that are in use, so that a change of one constraint does not make it for the others again.
+/// Results that follow from constraints in use, kept so that a change of one constraint does not make it for the others again.
 #[derive(Debug)]
 pub(super) struct ByConstraint<T> {
     /// By address. The weak reference keeps the address from being given to another constraint.
@@ -69,7 +69,7 @@ impl<T> Default for ByConstraint<T> {
 }
 
 impl<T: Clone> ByConstraint<T> {
-    /// What is known of a constraint, or what `make` gives.
+    /// Kept result of a constraint, or the one that `make` gives.
     pub fn of(&mut self, constraint: &Arc<Constraint>, make: impl FnOnce() -> T) -> T {
         let known = self.known.entry(Arc::as_ptr(constraint).addr());
         known.or_insert_with(|| (Arc::downgrade(constraint), make())).1.clone()

@@ -1,5 +1,7 @@
 //! Errors of compiling a built rig into a program, and of its states.
 
+use std::fmt;
+
 use crate::rig::{BuiltConstraint, Uid};
 
 /// Error of compiling a [`BuiltRig`](crate::rig::BuiltRig). Every text names the constraint and the command that made
@@ -28,7 +30,7 @@ pub enum ProgramError {
     #[error("{place} holds a number that is not finite or a rotation without length; correct the value")]
     NotFinite {
         /// Node or constraint with the number.
-        place: String,
+        place: NumberPlace,
     },
     /// A constraint that refers to a node outside the rig.
     #[error(
@@ -36,7 +38,7 @@ pub enum ProgramError {
     )]
     MissingNode {
         /// The constraint and its command.
-        constraint: String,
+        constraint: ConstraintName,
         /// Role of the node in the constraint.
         role: &'static str,
         /// Uid without a node.
@@ -46,7 +48,7 @@ pub enum ProgramError {
     #[error("{constraint}: its {role} {node} lies outside the rig and cannot be driven; drive a node of this rig")]
     DrivenInput {
         /// The constraint and its command.
-        constraint: String,
+        constraint: ConstraintName,
         /// Role of the node in the constraint.
         role: &'static str,
         /// Uid of the input.
@@ -56,7 +58,7 @@ pub enum ProgramError {
     #[error("{constraint}: {node} has no attribute \"{name}\"; it has {known}")]
     MissingAttribute {
         /// The constraint and its command.
-        constraint: String,
+        constraint: ConstraintName,
         /// Label of the node.
         node: String,
         /// Name without an attribute.
@@ -68,7 +70,7 @@ pub enum ProgramError {
     #[error("{constraint}: {child} must be a child of {parent}, on which the chain goes on; list the joints in order")]
     NotAChain {
         /// The constraint and its command.
-        constraint: String,
+        constraint: ConstraintName,
         /// Label of the joint that should be the parent.
         parent: String,
         /// Label of the joint that should be its child.
@@ -78,7 +80,7 @@ pub enum ProgramError {
     #[error("{constraint}: it has {found} {what} and needs at least {needed}")]
     TooFew {
         /// The constraint and its command.
-        constraint: String,
+        constraint: ConstraintName,
         /// Name of the list's content.
         what: &'static str,
         /// Number of entries.
@@ -90,7 +92,7 @@ pub enum ProgramError {
     #[error("{constraint}: {problem}")]
     BadParameter {
         /// The constraint and its command.
-        constraint: String,
+        constraint: ConstraintName,
         /// Description of the problem, with a hint.
         problem: String,
     },
@@ -143,7 +145,66 @@ pub enum StateError {
     NotFinite(Uid),
 }
 
-/// Text for a constraint in errors.
-pub(super) fn describe(constraint: &BuiltConstraint) -> String {
-    format!("{} constraint {} of command {}", constraint.constraint.kind(), constraint.uid, constraint.command)
+/// Identity of a constraint in errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConstraintName {
+    /// Kind of constraint, in words.
+    pub kind: &'static str,
+    /// Uid of the constraint.
+    pub uid: Uid,
+    /// Uid of the command that made it.
+    pub command: Uid,
+}
+
+impl fmt::Display for ConstraintName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} constraint {} of command {}", self.kind, self.uid, self.command)
+    }
+}
+
+impl From<&BuiltConstraint> for ConstraintName {
+    fn from(constraint: &BuiltConstraint) -> Self {
+        Self { kind: constraint.constraint.kind(), uid: constraint.uid, command: constraint.command }
+    }
+}
+
+/// Place of a number that a program cannot use.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NumberPlace {
+    /// The base transform of a node, with its label.
+    Base(String),
+    /// A constraint.
+    Constraint(ConstraintName),
+}
+
+impl fmt::Display for NumberPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Base(node) => write!(f, "the base of {node}"),
+            Self::Constraint(constraint) => constraint.fmt(f),
+        }
+    }
+}
+
+impl ProgramError {
+    /// Uids of the commands that made the constraints at fault, in the order in which the text names them; empty if no
+    /// constraint is at fault.
+    pub fn commands(&self) -> &[Uid] {
+        match self {
+            Self::MissingNode { constraint, .. }
+            | Self::DrivenInput { constraint, .. }
+            | Self::MissingAttribute { constraint, .. }
+            | Self::NotAChain { constraint, .. }
+            | Self::TooFew { constraint, .. }
+            | Self::BadParameter { constraint, .. }
+            | Self::NotFinite { place: NumberPlace::Constraint(constraint) } => {
+                std::slice::from_ref(&constraint.command)
+            }
+            Self::Cycle { commands, .. } => commands,
+            Self::DuplicateNode { .. }
+            | Self::ParentOrder { .. }
+            | Self::NotFinite { place: NumberPlace::Base(_) }
+            | Self::UnknownExposed { .. } => &[],
+        }
+    }
 }

@@ -11,9 +11,7 @@ use glam::Vec3;
 
 use self::scalar_key::{ScalarKey, scalar_key};
 use super::{
-    ExternalNode, Keep, ProgramError,
-    error::describe,
-    name,
+    ConstraintName, ExternalNode, Keep, NumberPlace, ProgramError, name,
     op::{N, Op, Pose, Span, Tables, X},
 };
 use crate::{
@@ -108,7 +106,7 @@ impl<'a> Graph<'a> {
                 parent => parent.map_or(Trs::IDENTITY, |parent| built[parent]),
             };
             if !valid(&node.base) {
-                return Err(ProgramError::NotFinite { place: format!("the base of {}", name(rig, at)) });
+                return Err(ProgramError::NotFinite { place: NumberPlace::Base(name(rig, at)) });
             }
             built.push(multiply(&parent, &node.base));
         }
@@ -246,8 +244,8 @@ impl<'a> Graph<'a> {
         self.steps.push(Step { op, node, constraint });
     }
 
-    fn text(&self, constraint: usize) -> String {
-        describe(&self.rig.constraints[constraint])
+    fn text(&self, constraint: usize) -> ConstraintName {
+        ConstraintName::from(&self.rig.constraints[constraint])
     }
 
     /// Index of a node that a constraint drives.
@@ -402,7 +400,9 @@ impl<'a> Graph<'a> {
     pub fn scalar(&mut self, constraint: usize, scalar: &Scalar) -> Result<N, ProgramError> {
         let node = match scalar {
             Scalar::Value(value) if value.is_finite() => return Ok(self.constant(*value)),
-            Scalar::Value(_) => return Err(ProgramError::NotFinite { place: self.text(constraint) }),
+            Scalar::Value(_) => {
+                return Err(ProgramError::NotFinite { place: NumberPlace::Constraint(self.text(constraint)) });
+            }
             Scalar::Attribute { node, .. } | Scalar::Choice { node, .. } | Scalar::Channel { node, .. } => *node,
         };
         let at = self.driven(constraint, "attribute's node", node)?;
@@ -416,7 +416,7 @@ impl<'a> Graph<'a> {
                 let number = self.attribute_number(constraint, at, name)?;
                 let input = self.nodes[at].attributes[number];
                 if !(factor.is_finite() && add.is_finite()) {
-                    return Err(ProgramError::NotFinite { place: self.text(constraint) });
+                    return Err(ProgramError::NotFinite { place: NumberPlace::Constraint(self.text(constraint)) });
                 }
                 if *factor == 1.0 && *add == 0.0 {
                     input

@@ -7,9 +7,8 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 
 use super::{
-    ProgramError,
+    ConstraintName, NumberPlace, ProgramError,
     cache::ByConstraint,
-    error::describe,
     graph::Graph,
     name,
     op::{
@@ -451,8 +450,8 @@ impl Lower<'_, '_> {
         self.graph.push(op, node, Some(self.at));
     }
 
-    fn text(&self) -> String {
-        describe(&self.graph.rig.constraints[self.at])
+    fn text(&self) -> ConstraintName {
+        ConstraintName::from(&self.graph.rig.constraints[self.at])
     }
 
     fn bad(&self, problem: String) -> ProgramError {
@@ -460,7 +459,7 @@ impl Lower<'_, '_> {
     }
 
     fn not_finite(&self) -> ProgramError {
-        ProgramError::NotFinite { place: self.text() }
+        ProgramError::NotFinite { place: NumberPlace::Constraint(self.text()) }
     }
 
     fn too_few(&self, what: &'static str, found: usize, needed: usize) -> ProgramError {

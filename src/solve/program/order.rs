@@ -3,8 +3,7 @@
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::{
-    ProgramError,
-    error::describe,
+    ConstraintName, ProgramError,
     graph::{Graph, Step},
     lists::Lists,
     name,
@@ -127,8 +126,8 @@ fn cycle(graph: &Graph<'_>, wires: &Wires, waits: &[usize]) -> ProgramError {
         let node = rig.nodes.get(step.node);
         if let Some(constraint) = step.constraint.map(|at| &rig.constraints[at]) {
             let text = match node {
-                Some(_) => format!("{} drives {}", describe(constraint), name(rig, step.node)),
-                None => describe(constraint),
+                Some(_) => format!("{} drives {}", ConstraintName::from(constraint), name(rig, step.node)),
+                None => ConstraintName::from(constraint).to_string(),
             };
             words.push(text);
             constraints.push(constraint.uid);

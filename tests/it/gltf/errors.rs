@@ -1,4 +1,4 @@
-//! What is wrong with a file is said with the file's name and the place, before anything is built on it.
+//! Faults of a file are said with the file's name and the place, before anything is built on it.
 
 use super::compose::{Composed, character, glb, read, triangle};
 use rigsmith::mesh::gltf::{ExternalError, ExternalFile, MAX_IMAGE_BYTES, memory_limit, read_gltf};

@@ -1,4 +1,4 @@
-//! What is written: only what deforms, as much as asked for, and nothing lost on the way back.
+//! Written files: only joints that deform, as much as asked for, and nothing lost on the way back.
 
 use super::{
     compose::{PNG, character, read, triangle},

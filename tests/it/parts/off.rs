@@ -7,7 +7,7 @@ use std::{
 
 use bevy::math::{Quat, Vec3};
 use rigsmith::{
-    processor::{Builder, CommandState, Off, SkipReason},
+    processor::{Builder, CommandState, Exclusion, SkipReason},
     rig::{
         BuiltRig, NodeType, PoseOffset, Rig, RigEdit, TagData, Uid,
         deform::DeformSkeleton,
@@ -223,7 +223,7 @@ fn what_is_passed_over_says_why() {
         .filter(|status| status.state == CommandState::Skipped)
         .map(|status| status.skipped.expect("a reason"))
         .collect();
-    assert!(skipped.iter().any(|reason| matches!(reason, SkipReason::Own(Off::Joint { .. }))));
+    assert!(skipped.iter().any(|reason| matches!(reason, SkipReason::Own(Exclusion::Joint { .. }))));
     let needed: Vec<String> = skipped
         .iter()
         .filter(|reason| matches!(reason, SkipReason::Reference { .. }))

@@ -1,4 +1,4 @@
-//! What has no program, and what the errors say.
+//! Rigs without a program, and the texts of the errors.
 
 use super::*;
 use rigsmith::{

@@ -1,4 +1,4 @@
-//! How a bent limb looks: folds, and the volume around the joint.
+//! Measures of a bent limb: folds, and the volume around the joint.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -9,7 +9,7 @@ use crate::mesh::voxels::Voxels;
 pub(super) const MOST: usize = 16;
 /// Lengths of steps to neighbours over a face, an edge and a corner, near the ratio of 1 : √2 : √3.
 const STEP: [u32; 3] = [10, 14, 17];
-/// How much longer a step counts inside the outer half of the surface layer, which may bridge a narrow gap.
+/// Factor of a step's length inside the outer half of the surface layer, which may bridge a narrow gap.
 const SHELL_STEP: u32 = 2;
 /// Length beyond the ratio of [`Limits`] that a path may have before it is given up, in tenths of a cell.
 const SLACK: f32 = 100.0;
@@ -81,7 +81,7 @@ impl Joints {
         self.offset(joint, point).length()
     }
 
-    /// How much longer than straight the path to a cell is, at least 1. Both are measured in steps between cells, so
+    /// Length of the path to a cell, as a multiple of the straight line, at least 1. Both are measured in steps between cells, so
     /// the error of such lengths cancels; a cell of slack covers where on the bone a path begins.
     pub(super) fn detour(&self, joint: u32, center: Vec3, cost: u32, cell: f32) -> f32 {
         let mut steps = (self.offset(joint, center) / cell).abs().to_array();
@@ -93,10 +93,10 @@ impl Joints {
     }
 }
 
-/// What of all joints is kept.
+/// Limits on the joints that a voxel keeps.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
-    /// How many joints a voxel keeps, at most [`MOST`].
+    /// Number of joints that a voxel keeps, at most [`MOST`].
     pub(super) labels: usize,
     /// Joints further than this multiple of the nearest one's distance have no weight.
     pub(super) ratio: f32,
@@ -222,7 +222,7 @@ impl Field {
     }
 }
 
-/// Where paths begin: length so far, joint, cell.
+/// Starts of paths: length so far, joint, cell.
 fn seeds(voxels: &Voxels, joints: &Joints, cells: &[[u16; 3]]) -> Vec<(u32, u32, u32)> {
     let mut seeds = Vec::new();
     let mut outside = 0;

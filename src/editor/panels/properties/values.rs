@@ -7,7 +7,7 @@ use bevy::{math::EulerRot, prelude::*};
 use crate::{
     editor::panels::{
         displayed_rig::{DisplayedRig, Stamp},
-        fields::Shared,
+        fields::CommonValue,
     },
     rig::{JointData, NodeKind, PoseOffset, Rig, Uid, operations::Operation},
 };
@@ -19,13 +19,13 @@ pub(super) struct Values {
     /// The selected joints, the active one last.
     pub joints: Vec<Uid>,
     /// Label, empty for none.
-    pub label: Shared<String>,
-    pub group: Shared<Option<Uid>>,
-    pub kind: Shared<NodeKind>,
-    pub locked: Shared<bool>,
+    pub label: CommonValue<String>,
+    pub group: CommonValue<Option<Uid>>,
+    pub kind: CommonValue<NodeKind>,
+    pub locked: CommonValue<bool>,
     /// Marks that one of the joints is not at rest.
     pub posed: bool,
-    vectors: [[Shared<f32>; 3]; Part::ALL.len()],
+    vectors: [[CommonValue<f32>; 3]; Part::ALL.len()],
     /// Distances at rest from each joint to its children.
     pub lengths: Vec<f32>,
     /// The size of the skeleton, for the speed of drags.
@@ -89,7 +89,7 @@ impl Values {
         let places: HashMap<Uid, Vec3> =
             rig.rest_globals().into_iter().map(|(uid, global)| (uid, global.translation)).collect();
         let place = |uid: Uid| places.get(&uid).copied().unwrap_or_default();
-        let mut vectors = [[Shared::default(); 3]; Part::ALL.len()];
+        let mut vectors = [[CommonValue::default(); 3]; Part::ALL.len()];
         for part in Part::ALL {
             let of = |joint: &JointData| match part {
                 Part::Position => place(joint.uid),
@@ -97,7 +97,7 @@ impl Values {
             };
             let list: Vec<Vec3> = data().map(of).collect();
             for axis in 0..3 {
-                vectors[part as usize][axis] = Shared::of(list.iter().map(|vector| vector[axis]))?;
+                vectors[part as usize][axis] = CommonValue::of(list.iter().map(|vector| vector[axis]))?;
             }
         }
         let finite = places.values().filter(|place| place.is_finite());
@@ -106,10 +106,10 @@ impl Values {
         let bones = known.iter().flat_map(|joint| joint.children.iter().map(|child| (joint.data.uid, *child)));
         Some(Self {
             made_from: None,
-            label: Shared::of(data().map(|joint| joint.label.clone().unwrap_or_default()))?,
-            group: Shared::of(data().map(|joint| joint.group))?,
-            kind: Shared::of(data().map(|joint| joint.kind))?,
-            locked: Shared::of(data().map(|joint| joint.locked))?,
+            label: CommonValue::of(data().map(|joint| joint.label.clone().unwrap_or_default()))?,
+            group: CommonValue::of(data().map(|joint| joint.group))?,
+            kind: CommonValue::of(data().map(|joint| joint.kind))?,
+            locked: CommonValue::of(data().map(|joint| joint.locked))?,
             posed: data().any(|joint| rig.offset(joint.uid).is_some()),
             vectors,
             lengths: bones.map(|(head, tail)| place(head).distance(place(tail))).collect(),
@@ -120,7 +120,7 @@ impl Values {
     }
 
     /// Common values of one of the joints' vectors.
-    pub fn vector(&self, part: Part) -> [Shared<f32>; 3] {
+    pub fn vector(&self, part: Part) -> [CommonValue<f32>; 3] {
         self.vectors[part as usize]
     }
 

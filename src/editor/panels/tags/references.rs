@@ -3,7 +3,7 @@
 use bevy_egui::egui::{Label, RichText, Ui};
 
 use super::values::Subject;
-use crate::{editor::panels::list, rig::Uid};
+use crate::{editor::panels::list, processor::FindError, rig::Uid};
 
 /// The most names that are listed.
 const NAMED: usize = 3;
@@ -28,7 +28,10 @@ pub(super) fn about(ui: &mut Ui, subject: &Subject, label: &str, text: Option<&s
                 let said = if count == 0 { nodes } else { format!("{nodes}: {listed}{more}") };
                 (said, ui.visuals().weak_text_color(), names.join(", "))
             }
-            Some(Err(error)) => (error.clone(), ui.visuals().error_fg_color, error),
+            Some(Err(error)) => {
+                let error = error.to_string();
+                (error.clone(), ui.visuals().error_fg_color, error)
+            }
         };
         let line = ui.add(Label::new(RichText::new(said).small().color(color)).truncate());
         if !whole.is_empty() {
@@ -38,12 +41,12 @@ pub(super) fn about(ui: &mut Ui, subject: &Subject, label: &str, text: Option<&s
     picked
 }
 
-fn found(subject: &Subject, text: &str) -> Option<Result<Vec<Uid>, String>> {
+fn found(subject: &Subject, text: &str) -> Option<Result<Vec<Uid>, FindError>> {
     let (joint, _) = *subject.entry.tags.first()?;
     if text.trim().is_empty() {
         return None;
     }
-    Some(subject.builder?.find_from(&subject.shown.rig, joint, text).map_err(|error| error.to_string()))
+    Some(subject.builder?.find_from(&subject.shown.rig, joint, text))
 }
 
 fn name(subject: &Subject, node: Uid) -> String {

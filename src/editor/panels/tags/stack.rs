@@ -54,7 +54,7 @@ impl Entry {
         }
     }
 
-    /// What the tags say in a few words.
+    /// Summary of the tags in a few words.
     pub fn summary(&self) -> String {
         let [first, others @ ..] = &self.params[..] else { return self.first.comment.clone() };
         if others.iter().any(|other| other != first) {

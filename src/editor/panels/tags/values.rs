@@ -6,19 +6,28 @@ use bevy_egui::egui::{
     Checkbox, CollapsingHeader, ComboBox, Key, RichText, TextEdit, TextStyle, Ui, WidgetInfo, WidgetType,
 };
 
-use super::{references, stack::Entry};
+use serde::Serialize;
+
+use super::{
+    parameter_text::{ValueError, plain, read, typed_number},
+    references,
+    stack::Entry,
+};
 use crate::{
     editor::panels::{
         displayed_rig::DisplayedRig,
-        fields::{Look, MIXED, NumberEdit, Numbers, Shared, labelled},
+        fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled},
         list,
     },
     processor::{
         Builder, ModuleInfo, ParameterValues,
         form::{Form, FormElement, read_module_form},
     },
-    rig::Uid,
+    rig::{Uid, ron_text},
 };
+
+/// Colour of a parameter that gets its first one.
+const FIRST_COLOR: [f32; 3] = [1.0, 0.8, 0.1];
 
 /// Change of a value.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +41,7 @@ pub(super) enum ValueEdit {
     /// End of a drag whose value is dropped.
     Cancel,
     /// A value that the module does not take, with the reason.
-    Refused(String),
+    Refused(ValueError),
 }
 
 /// Forms, and what is being typed into them.
@@ -65,35 +74,37 @@ impl Subject<'_> {
     }
 
     /// RON of a value in the last command, and whether the others have another.
-    fn value(&self, path: &str) -> Shared<&str> {
+    fn value(&self, path: &str) -> CommonValue<&str> {
         let values = self.values.iter().map(|values| values.get(path).unwrap_or("None"));
-        Shared::of(values).unwrap_or_default()
+        CommonValue::of(values).unwrap_or_default()
     }
 
     /// Three numbers of all commands.
-    fn vector(&self, path: &str) -> Option<[Shared<f32>; 3]> {
-        let all = self.values.iter().map(|values| numbers(values.get(path)?));
+    fn vector(&self, path: &str) -> Option<[CommonValue<f32>; 3]> {
+        let all = self.values.iter().map(|values| read(values.get(path)?));
         let all = all.collect::<Option<Vec<[f32; 3]>>>()?;
-        Some([0, 1, 2].map(|axis| Shared::of(all.iter().map(|numbers| numbers[axis])).unwrap_or_default()))
+        Some([0, 1, 2].map(|axis| CommonValue::of(all.iter().map(|numbers| numbers[axis])).unwrap_or_default()))
     }
 
     /// Parameters of all commands with the first of some texts that the module takes as the value.
     fn set(&self, path: &str, texts: &[String]) -> ValueEdit {
-        match self.changed(path, texts) {
-            Ok(changed) => ValueEdit::Set(changed),
-            Err(reason) => ValueEdit::Refused(reason),
-        }
+        self.changed(path, texts).map_or_else(ValueEdit::Refused, ValueEdit::Set)
     }
 
-    fn changed(&self, path: &str, texts: &[String]) -> Result<Vec<(Uid, String)>, String> {
-        let mut refused = "there is no value".to_owned();
+    /// The same for a value that has one text.
+    fn set_to<T: Serialize + ?Sized>(&self, path: &str, value: &T) -> ValueEdit {
+        self.set(path, &[ron_text(value)])
+    }
+
+    fn changed(&self, path: &str, texts: &[String]) -> Result<Vec<(Uid, String)>, ValueError> {
+        let mut refused = ValueError::Missing;
         'texts: for text in texts {
             let mut changed = Vec::new();
             for ((_, tag), params) in self.entry.tags.iter().zip(&self.entry.params) {
                 match self.module.with_value(params, path, text) {
                     Ok(params) => changed.push((*tag, params)),
                     Err(error) => {
-                        refused = format!("`{path}` cannot be {text}: {}", error.message);
+                        refused = ValueError::Value { path: path.to_owned(), value: text.clone(), source: error };
                         continue 'texts;
                     }
                 }
@@ -108,18 +119,17 @@ impl Subject<'_> {
         let changed = commands.map(|((_, tag), params)| Ok((*tag, self.module.with_default(params, path)?)));
         match changed.collect::<Result<Vec<_>, crate::rig::SourceError>>() {
             Ok(changed) => ValueEdit::Set(changed),
-            Err(error) => ValueEdit::Refused(error.message),
+            Err(error) => ValueEdit::Refused(ValueError::Parameters(error)),
         }
     }
 
     fn number(&self, path: &str, edit: NumberEdit) -> ValueEdit {
-        let texts = |number: f32| [format!("{number:?}"), format!("{}", number.round() as i64)];
+        let texts = |number: f32| [ron_text(&number), ron_text(&(number.round() as i64))];
         match edit {
             NumberEdit::Set(number) => self.set(path, &texts(number)),
-            NumberEdit::Preview(number) => match self.changed(path, &texts(number)) {
-                Ok(changed) => ValueEdit::Preview(changed),
-                Err(reason) => ValueEdit::Refused(reason),
-            },
+            NumberEdit::Preview(number) => {
+                self.changed(path, &texts(number)).map_or_else(ValueEdit::Refused, ValueEdit::Preview)
+            }
             NumberEdit::Commit => ValueEdit::Commit,
             NumberEdit::Cancel => ValueEdit::Cancel,
         }
@@ -210,12 +220,12 @@ impl Values {
 
     fn element(&mut self, ui: &mut Ui, subject: &Subject, element: &FormElement, path: &str) -> Option<ValueEdit> {
         let label = element.label();
-        let Shared { value, mixed } = subject.value(path);
+        let CommonValue { value, mixed } = subject.value(path);
         match element {
             FormElement::Check(_) => {
                 let mut on = value == "true";
                 let clicked = ui.add(Checkbox::new(&mut on, &label).indeterminate(mixed)).clicked();
-                clicked.then(|| subject.set(path, &[(mixed || on).to_string()]))
+                clicked.then(|| subject.set_to(path, &(mixed || on)))
             }
             FormElement::Menu { options, .. } => {
                 let shown = if mixed { MIXED.to_owned() } else { plain(value) };
@@ -234,14 +244,14 @@ impl Values {
                     let said = label.clone();
                     response.response.widget_info(move || WidgetInfo::labeled(WidgetType::ComboBox, true, &said));
                 });
-                chosen.map(|option| subject.set(path, &[format!("{option:?}"), option]))
+                chosen.map(|option| subject.set(path, &[ron_text(&option), option]))
             }
             FormElement::Slider { step, unit, .. } | FormElement::Number { step, unit, .. } => {
                 let label = if unit.is_empty() { label } else { format!("{label} ({unit})") };
                 match value.parse::<f32>() {
                     Ok(number) => {
                         let look = Look { speed: f64::from(*step), decimals: 4, suffix: "" };
-                        let edit = self.numbers.number(ui, &label, Shared { value: number, mixed }, look)?;
+                        let edit = self.numbers.number(ui, &label, CommonValue { value: number, mixed }, look)?;
                         Some(subject.number(path, edit))
                     }
                     Err(_) => self.optional_number(ui, subject, path, &label),
@@ -261,16 +271,16 @@ impl Values {
                 let text = plain(if mixed { "\"\"" } else { value });
                 let typed = self.text(ui, subject.tag(), path, &label, &text, false);
                 let picked = references::about(ui, subject, &label, (!mixed).then_some(text.as_str()));
-                typed.or(picked).map(|text| subject.set(path, &[format!("{text:?}")]))
+                typed.or(picked).map(|text| subject.set_to(path, &text))
             }
             FormElement::Text(_) | FormElement::Amount(_) => {
                 let shown = if mixed || value == "None" { String::new() } else { plain(value) };
                 let text = self.text(ui, subject.tag(), path, &label, &shown, false)?;
                 let text = text.trim();
                 Some(match (element, text.parse::<f32>()) {
-                    (FormElement::Amount(_), Ok(number)) => subject.set(path, &[format!("{number:?}")]),
+                    (FormElement::Amount(_), Ok(number)) => subject.set_to(path, &number),
                     _ if text.is_empty() => subject.reset(path),
-                    _ => subject.set(path, &[format!("{text:?}")]),
+                    _ => subject.set_to(path, text),
                 })
             }
             FormElement::Curve(_) | FormElement::List(_) => {
@@ -284,51 +294,45 @@ impl Values {
     /// A number that may be left out.
     fn optional_number(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
         let text = self.text(ui, subject.tag(), path, label, "", false)?;
-        let number = text.trim().replace(',', ".").parse::<f32>();
-        Some(match number {
+        Some(match typed_number(&text) {
             Ok(number) => subject.number(path, NumberEdit::Set(number)),
-            Err(_) => ValueEdit::Refused(format!("\"{}\" is no number", text.trim())),
+            Err(error) => ValueEdit::Refused(error),
         })
     }
 
     /// Three pairs of lowest and highest values; empty fields are open.
     fn limits(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
-        let axes = parts(subject.value(path).value);
-        let mut pairs: Vec<[String; 2]> = axes
-            .iter()
-            .map(|axis| {
-                let ends = parts(axis);
-                let end = |at: usize| ends.get(at).filter(|end| **end != "None").map_or("", |end| *end).to_owned();
-                [end(0), end(1)]
-            })
-            .collect();
+        let mut pairs: [[Option<f32>; 2]; 3] =
+            read::<[(Option<f32>, Option<f32>); 3]>(subject.value(path).value)?.map(|(low, high)| [low, high]);
         ui.label(label);
-        let mut changed = false;
-        for (pair, axis) in pairs.iter_mut().zip(["X", "Y", "Z"]) {
-            for (end, side) in pair.iter_mut().zip(["from", "to"]) {
-                let said = format!("{label} {axis} {side}");
-                let path = format!("{path}.{axis}.{side}");
-                let row = format!("{axis} {side}");
-                if let Some(text) = self.named_text(ui, (subject.tag(), &path), (&row, &said), end, false) {
-                    *end = text.trim().replace(',', ".");
-                    changed = true;
-                }
+        let mut edit = None;
+        for (number, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
+            for (end, side) in ["from", "to"].into_iter().enumerate() {
+                let (row, said) = (format!("{axis} {side}"), format!("{label} {axis} {side}"));
+                let field = format!("{path}.{axis}.{side}");
+                let now = pairs[number][end].map_or_else(String::new, |bound| ron_text(&bound));
+                let Some(text) = self.named_text(ui, (subject.tag(), &field), (&row, &said), &now, false) else {
+                    continue;
+                };
+                let typed = if text.trim().is_empty() { Ok(None) } else { typed_number(&text).map(Some) };
+                edit = Some(typed.map_or_else(ValueEdit::Refused, |bound| {
+                    pairs[number][end] = bound;
+                    subject.set_to(path, &pairs.map(|[low, high]| (low, high)))
+                }));
             }
         }
-        let end = |text: &String| if text.is_empty() { "None".to_owned() } else { text.clone() };
-        let pairs: Vec<String> = pairs.iter().map(|[low, high]| format!("({}, {})", end(low), end(high))).collect();
-        changed.then(|| subject.set(path, &[format!("({})", pairs.join(", "))]))
+        edit
     }
 
     fn color(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
         let id = ui.make_persistent_id((subject.tag(), path, "colour"));
-        let stored = numbers(subject.value(path).value);
+        let stored = read(subject.value(path).value);
         let kept: Option<[f32; 3]> = ui.data(|data| data.get_temp(id));
         let mut edit = None;
         labelled(ui, label, |ui| {
             let Some(mut rgb) = kept.or(stored) else {
                 if ui.button("Choose").clicked() {
-                    edit = Some(subject.set(path, &["(1.0, 0.8, 0.1)".to_owned()]));
+                    edit = Some(subject.set_to(path, &FIRST_COLOR));
                 }
                 return;
             };
@@ -338,7 +342,7 @@ impl Values {
             let holding = ui.input(|input| input.pointer.any_down());
             if let Some(rgb) = ui.data(|data| data.get_temp::<[f32; 3]>(id)).filter(|_| !holding) {
                 ui.data_mut(|data| data.remove_temp::<[f32; 3]>(id));
-                edit = Some(subject.set(path, &[tuple(rgb)]));
+                edit = Some(subject.set_to(path, &rgb));
             }
         });
         edit
@@ -416,13 +420,12 @@ fn made_form(module: &ModuleInfo) -> Form {
 }
 
 fn axis_edit(subject: &Subject, path: &str, axis: usize, edit: NumberEdit) -> ValueEdit {
-    let each = |number: f32| -> Result<Vec<(Uid, String)>, String> {
+    let each = |number: f32| -> Result<Vec<(Uid, String)>, ValueError> {
         let mut changed = Vec::new();
         for (((_, tag), params), values) in subject.entry.tags.iter().zip(&subject.entry.params).zip(&subject.values) {
-            let mut vector = values.get(path).and_then(numbers).unwrap_or_default();
+            let mut vector: [f32; 3] = values.get(path).and_then(read).unwrap_or_default();
             vector[axis] = number;
-            let text = subject.module.with_value(params, path, &tuple(vector));
-            changed.push((*tag, text.map_err(|error| error.message)?));
+            changed.push((*tag, subject.module.with_value(params, path, &ron_text(&vector))?));
         }
         Ok(changed)
     };
@@ -434,61 +437,21 @@ fn axis_edit(subject: &Subject, path: &str, axis: usize, edit: NumberEdit) -> Va
     }
 }
 
-/// Three boxes, or a text field for what is no vector.
+/// Three boxes; the text of what is no vector.
 fn boxes(ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
     let text = subject.value(path).value;
-    let mut on: Vec<bool> = parts(text).into_iter().map(|part| part == "true").collect();
+    let mut boxes: Option<[bool; 3]> = read(text);
     let mut changed = false;
-    labelled(ui, label, |ui| {
-        for (on, axis) in on.iter_mut().zip(["X", "Y", "Z"]) {
-            let response = ui.checkbox(on, axis);
-            changed |= response.clicked();
+    labelled(ui, label, |ui| match &mut boxes {
+        Some(boxes) => {
+            for (on, axis) in boxes.iter_mut().zip(["X", "Y", "Z"]) {
+                changed |= ui.checkbox(on, axis).clicked();
+            }
         }
-        if on.len() != 3 {
+        None => {
             let row = ui.available_rect_before_wrap();
             list::line(ui, row, text, ui.visuals().weak_text_color());
         }
     });
-    let on: Vec<String> = on.iter().map(ToString::to_string).collect();
-    changed.then(|| subject.set(path, &[format!("({})", on.join(", "))]))
-}
-
-/// A value without quotation marks.
-fn plain(value: &str) -> String {
-    ron::from_str::<String>(value).unwrap_or_else(|_| value.to_owned())
-}
-
-/// Parts of a tuple or list.
-fn parts(text: &str) -> Vec<&str> {
-    let text = text.trim();
-    let inner = text.strip_prefix("Some(").unwrap_or(text).trim();
-    let Some(inner) = inner.strip_prefix(['(', '[']) else { return Vec::new() };
-    let (mut depth, mut start, mut list) = (0, 0, Vec::new());
-    for (at, letter) in inner.char_indices() {
-        match letter {
-            '(' | '[' => depth += 1,
-            ')' | ']' if depth == 0 => {
-                list.push(inner[start..at].trim());
-                break;
-            }
-            ')' | ']' => depth -= 1,
-            ',' if depth == 0 => {
-                list.push(inner[start..at].trim());
-                start = at + 1;
-            }
-            _ => {}
-        }
-    }
-    list.retain(|part| !part.is_empty());
-    list
-}
-
-/// Three numbers of a tuple.
-fn numbers(text: &str) -> Option<[f32; 3]> {
-    let numbers: Vec<f32> = parts(text).into_iter().map(|part| part.parse().ok()).collect::<Option<_>>()?;
-    numbers.try_into().ok()
-}
-
-fn tuple([x, y, z]: [f32; 3]) -> String {
-    format!("({x:?}, {y:?}, {z:?})")
+    boxes.filter(|_| changed).map(|boxes| subject.set_to(path, &boxes))
 }

@@ -5,6 +5,44 @@ use crate::mesh::{
     model::{ChannelTarget, Interpolation, Model, Part, Weights},
 };
 
+/// Inconsistency of a part or of the weights of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum ModelFault {
+    /// Reference to an object outside the model.
+    #[error("refers to an object that is not there")]
+    Object,
+    /// Reference to a material outside the model.
+    #[error("refers to a material that is not there")]
+    Material,
+    /// Triangle with a vertex outside the part.
+    #[error("a triangle refers to a vertex that is not there")]
+    Vertex,
+    /// Vertex with a point outside the model.
+    #[error("a vertex refers to a point that is not there")]
+    Point,
+    /// Point that is not finite.
+    #[error("a point is not finite")]
+    PointNumber,
+    /// List of attributes of another length than the vertices.
+    #[error("a list of attributes is not as long as the vertices")]
+    AttributeCount,
+    /// Number of morph targets other than that of the object.
+    #[error("has another number of morph targets than its object")]
+    MorphCount,
+    /// Texture coordinate or morph displacement that is not finite.
+    #[error("a texture coordinate or morph displacement is not finite")]
+    AttributeNumber,
+    /// Lists of weights of another length than the points.
+    #[error("the weights are not as long as the points")]
+    WeightCount,
+    /// Weight of a node outside the model.
+    #[error("the weights refer to a node that is not there")]
+    WeightNode,
+    /// Weight that is not finite.
+    #[error("a weight is not finite")]
+    WeightNumber,
+}
+
 /// Checks the model; fails at the first inconsistency.
 pub(super) fn check(model: &Model) -> Result<(), GltfError> {
     let fail = |what: String| Err(GltfError::model(what));
@@ -50,33 +88,33 @@ pub(super) fn check(model: &Model) -> Result<(), GltfError> {
         }
     }
     for (i, part) in model.parts.iter().enumerate() {
-        if let Err(what) = check_part(model, part) {
-            return fail(format!("part {i}: {what}"));
+        if let Err(fault) = check_part(model, part) {
+            return fail(format!("part {i}: {fault}"));
         }
     }
     if let Some(weights) = &model.weights
-        && let Err(what) = check_weights(weights, model.points.len(), model.nodes.len())
+        && let Err(fault) = check_weights(weights, model.points.len(), model.nodes.len())
     {
-        return fail(what.to_owned());
+        return fail(fault.to_string());
     }
     check_clips(model)
 }
 
-fn check_part(model: &Model, part: &Part) -> Result<(), &'static str> {
+fn check_part(model: &Model, part: &Part) -> Result<(), ModelFault> {
     let Some(object) = model.objects.get(part.object) else {
-        return Err("refers to an object that is not there");
+        return Err(ModelFault::Object);
     };
     if part.material.is_some_and(|material| material >= model.material_set.materials.len()) {
-        return Err("refers to a material that is not there");
+        return Err(ModelFault::Material);
     }
     let count = part.vertices.len();
     if part.triangles.iter().flatten().any(|vertex| *vertex as usize >= count) {
-        return Err("a triangle refers to a vertex that is not there");
+        return Err(ModelFault::Vertex);
     }
     for point in &part.vertices {
         match model.points.get(*point as usize) {
-            None => return Err("a vertex refers to a point that is not there"),
-            Some(point) if !point.is_finite() => return Err("a point is not finite"),
+            None => return Err(ModelFault::Point),
+            Some(point) if !point.is_finite() => return Err(ModelFault::PointNumber),
             Some(_) => {}
         }
     }
@@ -85,30 +123,30 @@ fn check_part(model: &Model, part: &Part) -> Result<(), &'static str> {
     let morphs =
         part.morphs.iter().flat_map(|morph| [morph.positions.len(), morph.normals.len(), morph.tangents.len()]);
     if !lists.into_iter().chain(part.uvs.iter().map(Vec::len)).chain(morphs).all(fits) {
-        return Err("a list of attributes is not as long as the vertices");
+        return Err(ModelFault::AttributeCount);
     }
     if part.morphs.len() != object.morph_names.len() {
-        return Err("has another number of morph targets than its object");
+        return Err(ModelFault::MorphCount);
     }
     let offsets = |morph: &crate::mesh::model::Morph| {
         morph.positions.iter().chain(&morph.normals).chain(&morph.tangents).all(|offset| offset.is_finite())
     };
     let finite = part.morphs.iter().all(offsets) && part.uvs.iter().flatten().all(|uv| uv.is_finite());
-    if finite { Ok(()) } else { Err("a texture coordinate or morph displacement is not finite") }
+    if finite { Ok(()) } else { Err(ModelFault::AttributeNumber) }
 }
 
-fn check_weights(weights: &Weights, points: usize, nodes: usize) -> Result<(), &'static str> {
+fn check_weights(weights: &Weights, points: usize, nodes: usize) -> Result<(), ModelFault> {
     let rising = weights.starts.windows(2).all(|pair| pair[0] <= pair[1]);
     let ends = weights.starts.first() == Some(&0) && weights.starts.last() == Some(&(weights.joints.len() as u32));
     if weights.len() != points || !rising || !ends || weights.joints.len() != weights.values.len() {
-        return Err("the weights are not as long as the points");
+        return Err(ModelFault::WeightCount);
     }
     if weights.joints.iter().any(|joint| *joint as usize >= nodes) {
-        return Err("the weights refer to a node that is not there");
+        return Err(ModelFault::WeightNode);
     }
     match weights.values.iter().all(|value| value.is_finite()) {
         true => Ok(()),
-        false => Err("a weight is not finite"),
+        false => Err(ModelFault::WeightNumber),
     }
 }
 

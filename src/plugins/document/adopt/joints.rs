@@ -70,7 +70,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         self.index.insert(entity, rig_entity, uid, EntityPart::Joint);
         self.joints
             .joints
-            .insert(uid, MirroredJoint { entity, label, group, rest, parent: Some(above), tags: Vec::new() });
+            .insert(uid, MirroredJoint { entity, label, group, rest, parent: Some(above), kind, tags: Vec::new() });
     }
 
     pub fn joints_written(&mut self, writes: &RigWrites) {

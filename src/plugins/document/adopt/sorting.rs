@@ -8,7 +8,10 @@ use super::{
     super::entities::{EntityIndex, EntityPart, IndexedEntity},
     Views, WrittenByKind,
 };
-use crate::{plugins::schema::GroupOf, rig::Uid};
+use crate::{
+    plugins::schema::{GroupOf, NodeOf},
+    rig::Uid,
+};
 
 /// Written entities of one rig, by kind of part.
 #[derive(Default)]
@@ -69,7 +72,10 @@ pub(super) fn sort_by_rig(
             }
             Some(_) => {}
             None => {
-                let is_joint = views.get(*entity).is_ok_and(|view| view.joint && !view.created);
+                // Nodes of a game's instance that hangs on a rig are no joints of the document.
+                let is_own = |of: &NodeOf| is_rig(of.0);
+                let is_joint =
+                    views.get(*entity).is_ok_and(|view| view.joint && !view.created && view.node_of.is_none_or(is_own));
                 if let Some(rig) = rig_above(*entity).filter(|rig| is_joint && rig != entity) {
                     rigs.entry(rig).or_default().spawned_joints.push(*entity);
                 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{
     FeatureSummary, TemplateHeader,
-    shorthand::{Declared, TagForm},
+    shorthand::{Declarations, TagForm},
     write::{feature_summaries, needs_summary},
 };
 use crate::rig::{Rig, Uid};
@@ -18,7 +18,7 @@ pub(super) fn complete(mut header: TemplateHeader, text: &str) -> TemplateHeader
     if header.joint_count > 0 {
         return header;
     }
-    let Some(declared) = Declared::find(text) else { return header };
+    let Some(declared) = Declarations::find(text) else { return header };
     let tree = &declared.tree;
     let parts = tree.field(tree.root(), "parts").map(|parts| &tree.node(parts.value).items);
     if parts.is_some_and(|parts| !parts.is_empty()) {
@@ -41,7 +41,7 @@ impl TemplateHeader {
 }
 
 /// Named features with their switches, sorted.
-fn features(declared: &Declared) -> Vec<FeatureSummary> {
+fn features(declared: &Declarations) -> Vec<FeatureSummary> {
     let tree = &declared.tree;
     let mut found: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
     for tag in declared.tags.iter().flatten() {

@@ -6,7 +6,7 @@
 //! angles in degrees for a rotation. [`explicit`] writes all of it out, so that one strict reader reads every file, and
 //! keeps the places of the source for errors.
 
-mod declared;
+mod declarations;
 
 use std::{borrow::Cow, collections::HashMap, ops::Range};
 
@@ -21,7 +21,7 @@ use crate::rig::{
     reference::NameKind,
 };
 
-pub(in crate::rig::format) use declared::{Declaration, Declared, TagForm};
+pub(in crate::rig::format) use declarations::{Declaration, Declarations, TagForm};
 
 /// The first format with shorthand.
 const FIRST_FORMAT: u32 = 2;
@@ -69,7 +69,7 @@ impl Explicit<'_> {
 /// The text of a template without shorthand. A text of format 1, and one whose brackets do not match, is itself.
 pub fn explicit(source: &str) -> Explicit<'_> {
     let unchanged = Explicit { source, text: Cow::Borrowed(source), pieces: Vec::new(), faults: Vec::new() };
-    let Some(declared) = Declared::find(source).filter(|declared| declared.format() >= FIRST_FORMAT) else {
+    let Some(declared) = Declarations::find(source).filter(|declared| declared.format() >= FIRST_FORMAT) else {
         return unchanged;
     };
     let mut writer = Writer::new(&declared);
@@ -101,9 +101,38 @@ struct Change {
     text: String,
 }
 
+/// Reason why a name in a template means nothing.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(in crate::rig::format) enum NameError {
+    /// A name that nothing of its kind has.
+    #[error("there is no {kind} \"{name}\" in the file{nearest}")]
+    Unknown {
+        /// Kind of thing: joint, group, feature.
+        kind: String,
+        /// The name.
+        name: String,
+        /// End of the sentence with similar names.
+        nearest: String,
+    },
+    /// A name that several things of its kind have.
+    #[error("{} {kind}s are called \"{name}\"; write the uid, {}", uids.len(), uids_in_words(uids))]
+    Ambiguous {
+        /// Kind of thing: joint, group, feature.
+        kind: String,
+        /// The name.
+        name: String,
+        /// Uids of the things with that name.
+        uids: Vec<Uid>,
+    },
+}
+
+fn uids_in_words(uids: &[Uid]) -> String {
+    listed(&uids.iter().map(Uid::to_string).collect::<Vec<_>>(), "or")
+}
+
 /// Things of a text by the names that refer to them.
-pub(super) struct Called<'d, 'a> {
-    declared: &'d Declared<'a>,
+pub(super) struct NameIndex<'d, 'a> {
+    declared: &'d Declarations<'a>,
     groups: ByName<'d>,
     joints: ByName<'d>,
     features: ByName<'d>,
@@ -111,8 +140,8 @@ pub(super) struct Called<'d, 'a> {
 
 type ByName<'d> = HashMap<Cow<'d, str>, Vec<Uid>>;
 
-impl<'d, 'a> Called<'d, 'a> {
-    pub fn new(declared: &'d Declared<'a>) -> Self {
+impl<'d, 'a> NameIndex<'d, 'a> {
+    pub fn new(declared: &'d Declarations<'a>) -> Self {
         fn by_name<'d>(named: impl Iterator<Item = (Cow<'d, str>, Uid)>) -> ByName<'d> {
             let mut called = ByName::new();
             for (name, uid) in named {
@@ -133,8 +162,8 @@ impl<'d, 'a> Called<'d, 'a> {
     /// The only joint or group with that name.
     ///
     /// # Errors
-    /// A message with the nearest names, or with the uids of all that have the name.
-    pub fn find(&self, name: &str, kind: NameKind) -> Result<Uid, String> {
+    /// See [`NameError`].
+    pub fn find(&self, name: &str, kind: NameKind) -> Result<Uid, NameError> {
         let among = if kind == NameKind::Group { &self.groups } else { &self.joints };
         found(among, name, &kind.to_string())
     }
@@ -144,7 +173,7 @@ impl<'d, 'a> Called<'d, 'a> {
     ///
     /// # Errors
     /// As [`find`](Self::find).
-    pub fn feature(&self, name: &str, own: &[Declaration]) -> Result<Uid, String> {
+    pub fn feature(&self, name: &str, own: &[Declaration]) -> Result<Uid, NameError> {
         let tree = &self.declared.tree;
         let mut of_joint = own.iter().filter(|tag| feature_name(tree, tag.node).as_deref() == Some(name));
         match (of_joint.next(), of_joint.next()) {
@@ -155,15 +184,15 @@ impl<'d, 'a> Called<'d, 'a> {
 }
 
 struct Writer<'d, 'a> {
-    declared: &'d Declared<'a>,
-    called: Called<'d, 'a>,
+    declared: &'d Declarations<'a>,
+    called: NameIndex<'d, 'a>,
     changes: Vec<Change>,
     faults: Vec<SourceError>,
 }
 
 impl<'d, 'a> Writer<'d, 'a> {
-    fn new(declared: &'d Declared<'a>) -> Self {
-        Self { declared, called: Called::new(declared), changes: Vec::new(), faults: Vec::new() }
+    fn new(declared: &'d Declarations<'a>) -> Self {
+        Self { declared, called: NameIndex::new(declared), changes: Vec::new(), faults: Vec::new() }
     }
 
     fn tree(&self) -> &'d Tree<'a> {
@@ -228,7 +257,7 @@ impl<'d, 'a> Writer<'d, 'a> {
         let Some(name) = self.tree().string(node, field).filter(|name| name.parse::<Uid>().is_err()) else { return };
         let said = match self.called.find(&name, kind) {
             Ok(uid) => format!("\"{uid}\""),
-            Err(message) => self.fault(item, message),
+            Err(error) => self.fault(item, error.to_string()),
         };
         self.replace(item.value, said);
     }
@@ -241,7 +270,7 @@ impl<'d, 'a> Writer<'d, 'a> {
         let Some(name) = name.filter(|name| name.parse::<Uid>().is_err()) else { return written.to_owned() };
         match self.called.feature(&name, own) {
             Ok(uid) => format!("\"{uid}\""),
-            Err(message) => self.fault(item, message),
+            Err(error) => self.fault(item, error.to_string()),
         }
     }
 
@@ -305,18 +334,16 @@ impl<'d, 'a> Writer<'d, 'a> {
 /// The only thing with that name.
 ///
 /// # Errors
-/// A message with the nearest names, or with the uids of all that have the name.
-fn found(among: &ByName, name: &str, kind: &str) -> Result<Uid, String> {
+/// See [`NameError`].
+fn found(among: &ByName, name: &str, kind: &str) -> Result<Uid, NameError> {
     match among.get(name).map(Vec::as_slice) {
         Some([uid]) => Ok(*uid),
-        Some(uids) => {
-            let uids = uids.iter().map(Uid::to_string).collect::<Vec<_>>();
-            Err(format!("{} {kind}s are called \"{name}\"; write the uid, {}", uids.len(), listed(&uids, "or")))
-        }
+        Some(uids) => Err(NameError::Ambiguous { kind: kind.to_owned(), name: name.to_owned(), uids: uids.to_vec() }),
         None => {
             let mut names: Vec<&str> = among.keys().map(|name| &**name).collect();
             names.sort_unstable();
-            Err(format!("there is no {kind} \"{name}\" in the file{}", did_you_mean(name, names)))
+            let nearest = did_you_mean(name, names);
+            Err(NameError::Unknown { kind: kind.to_owned(), name: name.to_owned(), nearest })
         }
     }
 }

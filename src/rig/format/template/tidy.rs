@@ -3,9 +3,9 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{
-    over::{comparable, patch::Patch},
     read::{bind_references, read_text},
-    shorthand::{Called, Declaration, Declared, TAG_FIELDS, TagForm, feature_name},
+    shorthand::{Declaration, Declarations, NameError, NameIndex, TAG_FIELDS, TagForm, feature_name},
+    text_patch::{comparable, patch::Patch},
 };
 use crate::rig::{
     Rig, SourceError, Uid,
@@ -17,7 +17,7 @@ use crate::rig::{
     reference::{NameKind, bind_names, without_uids},
 };
 
-/// What becomes of uids when a template is formatted.
+/// Treatment of uids when a template is formatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum UidStyle {
     /// As they are.
@@ -36,7 +36,7 @@ pub enum UidStyle {
 /// What keeps the text from being read as a template, and comments for which there is no place in the layout.
 pub fn format_template(source: &str, uids: UidStyle) -> Result<String, SourceError> {
     let before = read_text(source, 1)?;
-    let text = match (uids, Declared::find(source)) {
+    let text = match (uids, Declarations::find(source)) {
         (UidStyle::Kept, _) | (_, None) => source.to_owned(),
         (style, Some(declared)) => Uids::new(&declared, &before.rig, style, !before.parts.is_empty()).text(),
     };
@@ -54,11 +54,11 @@ pub fn format_template(source: &str, uids: UidStyle) -> Result<String, SourceErr
 }
 
 struct Uids<'d, 'a> {
-    declared: &'d Declared<'a>,
+    declared: &'d Declarations<'a>,
     rig: &'d Rig,
     style: UidStyle,
     has_parts: bool,
-    called: Called<'d, 'a>,
+    called: NameIndex<'d, 'a>,
     by_uid: HashMap<Uid, &'d Declaration>,
     /// Uids that the text will not have.
     derived: HashSet<Uid>,
@@ -66,10 +66,10 @@ struct Uids<'d, 'a> {
 }
 
 impl<'d, 'a> Uids<'d, 'a> {
-    fn new(declared: &'d Declared<'a>, rig: &'d Rig, style: UidStyle, has_parts: bool) -> Self {
+    fn new(declared: &'d Declarations<'a>, rig: &'d Rig, style: UidStyle, has_parts: bool) -> Self {
         let follows = |one: &&Declaration| !one.is_written || one.derived == Some(one.uid);
         let derived = declared.all().filter(follows).map(|one| one.uid).collect();
-        let (called, patch) = (Called::new(declared), Patch::new(&declared.tree));
+        let (called, patch) = (NameIndex::new(declared), Patch::new(&declared.tree));
         let by_uid = declared.all().map(|one| (one.uid, one)).collect();
         Self { declared, called, by_uid, rig, style, has_parts, derived, patch }
     }
@@ -141,7 +141,7 @@ impl<'d, 'a> Uids<'d, 'a> {
     }
 
     /// True if a name means that thing, whose uid the text will not have.
-    fn is_only(&self, uid: Uid, named: Result<Uid, String>) -> bool {
+    fn is_only(&self, uid: Uid, named: Result<Uid, NameError>) -> bool {
         named == Ok(uid) && self.derived.contains(&uid)
     }
 

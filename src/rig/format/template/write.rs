@@ -89,7 +89,7 @@ pub(super) fn feature_list(rig: &Rig) -> String {
     out
 }
 
-/// What a part needs; `None` for another rig.
+/// Needs of a part as text; `None` for another rig.
 pub(super) fn needs_text(rig: &Rig) -> Option<String> {
     let NeedsSummary { joints, sockets } = needs_summary(rig)?;
     let list = |names: &[String]| names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
@@ -144,7 +144,7 @@ pub(super) fn feature_uids(rig: &Rig) -> HashSet<Uid> {
     rig.walk().flat_map(|joint| &joint.data.tags).filter_map(feature_uid).collect()
 }
 
-/// What a rig needs as a part; `None` for one of another kind.
+/// Needs of a rig as a part; `None` for one of another kind.
 pub(super) fn needs_summary(rig: &Rig) -> Option<NeedsSummary> {
     let needs = (rig.about().kind == "part").then(|| PartNeeds::of(rig))?;
     Some(NeedsSummary { joints: needs.joints, sockets: needs.sockets.iter().map(ToString::to_string).collect() })

@@ -32,7 +32,7 @@ pub(in crate::rig) fn drop_part(
     for (number, joint) in joints.iter().enumerate() {
         draft.rig().joint(*joint).ok_or(EditError::NoJoint(*joint))?;
         if joints[..number].contains(joint) {
-            return Err(EditError::Taken(*joint).into());
+            return Err(EditError::UidInUse(*joint).into());
         }
     }
     if joints.is_empty() {

@@ -1,22 +1,23 @@
 //! Parts in a template's file: what it lets others vary, and the parts that it uses itself.
 
-use std::{collections::HashSet, sync::Arc};
+use std::{collections::HashSet, fmt, sync::Arc};
 
 use bevy::math::Vec3;
+use ron::value::RawValue;
+use serde::Serialize;
 
 use super::{
     super::{
-        Template,
+        FORMAT, Template,
         file::{ChainFile, PartChangeFile, PartFile},
-        quoted,
     },
     Places, bind_references, read_text,
 };
 use crate::rig::{
     RestTransform, Rig, RigEdit, SourceError, Uid, degrees,
-    format::scan::Field,
+    format::{scan::Field, source::ron_text},
     label::mirrored_label,
-    part::{MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartInstance},
+    part::{MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance},
 };
 
 /// Chains of a part. One that does not fit the joints is told and left out.
@@ -81,7 +82,7 @@ pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<
         for change in file.changes {
             match change_of(change) {
                 Ok(change) => changes.push(change),
-                Err(message) => fault(message),
+                Err(error) => fault(error.to_string()),
             }
         }
         found.push(PartInstance {
@@ -104,21 +105,52 @@ pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<
     found
 }
 
-fn change_of(file: PartChangeFile) -> Result<PartChange, String> {
+/// Reason why a change of a part cannot be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum PartChangeError {
+    /// A change of neither a joint nor a tag, or of both.
+    #[error("a change of a part is one of a `joint` or of a `tag`; name one of the two")]
+    Subject,
+    /// A place or tags for a tag.
+    #[error("a tag of a part has no place and no tags; change the `joint`")]
+    TagFields,
+    /// A switch or parameters for a joint.
+    #[error("a joint of a part has no parameters; change the `tag`")]
+    JointFields,
+    /// Tags that cannot be read.
+    #[error("{}", .0.message)]
+    Tags(#[from] SourceError),
+}
+
+/// Template of one joint, through which the tags of a change are read.
+#[derive(Serialize)]
+struct TagTemplate<'a> {
+    format: u32,
+    name: &'a str,
+    joints: [TaggedJoint<'a>; 1],
+}
+
+/// Joint with the tags of a change as they are written.
+#[derive(Serialize)]
+struct TaggedJoint<'a> {
+    label: &'a str,
+    tags: &'a RawValue,
+}
+
+fn change_of(file: PartChangeFile) -> Result<PartChange, PartChangeError> {
     if file.joint.is_none() == file.tag.is_none() {
-        return Err("a change of a part is one of a `joint` or of a `tag`; name one of the two".to_owned());
+        return Err(PartChangeError::Subject);
     }
     if file.tag.is_some() && (file.translation.is_some() || file.rotation.is_some() || file.tags.is_some()) {
-        return Err("a tag of a part has no place and no tags; change the `joint`".to_owned());
+        return Err(PartChangeError::TagFields);
     }
     if file.joint.is_some() && (file.enabled.is_some() || file.params.is_some()) {
-        return Err("a joint of a part has no parameters; change the `tag`".to_owned());
+        return Err(PartChangeError::JointFields);
     }
     let mut tags = Vec::new();
     if let (Some(text), Some(joint)) = (&file.tags, &file.joint) {
-        let text =
-            format!("(format: 2, name: \"part\", joints: [(label: {}, tags: {})])", quoted(joint), text.get_ron());
-        let read = read_text(&text, 1).map_err(|error| error.message)?;
+        let joints = [TaggedJoint { label: joint, tags: text }];
+        let read = read_text(&ron_text(&TagTemplate { format: FORMAT, name: "part", joints }), 1)?;
         tags = read.rig.walk().next().map(|joint| joint.data.tags.clone()).unwrap_or_default();
     }
     Ok(PartChange {
@@ -137,18 +169,18 @@ impl Template {
     ///
     /// # Errors
     /// A part that cannot be had or does not fit, with its place in `source`, the text of the template.
-    pub fn with_parts(
+    pub fn with_parts<E: fmt::Display + From<PartError>>(
         mut self,
         source: &str,
-        part: &mut dyn FnMut(&str) -> Result<Arc<Part>, String>,
+        part: &mut dyn FnMut(&str) -> Result<Arc<Part>, E>,
         mirror: MirrorParams,
     ) -> Result<Self, SourceError> {
         for instance in std::mem::take(&mut self.parts) {
-            let put = part(&instance.part).and_then(|part| instance.put_into(&mut self.rig, &part, mirror));
+            let put = part(&instance.part).and_then(|part| Ok(instance.put_into(&mut self.rig, &part, mirror)?));
             match put {
                 Ok(notes) => self.notes.extend(notes),
-                Err(message) => {
-                    let message = format!("part \"{}\": {message}", instance.title());
+                Err(error) => {
+                    let message = format!("part \"{}\": {error}", instance.title());
                     return Err(SourceError::at(source, instance.offset, message));
                 }
             }

@@ -11,7 +11,7 @@ use crate::rig::{
 };
 
 /// Declarations of a text, in its order.
-pub(in crate::rig::format) struct Declared<'a> {
+pub(in crate::rig::format) struct Declarations<'a> {
     pub tree: Tree<'a>,
     pub rig: Declaration,
     pub groups: Vec<Declaration>,
@@ -37,7 +37,7 @@ pub(in crate::rig::format) struct Declaration {
     pub name: Option<String>,
 }
 
-impl<'a> Declared<'a> {
+impl<'a> Declarations<'a> {
     /// Declarations of a text; `None` if it is no struct with matching brackets.
     pub fn find(text: &'a str) -> Option<Self> {
         let tree = Tree::parse(text)?;
@@ -179,7 +179,7 @@ impl Finder<'_, '_> {
     }
 }
 
-/// What identifies a tag on its joint: module and name, or kind, name and switch of a feature.
+/// Key of a tag on its joint: module and name, or kind, name and switch of a feature.
 fn tag_key(tree: &Tree, item: &Item) -> [String; 3] {
     let text = |name: &str| tree.string(item.value, name).unwrap_or_default();
     match TagForm::of(tree, item.value) {

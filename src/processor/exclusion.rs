@@ -1,4 +1,4 @@
-//! What is off, and what that leaves out of a build.
+//! Exclusion from a build: joints, commands and features that a document switches off, and what depends on them.
 //!
 //! A joint is off with its local group, a command with its tag, its feature or its joint's group. A reference that means
 //! something that is off finds a [`Gap`] in its place. Where a module cannot do without it, the build passes the command
@@ -11,9 +11,9 @@ use bevy::platform::collections::HashMap;
 use super::world::NodeId;
 use crate::rig::Uid;
 
-/// Switch that is off, with what it leaves out.
+/// Switch that is off, and the thing that it excludes from the build.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Off {
+pub enum Exclusion {
     /// The local group of a joint.
     #[error("{joint} is in the group {group}, which is off")]
     Joint {
@@ -43,20 +43,20 @@ pub enum Off {
 pub enum SkipReason {
     /// Its own tag, its feature or its joint's group is off.
     #[error(transparent)]
-    Own(Off),
+    Own(Exclusion),
     /// A reference that it cannot do without means something that is off.
     #[error("{parameter}: {off}")]
     Reference {
         /// The parameter.
         parameter: Arc<str>,
         /// Switch that is off.
-        off: Off,
+        off: Exclusion,
     },
 }
 
 impl SkipReason {
     /// The switch that is off.
-    pub fn off(&self) -> &Off {
+    pub fn off(&self) -> &Exclusion {
         match self {
             Self::Own(off) | Self::Reference { off, .. } => off,
         }
@@ -69,42 +69,42 @@ pub(super) struct Gap {
     /// The number of nodes before it in the list.
     pub at: usize,
     /// Switch that is off.
-    pub off: Off,
+    pub off: Exclusion,
     /// The nearest node above what is missing that is built.
     pub above: Option<NodeId>,
 }
 
 /// Joint that is left out with its group.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct OffJoint {
-    pub off: Off,
+pub(super) struct JointExclusion {
+    pub off: Exclusion,
     /// The nearest joint above it that is built.
     pub above: Option<NodeId>,
 }
 
 /// Command that is passed over.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct OffCommand {
+pub(super) struct CommandExclusion {
     pub module: Arc<str>,
     pub reason: SkipReason,
     /// The nearest node above that is built of what is missing; `None` where a switch alone decides.
     pub above: Option<NodeId>,
 }
 
-/// What the document switches off, and what commands do without.
+/// Exclusions of a document, and gaps of commands that do without excluded nodes.
 #[derive(Debug, Clone, Default)]
-pub(super) struct OffParts {
+pub(super) struct Exclusions {
     /// Local groups that are off, with their names.
     pub groups: HashMap<Uid, Arc<str>>,
     /// Joints in them.
-    pub joints: HashMap<Uid, OffJoint>,
+    pub joints: HashMap<Uid, JointExclusion>,
     /// Commands that are passed over, by number.
-    pub commands: HashMap<u32, OffCommand>,
+    pub commands: HashMap<u32, CommandExclusion>,
     /// Commands that made less than they would, because a list of theirs has gaps: numbers of their nodes are others.
     pub partial: HashMap<u32, Gap>,
 }
 
-impl OffParts {
+impl Exclusions {
     /// The gap that a joint leaves, if it is off.
     pub fn joint(&self, uid: Uid) -> Option<Gap> {
         self.joints.get(&uid).map(|joint| Gap { at: 0, off: joint.off.clone(), above: joint.above })
@@ -112,11 +112,11 @@ impl OffParts {
 
     /// The gap that the nodes of a command leave, if it is passed over.
     pub fn command(&self, number: u32) -> Option<Gap> {
-        self.commands.get(&number).map(OffCommand::gap)
+        self.commands.get(&number).map(CommandExclusion::gap)
     }
 }
 
-impl OffCommand {
+impl CommandExclusion {
     /// True if its own switches decide, not what it refers to.
     pub fn is_own(&self) -> bool {
         matches!(self.reason, SkipReason::Own(_))

@@ -13,7 +13,7 @@ use bevy::math::{Quat, Vec3};
 
 use super::{
     read::read_text,
-    shorthand::{Declaration, Declared, TAG_FIELDS, TagForm},
+    shorthand::{Declaration, Declarations, TAG_FIELDS, TagForm},
     write::{
         face_text, feature_list, feature_summaries, feature_uids, group_text, joint_text, needed_format, needs_text,
         pose_text, tag_text,
@@ -40,7 +40,7 @@ pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
     }
     let wanted = comparable(read_text(&write_template(rig), 1).ok()?.rig);
     let is_right = |text: &str| read_text(text, 1).is_ok_and(|read| comparable(read.rig) == wanted);
-    let declared = Declared::find(source)?;
+    let declared = Declarations::find(source)?;
     let text = Rewriter::new(rig, &before, &declared).text();
     if is_right(&text) {
         return Some(text);
@@ -67,7 +67,7 @@ pub(crate) fn write_own_over(rig: &Rig, before: &Rig, own: &Rig, source: &str) -
         out
     };
     let (rig, before) = (stripped(rig), stripped(before));
-    Some(Rewriter::new(&rig, &before, &Declared::find(source)?).text())
+    Some(Rewriter::new(&rig, &before, &Declarations::find(source)?).text())
 }
 
 /// True if the templates of two rigs say the same.
@@ -135,7 +135,7 @@ fn new_joint(rig: &Rig, joint: &RigJoint, names: &NamesInUse, with_names: bool) 
     without_uids(&text, rig, |_| true).into_owned()
 }
 
-/// How many joints and groups have each name, and the features of a rig.
+/// Numbers of joints and groups with each name, and the features of a rig.
 struct NamesInUse {
     joints: HashMap<String, usize>,
     groups: HashMap<String, usize>,
@@ -164,7 +164,7 @@ impl NamesInUse {
 struct Rewriter<'d, 'a> {
     rig: &'d Rig,
     before: &'d Rig,
-    declared: &'d Declared<'a>,
+    declared: &'d Declarations<'a>,
     /// True in a text that leaves uids out: it gets names.
     with_names: bool,
     names: Rc<NamesInUse>,
@@ -172,7 +172,7 @@ struct Rewriter<'d, 'a> {
 }
 
 impl<'d, 'a> Rewriter<'d, 'a> {
-    fn new(rig: &'d Rig, before: &'d Rig, declared: &'d Declared<'a>) -> Self {
+    fn new(rig: &'d Rig, before: &'d Rig, declared: &'d Declarations<'a>) -> Self {
         let with_names = declared.all().any(|one| !one.is_written);
         Self {
             rig,

@@ -5,7 +5,7 @@ use std::{collections::HashMap, ops::Range};
 use crate::rig::{
     Rig, Uid,
     format::{
-        template::shorthand::{Declaration, Declared},
+        template::shorthand::{Declaration, Declarations},
         tree::{Item, NodeId, Tree},
     },
 };
@@ -13,14 +13,14 @@ use crate::rig::{
 /// The text with the tags of every joint, then groups, joints and poses in the rig's order; joints parents first. Every
 /// element takes the comments above it along. `None` if the text declares something else than the rig has.
 pub(super) fn reordered(rig: &Rig, text: &str) -> Option<String> {
-    let declared = Declared::find(text)?;
+    let declared = Declarations::find(text)?;
     let mut changes = Vec::new();
     for (joint, tags) in declared.joints.iter().zip(&declared.tags) {
         let wanted: Vec<Uid> = rig.joint(joint.uid)?.data.tags.iter().map(|tag| tag.uid).collect();
         changes.extend(sorted(&declared.tree, joint.node, "tags", tags, &wanted)?);
     }
     let text = with_changes(text, changes);
-    let declared = Declared::find(&text)?;
+    let declared = Declarations::find(&text)?;
     let root = declared.tree.root();
     let groups: Vec<Uid> = rig.groups().iter().map(|group| group.uid).collect();
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();

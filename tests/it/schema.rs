@@ -1,0 +1,201 @@
+//! The schema of rigs: components that are registered for reflection, and the same ones in a game as in the editor.
+
+use std::{any::TypeId, collections::BTreeSet};
+
+use bevy::{
+    asset::AssetPlugin,
+    ecs::reflect::{AppTypeRegistry, ReflectComponent},
+    prelude::*,
+};
+use rigsmith::{
+    files::BUNDLED_CHARACTERS,
+    instance::{RigInstance, RigInstancePlugin, RigTemplate},
+    plugins::{
+        RigPlugins,
+        commands::{BuildRequest, BuildStep, Built},
+        document::EditRequest,
+        runtime::{InstanceMode, RigNodes, RigRuntime},
+        schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer, NodeOf, NodeSlot, Null},
+    },
+    rig::{NodeKind, RestTransform, Rig, RigEdit, Uid, operations::Operation},
+};
+
+use super::bench::HANG;
+
+/// Names of components in the first column of the table of `plugins`, without the module in front.
+fn told_components() -> BTreeSet<String> {
+    let text = include_str!("../../src/plugins.rs");
+    let rows = text.lines().filter_map(|line| line.strip_prefix("//! | ")).skip(1);
+    let cells = rows.take_while(|row| !row.contains("plugin |")).filter_map(|row| row.split(" | ").next());
+    let mut names = BTreeSet::new();
+    for cell in cells {
+        for piece in cell.split('`').skip(1).step_by(2) {
+            let name = piece.rsplit("::").next().unwrap();
+            if name.starts_with(char::is_uppercase) {
+                names.insert(name.to_owned());
+            }
+        }
+    }
+    names
+}
+
+#[test]
+fn every_component_of_the_table_is_registered() {
+    let names = told_components();
+    assert!(names.len() > 30, "the table was not read: {names:?}");
+    for name in ["Rig", "NodeSlot", "BuildFailure", "RunFailure", "Parked", "Constrains"] {
+        assert!(names.contains(name), "the table lacks {name}");
+    }
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), TransformPlugin, RigPlugins));
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    for name in names {
+        let found = registry.get_with_short_type_path(&name);
+        let found = found.unwrap_or_else(|| panic!("{name} is not registered, or several types have its name"));
+        assert!(found.data::<ReflectComponent>().is_some(), "{name} is not reflected as a component");
+    }
+}
+
+/// Every component of the schema is in the table, and registered.
+#[test]
+fn every_component_of_the_schema_is_told() {
+    let text = include_str!("../../src/plugins/schema.rs");
+    let mut lines = text.lines();
+    let names = told_components();
+    let mut count = 0;
+    while let Some(line) = lines.next() {
+        if !line.starts_with("#[derive(Component") {
+            continue;
+        }
+        let declaration = lines.by_ref().find(|line| line.starts_with("pub struct")).unwrap();
+        let name: String = declaration["pub struct ".len()..].chars().take_while(|c| c.is_alphanumeric()).collect();
+        assert!(names.contains(&name), "the table of `plugins` lacks {name}");
+        count += 1;
+    }
+    assert!(count > 25, "the schema was not read");
+}
+
+fn template() -> (&'static str, RigTemplate) {
+    let (name, text) = BUNDLED_CHARACTERS[0];
+    (name, RigTemplate::read(text.as_bytes()).unwrap())
+}
+
+/// Kinds of components that describe nodes, by name.
+fn described(entity: EntityRef) -> BTreeSet<&'static str> {
+    let kinds = [
+        ("Joint", TypeId::of::<Joint>()),
+        ("Null", TypeId::of::<Null>()),
+        ("Control", TypeId::of::<Control>()),
+        ("NodeLabel", TypeId::of::<NodeLabel>()),
+        ("NodeLayer", TypeId::of::<NodeLayer>()),
+        ("CreatedRole", TypeId::of::<CreatedRole>()),
+        ("NodeOf", TypeId::of::<NodeOf>()),
+    ];
+    kinds.into_iter().filter(|(_, kind)| entity.contains_type_id(*kind)).map(|(name, _)| name).collect()
+}
+
+#[test]
+fn instances_carry_the_components_of_a_built_rig() {
+    let (name, template) = template();
+    let mut editor = App::new();
+    editor.add_plugins((MinimalPlugins, AssetPlugin::default(), TransformPlugin, RigPlugins));
+    let rig = editor.world_mut().spawn(template.rig().as_ref().clone()).id();
+    editor.world_mut().write_message(BuildRequest { rig, step: BuildStep::All });
+    for _ in 0..4 {
+        editor.update();
+    }
+    assert!(editor.world().get::<Built>(rig).is_some_and(|built| !built.0.nodes.is_empty()), "{name} is not built");
+    let by_uid = |world: &World, rig: Entity| -> Vec<(Uid, Entity)> {
+        let nodes = world.get::<RigNodes>(rig).unwrap();
+        nodes.iter().map(|node| (*world.get::<Uid>(node).unwrap(), node)).collect()
+    };
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let mut game = App::new();
+        game.add_plugins((MinimalPlugins, AssetPlugin::default(), TransformPlugin, RigInstancePlugin::default()));
+        game.finish();
+        game.cleanup();
+        let handle = game.world_mut().resource_mut::<Assets<RigTemplate>>().add(template.clone());
+        let instance = game.world_mut().spawn((RigInstance(handle), mode)).id();
+        let start = std::time::Instant::now();
+        while game.world().get::<RigRuntime>(instance).is_none() {
+            assert!(start.elapsed() < HANG, "{name} is not built for an instance");
+            game.update();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        let (told, played) = (editor.world(), game.world());
+        let nodes = by_uid(told, rig);
+        let known = by_uid(played, instance);
+        assert!(known.len() > 50, "{name} has {} nodes in {mode:?}", known.len());
+        for (uid, entity) in known {
+            let (_, model) = nodes.iter().find(|(other, _)| *other == uid).expect("a node that the editor has, too");
+            let node = played.entity(entity);
+            assert_eq!(described(node), described(told.entity(*model)), "{uid} in {mode:?}");
+            assert!(node.contains::<NodeSlot>());
+            assert_eq!(node.get::<NodeLabel>(), told.get::<NodeLabel>(*model), "{uid} in {mode:?}");
+            assert_eq!(node.get::<Control>(), told.get::<Control>(*model), "{uid} in {mode:?}");
+            assert_eq!(node.get::<RestTransform>(), told.get::<RestTransform>(*model), "{uid} in {mode:?}");
+            if mode == InstanceMode::Direct {
+                assert!(!node.contains::<Transform>(), "{uid} needs no local transform");
+            }
+        }
+    }
+}
+
+/// The marker of joints without weights follows the document, back and forth.
+#[test]
+fn nulls_follow_the_kind_of_their_joint() {
+    let (_, template) = template();
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), TransformPlugin, RigPlugins));
+    let rig = app.world_mut().spawn(template.rig().as_ref().clone()).id();
+    app.update();
+    let joint = template.rig().walk().next().unwrap().data.uid;
+    let is_null = |app: &App| {
+        let nodes = app.world().get::<RigNodes>(rig).unwrap();
+        let node = nodes.iter().find(|node| app.world().get::<Uid>(*node) == Some(&joint)).unwrap();
+        (app.world().get::<Joint>(node).is_some(), app.world().get::<Null>(node).is_some())
+    };
+    assert_eq!(is_null(&app), (true, false));
+    for (kind, expected) in [(NodeKind::Null, true), (NodeKind::Joint, false)] {
+        let edits = Operation::Edits(vec![RigEdit::SetKind(joint, kind)]);
+        app.world_mut().write_message(EditRequest::operation(rig, edits));
+        app.update();
+        assert_eq!(is_null(&app), (true, expected));
+    }
+}
+
+/// A character that stands on a joint of a rig with a document is no part of that document.
+#[test]
+fn instances_below_a_rig_stay_out_of_its_document() {
+    let (_, template) = template();
+    let mut app = App::new();
+    app.add_plugins((
+        MinimalPlugins,
+        AssetPlugin::default(),
+        TransformPlugin,
+        RigPlugins,
+        RigInstancePlugin::default(),
+    ));
+    app.finish();
+    app.cleanup();
+    let host = app.world_mut().spawn(template.rig().as_ref().clone()).id();
+    app.update();
+    let before = app.world().get::<Rig>(host).unwrap().clone();
+    let joint = app.world().get::<RigNodes>(host).unwrap().iter().next().unwrap();
+    let handle = app.world_mut().resource_mut::<Assets<RigTemplate>>().add(template);
+    let instance = app.world_mut().spawn((RigInstance(handle), ChildOf(joint))).id();
+    let start = std::time::Instant::now();
+    while app.world().get::<RigNodes>(instance).is_none() {
+        assert!(start.elapsed() < HANG, "the instance is not built");
+        app.update();
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    for _ in 0..4 {
+        app.update();
+    }
+    let world = app.world();
+    assert_eq!(world.get::<Rig>(host), Some(&before));
+    for node in world.get::<RigNodes>(instance).unwrap().iter() {
+        assert_eq!(world.get::<NodeOf>(node), Some(&NodeOf(instance)));
+    }
+}
