@@ -153,7 +153,7 @@ pub struct Locks<'a> {
     pub joints: &'a [bool],
 }
 
-/// Why there are no weights.
+/// Reason why there are no weights.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WeightError {
     /// There is nothing to bind to.

@@ -1,4 +1,4 @@
-//! `blend`: nodes between two others each.
+//! `blend`: nodes that follow one of two targets each, or a place between both.
 
 use crate::{
     parameters,
@@ -25,15 +25,15 @@ parameters! {
     /// # assert!(rigsmith::modules::all().load(BlendModule::NAME, params).is_ok());
     /// ```
     pub struct BlendModule {
-        /// The nodes that are driven.
+        /// Nodes that are driven.
         pub nodes: NodeRefs = NodeRef::this().into(),
         /// Targets at 0: as many nodes, in the same order.
         pub a: NodeRefs = NodeRefs::NONE,
         /// Targets at 1: as many nodes, in the same order.
         pub b: NodeRefs = NodeRefs::NONE,
-        /// 0 for a, 1 for b: a number, or the name of an attribute of the control.
+        /// Blend from `a` (0) to `b` (1): a number, or the name of an attribute of the control.
         pub blend: Amount = Amount::Value(0.0),
-        /// The node that has the attribute; it is added if it lacks it.
+        /// Node with the attribute; a missing attribute is added to it.
         pub control: NodeRefs = NodeRefs::NONE,
         /// Axes of the translation that follow, in the parent's space.
         pub translate: [bool; 3] = [true; 3],
@@ -41,7 +41,7 @@ parameters! {
         pub rotate: [bool; 3] = [true; 3],
         /// Factors along X, Y and Z that follow.
         pub scale: [bool; 3] = [false; 3],
-        /// Keep where the nodes stand now, in the space of each of the others; false: they lie on them.
+        /// Keeps the nodes' present places in the space of each target; false: the nodes lie on their targets.
         pub keep_offset: bool = true,
     }
 }

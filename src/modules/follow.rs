@@ -1,4 +1,5 @@
-//! `orient`, `point`, `scale` and `parent`: nodes that follow the turn, the place, the size or all of others.
+//! `orient`, `point`, `scale` and `parent`: nodes that follow the rotation, the place, the scale or the whole transform of
+//! targets.
 
 use crate::{
     parameters,
@@ -6,7 +7,7 @@ use crate::{
     rig::reference::{NodeRef, NodeRefs},
 };
 
-/// Declares a module that follows: its name, its words and the channels that it has, with their defaults.
+/// Declares a constraint module: its name, its words, and its channels with their defaults.
 macro_rules! follow_module {
     (
         $(#[$meta:meta])*
@@ -16,19 +17,19 @@ macro_rules! follow_module {
         parameters! {
             $(#[$meta])*
             pub struct $Name {
-                /// The nodes that follow.
+                /// Nodes that follow.
                 pub node: NodeRefs = NodeRef::this().into(),
-                /// The nodes that they follow.
+                /// Nodes that are followed.
                 pub targets: NodeRefs = NodeRefs::NONE,
-                /// For each target its share, a number from 0 or the name of an attribute; all the same if left out.
+                /// Share of each target, a number from 0 or the name of an attribute; equal shares if left out.
                 pub weights: Vec<Amount> = Vec::new(),
-                /// The node that has the attributes; those that it lacks are added.
+                /// Node with the attributes; missing attributes are added to it.
                 pub control: NodeRefs = NodeRefs::NONE,
                 $($(#[doc = $channel_doc])+ pub $channel: [bool; 3] = $default,)+
-                /// Keep where the node stands now, in the space of each target: as the target turns, it goes around
-                /// it; false: the node lies on its targets.
+                /// Keeps the node's present place in the space of each target, so that it circles a target that turns;
+                /// false: the node lies on its targets.
                 pub keep_offset: bool = true,
-                /// True: the node's own pose comes on top, so that people can still move it.
+                /// Adds the node's own pose on top, so that people can still move the node.
                 pub keep_pose: bool = false,
                 /// Weight of the constraint, a number from 0 to 1 or the name of an attribute of the control.
                 pub weight: Amount = Amount::Value(1.0),

@@ -1,4 +1,4 @@
-//! `pole_vector`: the node towards which a chain bends, in the right place.
+//! `pole_vector`: places the node towards which a chain bends.
 
 use glam::Vec3;
 
@@ -19,9 +19,9 @@ parameters! {
     /// # assert!(rigsmith::modules::all().load(PoleVectorModule::NAME, params).is_ok());
     /// ```
     pub struct PoleVectorModule {
-        /// The chain of at least three nodes from its root to its end.
+        /// Chain of at least three nodes from its root to its end.
         pub chain: NodeRefs = NodeRefs::NONE,
-        /// The control or null that is put in place; a null is made if left out.
+        /// Control or null that is put in place; a null is made if left out.
         pub pole: NodeRefs = NodeRefs::NONE,
         /// Distance of the pole from the bend, as a share of the chain's length, above 0.
         pub distance: f32 = 0.75,
@@ -29,11 +29,11 @@ parameters! {
         pub prefer: Vec3 = Vec3::Z,
         /// Parent of a null that is made; the rig if left out.
         pub parent: NodeRefs = NodeRefs::NONE,
-        /// Nodes whose place the pole follows from where it is; none to leave it where its parent takes it.
+        /// Nodes that the pole follows from its present place; without any, the pole moves with its parent alone.
         pub targets: NodeRefs = NodeRefs::NONE,
-        /// For each target its share, a number from 0 or the name of an attribute; all the same if left out.
+        /// Share of each target, a number from 0 or the name of an attribute; equal shares if left out.
         pub weights: Vec<Amount> = Vec::new(),
-        /// The node that has the attributes; those that it lacks are added.
+        /// Node with the attributes; missing attributes are added to it.
         pub control: NodeRefs = NodeRefs::NONE,
         /// Weight with which the pole follows, a number from 0 to 1 or the name of an attribute of the control.
         pub weight: Amount = Amount::Value(1.0),

@@ -3,7 +3,7 @@
 use super::exclusion::Exclusion;
 use crate::rig::{SourceError, Uid, reference::NodeRefs};
 
-/// Why a module could not do its work.
+/// Reason why a module could not do its work.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModuleError {
     /// A reference found nothing, or not what is needed.

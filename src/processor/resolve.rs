@@ -1,4 +1,4 @@
-//! From references to nodes.
+//! Resolution of references to nodes.
 
 use std::collections::HashSet;
 
@@ -55,7 +55,7 @@ pub(super) struct Resolution {
     pub gaps: Vec<Gap>,
 }
 
-/// Why a reference finds nothing.
+/// Reason why a reference finds nothing.
 enum Missing {
     Off(Box<Gap>),
     Wrong(ResolveError),
@@ -90,7 +90,7 @@ pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Res
     Ok(all)
 }
 
-/// The nodes of one reference; `gaps` gets what is off of a list that is not all off.
+/// Nodes of one reference; `gaps` gets the excluded nodes of a list that is not excluded as a whole.
 fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<Gap>) -> Result<Vec<NodeId>, Missing> {
     if let RigScope::Rig(rig) = reference.rig
         && rig != asker.rig
@@ -171,7 +171,7 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
     Ok(picked.into_iter().map(|index| found[index]).collect())
 }
 
-/// True if places of a list are counted, which are others where something of the list is missing.
+/// True if a pick counts places of a list: a gap in the list shifts them.
 fn picks_numbers(pick: &Pick) -> bool {
     matches!(pick, Pick::List(places) if places.iter().any(|place| matches!(place, PickAt::Number(_))))
 }
@@ -218,7 +218,7 @@ fn joint(world: &World, uid: Uid, place: u32) -> Result<NodeId, Missing> {
     }
 }
 
-/// The text of a label that is known by who bears it.
+/// Text of the label of a joint, or of the node that a command labels.
 fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, Missing> {
     let bare = || Missing::Wrong(ResolveError::NoLabel(bearer));
     let before = |command: &u32| world.places[*command as usize] < place;
@@ -247,7 +247,7 @@ fn is_below(world: &World, node: NodeId, top: NodeId, place: u32) -> bool {
     false
 }
 
-/// Parents first, siblings as authored, then in the order of creation.
+/// Sorts nodes: parents first, siblings as authored, then in the order of creation.
 pub(super) fn sort(world: &World, nodes: &mut [NodeId], place: u32) {
     if nodes.len() < 2 {
         return;

@@ -1,4 +1,4 @@
-//! The built world: every value with all who wrote it, so that it can be read as of any command.
+//! The built world: every value with the commands that wrote it, so that it can be read as of any command.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub struct NodeId(pub(super) u32);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum Aspect {
-    /// That it exists, and as what.
+    /// Existence of the node, and its type.
     Birth,
     /// Parent of the node.
     Parent,
@@ -34,16 +34,16 @@ pub enum Aspect {
     Layer,
     /// Attributes of the node.
     Attributes,
-    /// The constraint that it is (constraints have an identity like nodes).
+    /// Constraint (constraints have an identity like nodes).
     Constraint,
-    /// The switch that it is.
+    /// Switch (switches have an identity like nodes).
     Switch,
 }
 
 impl Aspect {
     pub(super) const COUNT: usize = 10;
 
-    /// True if a change of it can change what references resolve to.
+    /// True if a change of the aspect can change the nodes that references find.
     pub(super) fn is_structure(self) -> bool {
         matches!(self, Self::Birth | Self::Parent | Self::Label | Self::Group)
     }
@@ -54,11 +54,11 @@ impl Aspect {
 pub struct Birth {
     /// Joint, null or control.
     pub kind: NodeType,
-    /// The name that it was given, if any.
+    /// Given name of the node, if any.
     pub name: Option<Arc<str>>,
     /// Origin of the node; `None` for joints of the document.
     pub origin: Option<Arc<Origin>>,
-    /// Its place among those that the same command made, or among the document's joints.
+    /// Place among the nodes that the same command made, or among the document's joints.
     pub order: u32,
 }
 
@@ -81,18 +81,14 @@ pub enum Value {
     Layer(Arc<LayerData>),
     /// See [`Aspect::Attributes`].
     Attributes(Arc<[Attribute]>),
-    /// See [`Aspect::Constraint`].
-    ///
-    /// With its place among what the same command made.
+    /// Constraint, with its place among the constraints that the same command made.
     Constraint(u32, Arc<Constraint>),
-    /// See [`Aspect::Switch`].
-    ///
-    /// With its place among what the same command made.
+    /// Switch, with its place among the switches that the same command made.
     Switch(u32, Arc<SwitchData>),
 }
 
 impl Value {
-    /// True if the two are the same bit by bit where others read them (0 and -0 differ, as what follows may).
+    /// True if two values have the same bits where commands read them (0 and -0 differ, since results may).
     pub(super) fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Base(a), Self::Base(b)) => bits(a) == bits(b),
@@ -119,24 +115,24 @@ pub(super) fn same(a: Option<&Value>, b: Option<&Value>) -> bool {
     }
 }
 
-/// One aspect of one node: what the document says, and what commands made of it.
+/// One aspect of one node: the value of the document, and the values that commands wrote.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cell {
     pub document: Option<Value>,
-    /// By command, in no order: places of commands change.
+    /// Values by command, in no order: places of commands change.
     pub writes: Vec<(u32, Value)>,
-    /// Commands that read it, sorted.
+    /// Commands that read the cell, sorted.
     pub readers: Vec<u32>,
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
     pub uid: Uid,
-    /// The command that can bring it to life; `None` for joints of the document.
+    /// Command that can create the node; `None` for joints of the document.
     pub creator: Option<u32>,
-    /// Constraints that drive it, now or as of some other place.
+    /// Constraints that drive the node, at any place of the list.
     pub driven_by: Vec<NodeId>,
-    /// Nodes that stand on it, now or as of some other place, in rising order.
+    /// Children of the node at any place of the list, in rising order.
     pub below: Vec<NodeId>,
     pub cells: [Cell; Aspect::COUNT],
 }
@@ -159,11 +155,11 @@ pub(super) struct World {
     pub bearers: Vec<Uid>,
     /// The document's joints, in its order.
     pub joints: Vec<NodeId>,
-    /// Switch that is off.
+    /// Exclusions of the document and of commands.
     pub off: Exclusions,
-    /// Limits of what commands make.
+    /// Limits on the nodes and constraints that commands make.
     pub limits: BuildLimits,
-    /// Number of slots for what commands make.
+    /// Number of slots of nodes and constraints that commands make.
     made: usize,
 }
 
@@ -195,7 +191,7 @@ impl World {
         id
     }
 
-    /// Returns `true` if commands have made all that they may, seen by the command at `place`.
+    /// Returns `true` if the commands before `place` have made as many nodes and constraints as they may.
     pub fn is_full(&self, place: u32) -> bool {
         // Slots stay when what was made is gone.
         self.made >= self.limits.made && {
@@ -241,7 +237,7 @@ impl World {
         &mut self.slots[node.0 as usize].cells[aspect as usize]
     }
 
-    /// The value after all commands before `place`, and who wrote it last.
+    /// Value after all commands before `place`, and the command that wrote it last.
     pub fn read_at(&self, node: NodeId, aspect: Aspect, place: u32) -> Option<&Value> {
         let cell = self.cell(node, aspect);
         let mut best: Option<(u32, &Value)> = None;
@@ -262,7 +258,7 @@ impl World {
         }
     }
 
-    /// The name in files and messages: as given, or made of that of the node it is for and what it is for.
+    /// Name in files and messages: as given, or made of the name of the node's subject and its role.
     pub fn name(&self, node: NodeId, place: u32) -> String {
         let Some(birth) = self.birth(node, place) else { return self.uid(node).to_string() };
         let Some(origin) = &birth.origin else {

@@ -80,9 +80,9 @@ impl fmt::Display for Change {
 /// Side whose value is taken in a conflict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Take {
-    /// That of the file.
+    /// Value of the file.
     Theirs,
-    /// That of the rig now.
+    /// Value of the rig now.
     Mine,
 }
 

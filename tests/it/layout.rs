@@ -322,7 +322,8 @@ fn documentation_names_its_subject() {
                 }
                 count += 1;
                 let first = words.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
-                if ["What", "How", "Where", "Which", "Whether", "Those", "Who"].contains(&first) {
+                if ["What", "How", "Where", "Which", "Whether", "Those", "Who", "Whose", "Why", "That"].contains(&first)
+                {
                     wrong.push(format!("{}:{line}: {words}", path.strip_prefix(root).unwrap().display()));
                 }
             }

@@ -150,7 +150,7 @@ impl fmt::Display for LimbKind {
     }
 }
 
-/// Why there is no fit.
+/// Reason why there is no fit.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum FitError {
     /// No triangle has three finite corners and an area.

@@ -68,7 +68,7 @@ impl VoxelSettings {
     }
 }
 
-/// Why there are no weights.
+/// Reason why there are no weights.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum VoxelError {
     /// The mesh cannot be made into voxels.

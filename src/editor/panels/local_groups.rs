@@ -24,7 +24,7 @@ use crate::{
 pub struct GroupsPanel {
     /// Name of a group that is being made.
     draft: String,
-    /// Group whose name is being typed, with the text.
+    /// Group that is being renamed, with the typed name.
     renamed: Option<(Uid, String)>,
     /// Group whose colour is being chosen.
     colored: Option<(Uid, [f32; 3])>,

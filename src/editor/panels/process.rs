@@ -1,4 +1,4 @@
-//! Process panel: the list of commands with what became of each, steps in both directions, breakpoints.
+//! Process panel: the list of commands with their states, steps in both directions, breakpoints.
 
 use bevy::{ecs::change_detection::Tick, prelude::*};
 use bevy_egui::egui::{self, Color32, Rect, RichText, Sense, Ui, WidgetInfo, WidgetType, pos2, vec2};
@@ -22,9 +22,9 @@ use crate::{
 pub struct ProcessPanel {
     made_from: Option<(Stamp, Tick)>,
     rows: Vec<Row>,
-    /// Words that rows have to contain.
+    /// Search text: words that rows have to contain.
     filter: String,
-    /// Rows that contain them.
+    /// Rows that contain the words.
     shown: Vec<usize>,
     filtered: Option<String>,
     /// Scrolls to the next command after each step.

@@ -296,7 +296,7 @@ fn enabled(ui: &mut Ui, shown: &DisplayedRig, entry: &Entry) -> Option<CardReque
     clicked.then_some(CardRequest::Operation(TagOperation::Enable(tags, mixed || value)))
 }
 
-/// Draws what became of the commands in the build: the worst of them.
+/// Draws the state of the commands in the build: the worst state of all.
 fn state_of(ui: &mut Ui, world: &World, shown: &DisplayedRig, entry: &Entry) {
     let Some(entities) = world.get::<TagEntities>(shown.entity) else { return };
     let reports = entry.tags.iter().filter_map(|(_, tag)| world.get::<CommandReport>(entities.get(*tag)?));

@@ -29,9 +29,9 @@ pub struct CommandStatus {
     pub micros: f32,
     /// Number of its runs since the builder was made.
     pub runs: u32,
-    /// Why it failed, if it did.
+    /// Reason why the command failed, if it did.
     pub error: Option<BuildProblem>,
-    /// Why it is passed over, if it is.
+    /// Reason why the build passes the command over, if it does.
     pub skipped: Option<SkipReason>,
 }
 

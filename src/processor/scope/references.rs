@@ -154,7 +154,7 @@ impl BuildScope<'_> {
         }
     }
 
-    /// Why references find nothing.
+    /// Error of references that find nothing.
     fn nothing(&mut self, parameter: &str, references: &NodeRefs, gaps: &[Gap]) -> ModuleError {
         if let Some(gap) = gaps.first() {
             self.trace.above = gap.above;

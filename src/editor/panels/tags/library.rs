@@ -1,4 +1,4 @@
-//! Library of modules: what a command can do, found by words, attached with a click.
+//! Library of modules: a list with a search, from which a click attaches a command.
 
 use bevy_egui::egui::{self, Key, ScrollArea, Sense, TextStyle, Ui, WidgetInfo, WidgetType, vec2};
 

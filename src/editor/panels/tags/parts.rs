@@ -1,4 +1,4 @@
-//! Parts that come with Rigsmith: what they are, and the joints that one goes onto.
+//! Menu of the parts that come with Rigsmith, and the joints that a part goes onto.
 
 use std::sync::Arc;
 
@@ -30,8 +30,8 @@ impl PartList {
     }
 }
 
-/// Joints that a part of `count` joints goes onto: the selected ones in the order of the rig, or, if it is one, the chain that
-/// it begins, along the first children.
+/// Joints that a part of `count` joints goes onto: the selected joints in the order of the rig; for a single selected joint,
+/// the chain of first children below it.
 pub(super) fn chain(rig: &Rig, selected: &[Uid], count: usize) -> Vec<Uid> {
     match *selected {
         [top] => {

@@ -1,4 +1,4 @@
-//! References in forms: what they find in the built rig, and the selected joints in their place.
+//! References in forms: the nodes that they find in the built rig, and a button that refers to the selected joints.
 
 use bevy_egui::egui::{Label, RichText, Ui};
 
@@ -8,7 +8,7 @@ use crate::{editor::panels::list, processor::FindError, rig::Uid};
 /// The most names that are listed.
 const NAMED: usize = 3;
 
-/// Draws what a reference finds, and a button that puts the selected joints in its place; returns the reference to them.
+/// Draws the nodes that a reference finds, and a button that puts the selected joints in its place; returns the reference to them.
 /// `text` is `None` where several commands differ.
 pub(super) fn about(ui: &mut Ui, subject: &Subject, label: &str, text: Option<&str>) -> Option<String> {
     let mut picked = None;

@@ -34,17 +34,17 @@ const FIRST_COLOR: [f32; 3] = [1.0, 0.8, 0.1];
 pub(super) enum ValueEdit {
     /// Other parameters of tags.
     Set(Vec<(Uid, String)>),
-    /// The same while a number is dragged.
+    /// Preview of parameters while a number is dragged.
     Preview(Vec<(Uid, String)>),
     /// End of a drag.
     Commit,
-    /// End of a drag whose value is dropped.
+    /// End of a drag that discards the value.
     Cancel,
     /// A value that the module does not take, with the reason.
     Refused(ValueError),
 }
 
-/// Forms, and what is being typed into them.
+/// Forms of modules, with the text that a person is typing.
 #[derive(Default)]
 pub(super) struct Values {
     numbers: Numbers,
@@ -59,7 +59,7 @@ struct Draft {
     text: String,
 }
 
-/// The commands whose values are shown, with what is needed to show them.
+/// Commands whose values are shown, with their module and rig.
 pub(super) struct Subject<'a> {
     pub shown: &'a DisplayedRig<'a>,
     pub builder: Option<&'a Builder>,
@@ -73,7 +73,7 @@ impl Subject<'_> {
         self.entry.first.uid
     }
 
-    /// RON of a value in the last command, and whether the others have another.
+    /// RON of a value in the last command, with a mark if other commands have another value.
     fn value(&self, path: &str) -> CommonValue<&str> {
         let values = self.values.iter().map(|values| values.get(path).unwrap_or("None"));
         CommonValue::of(values).unwrap_or_default()
@@ -91,7 +91,7 @@ impl Subject<'_> {
         self.changed(path, texts).map_or_else(ValueEdit::Refused, ValueEdit::Set)
     }
 
-    /// The same for a value that has one text.
+    /// Parameters of all commands with a value.
     fn set_to<T: Serialize + ?Sized>(&self, path: &str, value: &T) -> ValueEdit {
         self.set(path, &[ron_text(value)])
     }
@@ -137,7 +137,7 @@ impl Subject<'_> {
 }
 
 impl Values {
-    /// Draws the form of an entry. Where its parameters cannot be read, their text and the reason.
+    /// Draws the form of an entry; the text of its parameters and the reason where they cannot be read.
     pub fn show(
         &mut self,
         ui: &mut Ui,
@@ -437,7 +437,7 @@ fn axis_edit(subject: &Subject, path: &str, axis: usize, edit: NumberEdit) -> Va
     }
 }
 
-/// Three boxes; the text of what is no vector.
+/// Three boxes to check; the text of a value that is no vector.
 fn boxes(ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
     let text = subject.value(path).value;
     let mut boxes: Option<[bool; 3]> = read(text);
