@@ -33,7 +33,10 @@ fn a_cycle_names_nodes_constraints_and_commands() {
         let constraint = point(&rig, driven, vec![target(&rig, goal, 1.0)]);
         rig.constrain(constraint);
     }
-    let ProgramError::Cycle { loop_text, constraints, commands, nodes } = error(&rig) else { panic!() };
+    let error = error(&rig);
+    let of_error = error.commands().to_vec();
+    let ProgramError::Cycle { loop_text, constraints, commands, nodes } = error else { panic!() };
+    assert_eq!(of_error, commands);
     assert_eq!(constraints.len(), 3);
     assert_eq!(commands.len(), 3);
     for label in ["a", "b", "c", "below_c"] {
@@ -156,7 +159,9 @@ fn what_is_missing_is_named() {
         let mut rig = controls(&[("a", Vec3::ZERO), ("b", Vec3::X), ("c", Vec3::Y)]);
         rig.attribute("a", "weight", 0.0, (0.0, 1.0));
         build(&mut rig);
-        let message = error(&rig).to_string();
+        let error = error(&rig);
+        let message = error.to_string();
+        assert_eq!(error.commands(), [command], "\"{message}\" names another command");
         for part in others.iter().map(String::as_str).chain([text, &constraint.to_string(), &command.to_string()]) {
             assert!(message.contains(part), "\"{message}\" does not say {part}");
         }
