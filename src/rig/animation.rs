@@ -5,15 +5,29 @@
 //! are those of poses: offsets from the rest transform of a joint or from the built base of a created node
 //! ([`PoseOffset`]), and values of attributes. Times are seconds.
 
+mod check;
+mod names;
 mod sample;
+mod sampler;
+mod tracks;
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+    sync::Arc,
+};
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-pub use self::sample::SampledPose;
-use crate::rig::{PoseOffset, Uid};
+pub(in crate::rig) use self::check::{check_about, check_clip, check_keys, check_layer, check_tracks};
+pub use self::{
+    check::{ClipFault, KeyFault},
+    names::{KnownNode, NodeNames, OrphanedKeys, orphaned_keys},
+    sample::SampledPose,
+    sampler::{ClipSampler, SampleCursor},
+};
+use crate::rig::{PoseOffset, Rig, Uid};
 
 /// Clip of a rig: layers of tracks over a range of time.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,8 +72,39 @@ pub struct ClipLayer {
     pub mask: Vec<Uid>,
     /// True if the layer has no effect at present.
     pub muted: bool,
-    /// Tracks by what they animate.
+    /// Tracks by what they animate; none of them is without keys.
+    #[serde(with = "tracks")]
     pub tracks: BTreeMap<TrackTarget, Arc<Track>>,
+}
+
+/// Header of a clip: all of it but its layers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClipAbout {
+    /// The name people see.
+    pub name: String,
+    /// Frames a second.
+    pub frame_rate: f32,
+    /// First and last second of the clip.
+    pub range: [f32; 2],
+    /// True if the clip is played over and over.
+    pub looped: bool,
+    /// Named moments, by rising time.
+    pub markers: Vec<Marker>,
+}
+
+/// Header of a layer: all of it but its tracks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LayerAbout {
+    /// The name people see.
+    pub name: String,
+    /// How the layer's values meet those below.
+    pub mode: LayerMode,
+    /// Weight of the layer from 0 to 1.
+    pub weight: f32,
+    /// Nodes that the layer concerns; empty for all.
+    pub mask: Vec<Uid>,
+    /// True if the layer has no effect at present.
+    pub muted: bool,
 }
 
 /// Manner in which a layer's values meet those of the layers below.
@@ -92,6 +137,18 @@ pub enum Property {
     Scale,
     /// Attribute of that name; switches are attributes.
     Attribute(String),
+}
+
+impl fmt::Display for Property {
+    /// The property in a word, an attribute by its name.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Translation => f.write_str("translation"),
+            Self::Rotation => f.write_str("rotation"),
+            Self::Scale => f.write_str("scale"),
+            Self::Attribute(name) => write!(f, "attribute \"{name}\""),
+        }
+    }
 }
 
 impl Property {
@@ -174,6 +231,66 @@ impl RigClip {
     pub fn layer(&self, uid: Uid) -> Option<&ClipLayer> {
         self.layers.iter().find(|layer| layer.uid == uid)
     }
+
+    /// Header of the clip.
+    pub fn about(&self) -> ClipAbout {
+        let Self { name, frame_rate, range, looped, markers, .. } = self.clone();
+        ClipAbout { name, frame_rate, range, looped, markers }
+    }
+
+    /// Exchanges the header of the clip; returns the former one.
+    pub(in crate::rig) fn set_about(&mut self, about: &ClipAbout) -> ClipAbout {
+        let before = self.about();
+        let ClipAbout { name, frame_rate, range, looped, markers } = about.clone();
+        *self =
+            Self { name, frame_rate, range, looped, markers, uid: self.uid, layers: std::mem::take(&mut self.layers) };
+        before
+    }
+
+    /// Animated nodes of all layers.
+    pub fn nodes(&self) -> BTreeSet<Uid> {
+        self.layers.iter().flat_map(|layer| layer.tracks.keys()).map(|target| target.node).collect()
+    }
+
+    /// Number of keys in all layers.
+    pub fn key_count(&self) -> usize {
+        self.layers.iter().flat_map(|layer| layer.tracks.values()).map(|track| track.keys.len()).sum()
+    }
+
+    /// Times of the keys of all layers, rising, each once.
+    pub fn key_times(&self) -> Vec<f32> {
+        let tracks = self.layers.iter().flat_map(|layer| layer.tracks.values());
+        let mut times: Vec<f32> = tracks.flat_map(|track| &track.keys).map(|key| key.time).collect();
+        times.sort_by(f32::total_cmp);
+        times.dedup();
+        times
+    }
+
+    /// The clip with other uids for nodes; what is mapped nowhere stays. Of two nodes that become one, the first track of
+    /// a property stays.
+    pub fn with_nodes(&self, map: impl Fn(Uid) -> Uid) -> Self {
+        let mut clip = self.clone();
+        for layer in &mut clip.layers {
+            layer.mask.iter_mut().for_each(|node| *node = map(*node));
+            for (target, track) in std::mem::take(&mut layer.tracks) {
+                layer.tracks.entry(TrackTarget { node: map(target.node), ..target }).or_insert(track);
+            }
+        }
+        clip
+    }
+}
+
+/// Clips.
+impl Rig {
+    /// Clips in order.
+    pub fn clips(&self) -> &[RigClip] {
+        &self.clips
+    }
+
+    /// The clip with that uid.
+    pub fn clip(&self, uid: Uid) -> Option<&RigClip> {
+        self.clips.iter().find(|clip| clip.uid == uid)
+    }
 }
 
 impl ClipLayer {
@@ -188,6 +305,20 @@ impl ClipLayer {
             muted: false,
             tracks: BTreeMap::new(),
         }
+    }
+
+    /// Header of the layer.
+    pub fn about(&self) -> LayerAbout {
+        let Self { name, mode, weight, mask, muted, .. } = self;
+        LayerAbout { name: name.clone(), mode: *mode, weight: *weight, mask: mask.clone(), muted: *muted }
+    }
+
+    /// Exchanges the header of the layer; returns the former one.
+    pub(in crate::rig) fn set_about(&mut self, about: &LayerAbout) -> LayerAbout {
+        let before = self.about();
+        let LayerAbout { name, mode, weight, mask, muted } = about.clone();
+        *self = Self { name, mode, weight, mask, muted, uid: self.uid, tracks: std::mem::take(&mut self.tracks) };
+        before
     }
 
     /// True if the layer concerns that node.

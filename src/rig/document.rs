@@ -9,7 +9,10 @@ use bevy::{math::Affine3, prelude::*};
 
 use crate::{
     mesh::model::Weights,
-    rig::{AttributeValues, GroupData, JointData, PoseOffset, RestTransform, RigJoint, StoredPose, TagData, Uid},
+    rig::{
+        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, RigJoint, StoredPose, TagData, Uid,
+        animation::RigClip,
+    },
 };
 
 /// A rig (= global group). All data can be read; only [`Rig::apply`](crate::rig::edit) changes them.
@@ -32,6 +35,7 @@ pub struct Rig {
     /// Attributes that have been set, by node and name; a node without any has no entry.
     pub(super) values: AttributeValues,
     pub(super) poses: Vec<StoredPose>,
+    pub(super) clips: Vec<RigClip>,
 }
 
 /// Header of a template, for people.
@@ -110,12 +114,13 @@ impl Rig {
         Some((joint, tag))
     }
 
-    /// Returns `true` if a joint, group, tag or stored pose has that uid.
+    /// Returns `true` if a joint, group, tag, stored pose, clip or layer has that uid.
     pub fn is_taken(&self, uid: Uid) -> bool {
         self.joints.contains_key(&uid)
             || self.tags.contains_key(&uid)
             || self.group(uid).is_some()
             || self.stored_pose(uid).is_some()
+            || self.clips.iter().any(|clip| clip.uid == uid || clip.layer(uid).is_some())
     }
 
     /// The number of joints.

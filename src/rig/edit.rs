@@ -4,6 +4,7 @@
 //! returns the reason. Larger changes (placing, mirroring, deleting a joint but keeping its children) are lists of
 //! edits.
 
+mod clips;
 mod poses;
 mod skin_weights;
 
@@ -17,6 +18,7 @@ use crate::{
     rig::{
         FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigJoint, StoredPose, TagData,
         TagKind, Uid,
+        animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
         document::{RigAbout, SkinData},
         format::source::ron_options,
     },
@@ -90,6 +92,50 @@ pub enum RigEdit {
     RemoveStoredPose(Uid),
     /// Replaces the stored pose that has the same uid.
     SetStoredPose(Box<StoredPose>),
+    /// Adds a clip as the `index`-th.
+    AddClip(Box<RigClip>, usize),
+    /// Removes a clip.
+    RemoveClip(Uid),
+    /// Sets name, frame rate, range, loop and markers of a clip.
+    SetClipAbout(Uid, Box<ClipAbout>),
+    /// Adds a layer to a clip as the `index`-th from the bottom.
+    AddLayer {
+        /// The clip.
+        clip: Uid,
+        /// The layer.
+        layer: Box<ClipLayer>,
+        /// Index of the layer.
+        index: usize,
+    },
+    /// Removes a layer of a clip.
+    RemoveLayer {
+        /// The clip.
+        clip: Uid,
+        /// The layer.
+        layer: Uid,
+    },
+    /// Sets name, mode, weight, mask and muting of a layer.
+    SetLayer {
+        /// The clip.
+        clip: Uid,
+        /// The layer.
+        layer: Uid,
+        /// The layer's header.
+        about: Box<LayerAbout>,
+    },
+    /// Removes keys of a property of a node, then adds others. The node need not be there at the moment.
+    SetKeys {
+        /// The clip.
+        clip: Uid,
+        /// The layer.
+        layer: Uid,
+        /// The node and its property.
+        target: TrackTarget,
+        /// Times of the keys to remove, rising; there must be a key at each.
+        removed: Vec<f32>,
+        /// Keys to add, by rising time; none may be at the time of a key that stays.
+        inserted: Vec<Key>,
+    },
     /// Several edits as one: all are applied or none.
     Batch(Vec<RigEdit>),
     /// Makes a joint a null, or a null a joint.
@@ -113,6 +159,23 @@ pub enum EditError {
     /// A stored pose that does not exist.
     #[error("there is no stored pose {0} in the rig; it may have been deleted: choose another")]
     NoPose(Uid),
+    /// A clip that does not exist.
+    #[error("there is no clip {0} in the rig; it may have been deleted: choose another")]
+    NoClip(Uid),
+    /// A layer that does not exist in its clip.
+    #[error("clip {0} has no layer {1}; it may have been deleted: choose another")]
+    NoLayer(Uid, Uid),
+    /// A clip with values that no clip can have.
+    #[error("clip {0} would get {1}")]
+    BadClip(Uid, ClipFault),
+    /// Keys that a track cannot have.
+    #[error("keys of {} of {}: {fault}", target.property, target.node)]
+    BadKeys {
+        /// The node and its property.
+        target: TrackTarget,
+        /// Defect of the keys.
+        fault: KeyFault,
+    },
     /// A uid that is taken.
     #[error("uid {0} is already used in the rig; give the added thing another uid")]
     UidInUse(Uid),
@@ -241,6 +304,15 @@ impl Rig {
             RigEdit::AddStoredPose(pose, index) => self.add_stored_pose(pose, *index)?,
             RigEdit::RemoveStoredPose(uid) => self.remove_stored_pose(*uid)?,
             RigEdit::SetStoredPose(pose) => self.set_stored_pose(pose)?,
+            RigEdit::AddClip(clip, index) => self.add_clip(clip, *index)?,
+            RigEdit::RemoveClip(uid) => self.remove_clip(*uid)?,
+            RigEdit::SetClipAbout(uid, about) => self.set_clip_about(*uid, about)?,
+            RigEdit::AddLayer { clip, layer, index } => self.add_layer(*clip, layer, *index)?,
+            RigEdit::RemoveLayer { clip, layer } => self.remove_layer(*clip, *layer)?,
+            RigEdit::SetLayer { clip, layer, about } => self.set_layer(*clip, *layer, about)?,
+            RigEdit::SetKeys { clip, layer, target, removed, inserted } => {
+                self.set_keys(*clip, *layer, target, removed, inserted)?
+            }
             RigEdit::Batch(edits) => self.apply_batch(edits)?,
             RigEdit::SetKind(uid, kind) => {
                 let joint = self.joint_mut(*uid)?;

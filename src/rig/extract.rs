@@ -18,7 +18,8 @@ pub struct Extracted {
 }
 
 /// The joints of a selection with their groups and tags, where they stand in the rig: each hangs on the nearest of them above
-/// it. Uids stay, or all are new with `uids`. The current pose, stored poses and weights are left out.
+/// it. Uids stay, or all are new with `uids`. The current pose, stored poses, clips and weights
+/// are left out, as templates have none.
 ///
 /// # Errors
 /// [`EditError::NoJoint`] for a joint that the rig does not have.

@@ -4,6 +4,7 @@
 //! a [`Draft`], which applies edits one after another through [`Rig::apply`] and takes them all back if one is refused.
 //! With symmetry on, an operation also changes the joints on the other side; pairs are identified by uid.
 
+mod clips;
 mod draft;
 mod frame;
 mod hierarchy;
@@ -20,6 +21,7 @@ use std::sync::Arc;
 
 use bevy::math::{Affine3, Quat, Vec3};
 
+pub use clips::{ClipOperation, KeyClipboard, KeyOperation, KeyTimes, KeyTolerance};
 pub use draft::{Draft, Outcome};
 pub use orient::Axis;
 pub use place::settle;
@@ -143,6 +145,19 @@ pub enum Operation {
     RenamePose(Uid, String),
     /// Deletes a stored pose; the current pose stays.
     DeletePose(Uid),
+    /// Changes clips.
+    Clips(ClipOperation),
+    /// Runs an operation, and sets keys of a clip for what it changed in the pose, all as one step.
+    Keyed {
+        /// The operation.
+        operation: Box<Operation>,
+        /// The clip.
+        clip: Uid,
+        /// The layer; `None` for the topmost one.
+        layer: Option<Uid>,
+        /// Second of the keys.
+        time: f32,
+    },
     /// Changes tags.
     Tags(TagOperation),
     /// Puts another rig's joints, groups and tags into this one.
@@ -181,6 +196,12 @@ pub enum OperationError {
     /// A pose without a name.
     #[error("a stored pose needs a name; type one")]
     NoName,
+    /// A clip without a name.
+    #[error("a clip needs a name; type one")]
+    NoClipName,
+    /// A clip name that is taken.
+    #[error("there is a clip \"{0}\" already; choose another name, or delete that clip first")]
+    ClipName(String),
     /// A pose name that is taken.
     #[error("there is a stored pose \"{0}\" already; choose another name, or delete that pose first")]
     PoseName(String),
@@ -210,6 +231,8 @@ impl Operation {
             Self::ApplyPose(..) => "Apply pose",
             Self::RenamePose(..) => "Rename pose",
             Self::DeletePose(..) => "Delete pose",
+            Self::Clips(operation) => operation.name(),
+            Self::Keyed { operation, .. } => operation.name(),
             Self::Tags(operation) => operation.name(),
             Self::Merge { .. } => "Merge rig",
             Self::Edits(edits) => match edits[..] {
@@ -285,6 +308,8 @@ impl Operation {
             Self::ApplyPose(pose) => pose::apply(draft, *pose),
             Self::RenamePose(pose, name) => pose::rename(draft, *pose, name),
             Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),
+            Self::Clips(operation) => clips::run(draft, operation),
+            Self::Keyed { operation, clip, layer, time } => clips::keyed(draft, operation, (*clip, *layer, *time)),
             Self::Tags(operation) => tags::run(draft, operation),
             Self::Merge { other, parent } => merge::merge(draft, other, *parent),
             Self::Edits(edits) | Self::Named { edits, .. } => {

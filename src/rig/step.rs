@@ -191,5 +191,6 @@ pub fn edits_from_empty(rig: &Rig) -> Vec<RigEdit> {
         edits.extend(values.iter().map(set));
     }
     edits.extend(rig.stored_poses().iter().map(|pose| RigEdit::AddStoredPose(Box::new(pose.clone()), last)));
+    edits.extend(rig.clips().iter().map(|clip| RigEdit::AddClip(Box::new(clip.clone()), last)));
     edits
 }

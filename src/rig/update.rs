@@ -4,7 +4,7 @@
 //! template as it is in the *file*. What the file changed is taken, what a person changed or added stays, and where both
 //! changed the same field to different values there is a conflict, which is decided by a choice and never by itself. Things
 //! are matched by uid; a joint or tag that seems to have got another name, because it stands at the same place with the
-//! same content, keeps its uid.
+//! same content, keeps its uid. Clips are a person's: every update leaves them as they are, with the keys of nodes that are gone.
 
 mod edits;
 mod fields;
@@ -22,7 +22,7 @@ use super::{GroupData, JointData, Rig, StoredPose, TagData, Uid, document::circl
 use fields::{Field, about_fields, group_fields, joint_fields, joint_title, pose_fields, tag_fields, tag_title};
 use order::merged_order;
 
-pub use edits::{edits_between, pose_edits};
+pub use edits::{clip_edits, edits_between, pose_edits};
 
 /// Kind of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

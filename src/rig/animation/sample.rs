@@ -20,7 +20,8 @@ impl Track {
     /// Value at a second, held before the first and after the last key; `None` without keys.
     pub fn sample(&self, property: &Property, time: f32) -> Option<[f32; 4]> {
         let (first, last) = (self.keys.first()?, self.keys.last()?);
-        if time <= first.time {
+        // A time that is no number counts as the start.
+        if time <= first.time || time.is_nan() {
             return Some(first.value);
         }
         if time >= last.time {
@@ -32,7 +33,7 @@ impl Track {
 }
 
 /// Value between two neighbouring keys.
-fn between(from: &Key, to: &Key, property: &Property, time: f32) -> [f32; 4] {
+pub(super) fn between(from: &Key, to: &Key, property: &Property, time: f32) -> [f32; 4] {
     let span = to.time - from.time;
     let share = (time - from.time) / span;
     match from.ease {
@@ -60,7 +61,7 @@ fn between(from: &Key, to: &Key, property: &Property, time: f32) -> [f32; 4] {
 }
 
 /// Rotation between two, on the shorter way.
-fn slerp(from: Quat, to: Quat, share: f32) -> Quat {
+pub(super) fn slerp(from: Quat, to: Quat, share: f32) -> Quat {
     let to = if from.dot(to) < 0.0 { -to } else { to };
     let cosine = from.dot(to).min(1.0);
     if cosine > 0.9995 {
@@ -100,30 +101,95 @@ impl RigClip {
     }
 }
 
+/// Values that layers need.
+impl RigClip {
+    /// Value of a property at a second, all layers mixed; `None` if no layer in effect has a key of it.
+    pub fn value(&self, target: &TrackTarget, time: f32) -> Option<[f32; 4]> {
+        self.value_below(self.layers.len(), target, time)
+    }
+
+    /// Value of a property, mixed from the first `count` layers.
+    fn value_below(&self, count: usize, target: &TrackTarget, time: f32) -> Option<[f32; 4]> {
+        let mut value = None;
+        let is_on = |layer: &&ClipLayer| !layer.muted && layer.weight > 0.0 && layer.concerns(target.node);
+        for layer in self.layers[..count].iter().filter(is_on) {
+            let of = layer.tracks.get(target).and_then(|track| track.sample(&target.property, time));
+            if let Some(own) = of {
+                value = Some(layer.mixed(&target.property, value, own));
+            }
+        }
+        value
+    }
+
+    /// Value of a layer's key with which the layers up to this one give `wanted`. A layer without weight cannot give it, and
+    /// gets the value as if it had full weight.
+    pub fn value_for(&self, layer: usize, target: &TrackTarget, time: f32, wanted: [f32; 4]) -> [f32; 4] {
+        let Some(own) = self.layers.get(layer) else { return wanted };
+        let property = &target.property;
+        let below = self.value_below(layer, target, time).unwrap_or_else(|| property.rest());
+        let weight = if own.weight > 1e-4 { own.weight } else { 1.0 };
+        let (from, to) = match own.mode {
+            LayerMode::Override => (below, wanted),
+            LayerMode::Additive => (property.rest(), without(property, wanted, below)),
+        };
+        if weight >= 1.0 {
+            return to;
+        }
+        if *property == Property::Rotation {
+            let (from, to) = (Quat::from_array(from), Quat::from_array(to));
+            return further(from, to, 1.0 / weight).to_array();
+        }
+        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) / weight)
+    }
+}
+
+/// Rotation that lies on the way from one to another, `factor` times as far.
+fn further(from: Quat, to: Quat, factor: f32) -> Quat {
+    let turn = from.inverse() * to;
+    let turn = if turn.w < 0.0 { -turn } else { turn };
+    let Some(axis) = turn.xyz().try_normalize() else { return to };
+    let half = bevy::math::ops::acos(turn.w.min(1.0)) * factor;
+    let turned = axis * bevy::math::ops::sin(half);
+    (from * Quat::from_xyzw(turned.x, turned.y, turned.z, bevy::math::ops::cos(half))).normalize()
+}
+
+/// Offset that has to be added to `below` to give `wanted`.
+fn without(property: &Property, wanted: [f32; 4], below: [f32; 4]) -> [f32; 4] {
+    match property {
+        Property::Rotation => (Quat::from_array(below).inverse() * Quat::from_array(wanted)).normalize().to_array(),
+        Property::Scale => {
+            std::array::from_fn(
+                |axis| if below[axis] == 0.0 { property.rest()[axis] } else { wanted[axis] / below[axis] },
+            )
+        }
+        Property::Translation | Property::Attribute(_) => std::array::from_fn(|axis| wanted[axis] - below[axis]),
+    }
+}
+
 impl ClipLayer {
+    /// Value of the layer on top of that of the layers below.
+    fn mixed(&self, property: &Property, below: Option<[f32; 4]>, own: [f32; 4]) -> [f32; 4] {
+        match (self.mode, below) {
+            (LayerMode::Override, None) if self.weight >= 1.0 => own,
+            (LayerMode::Override, below) => blend(property, below.unwrap_or_else(|| property.rest()), own, self.weight),
+            (LayerMode::Additive, below) => {
+                let added = blend(property, property.rest(), own, self.weight);
+                add(property, below.unwrap_or_else(|| property.rest()), added)
+            }
+        }
+    }
+
     fn mix_into(&self, time: f32, mixed: &mut BTreeMap<TrackTarget, [f32; 4]>) {
         for (target, track) in self.tracks.iter().filter(|(target, _)| self.concerns(target.node)) {
             let Some(value) = track.sample(&target.property, time) else { continue };
-            let below = mixed.get(target).copied();
-            let mix = match (self.mode, below) {
-                (LayerMode::Override, None) if self.weight >= 1.0 => value,
-                (LayerMode::Override, below) => {
-                    let below = below.unwrap_or_else(|| target.property.rest());
-                    blend(&target.property, below, value, self.weight)
-                }
-                (LayerMode::Additive, below) => {
-                    let below = below.unwrap_or_else(|| target.property.rest());
-                    let added = blend(&target.property, target.property.rest(), value, self.weight);
-                    add(&target.property, below, added)
-                }
-            };
+            let mix = self.mixed(&target.property, mixed.get(target).copied(), value);
             mixed.insert(target.clone(), mix);
         }
     }
 }
 
 /// Value between two, by a weight.
-fn blend(property: &Property, from: [f32; 4], to: [f32; 4], weight: f32) -> [f32; 4] {
+pub(super) fn blend(property: &Property, from: [f32; 4], to: [f32; 4], weight: f32) -> [f32; 4] {
     if weight >= 1.0 {
         return to;
     }
@@ -134,7 +200,7 @@ fn blend(property: &Property, from: [f32; 4], to: [f32; 4], weight: f32) -> [f32
 }
 
 /// Offset on top of another one.
-fn add(property: &Property, below: [f32; 4], added: [f32; 4]) -> [f32; 4] {
+pub(super) fn add(property: &Property, below: [f32; 4], added: [f32; 4]) -> [f32; 4] {
     match property {
         Property::Rotation => (Quat::from_array(below) * Quat::from_array(added)).normalize().to_array(),
         Property::Scale => std::array::from_fn(|axis| below[axis] * added[axis]),

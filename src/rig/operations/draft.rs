@@ -2,8 +2,8 @@
 
 use bevy::math::{Affine3, Mat3, Vec3};
 
-use super::{MirrorPlane, frame::Frame};
-use crate::rig::{EditError, PoseOffset, Rig, RigEdit, Uid, UidSource};
+use super::{MirrorPlane, clips::carried_key, frame::Frame};
+use crate::rig::{EditError, PoseOffset, Rig, RigEdit, Uid, UidSource, animation::Key};
 
 /// A rig under change: edits are applied at once and recorded with their inverses.
 pub struct Draft<'a> {
@@ -105,7 +105,7 @@ impl<'a> Draft<'a> {
         self.apply(RigEdit::SetRest(joint, rest))
     }
 
-    /// Runs `change` on a joint and restores the transforms of its children. Poses keep turning and moving the joint
+    /// Runs `change` on a joint and restores the transforms of its children. Poses and clips keep turning and moving the joint
     /// along the same axes of the rig, whatever its own axes are now.
     pub fn keeping_children(
         &mut self,
@@ -131,7 +131,26 @@ impl<'a> Draft<'a> {
             pose.offsets.entry(joint).and_modify(|offset| *offset = carried(offset));
             self.apply(RigEdit::SetStoredPose(Box::new(pose)))?;
         }
-        Ok(())
+        let mut edits = Vec::new();
+        for clip in self.rig.clips() {
+            for layer in &clip.layers {
+                for (target, track) in layer.tracks.iter().filter(|(target, _)| target.node == joint) {
+                    let carried = |key: &Key| carried_key(key, &target.property, (before, now), Mat3::IDENTITY);
+                    let inserted: Vec<Key> = track.keys.iter().map(carried).collect();
+                    if inserted == track.keys {
+                        continue;
+                    }
+                    edits.push(RigEdit::SetKeys {
+                        clip: clip.uid,
+                        layer: layer.uid,
+                        target: target.clone(),
+                        removed: track.keys.iter().map(|key| key.time).collect(),
+                        inserted,
+                    });
+                }
+            }
+        }
+        edits.into_iter().try_for_each(|edit| self.apply(edit))
     }
 
     /// Position of a joint, or an error.

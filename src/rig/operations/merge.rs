@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::{Draft, OperationError};
 use crate::rig::{EditError, GroupData, Rig, RigEdit, Uid, remap::Remap};
 
-/// Puts the joints of another rig, with groups and tags, into the draft's. The roots hang on `parent`, in the place that they
+/// Puts the joints of another rig, with groups, tags and clips, into the draft's. The roots hang on `parent`, in the place that they
 /// have in their own rig. Uids, labels and group names stay where they are free; others are new, and labels and names get
 /// the other rig's name in front.
 pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Result<(), OperationError> {
@@ -59,6 +59,18 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
         draft.note(format!(
             "{renamed} joints of {prefix} are called {prefix}_..., because the rig has their labels already"
         ));
+    }
+    for clip in other.clips() {
+        let mut clip = clip.with_nodes(|node| remap.get(node).unwrap_or(node));
+        for uid in std::iter::once(&mut clip.uid).chain(clip.layers.iter_mut().map(|layer| &mut layer.uid)) {
+            if draft.rig().is_taken(*uid) {
+                *uid = draft.next_uid();
+            }
+        }
+        if draft.rig().clips().iter().any(|own| own.name == clip.name) {
+            clip.name = format!("{prefix}_{}", clip.name);
+        }
+        draft.apply(RigEdit::AddClip(Box::new(clip), usize::MAX))?;
     }
     if !other.stored_poses().is_empty() {
         draft.note(format!("the stored poses of {prefix} are left out"));

@@ -2,7 +2,10 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use crate::rig::{EditError, Rig, RigEdit, RigJoint, TagData, Uid};
+use crate::rig::{
+    EditError, Rig, RigEdit, RigJoint, TagData, Uid,
+    animation::{Key, RigClip, Track, TrackTarget},
+};
 
 /// The edits after which the current pose of `from` is that of `to`.
 pub fn pose_edits(from: &Rig, to: &Rig) -> Vec<RigEdit> {
@@ -11,8 +14,46 @@ pub fn pose_edits(from: &Rig, to: &Rig) -> Vec<RigEdit> {
     nodes.into_iter().filter(is_other).map(|node| RigEdit::SetOffset(node, to.offset(node).copied())).collect()
 }
 
+/// The edits after which the clips of `from` are those of `to`; keys that both have are not touched.
+///
+/// # Errors
+/// [`EditError`] of an edit that is refused: one of the two has values that no rig can have.
+pub fn clip_edits(from: &Rig, to: &Rig) -> Result<Vec<RigEdit>, EditError> {
+    let mut steps = Steps { rig: from.clone(), edits: Vec::new() };
+    let layers = |clip: &RigClip| clip.layers.iter().map(|layer| layer.uid).collect::<Vec<_>>();
+    for clip in from.clips() {
+        // Clips with other layers are exchanged as a whole.
+        if to.clip(clip.uid).is_none_or(|other| layers(other) != layers(clip)) {
+            steps.apply(RigEdit::RemoveClip(clip.uid))?;
+        }
+    }
+    for (index, clip) in to.clips().iter().enumerate() {
+        let known = steps.rig.clips().iter().position(|own| own.uid == clip.uid);
+        if known.is_some_and(|place| place != index) {
+            steps.apply(RigEdit::RemoveClip(clip.uid))?;
+        }
+        match steps.rig.clip(clip.uid).cloned() {
+            Some(own) => steps.clip(&own, clip)?,
+            None => steps.apply(RigEdit::AddClip(Box::new(clip.clone()), index))?,
+        }
+    }
+    Ok(steps.edits)
+}
+
+/// The edit after which a track has the keys of another one; `None` if it has.
+fn key_edit(clip: Uid, layer: Uid, target: &TrackTarget, now: Option<&Track>, then: Option<&Track>) -> Option<RigEdit> {
+    let [now, then] = [now, then].map(|track| track.map_or(&[] as &[Key], |track| &track.keys));
+    let has = |keys: &[Key], key: &Key| {
+        keys.binary_search_by(|known| known.time.total_cmp(&key.time)).is_ok_and(|place| keys[place] == *key)
+    };
+    let removed: Vec<f32> = now.iter().filter(|key| !has(then, key)).map(|key| key.time).collect();
+    let inserted: Vec<Key> = then.iter().filter(|key| !has(now, key)).copied().collect();
+    let is_other = !removed.is_empty() || !inserted.is_empty();
+    is_other.then(|| RigEdit::SetKeys { clip, layer, target: target.clone(), removed, inserted })
+}
+
 /// The edits after which `from` has the content of `to`: header, groups, joints, tags and stored poses. Weights, the current
-/// pose and attribute values stay; those of joints that go, go with them. What is the same in both is not touched.
+/// pose, attribute values and clips stay; those of joints that go, go with them. What is the same in both is not touched.
 ///
 /// # Errors
 /// [`EditError`] of an edit that is refused: one of the two has values that no rig can have.
@@ -40,6 +81,27 @@ impl Steps {
     fn apply(&mut self, edit: RigEdit) -> Result<(), EditError> {
         self.rig.apply(&edit)?;
         self.edits.push(edit);
+        Ok(())
+    }
+
+    /// Headers and keys of a clip with the same layers.
+    fn clip(&mut self, own: &RigClip, clip: &RigClip) -> Result<(), EditError> {
+        if own.about() != clip.about() {
+            self.apply(RigEdit::SetClipAbout(clip.uid, Box::new(clip.about())))?;
+        }
+        for (now, then) in own.layers.iter().zip(&clip.layers) {
+            let (clip, layer) = (clip.uid, then.uid);
+            if now.about() != then.about() {
+                self.apply(RigEdit::SetLayer { clip, layer, about: Box::new(then.about()) })?;
+            }
+            let targets: BTreeSet<&TrackTarget> = now.tracks.keys().chain(then.tracks.keys()).collect();
+            for target in targets {
+                let tracks = [now, then].map(|layer| layer.tracks.get(target).map(|track| &**track));
+                if let Some(edit) = key_edit(clip, layer, target, tracks[0], tracks[1]) {
+                    self.apply(edit)?;
+                }
+            }
+        }
         Ok(())
     }
 

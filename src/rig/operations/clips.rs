@@ -1,0 +1,280 @@
+//! Clips, their layers and their keys, as people change them. Each operation is one step of the history.
+
+mod keys;
+mod mirror;
+mod pose;
+mod reduce;
+mod time;
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::{Draft, OperationError};
+use crate::rig::{
+    BuiltRig, EditError, RigEdit, Uid,
+    animation::{ClipAbout, ClipLayer, Key, LayerAbout, LayerMode, RigClip, TrackTarget},
+};
+
+pub use keys::KeyClipboard;
+pub(super) use mirror::carried as carried_key;
+pub(super) use pose::keyed;
+pub use reduce::KeyTolerance;
+
+/// Selected keys: times by what they animate. Times without a key are passed over.
+pub type KeyTimes = BTreeMap<TrackTarget, Vec<f32>>;
+
+/// Change of clips.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ClipOperation {
+    /// Creates a clip with one base layer, as the last one.
+    Create {
+        /// Name of the clip, which no other clip has.
+        name: String,
+        /// Frames a second.
+        frame_rate: f32,
+        /// First and last second.
+        range: [f32; 2],
+    },
+    /// Adds a clip, from a file for example. A name or uid that is taken gets another one.
+    Add(Box<RigClip>),
+    /// Renames a clip.
+    Rename(Uid, String),
+    /// Sets name, frame rate, range, loop and markers of a clip.
+    About(Uid, Box<ClipAbout>),
+    /// Deletes a clip.
+    Delete(Uid),
+    /// Adds a layer on top of a clip.
+    AddLayer {
+        /// The clip.
+        clip: Uid,
+        /// Name of the layer.
+        name: String,
+        /// How its values meet those below.
+        mode: LayerMode,
+    },
+    /// Sets name, mode, weight, mask and muting of a layer.
+    SetLayer {
+        /// The clip.
+        clip: Uid,
+        /// The layer.
+        layer: Uid,
+        /// The layer's header.
+        about: Box<LayerAbout>,
+    },
+    /// Puts a layer to another place.
+    MoveLayer {
+        /// The clip.
+        clip: Uid,
+        /// The layer.
+        layer: Uid,
+        /// Index from the bottom.
+        index: usize,
+    },
+    /// Deletes a layer with its keys.
+    DeleteLayer {
+        /// The clip.
+        clip: Uid,
+        /// The layer.
+        layer: Uid,
+    },
+    /// Stretches a span of time of a whole clip: keys of all layers and markers. What comes later moves along.
+    Retime {
+        /// The clip.
+        clip: Uid,
+        /// First and last second of the span.
+        from: [f32; 2],
+        /// Seconds at which the span begins and ends afterwards.
+        to: [f32; 2],
+    },
+    /// Changes keys of a layer.
+    Keys {
+        /// The clip.
+        clip: Uid,
+        /// The layer.
+        layer: Uid,
+        /// The change.
+        change: KeyOperation,
+    },
+}
+
+/// Change of keys of a layer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum KeyOperation {
+    /// Sets keys at a time so that the clip has the current pose of nodes there: translation and rotation, and what is not
+    /// at rest or has keys already.
+    Pose {
+        /// Second in the clip.
+        time: f32,
+        /// The nodes.
+        nodes: Vec<Uid>,
+    },
+    /// Sets keys; those at the same times are replaced.
+    Set(Vec<(TrackTarget, Vec<Key>)>),
+    /// Moves keys in time. Keys that they meet are replaced.
+    Move {
+        /// The keys.
+        keys: KeyTimes,
+        /// Seconds.
+        by: f32,
+    },
+    /// Scales the times of keys about a pivot, tangents with them. Keys that they meet are replaced.
+    Scale {
+        /// The keys.
+        keys: KeyTimes,
+        /// Second that stays.
+        pivot: f32,
+        /// Factor; a negative one turns the keys round, zero is refused.
+        factor: f32,
+    },
+    /// Deletes keys.
+    Delete(KeyTimes),
+    /// Inserts copied keys so that the first is at a time. Keys at the same times are replaced.
+    Paste {
+        /// The copied keys.
+        clipboard: Arc<KeyClipboard>,
+        /// Second of the first key.
+        at: f32,
+    },
+    /// Copies keys to the nodes on the other side, as their mirror image, and those of central nodes onto themselves. Keys of
+    /// a pair that are both selected are exchanged.
+    Mirror {
+        /// The keys.
+        keys: KeyTimes,
+        /// Result of the rig's commands, for the pairs of created nodes.
+        built: Option<Arc<BuiltRig>>,
+    },
+    /// Replaces the keys of tracks by linear ones at a rate; steps stay steps.
+    Bake {
+        /// The tracks.
+        targets: Vec<TrackTarget>,
+        /// Keys a second.
+        rate: f32,
+    },
+    /// Removes keys without which a track stays within a tolerance.
+    Reduce {
+        /// The tracks.
+        targets: Vec<TrackTarget>,
+        /// Largest differences.
+        tolerance: KeyTolerance,
+    },
+    /// Gives the keys of a node that is gone to another one; a property that the other one has keys of keeps those.
+    Adopt {
+        /// The node that is gone.
+        from: Uid,
+        /// The node that gets its keys.
+        to: Uid,
+    },
+}
+
+impl ClipOperation {
+    /// A few words for the history panel.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Create { .. } => "Create clip",
+            Self::Add(_) => "Add clip",
+            Self::Rename(..) => "Rename clip",
+            Self::About(..) => "Set clip",
+            Self::Delete(_) => "Delete clip",
+            Self::AddLayer { .. } => "Add animation layer",
+            Self::SetLayer { .. } => "Set animation layer",
+            Self::MoveLayer { .. } => "Move animation layer",
+            Self::DeleteLayer { .. } => "Delete animation layer",
+            Self::Retime { .. } => "Retime clip",
+            Self::Keys { change, .. } => match change {
+                KeyOperation::Pose { .. } | KeyOperation::Set(_) => "Set keys",
+                KeyOperation::Move { .. } => "Move keys",
+                KeyOperation::Scale { .. } => "Scale keys",
+                KeyOperation::Delete(_) => "Delete keys",
+                KeyOperation::Paste { .. } => "Paste keys",
+                KeyOperation::Mirror { .. } => "Mirror keys",
+                KeyOperation::Bake { .. } => "Bake keys",
+                KeyOperation::Reduce { .. } => "Reduce keys",
+                KeyOperation::Adopt { .. } => "Adopt keys",
+            },
+        }
+    }
+}
+
+/// Runs a change of clips.
+pub(super) fn run(draft: &mut Draft, operation: &ClipOperation) -> Result<(), OperationError> {
+    match operation {
+        ClipOperation::Create { name, frame_rate, range } => {
+            let name = free_name(draft, None, name)?;
+            let (uid, layer) = (draft.next_uid(), draft.next_uid());
+            let clip = RigClip { frame_rate: *frame_rate, range: *range, ..RigClip::new(uid, layer, name) };
+            Ok(draft.apply(RigEdit::AddClip(Box::new(clip), usize::MAX))?)
+        }
+        ClipOperation::Add(clip) => add(draft, clip),
+        ClipOperation::Rename(clip, name) => {
+            let name = free_name(draft, Some(*clip), name)?.to_owned();
+            let about = find(draft, *clip)?.about();
+            set_about(draft, *clip, ClipAbout { name, ..about })
+        }
+        ClipOperation::About(clip, about) => {
+            free_name(draft, Some(*clip), &about.name)?;
+            set_about(draft, *clip, (**about).clone())
+        }
+        ClipOperation::Delete(clip) => Ok(draft.apply(RigEdit::RemoveClip(*clip))?),
+        ClipOperation::AddLayer { clip, name, mode } => {
+            let uid = draft.next_uid();
+            let layer = Box::new(ClipLayer { name: name.clone(), mode: *mode, ..ClipLayer::empty(uid) });
+            Ok(draft.apply(RigEdit::AddLayer { clip: *clip, layer, index: usize::MAX })?)
+        }
+        ClipOperation::SetLayer { clip, layer, about } => {
+            if layer_of(draft, *clip, *layer)?.about() == **about {
+                return Ok(());
+            }
+            Ok(draft.apply(RigEdit::SetLayer { clip: *clip, layer: *layer, about: about.clone() })?)
+        }
+        ClipOperation::MoveLayer { clip, layer, index } => {
+            let moved = layer_of(draft, *clip, *layer)?.clone();
+            draft.apply(RigEdit::RemoveLayer { clip: *clip, layer: *layer })?;
+            Ok(draft.apply(RigEdit::AddLayer { clip: *clip, layer: Box::new(moved), index: *index })?)
+        }
+        ClipOperation::DeleteLayer { clip, layer } => {
+            Ok(draft.apply(RigEdit::RemoveLayer { clip: *clip, layer: *layer })?)
+        }
+        ClipOperation::Retime { clip, from, to } => time::retime(draft, *clip, *from, *to),
+        ClipOperation::Keys { clip, layer, change } => keys::run(draft, *clip, *layer, change),
+    }
+}
+
+fn add(draft: &mut Draft, clip: &RigClip) -> Result<(), OperationError> {
+    let mut clip = clip.clone();
+    for uid in std::iter::once(&mut clip.uid).chain(clip.layers.iter_mut().map(|layer| &mut layer.uid)) {
+        if draft.rig().is_taken(*uid) {
+            *uid = draft.next_uid();
+        }
+    }
+    let name = if clip.name.trim().is_empty() { "clip".to_owned() } else { clip.name.trim().to_owned() };
+    let is_taken = |name: &str| draft.rig().clips().iter().any(|known| known.name == name);
+    let numbered = (2..).map(|number| format!("{name} {number}"));
+    clip.name = std::iter::once(name.clone()).chain(numbered).find(|name| !is_taken(name)).unwrap_or(name);
+    Ok(draft.apply(RigEdit::AddClip(Box::new(clip), usize::MAX))?)
+}
+
+fn set_about(draft: &mut Draft, clip: Uid, about: ClipAbout) -> Result<(), OperationError> {
+    if find(draft, clip)?.about() == about {
+        return Ok(());
+    }
+    Ok(draft.apply(RigEdit::SetClipAbout(clip, Box::new(about)))?)
+}
+
+/// A name without blanks around it, which no clip but `own` has.
+fn free_name<'a>(draft: &Draft, own: Option<Uid>, name: &'a str) -> Result<&'a str, OperationError> {
+    let name = name.trim();
+    if name.is_empty() {
+        return Err(OperationError::NoClipName);
+    }
+    if draft.rig().clips().iter().any(|clip| Some(clip.uid) != own && clip.name == name) {
+        return Err(OperationError::ClipName(name.to_owned()));
+    }
+    Ok(name)
+}
+
+fn find<'a>(draft: &'a Draft, clip: Uid) -> Result<&'a RigClip, OperationError> {
+    Ok(draft.rig().clip(clip).ok_or(EditError::NoClip(clip))?)
+}
+
+fn layer_of<'a>(draft: &'a Draft, clip: Uid, layer: Uid) -> Result<&'a ClipLayer, OperationError> {
+    Ok(find(draft, clip)?.layer(layer).ok_or(EditError::NoLayer(clip, layer))?)
+}

@@ -1,0 +1,73 @@
+//! Keys on the other side of the character.
+
+use std::collections::BTreeMap;
+
+use bevy::math::Mat3;
+
+use super::{KeyTimes, OperationError, keys::Changes, keys::selected};
+use crate::rig::{
+    BuiltRig, Rig, Uid,
+    animation::{ClipLayer, Ease, Key, NodeNames},
+    label::mirrored_label,
+    operations::{Draft, MirrorPlane, frame::Frame},
+};
+
+/// Sets the mirror images of keys: on partners, or on the node itself where it has none.
+pub(super) fn mirror(
+    draft: &Draft,
+    layer: &ClipLayer,
+    keys: &KeyTimes,
+    built: Option<&BuiltRig>,
+    changes: &mut Changes,
+) -> Result<(), OperationError> {
+    let reflection = draft.symmetry().unwrap_or_else(|| MirrorPlane::sagittal(1.0)).reflection();
+    let pairs = partners(draft.rig(), built);
+    let frame = |node: Uid| match built.and_then(|built| Frame::built(built, node)) {
+        Some(frame) if draft.rig().joint(node).is_none() => frame,
+        _ => Frame::of(draft.rig(), node),
+    };
+    for (target, keys) in selected(layer, keys) {
+        let other = pairs.get(&target.node).copied().unwrap_or(target.node);
+        let (here, there) = (frame(target.node), frame(other));
+        let mirrored = keys.iter().map(|key| carried(key, &target.property, (&here, &there), reflection));
+        changes
+            .insert(&crate::rig::animation::TrackTarget { node: other, property: target.property.clone() }, mirrored);
+    }
+    Ok(())
+}
+
+/// A key with the same effect in another frame, mapped by `change`.
+pub(in crate::rig::operations) fn carried(
+    key: &Key,
+    property: &crate::rig::animation::Property,
+    (here, there): (&Frame, &Frame),
+    change: Mat3,
+) -> Key {
+    let map = |value: [f32; 4], is_tangent: bool| here.carried_value(property, value, there, change, is_tangent);
+    let ease = match key.ease {
+        Ease::Cubic { arrive, leave } => Ease::Cubic { arrive: map(arrive, true), leave: map(leave, true) },
+        ease => ease,
+    };
+    Key { time: key.time, value: map(key.value, false), ease }
+}
+
+/// Nodes on the other side: the partners of joints, and created nodes of the same purpose under the mirrored label.
+fn partners(rig: &Rig, built: Option<&BuiltRig>) -> BTreeMap<Uid, Uid> {
+    let mut pairs = BTreeMap::new();
+    let names = NodeNames::of(rig, built);
+    let by_name: BTreeMap<_, _> = names.0.iter().map(|(uid, name)| (name, *uid)).collect();
+    for (uid, name) in &names.0 {
+        let mut other = name.clone();
+        let Some(label) = mirrored_label(&name.label) else { continue };
+        other.label = label;
+        if let Some(partner) = by_name.get(&other) {
+            pairs.insert(*uid, *partner);
+        }
+    }
+    for joint in rig.walk() {
+        if let Some(partner) = joint.data.mirror.filter(|partner| rig.joint(*partner).is_some()) {
+            pairs.insert(joint.data.uid, partner);
+        }
+    }
+    pairs
+}

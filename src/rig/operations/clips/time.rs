@@ -1,0 +1,121 @@
+//! Times of keys: moving, scaling, retiming and baking.
+
+use super::{KeyTimes, OperationError, find, keys::Changes, keys::selected};
+use crate::rig::{
+    Uid,
+    animation::{ClipAbout, ClipLayer, Ease, Key, Marker, TrackTarget},
+    operations::Draft,
+};
+
+/// Most keys that baking gives a track.
+const MOST: f32 = 1e6;
+
+/// Puts keys to other times. `factor` is the rate at which time runs there: tangents are divided by it.
+pub(super) fn shifted(
+    layer: &ClipLayer,
+    keys: &KeyTimes,
+    changes: &mut Changes,
+    map: impl Fn(f32) -> f32,
+    factor: f32,
+) {
+    for (target, keys) in selected(layer, keys) {
+        changes.remove(&target, keys.iter().map(|key| key.time));
+        let mut next: Vec<Key> = keys.iter().map(|key| stretched(key, map(key.time), factor, factor)).collect();
+        if factor < 0.0 {
+            turn_round(&mut next);
+        }
+        changes.insert(&target, next);
+    }
+}
+
+/// A key at another time, where time runs slower by these factors before and behind it.
+fn stretched(key: &Key, time: f32, before: f32, behind: f32) -> Key {
+    let slower = |tangent: [f32; 4], factor: f32| if factor == 0.0 { [0.0; 4] } else { tangent.map(|t| t / factor) };
+    let ease = match key.ease {
+        Ease::Cubic { arrive, leave } => Ease::Cubic { arrive: slower(arrive, before), leave: slower(leave, behind) },
+        ease => ease,
+    };
+    Key { time, value: key.value, ease }
+}
+
+/// Puts keys whose times fall in order. What was the way to the next key is the way from it then.
+fn turn_round(keys: &mut Vec<Key>) {
+    let eases: Vec<Ease> = keys.iter().map(|key| key.ease).collect();
+    for (place, key) in keys.iter_mut().enumerate() {
+        let way = place.checked_sub(1).map(|before| eases[before]);
+        key.ease = match (key.ease, way) {
+            (Ease::Cubic { arrive, leave }, _) => Ease::Cubic { arrive: leave, leave: arrive },
+            // The way from a cubic key needs tangents at both of its ends.
+            (ease, Some(Ease::Cubic { .. }) | None) => ease,
+            (_, Some(way)) => way,
+        };
+    }
+    keys.reverse();
+}
+
+/// Stretches a span of a clip; what comes later moves along.
+pub(super) fn retime(draft: &mut Draft, uid: Uid, from: [f32; 2], to: [f32; 2]) -> Result<(), OperationError> {
+    let numbers = [from, to].concat();
+    if numbers.iter().any(|number| !number.is_finite()) || from[1] <= from[0] || to[1] <= to[0] {
+        return Err(OperationError::BadNumber("a span of time ends after it begins; correct its seconds"));
+    }
+    let rate = (to[1] - to[0]) / (from[1] - from[0]);
+    // Times at the ends are exact.
+    let map = |time: f32| {
+        if time <= from[0] {
+            time + (to[0] - from[0])
+        } else if time >= from[1] {
+            to[1] + (time - from[1])
+        } else {
+            to[0] + (time - from[0]) * rate
+        }
+    };
+    let clip = find(draft, uid)?.clone();
+    let markers = clip.markers.iter().map(|marker| Marker { time: map(marker.time), name: marker.name.clone() });
+    let about = ClipAbout { range: clip.range.map(map), markers: markers.collect(), ..clip.about() };
+    super::set_about(draft, uid, about)?;
+    for layer in &clip.layers {
+        let mut changes = Changes::default();
+        for (target, track) in &layer.tracks {
+            changes.remove(target, track.keys.iter().map(|key| key.time));
+            let rate_at = |is_in: bool| if is_in { rate } else { 1.0 };
+            let next = track.keys.iter().map(|key| {
+                let before = rate_at(key.time > from[0] && key.time <= from[1]);
+                let behind = rate_at(key.time >= from[0] && key.time < from[1]);
+                stretched(key, map(key.time), before, behind)
+            });
+            changes.insert(target, next);
+        }
+        changes.apply(draft, uid, layer.uid)?;
+    }
+    Ok(())
+}
+
+/// Linear keys at a rate in place of the keys of tracks.
+pub(super) fn bake(
+    layer: &ClipLayer,
+    targets: &[TrackTarget],
+    rate: f32,
+    changes: &mut Changes,
+) -> Result<(), OperationError> {
+    for target in targets {
+        let Some(track) = layer.tracks.get(target) else { continue };
+        let (Some(first), Some(last)) = (track.keys.first(), track.keys.last()) else { continue };
+        let frames = ((last.time - first.time) * rate).floor();
+        if frames > MOST {
+            return Err(OperationError::BadNumber("that many keys are too many for a track; bake at a lower rate"));
+        }
+        let at = |frame: u32| first.time + frame as f32 / rate;
+        let mut times: Vec<f32> = (0..=frames as u32).map(at).filter(|time| *time < last.time).collect();
+        times.push(last.time);
+        times.dedup();
+        changes.remove(target, track.keys.iter().map(|key| key.time));
+        let baked = times.into_iter().filter_map(|time| {
+            let place = track.keys.partition_point(|key| key.time <= time).max(1) - 1;
+            let ease = if track.keys[place].ease == Ease::Stepped { Ease::Stepped } else { Ease::Linear };
+            Some(Key { time, value: track.sample(&target.property, time)?, ease })
+        });
+        changes.insert(target, baked);
+    }
+    Ok(())
+}
