@@ -38,7 +38,9 @@ pub use disk_error::DiskError;
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
-pub use load::{FileKind, LoadError, load_gestures, load_model, load_rig_text, load_skin, load_template, stem};
+pub use load::{
+    FileKind, LoadError, load_animation, load_gestures, load_model, load_rig_text, load_skin, load_template, stem,
+};
 pub use parts::{BUNDLED_CHARACTERS, BUNDLED_PARTS, PartFiles, bundled_characters, bundled_parts};
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote, ProjectToSave,
@@ -46,5 +48,5 @@ pub use project::{
 };
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
-pub use store::{StoreError, store_model, store_rig, store_rig_over, store_skin};
+pub use store::{StoreError, store_animation, store_model, store_rig, store_rig_over, store_skin};
 pub use watch::{FileWatch, LOOK, TemplateWatch};

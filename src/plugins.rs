@@ -26,8 +26,10 @@
 //! | [`selection::Selection`] | picking, gestures, edits, undo | stands until one of them writes it |
 //! | label, group, rest and parent of a created node, and the node itself | the build | put back and told: change the command instead |
 //! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame; what is shown already is none; unknown names are told by [`face::Expressed`] |
+//! | [`animation::ClipPlayer`] | a person or a game; its time by the playback | plays from there |
 //! | `Name` of joints, groups and nodes | the label or name | stands until that changes |
 
+pub mod animation;
 pub mod commands;
 pub mod controls;
 #[cfg(feature = "draw")]
@@ -76,6 +78,7 @@ use bevy::{
 /// | [`fit::FitPlugin`] | templates moved into meshes |
 /// | [`mesh_reload::MeshReloadPlugin`] | meshes exchanged for other versions of them, with their weights |
 /// | [`runtime::RuntimePlugin`] | compiled rigs that run each frame |
+/// | [`animation::ClipPlugin`] | clips that play on rigs; keys set with each pose |
 /// | [`journal::JournalPlugin`] | every change stored at once, for rigs that request it |
 pub struct RigPlugins;
 
@@ -95,6 +98,7 @@ impl PluginGroup for RigPlugins {
             .add(fit::FitPlugin)
             .add(mesh_reload::MeshReloadPlugin)
             .add(runtime::RuntimePlugin)
+            .add(animation::ClipPlugin)
             .add(journal::JournalPlugin)
     }
 }

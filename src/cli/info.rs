@@ -7,7 +7,10 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report, progress::spinning, sketch::describe_rig};
 use crate::{
-    files::{FileKind, RealDisk, load_gestures, load_model, load_project, load_rig_text, load_skin, load_template},
+    files::{
+        FileKind, RealDisk, load_animation, load_gestures, load_model, load_project, load_rig_text, load_skin,
+        load_template,
+    },
     mesh::model::Model,
     rig::{Rig, Uid, UidSource, character::import_rig_text},
 };
@@ -85,6 +88,17 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             report.set("joints", joints);
             report.set("mesh_hash", format!("{:032x}", skin.mesh_hash()));
         }
+        Some(FileKind::Animation) => {
+            let read = load_animation(&RealDisk, path)?;
+            report.notes(read.notes);
+            for clip in &read.clips {
+                let tracks: usize = clip.layers.iter().map(|layer| layer.tracks.len()).sum();
+                let (seconds, keys) = (clip.duration(), clip.key_count());
+                report.line(format!("clip \"{}\": {seconds:.2} s, {tracks} tracks, {keys} keys", clip.name));
+            }
+            report.set("kind", "animation");
+            report.set("clips", read.clips.len());
+        }
         Some(FileKind::Gestures) => {
             let gestures = load_gestures(&RealDisk, path)?;
             report.line(format!("{} gestures", gestures.len()));
@@ -93,7 +107,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
         None => {
             let message = format!(
-                "`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .skin and .ron",
+                "`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .skin and .ron",
                 path.display()
             );
             return Err(Failure::Usage(message));

@@ -11,6 +11,7 @@ use crate::{
     },
     rig::{
         SourceError,
+        format::animation::{self, ReadAnimation, read_animation},
         project::{self, ReadProject, read_project},
         skin::{SkinFile, SkinFileError, content_hash},
         template::{self, Template},
@@ -40,11 +41,13 @@ pub enum FileKind {
     RigText,
     /// Template of a rig, `.rig.ron`.
     Template,
+    /// Clips of a rig, `.anim.ron`.
+    Animation,
     /// Project, `.rigsmith.ron`.
     Project,
     /// Weights of a mesh, `.skin`.
     Skin,
-    /// List of gestures, `.ron` that is neither template nor project.
+    /// List of gestures, `.ron` that is neither template nor clips nor project.
     Gestures,
 }
 
@@ -55,6 +58,7 @@ impl FileKind {
         let endings = [
             (".rig.ron", Self::Template),
             (".rigsmith.ron", Self::Project),
+            (".anim.ron", Self::Animation),
             (".ron", Self::Gestures),
             (".rig", Self::RigText),
             (".skin", Self::Skin),
@@ -173,6 +177,12 @@ pub fn load_template(disk: &dyn Disk, path: &Path) -> Result<Template, LoadError
     PartFiles::new(disk).complete(path, &bytes).map_err(|source| in_source(path, &bytes, source))
 }
 
+/// Reads clips.
+pub fn load_animation(disk: &dyn Disk, path: &Path) -> Result<ReadAnimation, LoadError> {
+    let bytes = read_capped(disk, path, animation::MAX_BYTES as u64)?;
+    read_animation(&bytes).map_err(|source| in_source(path, &bytes, source))
+}
+
 /// Reads a `.rig` text.
 pub fn load_rig_text(disk: &dyn Disk, path: &Path) -> Result<RigText, LoadError> {
     let bytes = read_capped(disk, path, MAX_RIG_BYTES)?;
@@ -210,7 +220,7 @@ pub(super) fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadE
 /// Name of a file without folder and endings.
 pub fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    for ending in [".rig.ron", ".rigsmith.ron", ".obj", ".gltf", ".glb", ".rig", ".ron", ".skin"] {
+    for ending in [".rig.ron", ".rigsmith.ron", ".anim.ron", ".obj", ".gltf", ".glb", ".rig", ".ron", ".skin"] {
         let split = name.len().saturating_sub(ending.len());
         if split > 0 && name.is_char_boundary(split) && name[split..].eq_ignore_ascii_case(ending) {
             return name[..split].to_owned();

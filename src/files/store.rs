@@ -12,8 +12,10 @@ use crate::{
         obj::write_obj,
     },
     rig::{
-        Rig,
+        BuiltRig, Rig,
+        animation::RigClip,
         character::rig_text,
+        format::animation::{self, write_animation},
         project,
         skin::{SkinError, SkinFile},
         template::{self, write_template},
@@ -62,6 +64,18 @@ pub enum StoreError {
         project::MAX_BYTES >> 20
     )]
     ProjectTooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Length in mebibytes that the file would have.
+        mebibytes: usize,
+    },
+    /// The clips would be longer than the limit of their reader.
+    #[error(
+        "`{}`: the clips would have {mebibytes} MiB, and no more than {} are read; reduce their keys, or save them one by one",
+        path.display(),
+        animation::MAX_BYTES >> 20
+    )]
+    AnimationTooLarge {
         /// The file.
         path: PathBuf,
         /// Length in mebibytes that the file would have.
@@ -253,6 +267,26 @@ pub fn store_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>,
         }
         _ => Err(StoreError::Kind { path: path.into(), wanted: "a rig is saved as .rig.ron or .rig" }),
     }
+}
+
+/// Saves clips of a rig as `.anim.ron`, after reading back what is to be written. `built` gives the labels of nodes that
+/// commands created.
+pub fn store_animation(
+    disk: &dyn Disk,
+    path: &Path,
+    rig: &Rig,
+    built: Option<&BuiltRig>,
+    clips: &[RigClip],
+) -> Result<(), StoreError> {
+    if FileKind::of(path) != Some(FileKind::Animation) {
+        return Err(StoreError::Kind { path: path.into(), wanted: "clips are saved as .anim.ron" });
+    }
+    let text = write_animation(rig, built, clips);
+    if text.len() > animation::MAX_BYTES {
+        return Err(StoreError::AnimationTooLarge { path: path.into(), mebibytes: text.len() >> 20 });
+    }
+    verify::animation(path, text.as_bytes(), clips)?;
+    Ok(save_atomic(disk, path, text.as_bytes())?)
 }
 
 /// Saves weights as `.skin`.

@@ -16,7 +16,10 @@ use crate::{
         model::Model,
         obj::{self, ObjSettings},
     },
-    rig::{project::read_project, skin::SkinFile, template::read_template, text},
+    rig::{
+        animation::RigClip, format::animation::read_animation, project::read_project, skin::SkinFile,
+        template::read_template, text,
+    },
 };
 
 /// Reads back a model before it is saved, and compares the counts of its content.
@@ -65,6 +68,17 @@ pub(super) fn skin(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
 /// Reads back a project before it is saved.
 pub(super) fn project(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     readable(path, read_project(bytes).map(drop).map_err(|source| in_source(path, bytes, source)))
+}
+
+/// Reads back clips before they are saved, and compares them.
+pub(super) fn animation(path: &Path, bytes: &[u8], clips: &[RigClip]) -> Result<(), StoreError> {
+    let read = read_animation(bytes).map_err(|source| in_source(path, bytes, source));
+    let read = readable(path, read)?.clips;
+    let count = |clips: &[RigClip]| clips.iter().map(RigClip::key_count).sum();
+    if read == clips {
+        return Ok(());
+    }
+    Err(StoreError::Lost { path: path.into(), what: "keys", written: count(clips), read: count(&read) })
 }
 
 fn readable<T>(path: &Path, read: Result<T, LoadError>) -> Result<T, StoreError> {

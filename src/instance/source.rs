@@ -12,12 +12,12 @@ use crate::{
         skinning::BindRequest,
         surface::{RigMesh, RigMeshes},
     },
-    processor::{PoseNote, keep_poses},
+    processor::{PoseNote, keep_clips, keep_poses},
     rig::{
         Rig,
         operations::Operation,
         step::{Committed, Step},
-        update::{Change as Difference, Take, Update, edits_between, pose_edits, update},
+        update::{Change as Difference, Take, Update, clip_edits, edits_between, pose_edits, update},
     },
 };
 
@@ -266,6 +266,11 @@ fn updated(base: Option<&Rig>, rig: &Rig, file: &Rig, take: Take, modules: &RigM
         warn!("poses were not re-expressed: {error}");
         Vec::new()
     });
+    // Clips are told in the log; the list of poses is for the panel of the update.
+    match keep_clips(rig, &mut updated.rig, &modules.0) {
+        Ok(notes) => notes.iter().for_each(|note| warn!("{note}")),
+        Err(error) => warn!("clips were not re-expressed: {error}"),
+    }
     (updated, notes.into())
 }
 
@@ -284,6 +289,10 @@ fn take_over(
         Ok(edits) if edits.is_empty() => source.base = Some(built.rig.clone()),
         Ok(mut edits) => {
             edits.extend(pose_edits(rig, &updated.rig));
+            match clip_edits(rig, &updated.rig) {
+                Ok(clips) => edits.extend(clips),
+                Err(error) => warn!("clips were not re-expressed: {error}"),
+            }
             source.pending = Some(built.clone());
             requests.write(EditRequest::operation(entity, Operation::Named { name: UPDATE, edits }));
         }

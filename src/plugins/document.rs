@@ -19,7 +19,9 @@ pub use self::{
     error::{ChangeError, EntityWrite, EntityWriteError},
 };
 use super::{
-    RigSystems, configure_sets,
+    RigSystems,
+    animation::AutoKey,
+    configure_sets,
     history::{Recorded, RigHistory},
 };
 pub use super::{
@@ -135,7 +137,7 @@ pub struct EditRefused {
 fn apply_edits(
     mut requests: MessageReader<EditRequest>,
     mut entity_edits: ResMut<adopt::EntityEdits>,
-    mut rigs: Query<(&mut Rig, &mut Selection, &mut RigHistory, &Symmetry)>,
+    mut rigs: Query<(&mut Rig, &mut Selection, &mut RigHistory, &Symmetry, Option<&AutoKey>)>,
     mut uids: ResMut<UidSource>,
     mut edited: MessageWriter<Edited>,
     mut refused: MessageWriter<EditRefused>,
@@ -147,7 +149,7 @@ fn apply_edits(
     for (request, is_of_entities) in of_entities.chain(requests.read().map(|request| (request.clone(), false))) {
         let EditRequest { rig, change } = &request;
         let rig = *rig;
-        let Ok((mut document, mut selection, mut history, symmetry)) = rigs.get_mut(rig) else {
+        let Ok((mut document, mut selection, mut history, symmetry, auto_key)) = rigs.get_mut(rig) else {
             refused.write(EditRefused { rig, reason: ChangeError::NoRig(rig) });
             continue;
         };
@@ -157,9 +159,10 @@ fn apply_edits(
         let recorded = |Recorded { name, step, notes }| Edited { notes, ..done(name, step.map(Committed::Done)) };
         // A write to an entity concerns that entity only; live mirroring does not apply to it.
         let plane = symmetry.0.filter(|_| !is_of_entities);
+        let keyed = |operation| auto_key.map_or(Cow::Borrowed(operation), |auto_key| auto_key.keyed(operation));
         let result = match change {
             Change::Do(operation) => history
-                .edit(&mut document, &mut selection, &mut uids, plane, operation)
+                .edit(&mut document, &mut selection, &mut uids, plane, &keyed(operation))
                 .map(recorded)
                 .map_err(ChangeError::from),
             Change::Undo => history
@@ -173,7 +176,7 @@ fn apply_edits(
                 .and_then(|redone| Ok(redone?))
                 .map(|step| done(step.name.clone(), Some(Committed::Redone(step)))),
             Change::Preview(operation) => history
-                .preview(&mut document, &mut uids, symmetry.0, operation)
+                .preview(&mut document, &mut uids, symmetry.0, &keyed(operation))
                 .map(previewed)
                 .map_err(ChangeError::from),
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,

@@ -98,7 +98,7 @@ fn is_part(pose: &Offsets, of: &Offsets) -> bool {
     pose.iter().all(|(node, offset)| of.get(node) == Some(offset))
 }
 
-fn program(rig: &Rig, modules: &Arc<Modules>) -> Option<Arc<RigProgram>> {
+pub(super) fn program(rig: &Rig, modules: &Arc<Modules>) -> Option<Arc<RigProgram>> {
     let built: BuiltRig = Builder::build(rig, modules).ok()?;
     RigProgram::compile(&built, &CompileOptions::default()).ok().map(Arc::new)
 }

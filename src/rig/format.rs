@@ -1,7 +1,8 @@
 //! File formats of rigs: text and bytes on one side, plain data on the other. No code here opens a file.
 //!
-//! Templates (`.rig.ron`), projects (`.rigsmith.ron`), skeleton text (`.rig`) and weights (`.skin`).
+//! Templates (`.rig.ron`), clips (`.anim.ron`), projects (`.rigsmith.ron`), skeleton text (`.rig`) and weights (`.skin`).
 
+pub mod animation;
 pub(super) mod layout;
 mod poses;
 pub mod project;

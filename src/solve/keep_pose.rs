@@ -152,19 +152,38 @@ impl PoseKeeper {
             }
         }
         kept.offsets.retain(|_, offset| *offset != PoseOffset::IDENTITY);
-        for (pair, target) in self.joints.iter().zip(&targets) {
-            let (distance, angle) = between(attempt.global_at(pair.after), target);
+        kept.deviations = self.listed(&attempt, &targets);
+        kept
+    }
+
+    /// Joints that do not stand as before where the new rig has one pose and the old one another, both with the same
+    /// attributes.
+    pub fn deviations(
+        &self,
+        was: &BTreeMap<Uid, PoseOffset>,
+        is: &BTreeMap<Uid, PoseOffset>,
+        values: &AttributeValues,
+    ) -> Vec<Deviation> {
+        let mut before = posed(&self.before, was, values);
+        before.evaluate(0.0);
+        let mut after = posed(&self.after, is, values);
+        after.evaluate(0.0);
+        let targets: Vec<Trs> = self.joints.iter().map(|pair| target(&before, pair)).collect();
+        self.listed(&after, &targets)
+    }
+
+    /// Joints that are off by more than anybody would see.
+    fn listed(&self, state: &RigState, targets: &[Trs]) -> Vec<Deviation> {
+        let mut deviations = Vec::new();
+        for (pair, target) in self.joints.iter().zip(targets) {
+            let (distance, angle) = between(state.global_at(pair.after), target);
             if distance > OFF.0 * self.size || angle > OFF.1 {
-                let node = &attempt.program().nodes()[pair.after];
-                kept.deviations.push(Deviation {
-                    joint: node.uid,
-                    label: node.label.as_deref().map(str::to_owned),
-                    distance,
-                    angle,
-                });
+                let node = &state.program().nodes()[pair.after];
+                let label = node.label.as_deref().map(str::to_owned);
+                deviations.push(Deviation { joint: node.uid, label, distance, angle });
             }
         }
-        kept
+        deviations
     }
 
     /// Puts the nodes of both rigs where they were, parents before children, as far as that helps.

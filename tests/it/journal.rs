@@ -1,5 +1,6 @@
 //! The journal: what was committed comes back, whatever happened to the file, and nothing else does.
 
+mod clips;
 mod damage;
 mod evidence;
 mod trouble;

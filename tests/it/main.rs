@@ -3,6 +3,7 @@
 //! Tests of real meshes need `RIGSMITH_DATA`, pictures and the window a graphics adapter; see `prerequisites`. Tests count
 //! work and measure no time: the benches do.
 
+mod animation;
 mod bench;
 mod build_limits;
 mod choices;
@@ -51,6 +52,7 @@ mod files_set;
 mod fill;
 mod fit;
 mod fit_data;
+mod fuzz_animation;
 mod fuzz_gestures;
 mod fuzz_gltf;
 mod fuzz_journal;

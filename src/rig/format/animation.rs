@@ -131,7 +131,8 @@ pub(super) fn clip_offset(text: &str, path: &[(&str, usize)], clip: usize) -> Op
 /// Names that are allowed for a field at its place.
 fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
     let above = |field: &Field| field.parent.map(|parent| &fields[parent]);
-    let mut path: Vec<&str> = std::iter::successors(above(field), |field| above(field)).map(|field| field.name).collect();
+    let mut path: Vec<&str> =
+        std::iter::successors(above(field), |field| above(field)).map(|field| field.name).collect();
     path.reverse();
     match path[..] {
         [] if field.depth == 1 => Some(&["format", "rig", "rig_name", "clips"]),

@@ -19,9 +19,9 @@ use crate::rig::{Rig, Uid};
 
 /// Highest format that this version reads; written only for content that needs it.
 ///
-/// Format 2 adds values of attributes, and poses of nodes that are not joints. Projects without them are written in
-/// format 1.
-pub const FORMAT: u32 = 2;
+/// Format 2 adds values of attributes, and poses of nodes that are not joints, format 3 adds clips. A project is written in the
+/// first format that can hold it.
+pub const FORMAT: u32 = 3;
 
 /// Largest size in bytes of a project that is read.
 pub const MAX_BYTES: usize = 64 << 20;

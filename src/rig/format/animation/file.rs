@@ -196,7 +196,8 @@ fn clip(
     if !seen.insert(uid) {
         return Err((ClipPlace { field: "uid", ..place }, twice(uid)));
     }
-    check_about(uid, &clip.about()).map_err(|error| (ClipPlace { field: "range", ..place.clone() }, error.to_string()))?;
+    check_about(uid, &clip.about())
+        .map_err(|error| (ClipPlace { field: "range", ..place.clone() }, error.to_string()))?;
     for (number, file) in layers.into_iter().enumerate() {
         let place = ClipPlace { layer: Some(number), ..place.clone() };
         if !seen.insert(file.uid) {
@@ -233,8 +234,7 @@ fn layer(file: LayerFile, place: &ClipPlace, names: &mut NodeNames) -> Result<Cl
         let keys = read_keys(node, &property, keys, &place)?;
         let target = TrackTarget { node, property };
         if tracks.contains_key(&target) {
-            let message =
-                format!("the {} of {node} has two tracks in the layer; keep one of them", target.property);
+            let message = format!("the {} of {node} has two tracks in the layer; keep one of them", target.property);
             return Err((ClipPlace { field: "property", ..place }, message));
         }
         if !keys.is_empty() {

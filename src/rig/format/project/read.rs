@@ -13,6 +13,7 @@ use super::{
 };
 use crate::rig::{
     AttributeValues, EditError, Rig, RigEdit, SourceError, StoredPose, Uid,
+    format::animation::{ClipFile, clip_fields, clip_offset, clips_in},
     format::poses::{OffsetFile, PoseFile, ValueFile},
     format::scan::{self, Field},
     format::source::{ron_options, utf8},
@@ -50,6 +51,8 @@ struct RigFile {
     values: Vec<ValueFile>,
     #[serde(default)]
     poses: Vec<PoseFile>,
+    #[serde(default)]
+    clips: Vec<ClipFile>,
 }
 
 pub(super) fn vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {
@@ -119,7 +122,7 @@ fn read_rigs(
     let mut rigs: Vec<ProjectRig> = Vec::with_capacity(files.len());
     let mut seen = HashSet::new();
     let mut templates = Templates { text: places.text, line: 1, counted: 0 };
-    for (file, element) in files.into_iter().zip(places.elements(places.top("rigs"))) {
+    for ((number, file), element) in files.into_iter().enumerate().zip(places.elements(places.top("rigs"))) {
         let field = places.within(element, "rig").map(|field| &places.fields[field]);
         let mut rig = templates.read(field, notes)?;
         if !seen.insert(rig.uid()) {
@@ -146,6 +149,7 @@ fn read_rigs(
             }
         }
         read_stored_poses(places, element, &mut rig, &file.poses)?;
+        read_clips(places, number, &mut rig, file.clips)?;
         rigs.push(ProjectRig { rig, skins: file.skins });
     }
     Ok(rigs)
@@ -192,6 +196,18 @@ fn read_stored_poses(
     Ok(())
 }
 
+fn read_clips(places: &Places, number: usize, rig: &mut Rig, files: Vec<ClipFile>) -> Result<(), SourceError> {
+    let path = [("rigs", number)];
+    let (clips, _) = clips_in(files, places.text, &path)?;
+    for (number, clip) in clips.into_iter().enumerate() {
+        rig.apply(&RigEdit::AddClip(Box::new(clip), usize::MAX)).map_err(|error| {
+            let offset = clip_offset(places.text, &path, number).unwrap_or_default();
+            SourceError::at(places.text, offset, error.to_string())
+        })?;
+    }
+    Ok(())
+}
+
 fn read_values(places: &Places, list: Option<usize>, files: &[ValueFile]) -> Result<AttributeValues, SourceError> {
     let mut values = AttributeValues::new();
     for (file, at) in files.iter().zip(places.elements(list)) {
@@ -219,6 +235,12 @@ fn named(error: &EditError) -> &'static str {
 /// Names that are allowed for a field at its place; `None` where any name is allowed, and in rigs, which are templates.
 fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
     let above = |field: &Field| field.parent.map(|parent| &fields[parent]);
+    let mut whole: Vec<&str> =
+        std::iter::successors(above(field), |field| above(field)).map(|field| field.name).collect();
+    whole.reverse();
+    if let ["rigs", "clips", rest @ ..] = &whole[..] {
+        return clip_fields(rest);
+    }
     let mut path = [""; 3];
     let mut parents = std::iter::successors(above(field), |field| above(field));
     for (name, parent) in path.iter_mut().zip(&mut parents) {
@@ -231,7 +253,7 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
     match (field.depth, path) {
         (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "view", "journal"]),
         (3, ["meshes", "", ""]) => Some(&["uid", "rig", "path", "hash", "nodes"]),
-        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses"]),
+        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips"]),
         (5, ["skins", "rigs", ""]) => Some(&["mesh", "path", "hash", "at_rest"]),
         (5, ["pose", "rigs", ""]) => Some(OFFSET),
         (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets", "values"]),

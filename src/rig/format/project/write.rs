@@ -5,7 +5,9 @@ use std::fmt::Write;
 use super::{FORMAT, Project, ProjectRig, ProjectView};
 use crate::rig::{
     Rig,
+    animation::NodeNames,
     format::{
+        animation::write_clips,
         poses::{write_offsets, write_stored_poses, write_values},
         scan,
     },
@@ -20,7 +22,7 @@ pub fn write_project(project: &Project) -> String {
 }
 
 fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
-    let format = if project.rigs.iter().any(|entry| needs_values(&entry.rig)) { FORMAT } else { 1 };
+    let format = project.rigs.iter().map(|entry| needed_format(&entry.rig)).max().unwrap_or(1);
     writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
     writeln!(out, "    meshes: [")?;
     for mesh in &project.meshes {
@@ -67,14 +69,25 @@ fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
     write_values(out, entry.rig.attribute_values(), "            ")?;
     writeln!(out, "            poses: [")?;
     write_stored_poses(out, &entry.rig, "                ")?;
-    writeln!(out, "            ],\n        ),")
+    writeln!(out, "            ],")?;
+    if !entry.rig.clips().is_empty() {
+        writeln!(out, "            clips: [")?;
+        write_clips(out, entry.rig.clips(), &NodeNames::of(&entry.rig, None), "                ")?;
+        writeln!(out, "            ],")?;
+    }
+    writeln!(out, "        ),")
 }
 
-/// True if the rig's poses have content that format 1 cannot hold.
-fn needs_values(rig: &Rig) -> bool {
-    !rig.attribute_values().is_empty()
+/// The first format that can hold the rig's poses and clips.
+fn needed_format(rig: &Rig) -> u32 {
+    let needs_values = !rig.attribute_values().is_empty()
         || rig.stored_poses().iter().any(|pose| !pose.values.is_empty())
-        || rig.pose().keys().any(|node| rig.joint(*node).is_none())
+        || rig.pose().keys().any(|node| rig.joint(*node).is_none());
+    match (rig.clips().is_empty(), needs_values) {
+        (false, _) => FORMAT,
+        (true, true) => 2,
+        (true, false) => 1,
+    }
 }
 
 /// Writes the text of a template with indentation. Parameters of modules stay unchanged, because a line break in them

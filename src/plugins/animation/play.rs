@@ -1,0 +1,322 @@
+//! Systems that play clips.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bevy::{math::Vec4, prelude::*};
+
+use super::{AutoKey, ClipPlayer, MarkerReached, RigClips, RootMotion};
+use crate::{
+    plugins::{
+        document::{JointEntities, ShowRest},
+        runtime::{ControlPose, InstanceMode, RigRuntime},
+        schema::Attributes,
+    },
+    rig::{
+        PoseOffset, RestTransform, Rig, Uid,
+        animation::{ClipSampler, Property, RigClip, SampleCursor, TrackTarget},
+    },
+};
+
+/// Most times that a clip ends in one frame.
+const LAPS: usize = 16;
+
+/// The clip that a player plays, compiled.
+#[derive(Component, Debug, Default)]
+pub struct PlayedClip {
+    compiled: Option<Compiled>,
+    /// Time up to which markers were told.
+    told: Option<f32>,
+    is_due: bool,
+}
+
+#[derive(Debug)]
+struct Compiled {
+    clip: Arc<RigClip>,
+    sampler: ClipSampler,
+    cursor: SampleCursor,
+    values: Vec<Vec4>,
+    nodes: Vec<PlayedNode>,
+}
+
+/// Node with the places of its values.
+#[derive(Debug)]
+struct PlayedNode {
+    uid: Uid,
+    translation: Option<usize>,
+    rotation: Option<usize>,
+    scale: Option<usize>,
+    attributes: Vec<(String, usize)>,
+}
+
+/// Compiles clips that are new or that were changed.
+pub(super) fn compile(
+    mut players: Query<(
+        Ref<ClipPlayer>,
+        &mut PlayedClip,
+        Option<Ref<Rig>>,
+        Option<Ref<RigClips>>,
+        Option<Ref<ShowRest>>,
+    )>,
+) {
+    for (player, mut played, rig, clips, rest) in &mut players {
+        let is_new = rig.as_ref().is_some_and(Ref::is_changed) || clips.as_ref().is_some_and(Ref::is_changed);
+        played.is_due |= player.is_changed() || is_new || rest.is_some_and(|rest| rest.is_changed());
+        let known = played.compiled.as_ref().map(|compiled| compiled.clip.uid);
+        if known == Some(player.clip) && !is_new {
+            continue;
+        }
+        let of_rig = rig.as_ref().and_then(|rig| rig.clip(player.clip));
+        let given = || clips.as_ref().and_then(|clips| clips.0.iter().find(|clip| clip.uid == player.clip));
+        let Some(clip) = of_rig.or_else(given) else {
+            played.compiled = None;
+            continue;
+        };
+        if played.compiled.as_ref().is_some_and(|compiled| *compiled.clip == *clip) {
+            continue;
+        }
+        if known != Some(player.clip) {
+            played.told = None;
+        }
+        played.compiled = Some(Compiled::new(clip));
+    }
+}
+
+impl Compiled {
+    fn new(clip: &RigClip) -> Self {
+        let sampler = ClipSampler::new(clip);
+        let mut nodes: BTreeMap<Uid, PlayedNode> = BTreeMap::new();
+        for (place, TrackTarget { node, property }) in sampler.targets().iter().enumerate() {
+            let none = || PlayedNode { uid: *node, translation: None, rotation: None, scale: None, attributes: vec![] };
+            let played = nodes.entry(*node).or_insert_with(none);
+            match property {
+                Property::Translation => played.translation = Some(place),
+                Property::Rotation => played.rotation = Some(place),
+                Property::Scale => played.scale = Some(place),
+                Property::Attribute(name) => played.attributes.push((name.clone(), place)),
+            }
+        }
+        let values = vec![Vec4::ZERO; sampler.targets().len()];
+        let (cursor, nodes) = (sampler.cursor(), nodes.into_values().collect());
+        Self { clip: Arc::new(clip.clone()), sampler, cursor, values, nodes }
+    }
+}
+
+/// Moves time on, tells markers, and writes the pose to the entities.
+pub(super) fn play(
+    mut players: Query<(
+        Entity,
+        &mut ClipPlayer,
+        &mut PlayedClip,
+        Option<&mut RootMotion>,
+        Option<&RigRuntime>,
+        Option<&Rig>,
+        Option<&JointEntities>,
+        Option<&ShowRest>,
+    )>,
+    mut transforms: Query<&mut Transform>,
+    mut poses: Query<&mut ControlPose>,
+    mut attributes: Query<&mut Attributes>,
+    time: Res<Time>,
+    mut commands: Commands,
+) {
+    for (entity, mut player, mut played, mut motion, runtime, rig, joints, rest) in &mut players {
+        let PlayedClip { compiled, told, is_due } = played.bypass_change_detection();
+        if let Some(motion) = &mut motion
+            && motion.delta != Transform::IDENTITY
+        {
+            motion.delta = Transform::IDENTITY;
+        }
+        let Some(compiled) = compiled else { continue };
+        let clip = Arc::clone(&compiled.clip);
+        if player.playing {
+            let from = player.time;
+            let spans = advance(&mut player, &clip, time.delta_secs());
+            if told.is_none() {
+                tell(entity, &clip, [from; 2], true, &mut commands);
+            }
+            for span in &spans {
+                tell(entity, &clip, *span, false, &mut commands);
+                let Some(motion) = &mut motion else { continue };
+                let Some(base) = base_of(motion.node, runtime, rig) else { continue };
+                let step = travelled(&clip, motion.node, &base, span[0]).inverse()
+                    * travelled(&clip, motion.node, &base, span[1]);
+                motion.delta = Transform::from_isometry(motion.delta.to_isometry() * step);
+            }
+            *told = Some(player.time);
+        } else if !std::mem::take(is_due) {
+            continue;
+        }
+        *is_due = false;
+        // A rig that is shown at rest waits for its pose.
+        if rest.is_some_and(|rest| rest.0) {
+            continue;
+        }
+        let Compiled { sampler, cursor, values, nodes, .. } = compiled;
+        sampler.sample(player.time, cursor, values);
+        let held = motion.as_ref().map(|motion| motion.node);
+        for node in nodes.iter() {
+            let Some(place) = NodePlace::of(node.uid, runtime, rig, joints) else { continue };
+            let mut offset = place.offset;
+            let vector = |at: usize| values[at].truncate();
+            offset.translation = node.translation.map_or(offset.translation, vector);
+            offset.rotation = node.rotation.map_or(offset.rotation, |at| Quat::from_vec4(values[at]));
+            offset.scale = node.scale.map_or(offset.scale, vector);
+            if held == Some(node.uid) {
+                let start = clip_offset(&clip, node.uid, clip.range[0]);
+                (offset.translation, offset.rotation) = (start.translation, start.rotation);
+            }
+            let is_posed = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
+            if is_posed && place.is_posable {
+                if place.is_direct {
+                    if let Ok(mut pose) = poses.get_mut(place.entity) {
+                        pose.set_if_neq(offset.into());
+                    }
+                } else if let Ok(mut transform) = transforms.get_mut(place.entity) {
+                    transform.set_if_neq(offset.on(&place.base));
+                }
+            }
+            if !node.attributes.is_empty()
+                && let Ok(mut told) = attributes.get_mut(place.entity)
+            {
+                for (name, at) in &node.attributes {
+                    if let Some(known) = told.0.get(name).copied().filter(|known| *known != values[*at].x) {
+                        debug_assert!(known.is_finite());
+                        told.0.insert(name.clone(), values[*at].x);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Entity of a node, with what its pose is told by.
+struct NodePlace {
+    entity: Entity,
+    base: RestTransform,
+    offset: PoseOffset,
+    is_direct: bool,
+    is_posable: bool,
+}
+
+impl NodePlace {
+    fn of(node: Uid, runtime: Option<&RigRuntime>, rig: Option<&Rig>, joints: Option<&JointEntities>) -> Option<Self> {
+        if let Some(runtime) = runtime {
+            let slot = runtime.state().program().node(node)?;
+            let found = &runtime.state().program().nodes()[slot];
+            return Some(Self {
+                entity: runtime.entity(slot)?,
+                base: rest_of(&found.base),
+                offset: runtime.state().offset_at(slot),
+                is_direct: runtime.mode() == InstanceMode::Direct,
+                is_posable: found.is_posable(),
+            });
+        }
+        let rig = rig?;
+        Some(Self {
+            entity: joints?.get(node)?,
+            base: rig.joint(node)?.data.rest,
+            offset: rig.offset(node).copied().unwrap_or_default(),
+            is_direct: false,
+            is_posable: true,
+        })
+    }
+}
+
+pub(super) fn rest_of(base: &crate::mesh::model::Trs) -> RestTransform {
+    RestTransform { translation: base.translation, rotation: base.rotation, scale: base.scale }
+}
+
+fn base_of(node: Uid, runtime: Option<&RigRuntime>, rig: Option<&Rig>) -> Option<RestTransform> {
+    match runtime {
+        Some(runtime) => {
+            let program = runtime.state().program();
+            Some(rest_of(&program.nodes()[program.node(node)?].base))
+        }
+        None => Some(rig?.joint(node)?.data.rest),
+    }
+}
+
+fn clip_offset(clip: &RigClip, node: Uid, time: f32) -> PoseOffset {
+    let value = |property: Property| {
+        let target = TrackTarget { node, property };
+        clip.value(&target, time).unwrap_or_else(|| target.property.rest())
+    };
+    let [x, y, z, _] = value(Property::Translation);
+    PoseOffset {
+        translation: Vec3::new(x, y, z),
+        rotation: Quat::from_array(value(Property::Rotation)),
+        ..PoseOffset::IDENTITY
+    }
+}
+
+/// Way of a node from the start of a clip to a time, in its parent's space.
+fn travelled(clip: &RigClip, node: Uid, base: &RestTransform, time: f32) -> Isometry3d {
+    let at = |time: f32| {
+        let posed = clip_offset(clip, node, time).on(base);
+        Isometry3d::new(posed.translation, posed.rotation)
+    };
+    at(time) * at(clip.range[0]).inverse()
+}
+
+/// Moves a player's time on; returns the spans of the clip that it passed.
+fn advance(player: &mut ClipPlayer, clip: &RigClip, seconds: f32) -> Vec<[f32; 2]> {
+    let [start, end] = clip.range;
+    let mut left = seconds * player.speed;
+    if !left.is_finite() || left == 0.0 {
+        return Vec::new();
+    }
+    let mut spans = Vec::new();
+    let mut at = player.time.clamp(start, end);
+    let (limit, begin) = if left > 0.0 { (end, start) } else { (start, end) };
+    for lap in 0..=LAPS {
+        let room = limit - at;
+        if left.abs() < room.abs() {
+            spans.push([at, at + left]);
+            player.time = at + left;
+            return spans;
+        }
+        spans.push([at, limit]);
+        if !player.looped || end <= start {
+            player.time = limit;
+            player.playing = false;
+            return spans;
+        }
+        left -= room;
+        at = begin;
+        if lap == LAPS {
+            left %= end - start;
+        }
+        if left == 0.0 {
+            break;
+        }
+    }
+    player.time = at;
+    spans
+}
+
+/// Tells the markers of a span: behind its begin, up to its end. At the first frame also the one at the begin.
+fn tell(entity: Entity, clip: &RigClip, [from, to]: [f32; 2], is_first: bool, commands: &mut Commands) {
+    let is_in = |time: f32| {
+        if is_first {
+            time == from
+        } else if from <= to {
+            // A lap begins at the start of the clip, which belongs to it.
+            time > from && time <= to
+        } else {
+            time < from && time >= to
+        }
+    };
+    for marker in clip.markers.iter().filter(|marker| is_in(marker.time)) {
+        let (clip, name, time) = (clip.uid, marker.name.clone(), marker.time);
+        commands.trigger(MarkerReached { entity, clip, name, time });
+    }
+}
+
+/// Keeps the time at which poses set keys with the player of the same clip.
+pub(super) fn follow_player(mut rigs: Query<(&ClipPlayer, &mut AutoKey), Changed<ClipPlayer>>) {
+    for (player, mut auto_key) in &mut rigs {
+        if player.clip == auto_key.clip && player.time != auto_key.time {
+            auto_key.time = player.time;
+        }
+    }
+}

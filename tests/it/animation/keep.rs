@@ -1,0 +1,122 @@
+//! Motion that survives changes of the rig.
+
+use std::{collections::HashSet, sync::Arc};
+
+use bevy::math::{EulerRot, Quat};
+use rigsmith::{
+    modules,
+    processor::{ClipNote, keep_clips},
+    rig::{NodeType, Rig, RigEdit, Uid, animation::RigClip},
+    solve::{
+        program::{RigProgram, RigState},
+        weights::{multiply, relative},
+    },
+};
+
+use super::{CLIP, animated, apply, program};
+
+/// Metres and degrees.
+const NEAR: (f32, f32) = (1e-4, 0.05);
+
+fn state(program: &Arc<RigProgram>, clip: Option<&RigClip>, time: f32) -> RigState {
+    let mut state = RigState::new(program.clone());
+    if let Some(clip) = clip {
+        let pose = clip.sample(time);
+        for (node, offset) in pose.offsets {
+            let _ = state.set_offset(node, offset);
+        }
+        for (node, values) in pose.values {
+            for (name, value) in values {
+                let _ = state.set_attribute(node, &name, value);
+            }
+        }
+    }
+    state.evaluate(0.0);
+    state
+}
+
+/// Largest distance and angle of joints, over all keys and frames, that are not listed; with the clip as it was, and kept.
+fn check(what: &str, before: &Rig, after: &Rig, most_listed: usize) -> Rig {
+    let mut kept = after.clone();
+    let notes: Vec<ClipNote> = keep_clips(before, &mut kept, &Arc::new(modules::all())).unwrap();
+    let listed: HashSet<Uid> = notes.iter().map(|note| note.deviation.joint).collect();
+    assert!(listed.len() <= most_listed, "{what}: {} joints are listed: {notes:?}", listed.len());
+    let (from, to) = (program(before), program(after));
+    let (rest_before, rest_after) = (state(&from, None, 0.0), state(&to, None, 0.0));
+    let clip = before.clip(CLIP).unwrap();
+    let frames = (0..=60).map(|frame| frame as f32 / clip.frame_rate).chain(clip.key_times());
+    let mut plain = (0.0f32, 0.0f32);
+    for time in frames {
+        let was = state(&from, Some(clip), time);
+        for rig in [&kept, after] {
+            let is = state(&to, rig.clip(CLIP), time);
+            for (slot, node) in to.nodes().iter().enumerate().filter(|(_, node)| node.kind == NodeType::Joint) {
+                let Some(known) = from.node(node.uid) else { continue };
+                let turned = relative(rest_before.global_at(known), rest_after.global_at(slot));
+                let (now, wanted) = (is.global_at(slot), multiply(was.global_at(known), &turned));
+                let distance = now.translation.distance(wanted.translation);
+                let chord = (now.rotation.conjugate() * wanted.rotation).xyz().length().min(1.0);
+                let angle = (chord.asin() * 2.0).to_degrees();
+                if !std::ptr::eq(rig, &kept) {
+                    plain = (plain.0.max(distance), plain.1.max(angle));
+                } else if !listed.contains(&node.uid) {
+                    assert!(
+                        distance <= NEAR.0 && angle <= NEAR.1,
+                        "{what}, {time} s: {:?} is off by {distance} m and {angle}°",
+                        node.label
+                    );
+                }
+            }
+        }
+    }
+    assert!(plain.0 > NEAR.0 || plain.1 > NEAR.1, "{what}: the change moves nothing");
+    kept
+}
+
+/// Turns a joint's axes; what hangs on it stays where it is.
+fn flip(rig: &mut Rig, label: &str, turn: Quat) {
+    let joint = rig.find_label(label).unwrap();
+    let children: Vec<_> = rig.children(Some(joint)).iter().map(|child| (*child, rig.rest_global(*child))).collect();
+    let mut rest = rig.joint(joint).unwrap().data.rest;
+    rest.rotation = (rest.rotation * turn).normalize();
+    apply(rig, RigEdit::SetRest(joint, rest));
+    for (child, global) in children {
+        let rest = rig.local_rest(Some(joint), &global);
+        apply(rig, RigEdit::SetRest(child, rest));
+    }
+}
+
+#[test]
+fn names_and_groups_leave_clips_alone() {
+    let before = animated();
+    let mut after = before.clone();
+    let hand = after.find_label("hand_l").unwrap();
+    apply(&mut after, RigEdit::SetLabel(hand, Some("fist_l".into())));
+    apply(&mut after, RigEdit::SetGroup(hand, None));
+    let mut kept = after.clone();
+    assert!(keep_clips(&before, &mut kept, &Arc::new(modules::all())).unwrap().is_empty());
+    assert_eq!(kept, after);
+}
+
+#[test]
+fn flipped_axes_hold_the_motion() {
+    let before = animated();
+    let mut after = before.clone();
+    for label in ["spine_1", "forearm_l", "hand_r", "head"] {
+        flip(&mut after, label, Quat::from_euler(EulerRot::XYZ, 0.0, std::f32::consts::PI, 0.0));
+    }
+    let kept = check("flipped axes", &before, &after, 8);
+    assert_ne!(kept.clips(), after.clips());
+}
+
+#[test]
+fn another_parent_holds_the_motion() {
+    let before = animated();
+    let mut after = before.clone();
+    let [clavicle, spine] = ["clavicle_l", "spine_1"].map(|label| after.find_label(label).unwrap());
+    let global = after.rest_global(clavicle);
+    apply(&mut after, RigEdit::SetParent { joint: clavicle, parent: Some(spine), index: usize::MAX });
+    let rest = after.local_rest(Some(spine), &global);
+    apply(&mut after, RigEdit::SetRest(clavicle, rest));
+    check("a clavicle below another joint", &before, &after, 0);
+}

@@ -1,0 +1,171 @@
+//! Random edits of an animated character: keys of nodes that live are as they were set, and undo brings back the first bytes.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bevy::math::{Quat, Vec3};
+use rigsmith::{
+    modules,
+    plugins::{document::Selection, history::RigHistory},
+    processor::Builder,
+    rig::{
+        GroupData, PoseOffset, Rig, RigEdit, Uid, UidSource,
+        animation::{Key, NodeNames, Property, TrackTarget, orphaned_keys},
+        operations::{ClipOperation, KeyOperation, Operation},
+        project::{Project, ProjectRig, write_project},
+        update::{Take, clip_edits, edits_between, update},
+    },
+};
+
+use super::{BASE, CLIP, Random, animated, share, target};
+
+/// Keys of the base layer by target and time, as they are expected.
+type Expected = BTreeMap<TrackTarget, BTreeMap<u32, Key>>;
+
+fn keys_of(rig: &Rig) -> Expected {
+    let layer = &rig.clip(CLIP).unwrap().layers[0];
+    let of = |key: &Key| (key.time.to_bits(), *key);
+    layer.tracks.iter().map(|(target, track)| (target.clone(), track.keys.iter().map(of).collect())).collect()
+}
+
+fn bytes(rig: &Rig) -> String {
+    write_project(&Project { rigs: vec![ProjectRig { rig: rig.clone(), skins: Vec::new() }], ..Default::default() })
+}
+
+/// A change of the rig that is no change of its keys.
+fn deed(rig: &Rig, random: &mut Random) -> Operation {
+    let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+    let (one, other) = (random.pick(&joints), random.pick(&joints));
+    let edits = |edits| Operation::Named { name: "deed", edits };
+    match random.below(8) {
+        0 => Operation::Labels(vec![(one, format!("joint {}", random.below(1000)))]),
+        1 => edits(vec![RigEdit::SetParent { joint: one, parent: Some(other), index: random.below(3) }]),
+        2 => {
+            let group =
+                GroupData { uid: Uid(random.next()), name: "g".into(), color: [0.5; 3], enabled: random.chance(2) };
+            edits(vec![RigEdit::AddLocalGroup(group.clone(), 0), RigEdit::SetGroup(one, Some(group.uid))])
+        }
+        3 => Operation::Pose(vec![(one, PoseOffset::from_rotation(Quat::from_rotation_x(share(random))))]),
+        4 => Operation::Move { to: vec![(one, Vec3::new(share(random), 1.0, 0.0))], with_children: true },
+        5 => {
+            let tags = rig.joint(one).map_or(&[][..], |joint| joint.data.tags.as_slice());
+            let off = tags.iter().map(|tag| {
+                let mut tag = tag.clone();
+                tag.enabled = !tag.enabled;
+                RigEdit::SetTag(one, Box::new(tag))
+            });
+            edits(off.take(1).collect())
+        }
+        6 if random.chance(6) => Operation::Delete { joints: vec![one], keep_children: true },
+        // An update to a version with another place of a joint.
+        _ => {
+            let mut file = rig.clone();
+            let mut rest = rig.joint(one).map(|joint| joint.data.rest).unwrap_or_default();
+            rest.translation += Vec3::splat(share(random) * 0.01);
+            file.apply(&RigEdit::SetRest(one, rest)).unwrap();
+            for clip in rig.clips() {
+                file.apply(&RigEdit::RemoveClip(clip.uid)).unwrap();
+            }
+            let updated = update(Some(rig), rig, &file, Take::Theirs);
+            let mut list = edits_between(rig, &updated.rig).unwrap();
+            list.extend(clip_edits(rig, &updated.rig).unwrap());
+            edits(list)
+        }
+    }
+}
+
+/// A change of keys, with what is expected after it.
+fn change(random: &mut Random, rig: &Rig, expected: &mut Expected) -> Operation {
+    let targets: Vec<TrackTarget> = expected.keys().cloned().collect();
+    let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+    let fresh = || target(Uid(0), Property::Rotation);
+    let mut at = if targets.is_empty() { fresh() } else { random.pick(&targets) };
+    if random.chance(4) && !joints.is_empty() {
+        at = target(random.pick(&joints), Property::Rotation);
+    }
+    let known: Vec<Key> = expected.get(&at).map(|keys| keys.values().copied().collect()).unwrap_or_default();
+    let own = expected.entry(at.clone()).or_default();
+    let change = match random.below(3) {
+        0 if !known.is_empty() => {
+            let key = random.pick(&known);
+            own.remove(&key.time.to_bits());
+            KeyOperation::Delete([(at.clone(), vec![key.time])].into())
+        }
+        1 if !known.is_empty() => {
+            let (key, by) = (random.pick(&known), random.below(64) as f32 / 32.0);
+            own.remove(&key.time.to_bits());
+            own.insert((key.time + by).to_bits(), Key { time: key.time + by, ..key });
+            KeyOperation::Move { keys: [(at.clone(), vec![key.time])].into(), by }
+        }
+        _ => {
+            let time = random.below(64) as f32 / 32.0;
+            let value = Quat::from_rotation_y(share(random));
+            let key = match at.property {
+                Property::Rotation => Key::rotation(time, value),
+                Property::Attribute(_) => Key::number(time, value.y),
+                Property::Translation | Property::Scale => Key::vector(time, Vec3::splat(value.y)),
+            };
+            own.insert(time.to_bits(), key);
+            KeyOperation::Set(vec![(at.clone(), vec![key])])
+        }
+    };
+    expected.retain(|_, keys| !keys.is_empty());
+    Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: BASE, change })
+}
+
+#[test]
+fn keys_live_through_random_deeds_and_undo_brings_back_the_first_bytes() {
+    let steps: usize = std::env::var("RIGSMITH_STEPS").ok().and_then(|count| count.parse().ok()).unwrap_or(1000);
+    let modules = Arc::new(modules::all());
+    let mut rig = animated();
+    let first = bytes(&rig);
+    let (mut history, mut selection, mut uids) = (RigHistory::default(), Selection::default(), UidSource::seeded(2));
+    let mut random = Random::new(2026);
+    // What is expected after each step in effect, and what was before the first.
+    let mut expected: Vec<Expected> = vec![keys_of(&rig)];
+    let mut undone: Vec<Expected> = Vec::new();
+    let (mut built, mut orphaned) = (0, 0);
+    let mut known = NodeNames::default();
+    for step in 0..steps {
+        let now = expected.last().unwrap().clone();
+        match random.below(10) {
+            0 | 1 if expected.len() > 1 => {
+                history.undo(&mut rig, &mut selection).unwrap().unwrap();
+                undone.extend(expected.pop());
+            }
+            2 if !undone.is_empty() => {
+                history.redo(&mut rig, &mut selection).unwrap().unwrap();
+                expected.extend(undone.pop());
+            }
+            kind => {
+                let mut next = now.clone();
+                let operation = if kind < 6 { change(&mut random, &rig, &mut next) } else { deed(&rig, &mut random) };
+                // A refused operation changes nothing, and one without effect is no step.
+                let done = history.edit(&mut rig, &mut selection, &mut uids, None, &operation);
+                if done.is_ok_and(|recorded| recorded.step.is_some()) {
+                    expected.push(next);
+                    undone.clear();
+                }
+            }
+        }
+        assert_eq!(keys_of(&rig), *expected.last().unwrap(), "step {step}");
+        if step % 100 == 0 {
+            let result = Builder::build(&rig, &modules).ok();
+            built += usize::from(result.is_some());
+            known.extend(&NodeNames::of(&rig, result.as_ref()));
+            let there = NodeNames::of(&rig, result.as_ref());
+            let gone = rig.clip(CLIP).unwrap().nodes().into_iter().filter(|node| !there.0.contains_key(node));
+            let mut listed: Vec<Uid> =
+                orphaned_keys(&rig, result.as_ref(), &known).iter().map(|orphan| orphan.node).collect();
+            listed.sort_unstable();
+            listed.dedup();
+            assert_eq!(listed, gone.collect::<Vec<_>>(), "step {step}");
+            orphaned += listed.len();
+        }
+    }
+    assert!(built > 0 && expected.len() > steps / 10, "{built} builds, {} steps in effect", expected.len());
+    assert!(orphaned > 0, "commands that are off leave keys of their nodes");
+    while history.steps().1 > 0 {
+        history.undo(&mut rig, &mut selection).unwrap().unwrap();
+    }
+    assert_eq!(bytes(&rig), first);
+}
