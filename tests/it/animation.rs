@@ -269,7 +269,7 @@ fn updates_leave_clips_alone() {
     let mut file = base.clone();
     let hand = file.find_label("hand_l").unwrap();
     apply(&mut file, RigEdit::SetLabel(hand, Some("fist_l".into())));
-    let below: Vec<Uid> = file.hierarchy(file.find_label("thumb_01_l").unwrap()).map(|joint| joint.data.uid).collect();
+    let below: Vec<Uid> = file.hierarchy(file.find_label("index_02_l").unwrap()).map(|joint| joint.data.uid).collect();
     for joint in below.iter().rev() {
         apply(&mut file, RigEdit::RemoveJoint(*joint));
     }

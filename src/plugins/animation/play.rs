@@ -132,14 +132,14 @@ pub(super) fn play(
             let from = player.time;
             let spans = advance(&mut player, &clip, time.delta_secs());
             if told.is_none() {
-                tell(entity, &clip, [from; 2], true, &mut commands);
+                tell(entity, &clip, &Span { from, to: from, is_whole: true }, &mut commands);
             }
             for span in &spans {
-                tell(entity, &clip, *span, false, &mut commands);
+                tell(entity, &clip, span, &mut commands);
                 let Some(motion) = &mut motion else { continue };
                 let Some(base) = base_of(motion.node, runtime, rig) else { continue };
-                let step = travelled(&clip, motion.node, &base, span[0]).inverse()
-                    * travelled(&clip, motion.node, &base, span[1]);
+                let step = travelled(&clip, motion.node, &base, span.from).inverse()
+                    * travelled(&clip, motion.node, &base, span.to);
                 motion.delta = Transform::from_isometry(motion.delta.to_isometry() * step);
             }
             *told = Some(player.time);
@@ -179,9 +179,9 @@ pub(super) fn play(
                 && let Ok(mut told) = attributes.get_mut(place.entity)
             {
                 for (name, at) in &node.attributes {
-                    if let Some(known) = told.0.get(name).copied().filter(|known| *known != values[*at].x) {
-                        debug_assert!(known.is_finite());
-                        told.0.insert(name.clone(), values[*at].x);
+                    let value = values[*at].x;
+                    if told.0.get(name).is_some_and(|known| *known != value) {
+                        told.0.insert(name.clone(), value);
                     }
                 }
             }
@@ -258,55 +258,54 @@ fn travelled(clip: &RigClip, node: Uid, base: &RestTransform, time: f32) -> Isom
     at(time) * at(clip.range[0]).inverse()
 }
 
+/// Span of a clip that playback passed.
+struct Span {
+    from: f32,
+    to: f32,
+    /// True if the span contains the moment at which it begins.
+    is_whole: bool,
+}
+
 /// Moves a player's time on; returns the spans of the clip that it passed.
-fn advance(player: &mut ClipPlayer, clip: &RigClip, seconds: f32) -> Vec<[f32; 2]> {
+fn advance(player: &mut ClipPlayer, clip: &RigClip, seconds: f32) -> Vec<Span> {
     let [start, end] = clip.range;
     let mut left = seconds * player.speed;
     if !left.is_finite() || left == 0.0 {
         return Vec::new();
     }
     let mut spans = Vec::new();
-    let mut at = player.time.clamp(start, end);
+    let mut from = player.time.clamp(start, end);
     let (limit, begin) = if left > 0.0 { (end, start) } else { (start, end) };
-    for lap in 0..=LAPS {
-        let room = limit - at;
+    for lap in 0..LAPS {
+        let (room, is_whole) = (limit - from, lap > 0);
         if left.abs() < room.abs() {
-            spans.push([at, at + left]);
-            player.time = at + left;
+            player.time = from + left;
+            spans.push(Span { from, to: player.time, is_whole });
             return spans;
         }
-        spans.push([at, limit]);
+        spans.push(Span { from, to: limit, is_whole });
         if !player.looped || end <= start {
             player.time = limit;
             player.playing = false;
             return spans;
         }
         left -= room;
-        at = begin;
-        if lap == LAPS {
-            left %= end - start;
-        }
-        if left == 0.0 {
-            break;
-        }
+        from = begin;
     }
-    player.time = at;
+    // So many laps in one frame are as good as none.
+    player.time = begin + left % (end - start);
     spans
 }
 
-/// Tells the markers of a span: behind its begin, up to its end. At the first frame also the one at the begin.
-fn tell(entity: Entity, clip: &RigClip, [from, to]: [f32; 2], is_first: bool, commands: &mut Commands) {
-    let is_in = |time: f32| {
-        if is_first {
-            time == from
-        } else if from <= to {
-            // A lap begins at the start of the clip, which belongs to it.
-            time > from && time <= to
-        } else {
-            time < from && time >= to
-        }
-    };
-    for marker in clip.markers.iter().filter(|marker| is_in(marker.time)) {
+/// Tells the markers of a span.
+fn tell(entity: Entity, clip: &RigClip, span: &Span, commands: &mut Commands) {
+    let (low, high) = (span.from.min(span.to), span.from.max(span.to));
+    let is_in = |time: f32| (low..=high).contains(&time) && (span.is_whole || time != span.from);
+    let mut reached: Vec<_> = clip.markers.iter().filter(|marker| is_in(marker.time)).collect();
+    if span.to < span.from {
+        reached.reverse();
+    }
+    for marker in reached {
         let (clip, name, time) = (clip.uid, marker.name.clone(), marker.time);
         commands.trigger(MarkerReached { entity, clip, name, time });
     }

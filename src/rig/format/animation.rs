@@ -93,10 +93,6 @@ pub fn read_animation(bytes: &[u8]) -> Result<ReadAnimation, SourceError> {
         std::borrow::Cow::Borrowed(text)
     };
     let file: AnimationFile = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
-    if file._format == 0 {
-        let at = text.find("format").unwrap_or_default();
-        return Err(SourceError::at(text, at, "format 0 was never released; the first is format: 1"));
-    }
     let mut names = NodeNames::default();
     let clips = file::clips(file.clips, &mut names).map_err(|(place, message)| {
         SourceError::at(text, file::offset(text, &[], &place).unwrap_or_default(), message)

@@ -222,7 +222,7 @@ fn markers_are_told_once_each_lap() {
     }
     let names =
         |app: &App| app.world().resource::<Markers>().0.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    assert_eq!(names(&app), ["start", "left", "right", "left", "right", "left"]);
+    assert_eq!(names(&app), ["start", "left", "right", "start", "left", "right", "start", "left"]);
     app.world_mut().resource_mut::<Markers>().0.clear();
     app.world_mut().entity_mut(entity).insert(ClipPlayer {
         time: 0.99,

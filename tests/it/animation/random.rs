@@ -55,7 +55,7 @@ fn deed(rig: &Rig, random: &mut Random) -> Operation {
             });
             edits(off.take(1).collect())
         }
-        6 if random.chance(6) => Operation::Delete { joints: vec![one], keep_children: true },
+        6 if random.chance(6) && joints.len() > 20 => Operation::Delete { joints: vec![one], keep_children: true },
         // An update to a version with another place of a joint.
         _ => {
             let mut file = rig.clone();

@@ -231,12 +231,12 @@ fn layer(file: LayerFile, place: &ClipPlace, names: &mut NodeNames) -> Result<Cl
         let place = ClipPlace { track: Some(number), ..place.clone() };
         let TrackFile { node, label, role, property, keys } = file;
         note(node, label, role);
-        let keys = read_keys(node, &property, keys, &place)?;
         let target = TrackTarget { node, property };
         if tracks.contains_key(&target) {
             let message = format!("the {} of {node} has two tracks in the layer; keep one of them", target.property);
             return Err((ClipPlace { field: "property", ..place }, message));
         }
+        let keys = read_keys(node, &target.property, keys, &place)?;
         if !keys.is_empty() {
             tracks.insert(target, Arc::new(Track { keys }));
         }

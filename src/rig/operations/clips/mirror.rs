@@ -7,7 +7,7 @@ use bevy::math::Mat3;
 use super::{KeyTimes, OperationError, keys::Changes, keys::selected};
 use crate::rig::{
     BuiltRig, Rig, Uid,
-    animation::{ClipLayer, Ease, Key, NodeNames},
+    animation::{ClipLayer, Ease, Key, KnownNode, NodeNames, Property, TrackTarget},
     label::mirrored_label,
     operations::{Draft, MirrorPlane, frame::Frame},
 };
@@ -30,8 +30,7 @@ pub(super) fn mirror(
         let other = pairs.get(&target.node).copied().unwrap_or(target.node);
         let (here, there) = (frame(target.node), frame(other));
         let mirrored = keys.iter().map(|key| carried(key, &target.property, (&here, &there), reflection));
-        changes
-            .insert(&crate::rig::animation::TrackTarget { node: other, property: target.property.clone() }, mirrored);
+        changes.insert(&TrackTarget { node: other, property: target.property.clone() }, mirrored);
     }
     Ok(())
 }
@@ -39,7 +38,7 @@ pub(super) fn mirror(
 /// A key with the same effect in another frame, mapped by `change`.
 pub(in crate::rig::operations) fn carried(
     key: &Key,
-    property: &crate::rig::animation::Property,
+    property: &Property,
     (here, there): (&Frame, &Frame),
     change: Mat3,
 ) -> Key {
@@ -55,13 +54,10 @@ pub(in crate::rig::operations) fn carried(
 fn partners(rig: &Rig, built: Option<&BuiltRig>) -> BTreeMap<Uid, Uid> {
     let mut pairs = BTreeMap::new();
     let names = NodeNames::of(rig, built);
-    let by_name: BTreeMap<_, _> = names.0.iter().map(|(uid, name)| (name, *uid)).collect();
     for (uid, name) in &names.0 {
-        let mut other = name.clone();
         let Some(label) = mirrored_label(&name.label) else { continue };
-        other.label = label;
-        if let Some(partner) = by_name.get(&other) {
-            pairs.insert(*uid, *partner);
+        if let Some(partner) = names.find(&KnownNode { label, role: name.role.clone() }) {
+            pairs.insert(*uid, partner);
         }
     }
     for joint in rig.walk() {

@@ -3,7 +3,7 @@
 use super::{KeyTimes, OperationError, find, keys::Changes, keys::selected};
 use crate::rig::{
     Uid,
-    animation::{ClipAbout, ClipLayer, Ease, Key, Marker, TrackTarget},
+    animation::{ClipAbout, ClipLayer, Ease, Key, Marker, Property, Track, TrackTarget},
     operations::Draft,
 };
 
@@ -78,8 +78,15 @@ pub(super) fn retime(draft: &mut Draft, uid: Uid, from: [f32; 2], to: [f32; 2]) 
         let mut changes = Changes::default();
         for (target, track) in &layer.tracks {
             changes.remove(target, track.keys.iter().map(|key| key.time));
+            let mut keys = track.keys.clone();
+            for time in from {
+                // Keys at the ends of the span keep the curves on both sides of it.
+                if let Some(key) = split(track, &target.property, time) {
+                    keys.push(key);
+                }
+            }
             let rate_at = |is_in: bool| if is_in { rate } else { 1.0 };
-            let next = track.keys.iter().map(|key| {
+            let next = keys.iter().map(|key| {
                 let before = rate_at(key.time > from[0] && key.time <= from[1]);
                 let behind = rate_at(key.time >= from[0] && key.time < from[1]);
                 stretched(key, map(key.time), before, behind)
@@ -89,6 +96,36 @@ pub(super) fn retime(draft: &mut Draft, uid: Uid, from: [f32; 2], to: [f32; 2]) 
         changes.apply(draft, uid, layer.uid)?;
     }
     Ok(())
+}
+
+/// The key that can be put between two keys of a track without a change of the curve; `None` where there is a key, or none
+/// on one of the sides. Cubic rotations are left whole.
+fn split(track: &Track, property: &Property, time: f32) -> Option<Key> {
+    let place = track.keys.partition_point(|key| key.time <= time);
+    let (from, to) = (track.keys.get(place.checked_sub(1)?)?, track.keys.get(place)?);
+    if from.time == time {
+        return None;
+    }
+    let value = track.sample(property, time)?;
+    let ease = match from.ease {
+        Ease::Cubic { .. } if *property == Property::Rotation => return None,
+        Ease::Cubic { leave, .. } => {
+            let arrive = match to.ease {
+                Ease::Cubic { arrive, .. } => arrive,
+                Ease::Stepped | Ease::Linear => [0.0; 4],
+            };
+            let span = to.time - from.time;
+            let share = (time - from.time) / span;
+            let tangent = std::array::from_fn(|axis| {
+                6.0 * share * (1.0 - share) * (to.value[axis] - from.value[axis]) / span
+                    + (3.0 * share * share - 4.0 * share + 1.0) * leave[axis]
+                    + (3.0 * share * share - 2.0 * share) * arrive[axis]
+            });
+            Ease::Cubic { arrive: tangent, leave: tangent }
+        }
+        ease => ease,
+    };
+    Some(Key { time, value, ease })
 }
 
 /// Linear keys at a rate in place of the keys of tracks.
