@@ -4,30 +4,31 @@
 //! The flesh around a joint turns about the joint. Where the section of the limb has its centre beside the joint, a bend by
 //! the angle `a` takes or adds the section's area times `a` times that distance, whatever the weights (Pappus). A half joint
 //! that leaves the bend on the outside makes up for it, and the right length depends on the body: it is measured here.
+//! Where that length would swell the mesh in another motion, the border between what moves and what stays is moved a little
+//! ([`blend`]), so that it encloses as much on both sides of the joint.
+
+mod blend;
+mod part;
+mod push;
 
 use std::{collections::BTreeMap, f32::consts::FRAC_PI_2};
 
-use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
+use glam::Vec3;
 
+use self::{
+    blend::Blend,
+    part::{Part, Pose},
+    push::push,
+};
 use super::WeightJoint;
 use crate::mesh::{adjacency, influences::keep_strongest, model::Weights};
 
-/// Loss of volume, as a share of a section, that is aimed at.
-const LOSS: f32 = 0.08;
-/// Gain of volume, as a share of a section, that is allowed where a joint turns aside.
-const SWELL: f32 = 0.55;
-/// Angle by which joints turn aside, in radians.
-const ASIDE: f32 = 1.0;
-/// Times that weights are smoothed where the mesh folds.
-const PASSES: usize = 24;
-/// Rounds of each pass.
-const ROUNDS: usize = 4;
+/// Rounds in which lengths are fitted to the weights and weights to the lengths.
+const ROUNDS: usize = 6;
 /// Rounds of smoothing of the weights around sockets, where a half joint that moves out would show every step of them.
 const SOFTEN: usize = 10;
 /// Share of a half joint from which on a place belongs to the flesh around its socket.
 const SOFT: f32 = 0.02;
-/// Triangles with less area than this share of their longest edge squared are slivers, whose direction means nothing.
-const SLIVER: f32 = 1e-3;
 /// Radius of the flesh that a bend concerns, in lengths of the longer of its two bones.
 const REACH: f32 = 1.2;
 
@@ -111,8 +112,8 @@ impl<'a> Flesh<'a> {
         flesh
     }
 
-    /// Smooths weights where the mesh folds when its joints bend, each by itself, and finds for each bend the least length,
-    /// within its limits, by which its half joint has to move outwards so that the mesh loses little; `None` where the mesh
+    /// Changes weights until the mesh neither folds nor loses much volume when its joints bend, each by itself, and finds for
+    /// each bend the least length, within its limits, by which its half joint has to move outwards; `None` where the mesh
     /// has no section around the joint. The order of the bends does not matter.
     pub fn settle(&mut self, bends: &[Bend]) -> Vec<Option<f32>> {
         let mut parts: Vec<Part> = bends.iter().map(|bend| Part::new(self, bend)).collect();
@@ -126,54 +127,35 @@ impl<'a> Flesh<'a> {
             let shares = part.shares.iter().zip(0..).filter(|([_, half], _)| *half > SOFT).map(|(_, place)| place);
             shares.collect::<Vec<u32>>()
         };
-        let region = self.around(sockets.flat_map(held), 0);
+        let mut region: Vec<u32> = sockets.flat_map(held).filter(|place| !self.fixed[*place as usize]).collect();
+        region.sort_unstable();
+        region.dedup();
         (0..SOFTEN).for_each(|_| self.smooth(&region));
         parts.iter_mut().for_each(|part| part.read(self, &region));
-        let first = pushes(self, &parts);
-        let pose =
-            |(bend, push): (&Bend, &Option<f32>)| Pose::new(bend, bend.axis, FRAC_PI_2, push.unwrap_or(bend.push[0]));
-        let poses: Vec<Pose> = bends.iter().zip(&first).map(pose).collect();
-        // Each bend changes the weights that it found; where two change one place, the place gets the mean of both.
-        let mut changes: BTreeMap<u32, Vec<Row>> = BTreeMap::new();
-        for (part, pose) in parts.iter().zip(&poses) {
-            for (place, row) in self.unfolded(part, pose) {
-                changes.entry(place).or_default().push(row);
+        for _ in 0..ROUNDS {
+            let lengths = pushes(self, &parts);
+            // Each bend changes the weights that it found; where two change one place, the place gets the mean of both.
+            let mut changes: BTreeMap<u32, Vec<Row>> = BTreeMap::new();
+            for (((bend, part), section), length) in bends.iter().zip(&parts).zip(&sections).zip(&lengths) {
+                let pose = Pose::new(bend, bend.axis, FRAC_PI_2, length.unwrap_or(bend.push[0]));
+                let mut blend = Blend::new(self, part);
+                if let Some(section) = section {
+                    blend.fill(&pose, *section);
+                }
+                blend.unfold(&pose);
+                blend.rows().into_iter().for_each(|(place, row)| changes.entry(place).or_default().push(row));
             }
-        }
-        let places: Vec<u32> = changes.keys().copied().collect();
-        for (place, rows) in changes {
-            let share = 1.0 / rows.len() as f32;
-            self.rows[place as usize] = mixed(rows.iter().map(|row| (row, share)));
-        }
-        parts.iter_mut().for_each(|part| part.read(self, &places));
-        pushes(self, &parts)
-    }
-
-    /// Rows with which the fewest triangles fold in a bend, of the places where smoothing changed them.
-    fn unfolded(&mut self, part: &Part, pose: &Pose) -> BTreeMap<u32, Row> {
-        let mut part = part.clone();
-        let (mut found, mut best) = (BTreeMap::new(), BTreeMap::new());
-        let mut least = usize::MAX;
-        for pass in 0..=PASSES {
-            let folds = part.folds(self, pose);
-            if folds.len() < least {
-                least = folds.len();
-                best = found.keys().map(|place| (*place, self.rows[*place as usize].clone())).collect();
-            }
-            if folds.is_empty() || pass == PASSES {
+            if changes.is_empty() {
                 break;
             }
-            let region = self.around(folds.iter().flat_map(|at| part.triangles[*at]), 1 + pass / 6);
-            for place in &region {
-                found.entry(*place).or_insert_with(|| self.rows[*place as usize].clone());
+            let places: Vec<u32> = changes.keys().copied().collect();
+            for (place, rows) in changes {
+                let share = 1.0 / rows.len() as f32;
+                self.rows[place as usize] = mixed(rows.iter().map(|row| (row, share)));
             }
-            (0..ROUNDS).for_each(|_| self.smooth(&region));
-            part.read(self, &region);
+            parts.iter_mut().for_each(|part| part.read(self, &places));
         }
-        for (place, row) in found {
-            self.rows[place as usize] = row;
-        }
-        best
+        pushes(self, &parts)
     }
 
     /// The weights of all points of the mesh.
@@ -190,22 +172,6 @@ impl<'a> Flesh<'a> {
             weights.push(row.iter().copied());
         }
         weights
-    }
-
-    /// Places within some edges of some places, sorted, without those that are fixed.
-    fn around(&self, places: impl Iterator<Item = u32>, edges: usize) -> Vec<u32> {
-        let mut region: Vec<u32> = places.collect();
-        for _ in 0..edges {
-            region.sort_unstable();
-            region.dedup();
-            let more: Vec<u32> =
-                region.iter().flat_map(|place| self.neighbours[*place as usize].iter().copied()).collect();
-            region.extend(more);
-        }
-        region.sort_unstable();
-        region.dedup();
-        region.retain(|place| !self.fixed[*place as usize]);
-        region
     }
 
     /// Moves the weights of some places half way to the mean of their neighbours.
@@ -296,156 +262,4 @@ fn mixed<'a>(rows: impl Iterator<Item = (&'a Row, f32)>) -> Row {
         is_same
     });
     row
-}
-
-/// The least push of a bend with which a mesh loses little, in limits.
-fn push(flesh: &Flesh, bend: &Bend, part: &Part, section: f32) -> Option<f32> {
-    let lost = |push: f32| part.lost(flesh, &Pose::new(bend, bend.axis, FRAC_PI_2, push)) / section;
-    let [least, mut most] = bend.push;
-    for (axis, angle) in bend.aside.into_iter().flat_map(|axis| [(axis, ASIDE), (axis, -ASIDE)]) {
-        let gained = |push: f32| -part.lost(flesh, &Pose::new(bend, axis, angle, push)) / section;
-        let (low, high) = (gained(least), gained(most));
-        let allowed = SWELL.max(low);
-        if high > allowed {
-            most = least + (most - least) * (allowed - low) / (high - low);
-        }
-    }
-    let (mut low, mut high) = ((least, lost(least)), (most, lost(most)));
-    if !(low.1.is_finite() && high.1.is_finite()) {
-        return None;
-    }
-    if low.1 <= LOSS {
-        return Some(least);
-    }
-    if high.1 >= LOSS {
-        return (high.1 < low.1).then_some(most);
-    }
-    // Volume is a polynomial of the third degree in the length, and nearly straight.
-    for _ in 0..4 {
-        let push = low.0 + (high.0 - low.0) * (low.1 - LOSS) / (low.1 - high.1);
-        let is = (push, lost(push));
-        if is.1 > LOSS { low = is } else { high = is }
-    }
-    let off = |end: (f32, f32)| (end.1 - LOSS).abs();
-    Some(if off(low) < off(high) { low.0 } else { high.0 })
-}
-
-/// Motions of the flesh in a bend about the joint; flesh above it stays.
-struct Pose {
-    lower: Affine3A,
-    half: Affine3A,
-}
-
-impl Pose {
-    fn new(bend: &Bend, axis: Vec3, angle: f32, push: f32) -> Self {
-        let length = push * bend.below.length();
-        let turn = Quat::from_axis_angle(axis, angle);
-        let share = Quat::from_axis_angle(axis, angle * bend.share);
-        let on = bend.above * length;
-        let back = bend.below.normalize_or_zero() * -length;
-        let (rest, posed) = (on.lerp(back, bend.share), on.lerp(turn * back, bend.share));
-        let half = Affine3A::from_rotation_translation(share, posed) * Affine3A::from_translation(-rest);
-        Self { lower: Affine3A::from_quat(turn), half }
-    }
-}
-
-/// Triangles that a bend concerns, with the shares of the bending and of the half joint at their corners.
-#[derive(Clone)]
-struct Part {
-    at: Vec3,
-    triangles: Vec<[u32; 3]>,
-    /// Shares of every place of the mesh.
-    shares: Vec<[f32; 2]>,
-    /// Side of each joint: true below the bend.
-    lower: Vec<bool>,
-    half: u32,
-}
-
-impl Part {
-    fn new(flesh: &Flesh, bend: &Bend) -> Self {
-        let joints = flesh.joints;
-        let mut lower = vec![false; joints.len()];
-        // Parents need not come before their children.
-        for (joint, below) in lower.iter_mut().enumerate() {
-            let mut chain = std::iter::successors(Some(joint), |joint| joints[*joint].parent).take(joints.len());
-            *below = chain.any(|above| above == bend.joint);
-        }
-        lower[bend.half] = false;
-        let at = joints[bend.joint].head;
-        let above = joints[bend.joint].parent.map_or(0.0, |parent| joints[parent].head.distance(at));
-        let reach = REACH * bend.below.length().max(above);
-        let is_near = |corners: &&[u32; 3]| flesh.points[corners[0] as usize].distance(at) < reach;
-        let triangles = flesh.triangles.iter().filter(is_near).copied().collect();
-        let mut part = Self { at, triangles, shares: vec![[0.0; 2]; flesh.rows.len()], lower, half: bend.half as u32 };
-        let all: Vec<u32> = (0..flesh.rows.len() as u32).collect();
-        part.read(flesh, &all);
-        // What does not move, and what moves as one, cannot fold and keeps its volume. Smoothing reaches a little further.
-        let is_still = |[lower, half]: [f32; 2]| half == 0.0 && (lower == 0.0 || lower > 0.999);
-        let still: Vec<bool> = part.shares.iter().map(|shares| is_still(*shares)).collect();
-        let mut near = still.iter().map(|still| !still).collect::<Vec<bool>>();
-        for _ in 0..8 {
-            let wider: Vec<usize> = (0..near.len()).filter(|place| near[*place]).collect();
-            for place in wider {
-                flesh.neighbours[place].iter().for_each(|other| near[*other as usize] = true);
-            }
-        }
-        part.triangles.retain(|corners| corners.iter().any(|corner| near[*corner as usize]));
-        part
-    }
-
-    /// Takes up the weights of some places.
-    fn read(&mut self, flesh: &Flesh, places: &[u32]) {
-        for &place in places {
-            let mut shares = [0.0; 2];
-            for (joint, weight) in &flesh.rows[place as usize] {
-                if *joint == self.half {
-                    shares[1] += weight;
-                } else if self.lower[*joint as usize] {
-                    shares[0] += weight;
-                }
-            }
-            self.shares[place as usize] = shares;
-        }
-    }
-
-    /// Corners of a triangle from the joint, at rest and posed, and the mean motion of the flesh there.
-    fn corners(&self, flesh: &Flesh, pose: &Pose, corners: &[u32; 3]) -> ([Vec3; 3], [Vec3; 3], Mat3A) {
-        let mut motion = Mat3A::ZERO;
-        let rest = corners.map(|corner| flesh.points[corner as usize] - self.at);
-        let mut posed = rest;
-        for (corner, point) in corners.iter().zip(&mut posed) {
-            let [lower, half] = self.shares[*corner as usize];
-            let still = 1.0 - lower - half;
-            motion += Mat3A::IDENTITY * still + pose.lower.matrix3 * lower + pose.half.matrix3 * half;
-            *point = *point * still
-                + pose.lower.transform_point3(*point) * lower
-                + pose.half.transform_point3(*point) * half;
-        }
-        (rest, posed, motion)
-    }
-
-    /// Triangles that turn by more than a right angle against the motion of the flesh around them.
-    fn folds(&self, flesh: &Flesh, pose: &Pose) -> Vec<usize> {
-        let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
-        let is_folded = |at: &usize| {
-            let (rest, posed, motion) = self.corners(flesh, pose, &self.triangles[*at]);
-            let [a, b, c] = rest;
-            let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
-            let before = normal(rest);
-            let turned = motion.inverse().transpose() * Vec3A::from(before);
-            before.length() > SLIVER * longest && Vec3::from(turned).dot(normal(posed)) < 0.0
-        };
-        (0..self.triangles.len()).filter(is_folded).collect()
-    }
-
-    /// Volume that the bend takes. Motions are about the joint, so what moves as one keeps its share of the volume, and
-    /// holes of the mesh do not matter.
-    fn lost(&self, flesh: &Flesh, pose: &Pose) -> f32 {
-        let volume = |[a, b, c]: [Vec3; 3]| f64::from(a.dot(b.cross(c))) / 6.0;
-        let lost = |corners: &[u32; 3]| {
-            let (rest, posed, _) = self.corners(flesh, pose, corners);
-            volume(rest) - volume(posed)
-        };
-        self.triangles.iter().map(lost).sum::<f64>() as f32
-    }
 }
