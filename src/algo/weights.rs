@@ -42,6 +42,7 @@ use crate::mesh::model::Weights;
 use bind::{Bound, Source};
 use finish::Shaping;
 use twist::Limbs;
+pub use twist::late_shares;
 
 /// A joint as the binding sees it, in the space of the points.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,7 @@
 //! Automatic weights, computed in the background and bound as one undoable edit.
 
 mod bends;
+mod late;
 
 use std::{
     collections::BTreeMap,
@@ -44,10 +45,10 @@ pub struct SkinningPlugin;
 impl Plugin for SkinningPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_message::<BindRequest>()
-            .add_message::<Bound>()
-            .add_message::<ResultHeld>()
-            .add_systems(Update, (start_skinning, land_skinning).chain().in_set(RigSystems::Bind));
+        app.add_message::<BindRequest>().add_message::<Bound>().add_message::<ResultHeld>().add_systems(
+            Update,
+            (start_skinning, late::start_late_shares, land_skinning).chain().in_set(RigSystems::Bind),
+        );
     }
 }
 
@@ -107,6 +108,8 @@ pub struct SkinningJob {
     basis: JobBasis,
     /// Finished weights that wait to be committed; see [`landing`](super::landing).
     held: Option<Computed>,
+    /// True if a [`BindRequest`] asked for it, which [`Bound`] answers.
+    is_asked: bool,
 }
 
 type Computed = Result<BoundSkin, WeightError>;
@@ -221,7 +224,7 @@ impl SkinningInput {
         let settings = &WeightSettings { bending: self.bending.clone(), ..settings.clone() };
         let (weights, report) =
             skin_weights(&mesh.rest.points, &mesh.triangles, &self.joints, &self.rigid, locks, settings, progress)?;
-        let (weights, pushes) = self.try_bends(mesh, weights, settings);
+        let (weights, pushes) = self.try_bends(mesh, weights, settings, &|_| false, &|_| true);
         let (joints, subjects) = (self.uids.clone(), self.subjects.clone());
         let skin = Arc::new(SkinData { joints, weights, at_rest: true, subjects });
         Ok(BoundSkin { skin, report, pushes })
@@ -283,7 +286,7 @@ fn start_skinning(
                 !stop.load(Ordering::Relaxed)
             })
         });
-        commands.entity(entity).insert(SkinningJob { progress, cancelled, task, basis, held: None });
+        commands.entity(entity).insert(SkinningJob { progress, cancelled, task, basis, held: None, is_asked: true });
     }
 }
 
@@ -306,7 +309,7 @@ fn land_skinning(
             (Ok(computed), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
                 JobOutcome::Hold => {
                     job.held = Some(Ok(computed));
-                    if !was_held && history.can_redo() {
+                    if !was_held && history.can_redo() && job.is_asked {
                         held.write(ResultHeld { mesh: entity, reason: HeldResult::Weights });
                     }
                     continue;
@@ -323,7 +326,9 @@ fn land_skinning(
                 }
             },
         };
-        bound.write(Bound { mesh: entity, result });
+        if job.is_asked {
+            bound.write(Bound { mesh: entity, result });
+        }
         commands.entity(entity).remove::<SkinningJob>();
     }
 }

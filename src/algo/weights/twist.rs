@@ -5,9 +5,12 @@
 //! a point lies, linearly from one to the next. So shares never cross the next joint of the limb, and points that other
 //! bones hold stay as they are.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 
 use super::{WeightJoint, half::Halves};
+use crate::mesh::{influences::keep_strongest, model::Weights};
 
 /// Twist joints closer than this share of the bone to its start stand in for the joint there.
 const AT_START: f32 = 0.01;
@@ -93,6 +96,64 @@ impl Limbs {
         self.halves.take(&mut row);
         row
     }
+}
+
+/// Shares of joints that were built after a mesh was bound: of `weights`, twist joints take theirs from the joints of their bone,
+/// and half joints from both sides of their bend, as if they had been there. `is_late` marks those joints. Influences of points
+/// for which `is_fixed` is true stay, and so do those of all other bones; no point gets more influences than `most`.
+pub fn late_shares(
+    points: &[Vec3],
+    joints: &[WeightJoint],
+    is_late: &[bool],
+    weights: &Weights,
+    is_fixed: impl Fn(usize) -> bool,
+    most: usize,
+) -> Weights {
+    let is_free = vec![true; joints.len()];
+    let mut twists: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (joint, data) in joints.iter().enumerate() {
+        if let Some(twist) = data.twist {
+            twists.entry(twist.joint as u32).or_default().push(joint as u32);
+        }
+    }
+    twists.retain(|_, twists| twists.iter().any(|joint| is_late[*joint as usize]));
+    let mut owners: Vec<Option<u32>> = vec![None; joints.len()];
+    for (owner, twists) in &twists {
+        twists.iter().chain([owner]).for_each(|joint| owners[*joint as usize] = Some(*owner));
+    }
+    let limbs: BTreeMap<u32, Vec<Bone>> =
+        twists.iter().map(|(owner, twists)| (*owner, bones(joints, *owner, twists, &is_free))).collect();
+    let halves = Halves::new(joints, is_late);
+    let mut shared = Weights { starts: Vec::with_capacity(weights.starts.len()), ..Weights::default() };
+    shared.starts.push(0);
+    let mut row: Vec<(u32, f32)> = Vec::new();
+    for (point, place) in points.iter().enumerate().take(weights.len()) {
+        let before: Vec<(u32, f32)> = weights.of(point).collect();
+        row.clear();
+        let mut held: BTreeMap<u32, f32> = BTreeMap::new();
+        for (joint, weight) in &before {
+            match owners.get(*joint as usize).copied().flatten() {
+                Some(owner) => *held.entry(owner).or_default() += weight,
+                None => row.push((*joint, *weight)),
+            }
+        }
+        for (owner, weight) in held {
+            let nearest = limbs[&owner].iter().min_by(|a, b| a.distance(*place).total_cmp(&b.distance(*place)));
+            match nearest {
+                Some(bone) => row.extend(bone.shares(*place).map(|(joint, share)| (joint, weight * share))),
+                None => row.push((owner, weight)),
+            }
+        }
+        halves.take(&mut row);
+        let is_changed = row.iter().any(|(joint, _)| is_late[*joint as usize]);
+        if is_changed && !is_fixed(point) {
+            keep_strongest(&mut row, most, 0.0);
+            shared.push(row.iter().copied());
+        } else {
+            shared.push(before);
+        }
+    }
+    shared
 }
 
 /// The bones of a joint that its free twist joints share.

@@ -103,15 +103,18 @@ pub(super) fn tried_bends(
 }
 
 impl SkinningInput {
-    /// Tries the bends of a mesh that was just bound: weights that do not fold, and for each command of half joints the
-    /// length by which they leave the bend.
+    /// Tries bends of a mesh, those for which `is_tried` is true: weights that do not fold, and for each command of half joints
+    /// the length by which they leave the bend. Points for which `is_fixed` is true keep their weights.
     pub(super) fn try_bends(
         &self,
         mesh: &RigMesh,
         weights: Weights,
         settings: &WeightSettings,
+        is_fixed: &dyn Fn(usize) -> bool,
+        is_tried: &dyn Fn(&Bend) -> bool,
     ) -> (Weights, Vec<FittedPush>) {
-        if self.bends.is_empty() {
+        let tried: Vec<&TriedBend> = self.bends.iter().filter(|tried| is_tried(&tried.bend)).collect();
+        if tried.is_empty() {
             return (weights, Vec::new());
         }
         let any_locked = self.locked.iter().any(|locked| *locked);
@@ -119,9 +122,10 @@ impl SkinningInput {
         for (range, _) in &self.rigid {
             is_rigid[range.start as usize..range.end as usize].fill(true);
         }
-        let mut flesh = Flesh::new(&mesh.rest.points, &mesh.triangles, &self.joints, &weights, |point| is_rigid[point]);
-        let bends: Vec<Bend> = self.bends.iter().map(|tried| tried.bend).collect();
-        let fitted = self.bends.iter().zip(flesh.settle(&bends)).filter(|(tried, _)| tried.is_fitted);
+        let stays = |point: usize| is_rigid[point] || is_fixed(point);
+        let mut flesh = Flesh::new(&mesh.rest.points, &mesh.triangles, &self.joints, &weights, stays);
+        let bends: Vec<Bend> = tried.iter().map(|tried| tried.bend).collect();
+        let fitted = tried.iter().zip(flesh.settle(&bends)).filter(|(tried, _)| tried.is_fitted);
         let pushes = fitted
             .filter_map(|(tried, push)| {
                 Some(FittedPush { command: tried.command, half: self.uids[tried.bend.half], push: push? })
