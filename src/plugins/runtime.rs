@@ -244,7 +244,7 @@ impl RigRuntime {
         if carry.is_aligned() {
             self.state.exchange(program, carry);
             // Results that no operation computes any more have other values, too.
-            self.all_due = self.mode == InstanceMode::Hierarchy;
+            self.all_due |= self.mode == InstanceMode::Hierarchy && !carry.is_partial();
             return;
         }
         let mut fresh = Self::new(Arc::clone(program), self.mode);

@@ -17,6 +17,7 @@ mod error;
 mod freedom;
 mod graph;
 mod hash;
+mod layout;
 mod lists;
 mod lower;
 mod op;
@@ -41,9 +42,9 @@ pub use state::{Carry, LANES, Memory, RigState};
 use self::{
     cache::ByConstraint,
     freedom::Freedom,
-    graph::{Driven, Graph, Step},
-    lists::Lists,
-    op::{N, Op, Operand, Pose, Tables, X},
+    graph::{Driven, Graph},
+    layout::{Ends, Layout, Layouts},
+    op::{Op, Pose, Tables, X},
     run::{Alone, Machine, Scratch},
     state::SpringState,
 };
@@ -162,21 +163,12 @@ pub struct RigProgram {
     inputs: Vec<Uid>,
     poses: usize,
     ops: Vec<Op>,
-    /// Number of operations at the start that depend on attributes only: values that people set once rather than
-    /// animate.
-    settings: usize,
+    layout: Arc<Layout>,
     tables: Tables,
     /// Registers before the first run. Transforms: the rig's space, nodes by slot, inputs, others; numbers: attributes,
     /// morph targets, others.
     x: Vec<Trs>,
     n: Vec<f32>,
-    /// Operations that read each pose, attribute and input, and registers that each operation writes.
-    pose_readers: Lists,
-    attribute_readers: Lists,
-    input_readers: Lists,
-    op_readers: Lists,
-    /// The operation of each spring.
-    spring_ops: Vec<u32>,
 }
 
 /// Label and uid of a node, for messages.
@@ -193,21 +185,22 @@ impl RigProgram {
     ///
     /// See [`ProgramError`]: references to missing nodes, joints that form no chain, cycles.
     pub fn compile(rig: &BuiltRig, options: &CompileOptions) -> Result<Self, ProgramError> {
-        Self::compile_hashed(rig, options, ContentHash::of(rig, options), &mut ByConstraint::default())
+        let hash = ContentHash::of(rig, options);
+        Self::compile_hashed(rig, options, hash, &mut ByConstraint::default(), &mut Layouts::default())
     }
 
-    /// Compiles a built rig whose hash is known. Expressions are read once for each constraint.
+    /// Compiles a built rig whose hash is known. Expressions are read once for each constraint, and layouts worked out once
+    /// for rigs that differ in numbers only.
     fn compile_hashed(
         rig: &BuiltRig,
         options: &CompileOptions,
         hash: ContentHash,
         expressions: &mut ByConstraint<Arc<Expression>>,
+        layouts: &mut Layouts,
     ) -> Result<Self, ProgramError> {
         let mut graph = Graph::new(rig, &options.keep, &options.inputs)?;
         lower::lower(&mut graph, expressions)?;
         let driven = graph.finish();
-        order::sort(&mut graph)?;
-        skip_empty(&mut graph);
         let kept: Vec<usize> = (0..rig.nodes.len()).filter(|node| graph.is_kept(*node)).collect();
         let mut slots = vec![None; rig.nodes.len()];
         kept.iter().enumerate().for_each(|(slot, node)| slots[*node] = Some(slot));
@@ -226,20 +219,22 @@ impl RigProgram {
                 });
             }
         }
-        let settable: Vec<N> = graph.attributes.iter().map(|known| known.2).collect();
-        let results: Vec<X> = kept.iter().map(|node| graph.global(*node)).collect();
-        let morphs: Vec<N> = graph.morphs.iter().map(|morph| morph.1).collect();
-        let numbers: Vec<N> = attribute_registers.iter().chain(&morphs).copied().collect();
-        let (fixed, settings) = order::split(&mut graph, &results, &numbers, &settable);
+        let local = |node: usize| if let Driven::Local(local) = driven[node] { Some(local) } else { None };
+        let count = attribute_registers.len();
+        attribute_registers.extend(graph.morphs.iter().map(|morph| morph.1));
+        let ends = Ends {
+            results: kept.iter().map(|node| graph.global(*node)).collect(),
+            numbers: attribute_registers,
+            attributes: count,
+            settable: graph.attributes.iter().map(|known| known.2).collect(),
+            nodes: kept.iter().map(|node| (graph.pose(*node), local(*node))).collect(),
+        };
+        let layout = layouts.of(&mut graph, ends)?;
+        let fixed = layout.fixed(&mut graph);
         run_fixed(&mut graph, &fixed);
+        let ops = layout.ops(&mut graph);
+        let (x, n) = layout.registers(&graph.x, &graph.n);
 
-        let mut numbering = Numbering::new(&mut graph);
-        for register in results.iter().chain(&graph.inputs) {
-            numbering.x(*register);
-        }
-        for register in &numbers {
-            numbering.n(*register);
-        }
         let nodes: Vec<ProgramNode> = kept
             .iter()
             .map(|node| ProgramNode {
@@ -249,14 +244,14 @@ impl RigProgram {
                 parent: rig.nodes[*node].parent.and_then(|parent| slots[parent]),
                 base: rig.nodes[*node].base,
                 is_driven: driven[*node] != Driven::Not,
-                pose: numbering.pose(graph.pose(*node)),
+                pose: layout.posed(graph.pose(*node)),
                 freedom: rig.nodes[*node].control.as_ref().and_then(|control| Freedom::of(control)),
-                local: if let Driven::Local(local) = driven[*node] { Some(numbering.x(local)) } else { None },
+                local: local(*node).map(|local| layout.placed(local)),
             })
             .collect();
         let mut by_uid: Vec<(Uid, u32)> = nodes.iter().enumerate().map(|(at, node)| (node.uid, at as u32)).collect();
         by_uid.sort_unstable();
-        let mut program = Self {
+        Ok(Self {
             serial: next_serial(),
             hash,
             nodes,
@@ -264,70 +259,13 @@ impl RigProgram {
             attributes,
             morphs: graph.morphs.iter().map(|morph| morph.0.clone()).collect(),
             inputs: options.inputs.iter().map(|input| input.uid).collect(),
-            poses: 0,
-            ops: graph.steps.iter().map(|step| step.op).collect(),
-            settings,
-            tables: std::mem::take(&mut graph.tables),
-            x: Vec::new(),
-            n: Vec::new(),
-            pose_readers: Lists::default(),
-            attribute_readers: Lists::default(),
-            input_readers: Lists::default(),
-            op_readers: Lists::default(),
-            spring_ops: Vec::new(),
-        };
-        program.number(&mut numbering);
-        program.connect(numbering.transforms.len(), numbering.numbers.len());
-        (program.x, program.n, program.poses) = (numbering.transforms, numbering.numbers, numbering.poses as usize);
-        Ok(program)
-    }
-
-    /// Gives registers and poses their final numbers.
-    fn number(&mut self, numbering: &mut Numbering) {
-        for op in &mut self.ops {
-            op.visit(&mut self.tables, |operand| match operand {
-                Operand::ReadX(x) | Operand::WriteX(x) => *x = numbering.x(*x),
-                Operand::ReadN(n) | Operand::WriteN(n) => *n = numbering.n(*n),
-                Operand::Pose(pose) => *pose = numbering.pose(*pose),
-            });
-        }
-    }
-
-    /// Collects the operations that read each pose, attribute, input and register. `transforms` and `numbers` are the
-    /// counts of the registers.
-    fn connect(&mut self, transforms: usize, numbers: usize) {
-        let (mut poses, mut reads, mut writes) = (Vec::new(), Vec::new(), Vec::new());
-        let number = |N(register): &N| transforms as u32 + register;
-        for (at, op) in self.ops.iter_mut().enumerate() {
-            if let Op::Spring(state) = op {
-                let state = *state as usize;
-                if self.spring_ops.len() <= state {
-                    self.spring_ops.resize(state + 1, u32::MAX);
-                }
-                self.spring_ops[state] = at as u32;
-            }
-            let at = at as u32;
-            op.visit(&mut self.tables, |operand| match operand {
-                Operand::ReadX(X(register)) => reads.push((*register, at)),
-                Operand::ReadN(register) => reads.push((number(register), at)),
-                Operand::Pose(Pose(pose)) => poses.push((*pose, at)),
-                Operand::WriteX(X(register)) => writes.push((at, *register)),
-                Operand::WriteN(register) => writes.push((at, number(register))),
-            });
-        }
-        let readers = Lists::new(transforms + numbers, &reads);
-        let pairs =
-            |list: usize, register: usize| readers.get(register).iter().map(move |reader| (list as u32, *reader));
-        let attributes = (0..self.attributes.len()).flat_map(|slot| pairs(slot, transforms + slot));
-        let first = self.nodes.len() + 1;
-        let inputs = (0..self.inputs.len()).flat_map(|input| pairs(input, first + input));
-        let ops = writes.iter().flat_map(|(at, register)| pairs(*at as usize, *register as usize));
-        let (attributes, inputs, ops): (Vec<_>, Vec<_>, Vec<_>) =
-            (attributes.collect(), inputs.collect(), ops.collect());
-        self.attribute_readers = Lists::new(self.attributes.len(), &attributes);
-        self.input_readers = Lists::new(self.inputs.len(), &inputs);
-        self.op_readers = Lists::new(self.ops.len(), &ops);
-        self.pose_readers = Lists::new(self.nodes.iter().filter(|node| node.is_posable()).count(), &poses);
+            poses: layout.poses(),
+            ops,
+            layout,
+            tables: graph.tables,
+            x,
+            n,
+        })
     }
 
     /// The hash of the rig and options that the program was compiled from: equal for equal content, on every machine.
@@ -362,7 +300,7 @@ impl RigProgram {
 
     /// Returns `true` if the rig moves by itself as time passes.
     pub fn has_springs(&self) -> bool {
-        !self.spring_ops.is_empty()
+        !self.layout.spring_ops.is_empty()
     }
 
     /// Slot of a node.
@@ -393,27 +331,8 @@ impl RigProgram {
     }
 }
 
-/// Lets readers of nodes that only repeat their parent read the parent.
-fn skip_empty(graph: &mut Graph<'_>) {
-    let mut same: Vec<X> = (0..graph.x.len() as u32).map(X).collect();
-    for at in 0..graph.steps.len() {
-        let Step { mut op, node, .. } = graph.steps[at];
-        op.visit(&mut graph.tables, |operand| {
-            if let Operand::ReadX(register) = operand {
-                *register = same[register.0 as usize];
-            }
-        });
-        graph.steps[at].op = op;
-        if let Op::Node { pose: Pose::NONE, base: 0, parent, out } = op
-            && !graph.is_kept(node)
-        {
-            same[out.0 as usize] = parent;
-        }
-    }
-}
-
 /// Runs the operations that depend on no input, once for all instances.
-fn run_fixed(graph: &mut Graph<'_>, fixed: &[Step]) {
+fn run_fixed(graph: &mut Graph<'_>, fixed: &[Op]) {
     let (x, n) = (&mut graph.x, &mut graph.n);
     let mut machine = Machine {
         tables: &graph.tables,
@@ -422,64 +341,7 @@ fn run_fixed(graph: &mut Graph<'_>, fixed: &[Step]) {
         scratch: &mut Scratch::default(),
         dt: 0.0,
     };
-    fixed.iter().for_each(|step| machine.run(&step.op));
-}
-
-/// Hands out final numbers in the order in which registers are first seen.
-struct Numbering {
-    old_x: Vec<Trs>,
-    old_n: Vec<f32>,
-    new_x: Vec<Option<X>>,
-    new_n: Vec<Option<N>>,
-    new_pose: Vec<Option<Pose>>,
-    poses: u32,
-    transforms: Vec<Trs>,
-    numbers: Vec<f32>,
-}
-
-impl Numbering {
-    /// Takes the registers of a graph; the rig's space stays the first.
-    fn new(graph: &mut Graph<'_>) -> Self {
-        let (old_x, old_n) = (std::mem::take(&mut graph.x), std::mem::take(&mut graph.n));
-        let mut numbering = Self {
-            new_x: vec![None; old_x.len()],
-            new_n: vec![None; old_n.len()],
-            old_x,
-            old_n,
-            new_pose: vec![None; graph.rig.nodes.len()],
-            poses: 0,
-            transforms: Vec::new(),
-            numbers: Vec::new(),
-        };
-        numbering.x(X::RIG);
-        numbering
-    }
-
-    fn x(&mut self, X(old): X) -> X {
-        let Self { new_x, old_x, transforms, .. } = self;
-        *new_x[old as usize].get_or_insert_with(|| {
-            transforms.push(old_x[old as usize]);
-            X(transforms.len() as u32 - 1)
-        })
-    }
-
-    fn n(&mut self, N(old): N) -> N {
-        let Self { new_n, old_n, numbers, .. } = self;
-        *new_n[old as usize].get_or_insert_with(|| {
-            numbers.push(old_n[old as usize]);
-            N(numbers.len() as u32 - 1)
-        })
-    }
-
-    fn pose(&mut self, pose: Pose) -> Pose {
-        if pose == Pose::NONE {
-            return pose;
-        }
-        *self.new_pose[pose.0 as usize].get_or_insert_with(|| {
-            self.poses += 1;
-            Pose(self.poses - 1)
-        })
-    }
+    fixed.iter().for_each(|op| machine.run(op));
 }
 
 fn next_serial() -> u64 {

@@ -2,6 +2,7 @@
 
 pub mod biped;
 mod constraints;
+mod layouts;
 mod programs;
 mod refusals;
 mod systems;

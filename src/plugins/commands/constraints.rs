@@ -25,8 +25,9 @@ pub(super) fn follow_constraints(
     for (rig_entity, built, joints, tags, mut known) in &mut rigs {
         let known = known.bypass_change_detection();
         let constraints = &built.0.constraints;
-        let is_built = |uid: &Uid| constraints.iter().any(|constraint| constraint.uid == *uid);
-        if known.constraints.len() > constraints.len() || !known.constraints.keys().all(is_built) {
+        let kept = constraints.iter().filter(|constraint| known.constraints.contains_key(&constraint.uid)).count();
+        if kept < known.constraints.len() {
+            let is_built = |uid: &Uid| constraints.iter().any(|constraint| constraint.uid == *uid);
             let gone: Vec<Uid> = known.constraints.keys().filter(|uid| !is_built(uid)).copied().collect();
             for uid in gone {
                 if let Some(mirrored) = known.constraints.remove(&uid) {

@@ -7,7 +7,7 @@ use std::{
 
 use bevy::platform::collections::HashMap;
 
-use super::{CompileOptions, ContentHash, ProgramError, RigProgram, hash::of_constraint};
+use super::{CompileOptions, ContentHash, ProgramError, RigProgram, hash::of_constraint, layout::Layouts};
 use crate::{
     rig::{BuiltRig, Constraint},
     solve::expression::Expression,
@@ -19,6 +19,7 @@ pub struct ProgramCache {
     programs: BTreeMap<ContentHash, Weak<RigProgram>>,
     hashes: ByConstraint<u128>,
     expressions: ByConstraint<Arc<Expression>>,
+    layouts: Layouts,
 }
 
 impl ProgramCache {
@@ -36,7 +37,8 @@ impl ProgramCache {
             return Ok(program);
         }
         self.programs.retain(|_, program| program.strong_count() > 0);
-        let program = Arc::new(RigProgram::compile_hashed(rig, options, hash, &mut self.expressions)?);
+        let Self { expressions, layouts, .. } = self;
+        let program = Arc::new(RigProgram::compile_hashed(rig, options, hash, expressions, layouts)?);
         self.expressions.forget_unused();
         self.programs.insert(hash, Arc::downgrade(&program));
         Ok(program)

@@ -5,6 +5,7 @@
 //! only those whose inputs changed gives the same bits as running all.
 
 mod operands;
+mod same;
 
 pub(super) use operands::Operand;
 

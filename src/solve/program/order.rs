@@ -5,9 +5,10 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 use super::{
     ConstraintName, ProgramError,
     graph::{Graph, Step},
+    layout::Shape,
     lists::Lists,
     name,
-    op::{N, Op, Operand, Pose, Tables, X},
+    op::{N, Operand, Pose, Tables, X},
 };
 use crate::rig::Uid;
 
@@ -15,27 +16,29 @@ use crate::rig::Uid;
 const NONE: u32 = u32::MAX;
 
 /// Registers that each operation reads and writes, transforms first, then numbers.
-struct Wires {
+#[derive(Debug, PartialEq)]
+pub(super) struct Wires {
+    /// Number of registers of transforms, and of all.
+    pub transforms: usize,
+    registers: usize,
     /// Registers that all operations read, and where each operation's begin.
     reads: Vec<u32>,
     starts: Vec<u32>,
     /// The same of registers that operations write.
     writes: Vec<u32>,
     write_starts: Vec<u32>,
-    /// The operation that writes each register.
-    writer: Vec<u32>,
-    is_posed: Vec<bool>,
+    /// Pose that each operation reads.
+    pub poses: Vec<Pose>,
 }
 
 impl Wires {
-    fn of(steps: &mut [Step], tables: &mut Tables, transforms: usize, numbers: usize) -> Self {
+    pub fn of(steps: &mut [Step], tables: &mut Tables, transforms: usize, numbers: usize) -> Self {
         let mut reads = Vec::with_capacity(4 * steps.len());
         let mut starts = Vec::with_capacity(steps.len() + 1);
         let mut writes = Vec::with_capacity(2 * steps.len());
         let mut write_starts = Vec::with_capacity(steps.len() + 1);
-        let mut writer = vec![NONE; transforms + numbers];
-        let mut is_posed = vec![false; steps.len()];
-        for (at, step) in steps.iter_mut().enumerate() {
+        let mut poses = vec![Pose::NONE; steps.len()];
+        for (step, posed) in steps.iter_mut().zip(&mut poses) {
             starts.push(reads.len() as u32);
             write_starts.push(writes.len() as u32);
             step.op.visit(tables, |operand| match operand {
@@ -43,49 +46,55 @@ impl Wires {
                 Operand::ReadN(N(register)) => reads.push(transforms as u32 + *register),
                 Operand::WriteX(X(register)) => writes.push(*register),
                 Operand::WriteN(N(register)) => writes.push(transforms as u32 + *register),
-                Operand::Pose(pose) => is_posed[at] |= *pose != Pose::NONE,
+                Operand::Pose(pose) => *posed = *pose,
             });
-            let start = write_starts[at] as usize;
-            writes[start..].iter().for_each(|register| writer[*register as usize] = at as u32);
         }
         starts.push(reads.len() as u32);
         write_starts.push(writes.len() as u32);
-        Self { reads, starts, writes, write_starts, writer, is_posed }
+        Self { transforms, registers: transforms + numbers, reads, starts, writes, write_starts, poses }
     }
 
     /// Registers that an operation reads.
-    fn reads(&self, step: usize) -> impl Iterator<Item = usize> {
-        let range = self.starts[step] as usize..self.starts[step + 1] as usize;
-        self.reads[range].iter().map(|register| *register as usize)
+    pub fn read_by(&self, step: usize) -> &[u32] {
+        &self.reads[self.starts[step] as usize..self.starts[step + 1] as usize]
     }
 
     /// Registers that an operation writes.
-    fn writes(&self, step: usize) -> impl Iterator<Item = usize> {
-        let range = self.write_starts[step] as usize..self.write_starts[step + 1] as usize;
-        self.writes[range].iter().map(|register| *register as usize)
+    pub fn written_by(&self, step: usize) -> &[u32] {
+        &self.writes[self.write_starts[step] as usize..self.write_starts[step + 1] as usize]
+    }
+
+    /// The operation that writes each register.
+    fn writers(&self) -> Vec<u32> {
+        let mut writers = vec![NONE; self.registers];
+        for step in 0..self.poses.len() {
+            self.written_by(step).iter().for_each(|register| writers[*register as usize] = step as u32);
+        }
+        writers
     }
 
     /// Operations that must run before another.
-    fn before(&self, step: usize) -> impl Iterator<Item = usize> {
-        self.reads(step).map(|register| self.writer[register]).filter(|at| *at != NONE).map(|at| at as usize)
+    fn before(&self, writers: &[u32], step: usize) -> impl Iterator<Item = usize> {
+        let writer = move |register: &u32| Some(writers[*register as usize] as usize).filter(|at| *at != NONE as usize);
+        self.read_by(step).iter().filter_map(writer)
     }
 }
 
-/// Orders the operations so that each comes after those that it reads from, close to their nodes' order in the rig.
-pub(super) fn sort(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
-    let (transforms, numbers) = (graph.x.len(), graph.n.len());
-    let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, numbers);
+/// The order of the operations in which each comes after those that it reads from, close to their nodes' order in the rig.
+pub(super) fn sort(graph: &Graph<'_>, shape: &Shape) -> Result<Vec<u32>, ProgramError> {
+    let wires = &shape.wires;
+    let writers = wires.writers();
     let count = graph.steps.len();
-    let pairs = (0..count).flat_map(|at| wires.before(at).map(move |before| (before as u32, at as u32)));
+    let pairs = (0..count).flat_map(|at| wires.before(&writers, at).map(move |before| (before as u32, at as u32)));
     let after = Lists::new(count, &pairs.collect::<Vec<_>>());
     let mut waits = vec![0; count];
     after.items.iter().for_each(|at| waits[*at as usize] += 1);
-    let key = |at: usize| Reverse((graph.steps[at].node, at));
-    let mut ready: BinaryHeap<Reverse<(usize, usize)>> = (0..count).filter(|at| waits[*at] == 0).map(key).collect();
+    let key = |at: usize| Reverse((shape.nodes[at], at as u32));
+    let mut ready: BinaryHeap<Reverse<(u32, u32)>> = (0..count).filter(|at| waits[*at] == 0).map(key).collect();
     let mut order = Vec::with_capacity(count);
     while let Some(Reverse((_, at))) = ready.pop() {
-        order.push(graph.steps[at]);
-        for next in after.get(at) {
+        order.push(at);
+        for next in after.get(at as usize) {
             let next = *next as usize;
             waits[next] -= 1;
             if waits[next] == 0 {
@@ -94,20 +103,19 @@ pub(super) fn sort(graph: &mut Graph<'_>) -> Result<(), ProgramError> {
         }
     }
     if order.len() < count {
-        return Err(cycle(graph, &wires, &waits));
+        return Err(cycle(graph, wires, &writers, &waits));
     }
-    graph.steps = order;
-    Ok(())
+    Ok(order)
 }
 
 /// Describes a cycle among the operations that were never ready.
-fn cycle(graph: &Graph<'_>, wires: &Wires, waits: &[usize]) -> ProgramError {
+fn cycle(graph: &Graph<'_>, wires: &Wires, writers: &[u32], waits: &[usize]) -> ProgramError {
     let first = waits.iter().position(|count| *count > 0).unwrap_or_default();
     // Each waiting operation waits for another, so the walk runs into itself.
     let mut path = vec![first];
     let start = loop {
         let last = path[path.len() - 1];
-        let Some(next) = wires.before(last).find(|at| waits[*at] > 0) else { break 0 };
+        let Some(next) = wires.before(writers, last).find(|at| waits[*at] > 0) else { break 0 };
         if let Some(start) = path.iter().position(|at| *at == next) {
             break start;
         }
@@ -153,48 +161,61 @@ fn cycle(graph: &Graph<'_>, wires: &Wires, waits: &[usize]) -> ProgramError {
     ProgramError::Cycle { loop_text, constraints, commands, nodes }
 }
 
-/// Drops operations on which no register in `results` or `numbers` depends, and splits off and returns those that depend on
-/// no input, on no pose, and on no attribute in `settable`. Those that depend on attributes only are put first; their
-/// number is returned, too.
-pub(super) fn split(graph: &mut Graph<'_>, results: &[X], numbers: &[N], settable: &[N]) -> (Vec<Step>, usize) {
-    let (transforms, count) = (graph.x.len(), graph.steps.len());
-    let wires = Wires::of(&mut graph.steps, &mut graph.tables, transforms, graph.n.len());
+/// Operations of a graph by when they run, in their order.
+pub(super) struct Split {
+    /// Operations that depend on no input, on no pose and on no attribute that can be set.
+    pub fixed: Vec<u32>,
+    /// All others; those that depend on attributes only come first.
+    pub ops: Vec<u32>,
+    /// The number of those.
+    pub settings: usize,
+}
+
+/// Splits sorted operations by what they depend on, without those on which no result depends. `same` is the register to read
+/// in the stead of each transform.
+pub(super) fn split(shape: &Shape, order: &[u32], same: &[X]) -> Split {
+    let wires = &shape.wires;
+    let read = |register: &u32| same.get(*register as usize).map_or(*register, |same| same.0) as usize;
     let registers = |list: &[X], numbers: &[N]| {
-        let mut marks = vec![false; transforms + graph.n.len()];
+        let mut marks = vec![false; wires.registers];
         list.iter().for_each(|X(register)| marks[*register as usize] = true);
-        numbers.iter().for_each(|N(register)| marks[transforms + *register as usize] = true);
+        numbers.iter().for_each(|N(register)| marks[wires.transforms + *register as usize] = true);
         marks
     };
-    let mut needed = registers(results, numbers);
-    let mut is_live = vec![false; count];
-    for at in (0..count).rev() {
-        is_live[at] = wires.writes(at).any(|register| needed[register]);
+    let mut needed = registers(&shape.ends.results, &shape.ends.numbers);
+    let mut is_live = vec![false; order.len()];
+    for at in order.iter().rev().map(|at| *at as usize) {
+        is_live[at] = wires.written_by(at).iter().any(|register| needed[*register as usize]);
         if is_live[at] {
-            wires.reads(at).for_each(|register| needed[register] = true);
+            wires.read_by(at).iter().for_each(|register| needed[read(register)] = true);
         }
     }
+    // A spring changes with time alone.
+    let mut is_spring = vec![false; order.len()];
+    shape.springs.iter().for_each(|(at, _)| is_spring[*at as usize] = true);
     let moving = |settable: &[N]| -> Vec<bool> {
-        let mut moves = registers(&graph.inputs, settable);
-        let moves_one = |at: usize| {
-            // A spring changes with time alone.
-            let is_spring = matches!(graph.steps[at].op, Op::Spring(_));
-            let is_moved = wires.is_posed[at] || is_spring || wires.reads(at).any(|register| moves[register]);
-            if is_moved {
-                wires.writes(at).for_each(|register| moves[register] = true);
+        let mut moves = registers(&shape.inputs, settable);
+        let mut moved = vec![false; order.len()];
+        for at in order.iter().map(|at| *at as usize) {
+            moved[at] = wires.poses[at] != Pose::NONE
+                || is_spring[at]
+                || wires.read_by(at).iter().any(|register| moves[read(register)]);
+            if moved[at] {
+                wires.written_by(at).iter().for_each(|register| moves[*register as usize] = true);
             }
-            is_moved
-        };
-        (0..count).map(moves_one).collect()
+        }
+        moved
     };
-    let (changes, plays) = (moving(settable), moving(&[]));
-    let steps = std::mem::take(&mut graph.steps);
+    let (changes, plays) = (moving(&shape.ends.settable), moving(&[]));
     let of = |wanted: [bool; 2]| {
-        let is_wanted = |at: &usize| is_live[*at] && [changes[*at], plays[*at]] == wanted;
-        (0..count).filter(is_wanted).map(|at| steps[at]).collect::<Vec<_>>()
+        let is_wanted = |at: &u32| {
+            let at = *at as usize;
+            is_live[at] && [changes[at], plays[at]] == wanted
+        };
+        order.iter().copied().filter(is_wanted).collect::<Vec<_>>()
     };
-    let fixed = of([false, false]);
-    graph.steps.extend(of([true, false]));
-    let settings = graph.steps.len();
-    graph.steps.extend(of([true, true]));
-    (fixed, settings)
+    let mut ops = of([true, false]);
+    let settings = ops.len();
+    ops.extend(of([true, true]));
+    Split { fixed: of([false, false]), ops, settings }
 }

@@ -109,7 +109,7 @@ impl Workspace {
                 is_same = false;
             }
         }
-        if is_same { program.settings } else { 0 }
+        if is_same { program.layout.settings } else { 0 }
     }
 
     /// Stores the results in an instance.
@@ -153,7 +153,7 @@ impl RigState {
         Self {
             memory,
             poses: vec![PoseOffset::IDENTITY; program.poses],
-            springs: vec![SpringState::default(); program.spring_ops.len()],
+            springs: vec![SpringState::default(); program.layout.spring_ops.len()],
             x: program.x[..transforms].to_vec(),
             n: program.n[..numbers].to_vec(),
             dirty: vec![0; operations.div_ceil(64)],
@@ -217,7 +217,7 @@ impl RigState {
             return true;
         }
         *known = offset;
-        mark(&mut self.dirty, self.program.pose_readers.get(node.pose.0 as usize));
+        mark(&mut self.dirty, self.program.layout.pose_readers.get(node.pose.0 as usize));
         self.any_dirty = true;
         true
     }
@@ -252,7 +252,7 @@ impl RigState {
         let value = attribute.kind.clamp(value, attribute.default);
         if self.n[slot].to_bits() != value.to_bits() {
             self.n[slot] = value;
-            mark(&mut self.dirty, self.program.attribute_readers.get(slot));
+            mark(&mut self.dirty, self.program.layout.attribute_readers.get(slot));
             self.any_dirty = true;
         }
         true
@@ -277,7 +277,7 @@ impl RigState {
         let register = self.program.nodes.len() + 1 + slot;
         if !super::run::same_bits(&self.x[register], &transform) {
             self.x[register] = transform;
-            mark(&mut self.dirty, self.program.input_readers.get(slot));
+            mark(&mut self.dirty, self.program.layout.input_readers.get(slot));
             self.any_dirty = true;
         }
         true
@@ -339,7 +339,7 @@ impl RigState {
     fn evaluate_whole(&mut self, dt: f32, scratch: &mut Scratch) {
         let Self { program, dirty, x, n, poses, springs, moved, .. } = self;
         if dt > 0.0 {
-            for (op, state) in program.spring_ops.iter().zip(springs.iter()) {
+            for (op, state) in program.layout.spring_ops.iter().zip(springs.iter()) {
                 if *op != u32::MAX && !state.is_settled() {
                     mark(dirty, &[*op]);
                 }
@@ -367,7 +367,7 @@ impl RigState {
                 machine.run(&program.ops[at]);
                 if machine.registers.changed {
                     // Readers come later in the list, so none is missed.
-                    mark(dirty, program.op_readers.get(at));
+                    mark(dirty, program.layout.op_readers.get(at));
                 }
             }
         }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{Memory, RigState};
+use super::{Memory, RigState, mark};
 use crate::{
     rig::PoseOffset,
-    solve::program::{ProgramAttribute, RigProgram},
+    solve::program::{ProgramAttribute, ProgramNode, RigProgram, run::same_bits},
 };
 
 /// Correspondences of two programs of the same rig: nodes by uid, attributes by node and name, springs by constraint. Made
@@ -20,18 +20,67 @@ pub struct Carry {
     is_aligned: bool,
     /// True if also poses, inputs and springs have the same places, so that an instance can go on with its own lists.
     is_in_place: bool,
+    /// What differs between programs of one layout; `None` for others.
+    changes: Option<Changes>,
+}
+
+/// Differences between two programs of one layout: operations with other parameters, and registers with other values at the
+/// start.
+#[derive(Debug, Clone, Default)]
+struct Changes {
+    ops: Vec<u32>,
+    x: Vec<u32>,
+    n: Vec<u32>,
+}
+
+impl Changes {
+    /// `None` where a result differs that no operation computes.
+    fn between(from: &RigProgram, to: &RigProgram) -> Option<Self> {
+        if !Arc::ptr_eq(&from.layout, &to.layout) {
+            return None;
+        }
+        let is_same = |at: &u32| {
+            let (before, after) = (&from.ops[*at as usize], &to.ops[*at as usize]);
+            after.is_same(&to.tables, before, &from.tables)
+        };
+        let inputs = to.nodes.len() + 1..to.nodes.len() + 1 + to.inputs.len();
+        let is_set = |slot: usize| to.attributes.get(slot).is_some_and(|attribute| attribute.is_settable);
+        let changes = Self {
+            ops: (0..to.ops.len() as u32).filter(|at| !is_same(at)).collect(),
+            x: (0..to.x.len())
+                .filter(|at| !inputs.contains(at) && !same_bits(&from.x[*at], &to.x[*at]))
+                .map(|at| at as u32)
+                .collect(),
+            n: (0..to.n.len())
+                .filter(|at| !is_set(*at) && from.n[*at].to_bits() != to.n[*at].to_bits())
+                .map(|at| at as u32)
+                .collect(),
+        };
+        changes.x.iter().all(|at| *at as usize > to.nodes.len()).then_some(changes)
+    }
 }
 
 impl Carry {
     /// Correspondences from one program to another.
     pub fn between(from: &RigProgram, to: &RigProgram) -> Self {
-        let attribute = |attribute: &ProgramAttribute| {
-            let slot = from.attribute(to.nodes[attribute.node].uid, &attribute.name)?;
+        // Programs of one rig mostly have the same nodes and attributes in the same slots.
+        let node = |(slot, node): (usize, &ProgramNode)| match from.nodes.get(slot) {
+            Some(before) if before.uid == node.uid => Some(slot),
+            _ => from.node(node.uid),
+        };
+        let attribute = |(slot, attribute): (usize, &ProgramAttribute)| {
+            let uid = to.nodes[attribute.node].uid;
+            let is_same =
+                |before: &&ProgramAttribute| from.nodes[before.node].uid == uid && before.name == attribute.name;
+            let slot = match from.attributes.get(slot).filter(is_same) {
+                Some(_) => slot,
+                None => from.attribute(uid, &attribute.name)?,
+            };
             from.attributes[slot].is_settable.then_some(slot)
         };
         let springs = &from.tables.springs;
-        let nodes: Vec<Option<usize>> = to.nodes.iter().map(|node| from.node(node.uid)).collect();
-        let attributes: Vec<Option<usize>> = to.attributes.iter().map(attribute).collect();
+        let nodes: Vec<Option<usize>> = to.nodes.iter().enumerate().map(node).collect();
+        let attributes: Vec<Option<usize>> = to.attributes.iter().enumerate().map(attribute).collect();
         let is_aligned = (from.nodes.len(), from.attributes.len()) == (to.nodes.len(), to.attributes.len())
             && nodes.iter().enumerate().all(|(slot, from)| *from == Some(slot))
             && to.attributes.iter().zip(&from.attributes).all(|(a, b)| (a.node, &a.name) == (b.node, &b.name))
@@ -41,12 +90,13 @@ impl Carry {
         let springs: Vec<Option<usize>> = to.tables.springs.iter().map(|op| spring(op.constraint)).collect();
         let in_order = |list: &[Option<usize>]| list.iter().enumerate().all(|(slot, from)| *from == Some(slot));
         let is_in_place = is_aligned
-            && (from.poses, from.inputs.len(), from.spring_ops.len(), from.morphs.len())
-                == (to.poses, to.inputs.len(), to.spring_ops.len(), to.morphs.len())
+            && (from.poses, from.inputs.len(), from.layout.spring_ops.len(), from.morphs.len())
+                == (to.poses, to.inputs.len(), to.layout.spring_ops.len(), to.morphs.len())
             && in_order(&inputs)
             && in_order(&springs)
             && to.nodes.iter().zip(&from.nodes).all(|(a, b)| a.pose == b.pose);
-        Self { nodes, attributes, is_aligned, inputs, springs, is_in_place }
+        let changes = if is_in_place { Changes::between(from, to) } else { None };
+        Self { nodes, attributes, is_aligned, inputs, springs, is_in_place, changes }
     }
 
     /// For each node slot of the new program the slot of the same node in the old one.
@@ -57,6 +107,11 @@ impl Carry {
     /// True if both programs have the same nodes and attributes in the same slots.
     pub fn is_aligned(&self) -> bool {
         self.is_aligned
+    }
+
+    /// True if an instance that remembers all registers runs only what differs between the programs.
+    pub fn is_partial(&self) -> bool {
+        self.changes.is_some()
     }
 }
 
@@ -74,6 +129,10 @@ impl RigState {
             let mut fresh = Self::with_memory(Arc::clone(program), self.memory);
             fresh.carry_along(self, carry);
             *self = fresh;
+            return;
+        }
+        if let Some(changes) = carry.changes.as_ref().filter(|_| self.memory == Memory::Whole) {
+            self.exchange_changes(program, changes);
             return;
         }
         let inputs = program.nodes.len() + 1..program.nodes.len() + 1 + program.inputs.len();
@@ -99,6 +158,37 @@ impl RigState {
         }
         self.program = Arc::clone(program);
         self.mark_all();
+    }
+
+    /// Goes on with a program of the same layout: what depends on a difference has to run.
+    fn exchange_changes(&mut self, program: &Arc<RigProgram>, changes: &Changes) {
+        let layout = &program.layout;
+        mark(&mut self.dirty, &changes.ops);
+        for at in changes.x.iter().map(|at| *at as usize) {
+            self.x[at] = program.x[at];
+            mark(&mut self.dirty, layout.readers.get(at));
+        }
+        for at in changes.n.iter().map(|at| *at as usize) {
+            self.n[at] = program.n[at];
+            mark(&mut self.dirty, layout.readers.get(program.x.len() + at));
+        }
+        for (slot, attribute) in program.attributes.iter().enumerate().filter(|(_, attribute)| attribute.is_settable) {
+            let value = attribute.kind.clamp(self.n[slot], attribute.default);
+            if self.n[slot].to_bits() != value.to_bits() {
+                self.n[slot] = value;
+                mark(&mut self.dirty, layout.attribute_readers.get(slot));
+            }
+        }
+        for node in program.nodes.iter() {
+            let Some((freedom, pose)) = node.freedom.zip(self.poses.get_mut(node.pose.0 as usize)) else { continue };
+            let clamped = if *pose == PoseOffset::IDENTITY { *pose } else { freedom.clamp(*pose) };
+            if *pose != clamped {
+                *pose = clamped;
+                mark(&mut self.dirty, layout.pose_readers.get(node.pose.0 as usize));
+            }
+        }
+        self.any_dirty |= self.dirty.iter().any(|word| *word != 0);
+        self.program = Arc::clone(program);
     }
 
     /// As [`carry_over`](Self::carry_over), with correspondences from the other instance's program to this one's.

@@ -105,7 +105,7 @@ impl Four {
             let is_posed = offsets.map(|offset| *offset != PoseOffset::IDENTITY);
             Posed { offset: together(offsets.map(Place::from)), is_posed: mask(is_posed) }
         }));
-        if is_same { program.settings } else { 0 }
+        if is_same { program.layout.settings } else { 0 }
     }
 
     /// Stores the results in the instances.
