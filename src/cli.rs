@@ -21,6 +21,8 @@ mod new;
 mod outputs;
 mod pose;
 mod progress;
+#[cfg(feature = "remote")]
+mod remote;
 #[cfg(feature = "render")]
 mod render;
 mod report;
@@ -56,10 +58,7 @@ struct Cli {
 #[derive(Subcommand, Debug)]
 enum Command {
     /// Open the window on a mesh, a template or a project; without a file on the bundled character
-    Edit {
-        /// The file
-        file: Option<PathBuf>,
-    },
+    Edit(EditArgs),
     /// Make gestures (clicks, strokes) on a mesh and save the skeleton, or the skinned character
     Sketch(sketch::SketchArgs),
     /// Bind a mesh to a skeleton and save the character
@@ -101,6 +100,31 @@ enum Command {
     /// Take a picture of a mesh, a template or a project, without a window
     #[cfg(feature = "render")]
     Render(render::RenderArgs),
+}
+
+/// Arguments of `edit`.
+#[derive(Args, Debug)]
+struct EditArgs {
+    /// The file
+    file: Option<PathBuf>,
+    /// Let other programs of this machine control the window over this port; 0 takes a free one
+    #[cfg(feature = "remote")]
+    #[arg(long, value_name = "PORT")]
+    remote: Option<u16>,
+    /// Folder in which remote control may read and save templates; the working folder by default
+    #[cfg(feature = "remote")]
+    #[arg(long, value_name = "FOLDER", requires = "remote")]
+    remote_folder: Vec<PathBuf>,
+}
+
+impl EditArgs {
+    fn window(self) -> Result<WindowRequest, Failure> {
+        Ok(WindowRequest {
+            file: self.file,
+            #[cfg(feature = "remote")]
+            remote: self.remote.map(|port| remote::bind(port, self.remote_folder)).transpose()?,
+        })
+    }
 }
 
 /// Options of the computation of weights.
@@ -191,8 +215,18 @@ pub enum WindowError {
     Window(Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// Function that opens the window on a file, or on the bundled character, and returns when it is closed.
-pub type OpenWindow<'a> = &'a dyn Fn(Option<PathBuf>) -> Result<ExitCode, WindowError>;
+/// Window to open.
+#[derive(Debug, Clone, Default)]
+pub struct WindowRequest {
+    /// The file; the bundled character without one.
+    pub file: Option<PathBuf>,
+    /// Remote control of the window.
+    #[cfg(feature = "remote")]
+    pub remote: Option<crate::remote::RemotePlugin>,
+}
+
+/// Function that opens the window, and returns when it is closed.
+pub type OpenWindow<'a> = &'a dyn Fn(WindowRequest) -> Result<ExitCode, WindowError>;
 
 /// Runs the command line of this process. `window` opens the editor, which this module does not depend on.
 pub fn main(window: OpenWindow) -> ExitCode {
@@ -206,13 +240,14 @@ pub fn main(window: OpenWindow) -> ExitCode {
     };
     let result = match cli.command {
         None if cli.json => demo::run(None),
-        None => match window(None) {
+        None => match window(WindowRequest::default()) {
             Ok(code) => return code,
             Err(reason) => demo::run(Some(&reason)),
         },
-        Some(Command::Edit { file }) => match window(file) {
-            Ok(code) => return code,
-            Err(reason) => Err(Failure::Usage(format!("{reason}; sketch, skin and convert work without a window"))),
+        Some(Command::Edit(args)) => match args.window().map(window) {
+            Ok(Ok(code)) => return code,
+            Ok(Err(reason)) => Err(Failure::Usage(format!("{reason}; sketch, skin and convert work without a window"))),
+            Err(failure) => Err(failure),
         },
         Some(Command::Sketch(args)) => sketch::run(&args),
         Some(Command::Skin(args)) => skin::run(&args),

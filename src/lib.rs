@@ -17,5 +17,7 @@ pub mod test_app;
 pub mod cli;
 #[cfg(feature = "editor")]
 pub mod editor;
+#[cfg(feature = "remote")]
+pub mod remote;
 #[cfg(feature = "render")]
 pub mod render;

@@ -1,8 +1,8 @@
 //! The `rigsmith` command.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::process::ExitCode;
 
-use rigsmith::cli::WindowError;
+use rigsmith::cli::{WindowError, WindowRequest};
 
 fn main() -> ExitCode {
     rigsmith::cli::main(&open_window)
@@ -10,11 +10,16 @@ fn main() -> ExitCode {
 
 /// Opens the editor.
 #[cfg(feature = "editor")]
-fn open_window(file: Option<PathBuf>) -> Result<ExitCode, WindowError> {
+fn open_window(request: WindowRequest) -> Result<ExitCode, WindowError> {
     use bevy::app::AppExit;
     use rigsmith::editor::app::{EditorOptions, run};
 
-    match run(EditorOptions { file }) {
+    let options = EditorOptions {
+        file: request.file,
+        #[cfg(feature = "remote")]
+        remote: request.remote,
+    };
+    match run(options) {
         Ok(AppExit::Success) => Ok(ExitCode::SUCCESS),
         Ok(AppExit::Error(code)) => Ok(ExitCode::from(code.get())),
         Err(error) => Err(WindowError::Window(error.into())),
@@ -23,6 +28,6 @@ fn open_window(file: Option<PathBuf>) -> Result<ExitCode, WindowError> {
 
 /// Reports that this build has no editor.
 #[cfg(not(feature = "editor"))]
-fn open_window(_file: Option<PathBuf>) -> Result<ExitCode, WindowError> {
+fn open_window(_request: WindowRequest) -> Result<ExitCode, WindowError> {
     Err(WindowError::NoEditor)
 }

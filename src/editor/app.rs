@@ -50,6 +50,9 @@ use crate::plugins::{
 pub struct EditorOptions {
     /// The file to open; the bundled character without one.
     pub file: Option<PathBuf>,
+    /// Remote control.
+    #[cfg(feature = "remote")]
+    pub remote: Option<crate::remote::RemotePlugin>,
 }
 
 /// Error of opening the window, in one line.
@@ -159,6 +162,10 @@ impl Plugin for EditorPlugin {
             drop_old_modifiers.after(EguiPreUpdateSet::ProcessInput).before(EguiPreUpdateSet::BeginPass),
         )
         .add_systems(Last, keep_drawing);
+        #[cfg(feature = "remote")]
+        if let Some(remote) = &self.options.remote {
+            app.add_plugins(remote.clone()).add_systems(Startup, wake_for_calls);
+        }
     }
 }
 
@@ -183,6 +190,16 @@ fn spawn_interface(mut commands: Commands, mut settings: ResMut<EguiGlobalSettin
 
 fn open_first(first: Res<OpenFirst>, mut requests: MessageWriter<OpenRequest>) {
     requests.write(first.0.clone());
+}
+
+/// Lets calls of remote control wake the window, which sleeps while nothing happens.
+#[cfg(feature = "remote")]
+fn wake_for_calls(server: Res<crate::remote::RemoteServer>, proxy: Res<bevy::winit::EventLoopProxyWrapper>) {
+    let proxy = (**proxy).clone();
+    server.set_wake(move || {
+        // The window may have been closed.
+        let _ = proxy.send_event(bevy::winit::WinitUserEvent::WakeUp);
+    });
 }
 
 /// Sends a notice if a software renderer draws instead of a graphics card.

@@ -43,6 +43,14 @@ pub struct BuiltTemplate {
     pub ran: Arc<[Uid]>,
 }
 
+#[cfg(feature = "remote")]
+impl BuiltTemplate {
+    /// True if it was built from that rig of a file.
+    pub(crate) fn is_of(&self, file: &Rig) -> bool {
+        *self.source == *file
+    }
+}
+
 type Id = AssetId<RigTemplate>;
 
 /// Something for the thread to do.

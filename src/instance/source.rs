@@ -115,6 +115,18 @@ impl RigSource {
     pub fn base(&self) -> Option<&Arc<Rig>> {
         self.base.as_ref()
     }
+
+    /// True if the built template has been compared with the rig.
+    #[cfg(feature = "remote")]
+    pub(crate) fn has_seen(&self, built: &Arc<BuiltTemplate>) -> bool {
+        self.seen.as_ref().is_some_and(|seen| Arc::ptr_eq(seen, built))
+    }
+
+    /// True if no update is under way.
+    #[cfg(feature = "remote")]
+    pub(crate) fn is_settled(&self) -> bool {
+        self.pending.is_none() && self.trial.is_none()
+    }
 }
 
 /// An update that waits for an [`AcceptUpdate`].

@@ -159,7 +159,7 @@ fn parts_depend_in_one_direction() {
         "Commands",
         "ResMut",
     ];
-    let rules: [(&str, &[&str]); 17] = [
+    let rules: [(&str, &[&str]); 18] = [
         ("rig", &pure),
         ("mesh", &pure),
         ("algo", &pure),
@@ -175,6 +175,7 @@ fn parts_depend_in_one_direction() {
         ("plugins", &["std::fs", "std::path", "crate::cli", "crate::editor", "crate::files"]),
         ("files", &["crate::cli", "crate::editor", "bevy::app", "App"]),
         ("instance", &["std::fs", "crate::cli", "crate::editor", "crate::headless"]),
+        ("remote", &["std::fs", "crate::cli", "crate::editor", "crate::headless"]),
         ("cli", &["crate::editor"]),
         ("headless", &["crate::cli", "crate::editor", "crate::files"]),
     ];
