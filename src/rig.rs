@@ -14,6 +14,7 @@ pub mod extract;
 pub mod feature;
 pub mod format;
 mod group;
+mod input;
 mod joint;
 pub mod label;
 pub mod nearest;
@@ -29,8 +30,8 @@ mod uid;
 pub mod update;
 
 pub use built::{
-    Attribute, AttributeKind, BuiltConstraint, BuiltNode, BuiltRig, Channels, ControlData, LayerData, LayerDisplay,
-    Limits, Matching, NodeType, Origin, SwitchData, VISIBLE,
+    Attribute, AttributeKind, BuiltConstraint, BuiltInput, BuiltNode, BuiltRig, Channels, ControlData, LayerData,
+    LayerDisplay, Limits, Matching, NodeType, Origin, SwitchData, VISIBLE,
 };
 pub use constraint::{
     AimUp, AngleLimits, ChainSolver, Channel, Constraint, Dependency, KeyEase, Output, Scalar, Target,
@@ -45,6 +46,7 @@ pub(crate) use format::{
     tree::with_field,
 };
 pub use group::{GROUP_COLORS, GroupData};
+pub use input::RigInput;
 pub use joint::{FaceBonePart, FacePlacement, JointData, NodeKind, RestTransform, RigJoint, degrees};
 pub use pose::{AttributeValues, PoseOffset, StoredPose};
 pub use reference::{NodeRef, NodeRefs};

@@ -11,6 +11,7 @@
 //! writes the `Transform`s of all nodes that moved. The document's pose is passed on only where the document changes.
 
 mod hand_over;
+mod inputs;
 mod spawn;
 mod systems;
 
@@ -21,6 +22,7 @@ use bevy::prelude::*;
 pub(crate) use self::systems::is_near;
 pub use self::{
     hand_over::{HandOver, OutsideTransform},
+    inputs::RigInputs,
     spawn::{furnish_instance, spawn_instance},
 };
 pub use super::schema::{ControlPose, NodeOf, NodeSlot, RigNodes};
@@ -40,7 +42,7 @@ impl Plugin for RuntimePlugin {
             PostUpdate,
             (
                 (
-                    systems::note_controls,
+                    (inputs::check_inputs, inputs::read_inputs, systems::note_controls).chain(),
                     systems::solve,
                     (systems::scatter_locals, systems::scatter_attributes, systems::scatter_morphs).chain(),
                 )
@@ -226,8 +228,10 @@ impl RigRuntime {
 
     fn carry_along(&mut self, before: &Self, carry: &Carry) {
         self.state.carry_along(&before.state, carry);
-        self.posed.clone_from(&before.posed);
-        self.valued.clone_from(&before.valued);
+        // What the document says of nodes that come back, from a roll back for example, is passed on again.
+        let known = |node: &Uid| before.state.program().node(*node).is_some();
+        self.posed = before.posed.iter().filter(|(node, _)| known(node)).map(|(node, at)| (*node, *at)).collect();
+        self.valued = before.valued.iter().filter(|(node, _)| known(node)).map(|(n, v)| (*n, v.clone())).collect();
         for (slot, from) in carry.nodes().iter().enumerate() {
             let Some((from, entity)) = from.and_then(|from| Some((from, before.entity(from)?))) else { continue };
             self.attach(slot, entity);

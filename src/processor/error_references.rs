@@ -28,7 +28,7 @@ impl Names for WorldNames<'_> {
         match kind {
             // What is built knows no names of these; the document watches over them.
             NameKind::Rig | NameKind::Group => Some(Cow::Borrowed("")),
-            NameKind::Joint => node(),
+            NameKind::Joint | NameKind::Input => node(),
             NameKind::Command => command(),
             NameKind::Label => node().or_else(command),
         }
@@ -47,6 +47,7 @@ impl Names for WorldNames<'_> {
                     .map(|label| Cow::Borrowed(&**label))
                     .collect()
             }
+            NameKind::Input => self.world.declared.iter().map(|input| Cow::Borrowed(&*input.name)).collect(),
             _ => Vec::new(),
         }
     }

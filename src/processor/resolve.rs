@@ -36,6 +36,9 @@ pub enum ResolveError {
     /// A joint that does not exist.
     #[error("there is no joint {0} in the rig; it was deleted: refer to another")]
     NoJoint(Uid),
+    /// An input that the rig does not declare.
+    #[error("the rig declares no input {0}; declare it under `inputs`, or refer to something else")]
+    NoInput(Uid),
     /// The label of a joint or command that has none.
     #[error("the joint or command {0}, whose label is meant, has no label; give it one")]
     NoLabel(Uid),
@@ -114,10 +117,17 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
     let before = |command: u32| world.places[command as usize] < place;
     let mut incomplete: Option<Gap> = None;
     let mut found: Vec<NodeId> = match &reference.source {
-        Source::Any => (0..world.slots.len() as u32).map(NodeId).filter(alive).collect(),
+        Source::Any => {
+            let all = (0..world.slots.len() as u32).map(NodeId);
+            all.filter(|node| !world.is_input(*node)).filter(alive).collect()
+        }
         Source::This => Some(asker.joint).into_iter().filter(alive).collect(),
         Source::Root => root_control(world, asker).into_iter().filter(alive).collect(),
         Source::Joints => world.joints.iter().copied().filter(alive).collect(),
+        Source::Input(uid) => {
+            let node = world.id(*uid).filter(|node| world.is_input(*node));
+            Some(node.ok_or(Missing::Wrong(ResolveError::NoInput(*uid)))?).into_iter().filter(alive).collect()
+        }
         Source::Joint(uid) => vec![joint(world, *uid, place)?].into_iter().filter(alive).collect(),
         Source::Hierarchy(top) => {
             let top = match top {

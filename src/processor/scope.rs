@@ -253,6 +253,7 @@ impl BuildScope<'_> {
                 format!("{rig} is another rig; leave it out, or carry the tag over to that rig"),
             ));
         }
+        self.check_inside(parent)?;
         let node = self.identity(role, subject, number)?;
         let origin = Origin {
             command: self.command(),
@@ -283,6 +284,17 @@ impl BuildScope<'_> {
         self.write(node, Aspect::Label, Value::Label(label));
         self.write(node, Aspect::Group, Value::Group(group));
         Ok(node)
+    }
+
+    /// Refuses an input where something of the rig is needed.
+    fn check_inside(&self, node: Option<NodeId>) -> Result<(), ModuleError> {
+        match node.filter(|node| self.world.is_input(*node)) {
+            Some(input) => Err(ModuleError::other(format!(
+                "{} is an input, outside of the rig: follow it, but hang nothing below it and do not move it",
+                self.name(input)
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// Makes a node like [`BuildScope::spawn`], given where it stands in the rig's space.
@@ -318,6 +330,10 @@ impl BuildScope<'_> {
         number: u32,
         constraint: Constraint,
     ) -> Result<NodeId, ModuleError> {
+        for driven in constraint.drives() {
+            let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = driven;
+            self.check_inside(self.world.id(uid))?;
+        }
         let id = self.identity(role, subject, number)?;
         for driven in constraint.drives() {
             let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = driven;

@@ -7,7 +7,7 @@ use bevy::platform::collections::{HashMap, HashSet};
 use super::world::{Aspect, NodeId, Value, World};
 use crate::{
     mesh::model::Trs,
-    rig::{Attribute, BuiltConstraint, BuiltNode, BuiltRig, Uid},
+    rig::{Attribute, BuiltConstraint, BuiltInput, BuiltNode, BuiltRig, Uid},
 };
 
 /// The last snapshot, and what has changed in the world since.
@@ -101,7 +101,7 @@ impl Last {
 pub(super) fn snapshot(world: &World, place: u32) -> BuiltRig {
     let mut alive: Vec<((u32, u32), NodeId)> = Vec::with_capacity(world.slots.len());
     for node in (0..world.slots.len() as u32).map(NodeId) {
-        if let Some(birth) = world.birth(node, place) {
+        if let Some(birth) = world.birth(node, place).filter(|_| !world.is_input(node)) {
             alive.push((world.order_key(node, birth), node));
         }
     }
@@ -110,7 +110,7 @@ pub(super) fn snapshot(world: &World, place: u32) -> BuiltRig {
     let mut children: Vec<Vec<NodeId>> = vec![Vec::new(); world.slots.len()];
     let mut roots = Vec::new();
     for (_, node) in &alive {
-        match world.parent(*node, place).filter(|parent| world.exists(*parent, place)) {
+        match world.parent(*node, place).filter(|parent| world.exists(*parent, place) && !world.is_input(*parent)) {
             Some(parent) => children[parent.0 as usize].push(*node),
             None => roots.push(*node),
         }
@@ -146,6 +146,11 @@ pub(super) fn snapshot(world: &World, place: u32) -> BuiltRig {
         nodes,
         constraints: constraints.into_iter().map(|(_, constraint)| constraint).collect(),
         switches: switches.into_iter().map(|(_, switch)| switch).collect(),
+        inputs: world
+            .declared
+            .iter()
+            .map(|input| BuiltInput { uid: input.uid, name: input.name.as_str().into(), rest: input.rest.into() })
+            .collect(),
     }
 }
 

@@ -7,7 +7,7 @@ use bevy::platform::collections::HashMap;
 use super::{exclusion::Exclusions, module::BuildLimits};
 use crate::{
     mesh::model::Trs,
-    rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, SwitchData, Uid},
+    rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, RigInput, SwitchData, Uid},
 };
 
 /// A node, as long as its builder lives: nodes that are rolled back keep their place.
@@ -155,6 +155,9 @@ pub(super) struct World {
     pub bearers: Vec<Uid>,
     /// The document's joints, in its order.
     pub joints: Vec<NodeId>,
+    /// Declared inputs, and their nodes: outside of the rig, so that nothing stands on them and nothing drives them.
+    pub declared: Vec<RigInput>,
+    pub inputs: Vec<NodeId>,
     /// Exclusions of the document and of commands.
     pub off: Exclusions,
     /// Limits on the nodes and constraints that commands make.
@@ -271,6 +274,11 @@ impl World {
         let subject = self.id(origin.subject).filter(|subject| *subject != node);
         let subject = subject.map_or_else(|| origin.subject.to_string(), |subject| self.name(subject, place));
         numbered(format!("{subject}_{}", origin.role))
+    }
+
+    /// True for a declared input.
+    pub fn is_input(&self, node: NodeId) -> bool {
+        self.inputs.contains(&node)
     }
 
     pub fn exists(&self, node: NodeId, place: u32) -> bool {

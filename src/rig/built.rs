@@ -16,6 +16,19 @@ pub struct BuiltRig {
     pub constraints: Vec<BuiltConstraint>,
     /// Switches whose nodes can be matched, so that setting a switch moves none of them.
     pub switches: Vec<Arc<SwitchData>>,
+    /// Declared inputs, outside of the rig.
+    pub inputs: Vec<BuiltInput>,
+}
+
+/// A declared input of a built rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BuiltInput {
+    /// Uid by which constraints refer to it.
+    pub uid: Uid,
+    /// Name by which apps find it.
+    pub name: Arc<str>,
+    /// Transform in the rig's space until it is set.
+    pub rest: Trs,
 }
 
 /// Switch between two ways of moving the same nodes, with the data that keeps the nodes in place when it is set: see

@@ -10,7 +10,7 @@ use bevy::{math::Affine3, prelude::*};
 use crate::{
     mesh::model::Weights,
     rig::{
-        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, RigJoint, StoredPose, TagData, Uid,
+        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, RigInput, RigJoint, StoredPose, TagData, Uid,
         animation::RigClip,
     },
 };
@@ -25,6 +25,7 @@ pub struct Rig {
     pub(super) uid: Uid,
     pub(super) about: RigAbout,
     pub(super) groups: Vec<GroupData>,
+    pub(super) inputs: Vec<RigInput>,
     pub(super) joints: HashMap<Uid, RigJoint>,
     pub(super) roots: Vec<Uid>,
     /// The joint of every tag, so that neither adding nor finding one needs a search.
@@ -97,6 +98,16 @@ impl Rig {
         self.groups.iter().find(|group| group.uid == uid)
     }
 
+    /// Declared inputs in order.
+    pub fn inputs(&self) -> &[RigInput] {
+        &self.inputs
+    }
+
+    /// The declared input with that uid.
+    pub fn input(&self, uid: Uid) -> Option<&RigInput> {
+        self.inputs.iter().find(|input| input.uid == uid)
+    }
+
     /// Root joints in authored order.
     pub fn roots(&self) -> &[Uid] {
         &self.roots
@@ -114,11 +125,12 @@ impl Rig {
         Some((joint, tag))
     }
 
-    /// Returns `true` if a joint, group, tag, stored pose, clip or layer has that uid.
+    /// Returns `true` if a joint, group, tag, stored pose, clip, layer or input has that uid.
     pub fn is_taken(&self, uid: Uid) -> bool {
         self.joints.contains_key(&uid)
             || self.tags.contains_key(&uid)
             || self.group(uid).is_some()
+            || self.input(uid).is_some()
             || self.stored_pose(uid).is_some()
             || self.clips.iter().any(|clip| clip.uid == uid || clip.layer(uid).is_some())
     }

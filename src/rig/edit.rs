@@ -5,6 +5,7 @@
 //! edits.
 
 mod clips;
+mod inputs;
 mod poses;
 mod skin_weights;
 
@@ -16,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     mesh::model::Weights,
     rig::{
-        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigJoint, StoredPose, TagData,
+        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigInput, RigJoint, StoredPose, TagData,
         TagKind, Uid,
         animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
         document::{RigAbout, SkinData},
@@ -142,6 +143,8 @@ pub enum RigEdit {
     SetKind(Uid, NodeKind),
     /// Sets the record of a joint's placement as a facial bone.
     SetFace(Uid, Option<Box<FacePlacement>>),
+    /// Replaces the declared inputs.
+    SetInputs(Vec<RigInput>),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -208,6 +211,12 @@ pub enum EditError {
     /// A colour that is not finite.
     #[error("the colour of local group {0} is not finite; use numbers from 0 to 1")]
     BadColor(Uid),
+    /// The name of an input that is empty, or another's.
+    #[error("input {0} cannot be called \"{1}\": it needs a name that no other input has")]
+    BadInputName(Uid, String),
+    /// An input at a place that is none.
+    #[error("input \"{0}\" would get a transform that is not finite or not a rotation; check the numbers")]
+    BadInput(String),
     /// Parameters of a tag that are not RON.
     #[error("the parameters of tag {0} are not RON text: {1}; correct them, or write () for none")]
     BadParams(Uid, String),
@@ -323,6 +332,7 @@ impl Rig {
                 let old = std::mem::replace(&mut joint.data.face, face.as_deref().cloned());
                 RigEdit::SetFace(*uid, old.map(Box::new))
             }
+            RigEdit::SetInputs(inputs) => self.set_inputs(inputs)?,
         })
     }
 

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{
-    EditError, Rig, RigAbout, RigEdit, TagKind, Uid, UidSource,
+    EditError, Rig, RigAbout, RigEdit, RigInput, TagData, TagKind, Uid, UidSource,
     reference::{NameKind, Names, references_in},
     remap::Remap,
 };
@@ -77,7 +77,8 @@ pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSourc
                     NameKind::Command => !tags.contains(uid),
                     NameKind::Group => !groups.contains(uid),
                     NameKind::Label => !chosen.contains(uid) && !tags.contains(uid),
-                    NameKind::Rig => false,
+                    // Inputs come along.
+                    NameKind::Rig | NameKind::Input => false,
                 })
                 .collect();
             outside.sort_unstable();
@@ -89,7 +90,20 @@ pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSourc
         }
         out.apply(&RigEdit::AddJoint { joint: Box::new(data), parent, index: usize::MAX })?;
     }
+    let named: HashSet<Uid> = out.walk().flat_map(|joint| &joint.data.tags).flat_map(inputs_of).collect();
+    let inputs: Vec<RigInput> = rig.inputs().iter().filter(|input| named.contains(&input.uid)).cloned().collect();
+    if !inputs.is_empty() {
+        out.apply(&RigEdit::SetInputs(inputs))?;
+    }
     Ok(Extracted { rig: out, left })
+}
+
+/// Inputs that a tag refers to.
+fn inputs_of(tag: &TagData) -> Vec<Uid> {
+    let TagKind::Command { params, .. } = &tag.kind else { return Vec::new() };
+    let references = references_in(params).filter_map(|found| found.references.ok()).flat_map(|list| list.0);
+    let uids = references.flat_map(|reference| reference.uids().collect::<Vec<_>>());
+    uids.filter(|(kind, _)| *kind == NameKind::Input).map(|(_, uid)| uid).collect()
 }
 
 fn groups_in_order<'a>(rig: &'a Rig, groups: &'a HashSet<Uid>) -> impl Iterator<Item = Uid> + 'a {

@@ -20,6 +20,7 @@
 //!            | "hierarchy" [ "this" | named ]              a joint (this if left out) and the joints below it
 //!            | "command" named                             nodes that one command creates
 //!            | "module" name                               nodes that any command of that module creates
+//!            | "input" named                               something outside of the rig that it declares as an input
 //! filter     = "rig:" ( "own" | named )                    which rig; own if left out
 //!            | "group:" ( "any" | "own" | named )          local group; any if left out
 //!            | "label:" named                              nodes with the label of that joint or command
@@ -126,6 +127,8 @@ pub enum Source {
     Command(Uid),
     /// The nodes that commands of that module create.
     Module(String),
+    /// A declared input of the rig.
+    Input(Uid),
 }
 
 /// The joint at the top of a hierarchy.
@@ -312,6 +315,7 @@ impl NodeRef {
         let source = match &mut self.source {
             Source::Joint(uid) | Source::Hierarchy(Top::Joint(uid)) => Some((NameKind::Joint, uid)),
             Source::Command(uid) => Some((NameKind::Command, uid)),
+            Source::Input(uid) => Some((NameKind::Input, uid)),
             _ => None,
         };
         let label = self.label.as_mut().map(|uid| (NameKind::Label, uid));

@@ -179,6 +179,9 @@ pub fn edits_from_empty(rig: &Rig) -> Vec<RigEdit> {
     let last = u32::MAX as usize;
     let mut edits = vec![RigEdit::SetAbout(Box::new(rig.about().clone()))];
     edits.extend(rig.groups().iter().map(|group| RigEdit::AddLocalGroup(group.clone(), last)));
+    if !rig.inputs().is_empty() {
+        edits.push(RigEdit::SetInputs(rig.inputs().to_vec()));
+    }
     edits.extend(rig.walk().map(|joint| RigEdit::AddJoint {
         joint: Box::new(joint.data.clone()),
         parent: joint.parent,

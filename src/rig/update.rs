@@ -18,8 +18,10 @@ use std::{
 
 use serde::Serialize;
 
-use super::{GroupData, JointData, Rig, StoredPose, TagData, Uid, document::circles};
-use fields::{Field, about_fields, group_fields, joint_fields, joint_title, pose_fields, tag_fields, tag_title};
+use super::{GroupData, JointData, Rig, RigInput, StoredPose, TagData, Uid, document::circles};
+use fields::{
+    Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields, tag_fields, tag_title,
+};
 use order::merged_order;
 
 pub use edits::{clip_edits, edits_between, pose_edits};
@@ -131,6 +133,7 @@ pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
     let mut merge = Merge { base, now, file, take, changes, rig: now.clone(), placed: HashSet::new(), renamed: told };
     merge.header();
     merge.groups();
+    merge.inputs();
     merge.joints();
     merge.poses();
     let Merge { rig, changes, .. } = merge;
@@ -186,6 +189,26 @@ impl Merge<'_> {
         }
         let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
         self.rig.groups = order.into_iter().filter_map(|uid| kept.remove(&uid)).collect();
+    }
+
+    fn inputs(&mut self) {
+        let (base, now, file) = (self.base, self.now, self.file);
+        let lists = [base, Some(now), Some(file)].map(|rig| uids(rig.into_iter().flat_map(Rig::inputs), |i| i.uid));
+        let mut kept: BTreeMap<Uid, RigInput> = BTreeMap::new();
+        for uid in all(&lists) {
+            let input = now.input(uid).or(file.input(uid));
+            let prefix = input.map_or_else(String::new, |input| format!("input {} ", input.name));
+            let named = Named { uid, joint: None, tag: None, prefix: &prefix };
+            let sides = (base.and_then(|base| base.input(uid)), now.input(uid), file.input(uid));
+            if let Fate::Kept(input) | Fate::Added(input) = self.fate(&input_fields(), sides, &named) {
+                kept.insert(uid, input);
+            }
+        }
+        let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
+        // Of two with one name the first one stays: only one entity can be given for it.
+        let mut names = HashSet::new();
+        let inputs = order.into_iter().filter_map(|uid| kept.remove(&uid));
+        self.rig.inputs = inputs.filter(|input| names.insert(input.name.clone())).collect();
     }
 
     fn poses(&mut self) {

@@ -17,6 +17,7 @@ mod error;
 mod freedom;
 mod graph;
 mod hash;
+mod inputs;
 mod layout;
 mod lists;
 mod lower;
@@ -59,7 +60,8 @@ use crate::{
 pub struct CompileOptions {
     /// Nodes whose transforms the program gives.
     pub keep: Keep,
-    /// Nodes outside the rig that constraints refer to, such as a steering wheel; their transforms are set each frame.
+    /// Nodes outside the rig that constraints refer to, such as a steering wheel, beyond those that the rig declares; their
+    /// transforms are set each frame.
     pub inputs: Vec<ExternalNode>,
 }
 
@@ -161,6 +163,8 @@ pub struct RigProgram {
     attributes: Vec<ProgramAttribute>,
     morphs: Vec<Arc<str>>,
     inputs: Vec<Uid>,
+    /// Names of the inputs that the rig declares, which come first.
+    declared: Vec<Arc<str>>,
     poses: usize,
     ops: Vec<Op>,
     layout: Arc<Layout>,
@@ -198,7 +202,8 @@ impl RigProgram {
         expressions: &mut ByConstraint<Arc<Expression>>,
         layouts: &mut Layouts,
     ) -> Result<Self, ProgramError> {
-        let mut graph = Graph::new(rig, &options.keep, &options.inputs)?;
+        let outside = inputs::outside(rig, options);
+        let mut graph = Graph::new(rig, &options.keep, &outside)?;
         lower::lower(&mut graph, expressions)?;
         let driven = graph.finish();
         let kept: Vec<usize> = (0..rig.nodes.len()).filter(|node| graph.is_kept(*node)).collect();
@@ -258,7 +263,8 @@ impl RigProgram {
             by_uid,
             attributes,
             morphs: graph.morphs.iter().map(|morph| morph.0.clone()).collect(),
-            inputs: options.inputs.iter().map(|input| input.uid).collect(),
+            inputs: outside.iter().map(|input| input.uid).collect(),
+            declared: rig.inputs.iter().map(|input| input.name.clone()).collect(),
             poses: layout.poses(),
             ops,
             layout,
@@ -286,11 +292,6 @@ impl RigProgram {
     /// Names of the morph targets by slot.
     pub fn morphs(&self) -> &[Arc<str>] {
         &self.morphs
-    }
-
-    /// Uids of the inputs by slot.
-    pub fn inputs(&self) -> &[Uid] {
-        &self.inputs
     }
 
     /// Number of operations of a full evaluation.
@@ -323,11 +324,6 @@ impl RigProgram {
     /// Slot of a morph target.
     pub fn morph(&self, name: &str) -> Option<usize> {
         self.morphs.iter().position(|known| **known == *name)
-    }
-
-    /// Slot of an input.
-    pub fn input(&self, uid: Uid) -> Option<usize> {
-        self.inputs.iter().position(|known| *known == uid)
     }
 }
 

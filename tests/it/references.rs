@@ -374,6 +374,7 @@ fn references() -> impl Strategy<Value = NodeRefs> {
         Just(Source::Joints),
         Just(Source::Hierarchy(Top::This)),
         uid().prop_map(Source::Joint),
+        uid().prop_map(Source::Input),
         uid().prop_map(|uid| Source::Hierarchy(Top::Joint(uid))),
         uid().prop_map(Source::Command),
         text().prop_map(Source::Module),

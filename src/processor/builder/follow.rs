@@ -22,6 +22,7 @@ impl Builder {
         self.rig = rig.uid();
         let switches = Switches::of(rig);
         self.sync_joints(rig, &switches);
+        self.sync_inputs(rig);
         self.sync_list(rig, &switches);
         self.spread_structure();
     }
@@ -98,11 +99,40 @@ impl Builder {
             self.set_document(node, Aspect::Group, Some(Value::Group(data.group)));
         }
         for node in before.into_iter().filter(|node| !seen.contains(node)) {
-            for aspect in [Aspect::Birth, Aspect::Parent, Aspect::Base, Aspect::Label, Aspect::Group] {
-                self.set_document(node, aspect, None);
-            }
+            self.clear_document(node);
         }
         self.set_joints_off(off, &switches.groups);
+    }
+
+    fn sync_inputs(&mut self, rig: &Rig) {
+        if self.world.declared == rig.inputs() {
+            return;
+        }
+        self.built.forget();
+        self.world.declared = rig.inputs().to_vec();
+        let before = std::mem::take(&mut self.world.inputs);
+        for (order, input) in rig.inputs().iter().enumerate() {
+            let node = self.world.slot(input.uid, None);
+            self.world.inputs.push(node);
+            let birth = Birth { kind: NodeType::Null, name: None, origin: None, order: order as u32 };
+            let label: Option<Arc<str>> = Some(input.name.as_str().into());
+            self.set_document(node, Aspect::Birth, Some(Value::Birth(Arc::new(birth))));
+            self.set_document(node, Aspect::Parent, Some(Value::Parent(None)));
+            self.set_document(node, Aspect::Base, Some(Value::Base(input.rest.into())));
+            self.set_document(node, Aspect::Label, Some(Value::Label(label)));
+            self.set_document(node, Aspect::Group, Some(Value::Group(None)));
+        }
+        for node in before {
+            if !self.world.inputs.contains(&node) && !self.world.joints.contains(&node) {
+                self.clear_document(node);
+            }
+        }
+    }
+
+    fn clear_document(&mut self, node: NodeId) {
+        for aspect in [Aspect::Birth, Aspect::Parent, Aspect::Base, Aspect::Label, Aspect::Group] {
+            self.set_document(node, aspect, None);
+        }
     }
 
     /// Notes which joints and groups are off.

@@ -31,6 +31,8 @@ impl BuildScope<'_> {
     /// # Errors
     /// If the node would stand below itself.
     pub fn set_parent(&mut self, node: NodeId, parent: Option<NodeId>) -> Result<(), ModuleError> {
+        self.check_inside(Some(node))?;
+        self.check_inside(parent)?;
         let mut above = parent;
         while let Some(ancestor) = above {
             if ancestor == node {
@@ -66,6 +68,7 @@ impl BuildScope<'_> {
     /// If it has one of that name already, or the name is empty, or the ends are in the wrong order, or it has as many
     /// as it may.
     pub fn add_attribute(&mut self, node: NodeId, attribute: Attribute) -> Result<(), ModuleError> {
+        self.check_inside(Some(node))?;
         let name = &attribute.name;
         let mut list = self.attributes(node).to_vec();
         if name.trim().is_empty() {

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{Draft, OperationError};
-use crate::rig::{EditError, GroupData, Rig, RigEdit, Uid, remap::Remap};
+use crate::rig::{EditError, GroupData, Rig, RigEdit, RigInput, Uid, remap::Remap};
 
 /// Puts the joints of another rig, with groups, tags and clips, into the draft's. The roots hang on `parent`, in the place that they
 /// have in their own rig. Uids, labels and group names stay where they are free; others are new, and labels and names get
@@ -21,6 +21,21 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
         if draft.rig().is_taken(uid) {
             uids.insert(uid, draft.next_uid());
         }
+    }
+    let moved = uids.len();
+    let mut inputs = draft.rig().inputs().to_vec();
+    for input in other.inputs() {
+        // The two mean the same thing outside of them.
+        if let Some(own) = inputs.iter().find(|own| own.name == input.name) {
+            uids.insert(input.uid, own.uid);
+            continue;
+        }
+        let uid = if draft.rig().is_taken(input.uid) { draft.next_uid() } else { input.uid };
+        uids.insert(input.uid, uid);
+        inputs.push(RigInput { uid, ..input.clone() });
+    }
+    if inputs != draft.rig().inputs() {
+        draft.apply(RigEdit::SetInputs(inputs))?;
     }
     let remap = Remap { uids, ..Remap::default() };
     let prefix = &other.about().name;
@@ -52,8 +67,8 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
         }
         draft.apply(RigEdit::AddJoint { joint: Box::new(data), parent: above, index: usize::MAX })?;
     }
-    if !remap.uids.is_empty() {
-        draft.note(format!("{} things of {prefix} got new uids, because the rig has theirs already", remap.uids.len()));
+    if moved > 0 {
+        draft.note(format!("{moved} things of {prefix} got new uids, because the rig has theirs already"));
     }
     if renamed > 0 {
         draft.note(format!(

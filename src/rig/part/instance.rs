@@ -157,6 +157,10 @@ impl PartInstance {
         for group in part.groups.iter_mut().filter(|_| self.mirror) {
             group.name = mirrored_label(&group.name).unwrap_or_else(|| group.name.clone());
         }
+        for input in part.inputs.iter_mut().filter(|_| self.mirror) {
+            input.name = mirrored_label(&input.name).unwrap_or_else(|| input.name.clone());
+            input.rest = RestTransform::from_affine(&plane.mirrored_affine(&input.rest.affine()));
+        }
         for uid in order {
             let Some(joint) = part.joints.get_mut(&uid) else { continue };
             if self.mirror {

@@ -22,6 +22,8 @@ pub enum NameKind {
     /// A command tag, by its module, and the label of its joint after a `/` where that is needed. The name that the command
     /// gives may stand in place of the label or, after another `/`, behind it.
     Command,
+    /// A declared input, by its name.
+    Input,
 }
 
 impl fmt::Display for NameKind {
@@ -32,6 +34,7 @@ impl fmt::Display for NameKind {
             Self::Joint => "joint",
             Self::Label => "node label",
             Self::Command => "command",
+            Self::Input => "input",
         })
     }
 }
@@ -79,6 +82,7 @@ impl Names for Rig {
         match kind {
             NameKind::Rig => (self.uid() == uid).then(|| Cow::Borrowed(self.about().name.as_str())),
             NameKind::Group => self.group(uid).map(|group| Cow::Borrowed(group.name.as_str())),
+            NameKind::Input => self.input(uid).map(|input| Cow::Borrowed(input.name.as_str())),
             NameKind::Joint => self.joint(uid)?.data.label.as_deref().map(Cow::Borrowed),
             NameKind::Label => label_text(self, uid),
             NameKind::Command => {
@@ -92,6 +96,7 @@ impl Names for Rig {
         match kind {
             NameKind::Rig => (self.about().name == name).then_some(self.uid()).into_iter().collect(),
             NameKind::Group => self.groups().iter().filter(|group| group.name == name).map(|group| group.uid).collect(),
+            NameKind::Input => self.inputs().iter().filter(|input| input.name == name).map(|input| input.uid).collect(),
             NameKind::Joint => labelled(self, name).map(|joint| joint.data.uid).collect(),
             NameKind::Label => bearer(self, scope.group, name).into_iter().collect(),
             NameKind::Command => find_commands(self, name),
@@ -103,6 +108,7 @@ impl Names for Rig {
         match kind {
             NameKind::Rig => vec![Cow::Borrowed(self.about().name.as_str())],
             NameKind::Group => self.groups().iter().map(|group| Cow::Borrowed(group.name.as_str())).collect(),
+            NameKind::Input => self.inputs().iter().map(|input| Cow::Borrowed(input.name.as_str())).collect(),
             NameKind::Joint => labels().collect(),
             NameKind::Label => labels().chain(commands(self).filter_map(|(_, tag)| given_label(tag))).collect(),
             NameKind::Command => commands(self).filter_map(|(joint, tag)| command_name(joint, tag)).collect(),

@@ -8,7 +8,8 @@ use super::{
 };
 use crate::rig::Uid;
 
-const SOURCES: [&str; 9] = ["any", "this", "root", "joints", "joint", "hierarchy", "command", "module", "none"];
+const SOURCES: [&str; 10] =
+    ["any", "this", "root", "joints", "joint", "hierarchy", "command", "module", "input", "none"];
 const FILTERS: [&str; 6] = ["rig", "group", "label", "type", "role", "pick"];
 const TYPES: [&str; NodeTypes::NAMES.len()] = {
     let mut names = [""; NodeTypes::NAMES.len()];
@@ -102,6 +103,7 @@ impl<'a> Reader<'a, '_> {
             "joints" => reference.source = Source::Joints,
             "joint" => joint = Some((word, NameKind::Joint, self.named("a joint's label")?)),
             "command" => joint = Some((word, NameKind::Command, self.named("a command's module")?)),
+            "input" => joint = Some((word, NameKind::Input, self.named("an input's name")?)),
             "hierarchy" if self.ahead("this") => {
                 self.word();
                 reference.source = Source::Hierarchy(Top::This);
@@ -133,6 +135,7 @@ impl<'a> Reader<'a, '_> {
             reference.source = match word.to_ascii_lowercase().as_str() {
                 "joint" => Source::Joint(uid),
                 "command" => Source::Command(uid),
+                "input" => Source::Input(uid),
                 _ => Source::Hierarchy(Top::Joint(uid)),
             };
         }

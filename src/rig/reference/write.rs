@@ -50,6 +50,10 @@ fn write_one(out: &mut String, reference: &NodeRef, names: Option<&dyn Names>) {
             out.push_str("command ");
             named(out, NameKind::Command, *uid);
         }
+        Source::Input(uid) => {
+            out.push_str("input ");
+            named(out, NameKind::Input, *uid);
+        }
         Source::Module(module) => {
             out.push_str("module ");
             out.push_str(&name_text(module));

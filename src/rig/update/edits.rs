@@ -52,7 +52,7 @@ fn key_edit(clip: Uid, layer: Uid, target: &TrackTarget, now: Option<&Track>, th
     is_other.then(|| RigEdit::SetKeys { clip, layer, target: target.clone(), removed, inserted })
 }
 
-/// The edits after which `from` has the content of `to`: header, groups, joints, tags and stored poses. Weights, the current
+/// The edits after which `from` has the content of `to`: header, groups, inputs, joints, tags and stored poses. Weights, the current
 /// pose, attribute values and clips stay; those of joints that go, go with them. What is the same in both is not touched.
 ///
 /// # Errors
@@ -63,6 +63,9 @@ pub fn edits_between(from: &Rig, to: &Rig) -> Result<Vec<RigEdit>, EditError> {
         steps.apply(RigEdit::SetAbout(Box::new(to.about().clone())))?;
     }
     steps.groups(to)?;
+    if from.inputs() != to.inputs() {
+        steps.apply(RigEdit::SetInputs(to.inputs().to_vec()))?;
+    }
     steps.leaving_tags(to)?;
     steps.joints(to)?;
     steps.tags(to)?;

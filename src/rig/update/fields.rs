@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::rig::{
-    GroupData, JointData, Rig, RigAbout, StoredPose, TagData, TagKind, Uid,
+    GroupData, JointData, Rig, RigAbout, RigInput, StoredPose, TagData, TagKind, Uid,
     format::{
         template::{quoted, vector},
         tree::Tree,
@@ -50,6 +50,23 @@ pub(super) fn group_fields() -> Vec<Field<'static, GroupData>> {
         field("name", |a: &GroupData| Some(quoted(&a.name)), |a, b| a.name.clone_from(&b.name)),
         field("color", color, |a, b| a.color = b.color),
         field("enabled", |a: &GroupData| Some(a.enabled.to_string()), |a, b| a.enabled = b.enabled),
+    ]
+}
+
+pub(super) fn input_fields() -> Vec<Field<'static, RigInput>> {
+    let rotation = |input: &RigInput| {
+        let [x, y, z, w] = input.rest.rotation.to_array();
+        Some(format!("({x:?}, {y:?}, {z:?}, {w:?})"))
+    };
+    vec![
+        field("name", |a: &RigInput| Some(quoted(&a.name)), |a, b| a.name.clone_from(&b.name)),
+        field(
+            "translation",
+            |a: &RigInput| Some(vector(a.rest.translation)),
+            |a, b| a.rest.translation = b.rest.translation,
+        ),
+        field("rotation", rotation, |a, b| a.rest.rotation = b.rest.rotation),
+        field("scale", |a: &RigInput| Some(vector(a.rest.scale)), |a, b| a.rest.scale = b.rest.scale),
     ]
 }
 

@@ -78,11 +78,13 @@ impl ContentHash {
                 list.iter().for_each(|exposed| hasher.debug(exposed));
             }
         }
-        hasher.word(options.inputs.len() as u64);
-        for input in &options.inputs {
+        let inputs = super::inputs::outside(rig, options);
+        hasher.word(inputs.len() as u64);
+        for input in &inputs {
             hasher.word(input.uid.0);
             hasher.trs(&input.rest);
         }
+        rig.inputs.iter().for_each(|input| hasher.text(&input.name));
         hasher.finish()
     }
 }

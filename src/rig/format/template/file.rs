@@ -39,6 +39,8 @@ pub(super) struct TemplateFile {
     #[serde(default)]
     pub(super) groups: Vec<GroupFile>,
     #[serde(default)]
+    pub(super) inputs: Vec<InputFile>,
+    #[serde(default)]
     pub(super) joints: Vec<JointFile>,
     #[serde(default)]
     pub(super) parts: Vec<PartFile>,
@@ -55,6 +57,20 @@ pub(super) struct GroupFile {
     pub(super) color: Option<(f32, f32, f32)>,
     #[serde(default = "yes")]
     pub(super) enabled: bool,
+}
+
+/// A declared input.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InputFile {
+    pub(super) uid: Uid,
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) translation: (f32, f32, f32),
+    #[serde(default = "no_rotation")]
+    pub(super) rotation: (f32, f32, f32, f32),
+    #[serde(default = "no_scale")]
+    pub(super) scale: (f32, f32, f32),
 }
 
 /// A chain of a part that takes other numbers of joints.
@@ -227,6 +243,7 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "needs",
             "chains",
             "groups",
+            "inputs",
             "joints",
             "parts",
             "poses",
@@ -260,6 +277,7 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
         (2, Some("needs")) => Some(&["joints", "sockets"]),
         (3, Some("features")) => Some(&["kind", "name", "switches"]),
         (3, Some("groups")) => Some(&["uid", "name", "color", "enabled"]),
+        (3, Some("inputs")) => Some(&["uid", "name", "translation", "rotation", "scale"]),
         (3, Some("joints")) => Some(&[
             "uid",
             "parent",

@@ -1,5 +1,6 @@
 //! Reader of templates: strict, with the place of each error.
 
+mod inputs;
 mod parts;
 
 use std::{
@@ -117,8 +118,9 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
         Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
     };
     let fields = scan::fields(text);
-    let is_list =
-        |field: &&Field| field.depth == 1 && matches!(field.name, "chains" | "groups" | "joints" | "parts" | "poses");
+    let is_list = |field: &&Field| {
+        field.depth == 1 && matches!(field.name, "chains" | "groups" | "inputs" | "joints" | "parts" | "poses")
+    };
     let mut passed_over = TEMPLATE.unknown(&fields);
     passed_over.extend(fields.iter().filter(is_list));
     passed_over.sort_unstable_by_key(|field| field.start);
@@ -159,6 +161,7 @@ fn build(
         }
         rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
+    rig.inputs = inputs::inputs(places, file.inputs, &mut seen, faults);
     let (format, count) = (file.format, file.joints.len());
     let instances = parts::instances(places, file.parts, faults);
     if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count && instances.is_empty()) {

@@ -201,8 +201,12 @@ impl<'d, 'a> Writer<'d, 'a> {
 
     fn declarations(&mut self) {
         let declared = self.declared;
-        for declaration in std::iter::once(&declared.rig).chain(&declared.groups).chain(&declared.poses) {
+        let named = declared.groups.iter().chain(&declared.inputs).chain(&declared.poses);
+        for declaration in std::iter::once(&declared.rig).chain(named) {
             self.say_uid(declaration);
+        }
+        for input in &declared.inputs {
+            self.say_rotation(input.node);
         }
         for pose in &declared.poses {
             for (list, field) in [("offsets", "joint"), ("values", "node")] {

@@ -1,6 +1,7 @@
 //! Saving over a text: only what changed is written, so that comments, blank lines, the order and the style of what a
 //! person wrote stay, and one changed value is one changed line.
 
+mod lists;
 mod order;
 pub(super) mod patch;
 
@@ -15,13 +16,12 @@ use super::{
     read::read_text,
     shorthand::{Declaration, Declarations, TAG_FIELDS, TagForm},
     write::{
-        face_text, feature_list, feature_summaries, feature_uids, group_text, joint_text, needed_format, needs_text,
-        pose_text, tag_text,
+        face_text, feature_list, feature_summaries, feature_uids, joint_text, needed_format, needs_text, tag_text,
     },
     write_template,
 };
 use crate::rig::{
-    JointData, NodeKind, Rig, RigJoint, TagData, TagKind, Uid, degrees,
+    JointData, NodeKind, RestTransform, Rig, RigJoint, TagData, TagKind, Uid, degrees,
     format::{
         template::{quoted, vector},
         tree::{Item, NodeId, Tree},
@@ -63,6 +63,7 @@ pub(crate) fn write_own_over(rig: &Rig, before: &Rig, own: &Rig, source: &str) -
         let joints = rig.walk().filter(|joint| is_own(joint.data.uid)).map(data).collect();
         let mut out = rig.clone();
         out.groups.retain(|group| is_own(group.uid));
+        out.inputs.retain(|input| is_own(input.uid));
         out.set_joints(joints, |parent| rig.children(parent).to_vec());
         out
     };
@@ -192,6 +193,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
     fn text(mut self) -> String {
         self.header();
         self.groups();
+        self.inputs();
         self.joints();
         self.poses();
         self.patch.text()
@@ -247,39 +249,6 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         }
     }
 
-    fn groups(&mut self) {
-        let rig = self.rig;
-        for declared in &self.declared.groups {
-            let (Some(old), Some(new)) = (self.before.group(declared.uid), rig.group(declared.uid)) else { continue };
-            self.keep_uid(declared.node, declared, ["group", &new.name]);
-            self.set_text(declared.node, "name", &old.name, &new.name);
-            self.patch.set_numbers(declared.node, "color", &old.color, &new.color);
-            if old.enabled != new.enabled {
-                self.patch.set_or_remove(declared.node, "enabled", (!new.enabled).then_some("false"));
-            }
-        }
-        let wanted: Vec<Uid> = rig.groups().iter().map(|group| group.uid).collect();
-        let text = |uid: Uid| rig.group(uid).map(group_text).unwrap_or_default();
-        self.patch.list(self.tree().root(), "groups", &self.declared.groups, &wanted, None, text);
-    }
-
-    fn poses(&mut self) {
-        let rig = self.rig;
-        for declared in &self.declared.poses {
-            let (old, new) = (self.before.stored_pose(declared.uid), rig.stored_pose(declared.uid));
-            let (Some(old), Some(new)) = (old, new) else { continue };
-            if old.offsets != new.offsets || old.values != new.values {
-                self.patch.replace(declared.node, &pose_text(new));
-                continue;
-            }
-            self.keep_uid(declared.node, declared, ["pose", &new.name]);
-            self.set_text(declared.node, "name", &old.name, &new.name);
-        }
-        let wanted: Vec<Uid> = rig.stored_poses().iter().map(|pose| pose.uid).collect();
-        let text = |uid: Uid| rig.stored_pose(uid).map(pose_text).unwrap_or_default();
-        self.patch.list(self.tree().root(), "poses", &self.declared.poses, &wanted, None, text);
-    }
-
     fn joints(&mut self) {
         let (rig, declared, with_names, names) = (self.rig, self.declared, self.with_names, self.names.clone());
         for (declared, tags) in declared.joints.iter().zip(&declared.tags) {
@@ -328,17 +297,20 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         if was.locked != is.locked {
             self.patch.set_or_remove(node, "locked", is.locked.then_some("true"));
         }
-        let (was_rest, rest) = (&was.rest, &is.rest);
-        self.patch.set_numbers(node, "translation", &was_rest.translation.to_array(), &rest.translation.to_array());
-        if was_rest.rotation != rest.rotation {
-            self.rotation(node, was_rest.rotation, rest.rotation);
-        }
-        match rest.scale == Vec3::ONE && was_rest.scale != Vec3::ONE {
-            true => self.patch.set_or_remove(node, "scale", None),
-            false => self.patch.set_numbers(node, "scale", &was_rest.scale.to_array(), &rest.scale.to_array()),
-        }
+        self.rest(node, &was.rest, &is.rest);
         if was.face != is.face {
             self.patch.set_or_remove(node, "face", is.face.as_ref().map(face_text).as_deref());
+        }
+    }
+
+    fn rest(&mut self, node: NodeId, old: &RestTransform, new: &RestTransform) {
+        self.patch.set_numbers(node, "translation", &old.translation.to_array(), &new.translation.to_array());
+        if old.rotation != new.rotation {
+            self.rotation(node, old.rotation, new.rotation);
+        }
+        match new.scale == Vec3::ONE && old.scale != Vec3::ONE {
+            true => self.patch.set_or_remove(node, "scale", None),
+            false => self.patch.set_numbers(node, "scale", &old.scale.to_array(), &new.scale.to_array()),
         }
     }
 

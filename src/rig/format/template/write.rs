@@ -9,7 +9,7 @@ use bevy::math::{Quat, Vec3};
 
 use super::{FORMAT, FeatureSummary, NeedsSummary};
 use crate::rig::{
-    FacePlacement, GroupData, NodeKind, Rig, RigJoint, StoredPose, TagData, TagKind, Uid,
+    FacePlacement, GroupData, NodeKind, RestTransform, Rig, RigInput, RigJoint, StoredPose, TagData, TagKind, Uid,
     format::poses::{write_stored_pose, write_stored_poses},
     part::PartNeeds,
     reference::refresh_names,
@@ -50,6 +50,12 @@ fn write_into(out: &mut String, rig: &Rig, with_poses: bool) -> std::fmt::Result
     for group in rig.groups() {
         writeln!(out, "        {},", group_text(group))?;
     }
+    if !rig.inputs().is_empty() {
+        writeln!(out, "    ],\n    inputs: [")?;
+        for input in rig.inputs() {
+            writeln!(out, "        {},", input_text(input))?;
+        }
+    }
     writeln!(out, "    ],\n    joints: [")?;
     let features = feature_uids(rig);
     for joint in rig.walk() {
@@ -70,7 +76,7 @@ pub(super) fn needed_format(rig: &Rig) -> u32 {
 fn format_without_poses(rig: &Rig) -> u32 {
     let has_choice = |tag: &TagData| matches!(&tag.kind, TagKind::Feature { choice, .. } if !choice.is_empty());
     let is_newer = |joint: &RigJoint| joint.data.face.is_some() || joint.data.tags.iter().any(has_choice);
-    if rig.about().kind == "part" || rig.walk().any(is_newer) { FORMAT } else { 1 }
+    if rig.about().kind == "part" || !rig.inputs().is_empty() || rig.walk().any(is_newer) { FORMAT } else { 1 }
 }
 
 /// The list of named features, an element a line.
@@ -101,6 +107,24 @@ pub(super) fn group_text(group: &GroupData) -> String {
     let [r, g, b] = group.color;
     let enabled = if group.enabled { "" } else { ", enabled: false" };
     format!("(uid: \"{}\", name: {}, color: ({r:?}, {g:?}, {b:?}){enabled})", group.uid, quoted(&group.name))
+}
+
+/// A declared input.
+pub(super) fn input_text(input: &RigInput) -> String {
+    let RestTransform { translation, rotation, scale } = input.rest;
+    let mut out = format!("(uid: \"{}\", name: {}", input.uid, quoted(&input.name));
+    if translation != Vec3::ZERO {
+        out.push_str(&format!(", translation: {}", vector(translation)));
+    }
+    if rotation != Quat::IDENTITY {
+        let [x, y, z, w] = rotation.to_array();
+        out.push_str(&format!(", rotation: ({x:?}, {y:?}, {z:?}, {w:?})"));
+    }
+    if scale != Vec3::ONE {
+        out.push_str(&format!(", scale: {}", vector(scale)));
+    }
+    out.push(')');
+    out
 }
 
 /// A joint with its tags.

@@ -8,7 +8,7 @@ use super::{
     paste::refresh_all,
 };
 use crate::rig::{
-    EditError, GroupData, JointData, NodeRefs, Rig, RigEdit, TagKind, Uid,
+    EditError, GroupData, JointData, NodeRefs, Rig, RigEdit, RigInput, TagKind, Uid,
     part::{PartNeeds, left_out},
     reference::{NameKind, NameScope, Names, RigScope, map_references, references_in},
     remap::Remap,
@@ -149,6 +149,20 @@ fn free_name(rig: &Rig, name: &str) -> String {
     std::iter::once(name.to_owned()).chain(numbered).find(is_free).unwrap_or_default()
 }
 
+/// The input of that name, which the part brings where the rig has none.
+fn declare(draft: &mut Draft, part: &Rig, uid: Uid, name: &str) -> Result<Uid, OperationError> {
+    let mut inputs = draft.rig().inputs().to_vec();
+    if let Some(own) = inputs.iter().find(|own| own.name == name) {
+        return Ok(own.uid);
+    }
+    let Some(input) = part.input(uid) else { return Ok(uid) };
+    // The other side has another input, under the same uid in the part.
+    let uid = if draft.rig().is_taken(uid) { Uid::derived(["input", name]) } else { uid };
+    inputs.push(RigInput { uid, ..input.clone() });
+    draft.apply(RigEdit::SetInputs(inputs))?;
+    Ok(uid)
+}
+
 /// Binds references of the part to nodes that were not put onto a joint.
 fn bind(
     draft: &mut Draft,
@@ -182,6 +196,7 @@ fn bind(
             _ if name.is_empty() => Vec::new(),
             // The bearer of the label decides the meaning of the reference once a bearer is renamed.
             NameKind::Joint | NameKind::Label => draft.rig().find(NameScope::default(), NameKind::Joint, &name),
+            NameKind::Input => vec![declare(draft, part, uid, &name)?],
             NameKind::Group | NameKind::Rig => draft.rig().find(NameScope::default(), kind, &name),
         };
         match candidates.as_slice() {

@@ -1,4 +1,4 @@
-//! Declarations of a template's text: its groups, joints, tags and stored poses with their identities, written or derived.
+//! Declarations of a template's text: its groups, inputs, joints, tags and stored poses with their identities, written or derived.
 
 use std::collections::{HashMap, HashSet};
 
@@ -15,6 +15,7 @@ pub(in crate::rig::format) struct Declarations<'a> {
     pub tree: Tree<'a>,
     pub rig: Declaration,
     pub groups: Vec<Declaration>,
+    pub inputs: Vec<Declaration>,
     pub joints: Vec<Declaration>,
     /// Tags of each of the joints.
     pub tags: Vec<Vec<Declaration>>,
@@ -33,7 +34,7 @@ pub(in crate::rig::format) struct Declaration {
     pub is_written: bool,
     /// The value that declares it.
     pub node: NodeId,
-    /// Name of a group or pose, label of a joint.
+    /// Name of a group, input or pose, label of a joint.
     pub name: Option<String>,
 }
 
@@ -48,11 +49,12 @@ impl<'a> Declarations<'a> {
         let mut finder = Finder { tree: &tree, taken: written_uids(&tree), named: HashSet::new(), faults: Vec::new() };
         let rig = finder.named(root, "rig", "name");
         let groups = finder.list(root, "groups", "group", "name");
+        let inputs = finder.list(root, "inputs", "input", "name");
         let joints = finder.list(root, "joints", "joint", "label");
         let tags = joints.iter().map(|joint| finder.tags(joint)).collect();
         let poses = finder.list(root, "poses", "pose", "name");
         let faults = finder.faults;
-        Some(Self { rig, groups, joints, tags, poses, faults, tree })
+        Some(Self { rig, groups, inputs, joints, tags, poses, faults, tree })
     }
 
     /// Format number of the file; 0 if it says none.
@@ -64,7 +66,7 @@ impl<'a> Declarations<'a> {
     /// All declarations but that of the rig.
     pub fn all(&self) -> impl Iterator<Item = &Declaration> {
         let tags = self.tags.iter().flatten();
-        self.groups.iter().chain(&self.joints).chain(tags).chain(&self.poses)
+        self.groups.iter().chain(&self.inputs).chain(&self.joints).chain(tags).chain(&self.poses)
     }
 }
 
@@ -207,7 +209,7 @@ fn written_uid(tree: &Tree, node: NodeId) -> Option<Uid> {
 /// All uids that declarations of a text say themselves: derived ones make way for them.
 fn written_uids(tree: &Tree) -> HashSet<Uid> {
     let root = tree.root();
-    let lists = ["groups", "joints", "poses"].into_iter().flat_map(|list| tree.elements(root, list));
+    let lists = ["groups", "inputs", "joints", "poses"].into_iter().flat_map(|list| tree.elements(root, list));
     let things = lists.flat_map(|item| {
         let tags = tree.elements(item.value, "tags").iter().map(|tag| tag.value);
         std::iter::once(item.value).chain(tags)

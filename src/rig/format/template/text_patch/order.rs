@@ -23,10 +23,12 @@ pub(super) fn reordered(rig: &Rig, text: &str) -> Option<String> {
     let declared = Declarations::find(&text)?;
     let root = declared.tree.root();
     let groups: Vec<Uid> = rig.groups().iter().map(|group| group.uid).collect();
+    let inputs: Vec<Uid> = rig.inputs().iter().map(|input| input.uid).collect();
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let poses: Vec<Uid> = rig.stored_poses().iter().map(|pose| pose.uid).collect();
     let lists = [
         sorted(&declared.tree, root, "groups", &declared.groups, &groups)?,
+        sorted(&declared.tree, root, "inputs", &declared.inputs, &inputs)?,
         sorted(&declared.tree, root, "joints", &declared.joints, &joints)?,
         sorted(&declared.tree, root, "poses", &declared.poses, &poses)?,
     ];
