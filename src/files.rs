@@ -29,6 +29,7 @@ mod parts;
 mod project;
 mod read;
 mod shapes;
+mod site;
 mod store;
 mod verify;
 mod watch;
@@ -50,5 +51,6 @@ pub use project::{
 };
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
+pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
 pub use store::{StoreError, store_animation, store_model, store_rig, store_rig_over, store_skin};
 pub use watch::{FileWatch, LOOK, TemplateWatch};

@@ -28,6 +28,7 @@ pub mod step;
 mod tag;
 mod uid;
 pub mod update;
+pub mod version;
 
 pub use built::{
     Attribute, AttributeKind, BuiltConstraint, BuiltInput, BuiltNode, BuiltRig, Channels, ControlData, LayerData,

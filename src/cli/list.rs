@@ -1,6 +1,8 @@
-//! `rigsmith list`: templates of a folder, by their headers alone.
+//! `rigsmith list`: templates of a folder, or of all folders in which templates are looked for, by their headers alone.
 
 use std::{
+    cmp::Ordering,
+    collections::BTreeMap,
     io::Read,
     path::{Path, PathBuf},
 };
@@ -10,19 +12,22 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report};
 use crate::{
-    files::{Disk, EntryKind, FileKind, RealDisk, load_template},
+    files::{
+        BUNDLED_CHARACTERS, BUNDLED_PARTS, Disk, EntryKind, FileKind, PartFiles, RealDisk, SearchPaths, load_template,
+    },
     rig::{
-        SourceError,
+        SourceError, Uid,
         template::{self, TemplateHeader},
+        version::compare,
     },
 };
 
 /// Arguments of `rigsmith list`.
 #[derive(Args, Debug)]
 pub(super) struct ListArgs {
-    /// The folder; folders in it count, too
-    #[arg(default_value = ".")]
-    folder: PathBuf,
+    /// The folder; folders in it count, too. Without one: the working folder, the folders of the site, and what comes with
+    /// Rigsmith
+    folder: Option<PathBuf>,
 }
 
 /// Bytes of a file that are read first: a header of usual length.
@@ -31,15 +36,53 @@ const FIRST_BYTES: u64 = 8 << 10;
 /// Most files that are listed.
 const MOST: usize = 10_000;
 
+/// A template by its header.
+struct Listed {
+    file: String,
+    header: Result<TemplateHeader, HeaderError>,
+}
+
 pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
+    let site = SearchPaths::of_site().map_err(|error| Failure::Input(Box::new(error)))?;
+    let own = args.folder.clone().unwrap_or_else(|| PathBuf::from("."));
+    let mut listed = in_folder(&own, true, &mut report)?;
+    let mut elsewhere = Vec::new();
+    for folder in &site.folders {
+        elsewhere.extend(in_folder(folder, false, &mut report)?);
+    }
+    elsewhere.retain(|other| listed.iter().all(|own| own.file != other.file));
+    let mut bundled: Vec<Listed> = BUNDLED_CHARACTERS.iter().chain(BUNDLED_PARTS).map(of_bundled).collect();
+    if args.folder.is_none() {
+        listed.append(&mut elsewhere);
+    }
+    if listed.len() > MOST {
+        report.notes.push(format!("{} more templates are not listed", listed.len() - MOST));
+        listed.truncate(MOST);
+    }
+    let newest = newest(listed.iter().chain(&elsewhere).chain(&bundled));
+    if listed.is_empty() {
+        report.line(format!("no templates, .rig.ron, in {}", own.display()));
+    }
+    let templates: Vec<Value> = listed.iter().map(|one| tell(one, &newest, &mut report)).collect();
+    report.set("templates", Value::Array(templates));
+    if args.folder.is_none() {
+        report.line("with Rigsmith:");
+        bundled.sort_by(|a, b| a.file.cmp(&b.file));
+        let bundled: Vec<Value> = bundled.iter().map(|one| tell(one, &newest, &mut report)).collect();
+        report.set("bundled", Value::Array(bundled));
+    }
+    Ok(report)
+}
+
+/// The templates in a folder and in those below it, in the order of their paths.
+fn in_folder(top: &Path, is_needed: bool, report: &mut Report) -> Result<Vec<Listed>, Failure> {
     let mut paths = Vec::new();
-    let mut folders = vec![args.folder.clone()];
-    let mut is_first = true;
+    let mut folders = vec![top.to_owned()];
     while let Some(folder) = folders.pop() {
         let names = match RealDisk.list(&folder, MOST) {
             Ok(names) => names,
-            Err(error) if is_first => {
+            Err(error) if is_needed && folder == top => {
                 return Err(Failure::Input(
                     format!("`{}` cannot be listed: {error}; give a folder", folder.display()).into(),
                 ));
@@ -49,7 +92,6 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
                 continue;
             }
         };
-        is_first = false;
         for name in names {
             let path = folder.join(&name);
             match RealDisk.entry(&path, false).map(|entry| entry.kind) {
@@ -60,28 +102,55 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
         }
     }
     paths.sort();
-    if paths.len() > MOST {
-        report.notes.push(format!("{} more templates are not listed", paths.len() - MOST));
-        paths.truncate(MOST);
-    }
-    let mut list = Vec::new();
-    for path in &paths {
-        match header(path) {
-            Ok(header) => {
-                report.line(line(path, &header));
-                list.push(value(path, &header));
-            }
-            Err(error) => {
-                report.line(format!("{}: {error}", path.display()));
-                list.push(json!({ "file": path.display().to_string(), "error": error.to_string() }));
-            }
+    Ok(paths.iter().map(|path| Listed { file: path.display().to_string(), header: header(path) }).collect())
+}
+
+/// A template that comes with Rigsmith.
+fn of_bundled((name, text): &(&str, &str)) -> Listed {
+    let header = template::read_header(text.as_bytes()).map_err(HeaderError::from);
+    let completed = header.map(|mut header| {
+        let none = BTreeMap::new();
+        if is_unknown(&header)
+            && let Ok(template) = PartFiles::given(&none).complete(Path::new(name), text.as_bytes())
+        {
+            header.complete_from(&template.rig);
+        }
+        header
+    });
+    Listed { file: (*name).to_owned(), header: completed }
+}
+
+/// The newest version of each template, and where it is.
+fn newest<'a>(all: impl Iterator<Item = &'a Listed>) -> BTreeMap<Uid, (&'a str, &'a str)> {
+    let mut newest: BTreeMap<Uid, (&str, &str)> = BTreeMap::new();
+    for Listed { file, header } in all {
+        let Ok(header) = header else { continue };
+        let known = newest.entry(header.uid).or_insert((&header.version, file));
+        if compare(known.0, &header.version) == Ordering::Less {
+            *known = (&header.version, file);
         }
     }
-    if paths.is_empty() {
-        report.line(format!("no templates, .rig.ron, in {}", args.folder.display()));
-    }
-    report.set("templates", Value::Array(list));
-    Ok(report)
+    newest
+}
+
+/// Tells a template in a line; returns what programs read of it.
+fn tell(one: &Listed, newest: &BTreeMap<Uid, (&str, &str)>, report: &mut Report) -> Value {
+    let Listed { file, header } = one;
+    let header = match header {
+        Ok(header) => header,
+        Err(error) => {
+            report.line(format!("{file}: {error}"));
+            return json!({ "file": file, "error": error.to_string() });
+        }
+    };
+    let mut value = value(file, header);
+    let newer = newest.get(&header.uid).filter(|(version, _)| compare(&header.version, version) == Ordering::Less);
+    let newer = newer.map(|(version, at)| {
+        value["newer"] = json!({ "version": version, "file": at });
+        format!("; {version} is in {at}")
+    });
+    report.line(format!("{}{}", line(file, header), newer.unwrap_or_default()));
+    value
 }
 
 /// Reason why a template of a folder cannot be listed.
@@ -111,30 +180,31 @@ fn header(path: &Path) -> Result<TemplateHeader, HeaderError> {
             template::read_header(&all)?
         }
     };
-    // What parts bring, and what a part needs, only the whole template tells, unless its author wrote it down.
-    let is_unknown = header.joint_count == 0 || header.kind == "part" && header.needs.is_none();
-    if is_unknown && let Ok(template) = load_template(&RealDisk, path) {
+    if is_unknown(&header)
+        && let Ok(template) = load_template(&RealDisk, path)
+    {
         header.complete_from(&template.rig);
     }
     Ok(header)
 }
 
-fn line(path: &Path, header: &TemplateHeader) -> String {
+/// True for what only the whole template tells, unless its author wrote it down: what parts bring, and what a part needs.
+fn is_unknown(header: &TemplateHeader) -> bool {
+    header.joint_count == 0 || header.kind == "part" && header.needs.is_none()
+}
+
+fn line(file: &str, header: &TemplateHeader) -> String {
     let TemplateHeader { name, version, kind, joint_count, .. } = header;
     let parts = [kind.as_str(), version].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
     let about = header.description.split(['.', ':']).next().unwrap_or_default();
     let about = if about.is_empty() { String::new() } else { format!(": {about}") };
-    format!(
-        "{}  {name} ({parts}{}{joint_count} joints){about}",
-        path.display(),
-        if parts.is_empty() { "" } else { ", " }
-    )
+    format!("{file}  {name} ({parts}{}{joint_count} joints){about}", if parts.is_empty() { "" } else { ", " })
 }
 
-fn value(path: &Path, header: &TemplateHeader) -> Value {
+fn value(file: &str, header: &TemplateHeader) -> Value {
     let mut value = serde_json::to_value(header).unwrap_or(Value::Null);
     if let Value::Object(fields) = &mut value {
-        fields.insert("file".to_owned(), Value::from(path.display().to_string()));
+        fields.insert("file".to_owned(), Value::from(file));
     }
     value
 }

@@ -16,6 +16,7 @@ use crate::{
     rig::{
         Rig,
         update::{Change, Take, diff, update},
+        version::VersionChange,
     },
 };
 
@@ -79,6 +80,10 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         Some(TakeArg::Mine) | None => Take::Mine,
     };
     let mut updated = update(base.as_ref(), &now, &file, take);
+    if let Some(version) = VersionChange::between(base.as_ref().unwrap_or(&now).about(), file.about()) {
+        report.line(format!("version  {version}"));
+        report.set("version", json!({"from": version.from, "to": version.to}));
+    }
     tell(&mut report, &updated.changes);
     let poses = keep_poses(&now, &mut updated.rig, &Arc::new(modules::all()))
         .map_err(|error| Failure::Input(Box::new(error)))?;
@@ -104,7 +109,8 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
 }
 
 pub(super) fn load(path: &Path, report: &mut Report) -> Result<Rig, Failure> {
-    if FileKind::of(path) != Some(FileKind::Template) {
+    // A name without an ending is that of a template in the folders of the site.
+    if path.extension().is_some() && FileKind::of(path) != Some(FileKind::Template) {
         return Err(Failure::Usage(format!("`{}` is no template; give a .rig.ron", path.display())));
     }
     let template = load_template(&RealDisk, path)?;

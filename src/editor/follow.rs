@@ -142,10 +142,11 @@ impl EditorOverlay for OfferView {
         let Some(rig) = world.get_resource::<ActiveRig>() else { return };
         let Some(offer) = world.get::<UpdateOffer>(rig.0) else { return };
         let conflicts = offer.changes.iter().filter(|change| change.conflict).count();
+        let version = offer.version.as_ref().map_or_else(String::new, |version| format!(", {version}"));
         let title = match conflicts {
-            0 => "The template's file has changed".to_owned(),
-            1 => "The template's file has changed: 1 conflict".to_owned(),
-            count => format!("The template's file has changed: {count} conflicts"),
+            0 => format!("The template's file has changed{version}"),
+            1 => format!("The template's file has changed{version}: 1 conflict"),
+            count => format!("The template's file has changed{version}: {count} conflicts"),
         };
         let window = egui::Window::new(title).id(egui::Id::new("offer")).collapsible(true).resizable(true);
         window.default_width(380.0).anchor(egui::Align2::RIGHT_BOTTOM, [-16.0, -40.0]).show(ctx, |ui| {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Disk, ModelFolder, PartFiles, ReadError, open, read_capped};
+use super::{Disk, ModelFolder, PartFiles, ReadError, open, parts::named_template, read_capped};
 use crate::{
     mesh::{
         gltf::{self, ExternalError, ExternalFile, GltfError, read_gltf},
@@ -171,10 +171,15 @@ fn load_gltf(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
     Ok(read_gltf(&bytes, &path.display().to_string(), &mut external)?)
 }
 
-/// Reads a template with its parts: see [`PartFiles`].
+/// Reads a template with its parts: see [`PartFiles`]. Where there is no such file, a relative path is the name of a template, with
+/// or without its ending, in the folders of the site ([`SearchPaths`](super::SearchPaths)), or of one that comes with Rigsmith.
 pub fn load_template(disk: &dyn Disk, path: &Path) -> Result<Template, LoadError> {
-    let bytes = read_capped(disk, path, template::MAX_BYTES as u64)?;
-    PartFiles::new(disk).complete(path, &bytes).map_err(|source| in_source(path, &bytes, source))
+    let (path, bytes) = match read_capped(disk, path, template::MAX_BYTES as u64) {
+        Ok(bytes) => (path.to_owned(), bytes),
+        Err(error @ ReadError::Missing { .. }) => named_template(disk, path).ok_or(error)?,
+        Err(error) => return Err(error.into()),
+    };
+    PartFiles::new(disk).complete(&path, &bytes).map_err(|source| in_source(&path, &bytes, source))
 }
 
 /// Reads clips.

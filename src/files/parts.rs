@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use super::{Disk, ReadError, read_capped};
+use super::{Disk, ReadError, SearchPaths, SiteError, read_capped};
 use crate::{
     modules,
     processor::Modules,
@@ -94,6 +94,12 @@ enum PartFileError {
     /// A file that the list of contents does not have.
     #[error("there is no file `{}`", path.display())]
     Missing { path: PathBuf },
+    /// A file that neither the template's folder nor the folders of the site have.
+    #[error("{source}; {folders} of the site's folders were searched, too")]
+    Nowhere { source: ReadError, folders: usize },
+    /// A site file that cannot be read.
+    #[error(transparent)]
+    Site(#[from] SiteError),
     /// A file that cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -105,14 +111,16 @@ enum PartFileError {
     Part(#[from] PartError),
 }
 
-/// Reader of templates with their parts. It notes the files of the parts that it has asked for.
+/// Reader of templates with their parts. A part is looked for beside its template, then in the folders of the site
+/// ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the files that it has asked for.
 pub struct PartFiles<'a> {
     source: Source<'a>,
     modules: Modules,
-    /// Files of parts, with their content if they could be read.
+    /// Files that parts may be in, up to those that have them, with their content if they could be read.
     pub asked: BTreeMap<PathBuf, Option<Vec<u8>>>,
     /// Files of parts that no list has, in the order in which they were asked for.
     pub missing: Vec<PathBuf>,
+    site: Option<SearchPaths>,
     known: BTreeMap<PathBuf, Arc<Part>>,
     open: Vec<PathBuf>,
 }
@@ -135,7 +143,20 @@ impl<'a> PartFiles<'a> {
     }
 
     fn of(source: Source<'a>, modules: Modules) -> Self {
-        Self { source, modules, missing: Vec::new(), asked: BTreeMap::new(), known: BTreeMap::new(), open: Vec::new() }
+        Self {
+            source,
+            modules,
+            missing: Vec::new(),
+            asked: BTreeMap::new(),
+            site: None,
+            known: BTreeMap::new(),
+            open: Vec::new(),
+        }
+    }
+
+    /// The reader with other folders than those of the site.
+    pub fn with_site(self, site: SearchPaths) -> Self {
+        Self { site: Some(site), ..self }
     }
 
     /// Reads a template with its parts, whose files are relative to the folder of `path`, the template's own file.
@@ -161,40 +182,98 @@ impl<'a> PartFiles<'a> {
         template.with_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
     }
 
-    fn part(&mut self, path: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
-        if let Some(known) = self.known.get(path) {
+    /// The part of that name, beside its template at `first` or elsewhere.
+    fn part(&mut self, first: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
+        if let Some(known) = self.known.get(first) {
             return Ok(known.clone());
         }
-        if self.open.iter().any(|open| open == path) || self.open.len() >= DEPTH {
-            return Err(PartFileError::Cycle { path: path.to_owned() });
+        let (path, bytes) = match self.found(first, name)? {
+            Some(found) => found,
+            None => match bundled(name) {
+                Some(text) => (first.to_owned(), text.as_bytes().to_vec()),
+                None => return Err(self.nowhere(first)),
+            },
+        };
+        if self.open.contains(&path) || self.open.len() >= DEPTH {
+            return Err(PartFileError::Cycle { path });
         }
-        let (read, is_there) = match self.source {
-            Source::Disk(disk) => {
-                let read = read_capped(disk, path, template::MAX_BYTES as u64);
-                (read.map_err(PartFileError::from), disk.entry(path, true).is_ok())
-            }
-            Source::Contents(files) => {
-                let known = files.get(path);
-                if known.is_none() {
-                    self.missing.push(path.to_owned());
-                }
-                let read = known.cloned().flatten();
-                let is_there = read.is_some();
-                (read.ok_or_else(|| PartFileError::Missing { path: path.to_owned() }), is_there)
-            }
-        };
-        self.asked.insert(path.to_owned(), read.as_ref().ok().cloned());
-        let bytes = match (read, bundled(name)) {
-            (Ok(bytes), _) => bytes,
-            (Err(_), Some(text)) if !is_there => text.as_bytes().to_vec(),
-            (Err(error), _) => return Err(error),
-        };
-        self.open.push(path.to_owned());
-        let template = self.complete(path, &bytes);
+        self.open.push(path.clone());
+        let template = self.complete(&path, &bytes);
         self.open.pop();
-        let template = template.map_err(|source| PartFileError::Template { path: path.to_owned(), source })?;
+        let template = template.map_err(|source| PartFileError::Template { path, source })?;
         let part = Arc::new(Part { rig: template.rig, chains: template.chains });
-        self.known.insert(path.to_owned(), part.clone());
+        self.known.insert(first.to_owned(), part.clone());
         Ok(part)
     }
+
+    /// The file of a part and its content; `None` if no folder has it. A file that is there, and cannot be read, is an error.
+    fn found(&mut self, first: &Path, name: &str) -> Result<Option<(PathBuf, Vec<u8>)>, PartFileError> {
+        let disk = match self.source {
+            Source::Disk(disk) => disk,
+            Source::Contents(files) => {
+                let known = files.get(first);
+                if known.is_none() {
+                    self.missing.push(first.to_owned());
+                }
+                let content = known.cloned().flatten();
+                self.asked.insert(first.to_owned(), content.clone());
+                return Ok(content.map(|content| (first.to_owned(), content)));
+            }
+        };
+        if let Some(bytes) = self.read(disk, first)? {
+            return Ok(Some((first.to_owned(), bytes)));
+        }
+        let site = match &self.site {
+            Some(site) => site.clone(),
+            None => self.site.insert(SearchPaths::of_site()?).clone(),
+        };
+        for path in site.candidates(Path::new(name)) {
+            if let Some(bytes) = self.read(disk, &path)? {
+                return Ok(Some((path, bytes)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Content of a file; `None` if there is none.
+    fn read(&mut self, disk: &dyn Disk, path: &Path) -> Result<Option<Vec<u8>>, PartFileError> {
+        let read = read_capped(disk, path, template::MAX_BYTES as u64);
+        self.asked.insert(path.to_owned(), read.as_ref().ok().cloned());
+        match read {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(_) if disk.entry(path, true).is_err() => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// The error of a part that no folder has.
+    fn nowhere(&self, first: &Path) -> PartFileError {
+        let missing = match self.source {
+            Source::Disk(disk) => read_capped(disk, first, 0).err(),
+            Source::Contents(_) => None,
+        };
+        match (missing, self.site.as_ref().map_or(0, |site| site.folders.len())) {
+            (None, _) => PartFileError::Missing { path: first.to_owned() },
+            (Some(error), 0) => error.into(),
+            (Some(source), folders) => PartFileError::Nowhere { source, folders },
+        }
+    }
+}
+
+/// A template that is called by its name: the file in a folder of the site, or one that comes with Rigsmith.
+pub(super) fn named_template(disk: &dyn Disk, name: &Path) -> Option<(PathBuf, Vec<u8>)> {
+    if name.is_absolute() {
+        return None;
+    }
+    let of_site = SearchPaths::of_site().ok().and_then(|site| site.find(disk, name));
+    if let Some(path) = of_site {
+        let bytes = read_capped(disk, &path, template::MAX_BYTES as u64).ok()?;
+        return Some((path, bytes));
+    }
+    let named = super::site::with_ending(name);
+    let file = named.to_str()?;
+    let character = |(known, _): &&(&str, &str)| file.strip_suffix(".rig.ron") == Some(*known);
+    let text = BUNDLED_CHARACTERS.iter().find(character).map(|(_, text)| *text).or_else(|| bundled(file))?;
+    let bytes = text.as_bytes().to_vec();
+    Some((named, bytes))
 }

@@ -18,6 +18,7 @@ use crate::{
         operations::Operation,
         step::{Committed, Step},
         update::{Change as Difference, Take, Update, clip_edits, edits_between, pose_edits, update},
+        version::VersionChange,
     },
 };
 
@@ -136,6 +137,8 @@ pub struct UpdateOffer {
     pub changes: Arc<[Difference]>,
     /// Joints that would not stand as before in a pose, although nothing but the meaning of the pose changes.
     pub poses: Arc<[PoseNote]>,
+    /// Version that the rig comes from and that of the template, if they say different ones.
+    pub version: Option<VersionChange>,
     built: Arc<BuiltTemplate>,
 }
 
@@ -244,7 +247,9 @@ pub(super) fn compare_templates(
             source.notes = poses;
             take_over(entity, rig, updated, built, &mut source, &mut edits, &mut commands);
         } else {
-            let offer = UpdateOffer { changes: updated.changes.into(), poses, built: built.clone() };
+            let from = source.base.as_deref().unwrap_or(rig);
+            let version = VersionChange::between(from.about(), built.rig.about());
+            let offer = UpdateOffer { changes: updated.changes.into(), poses, version, built: built.clone() };
             commands.entity(entity).try_insert(offer);
         }
     }

@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 use crate::{
     mesh::model::Weights,
     rig::{
-        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigInput, RigJoint, StoredPose, TagData,
-        TagKind, Uid,
+        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigInput, RigJoint, StoredPose,
+        TagData, TagKind, Uid,
         animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
         document::{RigAbout, SkinData},
         format::source::ron_options,

@@ -16,6 +16,8 @@ mod cli_face;
 #[cfg(feature = "cli")]
 mod cli_outputs;
 #[cfg(feature = "cli")]
+mod cli_site;
+#[cfg(feature = "cli")]
 mod cli_templates;
 mod commands;
 mod custom_module;
@@ -107,6 +109,7 @@ mod rig_text;
 mod runtime;
 mod schema;
 mod sided;
+mod site;
 mod skin_built;
 mod skin_file;
 mod solvers;

@@ -1,0 +1,68 @@
+//! Folders of the site, names and versions of templates on the command line.
+
+use std::{fs, path::Path, process::Command};
+
+use serde_json::Value;
+
+/// Runs the command in a folder, with folders of the site.
+fn rigsmith(folder: &Path, site: &[&Path], config: &Path, args: &[&str]) -> (i32, Value) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_rigsmith"));
+    command.current_dir(folder).env("RIGSMITH_CONFIG", config);
+    command.env("RIGSMITH_TEMPLATES", std::env::join_paths(site).unwrap());
+    let output = command.arg("--json").args(args).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    let value = serde_json::from_str(&said).unwrap_or_else(|error| panic!("{error}: {said}"));
+    (output.status.code().unwrap(), value)
+}
+
+fn template(version: &str, height: &str) -> String {
+    format!(
+        "(format: 2, name: \"mast\", version: \"{version}\", joints: [(label: \"foot\"), (label: \"top\", parent: \"foot\", translation: (0, {height}, 0))])"
+    )
+}
+
+#[test]
+fn templates_of_the_site_are_listed_named_and_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for place in ["project", "rigs", "more", "config"] {
+        fs::create_dir(at(place)).unwrap();
+    }
+    fs::write(at("project/mine.rig.ron"), template("1.9", "1")).unwrap();
+    fs::write(at("rigs/mast.rig.ron"), template("1.10", "2")).unwrap();
+    fs::write(at("more/mast.rig.ron"), template("1.2", "3")).unwrap();
+    fs::write(at("config/rigsmith.ron"), "(templates: [\"../more\"])").unwrap();
+    let rigs = at("rigs");
+    let run = |args: &[&str]| rigsmith(&at("project"), &[&rigs], &at("config"), args);
+
+    let (code, listed) = run(&["list"]);
+    let files: Vec<&str> =
+        listed["templates"].as_array().unwrap().iter().map(|one| one["file"].as_str().unwrap()).collect();
+    assert_eq!((code, files.len()), (0, 3), "{listed}");
+    assert!(files[0].ends_with("mine.rig.ron") && files[1].contains("rigs") && files[2].contains("more"), "{files:?}");
+    for (one, newer) in listed["templates"].as_array().unwrap().iter().zip([true, false, true]) {
+        assert_eq!(one["newer"]["version"] == "1.10", newer, "{one}");
+    }
+    let bundled = listed["bundled"].as_array().unwrap();
+    assert!(bundled.iter().any(|one| one["name"] == "biped" && one["joint_count"] == 52), "{listed}");
+    // Of a folder, only what is in it; but a newer copy elsewhere is told.
+    let (_, listed) = run(&["list", "."]);
+    assert_eq!(listed["templates"].as_array().unwrap().len(), 1);
+    assert!(
+        listed["templates"][0]["newer"]["file"].as_str().unwrap().contains("rigs") && listed.get("bundled").is_none()
+    );
+
+    // By name: the first folder that has it.
+    let (code, told) = run(&["update", "mine.rig.ron", "--from", "mast", "--base", "mine.rig.ron", "--dry-run"]);
+    assert_eq!((code, &told["version"]["from"], &told["version"]["to"]), (0, &"1.9".into(), &"1.10".into()), "{told}");
+    let heights: Vec<&Value> = told["changes"].as_array().unwrap().iter().map(|change| &change["to"]).collect();
+    assert!(heights.contains(&&Value::from("(0.0, 2.0, 0.0)")), "{told}");
+    let (code, told) = run(&["diff", "biped", "biped.rig.ron"]);
+    assert_eq!((code, &told["changes"]), (0, &Value::Array(Vec::new())), "{told}");
+    assert_eq!(run(&["diff", "biped", "nothing"]).0, 1);
+
+    fs::write(at("config/rigsmith.ron"), "(templates: 3)").unwrap();
+    let (code, told) = run(&["list"]);
+    assert_eq!(code, 1);
+    assert!(told.to_string().contains("rigsmith.ron"), "{told}");
+}
