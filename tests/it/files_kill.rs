@@ -17,7 +17,7 @@ use rigsmith::files::RealDisk;
 
 use crate::{
     files_set::{Kind, expected, furnished, names, temps},
-    mutate::Random,
+    random::Random,
 };
 
 const FOLDER: &str = "RIGSMITH_TEST_SET_FOLDER";
@@ -66,7 +66,7 @@ fn kill_once(round: u64, folder: &Path) -> (u64, usize) {
         assert!(output.read_line(&mut line).unwrap() > 0, "the child saves");
     }
     // Spread over several saves.
-    std::thread::sleep(Duration::from_micros(Random::new(round ^ 0x5E7).below(40_000) as u64));
+    std::thread::sleep(Duration::from_micros(Random(round ^ 0x5E7).below(40_000) as u64));
     child.kill().unwrap();
     child.wait().unwrap();
     let saves = output.lines().map_while(Result::ok).filter(|line| line.contains("saved")).count();

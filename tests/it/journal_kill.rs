@@ -33,7 +33,7 @@ use rigsmith::{
     },
 };
 
-use crate::{bench::HANG, mutate::Random};
+use crate::{bench::HANG, random::Random};
 
 const FOLDER: &str = "RIGSMITH_TEST_JOURNAL_FOLDER";
 const SEED: &str = "RIGSMITH_TEST_JOURNAL_SEED";
@@ -57,7 +57,7 @@ impl Editing {
         app.finish();
         app.cleanup();
         let rig = app.world_mut().spawn(Rig::new(Uid(seed), "victim")).id();
-        Self { app, rig, random: Random::new(seed), saves: seed.is_multiple_of(2) }
+        Self { app, rig, random: Random(seed), saves: seed.is_multiple_of(2) }
     }
 
     fn rig(&self) -> &Rig {
@@ -141,7 +141,7 @@ fn child_that_edits_until_killed() {
     let journal = Journal::start(Arc::new(RealDisk), JournalStart { places: places.clone(), rig, ..default() });
     let rig = editing.rig;
     editing.app.world_mut().entity_mut(rig).insert(RigJournal::new(journal.clone()));
-    let mut pause = Random::new(seed ^ 0xFACE);
+    let mut pause = Random(seed ^ 0xFACE);
     let started = Instant::now();
     let mut saving: Option<std::thread::JoinHandle<()>> = None;
     // In case the parent is gone.
@@ -206,7 +206,7 @@ fn kill_once(round: u64, folder: &Path) -> Outcome {
         }
     });
     // Killed after some number of changes, and somewhere within the next.
-    let mut random = Random::new(round ^ 0xBEEF);
+    let mut random = Random(round ^ 0xBEEF);
     let (patience, changes) = (Instant::now(), 1 + random.below(250));
     while lines.lock().unwrap().len() < changes {
         assert!(patience.elapsed() < HANG, "round {round}: the child does not edit");

@@ -15,7 +15,10 @@ use rigsmith::{
     },
 };
 
-use crate::three_strokes::{Bench, Body, Random, assert_no_faults, bodies, bundled, drawn, seeds};
+use crate::{
+    random::Random,
+    three_strokes::{Bench, Body, assert_no_faults, bodies, bundled, drawn, seeds},
+};
 
 /// A leg stroke.
 #[derive(Debug, Clone, Copy)]

@@ -102,6 +102,7 @@ mod pose;
 mod prerequisites;
 mod processor;
 mod project;
+mod random;
 mod references;
 #[cfg(feature = "render")]
 mod render;

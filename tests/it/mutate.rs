@@ -8,48 +8,19 @@ mod harness;
 
 pub use harness::run_fuzz;
 
-/// The random numbers of splitmix64: the same sequence on every machine.
-#[derive(Debug, Clone)]
-pub struct Random(u64);
+use crate::random::Random;
 
-impl Random {
-    pub fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// A number below `end`; 0 if `end` is 0.
-    pub fn below(&mut self, end: usize) -> usize {
-        if end == 0 { 0 } else { (self.next() % end as u64) as usize }
-    }
-
-    pub fn chance(&mut self, one_in: usize) -> bool {
-        self.below(one_in) == 0
-    }
-
-    pub fn pick<T: Clone>(&mut self, from: &[T]) -> T {
-        from[self.below(from.len())].clone()
-    }
-
-    /// A range within `len` bytes, short ones more often than long ones.
-    fn range(&mut self, len: usize) -> std::ops::Range<usize> {
-        let start = self.below(len + 1);
-        let most = match self.below(4) {
-            0 => 1,
-            1 => 8,
-            2 => 128,
-            _ => len,
-        };
-        let end = (start + 1 + self.below(most)).min(len);
-        start..end.max(start)
-    }
+/// A range within `len` bytes, short ones more often than long ones.
+fn range(random: &mut Random, len: usize) -> std::ops::Range<usize> {
+    let start = random.below(len + 1);
+    let most = match random.below(4) {
+        0 => 1,
+        1 => 8,
+        2 => 128,
+        _ => len,
+    };
+    let end = (start + 1 + random.below(most)).min(len);
+    start..end.max(start)
 }
 
 /// Numbers as text that readers get wrong, separated by blanks: around the limits of every width, and what is no number.
@@ -84,7 +55,7 @@ impl<'a> Mutator<'a> {
     /// `dictionary` holds the words of the format: keywords, keys, magic numbers.
     pub fn new(seed: u64, dictionary: &'a [&'a [u8]], max_len: usize) -> Self {
         Self {
-            random: Random::new(seed),
+            random: Random(seed),
             dictionary,
             numbers: TEXT_NUMBERS.split(' ').collect(),
             patterns: BINARY_NUMBERS.split(' ').map(|digits| u64::from_str_radix(digits, 16).unwrap()).collect(),
@@ -126,22 +97,22 @@ impl<'a> Mutator<'a> {
             }
             2 => bytes.truncate(random.below(len + 1)),
             3 => {
-                let range = random.range(len);
+                let range = range(random, len);
                 bytes.drain(range);
             }
             4 => {
-                let range = random.range(len);
+                let range = range(random, len);
                 let copy = bytes[range].to_vec();
                 insert(random, bytes, &copy);
             }
             5 => {
                 // Repeated often: deep nesting, long lines, large counts.
-                let range = random.range(len.min(64));
+                let range = range(random, len.min(64));
                 let copy = bytes[range].repeat(1 + random.below(200));
                 insert(random, bytes, &copy);
             }
             6 => {
-                let piece = other[random.range(other.len())].to_vec();
+                let piece = other[range(random, other.len())].to_vec();
                 insert(random, bytes, &piece);
             }
             7 => {
@@ -150,7 +121,7 @@ impl<'a> Mutator<'a> {
                 bytes.extend_from_slice(&other[random.below(other.len() + 1)..]);
             }
             8 => {
-                let piece = other[random.range(other.len())].to_vec();
+                let piece = other[range(random, other.len())].to_vec();
                 overwrite(random, bytes, &piece);
             }
             9 | 10 => {

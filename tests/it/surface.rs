@@ -7,37 +7,9 @@ use rigsmith::mesh::ray::{Hit, Ray};
 use rigsmith::mesh::skinning::{skin_point, skin_points};
 use rigsmith::mesh::surface::{PendingSurface, Surface, SurfaceError, Volume, hits_brute, volumes};
 
+use crate::random::Random;
+
 type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
-
-/// A small repeatable generator (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1 << 24) as f32
-    }
-
-    fn vec(&mut self) -> Vec3 {
-        Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
-    }
-
-    fn direction(&mut self) -> Vec3 {
-        loop {
-            let v = self.vec();
-            if v.length() > 0.1 && v.length() < 1.0 {
-                return v.normalize();
-            }
-        }
-    }
-}
 
 /// A closed bumpy ball of `6 * n * n * 2` triangles, radius about one, with concave dents.
 fn ball(n: usize, dent: f32) -> Mesh {
@@ -181,7 +153,7 @@ fn brute_force_gives_the_same_bits() {
         let pending = PendingSurface::new(points.clone().into(), triangles.clone().into());
         let mut found = 0;
         for i in 0..1000 {
-            let target = low + (random.vec() * 0.5 + 0.5) * (high - low);
+            let target = low + (random.point() * 0.5 + 0.5) * (high - low);
             let target = if i % 4 == 0 { points[random.next() as usize % points.len()] } else { target };
             let away = (high - low).length() * [1.0, 1.0, 0.3, 300.0][i / 4 % 4];
             let direction = if i % 5 == 0 { Vec3::AXES[i / 5 % 3] } else { random.direction() };
@@ -215,8 +187,8 @@ fn soup(count: usize) -> Mesh {
     let mut random = Random(5);
     let mut points = Vec::new();
     for _ in 0..count {
-        let (center, size) = (random.vec(), 0.5 * random.unit().powi(4));
-        points.extend([random.vec(), random.vec(), random.vec()].map(|v| center + v * size));
+        let (center, size) = (random.point(), 0.5 * random.unit().powi(4));
+        points.extend([random.point(), random.point(), random.point()].map(|v| center + v * size));
     }
     (points, (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
 }
@@ -249,7 +221,7 @@ fn refit_equals_build() {
     assert_eq!(surface.bounds(), built.bounds());
     let mut random = Random(3);
     for _ in 0..2000 {
-        let ray = towards(random.direction() * 9.0, random.vec());
+        let ray = towards(random.direction() * 9.0, random.point());
         assert_eq!(hits_of(&surface, &ray), hits_of(&built, &ray));
         assert_eq!(surface.near_far(&ray), built.near_far(&ray));
     }
@@ -271,7 +243,7 @@ fn threads_change_nothing() {
             let mut out = Vec::new();
             for _ in 0..500 {
                 let from = random.direction() * 3.0;
-                let ray = towards(from, random.vec());
+                let ray = towards(from, random.point());
                 out.push((hits_of(&surface, &ray), surface.near_far(&ray), surface.closest_point(from)));
             }
             out
@@ -344,7 +316,7 @@ fn closest_point_is_the_least_over_all_triangles() {
     let surface = Surface::build(&points, &triangles);
     let mut random = Random(17);
     for _ in 0..300 {
-        let from = random.vec() * 2.0;
+        let from = random.point() * 2.0;
         let found = surface.closest_point(from).unwrap();
         let corners = triangles[found.triangle as usize].map(|i| points[i as usize]);
         let b = found.barycentric;
@@ -427,7 +399,7 @@ fn volumes_of_duplicated_and_flipped_balls() {
     let sheet = [triangles.clone(), flipped.clone()].concat();
     let mut random = Random(23);
     for _ in 0..200 {
-        let ray = towards(random.direction() * 3.0, random.vec() * 0.3);
+        let ray = towards(random.direction() * 3.0, random.point() * 0.3);
         let expect = volumes(&hits_of(&Surface::build(&points, &triangles), &ray));
         assert_eq!(expect.len(), 1);
         for triangles in [&flipped, &twice, &sheet] {

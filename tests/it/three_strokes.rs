@@ -25,7 +25,7 @@ use rigsmith::{
     },
 };
 
-use crate::{bench::wait, prerequisites::test_data};
+use crate::{bench::wait, prerequisites::test_data, random::Random};
 
 /// A part of a body that has joints of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,33 +148,20 @@ pub fn bodies() -> Vec<Body> {
     folders.iter().map(read).collect()
 }
 
-/// A small generator of repeatable numbers from -1 to 1.
-pub struct Random(pub u64);
-
-impl Random {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut x = self.0;
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((x ^ (x >> 31)) >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-    }
-}
-
 /// A line as a hand draws it: it starts and ends a little early or late, keeps to one side, wavers and trembles, by at
 /// most `stray` together.
 pub fn drawn(line: &[Vec2], stray: f32, random: &mut Random) -> Vec<Vec2> {
     let total: f32 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
-    let (early, late) = (random.next() * stray, random.next() * stray);
+    let (early, late) = (random.signed() * stray, random.signed() * stray);
     let [shift, waver, tremble] = [0.45, 0.45, 0.1].map(|share| share * stray);
-    let shift = shift * random.next();
-    let (swings, phase) = (1.25 + 0.75 * random.next(), random.next());
-    let count = 70 + (30.0 * random.next()) as usize;
+    let shift = shift * random.signed();
+    let (swings, phase) = (1.25 + 0.75 * random.signed(), random.signed());
+    let count = 70 + (30.0 * random.signed()) as usize;
     (0..count)
         .map(|i| {
             let t = i as f32 / (count - 1) as f32;
             let (at, along) = along(line, early + (total + late - early) * t);
-            let side = shift + waver * (std::f32::consts::TAU * (swings * t + phase)).sin() + tremble * random.next();
+            let side = shift + waver * (std::f32::consts::TAU * (swings * t + phase)).sin() + tremble * random.signed();
             at + along.perp() * side
         })
         .collect()

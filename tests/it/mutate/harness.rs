@@ -8,7 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Mutator, Random};
+use super::Mutator;
+use crate::random::Random;
 
 /// One input that takes longer than this counts as a hang.
 const HANG: Duration = Duration::from_secs(60);

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::mutate::Random;
+use crate::random::Random;
 
 /// Joints of a random rig, at least.
 const JOINTS: usize = 20;
@@ -305,7 +305,7 @@ fn building_what_changed_is_building_from_nothing() {
     let (mut ran, mut all, mut failing) = (0, 0, 0);
     let mut used: BTreeSet<String> = BTreeSet::new();
     for seed in 0..seeds {
-        let mut maker = Maker { random: Random::new(seed), next: seed << 32 };
+        let mut maker = Maker { random: Random(seed), next: seed << 32 };
         let mut rig = maker.rig();
         let mut builder = started(&rig);
         let report = builder.run_all();
@@ -345,7 +345,7 @@ fn building_what_changed_is_building_from_nothing() {
 fn rolled_back_and_built_again_is_the_same() {
     let seeds = std::env::var("RIGSMITH_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(60);
     for seed in 0..seeds {
-        let mut maker = Maker { random: Random::new(1_000_000 + seed), next: seed << 32 };
+        let mut maker = Maker { random: Random(1_000_000 + seed), next: seed << 32 };
         let rig = maker.rig();
         let mut builder = started(&rig);
         let bare = builder.built();

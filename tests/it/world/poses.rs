@@ -13,7 +13,8 @@ use rigsmith::{
     rig::{NodeType, PoseOffset},
 };
 
-use super::{NEAR, Random, Stage, shipped};
+use super::{NEAR, Stage, shipped};
+use crate::random::Random;
 
 #[test]
 fn entities_stand_as_the_program_says_at_every_step() {

@@ -13,7 +13,8 @@ use rigsmith::{
     rig::{RestTransform, TagKind, template::write_template},
 };
 
-use super::{NEAR, Random, Stage, shipped};
+use super::{NEAR, Stage, shipped};
+use crate::random::Random;
 
 /// Fails unless the entities say what the document says, all of it and nothing else.
 fn check(stage: &mut Stage, what: &str) {
