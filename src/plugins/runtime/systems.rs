@@ -1,6 +1,9 @@
 //! Systems that run rigs, in their order.
 
-use bevy::{math::Affine3A, prelude::*};
+use bevy::{
+    math::{Affine3A, Vec3A},
+    prelude::*,
+};
 use rayon::prelude::*;
 
 use super::{ControlPose, DrivenMorphs, InstanceMode, NodeOf, NodeSlot, RigRuntime, spawn::transform};
@@ -253,6 +256,7 @@ pub(super) fn correct_globals(
 ) {
     for (runtime, world) in rigs.iter().filter(|(runtime, _)| runtime.mode == InstanceMode::Hierarchy) {
         let world = world.affine();
+        let height = runtime.height * world.matrix3.y_axis.length();
         for (slot, entity) in &runtime.written {
             let Ok(mut node) = nodes.get_mut(*entity) else { continue };
             // What neither Bevy nor the program has moved was correct before.
@@ -261,14 +265,22 @@ pub(super) fn correct_globals(
             }
             let wanted = world * runtime.state.global_at(*slot as usize).affine();
             let now = node.affine();
-            let size = wanted.translation.abs().max_element().max(1e-3);
-            let is_off = (now.translation - wanted.translation).abs().max_element() > 2e-6 * size
-                || !now.matrix3.abs_diff_eq(wanted.matrix3, 2e-6 * wanted.matrix3.x_axis.length().max(1.0));
-            if is_off {
+            if !is_same_place(&now, &wanted, height) {
                 *node = GlobalTransform::from(wanted);
             }
         }
     }
+}
+
+/// True if two world transforms of a node differ only by rounding: by less than a share of the rig's height or, far from
+/// the origin, by the last digits of its coordinates.
+fn is_same_place(now: &Affine3A, wanted: &Affine3A, height: f32) -> bool {
+    let rounding = 2.0 * f32::EPSILON * wanted.translation.abs().max_element();
+    let is_near = |a: Vec3A, b: Vec3A| (a - b).length_squared() <= 1.6e-11 * b.length_squared();
+    (now.translation - wanted.translation).abs().max_element() <= rounding.max(4e-6 * height)
+        && is_near(now.matrix3.x_axis, wanted.matrix3.x_axis)
+        && is_near(now.matrix3.y_axis, wanted.matrix3.y_axis)
+        && is_near(now.matrix3.z_axis, wanted.matrix3.z_axis)
 }
 
 /// Writes the world transforms of joints in [`InstanceMode::Direct`].
