@@ -7,7 +7,7 @@ pub mod posing;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use bevy::prelude::*;
+use bevy::{prelude::*, time::TimeUpdateStrategy};
 
 use crate::{
     algo::{
@@ -78,6 +78,8 @@ impl Workbench {
     /// A workbench with an empty rig. The same seed gives the same uids.
     pub fn new(seed: u64, name: &str) -> Self {
         let mut app = headless_app(seed);
+        // Time passes only where frames are requested, so that springs give the same result on every machine.
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
         app.finish();
         app.cleanup();
         let uid = app.world_mut().resource_mut::<UidSource>().next_uid();

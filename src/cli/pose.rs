@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 
-use super::{ExportArgs, Failure, Output, Report, SEED, WeightArgs, build, skin, switches::SwitchArgs};
+use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, skin, switches::SwitchArgs};
 use crate::{
     files::{FileKind, RealDisk, load_project, store_model, store_rig},
     headless::{
@@ -64,6 +64,8 @@ pub(super) struct PoseArgs {
     weights: WeightArgs,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    in_place: InPlaceArgs,
     #[cfg(feature = "render")]
     #[command(flatten)]
     deform: super::render::DeformArgs,
@@ -96,6 +98,9 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
                       which they are blended: write a .png";
         return Err(Failure::Usage(reason.to_owned()));
     }
+    let inputs: Vec<&Path> =
+        [Some(&args.rig), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let writes = parsed(&args.steps)?;
     let mut report = Report::default();
     let mut rig = read(args, &mut report)?;

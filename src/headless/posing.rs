@@ -246,11 +246,12 @@ impl Workbench {
         Ok(())
     }
 
-    /// Runs `count` frames of a sixtieth of a second each, so that springs move.
+    /// Runs `count` frames of a sixtieth of a second each, so that springs move. No other time passes in a workbench.
     pub fn frames(&mut self, count: u32) {
         let step = TimeUpdateStrategy::ManualDuration(Duration::from_nanos(16_666_667));
         self.app.insert_resource(step);
         (0..count).for_each(|_| self.app.update());
+        self.app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
     }
 
     /// Nodes of the built rig with the transforms of their entities and of the program.

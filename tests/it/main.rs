@@ -17,6 +17,7 @@ mod cli_face;
 mod cli_outputs;
 #[cfg(feature = "cli")]
 mod cli_site;
+mod cli_pose;
 #[cfg(feature = "cli")]
 mod cli_templates;
 mod commands;

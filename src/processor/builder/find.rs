@@ -36,7 +36,7 @@ pub enum FindError {
 }
 
 impl Builder {
-    /// The nodes that a reference in its text form (`@label hand_l type:control`) finds in what is built so far, in
+    /// The nodes that a reference in its text form (`@any label:hand_l type:control`) finds in what is built so far, in
     /// order; `@this` is the first joint. `rig` is the document that the builder follows.
     ///
     /// # Errors

@@ -1,0 +1,442 @@
+//! `rigsmith pose` and `render --build`: the app on the command line, with the real binary, real files and exit codes.
+
+use std::{collections::BTreeSet, fs, path::Path};
+
+use bevy::math::{Quat, Vec3};
+use rigsmith::{
+    files::{RealDisk, load_model, load_template},
+    headless::Workbench,
+    plugins::commands::BuildStep,
+    rig::{
+        NodeType, PoseOffset, Uid,
+        operations::Operation,
+        project::{Project, ProjectRig, write_project},
+    },
+};
+use serde_json::Value;
+
+use crate::cli_build::rigsmith;
+
+/// A turned root with a control and an attribute, a boom whose control has a name and a label, and a hook that the
+/// attribute turns by a quarter.
+const CRANE: &str = r#"(
+    format: 2,
+    name: "crane",
+    groups: [(name: "arm", color: (0.9, 0.6, 0.0))],
+    joints: [
+        (
+            label: "root",
+            translation: (0, 1, 0),
+            rotation: (0, 0, 90),
+            tags: [
+                control(creation: (name: "base")),
+                attribute(node: "@command control/base role:control", name: "turn", min: 0.0, max: 1.0, default: 0.0),
+            ],
+        ),
+        (
+            label: "boom",
+            parent: "root",
+            group: "arm",
+            translation: (0, -0.5, 0),
+            rotation: (0, 0, -90),
+            tags: [
+                control(follow_scale: true, creation: (name: "lift", label: "boom control")),
+            ],
+        ),
+        (
+            label: "hook",
+            parent: "boom",
+            group: "arm",
+            translation: (0.5, 0, 0),
+            tags: [
+                driven_key(
+                    driver: "@command control/base role:control",
+                    driver_attribute: "turn",
+                    keys: [(0.0, 0.0), (1.0, 90.0)],
+                    output: "@this",
+                    output_channel: RotateZ,
+                ),
+            ],
+        ),
+    ],
+)
+"#;
+
+/// A block around the crane.
+const BLOCK: &str = "o block\nv -0.1 0.9 -0.1\nv 1.1 0.9 -0.1\nv 1.1 1.1 -0.1\nv -0.1 1.1 -0.1\nv -0.1 0.9 0.1\n\
+    v 1.1 0.9 0.1\nv 1.1 1.1 0.1\nv -0.1 1.1 0.1\nf 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+/// First control of the part `spring_chain`, as a reference.
+const FIRST: &str = "@command control/chain_1 role:control pick:START";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("crane.rig.ron"), CRANE).unwrap();
+    fs::write(folder.path().join("block.obj"), BLOCK).unwrap();
+    folder
+}
+
+fn bundled(name: &str) -> String {
+    format!("{}/assets/templates/{name}.rig.ron", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Output of `rigsmith pose RIG --json`, which must succeed, with entities and program at the same places.
+#[track_caller]
+fn pose(folder: &Path, rig: &str, args: &[&str]) -> Value {
+    let answer = rigsmith(folder, &[&["pose", rig, "--json"], args].concat());
+    assert_eq!(answer.code, 0, "{args:?}: {}{}", answer.out, answer.err);
+    let json = answer.json();
+    let error = json["error"].as_f64().expect("a number");
+    assert!(error <= 1e-5, "{args:?}: entities and program differ by {error}");
+    json
+}
+
+#[track_caller]
+fn node<'a>(json: &'a Value, name: &str) -> &'a Value {
+    let nodes = json["nodes"].as_array().unwrap();
+    nodes.iter().find(|node| node["name"] == name).unwrap_or_else(|| panic!("no node {name} in {json}"))
+}
+
+fn vector(value: &Value) -> Vec3 {
+    Vec3::from([0, 1, 2].map(|axis| value[axis].as_f64().unwrap() as f32))
+}
+
+fn quat(value: &Value) -> Quat {
+    Quat::from_array([0, 1, 2, 3].map(|axis| value[axis].as_f64().unwrap() as f32))
+}
+
+#[track_caller]
+fn place(json: &Value, name: &str) -> Vec3 {
+    vector(&node(json, name)["position"])
+}
+
+#[track_caller]
+fn is_at(json: &Value, name: &str, wanted: [f32; 3]) {
+    let place = place(json, name);
+    assert!(place.distance(wanted.into()) < 1e-5, "{name} is at {place}, not at {wanted:?}");
+}
+
+#[test]
+fn json_lists_every_node_in_rig_space() {
+    let folder = folder();
+    let json = pose(folder.path(), "crane.rig.ron", &["--set", "base.translate=(0.25,0,0)", "--set", "base.turn=1"]);
+    let rig = load_template(&RealDisk, &folder.path().join("crane.rig.ron")).unwrap().rig;
+    let mut bench = Workbench::with_rig(1, rig);
+    bench.build(BuildStep::All);
+    let built = bench.built().unwrap();
+    let nodes = json["nodes"].as_array().unwrap();
+    assert_eq!(nodes.len(), built.nodes.len());
+    let keys = "name label uid kind parent position rotation scale program_position program_rotation deform";
+    for (node, built) in nodes.iter().zip(&built.nodes) {
+        let told: BTreeSet<&str> = node.as_object().unwrap().keys().map(String::as_str).collect();
+        assert_eq!(told, keys.split(' ').collect::<BTreeSet<&str>>(), "{node}");
+        assert_eq!(node["uid"].as_str().unwrap(), built.uid.to_string());
+        let (kind, deform) = match built.kind {
+            NodeType::Joint => ("joint", true),
+            NodeType::Null => ("null", false),
+            NodeType::Control => ("control", false),
+        };
+        assert_eq!((node["kind"].as_str(), node["deform"].as_bool()), (Some(kind), Some(deform)), "{node}");
+        let parent = built.parent.map(|parent| bench.built().unwrap().nodes[parent].uid.to_string());
+        assert_eq!(node["parent"].as_str(), parent.as_deref(), "{node}");
+        assert_eq!(node["label"].as_str(), built.label.as_deref(), "{node}");
+        assert!(vector(&node["position"]).distance(vector(&node["program_position"])) < 1e-5, "{node}");
+        assert!(quat(&node["rotation"]).angle_between(quat(&node["program_rotation"])) < 1e-3, "{node}");
+    }
+    assert!(nodes.iter().any(|node| node["kind"] == "null"), "{json}");
+    // The control's own X axis points up.
+    is_at(&json, "root", [0.0, 1.25, 0.0]);
+    is_at(&json, "boom", [0.5, 1.25, 0.0]);
+    is_at(&json, "hook", [1.0, 1.25, 0.0]);
+    let turned = quat(&node(&json, "hook")["rotation"]);
+    assert!(turned.angle_between(Quat::from_rotation_z(std::f32::consts::FRAC_PI_2)) < 1e-3, "{turned}");
+    // For people: how many nodes, and the largest difference.
+    let answer = rigsmith(folder.path(), &["pose", "crane.rig.ron"]);
+    assert!(answer.out.contains(&format!("{} nodes", nodes.len())), "{}", answer.out);
+}
+
+#[test]
+fn channels_are_set_relative_to_rest_in_the_axes_of_the_control() {
+    let folder = folder();
+    let run = |sets: &[&str]| {
+        let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+        pose(folder.path(), "crane.rig.ron", &args)
+    };
+    let rest = run(&[]);
+    is_at(&rest, "boom", [0.5, 1.0, 0.0]);
+    is_at(&rest, "hook", [1.0, 1.0, 0.0]);
+    is_at(&run(&["lift.rotate=(0,0,90)"]), "hook", [0.5, 1.5, 0.0]);
+    // About X, then about the turned Y.
+    is_at(&run(&["lift.rotate=(90,90,0)"]), "hook", [0.5, 1.5, 0.0]);
+    is_at(&run(&["lift.scale=(2,1,1)"]), "hook", [1.5, 1.0, 0.0]);
+    // Channels of one control add up, and the last value of a channel counts.
+    let all =
+        run(&["lift.scale=(2,1,1)", "lift.rotate=(0,0,90)", "lift.translate=(0,0,9)", "lift.translate=(0,0,0.5)"]);
+    is_at(&all, "boom", [0.5, 1.0, 0.5]);
+    is_at(&all, "hook", [0.5, 2.0, 0.5]);
+    let scale = vector(&node(&all, "lift")["scale"]);
+    assert!(scale.distance(Vec3::new(2.0, 1.0, 1.0)) < 1e-5, "{scale}");
+}
+
+#[test]
+fn controls_are_named_by_name_label_or_reference() {
+    let folder = folder();
+    let run = |name: &str| pose(folder.path(), "crane.rig.ron", &["--set", &format!("{name}.rotate=(10,20,30)")]);
+    let by_name = run("lift");
+    assert!(place(&by_name, "hook").distance(Vec3::new(1.0, 1.0, 0.0)) > 0.1);
+    for other in ["boom control", "@command control/lift role:control", "@any label:\"boom control\" type:control"] {
+        assert_eq!(run(other)["nodes"], by_name["nodes"], "{other}");
+    }
+    // The label of the hand means the goal of the arm while the arm follows it, else the forward control.
+    let arm = bundled("parts/arm");
+    let rest = place(&pose(folder.path(), &arm, &[]), "hand_l");
+    let kinematics = |switch: &str, set: &str| pose(folder.path(), &arm, &["--switch", switch, "--set", set]);
+    let goal = kinematics("arm_l=ik", "hand_l.translate=(0,-0.05,0)");
+    assert!((place(&goal, "hand_l").distance(rest) - 0.05).abs() < 1e-4, "{rest} {}", place(&goal, "hand_l"));
+    assert!(place(&goal, "hand_l").distance(place(&goal, "hand_ik_l")) < 1e-4);
+    let forward = kinematics("arm_l=fk", "hand_l.rotate=(0,0,30)");
+    assert!(place(&forward, "hand_l").distance(rest) < 1e-4);
+    let turned = quat(&node(&forward, "hand_l")["rotation"]).angle_between(quat(&node(&goal, "hand_l")["rotation"]));
+    assert!((turned.to_degrees() - 30.0).abs() < 0.1, "{turned}");
+}
+
+#[test]
+fn switches_are_set_without_a_jump_before_values() {
+    let folder = folder();
+    let arm = bundled("parts/arm");
+    let joints = |json: &Value| -> Vec<(String, Vec3)> {
+        let nodes = json["nodes"].as_array().unwrap().iter().filter(|node| node["kind"] == "joint");
+        nodes.map(|node| (node["uid"].as_str().unwrap().to_owned(), vector(&node["position"]))).collect()
+    };
+    let rest = joints(&pose(folder.path(), &arm, &[]));
+    // By group, by the control that carries the attribute, by a joint of the limb; by name and by number.
+    let switches = ["arm_l=fk", "arm_l=ik", "arm_settings_l=fk", "forearm_l=fk", "forearm_l=0", "hand_ik_l=chest"];
+    for switch in switches {
+        let json = pose(folder.path(), &arm, &["--switch", switch]);
+        for ((uid, before), (_, after)) in rest.iter().zip(joints(&json)) {
+            assert!(before.distance(after) < 1e-4, "{switch} moves {uid} from {before} to {after}");
+        }
+    }
+    let bend = format!("{}.rotate=(40,0,0)", "@command control/arm_fk_l role:control pick:1");
+    let hand = |switch: &str| {
+        let json = pose(folder.path(), &arm, &["--switch", switch, "--set", &bend]);
+        place(&json, "hand_l").distance(place(&pose(folder.path(), &arm, &[]), "hand_l"))
+    };
+    assert!(hand("arm_l=fk") > 0.1, "forward controls drive the arm");
+    assert!(hand("arm_l=ik") < 1e-4, "forward controls have no effect");
+}
+
+#[test]
+fn frames_move_springs_and_are_the_same_every_time() {
+    let folder = folder();
+    let chain = bundled("parts/spring_chain");
+    let bend = format!("{FIRST}.rotate=(60,0,0)");
+    let run = |frames: &str, more: &[&str]| {
+        let args = [&["--set", &bend, "--frames", frames], more].concat();
+        pose(folder.path(), &chain, &args)
+    };
+    let tip = |json: &Value| place(json, "chain_5");
+    let still = tip(&run("0", &["--set", &format!("{FIRST}.swing=0")]));
+    let start = tip(&pose(folder.path(), &chain, &[]));
+    assert!(still.distance(start) > 0.1, "the chain hangs on its first control");
+    let (early, late) = (run("3", &[]), run("1200", &[]));
+    assert!(tip(&early).distance(still) > 0.02, "three frames in, the chain still swings");
+    assert!(tip(&late).distance(still) < 1e-3, "{} is not {still}: the chain has settled", tip(&late));
+    assert_eq!(early["nodes"], run("3", &[])["nodes"], "no time but that of the frames passes");
+    assert_eq!(run("0", &[])["nodes"], run("0", &[])["nodes"]);
+}
+
+/// A project with the crane: posed, and with a stored pose `up`.
+fn with_project() -> tempfile::TempDir {
+    let folder = folder();
+    let rig = load_template(&RealDisk, &folder.path().join("crane.rig.ron")).unwrap().rig;
+    let mut bench = Workbench::with_rig(1, rig);
+    bench.build(BuildStep::All);
+    let control = |bench: &Workbench, name: &str| -> Uid {
+        bench.built().unwrap().nodes.iter().find(|node| *node.name == *name).unwrap().uid
+    };
+    let (base, lift) = (control(&bench, "base"), control(&bench, "lift"));
+    let up = PoseOffset::from_rotation(Quat::from_rotation_z(std::f32::consts::FRAC_PI_2));
+    bench.operate(Operation::Pose(vec![(lift, up)])).unwrap();
+    bench.operate(Operation::StorePose("up".into())).unwrap();
+    bench.operate(Operation::ResetPose(Vec::new())).unwrap();
+    let raised = PoseOffset { translation: Vec3::new(0.25, 0.0, 0.0), ..PoseOffset::IDENTITY };
+    bench.operate(Operation::Pose(vec![(base, raised)])).unwrap();
+    let rig = ProjectRig { rig: bench.rig().clone(), skins: Vec::new() };
+    let project = Project { name: "crane".into(), rigs: vec![rig], ..Project::default() };
+    fs::write(folder.path().join("crane.rigsmith.ron"), write_project(&project)).unwrap();
+    folder
+}
+
+#[test]
+fn a_project_keeps_its_pose_and_shows_stored_ones() {
+    let folder = with_project();
+    let run = |args: &[&str]| pose(folder.path(), "crane.rigsmith.ron", args);
+    let current = run(&[]);
+    is_at(&current, "boom", [0.5, 1.25, 0.0]);
+    is_at(&current, "hook", [1.0, 1.25, 0.0]);
+    let stored = run(&["--pose", "up"]);
+    is_at(&stored, "boom", [0.5, 1.0, 0.0]);
+    is_at(&stored, "hook", [0.5, 1.5, 0.0]);
+    // Values are set on top of it.
+    is_at(&run(&["--pose", "up", "--set", "base.translate=(0.25,0,0)"]), "hook", [0.5, 1.75, 0.0]);
+    let written = run(&["--pose", "up", "-o", "up.rig.ron"]);
+    assert_eq!(written["output"], "up.rig.ron");
+    let rig = load_template(&RealDisk, &folder.path().join("up.rig.ron")).unwrap().rig;
+    let hook = rig.position(rig.find_label("hook").unwrap());
+    assert!(hook.distance(Vec3::new(0.5, 1.5, 0.0)) < 1e-5, "{hook}");
+    let missing = rigsmith(folder.path(), &["pose", "crane.rigsmith.ron", "--pose", "down"]);
+    assert!(missing.code == 1 && missing.err.contains("up"), "names the stored poses: {}", missing.err);
+    let none = rigsmith(folder.path(), &["pose", "crane.rig.ron", "--pose", "up"]);
+    assert!(none.code == 1 && none.err.contains("none"), "{}", none.err);
+}
+
+#[test]
+fn the_posed_character_and_the_posed_skeleton_are_written() {
+    let folder = folder();
+    let set = ["--set", "lift.rotate=(0,0,90)", "--set", "base.translate=(0.25,0,0)"];
+    for (file, more) in [
+        ("bare.glb", &[] as &[&str]),
+        ("skinned.glb", &["--mesh", "block.obj"]),
+        ("skinned.gltf", &["--mesh", "block.obj"]),
+    ] {
+        let json = pose(folder.path(), "crane.rig.ron", &[&set, more, &["-o", file]].concat());
+        let model = load_model(&RealDisk, &folder.path().join(file)).unwrap();
+        let globals = model.rest_globals();
+        for joint in ["root", "boom", "hook"] {
+            let at =
+                model.nodes.iter().position(|node| node.name == joint).unwrap_or_else(|| panic!("{file}: {joint}"));
+            let is = Vec3::from(globals[at].translation);
+            assert!(is.distance(place(&json, joint)) < 1e-5, "{file}: {joint} is at {is}");
+        }
+        assert_eq!(model.weights.is_some(), !more.is_empty(), "{file}");
+        assert_eq!(model.points.len(), if more.is_empty() { 0 } else { 8 }, "{file}");
+    }
+    let args = [&set[..], &["-o", "posed.rig.ron"]].concat();
+    let json = pose(folder.path(), "crane.rig.ron", &args);
+    let bytes = fs::read(folder.path().join("posed.rig.ron")).unwrap();
+    let rig = load_template(&RealDisk, &folder.path().join("posed.rig.ron")).unwrap().rig;
+    assert!(rig.walk().all(|joint| joint.data.tags.is_empty()), "a skeleton");
+    for joint in rig.walk() {
+        let (label, at) = (joint.data.label.clone().unwrap(), rig.position(joint.data.uid));
+        assert!(at.distance(place(&json, &label)) < 1e-5, "{label} is at {at}");
+    }
+    pose(folder.path(), "crane.rig.ron", &args);
+    assert_eq!(fs::read(folder.path().join("posed.rig.ron")).unwrap(), bytes, "the same bytes every time");
+}
+
+#[test]
+fn the_hand_of_the_biped_goes_where_its_control_goes() {
+    let folder = folder();
+    let json = pose(folder.path(), &bundled("biped"), &["--set", "hand_l.translate=(-0.1,0.15,0.1)"]);
+    let rest = pose(folder.path(), &bundled("biped"), &[]);
+    assert!((place(&json, "hand_ik_l").distance(place(&rest, "hand_ik_l")) - 0.206).abs() < 1e-3);
+    let off = place(&json, "hand_l").distance(place(&json, "hand_ik_l"));
+    assert!(off < 1e-4, "the hand is off by {off}");
+    assert!(place(&json, "hand_r").distance(place(&rest, "hand_r")) < 1e-5, "the other hand stays");
+}
+
+#[test]
+fn wrong_inputs_are_refused_and_write_nothing() {
+    let folder = folder();
+    fs::write(folder.path().join("broken.rig.ron"), CRANE.replace("control(follow_scale", "controll(follow_scale"))
+        .unwrap();
+    let arm = bundled("parts/arm");
+    let crane = "crane.rig.ron";
+    let wrong_sets: &[(&str, i32, &str)] = &[
+        ("lift", 2, "sets nothing"),
+        ("lift.rotate", 2, "sets nothing"),
+        ("lift.rotate=", 2, "sets nothing"),
+        ("lift.rotate=(1,2)", 2, "sets nothing"),
+        ("lift.rotate=(1,2,3,4)", 2, "sets nothing"),
+        ("lift.rotate=(nan,0,0)", 2, "sets nothing"),
+        ("lift.rotate=(inf,0,0)", 2, "sets nothing"),
+        ("lift.rotate=1,2,3", 2, "sets nothing"),
+        (".rotate=(1,2,3)", 2, "sets nothing"),
+        ("base.turn=much", 2, "sets nothing"),
+        ("lifd.rotate=(0,0,0)", 1, "lift"),
+        ("base.trun=1", 1, "turn"),
+        ("lift.turn=1", 1, "lift"),
+        ("hook.rotate=(0,0,0)", 1, "control"),
+        ("@joint hook.rotate=(0,0,0)", 1, "control"),
+        ("@joint nothing.rotate=(0,0,0)", 1, "nothing"),
+        ("@.rotate=(0,0,0)", 1, "@"),
+    ];
+    let mut table: Vec<(Vec<&str>, i32, &str)> =
+        wrong_sets.iter().map(|(set, code, words)| (vec![crane, "--set", set], *code, *words)).collect();
+    table.extend([
+        (vec![crane, "-o", "out.txt"], 2, "out.txt"),
+        (vec![crane, "-o", "crane.rig.ron"], 2, "input"),
+        (vec![crane, "--mesh", "block.obj", "-o", "block.obj"], 2, "block.obj"),
+        (vec![crane, "--frames", "-1"], 2, "-1"),
+        (vec![crane, "--frames", "many"], 2, "many"),
+        (vec![crane, "--mesh", "gone.obj", "-o", "out.glb"], 1, "gone.obj"),
+        (vec!["gone.rig.ron"], 1, "gone.rig.ron"),
+        (vec!["broken.rig.ron", "-o", "out.glb"], 1, "controll"),
+        (vec![crane, "--group", "leg=off"], 2, "arm"),
+        (vec![crane, "--switch", "arm"], 2, "NAME=VALUE"),
+        (vec![crane, "--switch", "arm=fk"], 1, "no switch"),
+        (vec![&arm, "--switch", "arm_x=fk"], 1, "arm_settings_l"),
+        (vec![&arm, "--switch", "arm_l=wk"], 1, "no value"),
+        (vec![&arm, "--switch", "arm_l=nan"], 1, "no value"),
+        (vec![crane, "--group", "arm=off", "--set", "lift.rotate=(0,0,9)"], 1, "in the group arm, which is off"),
+    ]);
+    let names = |folder: &Path| -> BTreeSet<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    };
+    let before = names(folder.path());
+    for (args, code, words) in table {
+        let answer = rigsmith(folder.path(), &[&["pose"], &args[..]].concat());
+        assert_eq!(answer.code, code, "{args:?}: {}{}", answer.out, answer.err);
+        assert!(answer.err.contains(words), "{args:?} says \"{words}\": {}", answer.err);
+        assert_eq!(names(folder.path()), before, "{args:?} writes nothing");
+    }
+    assert_eq!(fs::read_to_string(folder.path().join(crane)).unwrap(), CRANE);
+    // One wrong value: none is written, and all is said by the exit code with --json, too.
+    let answer = rigsmith(folder.path(), &["pose", crane, "--json", "--set", "lift.rotate=(0,0,9)", "--set", "x.y=1"]);
+    assert_eq!(answer.code, 1);
+    assert_eq!(answer.json()["ok"], false);
+    // Whoever says so may.
+    let answer = rigsmith(folder.path(), &["pose", crane, "-o", crane, "--in-place"]);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    assert!(fs::read_to_string(folder.path().join(crane)).unwrap() != CRANE);
+}
+
+#[cfg(feature = "render")]
+#[test]
+fn pictures_show_the_pose_and_its_controls_on_a_gpu() {
+    if rigsmith::render::adapter().is_none() {
+        crate::prerequisites::skip("there is no graphics adapter, not even a software one", "RIGSMITH_REQUIRE_GPU");
+        return;
+    }
+    let folder = with_project();
+    let set = "lift.rotate=(0,0,70)";
+    let picture = |args: &[&str], file: &str| -> image::RgbImage {
+        let answer = rigsmith(folder.path(), &[args, &["-o", file]].concat());
+        assert_eq!(answer.code, 0, "{args:?}: {}", answer.err);
+        image::open(folder.path().join(file)).unwrap_or_else(|error| panic!("{args:?}: {error}")).to_rgb8()
+    };
+    let differing = |a: &image::RgbImage, b: &image::RgbImage| {
+        assert_eq!(a.dimensions(), b.dimensions());
+        let is_other =
+            |(a, b): &(&image::Rgb<u8>, &image::Rgb<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 24);
+        a.pixels().zip(b.pixels()).filter(is_other).count()
+    };
+    let render = |more: &[&str], file: &str| {
+        picture(&[&["render", "crane.rig.ron", "--no-grid", "--size", "320x240"], more].concat(), file)
+    };
+    let skeleton = render(&[], "skeleton.png");
+    let controls = render(&["--build"], "controls.png");
+    let posed = render(&["--build", "--set", set], "posed.png");
+    assert!(differing(&skeleton, &controls) > 50, "controls are drawn");
+    assert!(differing(&controls, &posed) > 50, "controls are drawn in the pose");
+    assert!(differing(&posed, &render(&["--set", set], "again.png")) < 20, "--set builds");
+    let rest = picture(&["pose", "crane.rig.ron", "--mesh", "block.obj"], "rest.png");
+    let up = picture(&["pose", "crane.rig.ron", "--mesh", "block.obj", "--set", set], "up.png");
+    assert!(differing(&rest, &up) > 500, "the mesh follows");
+    let stored = picture(&["pose", "crane.rigsmith.ron", "--pose", "up", "--mesh", "block.obj"], "stored.png");
+    assert!(differing(&rest, &stored) > 500, "a stored pose is drawn");
+    let wrong = rigsmith(folder.path(), &["render", "crane.rig.ron", "--set", "lift", "-o", "no.png"]);
+    assert!(wrong.code == 2 && !folder.path().join("no.png").exists(), "{}", wrong.err);
+}
