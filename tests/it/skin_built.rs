@@ -1,6 +1,7 @@
 //! Weights of built joints, wherever they are computed, and limbs that bend with them.
 
 mod figure;
+mod goals;
 mod late;
 mod measure;
 mod places;
