@@ -53,6 +53,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     }
     elsewhere.retain(|other| listed.iter().all(|own| own.file != other.file));
     let mut bundled: Vec<Listed> = BUNDLED_CHARACTERS.iter().chain(BUNDLED_PARTS).map(of_bundled).collect();
+    bundled.sort_by(|a, b| a.file.cmp(&b.file));
     if args.folder.is_none() {
         listed.append(&mut elsewhere);
     }
@@ -68,7 +69,6 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     report.set("templates", Value::Array(templates));
     if args.folder.is_none() {
         report.line("with Rigsmith:");
-        bundled.sort_by(|a, b| a.file.cmp(&b.file));
         let bundled: Vec<Value> = bundled.iter().map(|one| tell(one, &newest, &mut report)).collect();
         report.set("bundled", Value::Array(bundled));
     }
