@@ -17,7 +17,7 @@ use bevy::{
 use super::play::rest_of;
 use crate::{
     plugins::{
-        runtime::{ControlPose, InstanceMode, NodeOf},
+        runtime::{ControlPose, InstanceMode, NodeOf, RigRuntime},
         schema::Attributes,
     },
     rig::{
@@ -39,17 +39,28 @@ pub fn target_id(node: Uid) -> AnimationTargetId {
 #[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ClipTargets;
 
-/// Gives the nodes of rigs with [`ClipTargets`] their identities for Bevy's animation.
+/// Gives the nodes of rigs with [`ClipTargets`] their identities for Bevy's animation, and those of instances without a
+/// document their attributes.
 pub(super) fn name_targets(
-    nodes: Query<(Entity, &NodeOf, &Uid), Without<AnimationTargetId>>,
-    rigs: Query<(), With<ClipTargets>>,
+    nodes: Query<(Entity, &NodeOf, &Uid, Has<Attributes>), Without<AnimationTargetId>>,
+    rigs: Query<Option<&RigRuntime>, With<ClipTargets>>,
     mut commands: Commands,
 ) {
     if rigs.is_empty() {
         return;
     }
-    for (entity, NodeOf(rig), uid) in nodes.iter().filter(|(_, NodeOf(rig), _)| rigs.contains(*rig)) {
+    for (entity, NodeOf(rig), uid, has_attributes) in &nodes {
+        let Ok(runtime) = rigs.get(*rig) else { continue };
         commands.entity(entity).insert((target_id(*uid), AnimatedBy(*rig)));
+        let Some(state) = runtime.map(RigRuntime::state).filter(|_| !has_attributes) else { continue };
+        let program = state.program();
+        let Some(node) = program.node(*uid) else { continue };
+        let own = program.attributes().iter().enumerate().filter(|(_, attribute)| attribute.node == node);
+        let held: std::collections::BTreeMap<String, f32> =
+            own.map(|(slot, attribute)| (attribute.name.to_string(), state.attribute_at(slot))).collect();
+        if !held.is_empty() {
+            commands.entity(entity).insert(Attributes(held));
+        }
     }
 }
 

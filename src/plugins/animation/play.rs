@@ -108,7 +108,7 @@ pub(super) fn play(
         &mut ClipPlayer,
         &mut PlayedClip,
         Option<&mut RootMotion>,
-        Option<&RigRuntime>,
+        Option<&mut RigRuntime>,
         Option<&Rig>,
         Option<&JointEntities>,
         Option<&ShowRest>,
@@ -119,7 +119,7 @@ pub(super) fn play(
     time: Res<Time>,
     mut commands: Commands,
 ) {
-    for (entity, mut player, mut played, mut motion, runtime, rig, joints, rest) in &mut players {
+    for (entity, mut player, mut played, mut motion, mut runtime, rig, joints, rest) in &mut players {
         let PlayedClip { compiled, told, is_due } = played.bypass_change_detection();
         if let Some(motion) = &mut motion
             && motion.delta != Transform::IDENTITY
@@ -137,7 +137,7 @@ pub(super) fn play(
             for span in &spans {
                 tell(entity, &clip, span, &mut commands);
                 let Some(motion) = &mut motion else { continue };
-                let Some(base) = base_of(motion.node, runtime, rig) else { continue };
+                let Some(base) = base_of(motion.node, runtime.as_deref(), rig) else { continue };
                 let step = travelled(&clip, motion.node, &base, span.from).inverse()
                     * travelled(&clip, motion.node, &base, span.to);
                 motion.delta = Transform::from_isometry(motion.delta.to_isometry() * step);
@@ -155,7 +155,7 @@ pub(super) fn play(
         sampler.sample(player.time, cursor, values);
         let held = motion.as_ref().map(|motion| motion.node);
         for node in nodes.iter() {
-            let Some(place) = NodePlace::of(node.uid, runtime, rig, joints) else { continue };
+            let Some(place) = NodePlace::of(node.uid, runtime.as_deref(), rig, joints) else { continue };
             let mut offset = place.offset;
             let vector = |at: usize| values[at].truncate();
             offset.translation = node.translation.map_or(offset.translation, vector);
@@ -175,13 +175,22 @@ pub(super) fn play(
                     transform.set_if_neq(offset.on(&place.base));
                 }
             }
-            if !node.attributes.is_empty()
-                && let Ok(mut told) = attributes.get_mut(place.entity)
-            {
+            if node.attributes.is_empty() {
+                continue;
+            }
+            if let Ok(mut told) = attributes.get_mut(place.entity) {
                 for (name, at) in &node.attributes {
                     let value = values[*at].x;
                     if told.0.get(name).is_some_and(|known| *known != value) {
                         told.0.insert(name.clone(), value);
+                    }
+                }
+            } else if let Some(runtime) = &mut runtime {
+                // Entities of instances without a document hold no attributes.
+                let state = runtime.bypass_change_detection().state_mut();
+                for (name, at) in &node.attributes {
+                    if let Some(slot) = state.program().attribute(node.uid, name) {
+                        state.set_attribute_at(slot, values[*at].x);
                     }
                 }
             }

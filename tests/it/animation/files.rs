@@ -142,7 +142,7 @@ fn mistakes_are_named_with_their_places() {
         let text = FROZEN.replacen(from, to, 1);
         let error = read_animation(text.as_bytes()).unwrap_err();
         assert!(error.to_string().contains(told), "{to}: {error}");
-        let line = 1 + text[..text.find(to).unwrap()].matches('\n').count();
+        let line = 1 + text[..FROZEN.find(from).unwrap()].matches('\n').count();
         let near = if told == "frame rate" { line..=line + 1 } else { line..=line };
         assert!(near.contains(&error.line), "{to}: {error}, not in line {line}");
     }

@@ -6,14 +6,17 @@ use bevy::math::{EulerRot, Quat};
 use rigsmith::{
     modules,
     processor::{ClipNote, keep_clips},
-    rig::{NodeType, Rig, RigEdit, Uid, animation::RigClip},
+    rig::{
+        NodeType, Rig, RigEdit, Uid,
+        animation::{Key, Property, RigClip, Track},
+    },
     solve::{
         program::{RigProgram, RigState},
         weights::{multiply, relative},
     },
 };
 
-use super::{CLIP, animated, apply, program};
+use super::{BASE, CLIP, Random, animated, apply, biped, controls, program, target, turn};
 
 /// Metres and degrees.
 const NEAR: (f32, f32) = (1e-4, 0.05);
@@ -36,11 +39,13 @@ fn state(program: &Arc<RigProgram>, clip: Option<&RigClip>, time: f32) -> RigSta
 }
 
 /// Largest distance and angle of joints, over all keys and frames, that are not listed; with the clip as it was, and kept.
-fn check(what: &str, before: &Rig, after: &Rig, most_listed: usize) -> Rig {
+fn check(what: &str, before: &Rig, after: &Rig, most_frames: usize) -> Rig {
     let mut kept = after.clone();
     let notes: Vec<ClipNote> = keep_clips(before, &mut kept, &Arc::new(modules::all())).unwrap();
     let listed: HashSet<Uid> = notes.iter().map(|note| note.deviation.joint).collect();
-    assert!(listed.len() <= most_listed, "{what}: {} joints are listed: {notes:?}", listed.len());
+    let frames = notes.iter().map(|note| note.frames).max().unwrap_or_default();
+    println!("{what}: {} joints are listed, one of them at {frames} frames", listed.len());
+    assert!(frames <= most_frames, "{what}: a joint is listed at {frames} frames, {:?}", notes.first());
     let (from, to) = (program(before), program(after));
     let (rest_before, rest_after) = (state(&from, None, 0.0), state(&to, None, 0.0));
     let clip = before.clip(CLIP).unwrap();
@@ -98,14 +103,29 @@ fn names_and_groups_leave_clips_alone() {
     assert_eq!(kept, after);
 }
 
+/// The biped with a gentle motion of a few controls.
+fn gentle() -> Rig {
+    let mut rig = biped();
+    let nodes = controls(&program(&rig));
+    let mut random = Random::new(12);
+    let mut clip = RigClip { range: [0.0, 2.0], ..RigClip::new(CLIP, BASE, "gentle") };
+    for _ in 0..12 {
+        let keys = (0..=4).map(|time| Key::rotation(time as f32 * 0.5, turn(&mut random, 0.25))).collect();
+        let node = random.pick(&nodes);
+        clip.layers[0].tracks.insert(target(node, Property::Rotation), Arc::new(Track { keys }));
+    }
+    apply(&mut rig, RigEdit::AddClip(Box::new(clip), 0));
+    rig
+}
+
 #[test]
 fn flipped_axes_hold_the_motion() {
-    let before = animated();
+    let before = gentle();
     let mut after = before.clone();
     for label in ["spine_1", "forearm_l", "hand_r", "head"] {
         flip(&mut after, label, Quat::from_euler(EulerRot::XYZ, 0.0, std::f32::consts::PI, 0.0));
     }
-    let kept = check("flipped axes", &before, &after, 8);
+    let kept = check("flipped axes", &before, &after, 6);
     assert_ne!(kept.clips(), after.clips());
 }
 

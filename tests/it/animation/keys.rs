@@ -103,7 +103,7 @@ fn a_span_of_a_clip_is_retimed() {
     run(&mut rig, Operation::Clips(ClipOperation::Retime { clip: CLIP, from: [0.5, 1.5], to: [0.5, 3.5] }));
     let slow = rig.clip(CLIP).unwrap();
     assert_eq!((slow.range, slow.markers[1].time), ([0.0, 4.0], 3.5));
-    for (time, then) in [(0.3, 0.3), (0.5, 0.5), (0.7, 0.9), (1.4, 3.3), (1.9, 3.9)] {
+    for (time, then) in [(0.3, 0.3), (0.5, 0.5), (0.7, 1.1), (1.4, 3.2), (1.9, 3.9)] {
         let (was, is) = (clip.sample(time), slow.sample(then));
         for (node, offset) in &was.offsets {
             assert!(offset.rotation.dot(is.offsets[node].rotation).abs() > 1.0 - 1e-5, "{time}");
@@ -198,9 +198,10 @@ fn baked_keys_follow_the_track_and_reduced_ones_stay_within_the_tolerance() {
             let now = reduced.layers[0].tracks[target].sample(&target.property, key.time).unwrap();
             match target.property {
                 Property::Rotation => {
-                    let angle = Quat::from_array(key.value).angle_between(Quat::from_array(now)).to_degrees();
-                    // The arc cosine of a number near 1 is coarse.
-                    assert!(angle <= tolerance.angle + 0.05, "{target:?}: {angle}");
+                    let (a, b) = (Quat::from_array(key.value), Quat::from_array(now));
+                    let chord = (a - b).length().min((a + b).length());
+                    let angle = 4.0 * (chord * 0.5).asin().to_degrees();
+                    assert!(angle <= tolerance.angle + 1e-3, "{target:?}: {angle}");
                 }
                 _ => {
                     let off = key.value.iter().zip(now).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt();

@@ -39,7 +39,7 @@ fn stretched(key: &Key, time: f32, before: f32, behind: f32) -> Key {
 }
 
 /// Puts keys whose times fall in order. What was the way to the next key is the way from it then.
-fn turn_round(keys: &mut Vec<Key>) {
+fn turn_round(keys: &mut [Key]) {
     let eases: Vec<Ease> = keys.iter().map(|key| key.ease).collect();
     for (place, key) in keys.iter_mut().enumerate() {
         let way = place.checked_sub(1).map(|before| eases[before]);
