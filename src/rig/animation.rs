@@ -97,7 +97,7 @@ pub struct ClipAbout {
 pub struct LayerAbout {
     /// The name people see.
     pub name: String,
-    /// How the layer's values meet those below.
+    /// Manner in which the values of the layer meet those below.
     pub mode: LayerMode,
     /// Weight of the layer from 0 to 1.
     pub weight: f32,

@@ -48,7 +48,7 @@ pub enum ClipOperation {
         clip: Uid,
         /// Name of the layer.
         name: String,
-        /// How its values meet those below.
+        /// Manner in which its values meet those below.
         mode: LayerMode,
     },
     /// Sets name, mode, weight, mask and muting of a layer.

@@ -1,4 +1,4 @@
-//! What animators do with keys.
+//! Changes that animators make to keys.
 
 use std::sync::Arc;
 
