@@ -5,6 +5,8 @@
 
 pub mod outline;
 
+use std::collections::BTreeSet;
+
 use bevy::prelude::*;
 
 use super::{
@@ -175,41 +177,45 @@ pub fn find_switches(
             || name_of(built, switch).as_deref() == Some(name)
             || matched.iter().any(of_node)
     };
-    let mut first_error = None;
     let mut found = Vec::new();
+    // Values of the switches that the name matches: a limb has kinematics and spaces.
+    let mut possible: Vec<&str> = Vec::new();
     for switch in built.switches.iter().filter(is_meant) {
-        match number_of(built, switch, name, value) {
-            Ok(number) => found.push((switch.control, switch.attribute.to_string(), number)),
-            Err(error) => first_error = first_error.or(Some(error)),
+        let choices = choices(built, switch);
+        match number_of(&choices, value) {
+            Some(number) => found.push((switch.control, switch.attribute.to_string(), number)),
+            None if choices.is_empty() => possible.push("a number"),
+            None => possible.extend(choices),
         }
     }
-    match (found.is_empty(), first_error) {
-        (false, _) => Ok(found),
-        (true, Some(error)) => Err(error),
-        (true, None) => {
-            let known: Vec<String> = built.switches.iter().filter_map(|switch| name_of(built, switch)).collect();
-            let nearest = did_you_mean(name, known.iter().map(String::as_str));
-            Err(SwitchError::NoSwitch { name: name.to_owned(), nearest, known: names(built) })
-        }
+    if found.is_empty() && possible.is_empty() {
+        let known: Vec<String> = built.switches.iter().filter_map(|switch| name_of(built, switch)).collect();
+        let nearest = did_you_mean(name, known.iter().map(String::as_str));
+        return Err(SwitchError::NoSwitch { name: name.to_owned(), nearest, known: names(built) });
+    }
+    if found.is_empty() {
+        let mut seen = BTreeSet::new();
+        possible.retain(|value| seen.insert(*value));
+        let (name, value) = (name.to_owned(), value.to_owned());
+        return Err(SwitchError::NoValue { name, value, known: possible.join(", ") });
+    }
+    Ok(found)
+}
+
+/// Names of the values of a switch, in their order.
+fn choices<'a>(built: &'a BuiltRig, switch: &SwitchData) -> Vec<&'a str> {
+    let mut attributes = built.node(switch.control).into_iter().flat_map(|node| node.attributes.iter());
+    match attributes.find(|known| known.name == switch.attribute).map(|known| &known.kind) {
+        Some(AttributeKind::Choice(names)) => names.iter().map(String::as_str).collect(),
+        _ if matches!(switch.matching, Matching::IkFk { .. }) => vec!["fk", "ik"],
+        _ => Vec::new(),
     }
 }
 
-fn number_of(built: &BuiltRig, switch: &SwitchData, name: &str, value: &str) -> Result<f32, SwitchError> {
-    let attribute = built.node(switch.control).into_iter().flat_map(|node| node.attributes.iter());
-    let choices: Vec<&str> =
-        match attribute.clone().find(|known| known.name == switch.attribute).map(|known| &known.kind) {
-            Some(AttributeKind::Choice(names)) => names.iter().map(String::as_str).collect(),
-            _ if matches!(switch.matching, Matching::IkFk { .. }) => vec!["fk", "ik"],
-            _ => Vec::new(),
-        };
+/// The number of a value that is one of `choices`, or a number itself.
+fn number_of(choices: &[&str], value: &str) -> Option<f32> {
     let number = choices.iter().position(|choice| *choice == value).map(|number| number as f32);
-    number.or_else(|| value.parse().ok().filter(|number: &f32| number.is_finite())).ok_or_else(|| {
-        SwitchError::NoValue {
-            name: name.to_owned(),
-            value: value.to_owned(),
-            known: if choices.is_empty() { "a number".to_owned() } else { choices.join(", ") },
-        }
-    })
+    number.or_else(|| value.parse().ok().filter(|number: &f32| number.is_finite()))
 }
 
 /// Updates the visibility of nodes whose layer, attributes or control changed.
