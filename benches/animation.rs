@@ -13,10 +13,7 @@ use std::{hint::black_box, sync::Arc, time::Instant};
 
 use bevy::{
     animation::prelude::AnimatableKeyframeCurve,
-    math::{
-        EulerRot, Quat, Vec3, Vec4,
-        curve::{Curve, CurveExt},
-    },
+    math::{EulerRot, Quat, Vec3, Vec4, curve::Curve},
 };
 use rigsmith::rig::{
     Uid,

@@ -10,6 +10,9 @@
 
 #[path = "../tests/it/fit_data/known.rs"]
 mod known;
+#[expect(dead_code, reason = "tests use more of it")]
+#[path = "../tests/it/random.rs"]
+mod random;
 
 use std::{error::Error, path::Path, time::Instant};
 
@@ -19,7 +22,10 @@ use rigsmith::{
     files::bundled_characters,
 };
 
-use self::known::{Figure, Random, figures, is_finger, template_joints};
+use self::{
+    known::{Figure, figures, is_finger, template_joints},
+    random::Random,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
@@ -97,7 +103,7 @@ fn changed(figure: &Figure, joints: &[TemplateJoint]) -> Result<(), Box<dyn Erro
     let right = pairs.map(|(a, b)| turned(Quat::from_mat3(&Mat3::from_cols(a, b, a.cross(b))))).fold(0.0, f32::max);
     let mut random = Random(12345);
     let odd = (0..10).map(|_| {
-        let mut part = || random.share() - 0.5;
+        let mut part = || random.unit() - 0.5;
         Quat::from_xyzw(part(), part(), part(), part()).normalize()
     });
     let odd = odd.collect::<Vec<_>>().into_iter().map(turned).fold(0.0, f32::max);
@@ -114,7 +120,7 @@ fn changed(figure: &Figure, joints: &[TemplateJoint]) -> Result<(), Box<dyn Erro
     order.iter().zip(points).for_each(|(to, point)| others[*to as usize] = *point);
     let renamed: Vec<[u32; 3]> = triangles.iter().map(|corners| corners.map(|corner| order[corner as usize])).collect();
     let order = furthest(&others, &renamed, &|place| place);
-    let missing: Vec<[u32; 3]> = triangles.iter().copied().filter(|_| random.share() > 0.1).collect();
+    let missing: Vec<[u32; 3]> = triangles.iter().copied().filter(|_| random.unit() > 0.1).collect();
     let missing = furthest(points, &missing, &|place| place);
     println!(
         "{name:<28} turned {right:.2}, oddly {odd:.2}, scaled {:.2}, faces in another order {faces:.2}, points {order:.2}, a tenth \

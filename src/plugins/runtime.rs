@@ -17,7 +17,7 @@ mod systems;
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{math::Affine3A, prelude::*};
 
 pub(crate) use self::systems::is_near;
 pub use self::{

@@ -30,7 +30,7 @@ pub use self::{
 use crate::rig::{PoseOffset, Rig, Uid};
 
 /// Clip of a rig: layers of tracks over a range of time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigClip {
     /// Identity.
     pub uid: Uid,
@@ -58,7 +58,7 @@ pub struct Marker {
 }
 
 /// Layer of a clip: tracks that are mixed into the layers below.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClipLayer {
     /// Identity.
     pub uid: Uid,

@@ -25,7 +25,7 @@ use rigsmith::{
     solve::program::{CompileOptions, RigProgram},
 };
 
-use crate::mutate::Random;
+use crate::random::Random;
 
 const CLIP: Uid = Uid(0xC11B_0001);
 const BASE: Uid = Uid(0xC11B_0002);
@@ -108,7 +108,7 @@ fn controls(program: &RigProgram) -> Vec<Uid> {
 fn animated() -> Rig {
     let mut rig = biped();
     let program = program(&rig);
-    let mut clip = clip_on(&controls(&program), &mut Random::new(3));
+    let mut clip = clip_on(&controls(&program), &mut Random(3));
     for attribute in program.attributes().iter().filter(|one| one.is_settable && one.name.contains("ik_fk")) {
         let node = program.nodes()[attribute.node].uid;
         let key = |time, value| Key { ease: Ease::Stepped, ..Key::number(time, value) };
@@ -141,7 +141,7 @@ fn every_edit_of_clips_has_its_inverse() {
     let mut rig = biped();
     let node = rig.roots()[0];
     let rotation = target(node, Property::Rotation);
-    let clip = clip_on(&[node], &mut Random::new(1));
+    let clip = clip_on(&[node], &mut Random(1));
     there_and_back(&mut rig, RigEdit::AddClip(Box::new(clip.clone()), 5));
     let other = RigClip::new(Uid(77), Uid(78), "other");
     there_and_back(&mut rig, RigEdit::AddClip(Box::new(other), 0));
@@ -176,7 +176,7 @@ fn every_edit_of_clips_has_its_inverse() {
 fn what_no_clip_can_have_is_refused_and_changes_nothing() {
     let mut rig = biped();
     let node = rig.roots()[0];
-    apply(&mut rig, RigEdit::AddClip(Box::new(clip_on(&[node], &mut Random::new(1))), 0));
+    apply(&mut rig, RigEdit::AddClip(Box::new(clip_on(&[node], &mut Random(1))), 0));
     let before = rig.clone();
     let mut refuse = |edit: RigEdit, wanted: &dyn Fn(&EditError) -> bool| {
         let error = rig.apply(&edit).unwrap_err();
@@ -215,8 +215,8 @@ fn what_no_clip_can_have_is_refused_and_changes_nothing() {
     refuse(add(RigClip { markers, ..clip() }), &bad(ClipFault::Markers));
     let layers = vec![ClipLayer { weight: 1.5, ..ClipLayer::empty(Uid(6)) }];
     refuse(add(RigClip { layers, ..clip() }), &bad(ClipFault::Weight));
-    refuse(add(RigClip::new(Uid(5), node, "x")), &|error| *error == EditError::Taken(node));
-    refuse(add(RigClip::new(Uid(5), Uid(5), "x")), &|error| *error == EditError::Taken(Uid(5)));
+    refuse(add(RigClip::new(Uid(5), node, "x")), &|error| *error == EditError::UidInUse(node));
+    refuse(add(RigClip::new(Uid(5), Uid(5), "x")), &|error| *error == EditError::UidInUse(Uid(5)));
     refuse(RigEdit::RemoveClip(Uid(5)), &|error| *error == EditError::NoClip(Uid(5)));
     let remove = RigEdit::RemoveLayer { clip: CLIP, layer: Uid(5) };
     refuse(remove, &|error| *error == EditError::NoLayer(CLIP, Uid(5)));

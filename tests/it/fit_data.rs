@@ -17,9 +17,10 @@ use rigsmith::{
     mesh::surface::Surface,
 };
 
-use self::known::{Figure, HUMAN, Random, figures, is_finger, template_joints};
+use self::known::{Figure, HUMAN, figures, is_finger, template_joints};
 use crate::{
     prerequisites::test_data,
+    random::Random,
     weights_bodies::{Body, difference},
 };
 
@@ -122,7 +123,7 @@ fn joints_lie_in_their_own_limbs() {
     let (mut inside, mut count) = (0, 0);
     for fitted in all.iter().filter(|fitted| fitted.figure.template == "biped" && !fitted.figure.name.contains('.')) {
         let body = Body::read(&data.join("bodies"), &fitted.figure.name, "game_engine");
-        let surface = Surface::new(&body.points, &body.triangles);
+        let surface = Surface::build(&body.points, &body.triangles);
         let labels = labels("biped");
         for (label, bone) in pairs() {
             let Some(at) = labels.iter().position(|known| *known == label) else { continue };
@@ -257,7 +258,7 @@ fn the_same_figure_given_otherwise() {
         assert_eq!(reordered.joints, base.joints, "{name}: faces in another order");
         let (finer, faces) = subdivided(points, triangles);
         let finer = moved(&finer, &faces, &same);
-        let missing: Vec<[u32; 3]> = triangles.iter().copied().filter(|_| random.share() > 0.1).collect();
+        let missing: Vec<[u32; 3]> = triangles.iter().copied().filter(|_| random.unit() > 0.1).collect();
         let missing = moved(points, &missing, &same);
         let (specks, faces) = with_specks(points, triangles, &mut random);
         let specks = moved(&specks, &faces, &same);
@@ -308,7 +309,7 @@ fn with_specks(points: &[Vec3], triangles: &[[u32; 3]], random: &mut Random) -> 
     let (mut points, mut triangles) = (points.to_vec(), triangles.to_vec());
     let size = 0.002 * (high - low).max_element();
     for _ in 0..12 {
-        let at = low + (high - low) * Vec3::new(random.share(), random.share(), random.share());
+        let at = low + (high - low) * Vec3::new(random.unit(), random.unit(), random.unit());
         let first = points.len() as u32;
         points.extend([at, at + size * Vec3::X, at + size * Vec3::Y]);
         triangles.push([first, first + 1, first + 2]);

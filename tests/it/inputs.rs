@@ -104,8 +104,8 @@ fn an_edit_of_inputs_has_an_inverse_and_refuses_what_cannot_be() {
         error
     };
     let joint = before.find_label("hand").unwrap();
-    assert_eq!(refused(&|inputs| inputs[0].uid = joint), EditError::Taken(joint));
-    assert!(matches!(refused(&|inputs| inputs[0].uid = inputs[1].uid), EditError::Taken(_)));
+    assert_eq!(refused(&|inputs| inputs[0].uid = joint), EditError::UidInUse(joint));
+    assert!(matches!(refused(&|inputs| inputs[0].uid = inputs[1].uid), EditError::UidInUse(_)));
     assert!(matches!(refused(&|inputs| inputs[0].name = "gear".to_owned()), EditError::BadInputName(..)));
     assert!(matches!(refused(&|inputs| inputs[0].name.clear()), EditError::BadInputName(..)));
     assert!(matches!(refused(&|inputs| inputs[0].rest.translation.x = f32::NAN), EditError::BadInput(_)));

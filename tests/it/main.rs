@@ -16,8 +16,9 @@ mod cli_face;
 #[cfg(feature = "cli")]
 mod cli_outputs;
 #[cfg(feature = "cli")]
-mod cli_site;
 mod cli_pose;
+#[cfg(feature = "cli")]
+mod cli_site;
 #[cfg(feature = "cli")]
 mod cli_templates;
 mod commands;

@@ -17,6 +17,12 @@ pub(in crate::editor) enum OpenError {
         /// Name of the file.
         name: String,
     },
+    /// The file has animation clips, which are no document.
+    #[error("{name} has only animation clips; open the rig or the project that they belong to")]
+    ClipsAlone {
+        /// Name of the file.
+        name: String,
+    },
     /// The file's name ends in `.ron`, like a list of gestures.
     #[error("{name} is neither template nor project; those end in .rig.ron and .rigsmith.ron")]
     Gestures {

@@ -149,6 +149,7 @@ pub(super) fn recognise(path: &Path) -> Result<(), OpenError> {
         ) => Ok(()),
         Some(FileKind::Skin) => Err(OpenError::WeightsAlone { name: name() }),
         Some(FileKind::Gestures) => Err(OpenError::Gestures { name: name() }),
+        Some(FileKind::Animation) => Err(OpenError::ClipsAlone { name: name() }),
         None => Err(OpenError::Unknown { name: name() }),
     }
 }

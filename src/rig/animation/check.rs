@@ -75,7 +75,7 @@ pub(in crate::rig) fn check_clip(clip: &RigClip) -> Result<(), EditError> {
     let mut uids = HashSet::from([clip.uid]);
     for layer in &clip.layers {
         if !uids.insert(layer.uid) {
-            return Err(EditError::Taken(layer.uid));
+            return Err(EditError::UidInUse(layer.uid));
         }
         check_tracks(clip.uid, layer)?;
     }

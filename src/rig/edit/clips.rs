@@ -97,13 +97,12 @@ fn settle(layer: &mut ClipLayer) {
 fn exchanged(before: &[Key], removed: &[f32], inserted: &[Key]) -> Result<(Vec<Key>, Vec<Key>), KeyFault> {
     let mut taken = Vec::with_capacity(removed.len());
     let mut keys = Vec::with_capacity((before.len() + inserted.len()).saturating_sub(removed.len()));
-    let (mut old, mut gone, mut fresh) =
-        (before.iter().peekable(), removed.iter().peekable(), inserted.iter().peekable());
+    let (mut gone, mut fresh) = (removed.iter().peekable(), inserted.iter().peekable());
     if let Some(pair) = removed.windows(2).find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less))
     {
         return Err(KeyFault::Order(pair[1]));
     }
-    while let Some(key) = old.next() {
+    for key in before {
         match gone.peek() {
             Some(time) if **time == key.time => {
                 gone.next();

@@ -11,7 +11,7 @@ impl Rig {
         for input in inputs {
             let is_own = self.input(input.uid).is_some();
             if !seen.insert(input.uid) || self.is_taken(input.uid) && !is_own {
-                return Err(EditError::Taken(input.uid));
+                return Err(EditError::UidInUse(input.uid));
             }
             if input.name.is_empty() || inputs.iter().any(|other| other.uid != input.uid && other.name == input.name) {
                 return Err(EditError::BadInputName(input.uid, input.name.clone()));

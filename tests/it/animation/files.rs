@@ -110,7 +110,7 @@ fn clips_find_the_nodes_of_another_rig_by_their_labels() {
 fn keys_of_a_joint_that_is_gone_wait_for_it() {
     let mut rig = biped();
     let tip = rig.walk().last().unwrap().data.uid;
-    apply(&mut rig, RigEdit::AddClip(Box::new(clip_on(&[tip], &mut Random::new(2))), 0));
+    apply(&mut rig, RigEdit::AddClip(Box::new(clip_on(&[tip], &mut Random(2))), 0));
     let before = rig.clone();
     let back = rig.apply(&RigEdit::RemoveJoint(tip)).unwrap();
     assert_eq!(rig.clips(), before.clips());

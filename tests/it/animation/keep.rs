@@ -107,7 +107,7 @@ fn names_and_groups_leave_clips_alone() {
 fn gentle() -> Rig {
     let mut rig = biped();
     let nodes = controls(&program(&rig));
-    let mut random = Random::new(12);
+    let mut random = Random(12);
     let mut clip = RigClip { range: [0.0, 2.0], ..RigClip::new(CLIP, BASE, "gentle") };
     for _ in 0..12 {
         let keys = (0..=4).map(|time| Key::rotation(time as f32 * 0.5, turn(&mut random, 0.25))).collect();

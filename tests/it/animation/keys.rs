@@ -39,7 +39,7 @@ fn times(keys: &[Key]) -> Vec<f32> {
 fn keys_of_the_pose_give_the_pose() {
     let mut rig = animated();
     let nodes = controls(&program(&rig));
-    let mut random = Random::new(8);
+    let mut random = Random(8);
     for node in nodes.iter().take(12) {
         let translation = Vec3::new(share(&mut random), share(&mut random), 0.0) * 0.1;
         let offset = PoseOffset { translation, rotation: turn(&mut random, 0.3), scale: Vec3::new(1.0, 1.2, 1.0) };

@@ -119,7 +119,7 @@ fn keys_live_through_random_deeds_and_undo_brings_back_the_first_bytes() {
     let mut rig = animated();
     let first = bytes(&rig);
     let (mut history, mut selection, mut uids) = (RigHistory::default(), Selection::default(), UidSource::seeded(2));
-    let mut random = Random::new(2026);
+    let mut random = Random(2026);
     // What is expected after each step in effect, and what was before the first.
     let mut expected: Vec<Expected> = vec![keys_of(&rig)];
     let mut undone: Vec<Expected> = Vec::new();

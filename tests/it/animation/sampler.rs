@@ -15,7 +15,7 @@ fn compare(clip: &RigClip) {
     let sampler = ClipSampler::new(clip);
     let mut out = vec![Vec4::ZERO; sampler.targets().len()];
     let mut cursors = [sampler.cursor(), SampleCursor::default()];
-    let mut random = Random::new(4);
+    let mut random = Random(4);
     let rising = (0..400).map(|step| step as f32 * 0.006 - 0.2);
     let mut times: Vec<f32> = rising.collect();
     times.extend((0..400).map(|_| random.below(3000) as f32 / 1000.0 - 0.5));
@@ -53,7 +53,7 @@ fn a_compiled_clip_gives_the_values_of_the_clip() {
 #[test]
 fn far_turns_are_spherical() {
     let mut clip = RigClip::new(CLIP, BASE, "turns");
-    let mut random = Random::new(9);
+    let mut random = Random(9);
     for node in 1..20 {
         let turns = (0..6).map(|time| Key::rotation(time as f32 * 0.4, turn(&mut random, 3.0)));
         clip.layers[0].tracks.insert(target(Uid(node), Property::Rotation), Arc::new(Track { keys: turns.collect() }));

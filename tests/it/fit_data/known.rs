@@ -236,25 +236,3 @@ pub fn template_joints(rig: &Rig) -> Vec<TemplateJoint<'_>> {
 pub fn is_finger(label: &str) -> bool {
     ["thumb", "index", "middle", "ring", "pinky"].iter().any(|finger| label.starts_with(finger))
 }
-
-/// Generator of xorshift numbers: the same on every machine.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0
-    }
-
-    pub fn share(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1_u64 << 24) as f32
-    }
-
-    pub fn shuffle<T>(&mut self, list: &mut [T]) {
-        for at in (1..list.len()).rev() {
-            list.swap(at, (self.next() % (at as u64 + 1)) as usize);
-        }
-    }
-}
