@@ -11,7 +11,7 @@
 //! | joint | [`Joint`], `Uid`, `RestTransform`, `Transform`, [`NodeOf`] the rig, `ChildOf`; [`NodeLabel`], [`InGroup`], [`Null`] |
 //! | tag | [`Tag`], `Uid`, [`TagOf`] a joint, and [`CommandTag`] or [`FeatureTag`]; [`InFeature`] |
 //! | created node | [`CreatedBy`] a command, [`CreatedRole`], `Uid`, `RestTransform`, `Transform`, [`NodeOf`], `ChildOf`, and [`Control`], [`Null`] or [`Joint`]; [`NodeLabel`], [`InGroup`], [`NodeLayer`], [`Attributes`] |
-//! | node of a game's instance | [`NodeSlot`], `Uid`, [`NodeOf`] the instance, `RestTransform`, and [`Joint`], [`Null`] or [`Control`]; [`NodeLabel`], [`NodeLayer`], [`CreatedRole`]. With a hierarchy: `Transform`, `ChildOf`; without one: the `GlobalTransform` of joints, and the [`ControlPose`] of nodes that can be posed |
+//! | node of a game's instance | [`NodeSlot`], `Uid`, [`NodeOf`] the instance, `RestTransform` below the built parent, and [`Joint`], [`Null`] or [`Control`]; [`NodeLabel`], [`NodeLayer`], [`CreatedRole`]. With a hierarchy: `Transform`, `ChildOf`; without one: the `GlobalTransform` of joints, and the [`ControlPose`] of nodes that can be posed |
 //! | constraint | [`Constrains`] a node, [`ConstraintKind`], [`ConstraintTargets`], [`CreatedBy`] a command, `Uid` |
 
 use std::collections::BTreeMap;

@@ -300,10 +300,10 @@ impl Values {
         })
     }
 
-    /// Three pairs of lowest and highest values; empty fields are open.
+    /// Three pairs of lowest and highest values; empty fields are open, and so are limits that are left out.
     fn limits(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
-        let mut pairs: [[Option<f32>; 2]; 3] =
-            read::<[(Option<f32>, Option<f32>); 3]>(subject.value(path).value)?.map(|(low, high)| [low, high]);
+        let limits: [(Option<f32>, Option<f32>); 3] = read(subject.value(path).value).unwrap_or_default();
+        let mut pairs = limits.map(|(low, high)| [low, high]);
         ui.label(label);
         let mut edit = None;
         for (number, axis) in ["X", "Y", "Z"].into_iter().enumerate() {

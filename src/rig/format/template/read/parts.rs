@@ -127,7 +127,7 @@ enum PartChangeError {
 struct TagTemplate<'a> {
     format: u32,
     name: &'a str,
-    joints: [TaggedJoint<'a>; 1],
+    joints: &'a [TaggedJoint<'a>],
 }
 
 /// Joint with the tags of a change as they are written.
@@ -149,7 +149,7 @@ fn change_of(file: PartChangeFile) -> Result<PartChange, PartChangeError> {
     }
     let mut tags = Vec::new();
     if let (Some(text), Some(joint)) = (&file.tags, &file.joint) {
-        let joints = [TaggedJoint { label: joint, tags: text }];
+        let joints = &[TaggedJoint { label: joint, tags: text }];
         let read = read_text(&ron_text(&TagTemplate { format: FORMAT, name: "part", joints }), 1)?;
         tags = read.rig.walk().next().map(|joint| joint.data.tags.clone()).unwrap_or_default();
     }
