@@ -415,7 +415,9 @@ fn listening_ends_with_the_app_and_waiting_calls_wake_it() {
     let mut remote = Remote::new();
     let woken = Arc::new(AtomicUsize::new(0));
     let counted = woken.clone();
-    remote.app.world().resource::<RemoteServer>().set_wake(move || drop(counted.fetch_add(1, Ordering::SeqCst)));
+    remote.app.world().resource::<RemoteServer>().set_wake(move || {
+        counted.fetch_add(1, Ordering::SeqCst);
+    });
     remote.call("rig.list", json!({}));
     assert!(woken.load(Ordering::SeqCst) > 0);
     let taken = RemotePlugin::bind(RemoteSettings { port: remote.address.port(), ..default() });
