@@ -43,7 +43,7 @@ pub(super) enum Awaited {
     Update {
         rig: Entity,
         template: Handle<RigTemplate>,
-        /// What was built of the template before.
+        /// Former build of the template.
         before: Option<Arc<BuiltTemplate>>,
         /// True if that is the file's content already.
         is_known: bool,

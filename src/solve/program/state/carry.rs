@@ -20,7 +20,7 @@ pub struct Carry {
     is_aligned: bool,
     /// True if also poses, inputs and springs have the same places, so that an instance can go on with its own lists.
     is_in_place: bool,
-    /// What differs between programs of one layout; `None` for others.
+    /// Differences of two programs of one layout; `None` for programs of different layouts.
     changes: Option<Changes>,
 }
 
