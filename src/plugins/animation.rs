@@ -32,8 +32,7 @@ impl Plugin for ClipPlugin {
 }
 
 /// Playback of a clip on a rig.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Component)]
+#[derive(Component, Debug, Clone, Copy, PartialEq)]
 #[require(PlayedClip)]
 pub struct ClipPlayer {
     /// The clip, of the rig's document or of [`RigClips`].

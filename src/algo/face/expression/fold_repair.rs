@@ -26,11 +26,20 @@ const INFLUENCES: usize = 8;
 
 type Influences = Vec<(u32, f32)>;
 
+/// Result of [`repair_folds`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FoldRepair {
+    /// Number of triangles that are still folded, summed over the six expressions.
+    pub folds: usize,
+    /// Share of the furthest movement that mending the pose took from each of the six, by name.
+    pub mended: Vec<(String, f32)>,
+}
+
 /// Averages weights where one of the six expressions at full strength turns a triangle by more than a right angle.
 ///
 /// All in head space; `mask` and `weights` as [`FittedFace::new`] takes them. Points at the same place keep the same
 /// weights. Bones move otherwise with other weights, so that each pass poses anew, and the weights with the fewest folds
-/// are kept. Returns the folds that are left, summed over the six, after [`FittedFace::pose`] has repaired the poses.
+/// are kept. Returns the folds that are left after [`FittedFace::pose`] has repaired the poses, and what that took.
 /// Cost: a few poses of every expression.
 pub fn repair_folds(
     set: &ExpressionSet,
@@ -40,29 +49,30 @@ pub fn repair_folds(
     weights: &mut Weights,
     bones: &[FaceBone],
     landmarks: &Landmarks,
-) -> usize {
+) -> FoldRepair {
     if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
-        return 0;
+        return FoldRepair::default();
     }
     let six: Vec<&Expression> = set.six().collect();
     let with_area = with_area(points, triangles);
     let mut neighbourhood: Option<Neighbourhood> = None;
-    let mut best: Option<(usize, Weights)> = None;
+    let mut best: Option<(FoldRepair, Weights)> = None;
     let mirror = Mirror::new(points, bones, landmarks);
     for pass in 0..=PASSES {
         let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set());
-        let matrices = |expression: &&Expression| -> Vec<Affine3A> {
-            let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
+        let posed = |expression: &&Expression| -> (Vec<Affine3A>, f32) {
+            let (posed, taken) = face.mended_pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
             let moved = posed.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
-            [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
+            ([Affine3A::IDENTITY; 2].into_iter().chain(moved).collect(), taken)
         };
-        let poses: Vec<Vec<Affine3A>> = six.par_iter().map(matrices).collect();
+        let (poses, taken): (Vec<Vec<Affine3A>>, Vec<f32>) = six.par_iter().map(posed).unzip();
         let (sum, folded) = all_folded(points, triangles, &with_area, weights, &poses);
         // A pass that helped nothing is the last.
-        if best.as_ref().is_some_and(|(least, _)| sum >= *least) {
+        if best.as_ref().is_some_and(|(least, _)| sum >= least.folds) {
             break;
         }
-        best = Some((sum, weights.clone()));
+        let mended = six.iter().zip(taken).map(|(expression, taken)| (expression.name.clone(), taken)).collect();
+        best = Some((FoldRepair { folds: sum, mended }, weights.clone()));
         if sum == 0 || pass == PASSES {
             break;
         }
@@ -74,7 +84,7 @@ pub fn repair_folds(
             mirror.apply(weights);
         }
     }
-    let Some((left, best)) = best else { return 0 };
+    let Some((left, best)) = best else { return FoldRepair::default() };
     *weights = best;
     left
 }
