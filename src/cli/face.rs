@@ -358,12 +358,6 @@ fn describe(report: &mut Report, placed: &FaceReport) {
     report.set("square_error", placed.square_error);
     report.set("rounds", placed.rounds);
     report.set("folds", placed.folds);
-    let mended = placed.mended.iter().map(|(name, taken)| (name.clone(), json!(taken)));
-    report.set("mended", serde_json::Value::Object(mended.collect()));
-    let most = placed.mended.iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, taken)| *taken > 0.0);
-    if let Some((name, taken)) = most {
-        report.line(format!("mending folds takes {:.1} % of {name} at most", 100.0 * taken));
-    }
     report.set("kept", placed.kept);
     let bone = |bone: &crate::algo::face::bones::FaceBone| {
         json!({

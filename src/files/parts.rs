@@ -12,7 +12,7 @@ use crate::{
     processor::Modules,
     rig::{
         Rig, SourceError,
-        part::{Part, PartError, PartInstance},
+        part::{Part, PartError},
         template::{self, Template, read_template, text_of},
     },
 };
@@ -26,7 +26,6 @@ macro_rules! bundled {
 /// Parts that come with Rigsmith, by the names that templates call them.
 pub const BUNDLED_PARTS: &[(&str, &str)] = bundled![
     "arm",
-    "bendy_limb",
     "eye",
     "fk_chain",
     "front_leg",
@@ -35,14 +34,11 @@ pub const BUNDLED_PARTS: &[(&str, &str)] = bundled![
     "jaw",
     "leg",
     "leg_3joint",
-    "lips",
-    "neck_chain",
     "neck_head",
     "single_control",
     "spine",
     "spring_chain",
     "tail",
-    "tongue",
     "wing",
 ];
 
@@ -91,27 +87,16 @@ enum Source<'a> {
 
 /// Reason why a part of a template cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum PartFileError {
+enum PartFileError {
     /// A part that uses itself, at any depth.
     #[error("`{}` is a part of itself; take it out of one of the files", path.display())]
-    Cycle {
-        /// File of the part.
-        path: PathBuf,
-    },
+    Cycle { path: PathBuf },
     /// A file that the list of contents does not have.
     #[error("there is no file `{}`", path.display())]
-    Missing {
-        /// File of the part.
-        path: PathBuf,
-    },
+    Missing { path: PathBuf },
     /// A file that neither the template's folder nor the folders of the site have.
     #[error("{source}; {folders} of the site's folders were searched, too")]
-    Nowhere {
-        /// Error of reading the file beside the template.
-        source: ReadError,
-        /// Number of folders of the site.
-        folders: usize,
-    },
+    Nowhere { source: ReadError, folders: usize },
     /// A site file that cannot be read.
     #[error(transparent)]
     Site(#[from] SiteError),
@@ -120,12 +105,7 @@ pub enum PartFileError {
     Read(#[from] ReadError),
     /// A file that is no template, or has such a part itself.
     #[error("`{}`: {source}", path.display())]
-    Template {
-        /// File of the part.
-        path: PathBuf,
-        /// Place and reason in that file.
-        source: SourceError,
-    },
+    Template { path: PathBuf, source: SourceError },
     /// A part that does not fit.
     #[error(transparent)]
     Part(#[from] PartError),
@@ -202,22 +182,6 @@ impl<'a> PartFiles<'a> {
         template.with_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
     }
 
-    /// Every part instance of a template with its part, [fitted](PartInstance::fitted).
-    ///
-    /// # Errors
-    /// A part that cannot be had or does not fit.
-    pub fn fitted(&mut self, path: &Path, template: &Template) -> Result<Vec<(PartInstance, Rig)>, PartFileError> {
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let modules = self.modules.clone();
-        let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
-        let instances = template.parts.iter().chain(&template.instances);
-        let fitted = instances.map(|instance| {
-            let part = self.part(&folder.join(&instance.part), &instance.part)?;
-            Ok((instance.clone(), instance.fitted(&part, &mirror)?))
-        });
-        fitted.collect()
-    }
-
     /// The part of that name, beside its template at `first` or elsewhere.
     fn part(&mut self, first: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
         if let Some(known) = self.known.get(first) {
@@ -237,8 +201,7 @@ impl<'a> PartFiles<'a> {
         let template = self.complete(&path, &bytes);
         self.open.pop();
         let template = template.map_err(|source| PartFileError::Template { path, source })?;
-        let Template { rig, chains, sockets, options, .. } = template;
-        let part = Arc::new(Part { rig, chains, sockets, options });
+        let part = Arc::new(Part { rig: template.rig, chains: template.chains });
         self.known.insert(first.to_owned(), part.clone());
         Ok(part)
     }

@@ -32,7 +32,8 @@ impl Plugin for ClipPlugin {
 }
 
 /// Playback of a clip on a rig.
-#[derive(Component, Debug, Clone, Copy, PartialEq)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
+#[reflect(Component)]
 #[require(PlayedClip)]
 pub struct ClipPlayer {
     /// The clip, of the rig's document or of [`RigClips`].

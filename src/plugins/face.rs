@@ -9,7 +9,6 @@ mod error;
 mod job;
 mod placed_bones;
 mod pose;
-mod preparation;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -30,7 +29,6 @@ pub use error::{ExpressError, PlaceFaceError};
 pub use job::FaceJob;
 pub use placed_bones::{FaceRig, PlacedBone};
 pub use pose::{expressed_points, mixed};
-pub use preparation::FacePreparation;
 
 /// Plugin of automatic faces.
 pub struct FacePlugin;
@@ -39,8 +37,6 @@ impl Plugin for FacePlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.init_resource::<FaceExpressions>()
-            .init_resource::<preparation::PreparedSkins>()
-            .add_observer(preparation::forget)
             .add_message::<FaceRequest>()
             .add_message::<FacePlaced>()
             .add_message::<super::landing::ResultHeld>()
@@ -49,11 +45,7 @@ impl Plugin for FacePlugin {
             .add_systems(
                 Update,
                 (
-                    (preparation::keep, pose::adopt, pose::express)
-                        .chain()
-                        .after(RigSystems::Gesture)
-                        .before(RigSystems::Edits),
-                    preparation::prepare.after(RigSystems::Edits).before(RigSystems::Build),
+                    (pose::adopt, pose::express).chain().after(RigSystems::Gesture).before(RigSystems::Edits),
                     pose::follow_strengths.after(RigSystems::Edits).before(RigSystems::Build),
                     (job::start, job::land).chain().in_set(RigSystems::Bind),
                 ),
@@ -118,8 +110,6 @@ pub struct FaceReport {
     pub rounds: usize,
     /// Number of triangles that the six expressions fold over.
     pub folds: usize,
-    /// Share of the furthest movement that mending folds takes from each of the six expressions, by name.
-    pub mended: Vec<(String, f32)>,
     /// Number of folded triangles that nobody notices; see [`FaceAnalysis::tolerated_folds`].
     pub tolerated_folds: usize,
     /// Number of bones that a person had edited, which stayed.
@@ -175,7 +165,7 @@ pub struct Expressed {
 /// The document holds them as values of attributes of the mesh, so undo, stored poses and projects bring them back.
 ///
 /// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
-/// the answer is an [`Expressed`] message. While the face is still prepared ([`FacePreparation`]), both wait for it. A value equal to what is shown is no edit.
+/// the answer is an [`Expressed`] message. A value equal to what is shown is no edit.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
 #[reflect(Component, Debug, Clone, PartialEq, Default)]
 pub struct Expressions(pub BTreeMap<String, f32>);

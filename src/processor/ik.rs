@@ -51,8 +51,6 @@ pub struct Ik {
     pub max_stretch: f32,
     /// Turn of two bones about the line from root to goal, in degrees.
     pub twist: Amount,
-    /// Share by which the middle joint of two bones goes to the pole.
-    pub pin: Amount,
     /// True if the end turns with the goal, as it was built relative to it.
     pub orient_end: bool,
     /// Limits of each joint for [`IkSolver::Ccd`].
@@ -78,7 +76,6 @@ impl Ik {
             stretch: Amount::Value(0.0),
             max_stretch: 2.0,
             twist: Amount::Value(0.0),
-            pin: Amount::Value(0.0),
             orient_end: true,
             limits: Vec::new(),
             iterations: 24,
@@ -149,17 +146,11 @@ impl BuildScope<'_> {
                     stretch: self.amount("stretch", &ik.stretch, control, 0.0..=1.0, 0.0)?,
                     max_stretch: ik.max_stretch,
                     twist: self.amount("twist", &ik.twist, control, f32::NEG_INFINITY..=f32::INFINITY, 0.0)?,
-                    // Nothing is pinned to a pole that is off.
-                    pin: match pole {
-                        Some(_) => self.amount("pin", &ik.pin, control, 0.0..=1.0, 0.0)?,
-                        None => Scalar::Value(0.0),
-                    },
                     orient_end,
                 }
             }
             None => {
-                let numbers = [("soft", &ik.soft), ("stretch", &ik.stretch), ("twist", &ik.twist), ("pin", &ik.pin)];
-                for (name, amount) in numbers {
+                for (name, amount) in [("soft", &ik.soft), ("stretch", &ik.stretch), ("twist", &ik.twist)] {
                     if *amount != Amount::Value(0.0) {
                         return Err(ModuleError::parameter(
                             name,

@@ -40,7 +40,6 @@ mod edits;
 mod examples;
 mod exports;
 mod face;
-mod face_actions;
 #[cfg(feature = "cli")]
 mod face_arkit;
 mod face_bones;
@@ -48,7 +47,6 @@ mod face_expressions;
 mod face_fit;
 mod face_grouping;
 mod face_landmarks;
-mod face_parts;
 mod face_symmetry;
 mod face_units;
 mod files;
@@ -74,7 +72,6 @@ mod gltf;
 mod gltf_torture;
 mod heads;
 mod influences;
-mod inputs;
 mod instances;
 mod journal;
 mod journal_kill;
@@ -97,9 +94,7 @@ mod obj_torture;
 #[cfg(feature = "editor")]
 mod panels;
 mod part_instances;
-mod part_overrides;
 mod part_sizes;
-mod part_sockets;
 mod parts;
 mod parts_more;
 mod picking;
@@ -111,8 +106,6 @@ mod processor;
 mod project;
 mod random;
 mod references;
-#[cfg(feature = "remote")]
-mod remote;
 #[cfg(feature = "render")]
 mod render;
 mod rig_text;
@@ -124,7 +117,6 @@ mod skin_built;
 mod skin_file;
 mod solvers;
 mod sources;
-mod stages;
 mod stroke;
 mod surface;
 mod surface_refresh;
@@ -137,7 +129,6 @@ mod tools;
 mod transfer;
 mod update;
 mod voxels;
-mod watched_folder;
 mod weights;
 mod weights_bodies;
 #[cfg(all(feature = "editor", feature = "cli"))]

@@ -10,14 +10,14 @@ use glam::{Quat, Vec3};
 
 use super::{
     axes::{AxesError, HeadAxes, guess_axes},
-    bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, extras::eyeballs, place_bones_on, visible_skin},
-    expression::{ExpressionSet, Eyeball, FittedFace, UnitSet, repair_folds},
+    bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, place_bones},
+    expression::{ExpressionSet, FittedFace, UnitSet, repair_folds},
     grouping::{GroupingError, HeadGroups, group_head},
     head_bones::{HeadBones, HeadBonesError, head_bones},
     head_part::{HeadPartError, head_part},
     landmarks::{LandmarkError, Landmarks, find_landmarks},
     shells::{Shells, find_shells},
-    weights::{FaceWeightsError, face_weights_on},
+    weights::{FaceWeightsError, face_weights},
 };
 use crate::{algo::fit::FitError, mesh::model::Weights};
 
@@ -210,8 +210,6 @@ pub struct AutoFace {
     pub rounds: usize,
     /// Number of triangles that the six expressions fold over; usually none.
     pub folds: usize,
-    /// Share of the furthest movement that mending folds takes from each of the six expressions, by name.
-    pub mended: Vec<(String, f32)>,
 }
 
 impl FaceAnalysis {
@@ -299,13 +297,11 @@ impl FaceAnalysis {
             symmetric: settings.symmetric,
             extras: settings.extras,
         };
-        let seen = visible_skin(points, triangles, shells, groups, landmarks);
-        let bones = within(progress, FaceStep::Bones);
-        let placed = place_bones_on(&seen, points, triangles, shells, landmarks, fixed, &how, &bones)
-            .map_err(|error| cancelled(progress, FaceError::Bones(error)))?;
+        let placed =
+            place_bones(points, triangles, shells, groups, landmarks, fixed, &how, &within(progress, FaceStep::Bones))
+                .map_err(|error| cancelled(progress, FaceError::Bones(error)))?;
         begin(progress, FaceStep::Weights)?;
-        let weights = face_weights_on(
-            &seen,
+        let weights = face_weights(
             points,
             triangles,
             shells,
@@ -321,25 +317,16 @@ impl FaceAnalysis {
             square_error: placed.square_error,
             rounds: placed.rounds,
             folds: 0,
-            mended: Vec::new(),
         };
         begin(progress, FaceStep::Expressions)?;
         let mask = &groups.mask;
-        let repair = repair_folds(expressions, points, triangles, mask, &mut face.weights, &face.bones, landmarks);
-        (face.folds, face.mended) = (repair.folds, repair.mended);
+        face.folds = repair_folds(expressions, points, triangles, mask, &mut face.weights, &face.bones, landmarks);
         Ok(face)
     }
 
     /// The head with the given bones and weights, prepared for expressions.
     pub fn fitted(&self, bones: &[FaceBone], weights: &Weights, units: &UnitSet) -> FittedFace {
         FittedFace::new(&self.points, &self.triangles, &self.groups.mask, weights, bones, &self.landmarks, units)
-            .with_eyeballs(&self.eyeballs())
-    }
-
-    /// Eyeballs that are meshes of their own, in head space.
-    pub fn eyeballs(&self) -> Vec<Eyeball> {
-        let balls = eyeballs(&self.points, &self.shells).into_iter();
-        balls.map(|(center, radius)| Eyeball { center, radius }).collect()
     }
 
     /// Rotation from head space to the mesh's space.

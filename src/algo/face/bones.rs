@@ -5,7 +5,7 @@
 //! the samples of both sides are folded onto one and its centroids mirrored, with a strip along the middle plane for
 //! bones on the plane. Jaw and eyes get bones of their own on top.
 
-pub(crate) mod extras;
+mod extras;
 pub(crate) mod map;
 mod name;
 pub(crate) mod sample;
@@ -206,35 +206,8 @@ pub fn place_bones(
     progress: &(dyn Fn(f32) -> bool + Sync),
 ) -> Result<FaceBones, FaceBonesError> {
     check(points, triangles, fixed, settings)?;
-    let seen = visible_skin(points, triangles, shells, groups, landmarks);
-    place_bones_on(&seen, points, triangles, shells, landmarks, fixed, settings, progress)
-}
-
-/// Marks points of the mask that are visible from the front: see [`sample::visible_mask`].
-pub(crate) fn visible_skin(
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    shells: &Shells,
-    groups: &HeadGroups,
-    landmarks: &Landmarks,
-) -> Vec<bool> {
-    let scale = FaceMap::new(landmarks, landmarks.symmetric, extent(points)).scale;
-    sample::visible_mask(points, triangles, shells, groups, scale)
-}
-
-/// Places facial bones as [`place_bones`] does on skin that is known to be visible.
-pub(crate) fn place_bones_on(
-    seen: &[bool],
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    shells: &Shells,
-    landmarks: &Landmarks,
-    fixed: &[FixedBone],
-    settings: &FaceBonesSettings,
-    progress: &(dyn Fn(f32) -> bool + Sync),
-) -> Result<FaceBones, FaceBonesError> {
-    check(points, triangles, fixed, settings)?;
     let map = FaceMap::new(landmarks, settings.symmetric, extent(points));
+    let seen = sample::visible_mask(points, triangles, shells, groups, map.scale);
     let vertices = seen.iter().filter(|&&s| s).count();
     if vertices == 0 {
         return Err(FaceBonesError::EmptyMask);
@@ -242,7 +215,7 @@ pub(crate) fn place_bones_on(
     if settings.bones > vertices {
         return Err(FaceBonesError::TooManyBones { bones: settings.bones, vertices });
     }
-    let patches = sample::patches(points, triangles, seen, &map, group_of, PARTS.len());
+    let patches = sample::patches(points, triangles, &seen, &map, group_of, PARTS.len());
     let on_skin: Vec<Fixed> = fixed
         .iter()
         .enumerate()
@@ -258,11 +231,11 @@ pub(crate) fn place_bones_on(
     let mut seats = spread(&mut spreader, &patches, &on_skin)?;
     let rounds = spreader.rounds;
     let parts: Vec<Part> = seats.iter().map(|s| part_of(s, &map)).collect();
-    drop_onto_skin(&mut seats, points, triangles, seen, &map, landmarks.symmetric && settings.symmetric);
+    drop_onto_skin(&mut seats, points, triangles, &seen, &map, landmarks.symmetric && settings.symmetric);
     let mut bones = name::name(&seats, &parts, &map);
     let square_error = points
         .iter()
-        .zip(seen)
+        .zip(&seen)
         .filter(|(_, seen)| **seen)
         .map(|(p, _)| f64::from(bones.iter().map(|b| b.position.distance_squared(*p)).fold(f32::INFINITY, f32::min)))
         .sum();

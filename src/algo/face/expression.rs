@@ -26,17 +26,14 @@ use super::{
 use crate::mesh::{model::Weights, skinning::skin_points};
 
 pub use self::{
-    bone_fit::{Eyeball, FittedFace},
-    fold_repair::{FoldRepair, repair_folds},
+    bone_fit::FittedFace,
+    fold_repair::repair_folds,
     set::{ExpressionSet, UnitSet},
     text::{Expression, ExpressionError, Gaze, MAX_STRENGTH, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
 };
 
 /// Largest distance that a bone is moved, in eye distances.
 const FURTHEST: f32 = 0.9;
-
-/// Largest angle that a bone of skin turns by, in degrees.
-pub const MOST_TURN: f32 = 25.0;
 
 /// A bone's offset from rest in head space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,19 +148,6 @@ pub fn pose_sampled(mix: &Mix, units: &UnitSet, bones: &[FaceBone], landmarks: &
 /// A movement clamped to the longest that a bone may make; zero if it is not finite.
 fn limited(movement: Vec3, landmarks: &Landmarks) -> Vec3 {
     if movement.is_finite() { movement.clamp_length_max(FURTHEST * landmarks.eye_distance()) } else { Vec3::ZERO }
-}
-
-/// A turn clamped to the largest that a bone may make; none if it is not finite.
-fn limited_turn(turn: Vec3) -> Vec3 {
-    if turn.is_finite() { turn.clamp_length_max(MOST_TURN.to_radians()) } else { Vec3::ZERO }
-}
-
-/// The rotation of an axis times an angle in radians.
-fn turn_of(turn: Vec3) -> Quat {
-    let angle = turn.length();
-    let Some(axis) = turn.try_normalize() else { return Quat::IDENTITY };
-    let half = axis * ops::sin(0.5 * angle);
-    Quat::from_xyzw(half.x, half.y, half.z, ops::cos(0.5 * angle))
 }
 
 /// The points of a head in an expression, by linear blend skinning.

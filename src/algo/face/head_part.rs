@@ -45,14 +45,6 @@ const PLANES: usize = 64;
 const BIPED: f32 = 1.8;
 /// Widening of a section, relative to the narrowest one, at which the neck ends.
 const WIDENS: f32 = 1.3;
-/// Least share of all area that a body's own skin has, if it is one surface.
-const SKIN: f32 = 0.4;
-/// Distance from top and bottom at which a body's own skin may end, under hair or in shoes, as a share of the height.
-const SKIN_MISSES: f32 = 0.08;
-/// Least area of the head's skin before the cut, as a share of the largest area there.
-const MUCH: f32 = 0.25;
-/// Distance from the box of the head's skin up to which loose parts belong to the head, as a share of the box.
-const AROUND: f32 = 0.35;
 /// Least ratio of the height of a body to that of its head if it lifts a leg.
 const LIFTED: f32 = 3.0;
 
@@ -108,52 +100,24 @@ pub(super) struct Cut {
 
 /// The cut of an upright body, horizontal and below the topmost part, and the head's height above the narrowest place.
 fn crown_cut(body: &Body) -> Option<(Cut, f32)> {
-    let crown = Crown::new(body);
-    let planes = sections(&body.places, &crown.triangles, Vec3::NEG_Y, [-crown.top, -body.low.y], PLANES);
+    let planes = sections(&body.places, &body.joined, Vec3::NEG_Y, [-body.high.y, -body.low.y], PLANES);
     let sizes: Vec<f32> = planes.iter().map(Section::size).collect();
     let last = (sizes.len() as f32 * 0.35) as usize;
     let (narrow, end) = neck(&sizes, last, 0.0, WIDENS)?;
     let (narrow, end) = (-planes.get(narrow)?.at, planes.get(end)?);
-    let away: Vec<f32> = body.places.iter().map(|place| crown.top - place.y).collect();
-    let reach = crown.top + end.at;
-    let tip = body.crown(&away, reach)?;
-    Some((Cut { away, reach, tip, plane: (end.centroid, Vec3::Y) }, crown.top - narrow))
-}
-
-/// Surface in which the neck of an upright body is sought.
-struct Crown {
-    triangles: Vec<[u32; 3]>,
-    /// Height at which it begins.
-    top: f32,
-}
-
-impl Crown {
-    /// The body's own skin, if it is one surface from feet to head: hair and hats would hide the neck. Otherwise all
-    /// surfaces.
-    fn new(body: &Body) -> Self {
-        let whole = || Self { triangles: body.joined.clone(), top: body.high.y };
-        let all: f32 = body.island_areas.iter().sum();
-        let largest = (0..body.island_areas.len())
-            .max_by(|a, b| body.island_areas[*a].total_cmp(&body.island_areas[*b]))
-            .filter(|island| body.island_areas[*island] > SKIN * all);
-        let Some(largest) = largest else { return whole() };
-        let is_own = |corners: &&[u32; 3]| body.island_of[corners[0] as usize] as usize == largest;
-        let triangles: Vec<[u32; 3]> = body.joined.iter().filter(is_own).copied().collect();
-        let heights = triangles.iter().flatten().map(|corner| body.places[*corner as usize].y);
-        let (low, top) = heights.fold((f32::MAX, f32::MIN), |(low, top), y| (low.min(y), top.max(y)));
-        let (height, slack) = (body.size().y, SKIN_MISSES * body.size().y);
-        let spans = top > body.high.y - slack && low < body.low.y + slack && top - low > 0.5 * height;
-        if spans { Self { triangles, top } } else { whole() }
-    }
+    let tip = (0..body.places.len()).max_by(|a, b| body.places[*a].y.total_cmp(&body.places[*b].y))?;
+    let cut = Cut {
+        away: body.places.iter().map(|place| body.high.y - place.y).collect(),
+        reach: body.high.y + end.at,
+        tip,
+        plane: (end.centroid, Vec3::Y),
+    };
+    Some((cut, body.high.y - narrow))
 }
 
 /// A mesh whose points of one position are welded.
 pub(super) struct Body {
     welded: Vec<u32>,
-    /// Island of each place.
-    island_of: Vec<u32>,
-    /// Area of each island, doubled.
-    island_areas: Vec<f32>,
     pub(super) places: Vec<Vec3>,
     pub(super) joined: Vec<[u32; 3]>,
     pub(super) low: Vec3,
@@ -174,10 +138,7 @@ impl Body {
             places[*number as usize] = *point;
         }
         let (low, high) = places.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
-        let (island_of, islands) = adjacency::islands(&joined, count);
-        let mut body = Self { welded, island_of, island_areas: Vec::new(), places, joined, low, high };
-        body.island_areas = body.areas(&body.joined, &body.island_of, islands);
-        body
+        Self { welded, places, joined, low, high }
     }
 
     pub(super) fn size(&self) -> Vec3 {
@@ -220,58 +181,28 @@ impl Body {
         areas
     }
 
-    /// The topmost place of the island that the head's skin belongs to: among islands with much area before the cut the
-    /// largest one, which hair and hats are not.
-    fn crown(&self, away: &[f32], reach: f32) -> Option<usize> {
-        let near: Vec<[u32; 3]> = self
-            .joined
-            .iter()
-            .filter(|triangle| triangle.iter().all(|corner| away[*corner as usize] <= reach))
-            .copied()
-            .collect();
-        let areas = self.areas(&near, &self.island_of, self.island_areas.len());
-        let most = areas.iter().copied().fold(0.0, f32::max);
-        let head = (0..areas.len())
-            .filter(|island| areas[*island] >= MUCH * most)
-            .max_by(|a, b| self.island_areas[*a].total_cmp(&self.island_areas[*b]))?;
-        (0..self.places.len())
-            .filter(|place| self.island_of[*place] as usize == head)
-            .max_by(|a, b| self.places[*a].y.total_cmp(&self.places[*b].y))
-    }
-
-    /// Marks the places of the head: those connected with its tip before the cut, and loose parts of which most lies
-    /// among them.
+    /// Marks the places of the head: those connected with its tip before the cut, and loose parts among them.
     fn within(&self, cut: &Cut) -> Vec<bool> {
         let near = |place: usize| cut.away[place] <= cut.reach;
-        let before: Vec<[u32; 3]> = self
+        let above: Vec<[u32; 3]> = self
             .joined
             .iter()
             .filter(|triangle| triangle.iter().all(|corner| near(*corner as usize)))
             .copied()
             .collect();
-        let (part_of, _) = adjacency::islands(&before, self.places.len());
-        let (head, skin) = (part_of[cut.tip], self.island_of[cut.tip]);
-        let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
-        for (place, part) in self.places.iter().zip(&part_of) {
-            if *part == head {
-                (low, high) = (low.min(*place), high.max(*place));
+        let (island_of, _) = adjacency::islands(&above, self.places.len());
+        let head = island_of[cut.tip];
+        let mut inside = (Vec3::MAX, Vec3::MIN);
+        for (place, island) in self.places.iter().zip(&island_of) {
+            if *island == head {
+                inside = (inside.0.min(*place), inside.1.max(*place));
             }
         }
-        // Eyes and teeth are loose, and lie within the head's box; raised hands do not. Hair lies around it.
-        let boxed = |place: Vec3, margin: Vec3| place.cmpge(low - margin).all() && place.cmple(high + margin).all();
-        let around = (high - low) * AROUND;
-        let inside = |corner: &u32| near(*corner as usize) && boxed(self.places[*corner as usize], around);
-        let among: Vec<[u32; 3]> = self.joined.iter().filter(|triangle| triangle.iter().all(inside)).copied().collect();
-        let areas = self.areas(&among, &self.island_of, self.island_areas.len());
-        let belongs = |place: usize| {
-            let island = self.island_of[place];
-            let (own, whole) = (areas[island as usize], self.island_areas[island as usize]);
-            match island == skin || whole <= 0.0 {
-                true => near(place) && boxed(self.places[place], Vec3::ZERO),
-                false => own > 0.5 * whole,
-            }
-        };
-        (0..self.places.len()).map(|place| part_of[place] == head || belongs(place)).collect()
+        // Eyes and teeth are loose, and lie within the head's box; raised hands do not.
+        let boxed = |place: Vec3| place.cmpge(inside.0).all() && place.cmple(inside.1).all();
+        (0..self.places.len())
+            .map(|place| island_of[place] == head || (near(place) && boxed(self.places[place])))
+            .collect()
     }
 }
 

@@ -188,8 +188,7 @@ fn look(
     let (low, high) = own.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), (_, p)| (low.min(*p), high.max(*p)));
     let size = high - low;
     let coarse = DepthFrame::over(low.truncate(), high.truncate(), size.truncate().max_element() / 191.0, 192);
-    let (coarse, solid) =
-        front(coarse, points, triangles, |t| !matches!(kind(t), ShellKind::Inside | ShellKind::Cover));
+    let (coarse, solid) = front(coarse, points, triangles, |t| kind(t) != ShellKind::Inside);
     let hint = eye_hint(points, shells);
     let middles = match (exact, hint) {
         (Some(middle), _) => vec![middle],
@@ -208,8 +207,7 @@ fn look(
     // If nothing looks like a face, the mean face of a person in the size of the front is used.
     let guessed = seen.is_none();
     let mut pose = seen.unwrap_or_else(|| search::guess(exact.unwrap_or((low.x + high.x) / 2.0), low, high));
-    let (fine, _) =
-        front(relief::close_up(&pose), points, triangles, |t| !matches!(kind(t), ShellKind::Inside | ShellKind::Cover));
+    let (fine, _) = front(relief::close_up(&pose), points, triangles, |t| kind(t) != ShellKind::Inside);
     if exact.is_none() {
         let (x, y, d) = (pose.center.x, pose.center.y, pose.size);
         let rows = (y - 1.0 * d * pose.tall, y + 0.35 * d);

@@ -2,11 +2,10 @@
 //!
 //! A head often comes with eyeballs, teeth and lashes as loose parts, and a scan with its skin in several pieces. Size
 //! alone cannot tell them apart, so the visibility of every part is measured from six sides: skin is large and visible,
-//! eyes are a pair of equal balls, hair lies closely before the skin, and the rest lies inside.
+//! eyes are a pair of equal balls, and the rest lies inside.
 
 use glam::Vec3;
 
-use self::visibility::Sight;
 use crate::mesh::adjacency;
 
 mod eyes;
@@ -21,8 +20,6 @@ pub enum ShellKind {
     LeftEye,
     /// The eyeball on the character's right.
     RightEye,
-    /// Hair, brows, a beard and all else that lies on the skin.
-    Cover,
     /// Teeth, tongue, lashes and everything else.
     Inside,
 }
@@ -49,9 +46,6 @@ const SKIN_AREA: f32 = 0.03;
 /// lips show a sixth.
 const SKIN_SEEN: f32 = 0.3;
 
-/// Share of a shell's visible cells behind which the skin lies close, from which the shell is a cover.
-const COVERS: f32 = 0.5;
-
 /// Measurements of one shell.
 #[derive(Debug, Clone, Copy)]
 struct Island {
@@ -64,8 +58,7 @@ struct Island {
 ///
 /// `points` are in head space (+x the character's left, +y up, +z forward), in any unit. Points of equal position are
 /// connected, so that texture seams do not cut the skin. Every large part that is visible from outside is
-/// [`ShellKind::Skin`], with the walls of mouth and eye sockets connected to it, unless it lies closely on the largest
-/// one ([`ShellKind::Cover`]); two balls of one size are the eyes.
+/// [`ShellKind::Skin`], with the walls of mouth and eye sockets connected to it; two balls of one size are the eyes.
 /// Points without triangles are [`ShellKind::Inside`]. Triangles with corners past the end are ignored.
 ///
 /// Shells are numbered by their first points. Linear time; a millisecond for 10,000 points.
@@ -101,18 +94,10 @@ fn kinds(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands: &[I
         return kinds;
     }
     let solid = islands.iter().filter(|island| island.area > 0.0).count();
-    let main = islands.iter().position(|island| island.area == largest).unwrap_or(0);
-    let seen = match solid > 1 {
-        true => visibility::sights(points, triangles, shell_of, islands, main as u32),
-        false => vec![Sight { seen: 1.0, covers: 0.0 }; islands.len()],
-    };
-    for (shell, (kind, (island, sight))) in kinds.iter_mut().zip(islands.iter().zip(&seen)).enumerate() {
-        if sight.seen < SKIN_SEEN || island.area <= 0.0 {
-            continue;
-        }
-        if shell != main && sight.covers >= COVERS {
-            *kind = ShellKind::Cover;
-        } else if island.area >= SKIN_AREA * largest {
+    let seen =
+        if solid > 1 { visibility::shares(points, triangles, shell_of, islands) } else { vec![1.0; islands.len()] };
+    for (kind, (island, seen)) in kinds.iter_mut().zip(islands.iter().zip(&seen)) {
+        if island.area >= SKIN_AREA * largest && *seen >= SKIN_SEEN {
             *kind = ShellKind::Skin;
         }
     }

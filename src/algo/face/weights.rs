@@ -12,7 +12,7 @@ mod symmetry;
 use glam::Vec3;
 
 use super::{
-    bones::{FaceBone, FaceBoneKind, Side, extent, map::FaceMap, visible_skin},
+    bones::{FaceBone, FaceBoneKind, Side, extent, map::FaceMap, sample::visible_mask},
     grouping::HeadGroups,
     landmarks::Landmarks,
     shells::{ShellKind, Shells},
@@ -115,26 +115,9 @@ pub fn face_weights(
     if let Some(triangle) = triangles.iter().position(|t| t.iter().any(|&i| i as usize >= points.len())) {
         return Err(FaceWeightsError::Triangle { triangle });
     }
-    let seen = visible_skin(points, triangles, shells, groups, landmarks);
-    face_weights_on(&seen, points, triangles, shells, groups, landmarks, bones, progress)
-}
-
-/// Weights of all points of a sound head, as [`face_weights`] computes them, on skin that is known to be visible.
-pub(crate) fn face_weights_on(
-    seen: &[bool],
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    shells: &Shells,
-    groups: &HeadGroups,
-    landmarks: &Landmarks,
-    bones: &[FaceBone],
-    progress: &(dyn Fn(f32) -> bool + Sync),
-) -> Result<Weights, FaceWeightsError> {
-    if let Some(bone) = bones.iter().position(|b| !b.position.is_finite()) {
-        return Err(FaceWeightsError::Bone { bone });
-    }
     let (welded, count) = weld(points);
     let map = FaceMap::new(landmarks, landmarks.symmetric, extent(points));
+    let seen = visible_mask(points, triangles, shells, groups, map.scale);
     let mut places = vec![Vec3::ZERO; count];
     let (mut skin, mut mask) = (vec![false; count], vec![false; count]);
     let mut shell = vec![u32::MAX; count];

@@ -5,7 +5,7 @@
 //! the angle `a` takes or adds the section's area times `a` times that distance, whatever the weights (Pappus). A half joint
 //! that leaves the bend on the outside makes up for it, and the right length depends on the body: it is measured here.
 //! Where that length would swell the mesh in another motion, the border between what moves and what stays is moved a little
-//! ([`blend`]), so that it encloses as much on both sides of the joint.
+//! (`blend`), so that it encloses as much on both sides of the joint.
 
 mod blend;
 mod part;

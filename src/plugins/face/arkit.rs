@@ -67,8 +67,7 @@ pub fn arkit_shapes(
         let mut own = poses(&[(unit, side)]);
         if let Some(open) = open.filter(|_| name == CLOSE) {
             for ((own, both), open) in own.iter_mut().zip(poses(&[(unit, side), open])).zip(poses(&[open])) {
-                let rotation = open.rotation.inverse() * both.rotation;
-                *own = BonePose { translation: both.translation - open.translation, rotation };
+                *own = BonePose { translation: both.translation - open.translation, ..BonePose::REST };
             }
         }
         let mut offsets = vec![Vec3::ZERO; analysis.mesh_points];

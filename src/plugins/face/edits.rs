@@ -9,7 +9,6 @@ use crate::{
     algo::face::{
         auto::{AutoFace, FaceAnalysis},
         bones::{FaceBone, FaceBoneKind, Region},
-        expression::MOST_TURN,
     },
     mesh::{influences::keep_strongest, model::Weights},
     modules::control::{ControlModule, ShapeAxes},
@@ -222,7 +221,7 @@ fn limits(bone: &FaceBone) -> ([(f32, f32); 3], [(f32, f32); 3]) {
             Region::Temple => (0.06, 0.08, 0.06, 0.04),
         },
     };
-    ([both(side), (-down, up), both(depth)], [both(MOST_TURN); 3])
+    ([both(side), (-down, up), both(depth)], [both(25.0); 3])
 }
 
 /// The weights of the whole mesh. On a rig with weights the face takes its share from the existing ones.

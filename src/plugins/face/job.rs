@@ -357,7 +357,6 @@ impl JobResult {
             square_error: face.square_error,
             rounds: face.rounds,
             folds: face.folds,
-            mended: face.mended.clone(),
             tolerated_folds: analysis.tolerated_folds(),
             kept: self.kept.len(),
             fit_error: self.fit.as_ref().map(|fit| fit.error),

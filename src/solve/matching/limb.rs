@@ -117,9 +117,6 @@ impl Limb<'_> {
         length: f32,
     ) -> Result<Vec3, MatchError> {
         let [root, mid, end] = [wanted[0], wanted[1], wanted[2]];
-        if solver.pin.as_ref().is_some_and(|pin| number(attempt, pin) > 0.0) {
-            return Ok(mid.translation);
-        }
         let built = |node: Option<Uid>| node.and_then(|node| attempt.built(node)).map(|global| global.translation);
         let far = match (built(self.pole), built(self.joints.get(1).copied())) {
             (Some(pole), Some(mid)) => pole.distance(mid),
@@ -151,8 +148,6 @@ struct Solver {
     is_soft: bool,
     prefer: Vec3,
     twist: Option<Scalar>,
-    /// The middle joint goes to the pole by this share.
-    pin: Option<Scalar>,
 }
 
 impl Solver {
@@ -160,7 +155,7 @@ impl Solver {
         let root_of = joints.first().copied();
         for built in &attempt.rig.constraints {
             match &*built.constraint {
-                Constraint::TwoBone { root, goal, orient_end, soft, prefer, twist, pin, .. }
+                Constraint::TwoBone { root, goal, orient_end, soft, prefer, twist, .. }
                     if Some(*root) == root_of && *goal == goal_of =>
                 {
                     let is_soft = *soft != Scalar::Value(0.0);
@@ -169,17 +164,16 @@ impl Solver {
                         is_soft,
                         prefer: *prefer,
                         twist: Some(twist.clone()),
-                        pin: Some(pin.clone()),
                     };
                 }
                 Constraint::Chain { joints: chain, goal, orient_end, .. } if chain == joints && *goal == goal_of => {
                     let orients = orient_end.is_some();
-                    return Self { orients, is_soft: false, prefer: Vec3::ZERO, twist: None, pin: None };
+                    return Self { orients, is_soft: false, prefer: Vec3::ZERO, twist: None };
                 }
                 _ => {}
             }
         }
-        Self { orients: true, is_soft: false, prefer: Vec3::ZERO, twist: None, pin: None }
+        Self { orients: true, is_soft: false, prefer: Vec3::ZERO, twist: None }
     }
 }
 

@@ -116,7 +116,15 @@ fn exchanged_programs_run_what_differs() {
         node == hand
     };
     let is_below: Vec<bool> = (0..built.nodes.len()).map(below).collect();
-    let finger = (hand + 1..built.nodes.len()).find(|node| is_below[*node]).unwrap();
+    // The base of a node that constraints place moves nothing.
+    let moves = |node: &usize| {
+        let mut changed = built.clone();
+        changed.nodes[*node].base.translation += Vec3::new(0.01, 0.0, 0.0);
+        let mut fresh = RigState::new(Arc::new(RigProgram::compile(&changed, &options).unwrap()));
+        fresh.evaluate(0.0);
+        fresh.global_at(*node) != state.global_at(*node)
+    };
+    let finger = (hand + 1..built.nodes.len()).filter(|node| is_below[*node]).find(moves).unwrap();
     built.nodes[finger].base.translation += Vec3::new(0.01, 0.0, 0.0);
     let program = cache.get(&built, &options).unwrap();
     let carry = Carry::between(state.program(), &program);

@@ -8,9 +8,6 @@ use crate::algo::face::{
     shells::{ShellKind, Shells},
 };
 
-/// Largest deviation of the front of an eyeball from a sphere, as a share of its radius (root of the mean square).
-const ROUND: f32 = 0.15;
-
 /// Adds the bones of jaw and eyes: fixed ones at their places, others if `wanted` and the mesh has them.
 pub(super) fn add(
     points: &[Vec3],
@@ -33,7 +30,11 @@ pub(super) fn add(
     }
     let first = bones.len();
     for (kind, side) in [(ShellKind::LeftEye, Side::Left), (ShellKind::RightEye, Side::Right)] {
-        let ball = || ball_center(&points_of(points, shells, kind)).filter(|_| wanted).map(|center| (center, None));
+        let ball = || {
+            let of = |(i, _): &(usize, &Vec3)| shells.kind(*i) == kind;
+            let ball: Vec<Vec3> = points.iter().enumerate().filter(of).map(|(_, &p)| p).collect();
+            ball_center(&ball).filter(|_| wanted).map(|center| (center, None))
+        };
         if let Some((position, fixed)) = given(FaceBoneKind::Eye, Some(side)).or_else(ball) {
             bones.push(FaceBone { fixed, ..name::extra(position, FaceBoneKind::Eye, side) });
         }
@@ -42,24 +43,6 @@ pub(super) fn add(
         bones[first].pair = Some(first + 1);
         bones[first + 1].pair = Some(first);
     }
-}
-
-/// Points of the shells of a kind.
-fn points_of(points: &[Vec3], shells: &Shells, kind: ShellKind) -> Vec<Vec3> {
-    points.iter().enumerate().filter(|(point, _)| shells.kind(*point) == kind).map(|(_, place)| *place).collect()
-}
-
-/// Centre and radius of the eyeballs that are shells of their own: left, right, as far as they are round in front.
-pub(crate) fn eyeballs(points: &[Vec3], shells: &Shells) -> Vec<(Vec3, f32)> {
-    let of = |kind: ShellKind| {
-        let ball = points_of(points, shells, kind);
-        let center = ball_center(&ball)?;
-        let front: Vec<f32> = ball.iter().filter(|at| at.z > center.z).map(|at| at.distance(center)).collect();
-        let mean = front.iter().sum::<f32>() / front.len().max(1) as f32;
-        let square = front.iter().map(|far| (far - mean) * (far - mean)).sum::<f32>() / front.len().max(1) as f32;
-        (mean > 0.0 && square.sqrt() < ROUND * mean).then_some((center, mean))
-    };
-    [ShellKind::LeftEye, ShellKind::RightEye].into_iter().filter_map(of).collect()
 }
 
 /// Centre of an eyeball: that of the best-fitting sphere, or of its box if no sphere fits nearby.

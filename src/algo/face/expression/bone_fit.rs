@@ -5,31 +5,25 @@
 //! of the skin, in which landmarks count most, with a weak pull towards the mean of the field over each bone's own
 //! patch. With fixed weights the matrix is the same for all expressions and factorised once; as the field is a sum over
 //! units, the movements for each unit are solved once, too, when it is first used, and an expression is their sum.
-//! Bones turn as well as move: a patch of skin that stretches along a jaw or around a lip needs both.
 
 mod moving_skin;
-mod normal_equations;
 mod pose_problem;
-mod region_gains;
 mod samples;
 
 use std::sync::OnceLock;
 
-use glam::{DMat3, DVec3, Quat, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use self::{
     moving_skin::MovingSkin,
-    normal_equations::{Motion, NormalEquations, target},
-    region_gains::RegionGains,
-    samples::{Mark, Sample, influences},
+    samples::{Mark, Sample},
 };
 use super::{
     BonePose, Mix, UnitSet,
     field::{Field, jaw_pivot},
-    limited, limited_turn,
+    limited,
     openings::OpeningLines,
-    turn_of,
 };
 use crate::{
     algo::face::{
@@ -39,10 +33,12 @@ use crate::{
     mesh::model::Weights,
 };
 
-/// Length that a turn of one radian counts as when bones are fitted, in eye distances.
-const TURN: f32 = 0.12;
-/// Distance from an eyeball's centre up to which skin belongs to its lids, in radii.
-const LID: f32 = 1.35;
+/// Weight of the pull towards the mean of the field over a bone's patch, as a share of the patch's weight.
+const HOLD: f64 = 0.02;
+/// Stiffness between bones with common skin.
+const STIFF: f64 = 0.01;
+/// Factor of the field. What bones cannot follow is lost, and makes the rest smaller than the field on average.
+const GAIN: f64 = 1.09;
 /// Largest area of triangles that are ignored, as a share of their longest edge squared.
 pub(super) const SLIVER: f32 = 1e-3;
 /// Shares by which the movements of bones are brought nearer to each other where skin folds, one a round.
@@ -63,64 +59,26 @@ pub struct FittedFace {
     /// The lines of mouth and eyes; `None` for degenerate landmarks, with which nothing moves.
     opening_lines: Option<OpeningLines>,
     samples: Vec<Sample>,
-    equations: NormalEquations,
-    gains: RegionGains,
-    /// Motions of the skin bones for each unit on the left and the right side at full strength, without the jaw.
-    unit_motions: Vec<[OnceLock<Vec<Motion>>; 2]>,
-    jaw: JawMotions,
+    /// The Cholesky factor.
+    factor: Vec<f64>,
+    /// Movements of the skin bones for each unit on the left and the right side at full strength, without the jaw.
+    unit_movements: Vec<[OnceLock<Vec<DVec3>>; 2]>,
+    jaw: JawMovements,
     /// The skin that bones move.
     moving: MovingSkin,
     /// Bones of skin that mirror each other.
     pairs: Vec<[usize; 2]>,
-    eyeballs: Vec<Eyeball>,
-    lids: Vec<LidPoint>,
 }
 
-/// An eyeball that is a mesh of its own, which lids slide over.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Eyeball {
-    /// Centre, in head space.
-    pub center: Vec3,
-    /// Radius, in units of the mesh.
-    pub radius: f32,
-}
-
-/// A point of a lid.
-struct LidPoint {
-    /// Index of the point in the moving skin.
-    point: u32,
-    /// Index of the eyeball.
-    eyeball: usize,
-    /// Distance from the eyeball's centre at rest.
-    rest: f32,
-}
-
-/// Motions of the skin bones that belong to the jaw's, which are linear in the entries of its rotation matrix, a turn
-/// about the x axis, and in its shift.
+/// Movements of the skin bones that belong to the jaw's, which are linear in its rotation matrix and its shift.
 #[derive(Default)]
-struct JawMotions {
-    /// For the rotation of the skin below the mouth: for its cosine less one, and for its sine.
-    skin: [Vec<Motion>; 2],
-    /// For the rotation of the jaw bone, likewise: what it moves need not be moved by others.
-    rotation: [Vec<Motion>; 2],
-    /// For each axis of its shift.
-    shift: [Vec<Motion>; 3],
-}
-
-/// A pose before and while its problems are repaired.
-pub(super) struct SolvedPose {
-    pub poses: Vec<BonePose>,
-    /// Turn of each skin bone, as the axis times the angle; zero for others.
-    pub turns: Vec<Vec3>,
-}
-
-impl SolvedPose {
-    /// Sets the motion of a skin bone, within the limits of bones.
-    fn set(&mut self, bone: usize, shift: Vec3, turn: Vec3, landmarks: &Landmarks) {
-        let turn = limited_turn(turn);
-        self.turns[bone] = turn;
-        self.poses[bone] = BonePose { translation: limited(shift, landmarks), rotation: turn_of(turn) };
-    }
+struct JawMovements {
+    /// For the rotation of the skin below the mouth, less the identity.
+    skin: Vec<DVec3>,
+    /// For the rotation of the jaw bone, less the identity: what it moves need not be moved by others.
+    rotation: Vec<DVec3>,
+    /// For its shift.
+    shift: Vec<f64>,
 }
 
 impl FittedFace {
@@ -146,47 +104,19 @@ impl FittedFace {
             skin: (0..bones.len()).filter(|&bone| bones[bone].kind == FaceBoneKind::Skin).collect(),
             opening_lines: OpeningLines::new(landmarks),
             samples: Vec::new(),
-            equations: NormalEquations::default(),
-            gains: RegionGains::default(),
-            unit_motions: units.units().iter().map(|_| [OnceLock::new(), OnceLock::new()]).collect(),
-            jaw: JawMotions::default(),
+            factor: Vec::new(),
+            unit_movements: units.units().iter().map(|_| [OnceLock::new(), OnceLock::new()]).collect(),
+            jaw: JawMovements::default(),
             moving: MovingSkin::default(),
             pairs: mirrored_pairs(bones, landmarks),
-            eyeballs: Vec::new(),
-            lids: Vec::new(),
         };
         let Some(opening_lines) = face.opening_lines.clone() else { return face };
         let (samples, apart) = samples::gather(points, mask, weights, bones, landmarks, &opening_lines);
         face.samples = samples;
-        let length = f64::from(TURN * landmarks.eye_distance());
-        face.equations = NormalEquations::new(&face.samples, face.skin.len(), length);
-        face.gains = RegionGains::new(&face.samples, bones, &face.skin);
-        face.jaw = face.jaw_motions(&opening_lines);
+        face.factorise();
+        face.jaw = face.jaw_movements(&opening_lines);
         face.moving = MovingSkin::new(points, triangles, weights, bones, &apart);
         face
-    }
-
-    /// The face with eyeballs: lids stay outside of them, or as deep inside as they are at rest.
-    pub fn with_eyeballs(mut self, eyeballs: &[Eyeball]) -> Self {
-        self.eyeballs = eyeballs.to_vec();
-        self.lids.clear();
-        let of_skin = |point: usize| {
-            let bones = influences(&self.moving.weights, point).filter_map(|(joint, weight)| {
-                let bone = self.bones.get((joint as usize).checked_sub(2)?)?;
-                (bone.kind == FaceBoneKind::Skin).then_some(weight)
-            });
-            bones.sum::<f32>() > 0.3
-        };
-        for (number, ball) in eyeballs.iter().enumerate() {
-            for (point, at) in self.moving.points.iter().enumerate() {
-                let rest = at.distance(ball.center);
-                // Skin behind the middle of the ball is the wall of its socket.
-                if rest < LID * ball.radius && at.z > ball.center.z && of_skin(point) {
-                    self.lids.push(LidPoint { point: point as u32, eyeball: number, rest });
-                }
-            }
-        }
-        self
     }
 
     /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of the units that the face was made with.
@@ -196,87 +126,117 @@ impl FittedFace {
     /// apart.
     /// Cost: points that bones move times rounds of repair, and for each unit once samples times moves of the field.
     pub fn pose(&self, mix: &Mix) -> Vec<BonePose> {
-        self.mended_pose(mix).0
-    }
-
-    /// The pose of each bone, as [`FittedFace::pose`] gives it, and the share of the furthest movement that mending folds
-    /// took from it.
-    pub fn mended_pose(&self, mix: &Mix) -> (Vec<BonePose>, f32) {
         let rest = vec![BonePose::REST; self.bones.len()];
-        let Some(opening_lines) = self.opening_lines.as_ref().filter(|_| !mix.is_rest()) else { return (rest, 0.0) };
-        let Some(field) = Field::new(mix, &self.units, &self.bones, &self.landmarks) else { return (rest, 0.0) };
-        let mut solved = self.solve(mix, &field, opening_lines);
-        let taken = self.repair(&mut solved, mix.strengths.iter().all(|[left, right]| left == right));
-        (solved.poses, taken)
+        let Some(opening_lines) = self.opening_lines.as_ref().filter(|_| !mix.is_rest()) else { return rest };
+        let Some(field) = Field::new(mix, &self.units, &self.bones, &self.landmarks) else { return rest };
+        let mut poses = self.solve(mix, &field, opening_lines);
+        self.repair(&mut poses, mix.strengths.iter().all(|[left, right]| left == right));
+        poses
     }
 
-    /// Motions of the skin bones whose skin follows a displacement best; in full size, or as they come out.
-    fn motions(&self, displacement: impl Fn(&Mark) -> DVec3, in_full: bool) -> Vec<Motion> {
-        let targets: Vec<DVec3> = self.samples.iter().map(|sample| target(sample, &displacement)).collect();
-        match in_full {
-            true => self.gains.motions(&self.equations, &self.samples, &targets),
-            false => self.equations.motions(&self.samples, targets.into_iter()),
+    /// Sums the normal equations and factorises them.
+    fn factorise(&mut self) {
+        let size = self.skin.len();
+        let mut matrix = vec![0.0; size * size];
+        let mut patch = vec![0.0; size];
+        for sample in &self.samples {
+            for &(a, weight) in &sample.influences {
+                if sample.minus.is_none() {
+                    patch[a as usize] += sample.counts * weight;
+                }
+                for &(b, other) in &sample.influences {
+                    matrix[a as usize * size + b as usize] += sample.counts * weight * other;
+                }
+            }
         }
+        let floor = 1e-6 / size.max(1) as f64;
+        let common = matrix.clone();
+        for a in 0..size {
+            matrix[a * size + a] += HOLD * patch[a] + floor;
+            for b in (0..size).filter(|&b| b != a) {
+                matrix[a * size + a] += STIFF * common[a * size + b];
+                matrix[a * size + b] -= STIFF * common[a * size + b];
+            }
+        }
+        cholesky(&mut matrix, size);
+        self.factor = matrix;
     }
 
-    fn jaw_motions(&self, opening_lines: &OpeningLines) -> JawMotions {
+    /// Movements of the skin bones whose skin follows a displacement best.
+    fn movements(&self, displacement: impl Fn(&Mark) -> DVec3) -> Vec<DVec3> {
+        let mut right = vec![DVec3::ZERO; self.skin.len()];
+        for sample in &self.samples {
+            let mut target = displacement(&sample.mark);
+            // The mean of the field over a bone's patch is a target, too.
+            let mut counts = sample.counts * (1.0 + HOLD);
+            if let Some(minus) = &sample.minus {
+                target -= displacement(minus);
+                counts = sample.counts;
+            }
+            for &(unknown, weight) in &sample.influences {
+                right[unknown as usize] += counts * weight * target;
+            }
+        }
+        substitute(&self.factor, &mut right);
+        right
+    }
+
+    fn jaw_movements(&self, opening_lines: &OpeningLines) -> JawMovements {
         let pivot = jaw_pivot(&self.bones, &self.landmarks);
-        let share = |mark: &Mark| f64::from(opening_lines.jaw(mark.place, mark.known));
-        // Cosine less one, and sine, of a turn about the x axis.
-        let arms: [fn(DVec3) -> DVec3; 2] = [|arm: DVec3| arm.with_x(0.0), |arm: DVec3| DVec3::new(0.0, -arm.z, arm.y)];
-        let arm = |mark: &Mark| (mark.place - pivot).as_dvec3();
-        JawMotions {
-            skin: arms.map(|of| self.motions(|mark| of(arm(mark)) * share(mark), true)),
-            rotation: arms.map(|of| self.motions(|mark| of(arm(mark)) * -mark.jaw, false)),
-            shift: DVec3::AXES.map(|axis| self.motions(|mark| axis * -mark.jaw, false)),
+        let share = |mark: &Mark| f64::from(opening_lines.jaw(mark.place, mark.known)) * GAIN;
+        JawMovements {
+            skin: self.movements(|mark| (mark.place - pivot).as_dvec3() * share(mark)),
+            rotation: self.movements(|mark| (pivot - mark.place).as_dvec3() * mark.jaw),
+            shift: self.movements(|mark| DVec3::splat(-mark.jaw)).into_iter().map(|movement| movement.x).collect(),
         }
     }
 
-    /// The motions for one unit on one side, without the jaw; solved when they are first asked for.
-    fn unit_motions(&self, unit: usize, side: usize, opening_lines: &OpeningLines) -> &[Motion] {
-        self.unit_motions[unit][side].get_or_init(|| {
+    /// The movements for one unit on one side, without the jaw; solved when they are first asked for.
+    fn unit_movements(&self, unit: usize, side: usize, opening_lines: &OpeningLines) -> &[DVec3] {
+        self.unit_movements[unit][side].get_or_init(|| {
             let field = Field::of_unit(&self.units.units()[unit], side, opening_lines, &self.landmarks);
-            self.motions(|mark| field.at(mark.place, mark.known).as_dvec3(), true)
+            self.movements(|mark| field.at(mark.place, mark.known).as_dvec3() * GAIN)
         })
     }
 
-    /// The pose that follows a mix best, before folds are repaired.
-    fn solve(&self, mix: &Mix, field: &Field, opening_lines: &OpeningLines) -> SolvedPose {
-        let poses: Vec<BonePose> = self.bones.iter().map(|bone| field.turn(bone)).collect();
-        let sides = self.unit_motions.iter().zip(&mix.strengths).enumerate().flat_map(|(unit, (known, strengths))| {
-            [0, 1].map(|side| (unit, side, f64::from(strengths[side]), known[side].get().is_some()))
-        });
+    /// The poses that follow a mix best, before folds are repaired.
+    fn solve(&self, mix: &Mix, field: &Field, opening_lines: &OpeningLines) -> Vec<BonePose> {
+        let mut poses: Vec<BonePose> = self.bones.iter().map(|bone| field.turn(bone)).collect();
+        let sides =
+            self.unit_movements.iter().zip(&mix.strengths).enumerate().flat_map(|(unit, (known, strengths))| {
+                [0, 1].map(|side| (unit, side, f64::from(strengths[side]), known[side].get().is_some()))
+            });
         let used: Vec<(usize, usize, f64, bool)> = sides.filter(|(_, _, strength, _)| *strength > 0.0).collect();
         let new: Vec<_> = used.iter().filter(|(.., is_known)| !is_known).collect();
         new.par_iter().for_each(|(unit, side, ..)| {
-            self.unit_motions(*unit, *side, opening_lines);
+            self.unit_movements(*unit, *side, opening_lines);
         });
-        let mut motions = vec![Motion::default(); self.skin.len()];
-        let mut add = |share: f64, more: &[Motion]| {
-            for (sum, motion) in motions.iter_mut().zip(more) {
-                sum.add(motion, share);
+        let mut movements = vec![DVec3::ZERO; self.skin.len()];
+        for (unit, side, strength, _) in used {
+            for (sum, movement) in movements.iter_mut().zip(self.unit_movements(unit, side, opening_lines)) {
+                *sum += *movement * strength;
+            }
+        }
+        let turned = |rotation: glam::Quat, sum: &mut [DVec3], arms: &[DVec3]| {
+            let less = DMat3::from_quat(rotation.as_dquat()) - DMat3::IDENTITY;
+            for (sum, arm) in sum.iter_mut().zip(arms) {
+                *sum += less * *arm;
             }
         };
-        for (unit, side, strength, _) in used {
-            add(strength, self.unit_motions(unit, side, opening_lines));
-        }
-        let entries = |rotation: Quat| {
-            let matrix = DMat3::from_quat(rotation.as_dquat());
-            [matrix.y_axis.y - 1.0, matrix.y_axis.z]
-        };
         if let Some(rotation) = field.skin_jaw() {
-            entries(rotation).into_iter().zip(&self.jaw.skin).for_each(|(share, motions)| add(share, motions));
+            turned(rotation, &mut movements, &self.jaw.skin);
         }
         if let Some(jaw) = self.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw) {
-            let turned = entries(poses[jaw].rotation).into_iter().zip(&self.jaw.rotation);
-            let shift = poses[jaw].translation.as_dvec3().to_array();
-            turned.chain(shift.into_iter().zip(&self.jaw.shift)).for_each(|(share, motions)| add(share, motions));
+            turned(poses[jaw].rotation, &mut movements, &self.jaw.rotation);
+            let shift = poses[jaw].translation.as_dvec3();
+            for (sum, share) in movements.iter_mut().zip(&self.jaw.shift) {
+                *sum += shift * *share;
+            }
         }
-        let mut solved = SolvedPose { turns: vec![Vec3::ZERO; poses.len()], poses };
-        for (&bone, motion) in self.skin.iter().zip(&motions) {
-            solved.set(bone, motion.shift.as_vec3(), motion.turn.as_vec3(), &self.landmarks);
+        for (&bone, movement) in self.skin.iter().zip(movements) {
+            poses[bone].translation = limited(movement.as_vec3(), &self.landmarks);
         }
-        solved
+        poses
     }
 }
 
@@ -292,4 +252,40 @@ fn mirrored_pairs(bones: &[FaceBone], landmarks: &Landmarks) -> Vec<[usize; 2]> 
     let partners: Vec<Option<usize>> = (0..bones.len()).map(partner).collect();
     let mutual = |bone: usize| partners[bone].filter(|other| *other > bone && partners[*other] == Some(bone));
     (0..bones.len()).filter_map(|bone| Some([bone, mutual(bone)?])).collect()
+}
+
+/// Factorises a symmetric positive matrix in place, L in the lower triangle. A pivot lost to rounding becomes 1.
+fn cholesky(matrix: &mut [f64], size: usize) {
+    for row in 0..size {
+        for column in 0..=row {
+            let mut sum = matrix[row * size + column];
+            for k in 0..column {
+                sum -= matrix[row * size + k] * matrix[column * size + k];
+            }
+            matrix[row * size + column] = if row == column {
+                if sum > 0.0 { sum.sqrt() } else { 1.0 }
+            } else {
+                sum / matrix[column * size + column]
+            };
+        }
+    }
+}
+
+/// Solves for a right-hand side of vectors, in place.
+fn substitute(factor: &[f64], right: &mut [DVec3]) {
+    let size = right.len();
+    for row in 0..size {
+        let mut sum = right[row];
+        for k in 0..row {
+            sum -= right[k] * factor[row * size + k];
+        }
+        right[row] = sum / factor[row * size + row];
+    }
+    for row in (0..size).rev() {
+        let mut sum = right[row];
+        for k in row + 1..size {
+            sum -= right[k] * factor[k * size + row];
+        }
+        right[row] = sum / factor[row * size + row];
+    }
 }

@@ -26,20 +26,11 @@ const INFLUENCES: usize = 8;
 
 type Influences = Vec<(u32, f32)>;
 
-/// Result of [`repair_folds`].
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct FoldRepair {
-    /// Number of triangles that are still folded, summed over the six expressions.
-    pub folds: usize,
-    /// Share of the furthest movement that mending the pose took from each of the six, by name.
-    pub mended: Vec<(String, f32)>,
-}
-
 /// Averages weights where one of the six expressions at full strength turns a triangle by more than a right angle.
 ///
 /// All in head space; `mask` and `weights` as [`FittedFace::new`] takes them. Points at the same place keep the same
 /// weights. Bones move otherwise with other weights, so that each pass poses anew, and the weights with the fewest folds
-/// are kept. Returns the folds that are left after [`FittedFace::pose`] has repaired the poses, and what that took.
+/// are kept. Returns the folds that are left, summed over the six, after [`FittedFace::pose`] has repaired the poses.
 /// Cost: a few poses of every expression.
 pub fn repair_folds(
     set: &ExpressionSet,
@@ -49,30 +40,29 @@ pub fn repair_folds(
     weights: &mut Weights,
     bones: &[FaceBone],
     landmarks: &Landmarks,
-) -> FoldRepair {
+) -> usize {
     if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
-        return FoldRepair::default();
+        return 0;
     }
     let six: Vec<&Expression> = set.six().collect();
     let with_area = with_area(points, triangles);
     let mut neighbourhood: Option<Neighbourhood> = None;
-    let mut best: Option<(FoldRepair, Weights)> = None;
+    let mut best: Option<(usize, Weights)> = None;
     let mirror = Mirror::new(points, bones, landmarks);
     for pass in 0..=PASSES {
         let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set());
-        let posed = |expression: &&Expression| -> (Vec<Affine3A>, f32) {
-            let (posed, taken) = face.mended_pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
+        let matrices = |expression: &&Expression| -> Vec<Affine3A> {
+            let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
             let moved = posed.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
-            ([Affine3A::IDENTITY; 2].into_iter().chain(moved).collect(), taken)
+            [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
         };
-        let (poses, taken): (Vec<Vec<Affine3A>>, Vec<f32>) = six.par_iter().map(posed).unzip();
+        let poses: Vec<Vec<Affine3A>> = six.par_iter().map(matrices).collect();
         let (sum, folded) = all_folded(points, triangles, &with_area, weights, &poses);
         // A pass that helped nothing is the last.
-        if best.as_ref().is_some_and(|(least, _)| sum >= least.folds) {
+        if best.as_ref().is_some_and(|(least, _)| sum >= *least) {
             break;
         }
-        let mended = six.iter().zip(taken).map(|(expression, taken)| (expression.name.clone(), taken)).collect();
-        best = Some((FoldRepair { folds: sum, mended }, weights.clone()));
+        best = Some((sum, weights.clone()));
         if sum == 0 || pass == PASSES {
             break;
         }
@@ -84,7 +74,7 @@ pub fn repair_folds(
             mirror.apply(weights);
         }
     }
-    let Some((left, best)) = best else { return FoldRepair::default() };
+    let Some((left, best)) = best else { return 0 };
     *weights = best;
     left
 }

@@ -1,7 +1,7 @@
 //! Openings of mouth and eyes: the assignment of skin to lips and lids, and its share in the jaw's movement.
 //!
 //! The line of a mouth or an eye is drawn through the middle of its inner landmarks. Between the corners it divides the
-//! skin sharply, at the corners and beyond them the two sides blend.
+//! skin sharply, beyond them the two sides blend.
 
 use glam::Vec3;
 
@@ -10,9 +10,6 @@ use crate::algo::face::landmarks::Landmarks;
 
 /// Half the height, in eye distances, in which the skin of a closed mouth goes over from the upper to the lower lip.
 const CLOSED_BLEND: f32 = 0.12;
-
-/// Distance before a corner of mouth or eye, in eye distances, from which the two sides blend.
-const CORNER: f32 = 0.08;
 
 /// Known lip and lid of a point: touching lips cannot be told apart by position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -136,7 +133,7 @@ impl OpeningLines {
             Some(upper) => f32::from(u8::from(upper)),
             None => {
                 let place = line.place(point * self.scale);
-                ramp(place.above / (0.015 + 0.4 * (place.beyond + CORNER).max(0.0)))
+                ramp(place.above / (0.015 + 0.4 * place.beyond.max(0.0)))
             }
         }
     }

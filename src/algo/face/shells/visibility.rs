@@ -7,23 +7,10 @@ use super::Island;
 /// Cells along each side of the pictures.
 const CELLS: usize = 72;
 
-/// Largest distance of a cover from the skin behind it, in cells.
-const CLOSE: f32 = 8.0;
-
-/// Sight of a shell from outside.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sight {
-    /// Visible share, relative to the shell without the others.
-    pub seen: f32,
-    /// Share of the visible part behind which the skin lies close.
-    pub covers: f32,
-}
-
-/// Sight of each shell from the six sides along the axes; `main` is the shell of the skin.
+/// Visible share of each shell from the six sides along the axes, relative to the shell without the others.
 ///
-/// Each triangle is drawn into three pictures, each of which keeps the nearest shell from either side, and the skin
-/// nearest to either side.
-pub fn sights(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands: &[Island], main: u32) -> Vec<Sight> {
+/// Each triangle is drawn into three pictures, each of which keeps the nearest shell from either side.
+pub fn shares(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands: &[Island]) -> Vec<f32> {
     let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
     for island in islands.iter().filter(|island| island.area > 0.0) {
         low = low.min(island.low);
@@ -32,9 +19,8 @@ pub fn sights(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands
     let size = (high - low).max_element();
     let mut shown = vec![0_u32; islands.len()];
     let mut alone = vec![0_u32; islands.len()];
-    let mut covering = vec![0_u32; islands.len()];
     if size <= 0.0 || !size.is_finite() {
-        return vec![Sight { seen: 1.0, covers: 0.0 }; islands.len()];
+        return vec![1.0; islands.len()];
     }
     // Shells are drawn one by one, so that one stamp a cell records whether a shell has drawn there.
     let mut order: Vec<u32> = (0..triangles.len() as u32)
@@ -44,7 +30,7 @@ pub fn sights(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands
     order.sort_by_key(shell);
     let scale = (CELLS - 1) as f32 / size;
     for axis in 0..3 {
-        let mut picture = Picture::new(main);
+        let mut picture = Picture::new();
         for index in &order {
             let corners = triangles[*index as usize].map(|corner| {
                 let [x, y, z] = ((points[corner as usize] - low) * scale).to_array();
@@ -56,41 +42,31 @@ pub fn sights(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands
             });
             picture.draw(corners, shell(index), &mut alone);
         }
-        for ((near, far), [skin_near, skin_far]) in picture.near.iter().zip(&picture.far).zip(&picture.skin) {
-            for ((depth, owner), skin) in [(near, skin_near), (far, skin_far)] {
-                if let Some(count) = shown.get_mut(*owner as usize) {
+        for (near, far) in picture.near.iter().zip(&picture.far) {
+            for owner in [near.1, far.1] {
+                if let Some(count) = shown.get_mut(owner as usize) {
                     *count += 1;
-                    covering[*owner as usize] += u32::from((depth - skin).abs() < CLOSE);
                 }
             }
         }
     }
-    let sight = |shell: usize| Sight {
-        // A shell alone would show every cell it covers, from both sides.
-        seen: shown[shell] as f32 / (2 * alone[shell]).max(1) as f32,
-        covers: covering[shell] as f32 / shown[shell].max(1) as f32,
-    };
-    (0..islands.len()).map(sight).collect()
+    // A shell alone would show every cell it covers, from both sides.
+    shown.iter().zip(&alone).map(|(shown, alone)| *shown as f32 / (2 * *alone).max(1) as f32).collect()
 }
 
 struct Picture {
     near: Vec<(f32, u32)>,
     far: Vec<(f32, u32)>,
     stamp: Vec<u32>,
-    /// Number of the shell of the skin, and the least and the greatest depth of the skin in each cell.
-    main: u32,
-    skin: Vec<[f32; 2]>,
 }
 
 impl Picture {
-    fn new(main: u32) -> Self {
+    fn new() -> Self {
         let cells = CELLS * CELLS;
         Self {
             near: vec![(f32::MAX, u32::MAX); cells],
             far: vec![(f32::MIN, u32::MAX); cells],
             stamp: vec![u32::MAX; cells],
-            main,
-            skin: vec![[f32::MAX, f32::MIN]; cells],
         }
     }
 
@@ -124,10 +100,6 @@ impl Picture {
         if self.stamp[cell] != shell {
             self.stamp[cell] = shell;
             alone[shell as usize] += 1;
-        }
-        if shell == self.main {
-            let [near, far] = &mut self.skin[cell];
-            (*near, *far) = (f32::min(*near, depth), f32::max(*far, depth));
         }
         if depth < self.near[cell].0 {
             self.near[cell] = (depth, shell);

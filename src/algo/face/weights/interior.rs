@@ -1,4 +1,4 @@
-//! Weights of parts other than skin: eyeballs, teeth, tongue, lashes, hair.
+//! Weights of parts other than skin: eyeballs, teeth, tongue, lashes.
 
 use std::collections::BTreeMap;
 
@@ -9,21 +9,14 @@ use super::{
 };
 use crate::algo::face::{bones::map::line_distance, shells::ShellKind};
 
-/// Distance from the skin up to which a cover lies on it, as a share of the face's scale.
-const WORN: f32 = 0.06;
-/// Least share of a cover's vertices that lie on the skin of the face, for a brow or a beard.
-const ON_FACE: f32 = 0.8;
-
 /// Fills the rows of vertices that are not skin, shell by shell.
 pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind], rows: &mut [Row]) {
     let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    let mut covers: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for v in 0..face.places.len() {
         match kinds[v] {
             ShellKind::Skin => {}
             ShellKind::LeftEye => rows[v] = vec![(face.eyes[0], 1.0)],
             ShellKind::RightEye => rows[v] = vec![(face.eyes[1], 1.0)],
-            ShellKind::Cover => covers.entry(shell[v]).or_default().push(v),
             ShellKind::Inside => members.entry(shell[v]).or_default().push(v),
         }
     }
@@ -31,77 +24,11 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
         if in_mouth(face, members) {
             mouth(face, members, rows);
         } else if !lashes(face, sides, members, rows) {
-            stiff(face, members, rows);
+            for &v in members {
+                let neck = face.neck_share(face.places[v]);
+                rows[v] = vec![(HEAD, 1.0 - neck), (NECK, neck)];
+            }
         }
-    }
-    if covers.is_empty() {
-        return;
-    }
-    let skin = SkinGrid::new(face);
-    for members in covers.values() {
-        if !lashes(face, sides, members, rows) && !worn(face, &skin, members, rows) {
-            stiff(face, members, rows);
-        }
-    }
-}
-
-/// Fills the rows of vertices that follow the head, and below it the neck.
-fn stiff(face: &Face, members: &[usize], rows: &mut [Row]) {
-    for &v in members {
-        let neck = face.neck_share(face.places[v]);
-        rows[v] = vec![(HEAD, 1.0 - neck), (NECK, neck)];
-    }
-}
-
-/// Fills the rows of a brow or a beard, nearly all of which lies on the skin of the face, with those of the nearest
-/// skin; returns `false` for hair.
-fn worn(face: &Face, skin: &SkinGrid, members: &[usize], rows: &mut [Row]) -> bool {
-    if !face.map.trusted {
-        return false;
-    }
-    let nearest: Vec<Option<usize>> = members.iter().map(|&v| skin.nearest(face, face.places[v])).collect();
-    let on_face = nearest.iter().flatten().filter(|&&s| face.mask[s]).count();
-    if (on_face as f32) < ON_FACE * members.len() as f32 {
-        return false;
-    }
-    for (&v, nearest) in members.iter().zip(nearest) {
-        match nearest {
-            Some(s) => rows[v] = rows[s].clone(),
-            None => stiff(face, &[v], rows),
-        }
-    }
-    true
-}
-
-/// Vertices of the skin in cells as wide as a cover may be away from it.
-struct SkinGrid {
-    cell: f32,
-    vertices: BTreeMap<[i32; 3], Vec<usize>>,
-}
-
-impl SkinGrid {
-    fn new(face: &Face) -> Self {
-        let cell = (WORN * face.map.scale).max(f32::MIN_POSITIVE);
-        let mut grid = Self { cell, vertices: BTreeMap::new() };
-        for v in (0..face.places.len()).filter(|&v| face.skin[v]) {
-            grid.vertices.entry(grid.cell_of(face.places[v])).or_default().push(v);
-        }
-        grid
-    }
-
-    fn cell_of(&self, place: glam::Vec3) -> [i32; 3] {
-        (place / self.cell).floor().as_ivec3().to_array()
-    }
-
-    /// The nearest vertex of the skin, if it is not farther than a cell is wide.
-    fn nearest(&self, face: &Face, place: glam::Vec3) -> Option<usize> {
-        let [x, y, z] = self.cell_of(place);
-        let around = |at: i32| (-1..=1).map(move |step| at.saturating_add(step));
-        let cells = around(x).flat_map(|x| around(y).flat_map(move |y| around(z).map(move |z| [x, y, z])));
-        let near = cells.filter_map(|cell| self.vertices.get(&cell)).flatten().copied();
-        let far = |v: usize| face.places[v].distance_squared(place);
-        let nearest = near.min_by(|&a, &b| far(a).total_cmp(&far(b)).then(a.cmp(&b)));
-        nearest.filter(|&v| far(v) <= self.cell * self.cell)
     }
 }
 

@@ -111,7 +111,6 @@ fn tone(kind: ShellKind) -> [f32; 3] {
     match kind {
         ShellKind::Skin => [226.0, 190.0, 170.0],
         ShellKind::LeftEye | ShellKind::RightEye => [240.0, 240.0, 240.0],
-        ShellKind::Cover => [120.0, 95.0, 80.0],
         ShellKind::Inside => [190.0, 150.0, 145.0],
     }
 }

@@ -1,52 +1,39 @@
-//! Problems of a pose, folded skin, crossed lips or lids and lids inside eyeballs, and their repair.
+//! Problems of a pose, folded skin and crossed lips or lids, and their repair.
 
 use glam::{Affine3A, Vec3};
 
-use super::{FittedFace, PATIENCE, ROUNDS, SolvedPose, TAKEN, TURN, moving_skin::PosedSkin, samples::influences};
-use crate::algo::face::bones::FaceBoneKind;
-
-/// Share of an eyeball's radius by which a lid stays outside of it.
-const CLEAR: f32 = 1.01;
-/// Passes over the shortfalls of a pose; each corrects what the others before it left.
-const PASSES: usize = 3;
-
-/// A distance that a pose falls short of, along a direction.
-struct Shortfall {
-    /// Points of which the first should be further in the direction, and the second less far; with their signs.
-    points: [(u32, f32); 2],
-    /// Unit length.
-    direction: Vec3,
-    missing: f32,
-}
+use super::{FittedFace, PATIENCE, ROUNDS, TAKEN, moving_skin::PosedSkin, samples::influences};
+use crate::algo::face::{
+    bones::FaceBoneKind,
+    expression::{BonePose, limited},
+};
 
 /// Problems of a pose.
 #[derive(Default)]
 struct PoseProblems {
     /// Corners of the triangles that flip.
     folded: Vec<[u32; 3]>,
-    /// Lips and lids that cross, and lids that sink into an eyeball.
-    shortfalls: Vec<Shortfall>,
+    /// Points of lips and lids of which the first should be above the second, and the missing distance.
+    crossed: Vec<([u32; 2], f32)>,
 }
 
 impl PoseProblems {
     fn count(&self) -> usize {
-        self.folded.len() + self.shortfalls.len()
+        self.folded.len() + self.crossed.len()
     }
 }
 
 impl FittedFace {
-    /// Repairs a pose as far as it may; alike on both sides if `is_alike`. Returns the share of the furthest movement
-    /// that the repair of folds took.
-    pub(super) fn repair(&self, pose: &mut SolvedPose, is_alike: bool) -> f32 {
-        let furthest = pose.poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
-        let solved: Vec<[Vec3; 2]> = self.motions_of(pose);
-        let mut apart = vec![Vec3::ZERO; solved.len()];
+    /// Repairs a pose as far as it may; alike on both sides if `is_alike`.
+    pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) {
+        let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
+        let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
+        let mut apart = vec![0.0; poses.len()];
         if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
-            return 0.0;
+            return;
         }
-        let length = (TURN * self.landmarks.eye_distance()).max(f32::MIN_POSITIVE);
-        let mut posed = PosedSkin::new(&self.moving, self.matrices(pose));
-        let (mut fewest, mut in_vain, mut taken) = (usize::MAX, 0, 0.0);
+        let mut posed = PosedSkin::new(&self.moving, self.matrices(poses));
+        let (mut fewest, mut in_vain) = (usize::MAX, 0);
         for share in ROUNDS {
             let problems = self.problems(&posed);
             in_vain = if problems.count() < fewest { 0 } else { in_vain + 1 };
@@ -54,135 +41,109 @@ impl FittedFace {
             if problems.count() == 0 || in_vain == PATIENCE {
                 break;
             }
-            self.relax(pose, &problems.folded, share);
-            let mut changes: Vec<[Vec3; 2]> = (self.motions_of(pose).iter().zip(&solved).zip(&apart))
-                .map(|(([shift, turn], [solved_shift, solved_turn]), apart)| {
-                    [*shift - *solved_shift - *apart, *turn - *solved_turn]
-                })
+            self.relax(poses, &problems.folded, share);
+            self.part(poses, &problems.crossed, &mut apart);
+            let mut changes: Vec<Vec3> = (poses.iter().zip(&solved).zip(&apart))
+                .map(|((pose, solved), apart)| pose.translation - *solved - Vec3::Y * *apart)
                 .collect();
-            self.part(&problems.shortfalls, &mut apart);
             if is_alike {
-                self.even_out(&mut changes, &mut apart);
+                self.even_out(&mut changes);
             }
-            taken = 0.0;
-            for (bone, ([shift, turn], [change, turned])) in solved.iter().zip(changes).enumerate() {
-                if self.bones[bone].kind != FaceBoneKind::Skin {
-                    continue;
-                }
+            for (((pose, solved), apart), change) in poses.iter_mut().zip(&solved).zip(&apart).zip(changes) {
                 let change = change.clamp_length_max(TAKEN * furthest);
-                let turned = turned.clamp_length_max(TAKEN * furthest / length);
-                taken = f32::max(taken, change.length());
-                pose.set(bone, *shift + change + apart[bone], *turn + turned, &self.landmarks);
+                pose.translation = limited(*solved + change + Vec3::Y * *apart, &self.landmarks);
             }
-            posed.update(self.matrices(pose));
+            posed.update(self.matrices(poses));
         }
-        if furthest > 0.0 { taken / furthest } else { 0.0 }
-    }
-
-    /// Movement and turn of each bone.
-    fn motions_of(&self, pose: &SolvedPose) -> Vec<[Vec3; 2]> {
-        pose.poses.iter().zip(&pose.turns).map(|(pose, turn)| [pose.translation, *turn]).collect()
     }
 
     /// Matrices of neck, head and each bone.
-    fn matrices(&self, pose: &SolvedPose) -> Vec<Affine3A> {
-        let moved = pose.poses.iter().zip(&self.bones).map(|(pose, bone)| pose.affine(bone.position));
+    fn matrices(&self, poses: &[BonePose]) -> Vec<Affine3A> {
+        let moved = poses.iter().zip(&self.bones).map(|(pose, bone)| pose.affine(bone.position));
         [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
     }
 
-    /// Gives both bones of each pair the mean of their changes, and bones in the middle no change to a side.
-    fn even_out(&self, changes: &mut [[Vec3; 2]], apart: &mut [Vec3]) {
-        let over = |v: Vec3| v.with_x(-v.x);
-        // A turn mirrors as an axial vector.
-        let turned_over = |v: Vec3| Vec3::new(v.x, -v.y, -v.z);
+    /// Gives both bones of each pair the mean of their changes.
+    fn even_out(&self, changes: &mut [Vec3]) {
         for &[one, other] in &self.pairs {
-            let mean = 0.5 * (changes[one][0] + over(changes[other][0]));
-            let turn = 0.5 * (changes[one][1] + turned_over(changes[other][1]));
-            (changes[one], changes[other]) = ([mean, turn], [over(mean), turned_over(turn)]);
-            let mean = 0.5 * (apart[one] + over(apart[other]));
-            (apart[one], apart[other]) = (mean, over(mean));
+            let over = |v: Vec3| v.with_x(-v.x);
+            let mean = 0.5 * (changes[one] + over(changes[other]));
+            (changes[one], changes[other]) = (mean, over(mean));
         }
     }
 
-    /// Finds triangles that turn by more than a right angle, lips and lids that cross, and lids in eyeballs.
+    /// Finds triangles that turn by more than a right angle, and lips and lids that cross.
     fn problems(&self, posed: &PosedSkin) -> PoseProblems {
         let slack = 0.002 * self.landmarks.eye_distance();
-        let mut shortfalls = Vec::new();
+        let mut crossed = Vec::new();
         for &[above, below] in &self.moving.apart {
             let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
             let rest = gap(&self.moving.points);
             // Lips that touch at rest may keep touching.
             let least = if rest > slack { 0.3 * rest } else { rest - slack };
-            let missing = least - gap(&posed.points);
-            if missing > 0.0 {
-                shortfalls.push(Shortfall { points: [(above, 1.0), (below, -1.0)], direction: Vec3::Y, missing });
+            let now = gap(&posed.points);
+            if now < least {
+                crossed.push(([above, below], least - now));
             }
         }
-        for lid in &self.lids {
-            let ball = &self.eyeballs[lid.eyeball];
-            let out = posed.points[lid.point as usize] - ball.center;
-            let distance = out.length();
-            let missing = lid.rest.min(CLEAR * ball.radius) - distance;
-            if missing > 0.1 * slack && distance > 0.0 {
-                let points = [(lid.point, 1.0), (lid.point, 0.0)];
-                shortfalls.push(Shortfall { points, direction: out / distance, missing });
-            }
-        }
-        PoseProblems { folded: posed.folded().collect(), shortfalls }
+        PoseProblems { folded: posed.folded().collect(), crossed }
     }
 
-    /// Moves points by the distances that they fall short of, with the least movement of bones, which is added to
-    /// `apart`.
-    fn part(&self, shortfalls: &[Shortfall], apart: &mut [Vec3]) {
-        let rows: Vec<(&Shortfall, Vec<(usize, f32)>, f32)> = shortfalls
-            .iter()
-            .map(|shortfall| {
-                let mut shares: Vec<(usize, f32)> = Vec::new();
-                for (point, sign) in shortfall.points.into_iter().filter(|(_, sign)| *sign != 0.0) {
-                    for (joint, weight) in influences(&self.moving.weights, point as usize) {
-                        let bone = (joint as usize).checked_sub(2).filter(|bone| *bone < self.bones.len());
-                        let Some(bone) = bone.filter(|bone| self.bones[*bone].kind == FaceBoneKind::Skin) else {
-                            continue;
-                        };
-                        match shares.iter_mut().find(|(known, _)| *known == bone) {
-                            Some((_, share)) => *share += sign * weight,
-                            None => shares.push((bone, sign * weight)),
-                        }
+    /// Raises the first of two points above the second by the missing distance, with the least movement of bones, which
+    /// is added to `apart`.
+    fn part(&self, poses: &mut [BonePose], crossed: &[([u32; 2], f32)], apart: &mut [f32]) {
+        let mut more = vec![0.0_f32; poses.len()];
+        for &([above, below], missing) in crossed {
+            let mut shares = vec![0.0_f32; poses.len()];
+            for (point, sign) in [(above, 1.0), (below, -1.0)] {
+                for (joint, weight) in influences(&self.moving.weights, point as usize) {
+                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < shares.len()) else {
+                        continue;
+                    };
+                    if self.bones[bone].kind == FaceBoneKind::Skin {
+                        shares[bone] += sign * weight;
                     }
                 }
-                let square = shares.iter().map(|(_, share)| share * share).sum::<f32>();
-                (shortfall, shares, square)
-            })
+            }
+            let square: f32 = shares.iter().map(|share| share * share).sum();
             // Points with equal influences cannot be moved apart.
-            .filter(|(.., square)| *square >= 0.01)
-            .collect();
-        let before = apart.to_vec();
-        for _ in 0..PASSES {
-            for (shortfall, shares, square) in &rows {
-                // Neighbours ask for about the same movement, which counts once.
-                let moved: Vec3 = shares.iter().map(|(bone, share)| (apart[*bone] - before[*bone]) * *share).sum();
-                let missing = shortfall.missing - moved.dot(shortfall.direction);
-                if missing > 0.0 {
-                    for (bone, share) in shares {
-                        apart[*bone] += shortfall.direction * (missing * share / square);
-                    }
+            if square < 0.01 {
+                continue;
+            }
+            for (more, share) in more.iter_mut().zip(shares) {
+                let asked = missing * share / square;
+                // Neighbouring pairs ask for about the same movement, which counts once.
+                if asked.abs() > more.abs() {
+                    *more = asked;
                 }
             }
         }
+        for ((pose, apart), more) in poses.iter_mut().zip(apart).zip(more) {
+            pose.translation.y += more;
+            *apart += more;
+        }
     }
 
-    /// Brings the motions of the bones at some corners nearer to each other, by the share `part`.
-    fn relax(&self, pose: &mut SolvedPose, folded: &[[u32; 3]], part: f32) {
-        let matrices = self.matrices(pose);
+    /// Brings the movements of the bones at some corners nearer to each other, by the share `part`.
+    fn relax(&self, poses: &mut [BonePose], folded: &[[u32; 3]], part: f32) {
+        let jaw = self.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw);
+        let jaw = jaw.map(|bone| (bone, poses[bone].affine(self.bones[bone].position)));
         let mut alike = vec![(Vec3::ZERO, 0.0_f32); self.bones.len()];
         for &corners in folded {
             let mut mean = Vec3::ZERO;
             for corner in corners {
-                let point = self.moving.points[corner as usize];
                 for (joint, weight) in influences(&self.moving.weights, corner as usize) {
-                    if let Some(matrix) = matrices.get(joint as usize).filter(|_| joint >= 2) {
-                        mean += weight / 3.0 * (matrix.transform_point3(point) - point);
-                    }
+                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < poses.len()) else {
+                        continue;
+                    };
+                    mean += weight / 3.0
+                        * match jaw {
+                            Some((jaw, turn)) if jaw == bone => {
+                                let point = self.moving.points[corner as usize];
+                                turn.transform_point3(point) - point
+                            }
+                            _ => poses[bone].translation,
+                        };
                 }
             }
             for corner in corners {
@@ -195,12 +156,9 @@ impl FittedFace {
                 }
             }
         }
-        for (bone, (sum, weights)) in alike.into_iter().enumerate() {
-            if self.bones[bone].kind == FaceBoneKind::Skin && weights > 0.0 {
-                let share = (part * weights.min(1.0)).min(1.0);
-                let (shift, turn) = (pose.poses[bone].translation, pose.turns[bone]);
-                let shift = shift + (sum / weights - shift) * share;
-                pose.set(bone, shift, turn * (1.0 - share), &self.landmarks);
+        for ((pose, bone), (sum, weights)) in poses.iter_mut().zip(&self.bones).zip(alike) {
+            if bone.kind == FaceBoneKind::Skin && weights > 0.0 {
+                pose.translation += (sum / weights - pose.translation) * (part * weights.min(1.0)).min(1.0);
             }
         }
     }

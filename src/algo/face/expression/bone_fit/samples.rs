@@ -1,6 +1,6 @@
 //! Samples of the skin that should follow the field.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use crate::{
     algo::face::{
@@ -41,18 +41,8 @@ pub(super) struct Sample {
     /// The other end of a pair whose difference counts.
     pub minus: Option<Mark>,
     pub counts: f64,
-    /// Skin bones that move the point.
-    pub influences: Vec<Influence>,
-}
-
-/// A skin bone that moves a sample.
-#[derive(Clone, Copy)]
-pub(super) struct Influence {
-    /// Number of the bone among the skin bones.
-    pub unknown: u32,
-    pub weight: f64,
-    /// Way from the bone to the point, times the weight.
-    pub arm: DVec3,
+    /// Numbers of skin bones among the skin bones, and their weights.
+    pub influences: Vec<(u32, f64)>,
 }
 
 /// A face whose skin is sampled.
@@ -121,13 +111,10 @@ pub(super) fn gather(
         let minus = Mark { known: OpeningSide::of_landmark(b), ..other.mark.clone() };
         let mut pair = Sample { counts: PAIR, minus: Some(minus), ..one.clone() };
         pair.mark.known = OpeningSide::of_landmark(a);
-        for &Influence { unknown, weight, arm } in &other.influences {
-            match pair.influences.iter_mut().find(|known| known.unknown == unknown) {
-                Some(known) => {
-                    known.weight -= weight;
-                    known.arm -= arm;
-                }
-                None => pair.influences.push(Influence { unknown, weight: -weight, arm: -arm }),
+        for &(unknown, weight) in &other.influences {
+            match pair.influences.iter_mut().find(|(known, _)| *known == unknown) {
+                Some((_, known)) => *known -= weight,
+                None => pair.influences.push((unknown, -weight)),
             }
         }
         samples.push(pair);
@@ -217,11 +204,7 @@ impl Skin<'_> {
             let Some(bone) = self.bone(joint).filter(|_| weight.is_finite()) else { continue };
             all += weight;
             match self.bones[bone].kind {
-                FaceBoneKind::Skin => {
-                    let arm = (self.points[index] - self.bones[bone].position).as_dvec3() * f64::from(weight);
-                    let unknown = self.unknown_of[bone];
-                    sample.influences.push(Influence { unknown, weight: f64::from(weight), arm });
-                }
+                FaceBoneKind::Skin => sample.influences.push((self.unknown_of[bone], f64::from(weight))),
                 FaceBoneKind::Jaw => sample.mark.jaw += f64::from(weight),
                 FaceBoneKind::Eye => {}
             }
