@@ -29,14 +29,14 @@ use measure::Joint;
 /// Half joints move outwards by what each body asks for, shoulders no further than an arm raised to the side allows, where the
 /// same length swells; where that is not enough, the border of the flesh that moves is moved.
 const KNOWN: [(&str, [(i32, usize); 4]); 8] = [
-    ("biped", [(10, 0), (12, 0), (10, 0), (13, 0)]),
-    ("baby", [(11, 0), (11, 0), (10, 0), (13, 0)]),
+    ("biped", [(10, 0), (12, 0), (6, 0), (12, 0)]),
+    ("baby", [(10, 0), (11, 0), (5, 0), (13, 0)]),
     ("female_heavy_tpose", [(11, 0), (-5, 0), (10, 0), (11, 0)]),
-    ("female_young", [(11, 0), (8, 0), (10, 0), (13, 0)]),
-    ("female_young_armsdown", [(11, 0), (8, 0), (10, 0), (13, 0)]),
-    ("male_child_tpose", [(11, 0), (11, 0), (14, 0), (12, 0)]),
-    ("male_muscular_action", [(11, 0), (11, 0), (14, 0), (10, 0)]),
-    ("male_young", [(10, 0), (11, 0), (14, 0), (11, 0)]),
+    ("female_young", [(11, 0), (8, 0), (10, 0), (9, 0)]),
+    ("female_young_armsdown", [(11, 0), (8, 0), (10, 0), (8, 0)]),
+    ("male_child_tpose", [(11, 0), (11, 0), (13, 0), (12, 0)]),
+    ("male_muscular_action", [(11, 0), (11, 0), (13, 0), (10, 0)]),
+    ("male_young", [(10, 0), (11, 0), (13, 0), (11, 0)]),
 ];
 
 /// The bundled biped, and the seven bodies where there is data.
