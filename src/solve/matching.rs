@@ -5,11 +5,12 @@
 //! edits are tried on a copy of the instance, so that everything else that moves the controls (parents, other
 //! constraints, softness) is taken into account, and the remaining jump is measured.
 
+mod followers;
 mod limb;
 
 use crate::{
     mesh::model::Trs,
-    rig::{BuiltRig, Matching, PoseOffset, RigEdit, SwitchData, Uid},
+    rig::{BuiltRig, Matching, PoseOffset, RigEdit, Scalar, SwitchData, Uid},
     solve::program::{RigState, StateError},
 };
 
@@ -51,33 +52,69 @@ pub fn match_switch(
 ) -> Result<MatchedSwitch, MatchError> {
     let mut state = state.clone();
     state.evaluate(0.0);
-    let before = state.attribute(switch.control, &switch.attribute).unwrap_or_default();
     let mut attempt = Attempt { rig, state, offsets: Vec::new() };
     let kept = match &switch.matching {
-        Matching::IkFk { joints, .. } => joints.clone(),
-        Matching::Space { control } => vec![*control],
-    };
-    let wanted = kept.iter().map(|node| attempt.global(*node)).collect::<Result<Vec<Trs>, _>>()?;
-    attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
-    let value = attempt.state.attribute(switch.control, &switch.attribute).unwrap_or(value);
-    match &switch.matching {
         Matching::IkFk { joints, fk, goal, goal_offset, pole } => {
             let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
-            limb.hold(&mut attempt, &wanted, before, value)?;
+            hold_limb(&mut attempt, &limb, switch, value)?
         }
-        Matching::Space { control } => attempt.place(*control, &wanted[0], None)?,
-    }
+        Matching::Space { control } => {
+            let wanted = attempt.global(*control)?;
+            attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
+            attempt.place(*control, &wanted, None)?;
+            vec![(*control, wanted)]
+        }
+    };
+    let value = attempt.state.attribute(switch.control, &switch.attribute).unwrap_or(value);
     let mut thrown = MatchedSwitch::default();
-    for (node, wanted) in kept.iter().zip(&wanted) {
-        let now = attempt.global(*node)?;
+    for (node, wanted) in kept {
+        let now = attempt.global(node)?;
         thrown.distance = thrown.distance.max(now.translation.distance(wanted.translation));
-        thrown.angle = thrown.angle.max(angle_between(&now, wanted));
+        thrown.angle = thrown.angle.max(angle_between(&now, &wanted));
     }
     for (node, offset) in attempt.offsets {
         thrown.edits.push(RigEdit::SetOffset(node, Some(offset)));
     }
     thrown.edits.push(RigEdit::SetAttributeValue(switch.control, switch.attribute.to_string(), Some(value)));
     Ok(thrown)
+}
+
+/// Throws the switch of a limb and poses controls so that the limb, and the joints behind it that the switch weighs, stay;
+/// returns these joints with their former rig transforms.
+fn hold_limb(
+    attempt: &mut Attempt<'_>,
+    limb: &limb::Limb<'_>,
+    switch: &SwitchData,
+    value: f32,
+) -> Result<Vec<(Uid, Trs)>, MatchError> {
+    let before = attempt.state.attribute(switch.control, &switch.attribute).unwrap_or_default();
+    let wanted = limb.joints.iter().map(|node| attempt.global(*node)).collect::<Result<Vec<Trs>, _>>()?;
+    let length: f32 = wanted.windows(2).map(|pair| pair[0].translation.distance(pair[1].translation)).sum();
+    let followers = followers::followers(attempt, switch, limb, 1e-4 * length);
+    let behind = followers.iter().map(|of| attempt.global(of.joint)).collect::<Result<Vec<Trs>, _>>()?;
+    attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
+    let value = attempt.state.attribute(switch.control, &switch.attribute).unwrap_or(value);
+    // A goal may hang below the control that turns a joint behind the limb, and such a control below one of the limb.
+    for (follower, wanted) in followers.iter().zip(&behind) {
+        follower.hold(attempt, wanted, length)?;
+    }
+    limb.hold(attempt, &wanted, before, value)?;
+    for (follower, wanted) in followers.iter().zip(&behind) {
+        follower.hold(attempt, wanted, length)?;
+    }
+    let of_limb = limb.joints.iter().copied().zip(wanted);
+    Ok(of_limb.chain(followers.iter().map(|follower| follower.joint).zip(behind)).collect())
+}
+
+/// Current value of a scalar.
+fn number(attempt: &Attempt<'_>, scalar: &Scalar) -> f32 {
+    match scalar {
+        Scalar::Value(value) => *value,
+        Scalar::Attribute { node, name, factor, add } => {
+            factor * attempt.state.attribute(*node, name).unwrap_or_default() + add
+        }
+        Scalar::Choice { .. } | Scalar::Channel { .. } => 0.0,
+    }
 }
 
 /// Angle between two rotations in degrees. It is computed from the vector part: the dot product of two quaternions has

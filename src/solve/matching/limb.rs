@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Attempt, MatchError};
+use super::{Attempt, MatchError, number};
 use crate::{
     mesh::model::Trs,
     rig::{Constraint, Scalar, Uid},
@@ -190,15 +190,4 @@ fn follows(attempt: &Attempt<'_>, joint: Uid, control: Uid) -> Option<(Uid, bool
         }
         _ => None,
     })
-}
-
-/// Current value of a scalar.
-fn number(attempt: &Attempt<'_>, scalar: &Scalar) -> f32 {
-    match scalar {
-        Scalar::Value(value) => *value,
-        Scalar::Attribute { node, name, factor, add } => {
-            factor * attempt.state.attribute(*node, name).unwrap_or_default() + add
-        }
-        Scalar::Choice { .. } | Scalar::Channel { .. } => 0.0,
-    }
 }
