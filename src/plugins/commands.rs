@@ -46,6 +46,7 @@ impl Plugin for CommandsPlugin {
             (
                 build_rigs,
                 nodes::follow_nodes,
+                nodes::unsorted_rigs.pipe(nodes::order_siblings),
                 nodes::despawn_parked,
                 constraints::follow_constraints,
                 (run::run_built, report_commands),

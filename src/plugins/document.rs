@@ -153,6 +153,8 @@ fn apply_edits(
             refused.write(EditRefused { rig, reason: ChangeError::NoRig(rig) });
             continue;
         };
+        // The selection is written only where it changes.
+        let mut selected = selection.clone();
         let done = |name, committed| Edited { rig, name, committed, preview: false, notes: Vec::new() };
         let previewed =
             |name: &'static str| Edited { rig, name: name.into(), committed: None, preview: true, notes: Vec::new() };
@@ -162,16 +164,16 @@ fn apply_edits(
         let keyed = |operation| auto_key.map_or(Cow::Borrowed(operation), |auto_key| auto_key.keyed(operation));
         let result = match change {
             Change::Do(operation) => history
-                .edit(&mut document, &mut selection, &mut uids, plane, &keyed(operation))
+                .edit(&mut document, &mut selected, &mut uids, plane, &keyed(operation))
                 .map(recorded)
                 .map_err(ChangeError::from),
             Change::Undo => history
-                .undo(&mut document, &mut selection)
+                .undo(&mut document, &mut selected)
                 .ok_or(ChangeError::NothingToUndo)
                 .and_then(|undone| Ok(undone?))
                 .map(|step| done(step.name.clone(), Some(Committed::Undone(step)))),
             Change::Redo => history
-                .redo(&mut document, &mut selection)
+                .redo(&mut document, &mut selected)
                 .ok_or(ChangeError::NothingToRedo)
                 .and_then(|redone| Ok(redone?))
                 .map(|step| done(step.name.clone(), Some(Committed::Redone(step)))),
@@ -181,7 +183,7 @@ fn apply_edits(
                 .map_err(ChangeError::from),
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
             Change::Commit => {
-                let Some(step) = history.commit_preview(&mut selection) else { continue };
+                let Some(step) = history.commit_preview(&mut selected) else { continue };
                 Ok(recorded(step))
             }
             Change::CancelPreview => {
@@ -189,6 +191,7 @@ fn apply_edits(
                 Ok(previewed("Cancel"))
             }
         };
+        selection.set_if_neq(selected);
         match result {
             Ok(message) => {
                 edited.write(message);

@@ -1,6 +1,6 @@
 //! Created nodes as entities that follow the build, and the hierarchy of all nodes of a rig.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use bevy::{
     ecs::{entity::EntityHashMap, entity_disabling::Disabled, query::Allow},
@@ -110,6 +110,50 @@ pub(super) fn follow_nodes(
             writer.place_joint(joints, joint.data.uid, parent, &parents);
         }
         known.joints.retain(|uid, _| built_uids.contains(uid));
+    }
+}
+
+/// Rigs whose joints may stand in another order than in the document: the document or the build changed, or somebody
+/// wrote the parent of a node.
+pub(super) fn unsorted_rigs(
+    rigs: Query<Entity, (With<Rig>, Or<(Changed<Built>, Changed<Rig>, Changed<Children>)>)>,
+    nodes: Query<&NodeOf, Changed<Children>>,
+) -> BTreeSet<Entity> {
+    rigs.iter().chain(nodes.iter().map(|of| of.0)).collect()
+}
+
+/// Puts the joints below each node into the order that the document gives them. Created nodes keep their places among
+/// them.
+pub(super) fn order_siblings(
+    In(unsorted): In<BTreeSet<Entity>>,
+    rigs: Query<(&Rig, &JointEntities)>,
+    parents: Query<&ChildOf>,
+    mut lists: Query<&mut Children>,
+) {
+    for (rig, joints) in unsorted.into_iter().filter_map(|rig| rigs.get(rig).ok()) {
+        let mut ranks: EntityHashMap<usize> = EntityHashMap::default();
+        let mut bearers: BTreeSet<Entity> = BTreeSet::new();
+        for (rank, joint) in rig.walk().enumerate() {
+            let Some(entity) = joints.get(joint.data.uid) else { continue };
+            ranks.insert(entity, rank);
+            bearers.extend(parents.get(entity).map(ChildOf::parent));
+        }
+        for bearer in bearers {
+            let Ok(mut children) = lists.get_mut(bearer) else { continue };
+            let mut order: Vec<Entity> = children.iter().filter(|child| ranks.contains_key(child)).collect();
+            if order.is_sorted_by_key(|child| ranks.get(child)) {
+                continue;
+            }
+            order.sort_by_key(|child| ranks.get(child));
+            let mut sorted = order.into_iter();
+            let places: EntityHashMap<usize> = (children.iter().enumerate())
+                .filter_map(|(place, child)| {
+                    let child = if ranks.contains_key(&child) { sorted.next()? } else { child };
+                    Some((child, place))
+                })
+                .collect();
+            children.sort_by_key(|child| places.get(child).copied());
+        }
     }
 }
 
@@ -245,7 +289,12 @@ impl Writer<'_, '_, '_> {
                     (attribute.name.to_string(), attribute.clamp(value))
                 })
                 .collect();
-            target.try_insert(Attributes(values));
+            target.queue_silenced(move |mut entity: EntityWorldMut| {
+                let values = Attributes(values);
+                if entity.get::<Attributes>() != Some(&values) {
+                    entity.insert(values);
+                }
+            });
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Entities of joints, groups and tags follow the document: a component is written only where its value changed.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use bevy::prelude::*;
 
@@ -217,7 +217,7 @@ pub(in crate::plugins) fn follow_tags(
             }
         }
         // Entities of all tags are spawned first, because a command may refer to a feature further down.
-        let mut fresh: HashSet<Uid> = HashSet::new();
+        let mut fresh: HashMap<Uid, Entity> = HashMap::new();
         for joint in rig.walk() {
             for tag in &joint.data.tags {
                 if known.get(tag.uid).is_some() {
@@ -226,7 +226,7 @@ pub(in crate::plugins) fn follow_tags(
                 let entity = commands.spawn(tag.uid).id();
                 index.insert(entity, rig_entity, tag.uid, EntityPart::Tag);
                 known.insert_fresh(joint.data.uid, tag, entity);
-                fresh.insert(tag.uid);
+                fresh.insert(tag.uid, entity);
             }
         }
         for joint in rig.walk() {
@@ -238,13 +238,19 @@ pub(in crate::plugins) fn follow_tags(
                 mirrored.tags = data.tags.iter().map(|tag| tag.uid).collect();
             }
             for tag in &data.tags {
-                let is_fresh = fresh.contains(&tag.uid);
+                let is_fresh = fresh.contains_key(&tag.uid);
                 let Some(before) = known.tags.get_mut(&tag.uid) else { continue };
                 let entity = before.entity;
                 if !is_ordered || before.joint != data.uid {
                     before.joint = data.uid;
                     // Removing and inserting each tag in turn puts the tags into the document's order.
                     commands.entity(entity).try_remove::<TagOf>().try_insert(TagOf(bearer));
+                }
+                // With the entity of a feature went the relation of its commands.
+                if let TagKind::Command { feature: Some(feature), .. } = &tag.kind
+                    && let Some(entity_of) = fresh.get(feature)
+                {
+                    commands.entity(entity).try_insert(InFeature(*entity_of));
                 }
                 if !is_fresh && before.data == *tag {
                     continue;
