@@ -20,8 +20,8 @@ use crate::{
         commands::Built,
         document::{ChangeError, EditRefused, EditRequest},
         face::{
-            ExpressError, ExpressRequest, Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport,
-            FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
+            ExpressError, ExpressRequest, Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FacePreparation,
+            FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
         },
         fit::{FitFailure, FitJob, FitReport, FitRequest, FitTemplates, Fitted},
         gesture::{Gesture, GestureAnswer, GestureScript},
@@ -221,6 +221,10 @@ impl Workbench {
                 // The edit that makes the face is applied in the next frame.
                 self.app.update();
                 let report = placed.result?;
+                while self.app.world().get::<FacePreparation>(mesh).is_some() {
+                    std::thread::sleep(Duration::from_millis(1));
+                    self.app.update();
+                }
                 return self.refused().map_or(Ok(report), Err);
             }
             if let Some(job) = self.app.world().get::<FaceJob>(mesh)
@@ -237,10 +241,15 @@ impl Workbench {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.forget_refusals();
         self.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
-        self.app.update();
-        let told = self.app.world_mut().resource_mut::<Messages<Expressed>>().drain().last();
-        told.map_or(Ok(()), |told| told.result)?;
-        self.refused().map_or(Ok(()), Err)
+        loop {
+            self.app.update();
+            let told = self.app.world_mut().resource_mut::<Messages<Expressed>>().drain().last();
+            if told.is_some() || self.app.world().get::<FacePreparation>(mesh).is_none() {
+                told.map_or(Ok(()), |told| told.result)?;
+                return self.refused().map_or(Ok(()), Err);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 
     /// Analysis of the mesh's face, if there is one.

@@ -9,6 +9,7 @@ mod error;
 mod job;
 mod placed_bones;
 mod pose;
+mod preparation;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -29,6 +30,7 @@ pub use error::{ExpressError, PlaceFaceError};
 pub use job::FaceJob;
 pub use placed_bones::{FaceRig, PlacedBone};
 pub use pose::{expressed_points, mixed};
+pub use preparation::FacePreparation;
 
 /// Plugin of automatic faces.
 pub struct FacePlugin;
@@ -37,6 +39,8 @@ impl Plugin for FacePlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.init_resource::<FaceExpressions>()
+            .init_resource::<preparation::PreparedSkins>()
+            .add_observer(preparation::forget)
             .add_message::<FaceRequest>()
             .add_message::<FacePlaced>()
             .add_message::<super::landing::ResultHeld>()
@@ -45,7 +49,11 @@ impl Plugin for FacePlugin {
             .add_systems(
                 Update,
                 (
-                    (pose::adopt, pose::express).chain().after(RigSystems::Gesture).before(RigSystems::Edits),
+                    (preparation::keep, pose::adopt, pose::express)
+                        .chain()
+                        .after(RigSystems::Gesture)
+                        .before(RigSystems::Edits),
+                    preparation::prepare.after(RigSystems::Edits).before(RigSystems::Build),
                     pose::follow_strengths.after(RigSystems::Edits).before(RigSystems::Build),
                     (job::start, job::land).chain().in_set(RigSystems::Bind),
                 ),
@@ -165,7 +173,8 @@ pub struct Expressed {
 /// The document holds them as values of attributes of the mesh, so undo, stored poses and projects bring them back.
 ///
 /// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
-/// the answer is an [`Expressed`] message. A value equal to what is shown is no edit.
+/// the answer is an [`Expressed`] message. While the face is still prepared ([`FacePreparation`]), both wait for it. A
+/// value equal to what is shown is no edit.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
 #[reflect(Component, Debug, Clone, PartialEq, Default)]
 pub struct Expressions(pub BTreeMap<String, f32>);

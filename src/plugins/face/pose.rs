@@ -4,11 +4,15 @@ use std::{borrow::Cow, collections::BTreeMap, sync::Arc};
 
 use bevy::prelude::*;
 
-use super::{ExpressError, ExpressRequest, Expressed, Expressions, Face, FaceExpressions, placed_bones::FaceRig};
+use super::{
+    ExpressError, ExpressRequest, Expressed, Expressions, Face, FaceExpressions,
+    placed_bones::FaceRig,
+    preparation::{FacePreparation, PreparedFace, PreparedParts},
+};
 use crate::{
     algo::face::{
-        auto::{AutoSettings, FaceAnalysis, FaceError},
-        expression::{BonePose, Expression, ExpressionSet, FittedFace, MAX_STRENGTH, Mix, apply},
+        auto::FaceAnalysis,
+        expression::{BonePose, Expression, ExpressionSet, MAX_STRENGTH, Mix, apply},
     },
     mesh::model::Weights,
     plugins::{
@@ -107,69 +111,62 @@ fn strengths_of(rig: &Rig, mesh: Uid) -> BTreeMap<String, f32> {
 pub(super) fn express(
     mut commands: Commands,
     mut requests: MessageReader<ExpressRequest>,
-    meshes: Query<(&RigMesh, &SkinOf, Option<&Face>, Option<&PreparedFace>)>,
+    mut meshes: Query<(&RigMesh, &SkinOf, Option<&Face>, Option<&PreparedFace>, Option<&mut FacePreparation>)>,
     rigs: Query<(&Rig, Option<&RigHistory>)>,
     set: Res<FaceExpressions>,
     mut told: MessageWriter<Expressed>,
 ) {
-    for ExpressRequest { mesh: entity, strengths, preview } in requests.read() {
-        let found = meshes
-            .get(*entity)
-            .ok()
-            .and_then(|(mesh, of, face, prepared)| Some((mesh, of.0, rigs.get(of.0).ok()?, face, prepared)));
-        let Some((mesh, rig_entity, (rig, history), face, prepared)) = found else {
+    for request in requests.read() {
+        let ExpressRequest { mesh: entity, strengths, preview } = request;
+        let found = meshes.get_mut(*entity).ok().and_then(|(mesh, of, face, prepared, preparation)| {
+            Some((mesh, of.0, rigs.get(of.0).ok()?, face, prepared, preparation))
+        });
+        let Some((mesh, rig_entity, (rig, history), face, prepared, preparation)) = found else {
             told.write(Expressed { mesh: *entity, result: Err(ExpressError::NoRig) });
             continue;
         };
-        let analysed = match face {
-            Some(face) if face.serves(&mesh.rest, &face.settings) => Ok(face.clone()),
-            // An opened file has the positions of the bones, but not of the features.
-            _ => analyse(mesh),
+        // A preview is undone before the next preview or edit.
+        let settled = history.map_or(Cow::Borrowed(rig), |history| history.settled(rig));
+        let checked = mixed(&set.0, strengths).and_then(|mix| Ok((mix, facial_bones(&settled, mesh)?)));
+        let (mix, (known, skin)) = match checked {
+            Ok(checked) => checked,
+            Err(error) => {
+                told.write(Expressed { mesh: *entity, result: Err(error) });
+                continue;
+            }
         };
-        let result = analysed.map_err(ExpressError::from).and_then(|face| {
-            // A preview is undone before the next preview or edit.
-            let settled = history.map_or(Cow::Borrowed(rig), |history| history.settled(rig));
-            let mix = mixed(&set.0, strengths)?;
-            let prepared = PreparedFace::reused(prepared, &settled, mesh, &face.analysis, &set.0)?;
-            let mut edits = expression_edits(&settled, &prepared, &mix);
-            edits.extend(strength_edits(&settled, mesh.uid, strengths));
-            // An expression that the face shows already adds no step to the history.
-            let is_shown = edits.is_empty();
-            let operation = Operation::Named { name: "Express", edits };
-            if *preview {
-                commands.write_message(EditRequest { rig: rig_entity, change: Change::Preview(operation) });
-            } else {
-                commands.write_message(EditRequest { rig: rig_entity, change: Change::CancelPreview });
-                if !is_shown {
-                    commands.write_message(EditRequest { rig: rig_entity, change: Change::Do(operation) });
+        let parts = face
+            .filter(|face| face.serves(&mesh.rest, &face.settings))
+            .and_then(|face| prepared?.parts(&face.analysis, &set.0, &known, skin));
+        let Some(parts) = parts else {
+            // The request is repeated when the face is prepared; of several, the last one counts.
+            match preparation {
+                Some(mut preparation) => preparation.wanted = Some(request.clone()),
+                None => {
+                    let wanted = Some(request.clone());
+                    let preparation = FacePreparation::start(mesh, face, known, skin, &set.0, wanted);
+                    commands.entity(*entity).insert(preparation);
                 }
             }
-            // What is shown is what the document says after the edit: see `follow_strengths`.
-            let shown = (Expressions(strengths.clone()), OwnStrengths(strengths.clone()));
-            commands.entity(*entity).insert((shown, face, prepared));
-            Ok(())
-        });
-        told.write(Expressed { mesh: *entity, result });
+            continue;
+        };
+        let mut edits = expression_edits(&settled, parts, &mix);
+        edits.extend(strength_edits(&settled, mesh.uid, strengths));
+        // An expression that the face shows already adds no step to the history.
+        let is_shown = edits.is_empty();
+        let operation = Operation::Named { name: "Express", edits };
+        if *preview {
+            commands.write_message(EditRequest { rig: rig_entity, change: Change::Preview(operation) });
+        } else {
+            commands.write_message(EditRequest { rig: rig_entity, change: Change::CancelPreview });
+            if !is_shown {
+                commands.write_message(EditRequest { rig: rig_entity, change: Change::Do(operation) });
+            }
+        }
+        // What is shown is what the document says after the edit: see `follow_strengths`.
+        commands.entity(*entity).insert((Expressions(strengths.clone()), OwnStrengths(strengths.clone())));
+        told.write(Expressed { mesh: *entity, result: Ok(()) });
     }
-}
-
-fn analyse(mesh: &RigMesh) -> Result<Face, FaceError> {
-    let settings = AutoSettings::default();
-    let analysis = FaceAnalysis::new(&mesh.rest.points, &mesh.triangles, &settings, &|_, _| true)?;
-    Ok(Face { analysis: analysis.into(), settings, rest: mesh.rest.clone() })
-}
-
-/// A mesh's face as expressions take it, kept from one expression to the next: a slider that is dragged only sums up
-/// movements that are solved already.
-#[derive(Component, Clone)]
-pub(super) struct PreparedFace(Arc<PreparedParts>);
-
-struct PreparedParts {
-    analysis: Arc<FaceAnalysis>,
-    set: Arc<ExpressionSet>,
-    skin: Arc<SkinData>,
-    known: FaceRig,
-    fitted: FittedFace,
 }
 
 /// The facial bones of a rig, and the skin of a mesh that is bound to them.
@@ -179,32 +176,6 @@ pub(super) fn facial_bones<'a>(rig: &'a Rig, mesh: &RigMesh) -> Result<(FaceRig,
         return Err(ExpressError::NoBones);
     }
     Ok((known, rig.skin(mesh.uid).ok_or(ExpressError::NotSkinned)?))
-}
-
-impl PreparedFace {
-    /// The face that was prepared `before`, if rig, mesh, analysis and units are still the same, or a new one.
-    fn reused(
-        before: Option<&Self>,
-        rig: &Rig,
-        mesh: &RigMesh,
-        analysis: &Arc<FaceAnalysis>,
-        set: &Arc<ExpressionSet>,
-    ) -> Result<Self, ExpressError> {
-        let (known, skin) = facial_bones(rig, mesh)?;
-        let serves = |parts: &PreparedParts| {
-            Arc::ptr_eq(&parts.analysis, analysis)
-                && Arc::ptr_eq(&parts.set, set)
-                && Arc::ptr_eq(&parts.skin, skin)
-                && parts.known == known
-        };
-        if let Some(before) = before.filter(|before| serves(&before.0)) {
-            return Ok(before.clone());
-        }
-        let weights = analysed_weights(skin, &known, analysis);
-        let fitted = analysis.fitted(&known.face_bones(analysis), &weights, set.unit_set());
-        let (analysis, set, skin) = (analysis.clone(), set.clone(), skin.clone());
-        Ok(Self(Arc::new(PreparedParts { analysis, set, skin, known, fitted })))
-    }
 }
 
 /// A blend of expressions and units by name; a unit's name may end in `_l` or `_r` for one side.
@@ -228,8 +199,8 @@ pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<M
 }
 
 /// The edits that pose the facial joints for a mix. Facial joints that are not moved are reset to rest.
-fn expression_edits(rig: &Rig, prepared: &PreparedFace, mix: &Mix) -> Vec<RigEdit> {
-    let PreparedParts { analysis, known, fitted, .. } = prepared.0.as_ref();
+fn expression_edits(rig: &Rig, prepared: &PreparedParts, mix: &Mix) -> Vec<RigEdit> {
+    let PreparedParts { analysis, known, fitted, .. } = prepared;
     let poses = fitted.pose(mix);
     let edits = known.bones.iter().zip(&poses).filter_map(|(bone, pose)| {
         let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
