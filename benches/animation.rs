@@ -9,6 +9,10 @@
 //! the clip forwards at 60 frames a second. The peer is Bevy's `AnimatableKeyframeCurve` with the same keys in the same run.
 //! Prints one JSON line.
 
+#[path = "../tests/it/random.rs"]
+#[expect(dead_code, reason = "tests use more of it")]
+mod random;
+
 use std::{hint::black_box, sync::Arc, time::Instant};
 
 use bevy::{
@@ -19,6 +23,8 @@ use rigsmith::rig::{
     Uid,
     animation::{ClipSampler, Ease, Key, Property, RigClip, SampleCursor, Track, TrackTarget},
 };
+
+use random::Random;
 
 const SECONDS: f32 = 10.0;
 const CROWD: usize = 1000;
@@ -53,7 +59,7 @@ fn main() {
     let sampler = ClipSampler::new(&clip);
     let mut cursors: Vec<SampleCursor> = vec![sampler.cursor(); CROWD];
     let mut out = vec![Vec4::ZERO; sampler.targets().len()];
-    let phases: Vec<f32> = (0..CROWD).map(|_| random.share() * SECONDS).collect();
+    let phases: Vec<f32> = (0..CROWD).map(|_| random.unit() * SECONDS).collect();
     let seconds = best(10, || {
         for frame in 0..30 {
             for (cursor, phase) in cursors.iter_mut().zip(&phases) {
@@ -91,7 +97,7 @@ fn clip(random: &mut Random, tracks: usize, spacing: Keys) -> RigClip {
         let mut time = 0.0;
         let mut keys = Vec::new();
         while time <= SECONDS {
-            turn += Vec3::new(random.share() - 0.5, random.share() - 0.5, random.share() - 0.5) * 0.1;
+            turn += Vec3::new(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5) * 0.1;
             let mut key = match is_place {
                 true => Key::vector(time, turn),
                 false => Key::rotation(time, Quat::from_euler(EulerRot::XYZ, turn.x, turn.y, turn.z)),
@@ -100,7 +106,7 @@ fn clip(random: &mut Random, tracks: usize, spacing: Keys) -> RigClip {
                 key.ease = Ease::Cubic { arrive: [0.0; 4], leave: [0.0; 4] };
             }
             keys.push(key);
-            time += if spacing == Keys::Baked { 1.0 / 30.0 } else { 0.05 + random.share() * 0.1 };
+            time += if spacing == Keys::Baked { 1.0 / 30.0 } else { 0.05 + random.unit() * 0.1 };
         }
         let target = TrackTarget { node: Uid(100 + number as u64), property };
         clip.layers[0].tracks.insert(target, Arc::new(Track { keys }));
@@ -133,15 +139,4 @@ fn best(runs: u32, mut run: impl FnMut()) -> f64 {
         start.elapsed().as_secs_f64()
     };
     std::iter::repeat_with(once).take(runs as usize).fold(f64::INFINITY, f64::min)
-}
-
-/// Numbers that are the same on every machine.
-struct Random(u64);
-
-impl Random {
-    /// A number from 0 to 1.
-    fn share(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
-    }
 }

@@ -7,7 +7,7 @@
 //!
 //! Sizes in pixels are logical pixels. If several cameras are marked, the first active one by order counts.
 
-mod controls;
+pub mod controls;
 pub mod ghosts;
 pub mod grid;
 pub mod ink;

@@ -4,6 +4,8 @@ use glam::Vec3;
 use proptest::prelude::*;
 use rigsmith::algo::kmeans::{KMeans, KMeansError, KMeansSettings, kmeans, kmeans_plain};
 
+use crate::random::Random;
+
 fn go(_: f32) -> bool {
     true
 }
@@ -14,11 +16,8 @@ fn settings(groups: usize) -> KMeansSettings {
 
 /// Points on a bent sheet, denser at one end.
 fn sheet(count: usize) -> Vec<Vec3> {
-    let mut state = 3_u64;
-    let mut noise = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1_u64 << 24) as f32
-    };
+    let mut random = Random(3);
+    let mut noise = || random.unit();
     (0..count)
         .map(|_| {
             let (a, b) = (noise() * noise(), noise());

@@ -5,29 +5,23 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::Vec3;
 use rigsmith::algo::linkage::{Dendrogram, LinkageError, average_linkage, average_linkage_1d, squared_linkage};
 
+use crate::random::Random;
+
 fn go(_: f32) -> bool {
     true
 }
 
-/// Numbers that look random, from 0 to 1.
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1_u64 << 24) as f32
-    }
-
-    fn points(&mut self, count: usize) -> Vec<Vec3> {
-        (0..count).map(|_| Vec3::new(self.next(), self.next(), self.next())).collect()
-    }
+/// Points of the unit cube.
+fn points(count: usize, seed: u64) -> Vec<Vec3> {
+    let mut random = Random(seed);
+    (0..count).map(|_| Vec3::new(random.unit(), random.unit(), random.unit())).collect()
 }
 
 /// Points on a bent sheet, as those of a mesh are.
 fn sheet(count: usize, seed: u64) -> Vec<Vec3> {
-    let mut noise = Noise(seed);
+    let mut random = Random(seed);
     let place = |a: f32, b: f32| Vec3::new(a, b, 0.3 * (a * a - b) + 0.1 * a * b) * 10.0;
-    (0..count).map(|_| place(noise.next(), noise.next())).collect()
+    (0..count).map(|_| place(random.unit(), random.unit())).collect()
 }
 
 /// The definition: all distances, the least merges, means weighted by sizes.
@@ -112,7 +106,7 @@ fn equal_points_merge_at_zero() {
 
 #[test]
 fn duplicates_keep_their_distance_to_others() {
-    let mut points = Noise(5).points(150);
+    let mut points = points(150, 5);
     points.extend(points.clone());
     let tree = average_linkage(&points, &go).unwrap();
     assert_heights(&tree, &naive(300, |a, b| f64::from(points[a].distance(points[b]))));
@@ -121,7 +115,7 @@ fn duplicates_keep_their_distance_to_others() {
 #[test]
 fn heights_are_those_of_the_definition() {
     for (seed, count) in [(1, 2), (2, 3), (3, 9), (4, 50), (5, 300)] {
-        let points = Noise(seed).points(count);
+        let points = points(count, seed);
         let exact = |a: usize, b: usize| points[a].as_dvec3().distance(points[b].as_dvec3());
         assert_heights(&average_linkage(&points, &go).unwrap(), &naive(count, exact));
         let square = |a: usize, b: usize| points[a].as_dvec3().distance_squared(points[b].as_dvec3());
@@ -156,8 +150,8 @@ fn top_of_a_large_sheet_is_the_mean_over_all_pairs() {
 
 #[test]
 fn points_on_a_line_agree_with_one_dimension() {
-    let mut noise = Noise(21);
-    let values: Vec<f32> = (0..1200).map(|_| noise.next() * 7.0 - 3.0).collect();
+    let mut random = Random(21);
+    let values: Vec<f32> = (0..1200).map(|_| random.unit() * 7.0 - 3.0).collect();
     let points: Vec<Vec3> = values.iter().map(|&x| Vec3::new(x, 1.0, 2.0)).collect();
     let line = average_linkage_1d(&values, &go).unwrap();
     let space = average_linkage(&points, &go).unwrap();

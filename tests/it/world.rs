@@ -1,12 +1,20 @@
 //! One world: the entities of a rig say what its document and its program say, whoever changed what.
 
+mod counts;
+mod layers;
+pub mod limits;
 mod poses;
 mod random;
+mod springs;
+mod switches;
 mod writes;
 
 use std::{path::PathBuf, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{
+    math::{Affine3A, DAffine3},
+    prelude::*,
+};
 use rigsmith::{
     files::{RealDisk, load_template},
     plugins::{
@@ -15,6 +23,7 @@ use rigsmith::{
         runtime::RigRuntime,
     },
     prelude::*,
+    rig::{BuiltNode, NodeType},
     solve::program::{CompileOptions, RigProgram, RigState},
     test_app::test_app,
 };
@@ -90,36 +99,71 @@ impl Stage {
         self.node(built.find_label(label).unwrap_or_else(|| panic!("no {label}")).uid).unwrap()
     }
 
+    /// The control with that name.
+    pub fn control(&self, name: &str) -> Entity {
+        let built = &self.app.world().get::<Built>(self.rig).unwrap().0;
+        let is_meant = |node: &&BuiltNode| node.kind == NodeType::Control && *node.name == *name;
+        let found = built.nodes.iter().find(is_meant).unwrap_or_else(|| panic!("no control {name}"));
+        self.node(found.uid).unwrap()
+    }
+
     pub fn get<C: Component>(&self, entity: Entity) -> Option<&C> {
         self.app.world().get::<C>(entity)
     }
 
-    /// Largest distance, as a share of the rig's size, between the place of an entity and the place that the program gives
-    /// the node, over all nodes; matrices included.
+    /// Height of the authored skeleton at rest: its extent along Y, or along its longest axis where it lies flat (less
+    /// than a tenth of that axis). Joints that all lie at one place have the height of what is built of them.
+    pub fn height(&self) -> f32 {
+        let extent = |places: &[Vec3]| {
+            let low = places.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+            let high = places.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+            let extent = (high - low).max(Vec3::ZERO);
+            let longest = extent.max_element();
+            if extent.y >= 0.1 * longest { extent.y } else { longest }
+        };
+        let joints = self.document().rest_globals().into_iter().map(|(_, rest)| rest.translation);
+        let height = extent(&joints.collect::<Vec<Vec3>>());
+        if height > 1e-3 {
+            return height;
+        }
+        let nodes = self.runtime().state().globals().iter().map(|global| global.translation);
+        extent(&nodes.collect::<Vec<Vec3>>()).max(1e-3)
+    }
+
+    /// Largest difference between the world transform of an entity and the transform that the program gives the node, in
+    /// the rig's space, over all nodes: of places as a share of the rig's height, of axes as a share of their length.
     pub fn off(&self) -> f32 {
         let world = self.app.world();
         let built = &world.get::<Built>(self.rig).expect("the rig is built").0;
         let state = self.runtime().state();
         assert_eq!(state.program().nodes().len(), built.nodes.len(), "the program is that of the build");
-        let place = *world.get::<GlobalTransform>(self.rig).unwrap();
-        let globals = || built.nodes.iter().map(|node| state.global(node.uid).unwrap());
-        let size = globals().map(|global| global.translation.abs().max_element()).fold(1e-3, f32::max);
-        let mut worst = 0.0_f32;
-        for (node, global) in built.nodes.iter().zip(globals()) {
+        let exact = |affine: Affine3A| DAffine3 {
+            matrix3: affine.matrix3.as_dmat3(),
+            translation: affine.translation.as_dvec3(),
+        };
+        // In double precision, so that the comparison itself rounds nothing.
+        let to_rig = exact(world.get::<GlobalTransform>(self.rig).unwrap().affine()).inverse();
+        let height = f64::from(self.height());
+        let mut worst = 0.0_f64;
+        for node in &built.nodes {
             let entity = self.node(node.uid).unwrap_or_else(|| panic!("{} has no entity", node.name));
-            let now = world.get::<GlobalTransform>(entity).unwrap().affine();
-            let wanted = place.affine() * global.affine();
-            let off = (now.translation - wanted.translation).length() / size;
+            let now = to_rig * exact(world.get::<GlobalTransform>(entity).unwrap().affine());
+            let wanted = exact(state.global(node.uid).unwrap().affine());
+            // A place in the world cannot be told more exactly than its coordinates are rounded.
+            let world_place = world.get::<GlobalTransform>(entity).unwrap().translation();
+            let rounding = f64::from(2.0 * f32::EPSILON * world_place.abs().max_element());
+            let off = ((now.translation - wanted.translation).length() - rounding).max(0.0) / height;
             assert!(off.is_finite(), "{} is nowhere", node.name);
             worst = worst.max(off);
-            for (a, b) in [(now.matrix3.x_axis, wanted.matrix3.x_axis), (now.matrix3.y_axis, wanted.matrix3.y_axis)] {
+            for axis in 0..3 {
+                let (a, b) = (now.matrix3.col(axis), wanted.matrix3.col(axis));
                 worst = worst.max((a - b).length() / b.length().max(1e-6));
             }
         }
-        worst
+        worst as f32
     }
 
-    /// Largest distance, as a share of the rig's size, between the running program and one compiled from nothing and
+    /// Largest distance, as a share of the rig's height, between the running program and one compiled from nothing and
     /// posed as the document says.
     pub fn off_from_document(&self) -> f32 {
         let built = &self.app.world().get::<Built>(self.rig).unwrap().0;
@@ -135,14 +179,14 @@ impl Stage {
         }
         state.evaluate(0.0);
         let running = self.runtime().state();
-        let size = state.globals().iter().map(|global| global.translation.abs().max_element()).fold(1e-3, f32::max);
-        let off = |node: &rigsmith::rig::BuiltNode| {
+        let height = self.height();
+        let off = |node: &BuiltNode| {
             let (a, b) = (state.global(node.uid).unwrap(), running.global(node.uid).unwrap());
-            a.translation.distance(b.translation) / size
+            a.translation.distance(b.translation) / height
         };
         built.nodes.iter().map(off).fold(0.0, f32::max)
     }
 }
 
-/// Distances below this share of the size are rounding.
+/// Differences below this share of the rig's height are rounding.
 pub const NEAR: f32 = 1e-5;

@@ -5,12 +5,12 @@ use bevy::{
     prelude::*,
 };
 use rigsmith::{
-    plugins::{
-        commands::{Attributes, BuildStep, Built, Control},
-        runtime::RigRuntime,
-    },
+    plugins::commands::{Attributes, BuildStep, Built, Processor},
     prelude::*,
-    rig::{NodeType, PoseOffset},
+    rig::{
+        NodeType, PoseOffset,
+        feature::{combined_features, set_feature, set_switch},
+    },
 };
 
 use super::{NEAR, Stage, shipped};
@@ -26,8 +26,7 @@ fn entities_stand_as_the_program_says_at_every_step() {
             let off = stage.off();
             assert!(off <= NEAR, "{name} after {steps} commands: {off}");
             stage.step(BuildStep::Forward);
-            let cursor =
-                stage.app.world().get::<rigsmith::plugins::commands::Processor>(stage.rig).unwrap().builder().cursor();
+            let cursor = stage.get::<Processor>(stage.rig).unwrap().builder().cursor();
             if cursor == steps {
                 break;
             }
@@ -61,56 +60,111 @@ fn a_rig_that_is_spawned_and_built_stands_as_it_was_drawn() {
     }
 }
 
+/// One random move of a rig: of its controls, attributes and place, of its document and its history, of what is switched
+/// off, and of the build.
+fn random_move(stage: &mut Stage, random: &mut Random) -> &'static str {
+    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+    let controls: Vec<Uid> =
+        built.nodes.iter().filter(|node| node.kind == NodeType::Control).map(|node| node.uid).collect();
+    let attributes: Vec<(Uid, &str)> = (built.nodes.iter())
+        .flat_map(|node| node.attributes.iter().map(|attribute| (node.uid, &*attribute.name)))
+        .collect();
+    let turn = Quat::from_euler(EulerRot::XYZ, random.signed(), random.signed(), random.signed());
+    let shift = 0.1 * random.point();
+    let control = random.of(&controls);
+    match (random.below(16), control) {
+        (0..5, Some(control)) => {
+            let entity = stage.node(control).unwrap();
+            let mut transform = stage.app.world_mut().get_mut::<Transform>(entity).unwrap();
+            transform.rotation *= turn;
+            transform.translation += shift;
+            stage.app.update();
+            "control"
+        }
+        (5..7, Some(control)) => {
+            let offset = PoseOffset { translation: shift, rotation: turn, scale: Vec3::ONE };
+            stage.change(Change::Do(Operation::Pose(vec![(control, offset)])));
+            "pose"
+        }
+        (7, _) if !attributes.is_empty() => {
+            let (node, attribute) = attributes[random.below(attributes.len())];
+            let entity = stage.node(node).unwrap();
+            let mut values = stage.app.world_mut().get_mut::<Attributes>(entity).unwrap();
+            values.0.insert(attribute.to_owned(), 2.0 * random.signed());
+            stage.app.update();
+            "attribute"
+        }
+        (8, _) => {
+            stage.change(Change::Undo);
+            "undo"
+        }
+        (9, _) => {
+            stage.change(Change::Redo);
+            "redo"
+        }
+        (10, _) => {
+            let mut place = stage.app.world_mut().get_mut::<Transform>(stage.rig).unwrap();
+            place.translation += shift;
+            place.rotation *= turn;
+            stage.app.update();
+            "place"
+        }
+        (11, _) if !stage.document().groups().is_empty() => {
+            let mut group = random.pick(stage.document().groups());
+            group.enabled = !group.enabled;
+            stage.edit(vec![RigEdit::SetLocalGroup(group)]);
+            "group"
+        }
+        (12, _) => {
+            let features = combined_features(stage.document());
+            if features.is_empty() {
+                return "nothing";
+            }
+            let feature = random.pick(&features);
+            let on = random.chance(2);
+            let edits = match random.of(&feature.switches.iter().map(|switch| &*switch.name).collect::<Vec<&str>>()) {
+                Some(switch) if random.chance(2) => set_switch(stage.document(), &feature.key, switch, on),
+                _ => set_feature(stage.document(), &feature.key, on),
+            };
+            // A choice has no switch that is off.
+            stage.edit(edits.unwrap_or_default());
+            "feature"
+        }
+        (13, _) => {
+            stage.step(BuildStep::Back);
+            "back"
+        }
+        (14, _) => {
+            stage.step(BuildStep::Forward);
+            "forward"
+        }
+        _ => {
+            let processor = stage.get::<Processor>(stage.rig).unwrap().builder();
+            // Now and then a part of the commands, mostly all.
+            let to = if random.chance(4) { random.below(processor.len() + 1) } else { usize::MAX };
+            stage.step(if to == usize::MAX { BuildStep::All } else { BuildStep::To(to) });
+            "build"
+        }
+    }
+}
+
 #[test]
 fn random_moves_keep_entities_and_program_together() {
-    let rounds: usize = std::env::var("RIGSMITH_SEEDS").ok().and_then(|count| count.parse().ok()).unwrap_or(40);
+    let rounds: usize = std::env::var("RIGSMITH_SEEDS").ok().and_then(|count| count.parse().ok()).unwrap_or(60);
+    let mut worst = (0.0_f32, String::new());
     for (number, (name, rig)) in shipped().into_iter().enumerate() {
         let mut random = Random(number as u64 + 1);
         let mut stage = Stage::built(rig);
-        let built = stage.app.world().get::<Built>(stage.rig).unwrap().0.clone();
-        let controls: Vec<Uid> =
-            built.nodes.iter().filter(|node| node.kind == NodeType::Control).map(|node| node.uid).collect();
-        let attributes: Vec<(Uid, String)> = (built.nodes.iter())
-            .flat_map(|node| node.attributes.iter().map(|attribute| (node.uid, attribute.name.to_string())))
-            .collect();
         for round in 0..rounds {
-            let turn = Quat::from_euler(EulerRot::XYZ, random.signed(), random.signed(), random.signed());
-            let shift = 0.1 * Vec3::new(random.signed(), random.signed(), random.signed());
-            let what = random.below(10);
-            match what {
-                0..4 if !controls.is_empty() => {
-                    let entity = stage.node(controls[random.below(controls.len())]).unwrap();
-                    let mut transform = stage.app.world_mut().get_mut::<Transform>(entity).unwrap();
-                    transform.rotation *= turn;
-                    transform.translation += shift;
-                    stage.app.update();
-                }
-                4..6 if !controls.is_empty() => {
-                    let control = controls[random.below(controls.len())];
-                    let offset = PoseOffset { translation: shift, rotation: turn, scale: Vec3::ONE };
-                    stage.change(Change::Do(Operation::Pose(vec![(control, offset)])));
-                }
-                6 if !attributes.is_empty() => {
-                    let (node, attribute) = &attributes[random.below(attributes.len())];
-                    let entity = stage.node(*node).unwrap();
-                    let mut values = stage.app.world_mut().get_mut::<Attributes>(entity).unwrap();
-                    values.0.insert(attribute.clone(), 2.0 * random.signed());
-                    stage.app.update();
-                }
-                7 => stage.change(Change::Undo),
-                8 => stage.change(Change::Redo),
-                _ => {
-                    let mut place = stage.app.world_mut().get_mut::<Transform>(stage.rig).unwrap();
-                    place.translation += shift;
-                    place.rotation *= turn;
-                    stage.app.update();
-                }
-            }
+            let what = random_move(&mut stage, &mut random);
             let off = stage.off();
-            // Measured in shares of the size within the rig; the rig itself has walked away by then.
-            assert!(off <= 2.0 * NEAR, "{name}, round {round}, {what}: {off}");
+            assert!(off <= NEAR, "{name}, round {round}, {what}: {off}");
+            if off > worst.0 {
+                worst = (off, format!("{name}, round {round}, {what}"));
+            }
         }
     }
+    println!("largest difference: {worst:?}");
 }
 
 fn biped() -> Stage {
@@ -225,220 +279,4 @@ fn posing_in_the_document_and_undoing_it_reaches_the_entity_of_the_control() {
     let back = *stage.get::<Transform>(control).unwrap();
     assert!(back.translation.distance(before.translation) < 1e-6, "{back:?} {before:?}");
     assert!(stage.off_from_document() <= NEAR);
-}
-
-#[test]
-fn a_build_that_executes_nothing_writes_nothing() {
-    let mut stage = biped();
-    stage.app.update();
-    stage.app.update();
-    let tick = stage.app.world().read_change_tick();
-    stage.step(BuildStep::All);
-    let world = stage.app.world();
-    let written: Vec<Entity> = world
-        .iter_entities()
-        .filter(|entity| {
-            let since = |ticks: Option<bevy::ecs::change_detection::ComponentTicks>| {
-                ticks.is_some_and(|ticks| ticks.is_changed(tick, world.read_change_tick()))
-            };
-            since(entity.get_change_ticks::<Transform>())
-                || since(entity.get_change_ticks::<GlobalTransform>())
-                || since(entity.get_change_ticks::<Built>())
-                || since(entity.get_change_ticks::<RigRuntime>())
-                || since(entity.get_change_ticks::<Control>())
-                || since(entity.get_change_ticks::<Name>())
-                || since(entity.get_change_ticks::<ChildOf>())
-        })
-        .map(|entity| entity.id())
-        .collect();
-    assert!(written.is_empty(), "{} entities were written", written.len());
-}
-
-/// A chain of three joints whose middle one has a control: it may only move along Y by up to a tenth, and turn about Z by
-/// up to ten degrees.
-fn limited() -> (Stage, Uid) {
-    let mut stage = Stage::new(Rig::new(Uid(1000), "rig"));
-    for number in 1..=3 {
-        let joint = rigsmith::rig::JointData {
-            uid: Uid(number),
-            label: Some(format!("j{number}")),
-            rest: rigsmith::rig::RestTransform::from_translation(Vec3::Y),
-            ..default()
-        };
-        let parent = (number > 1).then(|| Uid(number - 1));
-        stage.edit(vec![RigEdit::AddJoint { joint: Box::new(joint), parent, index: 0 }]);
-    }
-    let params = "(channels: (translate: (false, true, false), rotate: (false, false, true), \
-                  scale: (false, false, false)), \
-                  limits: (translate: ((None, None), (-0.1, 0.1), (None, None)), \
-                  rotate: ((None, None), (None, None), (-10.0, 10.0))))";
-    let kind = rigsmith::rig::TagKind::Command { module: "control".into(), params: params.into(), feature: None };
-    let tag = rigsmith::rig::TagData { uid: Uid(77), enabled: true, comment: String::new(), kind };
-    stage.edit(vec![RigEdit::AddTag { joint: Uid(2), tag: Box::new(tag), index: 0 }]);
-    stage.step(BuildStep::All);
-    let built = &stage.get::<Built>(stage.rig).unwrap().0;
-    let control = built.nodes.iter().find(|node| node.kind == NodeType::Control);
-    let control = control.unwrap_or_else(|| panic!("no control in {:?}", built.nodes)).uid;
-    (stage, control)
-}
-
-#[test]
-fn channels_and_limits_hold_for_whoever_writes() {
-    let far = PoseOffset {
-        translation: Vec3::splat(5.0),
-        rotation: Quat::from_rotation_z(core::f32::consts::FRAC_PI_2),
-        scale: Vec3::splat(3.0),
-    };
-    let check = |stage: &Stage, control: Uid, who: &str| {
-        let entity = stage.node(control).unwrap();
-        let rest = *stage.get::<rigsmith::rig::RestTransform>(entity).unwrap();
-        let offset = PoseOffset::between(&rest, stage.get::<Transform>(entity).unwrap());
-        assert!(offset.translation.distance(Vec3::new(0.0, 0.1, 0.0)) < 1e-6, "{who}: {offset:?}");
-        let angle = offset.rotation.angle_between(Quat::IDENTITY).to_degrees();
-        assert!((angle - 10.0).abs() < 1e-3, "{who}: {angle}");
-        assert!(offset.scale.distance(Vec3::ONE) < 1e-6, "{who}: {offset:?}");
-        // The joint that follows the control is held, too.
-        let tip = stage.get::<GlobalTransform>(stage.node(Uid(3)).unwrap()).unwrap().translation();
-        let wanted = Vec3::new(-(10.0_f32.to_radians().sin()), 2.1 + 10.0_f32.to_radians().cos(), 0.0);
-        assert!(tip.distance(wanted) < 1e-4, "{who}: {tip}, not {wanted}");
-        assert!(stage.off() <= NEAR, "{who}");
-    };
-
-    let (mut stage, control) = limited();
-    let entity = stage.node(control).unwrap();
-    let rest = *stage.get::<rigsmith::rig::RestTransform>(entity).unwrap();
-    *stage.app.world_mut().get_mut::<Transform>(entity).unwrap() = far.on(&rest);
-    stage.app.update();
-    check(&stage, control, "code");
-
-    let (mut stage, control) = limited();
-    stage.change(Change::Do(Operation::Pose(vec![(control, far)])));
-    check(&stage, control, "an edit");
-    stage.change(Change::Undo);
-    let entity = stage.node(control).unwrap();
-    let rest = *stage.get::<rigsmith::rig::RestTransform>(entity).unwrap();
-    assert!(PoseOffset::between(&rest, stage.get::<Transform>(entity).unwrap()).translation.length() < 1e-6);
-
-    // Limits that come later hold a pose that is there already.
-    let (mut stage, control) = limited();
-    let loose = {
-        let mut tag = stage.document().find_tag(Uid(77)).unwrap().1.clone();
-        tag.kind = rigsmith::rig::TagKind::Command { module: "control".into(), params: "()".into(), feature: None };
-        tag
-    };
-    stage.edit(vec![RigEdit::SetTag(Uid(2), Box::new(loose))]);
-    let entity = stage.node(control).unwrap();
-    *stage.app.world_mut().get_mut::<Transform>(entity).unwrap() = far.on(&rest);
-    stage.app.update();
-    assert!(stage.get::<Transform>(entity).unwrap().translation.x > 4.0, "nothing holds it now");
-    stage.change(Change::Undo);
-    check(&stage, control, "limits that come back");
-}
-
-/// Controls whose kinematics has no effect are neither seen nor picked; a blend of both shows both.
-#[test]
-fn controls_without_effect_are_hidden() {
-    let mut stage = biped();
-    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
-    let limbs = built.switches.iter().filter_map(|switch| match &switch.matching {
-        rigsmith::rig::Matching::IkFk { fk, goal, .. } if *goal != switch.control => {
-            Some((switch.control, switch.attribute.to_string(), fk.clone(), *goal))
-        }
-        _ => None,
-    });
-    let limbs: Vec<_> = limbs.collect();
-    assert!(limbs.len() >= 4, "arms and legs");
-    let visible = |stage: &Stage, node: Uid| {
-        let entity = stage.node(node).unwrap();
-        stage.get::<rigsmith::plugins::controls::NodeVisible>(entity).unwrap().0
-    };
-    // The control that carries a goal: a foot's goal hangs below its control.
-    let index = built.index();
-    let carrier = |goal: Uid| {
-        let mut at = &built.nodes[index[&goal]];
-        while at.kind != NodeType::Control {
-            at = &built.nodes[at.parent.expect("a control carries the goal")];
-        }
-        at.uid
-    };
-    for (control, attribute, fk, goal) in limbs {
-        for (value, forward, inverse) in [(0.0, true, false), (0.4, true, true), (1.0, false, true)] {
-            let edit = RigEdit::SetAttributeValue(control, attribute.clone(), Some(value));
-            stage.edit(vec![edit]);
-            assert_eq!(visible(&stage, carrier(goal)), inverse, "the goal at {value}");
-            for node in fk.iter().filter(|node| **node != control) {
-                assert_eq!(visible(&stage, *node), forward, "a forward control at {value}");
-            }
-        }
-    }
-}
-
-/// Entities of the rig with a component that was written after a tick, with the components' names.
-fn written_since(stage: &Stage, tick: bevy::ecs::change_detection::Tick) -> Vec<(Entity, String)> {
-    let world = stage.app.world();
-    let now = world.read_change_tick();
-    let mut found = Vec::new();
-    for entity in world.iter_entities() {
-        let is_of_rig = entity.contains::<rigsmith::plugins::schema::NodeOf>()
-            || entity.contains::<rigsmith::plugins::schema::TagOf>()
-            || entity.contains::<rigsmith::plugins::schema::GroupOf>()
-            || entity.contains::<rigsmith::plugins::schema::Constrains>();
-        if !is_of_rig {
-            continue;
-        }
-        for component in entity.archetype().components() {
-            let ticks = entity.get_change_ticks_by_id(*component);
-            if ticks.is_some_and(|ticks| ticks.is_changed(tick, now)) {
-                let name = world.components().get_name(*component).map(|name| name.to_string()).unwrap_or_default();
-                found.push((entity.id(), name));
-            }
-        }
-    }
-    found
-}
-
-/// An edit of one tag writes the components of that tag and of what it made, and no other.
-#[test]
-fn an_edit_of_one_tag_touches_only_what_changed() {
-    let mut stage = biped();
-    (0..3).for_each(|_| stage.app.update());
-    let tag = stage.document().walk().flat_map(|joint| joint.data.tags.clone()).find(|tag| {
-        matches!(&tag.kind, rigsmith::rig::TagKind::Command { module, params, .. }
-            if module == "control" && params.starts_with("()") | params.contains("shape_scale"))
-    });
-    let mut tag = tag.expect("a control with a scaled shape");
-    let joint = stage.document().find_tag(tag.uid).unwrap().0.data.uid;
-    let rigsmith::rig::TagKind::Command { params, .. } = &mut tag.kind else { unreachable!() };
-    let start = params.find("shape_scale").unwrap();
-    let end = start + params[start..].find(')').unwrap();
-    params.replace_range(start..=end, "shape_scale: (1.5, 1.25, 1.75)");
-    let uid = tag.uid;
-    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
-    let of_tag = |node: Uid| {
-        let origin = built.node(node).and_then(|node| node.origin.clone());
-        origin.is_some_and(|origin| origin.command == uid)
-    };
-    let tick = stage.app.world().read_change_tick();
-    stage.edit(vec![RigEdit::SetTag(joint, Box::new(tag))]);
-    let written = written_since(&stage, tick);
-    let controls = written.iter().filter(|(_, name)| name.ends_with("schema::Control")).count();
-    assert!(controls > 0, "the control's shape is written: {written:?}");
-    for (entity, name) in &written {
-        let node = *stage.get::<Uid>(*entity).unwrap();
-        assert!(node == uid || of_tag(node), "{name} of {node}, which the tag did not make");
-        assert!(!name.contains("Transform"), "{name} of {node}: nothing moved");
-    }
-
-    // A pose moves what hangs on it and touches nothing else.
-    let (_, control) = hand_and_control(&stage);
-    stage.app.update();
-    let tick = stage.app.world().read_change_tick();
-    stage.app.world_mut().get_mut::<Transform>(control).unwrap().translation.y += 0.01;
-    stage.app.update();
-    let written = written_since(&stage, tick);
-    for (entity, name) in &written {
-        assert!(name.contains("Transform"), "a pose writes {name} of {entity}");
-    }
-    let entities: std::collections::BTreeSet<Entity> = written.iter().map(|(entity, _)| *entity).collect();
-    assert!(entities.len() < built.nodes.len() / 2, "{} of {} nodes", entities.len(), built.nodes.len());
 }

@@ -1,16 +1,23 @@
 //! World and document, thousands of random steps of both kinds: equal after each, and undone to the first bytes.
 
+use std::collections::BTreeMap;
+
 use bevy::prelude::*;
 use rigsmith::{
     plugins::{
-        commands::BuildStep,
+        commands::{Attributes, BuildStep, Built},
+        controls::SwitchRequest,
         document::{GroupEntities, JointEntities, TagEntities},
         history::RigHistory,
         runtime::RigRuntime,
         schema::{CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, Tag, TagOf, Tags},
     },
     prelude::*,
-    rig::{RestTransform, TagKind, template::write_template},
+    rig::{
+        PoseOffset, RestTransform, TagKind,
+        feature::{combined_features, set_feature},
+        template::write_template,
+    },
 };
 
 use super::{NEAR, Stage, shipped};
@@ -19,17 +26,30 @@ use crate::random::Random;
 /// Fails unless the entities say what the document says, all of it and nothing else.
 fn check(stage: &mut Stage, what: &str) {
     let rig = stage.document().clone();
+    // Commands may put joints below other nodes.
+    let built = stage.get::<Built>(stage.rig).map(|built| built.0.clone()).unwrap_or_default();
+    let parents: BTreeMap<Uid, Option<Uid>> =
+        (built.nodes.iter()).map(|node| (node.uid, node.parent.map(|parent| built.nodes[parent].uid))).collect();
+    let mut siblings: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();
     let joints: Vec<Entity> = rig
         .walk()
         .map(|joint| {
             let entity = stage.get::<JointEntities>(stage.rig).unwrap().get(joint.data.uid);
             let entity = entity.unwrap_or_else(|| panic!("{what}: joint {} has no entity", joint.data.uid));
             let data = &joint.data;
+            let parent = parents.get(&data.uid).copied().unwrap_or(joint.parent);
+            let parent = parent.map_or(stage.rig, |parent| stage.node(parent).unwrap());
+            let above = stage.get::<ChildOf>(entity).map(ChildOf::parent);
+            assert_eq!(above, Some(parent), "{what}: the parent of {}", data.uid);
+            siblings.entry(parent).or_default().push(entity);
+            let name = stage.get::<Name>(entity).map(Name::as_str);
+            assert_eq!(name, data.label.as_deref(), "{what}: the name of {}", data.uid);
             assert_eq!(stage.get::<Uid>(entity), Some(&data.uid), "{what}");
             assert_eq!(stage.get::<NodeLabel>(entity).map(|label| &label.0), data.label.as_ref(), "{what}");
             assert_eq!(stage.get::<RestTransform>(entity), Some(&data.rest), "{what}");
             let group = stage.get::<InGroup>(entity).map(|group| *stage.get::<Uid>(group.0).unwrap());
-            assert_eq!(group, data.group, "{what}");
+            let is_there = data.group.map(|group| rig.group(group).is_some());
+            assert_eq!(group, data.group, "{what}: the group of {}, which is there: {is_there:?}", data.uid);
             let tags: Vec<Uid> = stage
                 .get::<Tags>(entity)
                 .map_or_else(Vec::new, |tags| tags.iter().map(|tag| *stage.get::<Uid>(tag).unwrap()).collect());
@@ -58,10 +78,24 @@ fn check(stage: &mut Stage, what: &str) {
             entity
         })
         .collect();
+    for (parent, wanted) in &siblings {
+        let children = stage.get::<Children>(*parent).unwrap();
+        let order: Vec<Entity> = children.iter().filter(|child| wanted.contains(child)).collect();
+        assert_eq!(&order, wanted, "{what}: the order of siblings");
+    }
+    let is_running = stage.get::<RigRuntime>(stage.rig).is_some();
+    for node in built.nodes.iter().filter(|node| is_running && !node.attributes.is_empty()) {
+        let values = stage.get::<Attributes>(stage.node(node.uid).unwrap()).unwrap();
+        for attribute in node.attributes.iter() {
+            let value = stage.runtime().state().attribute(node.uid, &attribute.name);
+            assert_eq!(values.0.get(&*attribute.name).copied(), value, "{what}: {} of {}", attribute.name, node.name);
+        }
+    }
     for group in rig.groups() {
         let entity = stage.get::<GroupEntities>(stage.rig).unwrap().get(group.uid).unwrap();
         let told = stage.get::<LocalGroup>(entity).unwrap();
         assert_eq!((&told.name, told.color, told.enabled), (&group.name, group.color, group.enabled), "{what}");
+        assert_eq!(stage.get::<Name>(entity).map(Name::as_str), Some(group.name.as_str()), "{what}");
     }
     let world = stage.app.world_mut();
     let groups = world.query::<&LocalGroup>().iter(world).count();
@@ -77,8 +111,8 @@ fn check(stage: &mut Stage, what: &str) {
     }
 }
 
-/// One random deed, and its name.
-fn step(stage: &mut Stage, random: &mut Random) -> String {
+/// One random deed: its name, and whether the app has taken it up.
+fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
     let rig = stage.document().clone();
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let tags: Vec<Uid> = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
@@ -97,7 +131,7 @@ fn step(stage: &mut Stage, random: &mut Random) -> String {
         .map(|built| built.iter().map(|(_, entity)| entity).filter(is_alive).collect())
         .unwrap_or_default();
     let number = random.below(1000);
-    let what = random.below(24);
+    let what = random.below(32);
     let rig_entity = stage.rig;
     let world = stage.app.world_mut();
     let translation = Vec3::new(0.0, 0.1 + number as f32 * 1e-3, 0.02);
@@ -198,41 +232,119 @@ fn step(stage: &mut Stage, random: &mut Random) -> String {
                 }));
             }
         }
+        (24, _, _, Some(group)) => {
+            let mut group = world.get_mut::<LocalGroup>(group).unwrap();
+            match random.below(3) {
+                0 => group.name = format!("n{number}"),
+                1 => group.color = [random.unit(), random.unit(), random.unit()],
+                _ => (group.name, group.color) = (String::new(), [number as f32, -1.0, f32::NAN]),
+            }
+        }
+        (25, _, Some(tag), _) => {
+            if let Some(mut command) = world.get_mut::<CommandTag>(tag) {
+                match random.below(4) {
+                    0 => command.params = "()".into(),
+                    1 => command.params = format!("(size: {number}, shape: \"square\")"),
+                    2 => command.params = "(at: ".into(),
+                    _ => command.module = ["null", "control", "nothing"][number % 3].into(),
+                }
+            }
+        }
+        (26, _, Some(tag), _) => {
+            if let Some(mut feature) = world.get_mut::<FeatureTag>(tag) {
+                match random.below(4) {
+                    0 => feature.name = format!("f{number}"),
+                    1 => feature.switch = ["", "a", "b"][number % 3].into(),
+                    2 => feature.choice = ["", "solver"][number % 2].into(),
+                    _ => feature.kind = ["generic", "ik", "nothing"][number % 3].into(),
+                }
+            }
+        }
+        (27, _, Some(tag), _) => {
+            if let Some(bearer) = world.get::<TagOf>(tag).map(|of| of.0) {
+                let count = world.get::<Tags>(bearer).map_or(0, |tags| tags.len());
+                world.entity_mut(bearer).insert_related::<TagOf>(number % count.max(1), &[tag]);
+            }
+        }
+        (28, ..) => {
+            let with: Vec<Entity> =
+                created.iter().copied().filter(|entity| world.get::<Attributes>(*entity).is_some()).collect();
+            if let Some(mut values) = random.of(&with).and_then(|entity| world.get_mut::<Attributes>(entity)) {
+                let names: Vec<String> = values.0.keys().cloned().collect();
+                if !names.is_empty() {
+                    values.0.insert(random.pick(&names), 2.0 * random.signed());
+                }
+            }
+        }
+        (29, ..) => {
+            let nodes: Vec<Uid> = (created.iter().filter_map(|entity| world.get::<Uid>(*entity)).copied())
+                .chain(joints.iter().copied())
+                .collect();
+            if let Some(node) = random.of(&nodes) {
+                let offset =
+                    PoseOffset { translation: 0.02 * random.point(), rotation: random.rotation(), scale: Vec3::ONE };
+                stage.change(Change::Do(Operation::Pose(vec![(node, offset)])));
+            }
+        }
+        (30, ..) => {
+            let built = stage.get::<Built>(stage.rig).map(|built| built.0.clone()).unwrap_or_default();
+            if !built.switches.is_empty() {
+                let switch = random.pick(&built.switches);
+                let request = SwitchRequest {
+                    rig: rig_entity,
+                    control: switch.control,
+                    attribute: switch.attribute.to_string(),
+                    value: (number % 3) as f32,
+                };
+                stage.app.world_mut().write_message(request);
+            }
+        }
+        (31, ..) => {
+            let features = combined_features(&rig);
+            if !features.is_empty() {
+                let feature = random.pick(&features);
+                stage.edit(set_feature(&rig, &feature.key, random.chance(2)).unwrap_or_default());
+            }
+        }
         _ => {}
     }
     // Sometimes several in one frame.
-    if random.below(4) > 0 {
+    let is_seen = random.below(4) > 0;
+    if is_seen {
         stage.app.update();
         stage.app.update();
     }
-    format!("deed {what} ({number}) on joint {joint:?}, tag {tag:?}, group {group:?}")
+    (format!("deed {what} ({number}) on joint {joint:?}, tag {tag:?}, group {group:?}"), is_seen)
 }
 
 #[test]
 fn world_and_document_stay_equal_through_random_deeds() {
-    let steps: usize = std::env::var("RIGSMITH_STEPS").ok().and_then(|count| count.parse().ok()).unwrap_or(1200);
+    let steps: usize = std::env::var("RIGSMITH_STEPS").ok().and_then(|count| count.parse().ok()).unwrap_or(2000);
     let templates = shipped();
-    let starts =
-        ["arm", "hand", "spine"].map(|start| templates.iter().find(|(name, _)| name == start).unwrap().1.clone());
-    for (number, rig) in starts.into_iter().enumerate() {
+    // The last one is edited for a while before it is built.
+    let starts = [("arm", true), ("hand", true), ("spine", true), ("arm", false)];
+    for (number, (start, is_built)) in starts.into_iter().enumerate() {
+        let rig = templates.iter().find(|(name, _)| name == start).unwrap().1.clone();
         let mut random = Random(7 + number as u64);
-        let mut stage = Stage::built(rig);
+        let mut stage = if is_built { Stage::built(rig) } else { Stage::new(rig) };
         let first = write_template(stage.document());
         let mut deeds: Vec<String> = Vec::new();
-        for round in 0..steps / 3 {
-            deeds.push(step(&mut stage, &mut random));
-            if round % 2 == 0 {
-                stage.app.update();
-                stage.app.update();
+        for round in 0..steps / 4 {
+            let (deed, is_seen) = step(&mut stage, &mut random);
+            deeds.push(deed);
+            if is_seen {
                 let last = deeds[deeds.len().saturating_sub(4)..].join("; ");
                 check(&mut stage, &format!("rig {number}, round {round}, the last ones: {last}"));
             }
         }
         stage.app.update();
-        while stage.get::<RigHistory>(stage.rig).unwrap().steps().1 > 0 {
+        loop {
+            let (names, done) = stage.get::<RigHistory>(stage.rig).unwrap().steps();
+            let Some(last) = done.checked_sub(1) else { break };
+            let what = format!("rig {number}, step {last} undone: {}", names[last]);
             stage.change(Change::Undo);
+            check(&mut stage, &what);
         }
-        check(&mut stage, "undone");
         assert_eq!(write_template(stage.document()), first, "rig {number} is back at its first bytes");
     }
 }
