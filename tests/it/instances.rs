@@ -1,5 +1,8 @@
 //! Characters of a game: instances of templates, and templates whose files are saved while they move.
 
+mod meshes;
+mod reloads;
+
 use std::{
     collections::BTreeMap,
     fs,

@@ -7,7 +7,7 @@ use super::{
     shorthand::{Declarations, TagForm},
     write::{feature_summaries, needs_summary},
 };
-use crate::rig::{Rig, Uid};
+use crate::rig::{Rig, Uid, part::PartInstance};
 
 /// The header with the uid that follows from the name, and, where the file is complete and says none, the number of
 /// joints and the named features. What parts bring is in other files: see [`TemplateHeader::complete_from`].
@@ -37,6 +37,31 @@ impl TemplateHeader {
         self.joint_count = rig.len();
         self.features = feature_summaries(rig);
         self.needs = needs_summary(rig);
+    }
+}
+
+impl TemplateHeader {
+    /// Sets the number of joints and the named features of a template with parts, each as it is [fitted](PartInstance::fitted).
+    pub fn complete_from_parts(&mut self, own: &Rig, parts: &[(PartInstance, Rig)]) {
+        self.joint_count = own.len();
+        let mut features: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
+        let mut add = |rig: &Rig| {
+            for FeatureSummary { kind, name, switches } in feature_summaries(rig) {
+                features.entry((kind, name)).or_default().extend(switches);
+            }
+        };
+        add(own);
+        for (instance, part) in parts {
+            let brings = instance.onto.is_empty() || instance.adds;
+            self.joint_count += if brings { part.len().saturating_sub(instance.onto.len()) } else { 0 };
+            add(part);
+        }
+        let summary = |((kind, name), mut switches): ((String, String), Vec<String>)| {
+            switches.sort_unstable();
+            switches.dedup();
+            FeatureSummary { kind, name, switches }
+        };
+        self.features = features.into_iter().map(summary).collect();
     }
 }
 

@@ -94,6 +94,34 @@ impl<'d, 'a> Patch<'d, 'a> {
         }
     }
 
+    /// Adds elements behind the last one of the list that is the value of a field.
+    pub fn push(&mut self, node: NodeId, field: &str, texts: &[String]) {
+        if texts.is_empty() {
+            return;
+        }
+        let list = self.tree.field(node, field).map(|item| item.value);
+        match list.map(|list| (list, self.tree.node(list).items.len())) {
+            Some((list, count)) if count > 0 => {
+                for text in texts {
+                    self.insert(list, Some(count - 1), text);
+                }
+            }
+            _ => self.set(node, field, &format!("[{}]", texts.join(", "))),
+        }
+    }
+
+    /// Takes elements out of the list that is the value of a field, and the field if none is left.
+    pub fn pull(&mut self, node: NodeId, field: &str, places: &[usize]) {
+        let elements = self.tree.elements(node, field);
+        if !places.is_empty() && places.len() == elements.len() {
+            return self.set_or_remove(node, field, None);
+        }
+        for place in places {
+            let range = self.block(&elements[*place]);
+            self.changes.push((range, String::new()));
+        }
+    }
+
     /// Puts text before the first item of a struct.
     pub fn put_first(&mut self, node: NodeId, text: &str) {
         self.insert(node, None, text);
