@@ -7,7 +7,7 @@ use bevy::{
 };
 use rigsmith::{
     files::{RealDisk, load_model},
-    instance::{InstanceSkins, RigInstance, RunningTemplate, SkinBound},
+    instance::{InstanceSkins, RigInstance, RigInstancePlugin, RunningTemplate, SkinBound},
     mesh::{
         model::Trs,
         obj::{ObjSettings, read_model},
@@ -22,6 +22,7 @@ use rigsmith::{
 
 use std::{
     fs,
+    path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -131,8 +132,10 @@ fn a_loaded_character_with_an_animation_of_its_own_is_moved_by_an_instance() {
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), &write_template(&rig));
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
-        let mut game = Game::still();
-        game.app.add_plugins(AnimationPlugin).init_resource::<Bindings>();
+        let mut game = Game::with(RigInstancePlugin::default(), Path::new("assets"), |app| {
+            app.add_plugins(AnimationPlugin);
+        });
+        game.app.init_resource::<Bindings>();
         game.app.add_observer(|bound: On<SkinBound>, mut bindings: ResMut<Bindings>| {
             bindings.0.push((bound.instance, bound.unknown.clone()));
         });

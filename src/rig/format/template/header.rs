@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     FeatureSummary, TemplateHeader,
     shorthand::{Declarations, TagForm},
-    write::{feature_summaries, needs_summary},
+    write::{feature_summaries, features_of, needs_summary},
 };
 use crate::rig::{Rig, Uid, part::PartInstance};
 
@@ -45,16 +45,18 @@ impl TemplateHeader {
     pub fn complete_from_parts(&mut self, own: &Rig, parts: &[(PartInstance, Rig)]) {
         self.joint_count = own.len();
         let mut features: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
-        let mut add = |rig: &Rig| {
-            for FeatureSummary { kind, name, switches } in feature_summaries(rig) {
+        let mut add = |rig: &Rig, joints: usize| {
+            for FeatureSummary { kind, name, switches } in features_of(rig.walk().take(joints)) {
                 features.entry((kind, name)).or_default().extend(switches);
             }
         };
-        add(own);
+        add(own, own.len());
         for (instance, part) in parts {
-            let brings = instance.onto.is_empty() || instance.adds;
-            self.joint_count += if brings { part.len().saturating_sub(instance.onto.len()) } else { 0 };
-            add(part);
+            // Joints of a part beyond those that it goes onto stay out, with their tags, unless it adds them.
+            let there = instance.onto.len();
+            let joints = if there == 0 || instance.adds { part.len() } else { there.min(part.len()) };
+            self.joint_count += joints.saturating_sub(there);
+            add(part, joints);
         }
         let summary = |((kind, name), mut switches): ((String, String), Vec<String>)| {
             switches.sort_unstable();

@@ -23,7 +23,7 @@ pub(super) fn header_labels(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &
             patch.set(item.value, "joint", &now);
         }
     }
-    patch.pull(root, "sockets", &gone);
+    patch.exchange(root, "sockets", &gone, &[]);
     for chain in tree.elements(root, "chains") {
         for item in tree.elements(chain.value, "joints") {
             let label: Option<String> = ron::from_str(tree.written(item.value)).ok();

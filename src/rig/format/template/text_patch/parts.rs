@@ -8,6 +8,7 @@ use super::{Rewriter, labels::header_labels, patch::Patch, tag_text};
 use crate::rig::{
     Rig, RigJoint, TagData, Uid,
     format::{
+        layout::value_on_one_line,
         template::{quoted, shorthand::Declarations, write::feature_uids},
         tree::{NodeId, Tree},
     },
@@ -129,6 +130,25 @@ enum Target {
     Tag(Uid),
 }
 
+/// What becomes of the changes of an instance in the text.
+#[derive(Default)]
+struct Entries {
+    /// The instance's element.
+    node: NodeId,
+    /// Changes that come, each on one line.
+    fresh: Vec<String>,
+    /// Numbers of the changes that go.
+    gone: Vec<usize>,
+}
+
+/// A change of the list of features that are off.
+enum Switched {
+    /// The number of the one that is on again.
+    On(usize),
+    /// The name of one that is off now.
+    Off(String),
+}
+
 struct Overrides<'d, 'a> {
     rig: &'d Rig,
     rigs: &'d PartRigs<'d>,
@@ -144,7 +164,8 @@ impl Overrides<'_, '_> {
         let (instance, part) = &self.rigs.parts[number];
         self.labels(node, instance);
         let entries = self.entries(node, instance, part);
-        let (mut fresh, mut gone) = (Vec::new(), Vec::new());
+        let mut changes = Entries { node, ..Entries::default() };
+        let (mut off, mut on) = (Vec::new(), Vec::new());
         for (place, joint) in part.walk().enumerate() {
             let source = joint.data.uid;
             let here = match instance.onto.get(place) {
@@ -167,26 +188,22 @@ impl Overrides<'_, '_> {
                     is_set,
                     name: instance.name_of_joint(part, place),
                 },
-                node,
                 entry,
                 &new,
-                &mut fresh,
-                &mut gone,
+                &mut changes,
             );
             for tag in &joint.data.tags {
                 let entry = entries.get(&Target::Tag(tag.uid)).copied();
-                if entry.is_some() || !self.switch(node, instance, part, tag) {
-                    self.tag(instance, part, tag.uid, node, entry, &mut fresh, &mut gone);
+                let switched = entry.is_none().then(|| self.switch(instance, part, tag)).flatten();
+                match switched {
+                    Some(Switched::On(place)) => on.push(place),
+                    Some(Switched::Off(name)) => off.push(quoted(&name)),
+                    None => self.tag((instance, part), tag.uid, entry, &mut changes),
                 }
             }
         }
-        self.patch.pull(node, "changes", &gone);
-        let all_gone = !gone.is_empty() && gone.len() == self.tree.elements(node, "changes").len();
-        if all_gone && !fresh.is_empty() {
-            self.patch.set(node, "changes", &format!("[{}]", fresh.join(", ")));
-        } else {
-            self.patch.push(node, "changes", &fresh);
-        }
+        self.patch.exchange(node, "off", &on, &off);
+        self.patch.exchange(node, "changes", &changes.gone, &changes.fresh);
     }
 
     /// Writes other labels of the joints that a part goes onto and hangs on.
@@ -199,6 +216,11 @@ impl Overrides<'_, '_> {
             self.patch.set(node, "parent", &quoted(&now));
         }
         let onto: Vec<Option<String>> = instance.onto.iter().map(|label| renamed(label)).collect();
+        // The uid of a part without a name follows from the labels.
+        let follows = instance.name.is_empty() && self.tree.field(node, "uid").is_none();
+        if follows && onto.iter().any(Option::is_some) {
+            self.patch.put_first(node, &format!("uid: \"{}\"", instance.uid));
+        }
         for (item, now) in self.tree.elements(node, "onto").iter().zip(onto) {
             if let Some(now) = now {
                 self.patch.replace(item.value, &quoted(&now));
@@ -222,36 +244,25 @@ impl Overrides<'_, '_> {
         entries
     }
 
-    /// Turns a feature on or off by its name in the list `off`. `false` if that does not say it.
-    fn switch(&mut self, node: NodeId, instance: &PartInstance, part: &Rig, tag: &TagData) -> bool {
-        let Some(name) = switch_name(tag) else { return false };
+    /// Change of the list `off` that turns a feature on or off; `None` if that does not say what is different.
+    fn switch(&self, instance: &PartInstance, part: &Rig, tag: &TagData) -> Option<Switched> {
+        let name = switch_name(tag)?;
         let here = instance.uid_of(tag.uid);
-        let (Some((_, was)), Some((_, is))) = (self.rigs.before.find_tag(here), self.rig.find_tag(here)) else {
-            return false;
-        };
+        let ((_, was), (_, is)) = (self.rigs.before.find_tag(here)?, self.rig.find_tag(here)?);
         let tags = || part.walk().flat_map(|joint| &joint.data.tags);
         let is_only = tags().filter(|other| switch_name(other).as_ref() == Some(&name)).count() == 1;
         let place = instance.off.iter().position(|off| *off == name);
         if was.enabled == is.enabled || !is_only || was.comment != is.comment || was.kind != is.kind {
-            return false;
+            return None;
         }
         match (is.enabled, place) {
-            (true, Some(place)) if tag.enabled => self.patch.pull(node, "off", &[place]),
-            (false, None) => self.patch.push(node, "off", &[quoted(&name)]),
-            _ => return false,
+            (true, Some(place)) if tag.enabled => Some(Switched::On(place)),
+            (false, None) => Some(Switched::Off(name)),
+            _ => None,
         }
-        true
     }
 
-    fn joint(
-        &mut self,
-        joint: JointPlace,
-        node: NodeId,
-        entry: Option<usize>,
-        new: &[&TagData],
-        fresh: &mut Vec<String>,
-        gone: &mut Vec<usize>,
-    ) {
+    fn joint(&mut self, joint: JointPlace, entry: Option<usize>, new: &[&TagData], changes: &mut Entries) {
         let of = |rig: &'_ Rig| rig.joint(joint.here).map(|joint| joint.data.clone());
         let (Some(before), Some(now), Some(plain)) = (of(self.rigs.before), of(self.rig), of(self.rigs.plain)) else {
             return;
@@ -270,11 +281,11 @@ impl Overrides<'_, '_> {
                 said.push(format!("tags: [{}]", texts.join(", ")));
             }
             if let Some(name) = joint.name.filter(|_| !said.is_empty()) {
-                fresh.push(format!("(joint: {}, {})", quoted(name), said.join(", ")));
+                changes.fresh.push(format!("(joint: {}, {})", quoted(name), said.join(", ")));
             }
             return;
         };
-        let element = self.tree.elements(node, "changes")[number].value;
+        let element = self.tree.elements(changes.node, "changes")[number].value;
         let mut left = self.fields_of(element);
         for (field, value) in fields {
             left.retain(|other| *other != field);
@@ -303,28 +314,18 @@ impl Overrides<'_, '_> {
         if !removed.is_empty() && removed.len() == elements.len() && texts.is_empty() {
             left.retain(|field| *field != "tags");
         }
-        match texts.is_empty() || removed.len() < elements.len() {
-            true => {
-                self.patch.pull(element, "tags", &removed);
-                self.patch.push(element, "tags", &texts);
-            }
-            false => self.patch.set(element, "tags", &format!("[{}]", texts.join(", "))),
-        }
+        self.patch.exchange(element, "tags", &removed, &texts);
         if left.is_empty() && texts.is_empty() {
-            gone.push(number);
+            changes.gone.push(number);
         }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "two lists collect what becomes of the changes")]
     fn tag(
         &mut self,
-        instance: &PartInstance,
-        part: &Rig,
+        (instance, part): (&PartInstance, &Rig),
         source: Uid,
-        node: NodeId,
         entry: Option<usize>,
-        fresh: &mut Vec<String>,
-        gone: &mut Vec<usize>,
+        changes: &mut Entries,
     ) {
         let here = instance.uid_of(source);
         let of = |rig: &'_ Rig| rig.find_tag(here).map(|(_, tag)| tag.clone());
@@ -355,11 +356,12 @@ impl Overrides<'_, '_> {
                 said.push(format!("params: ({})", set.join(", ")));
             }
             if !said.is_empty() {
-                fresh.push(format!("(tag: {}, {})", quoted(&instance.name_of_tag(part, source)), said.join(", ")));
+                let name = quoted(&instance.name_of_tag(part, source));
+                changes.fresh.push(format!("(tag: {name}, {})", said.join(", ")));
             }
             return;
         };
-        let element = self.tree.elements(node, "changes")[number].value;
+        let element = self.tree.elements(changes.node, "changes")[number].value;
         let mut left = self.fields_of(element);
         for (field, value) in fields {
             left.retain(|other| *other != field);
@@ -372,7 +374,7 @@ impl Overrides<'_, '_> {
             left.retain(|field| *field != "params");
         }
         if left.is_empty() {
-            gone.push(number);
+            changes.gone.push(number);
         }
     }
 
@@ -406,7 +408,7 @@ impl Overrides<'_, '_> {
     }
 
     fn tag_text(&self, tag: &TagData) -> String {
-        let long = || tag_text(self.rig, tag, &self.features);
+        let long = || value_on_one_line(&tag_text(self.rig, tag, &self.features));
         self.words.styled(&short_tag(self.rig, tag, &self.features).unwrap_or_else(long))
     }
 }

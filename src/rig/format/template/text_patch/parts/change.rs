@@ -7,6 +7,7 @@ use bevy::math::{Quat, Vec3};
 use crate::rig::{
     JointData, Rig, TagData, TagKind, Uid, degrees,
     format::{
+        layout::value_on_one_line,
         template::{quoted, shorthand::TAG_FIELDS, text_patch::canonical, vector},
         tree::{Item, Tree},
     },
@@ -177,7 +178,8 @@ impl TagDiff<'_> {
             let value = Some(value.clone());
             if !is_same(&find(&before, key), &value) {
                 let is_of_part = is_same(&find(&plain, key), &value);
-                changed.push((key.clone(), value.filter(|_| !is_of_part).map(|value| self.words.styled(&value))));
+                let text = value.filter(|_| !is_of_part).map(|value| value_on_one_line(&self.words.styled(&value)));
+                changed.push((key.clone(), text));
             }
         }
         let gone = before.iter().filter(|(key, _)| find(&now, key).is_none());
