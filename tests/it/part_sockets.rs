@@ -37,11 +37,11 @@ const ARM: &str = r#"(
                 (tag: "control/lower", param: "relative_size"),
             ],
         ),
-        (name: "shape", default: "ring", form: Menu(options: ["cube", "ring"]), sets: [(tag: "control/lower", param: "shape")]),
+        (name: "shape", default: "circle", form: Menu(options: ["cube", "circle"]), sets: [(tag: "control/lower", param: "shape")]),
     ],
     joints: [
         (label: "upper", tags: [control(relative_size: 0.5)]),
-        (label: "lower", parent: "upper", translation: (0, 0.4, 0), tags: [control(relative_size: 0.5, shape: "ring")]),
+        (label: "lower", parent: "upper", translation: (0, 0.4, 0), tags: [control(relative_size: 0.5, shape: "circle")]),
     ],
 )
 "#;
@@ -139,7 +139,7 @@ fn sockets_and_options_that_do_not_fit_are_told_with_their_place() {
         (one("(part: \"arm.rig.ron\", options: {\"sze\": 1.0})"), "no option \"sze\"; did you mean \"size\"?", 7),
         (one("(part: \"arm.rig.ron\", options: {\"size\": 5.0})"), "takes a number from 0.1 to 2, not 5.0", 7),
         (one("(part: \"arm.rig.ron\", options: {\"size\": \"big\"})"), "takes a number", 7),
-        (one("(part: \"arm.rig.ron\", options: {\"shape\": \"star\"})"), "one of \"cube\", \"ring\"", 7),
+        (one("(part: \"arm.rig.ron\", options: {\"shape\": \"star\"})"), "one of \"cube\", \"circle\"", 7),
         (body("(name: \"a.b\", joint: \"body\")", "(part: \"tool.rig.ron\")"), "a name without points", 4),
         (
             body("(name: \"a\", joint: \"bdy\")", "(part: \"tool.rig.ron\")"),
@@ -166,7 +166,7 @@ fn a_header_lists_sockets_and_options() {
     assert_eq!((header.sockets[0].name.as_str(), header.sockets[0].joint.as_str()), ("hand_l", "lower"));
     let options: Vec<(&str, &str)> =
         header.options.iter().map(|option| (option.name.as_str(), option.default.as_str())).collect();
-    assert_eq!(options, [("size", "0.5"), ("shape", "\"ring\"")]);
+    assert_eq!(options, [("size", "0.5"), ("shape", "\"circle\"")]);
     assert!(header.options[0].form.is_some() && header.options[0].description == "Size of the controls");
 }
 
@@ -209,7 +209,8 @@ fn game() -> App {
 fn until(app: &mut App, is_so: impl Fn(&Told) -> bool) {
     let start = std::time::Instant::now();
     while !is_so(app.world().resource::<Told>()) {
-        assert!(start.elapsed() < super::bench::HANG, "nothing comes");
+        let failed = &app.world().resource::<Told>().failed;
+        assert!(start.elapsed() < super::bench::HANG, "nothing comes: {failed:?}");
         app.update();
         std::thread::sleep(std::time::Duration::from_millis(1));
     }

@@ -27,13 +27,17 @@ impl Stages {
     /// A rig with poses of a joint and of a control, a stored pose, an attribute value and weights; not built yet.
     fn new() -> Self {
         let rig = read_template(CHAIN.as_bytes()).unwrap().rig;
-        let tip = rig.find_label("tail_3").unwrap();
+        let [root, tip] = ["tail_1", "tail_3"].map(|label| rig.find_label(label).unwrap());
         let mut app = test_app();
         let entity = app.world_mut().spawn(rig).id();
         let mut stages = Self { app, rig: entity };
         stages.request(RigStage::Built);
         let built = stages.built();
-        let control = built.nodes.iter().find(|node| node.control.is_some()).unwrap().uid;
+        // Nodes stand in the order of the hierarchy: the first control is not that of the first joint.
+        let is_of_root = |node: &rigsmith::rig::BuiltNode| {
+            node.control.is_some() && node.origin.as_ref().is_some_and(|origin| origin.subject == root)
+        };
+        let control = built.nodes.iter().find(|node| is_of_root(node)).unwrap().uid;
         let turned = PoseOffset { rotation: Quat::from_rotation_z(0.7), ..PoseOffset::IDENTITY };
         let moved = PoseOffset { translation: Vec3::X * 0.1, ..PoseOffset::IDENTITY };
         let weights = Weights { starts: vec![0, 1], joints: vec![0], values: vec![1.0] };
