@@ -58,7 +58,12 @@ impl FileWatch {
             return None;
         }
         self.read = Some(Instant::now());
-        let content = read_capped(disk, &self.path, self.limit).ok()?;
+        let content = match read_capped(disk, &self.path, self.limit) {
+            Ok(content) => content,
+            // A file may be emptied before it is written; one that stays empty is given out, too.
+            Err(ReadError::Empty { .. }) => Vec::new(),
+            Err(_) => return None,
+        };
         self.seen = state;
         if self.known.as_ref() == Some(&content) {
             self.next = None;

@@ -10,7 +10,7 @@ use rigsmith::{
 
 use super::{
     part_instances::{FINGER, hand, load},
-    template_text::{Dice, apply, plain},
+    template_text::{Dice, apply, plain, without_blanks},
 };
 
 /// A folder with a part and a template that uses it.
@@ -34,9 +34,45 @@ impl Desk {
     fn saved(&self, rig: &Rig) -> String {
         let path = self.path();
         assert_eq!(store_rig_over(&RealDisk, &path, rig, &[&path]).unwrap(), Vec::<String>::new());
-        assert_eq!(plain(load(&path)), plain(rig.clone()));
+        assert_eq!(said(load(&path)), said(rig.clone()));
         fs::read_to_string(path).unwrap()
     }
+}
+
+/// The template of a rig, with the parameters of every command in the order of their names, which means nothing: a parameter
+/// that a change sets comes behind those of the part.
+fn said(mut rig: Rig) -> String {
+    let tags: Vec<(Uid, TagData)> =
+        rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.clone()))).collect();
+    for (joint, mut tag) in tags {
+        if let TagKind::Command { params, .. } = &mut tag.kind {
+            *params = sorted(&without_blanks(params));
+            apply(&mut rig, RigEdit::SetTag(joint, Box::new(tag)));
+        }
+    }
+    plain(rig)
+}
+
+/// Parameters in the order of their names.
+fn sorted(params: &str) -> String {
+    let inside = params.trim().strip_prefix('(').and_then(|rest| rest.strip_suffix(')')).unwrap();
+    let (mut fields, mut depth, mut is_text) = (vec![String::new()], 0, false);
+    for c in inside.chars() {
+        match c {
+            '"' => is_text = !is_text,
+            '(' | '[' if !is_text => depth += 1,
+            ')' | ']' if !is_text => depth -= 1,
+            ',' if !is_text && depth == 0 => {
+                fields.push(String::new());
+                continue;
+            }
+            _ => {}
+        }
+        fields.last_mut().unwrap().push(c);
+    }
+    let mut fields: Vec<&str> = fields.iter().map(|field| field.trim()).filter(|field| !field.is_empty()).collect();
+    fields.sort_unstable();
+    format!("({})", fields.join(", "))
 }
 
 /// Lines of a text that another does not have.
@@ -300,7 +336,7 @@ fn a_value_of_the_bundled_biped_is_one_line() {
         assert!(added.len() <= 8 && added.iter().any(|added| added.contains(line)), "{added:#?}");
         in_a_line += usize::from(added.len() == 1);
         assert!(lines_beyond(&text, &saved).len() <= 1);
-        assert_eq!(plain(load(&out)), plain(rig));
+        assert_eq!(said(load(&out)), said(rig));
         changed += 1;
     }
     assert!(changed > 5 && in_a_line * 2 > changed, "{changed} {in_a_line}");

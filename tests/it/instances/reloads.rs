@@ -54,7 +54,8 @@ fn a_thousand_broken_files_on_the_disk_change_nothing_and_are_told() {
         save(&content);
         last = content;
         count += 1;
-        game.until("the report", |told| told.failed.len() == count);
+        let saved = String::from_utf8_lossy(&last);
+        game.until(&format!("the report of {saved:?}"), |told| told.failed.len() == count);
     }
     assert!(game.told().updated.is_empty());
     assert!(game.told().failed.iter().all(|told| told.contains("t.rig.ron")), "each has its file");
