@@ -558,5 +558,6 @@ fn the_template_that_a_rig_follows_is_kept_with_its_version() {
     let followed = ProjectTemplate { rig: project.rigs[0].uid(), path: file, base: Arc::new(template.base.clone()) };
     project.templates = vec![followed.clone()];
     folder.save(&project);
-    assert_eq!(folder.load().templates, [followed]);
+    let path = folder.0.path().join("work/../meshes/t.rig.ron");
+    assert_eq!(folder.load().templates, [ProjectTemplate { path, ..followed }]);
 }

@@ -1,10 +1,10 @@
-//! What an app hangs on joints of instances without a hierarchy.
+//! Entities that an app hangs on joints of instances without a hierarchy.
 
 use bevy::prelude::*;
 
 use super::NodeSlot;
 
-/// Writes the world transforms of what hangs on joints in [`InstanceMode::Direct`](super::InstanceMode): these have no local
+/// Writes the world transforms of entities below joints in [`InstanceMode::Direct`](super::InstanceMode): these have no local
 /// transforms, so Bevy's propagation ends there.
 pub(super) fn place_hung(
     joints: Query<(Ref<GlobalTransform>, Ref<Children>), (With<NodeSlot>, Without<Transform>)>,

@@ -130,7 +130,7 @@ enum Target {
     Tag(Uid),
 }
 
-/// What becomes of the changes of an instance in the text.
+/// Changes of an instance that come into its text and go out of it.
 #[derive(Default)]
 struct Entries {
     /// The instance's element.
