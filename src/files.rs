@@ -44,10 +44,10 @@ pub use identity::is_same_file;
 pub use load::{
     FileKind, LoadError, load_animation, load_gestures, load_model, load_rig_text, load_skin, load_template, stem,
 };
-pub use parts::{BUNDLED_CHARACTERS, BUNDLED_PARTS, PartFiles, bundled_characters, bundled_parts};
+pub use parts::{BUNDLED_CHARACTERS, BUNDLED_PARTS, PartFileError, PartFiles, bundled_characters, bundled_parts};
 pub use project::{
-    LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote, ProjectToSave,
-    load_project, project_files, store_project,
+    LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote,
+    ProjectTemplate, ProjectToSave, load_project, project_files, store_project,
 };
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};

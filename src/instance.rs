@@ -7,8 +7,10 @@
 //! A file that cannot be read, or whose build fails, changes nothing: it is told ([`RigFailed`]), and the next good save is
 //! taken over.
 //!
-//! An instance is as its template says. A rig that people edit, or that a mesh is bound to by Rigsmith, has a document of its
-//! own: [`RigSource`].
+//! A [`RigMesh`](crate::plugins::surface::RigMesh) of an instance is bound to the template's joints in the background, once for
+//! all instances with the mesh; [`SkinBound`] tells it. Skinned meshes that Bevy loaded below an instance are moved by it.
+//!
+//! An instance is as its template says. A rig that people edit has a document of its own: [`RigSource`].
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -27,7 +29,9 @@
 
 mod apply;
 mod asset;
+mod bodies;
 mod builds;
+mod folders;
 mod skins;
 mod source;
 
@@ -50,11 +54,14 @@ use self::builds::{Builds, Work};
 pub use self::skins::SharedMesh;
 pub use self::{
     asset::{RigTemplate, RigTemplateLoader, RigTemplateSaver},
+    bodies::InstanceSkins,
     builds::BuiltTemplate,
+    folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolderPlugin},
     skins::{BoundTo, SkinBound},
     source::{AcceptUpdate, RigSource, UPDATE, UpdateOffer},
 };
 use crate::{
+    algo::weights::WeightError,
     files::LOOK,
     mesh::model::Trs,
     modules,
@@ -64,7 +71,7 @@ use crate::{
     },
     processor::PoseNote,
     rig::{PoseOffset, RestTransform, SourceError, Uid, update::Change},
-    solve::program::ProgramError,
+    solve::program::{Exposed, ProgramError},
 };
 
 /// Plugin of instances. Add it after Bevy's [`AssetPlugin`] and [`RigPlugins`](crate::plugins::RigPlugins) where an app has
@@ -139,6 +146,10 @@ impl Plugin for RigInstancePlugin {
                 .chain(),
         );
         source::add(app);
+        app.init_resource::<bodies::InstanceSkins>().add_systems(
+            UpdateInstances,
+            (bodies::land_bodies, bodies::give_bodies, bodies::bind_bodies).chain().after(apply::update_instances),
+        );
         app.add_systems(UpdateInstances, skins::bind_skins.run_if(skins::is_due).after(apply::update_instances));
         #[cfg(feature = "draw")]
         app.add_systems(UpdateInstances, skins::share_meshes.after(apply::update_instances).before(skins::bind_skins));
@@ -151,6 +162,12 @@ impl Plugin for RigInstancePlugin {
 #[derive(Component, Debug, Clone, PartialEq, Eq)]
 #[require(InstanceMode, Transform)]
 pub struct RigInstance(pub Handle<RigTemplate>);
+
+/// Nodes that an instance in [`InstanceMode::Direct`] has as entities besides its joints and sockets. Without this component it
+/// has all controls; instances with the same nodes share a program. A node that the template does not have is told
+/// ([`RigFailed`]), and the instance has all controls then.
+#[derive(Component, Debug, Clone, PartialEq, Eq, Default)]
+pub struct ExposedNodes(pub Vec<Exposed>);
 
 /// The built template that an instance runs.
 #[derive(Component, Debug, Clone)]
@@ -214,6 +231,12 @@ pub enum TemplateError {
     /// The file cannot be loaded.
     #[error("{0}")]
     Load(String),
+    /// A mesh of the instance cannot be bound to the joints.
+    #[error("a mesh is not bound: {source}")]
+    CannotBind {
+        /// The reason.
+        source: WeightError,
+    },
 }
 
 fn named(file: Option<&Path>) -> String {
@@ -286,6 +309,7 @@ impl TemplateFiles<'_> {
 #[derive(SystemParam)]
 pub struct InstanceNodes<'w, 's> {
     instances: Query<'w, 's, (AnyOf<(&'static RunningTemplate, &'static Built)>, &'static RigRuntime)>,
+    sources: Query<'w, 's, &'static RigSource>,
 }
 
 impl InstanceNodes<'_, '_> {
@@ -299,6 +323,17 @@ impl InstanceNodes<'_, '_> {
         let labelled = nodes().filter(|node| node.label.as_deref() == Some(name));
         let mut entities = named.chain(labelled).filter_map(|node| entity(runtime, node.uid));
         entities.next()
+    }
+
+    /// Socket of an instance: the entity of its joint, and its place relative to that. Something that is a child of the joint
+    /// with the place as its transform hangs on the socket. The name is `hand` for a socket of the template itself, and
+    /// `left arm.hand` for one of its part of that name.
+    pub fn socket(&self, instance: Entity, name: &str) -> Option<(Entity, Transform)> {
+        let ((template, _), runtime) = self.instances.get(instance).ok()?;
+        let built = template.map(|template| &template.0);
+        let built = built.or_else(|| self.sources.get(instance).ok()?.built())?;
+        let socket = built.sockets.iter().find(|socket| socket.name == name)?;
+        Some((entity(runtime, socket.joint?)?, socket.rest.into()))
     }
 
     /// Entity of the node with that uid.

@@ -50,6 +50,7 @@ pub mod runtime;
 pub mod schema;
 pub mod selection;
 pub mod skinning;
+pub mod stage;
 pub mod stroke;
 pub mod surface;
 #[cfg(feature = "draw")]
@@ -67,6 +68,7 @@ use bevy::{
 /// | --- | --- |
 /// | [`document::DocumentPlugin`] | rigs, their joint entities, the one edit path, undo and redo |
 /// | [`commands::CommandsPlugin`] | tags as entities, building, stepping and rolling back |
+/// | [`stage::StagePlugin`] | stages of a rig: skeleton, edited, built, deleted |
 /// | [`controls::ControlsPlugin`] | which controls are visible; switches without a jump |
 /// | [`surface::SurfacePlugin`] | the posed surface that rays meet |
 /// | [`picking::PickingPlugin`] | selecting joints |
@@ -87,6 +89,7 @@ impl PluginGroup for RigPlugins {
         PluginGroupBuilder::start::<Self>()
             .add(document::DocumentPlugin)
             .add(commands::CommandsPlugin)
+            .add(stage::StagePlugin)
             .add(controls::ControlsPlugin)
             .add(surface::SurfacePlugin)
             .add(picking::PickingPlugin)

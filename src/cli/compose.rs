@@ -5,17 +5,17 @@ use std::{
     sync::Arc,
 };
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::{Failure, InPlaceArgs, Report, SEED, update::load};
 use crate::{
     files::{RealDisk, stem, store_rig, store_rig_over},
     rig::{
-        Rig, Uid, UidSource,
+        Rig, RigAbout, RigEdit, Uid, UidSource,
         extract::{self, Extracted},
         nearest::{did_you_mean, listed},
-        operations::{Operation, TagOperation},
+        operations::{Axis, Operation, TagOperation},
     },
 };
 
@@ -25,9 +25,10 @@ pub(super) struct MergeArgs {
     /// The rigs, `.rig.ron`: all others come into the first
     #[arg(required = true, num_args = 2..)]
     rigs: Vec<PathBuf>,
-    /// Joint of the first rig on which the roots of the others hang; they stay roots without it
-    #[arg(long, value_name = "LABEL")]
-    parent: Option<String>,
+    /// Joint on which the roots of the others hang; they stay roots without it. `FILE:LABEL` says it of one of the others, and
+    /// may be given for several; a joint that another one brought counts, too
+    #[arg(long, value_name = "[FILE:]LABEL")]
+    parent: Vec<String>,
     /// The file to write, `.rig.ron`
     #[arg(short, long)]
     output: PathBuf,
@@ -45,11 +46,34 @@ pub(super) struct InjectArgs {
     /// Labels or uids of the joints, in the order in which they take the template's tags
     #[arg(long, value_delimiter = ',', required = true, value_name = "LABEL,...")]
     joints: Vec<String>,
+    /// Turn these joints first, so that this axis points along their bones
+    #[arg(long, value_enum, value_name = "AXIS")]
+    orient: Option<AxisArg>,
     /// The file to write, `.rig.ron`
     #[arg(short, long)]
     output: PathBuf,
     #[command(flatten)]
     in_place: InPlaceArgs,
+}
+
+/// Axis of a joint.
+#[derive(ValueEnum, Debug, Clone, Copy)]
+enum AxisArg {
+    /// The X axis, as in Maya and Unreal
+    X,
+    /// The Y axis, as in Blender
+    Y,
+    /// The Z axis
+    Z,
+}
+
+/// Kind of what is extracted.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+enum ExtractKind {
+    /// A rig of its own
+    Template,
+    /// A part, which says what it needs
+    Part,
 }
 
 /// Arguments of `rigsmith extract`.
@@ -66,6 +90,12 @@ pub(super) struct ExtractArgs {
     /// Give everything a new uid
     #[arg(long)]
     new_uids: bool,
+    /// Kind of the new file
+    #[arg(long, value_enum, default_value = "part")]
+    kind: ExtractKind,
+    /// Turn the joints, so that this axis points along their bones
+    #[arg(long, value_enum, value_name = "AXIS")]
+    orient: Option<AxisArg>,
     /// The file to write, `.rig.ron`
     #[arg(short, long)]
     output: PathBuf,
@@ -80,9 +110,10 @@ pub(super) fn merge(args: &MergeArgs) -> Result<Report, Failure> {
     let rigs = args.rigs.iter().map(|path| load(path, &mut report)).collect::<Result<Vec<_>, _>>()?;
     let Some((first, others)) = rigs.split_first() else { return Ok(report) };
     let mut rig = first.clone();
-    let parent = args.parent.as_deref().map(|label| joint(&rig, label)).transpose()?;
+    let parents = parents(&args.parent, &args.rigs[1..])?;
     let mut uids = uids_of(&rigs);
-    for other in others {
+    for (other, parent) in others.iter().zip(parents) {
+        let parent = parent.map(|label| joint(&rig, label)).transpose()?;
         let operation = Operation::Merge { other: Arc::new(other.clone()), parent };
         run(&mut rig, &operation, &mut uids, &mut report)?;
     }
@@ -91,12 +122,54 @@ pub(super) fn merge(args: &MergeArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
+/// Label of the joint on which each file's roots hang.
+fn parents<'a>(wanted: &'a [String], files: &[PathBuf]) -> Result<Vec<Option<&'a str>>, Failure> {
+    let mut all = None;
+    let mut parents = vec![None; files.len()];
+    for text in wanted {
+        let is_called = |file: &Path, name: &str| file == Path::new(name) || stem(file) == name;
+        let of_file = text.rsplit_once(':').and_then(|(name, label)| {
+            let place = files.iter().position(|file| is_called(file, name))?;
+            Some((place, label))
+        });
+        let known = match of_file {
+            Some((place, label)) => parents[place].replace(label),
+            None => all.replace(text.as_str()),
+        };
+        if known.is_some() {
+            return Err(Failure::Usage(format!(
+                "`--parent {text}`: another parent is given for the same rigs; keep one"
+            )));
+        }
+    }
+    Ok(parents.into_iter().map(|parent| parent.or(all)).collect())
+}
+
+/// Turns joints so that an axis points along their bones.
+fn orient(
+    rig: &mut Rig,
+    joints: Vec<Uid>,
+    along: AxisArg,
+    uids: &mut UidSource,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let along = match along {
+        AxisArg::X => Axis::X,
+        AxisArg::Y => Axis::Y,
+        AxisArg::Z => Axis::Z,
+    };
+    run(rig, &Operation::Orient { joints, along }, uids, report)
+}
+
 pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
     args.in_place.check(&[&args.template, &args.rig], Some(&args.output), &[])?;
     let mut report = Report::default();
     let (template, mut rig) = (load(&args.template, &mut report)?, load(&args.rig, &mut report)?);
     let joints = args.joints.iter().map(|label| joint(&rig, label)).collect::<Result<Vec<_>, _>>()?;
     let mut uids = uids_of(&[rig.clone(), template.clone()]);
+    if let Some(along) = args.orient {
+        orient(&mut rig, joints.clone(), along, &mut uids, &mut report)?;
+    }
     let count = |rig: &Rig| rig.walk().map(|joint| joint.data.tags.len()).sum::<usize>();
     let before = count(&rig);
     let left = (template.len().saturating_sub(joints.len()), joints.len().saturating_sub(template.len()));
@@ -121,7 +194,15 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
     let mut uids = uids_of(std::slice::from_ref(&rig));
     let name = stem(&args.output);
     let extracted = extract::extract(&rig, &joints, &name, args.new_uids.then_some(&mut uids));
-    let Extracted { rig: out, left } = extracted.map_err(|error| Failure::Input(Box::new(error)))?;
+    let Extracted { rig: mut out, left } = extracted.map_err(|error| Failure::Input(Box::new(error)))?;
+    if args.kind == ExtractKind::Template {
+        let about = RigAbout { kind: "template".to_owned(), ..out.about().clone() };
+        out.apply(&RigEdit::SetAbout(Box::new(about))).map_err(|error| Failure::Input(Box::new(error)))?;
+    }
+    if let Some(along) = args.orient {
+        let joints = out.walk().map(|joint| joint.data.uid).collect();
+        orient(&mut out, joints, along, &mut uids, &mut report)?;
+    }
     report.notes(store_rig(&RealDisk, &args.output, &out)?);
     report.notes.extend(left.iter().cloned());
     report.line(format!("wrote {}: {} joints", args.output.display(), out.len()));

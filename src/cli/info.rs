@@ -12,7 +12,11 @@ use crate::{
         load_template,
     },
     mesh::model::Model,
-    rig::{Rig, Uid, UidSource, character::import_rig_text},
+    rig::{
+        Rig, Uid, UidSource,
+        character::import_rig_text,
+        part::{PartInstance, PartOverride},
+    },
 };
 
 /// Arguments of `rigsmith info`.
@@ -44,13 +48,27 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
                 let place = match &part.parent {
                     _ if !part.onto.is_empty() => format!(" on {}", part.onto.join(", ")),
                     Some(parent) => format!(" below {parent}"),
-                    None => String::new(),
+                    None => part.socket.as_ref().map_or_else(String::new, |socket| format!(" on socket {socket}")),
                 };
                 let side = if part.mirror { ", mirrored" } else { "" };
-                let different = part.changes.len() + part.off.len();
-                report.line(format!("part {}: {}{place}{side}, {different} differences", part.title(), part.part));
+                let overrides = part.overrides();
+                let different = if overrides.is_empty() { "" } else { ", changed here:" };
+                report.line(format!("part {}: {}{place}{side}{different}", part.title(), part.part));
+                for PartOverride { target, field, value } in overrides {
+                    report.line(format!("  {target}: {field} = {value}"));
+                }
             }
             report.set("parts", template.instances.iter().map(|part| part.part.clone()).collect::<Vec<_>>());
+            report.set("overrides", template.instances.iter().flat_map(overrides).collect::<Vec<_>>());
+            for socket in &template.sockets {
+                report.line(format!("socket {} on {}", socket.name, socket.label));
+            }
+            report.set("sockets", template.sockets.iter().map(|socket| socket.name.clone()).collect::<Vec<_>>());
+            for option in &template.options {
+                let about = if option.description.is_empty() { "" } else { ": " };
+                report.line(format!("option {} = {}{about}{}", option.name, option.default, option.description));
+            }
+            report.set("options", template.options.iter().map(|option| option.name.clone()).collect::<Vec<_>>());
             describe_joints(&mut report, &template.rig);
         }
         Some(FileKind::RigText) => {
@@ -114,6 +132,12 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
     }
     Ok(report)
+}
+
+/// Changes that an instance makes to its part, an object each.
+fn overrides(part: &PartInstance) -> Vec<Value> {
+    let listed = |PartOverride { target, field, value }| json!({ "part": part.title(), "target": target, "field": field, "value": value });
+    part.overrides().into_iter().map(listed).collect()
 }
 
 fn describe_model(report: &mut Report, model: &Model) {

@@ -8,6 +8,7 @@ use std::{
 };
 
 use clap::Args;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::{Failure, Report};
@@ -17,7 +18,7 @@ use crate::{
     },
     rig::{
         SourceError, Uid,
-        template::{self, TemplateHeader},
+        template::{self, FeatureSummary, TemplateHeader},
         version::compare,
     },
 };
@@ -102,7 +103,11 @@ fn in_folder(top: &Path, is_needed: bool, report: &mut Report) -> Result<Vec<Lis
         }
     }
     paths.sort();
-    Ok(paths.iter().map(|path| Listed { file: path.display().to_string(), header: header(path) }).collect())
+    let listed = paths.par_iter().map_init(
+        || PartFiles::new(&RealDisk),
+        |files, path| Listed { file: path.display().to_string(), header: header(path, files) },
+    );
+    Ok(listed.collect())
 }
 
 /// A template that comes with Rigsmith.
@@ -150,6 +155,7 @@ fn tell(one: &Listed, newest: &BTreeMap<Uid, (&str, &str)>, report: &mut Report)
         format!("; {version} is in {at}")
     });
     report.line(format!("{}{}", line(file, header), newer.unwrap_or_default()));
+    details(header).into_iter().for_each(|detail| report.line(format!("    {detail}")));
     value
 }
 
@@ -165,7 +171,7 @@ enum HeaderError {
 }
 
 /// Header of a file: of its beginning if that is enough, else of all of it, else of the template with its parts.
-fn header(path: &Path) -> Result<TemplateHeader, HeaderError> {
+fn header(path: &Path, files: &mut PartFiles) -> Result<TemplateHeader, HeaderError> {
     let read = |limit: u64| -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         RealDisk.open(path)?.take(limit).read_to_end(&mut bytes)?;
@@ -180,10 +186,19 @@ fn header(path: &Path) -> Result<TemplateHeader, HeaderError> {
             template::read_header(&all)?
         }
     };
-    if is_unknown(&header)
-        && let Ok(template) = load_template(&RealDisk, path)
-    {
-        header.complete_from(&template.rig);
+    // What parts bring, and what a part needs, only the whole template tells, unless its author wrote it down.
+    if header.kind == "part" && header.needs.is_none() {
+        if let Ok(template) = load_template(&RealDisk, path) {
+            header.complete_from(&template.rig);
+        }
+    } else if header.joint_count == 0 {
+        let all = read(template::MAX_BYTES as u64)?;
+        // What is wrong with a part is told where the template is used.
+        if let Ok(template) = template::read_template(&all)
+            && let Ok(parts) = files.fitted(path, &template)
+        {
+            header.complete_from_parts(&template.rig, &parts);
+        }
     }
     Ok(header)
 }
@@ -199,6 +214,29 @@ fn line(file: &str, header: &TemplateHeader) -> String {
     let about = header.description.split(['.', ':']).next().unwrap_or_default();
     let about = if about.is_empty() { String::new() } else { format!(": {about}") };
     format!("{file}  {name} ({parts}{}{joint_count} joints){about}", if parts.is_empty() { "" } else { ", " })
+}
+
+/// Author, picture, features with their switches, sockets and options, as far as there are any.
+fn details(header: &TemplateHeader) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut add = |name: &str, items: Vec<String>| {
+        if !items.is_empty() {
+            lines.push(format!("{name}: {}", items.join(", ")));
+        }
+    };
+    add("author", Some(header.author.clone()).filter(|author| !author.is_empty()).into_iter().collect());
+    add("preview", header.preview.clone().into_iter().collect());
+    let feature = |feature: &FeatureSummary| match feature.switches.as_slice() {
+        [] => feature.name.clone(),
+        switches => format!("{} ({})", feature.name, switches.join(", ")),
+    };
+    add("features", header.features.iter().map(feature).collect());
+    add("sockets", header.sockets.iter().map(|socket| format!("{} on {}", socket.name, socket.joint)).collect());
+    add("options", header.options.iter().map(|option| format!("{} = {}", option.name, option.default)).collect());
+    if let Some(needs) = &header.needs {
+        add("needs", needs.joints.iter().chain(&needs.sockets).cloned().collect());
+    }
+    lines
 }
 
 fn value(file: &str, header: &TemplateHeader) -> Value {

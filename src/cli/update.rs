@@ -10,11 +10,12 @@ use serde_json::{Value, json};
 
 use super::{Failure, InPlaceArgs, Report};
 use crate::{
-    files::{FileKind, RealDisk, load_template, store_rig_over},
+    files::{Disk, FileKind, RealDisk, StoreError, load_template, save_atomic, store_rig_over},
     modules,
     processor::keep_poses,
     rig::{
         Rig,
+        template::write_template,
         update::{Change, Take, diff, update},
         version::VersionChange,
     },
@@ -37,9 +38,13 @@ pub(super) struct UpdateArgs {
     /// The template in its new version
     #[arg(long)]
     from: PathBuf,
-    /// The template in the version that the rig was made from; without it every difference is a conflict
+    /// The template in the version that the rig was made from. Without it that is `RIG.base`, if there is such a file, and
+    /// else every difference is a conflict
     #[arg(long)]
     base: Option<PathBuf>,
+    /// Keep the version that is taken over as `OUT.base`, for the next update
+    #[arg(long)]
+    keep_base: bool,
     /// Say what would change, and write nothing
     #[arg(long)]
     dry_run: bool,
@@ -74,7 +79,17 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let mut report = Report::default();
     let (now, file) = (load(&args.rig, &mut report)?, load(&args.from, &mut report)?);
-    let base = args.base.as_deref().map(|base| load(base, &mut report)).transpose()?;
+    let beside = companion(&args.rig);
+    let is_beside = args.base.is_none() && RealDisk.entry(&beside, true).is_ok();
+    let base = match &args.base {
+        Some(base) => Some(load(base, &mut report)?),
+        None if is_beside => Some(load_template(&RealDisk, &beside)?.rig),
+        None => None,
+    };
+    report.set(
+        "base",
+        is_beside.then(|| beside.display().to_string()).or(args.base.as_ref().map(|base| base.display().to_string())),
+    );
     let take = match args.take {
         Some(TakeArg::Theirs) => Take::Theirs,
         Some(TakeArg::Mine) | None => Take::Mine,
@@ -104,8 +119,20 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
         report.notes(store_rig_over(&RealDisk, output, &updated.rig, &[&args.rig])?);
         report.line(format!("wrote {}", output.display()));
+        if args.keep_base || is_beside {
+            let base = companion(output);
+            save_atomic(&RealDisk, &base, write_template(&file).as_bytes()).map_err(StoreError::from)?;
+            report.line(format!("wrote {}", base.display()));
+        }
     }
     Ok(report)
+}
+
+/// File beside a rig that has the version of the template that it was made from, or updated to last.
+fn companion(rig: &Path) -> PathBuf {
+    let mut name = rig.as_os_str().to_owned();
+    name.push(".base");
+    name.into()
 }
 
 pub(super) fn load(path: &Path, report: &mut Report) -> Result<Rig, Failure> {

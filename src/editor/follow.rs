@@ -59,7 +59,11 @@ fn follow(
             let source = RigSource::new(files.open(template.clone())).without_binding();
             // Recovered work has come from the file too, and nobody knows how the file was then.
             let is_as_opened = history.last().is_none();
-            let source = if is_as_opened { source.with_base(Arc::new(rig.clone())) } else { source.of_first_version() };
+            let source = match &document.base {
+                Some(base) => source.with_base(base.clone()),
+                None if is_as_opened => source.with_base(Arc::new(rig.clone())),
+                None => source.of_first_version(),
+            };
             commands.entity(entity).try_insert(source);
         }
     }

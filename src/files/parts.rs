@@ -12,7 +12,7 @@ use crate::{
     processor::Modules,
     rig::{
         Rig, SourceError,
-        part::{Part, PartError},
+        part::{Part, PartError, PartInstance},
         template::{self, Template, read_template, text_of},
     },
 };
@@ -87,16 +87,27 @@ enum Source<'a> {
 
 /// Reason why a part of a template cannot be used.
 #[derive(Debug, thiserror::Error)]
-enum PartFileError {
+pub enum PartFileError {
     /// A part that uses itself, at any depth.
     #[error("`{}` is a part of itself; take it out of one of the files", path.display())]
-    Cycle { path: PathBuf },
+    Cycle {
+        /// File of the part.
+        path: PathBuf,
+    },
     /// A file that the list of contents does not have.
     #[error("there is no file `{}`", path.display())]
-    Missing { path: PathBuf },
+    Missing {
+        /// File of the part.
+        path: PathBuf,
+    },
     /// A file that neither the template's folder nor the folders of the site have.
     #[error("{source}; {folders} of the site's folders were searched, too")]
-    Nowhere { source: ReadError, folders: usize },
+    Nowhere {
+        /// Error of reading the file beside the template.
+        source: ReadError,
+        /// Number of folders of the site.
+        folders: usize,
+    },
     /// A site file that cannot be read.
     #[error(transparent)]
     Site(#[from] SiteError),
@@ -105,7 +116,12 @@ enum PartFileError {
     Read(#[from] ReadError),
     /// A file that is no template, or has such a part itself.
     #[error("`{}`: {source}", path.display())]
-    Template { path: PathBuf, source: SourceError },
+    Template {
+        /// File of the part.
+        path: PathBuf,
+        /// Place and reason in that file.
+        source: SourceError,
+    },
     /// A part that does not fit.
     #[error(transparent)]
     Part(#[from] PartError),
@@ -182,6 +198,22 @@ impl<'a> PartFiles<'a> {
         template.with_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
     }
 
+    /// Every part instance of a template with its part, [fitted](PartInstance::fitted).
+    ///
+    /// # Errors
+    /// A part that cannot be had or does not fit.
+    pub fn fitted(&mut self, path: &Path, template: &Template) -> Result<Vec<(PartInstance, Rig)>, PartFileError> {
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let modules = self.modules.clone();
+        let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
+        let instances = template.parts.iter().chain(&template.instances);
+        let fitted = instances.map(|instance| {
+            let part = self.part(&folder.join(&instance.part), &instance.part)?;
+            Ok((instance.clone(), instance.fitted(&part, &mirror)?))
+        });
+        fitted.collect()
+    }
+
     /// The part of that name, beside its template at `first` or elsewhere.
     fn part(&mut self, first: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
         if let Some(known) = self.known.get(first) {
@@ -201,7 +233,8 @@ impl<'a> PartFiles<'a> {
         let template = self.complete(&path, &bytes);
         self.open.pop();
         let template = template.map_err(|source| PartFileError::Template { path, source })?;
-        let part = Arc::new(Part { rig: template.rig, chains: template.chains });
+        let Template { rig, chains, sockets, options, .. } = template;
+        let part = Arc::new(Part { rig, chains, sockets, options });
         self.known.insert(first.to_owned(), part.clone());
         Ok(part)
     }

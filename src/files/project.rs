@@ -33,10 +33,23 @@ pub struct ProjectToSave {
     pub rigs: Vec<Rig>,
     /// Meshes that the rigs move.
     pub meshes: Vec<MeshToSave>,
+    /// Templates that the rigs follow.
+    pub templates: Vec<ProjectTemplate>,
     /// View of the project: camera, tool and display settings.
     pub view: ProjectView,
     /// Journal that continues from this save.
     pub journal: Option<JournalReference>,
+}
+
+/// A template that a rig of a project follows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProjectTemplate {
+    /// The rig.
+    pub rig: Uid,
+    /// File of the template, which may be missing.
+    pub path: PathBuf,
+    /// The version of the template that the rig took over last.
+    pub base: Arc<Rig>,
 }
 
 /// A mesh of a project and its geometry: a [`MeshShape`] to save, or a [`MeshState`] as it was loaded.
@@ -105,6 +118,8 @@ pub struct LoadedProject {
     pub rigs: Vec<Rig>,
     /// Meshes that the rigs move.
     pub meshes: Vec<LoadedMesh>,
+    /// Templates that the rigs follow.
+    pub templates: Vec<ProjectTemplate>,
     /// View of the project: camera, tool and display settings.
     pub view: ProjectView,
     /// Journal that continues from this save.

@@ -16,9 +16,10 @@ use crate::{
         animation::RigClip,
         character::rig_text,
         format::animation::{self, write_animation},
+        part::PartChange,
         project,
         skin::{SkinError, SkinFile},
-        template::{self, write_template},
+        template::{self, PartRigs, write_template},
         text::{self, RigTextError},
     },
 };
@@ -230,10 +231,24 @@ fn over_parts(disk: &dyn Disk, rig: &Rig, path: &Path, text: &str) -> Option<Str
     if says(text) {
         return Some(text.to_owned());
     }
-    let own = template::read_template(text.as_bytes()).ok()?.rig;
-    let before = PartFiles::new(disk).complete(path, text.as_bytes()).ok()?.rig;
-    let changed = template::write_own_over(rig, &before, &own, text)?;
-    says(&changed).then_some(changed)
+    let mut files = PartFiles::new(disk);
+    let read = template::read_template(text.as_bytes()).ok()?;
+    let parts = files.fitted(path, &read).ok()?;
+    let own = read.rig.clone();
+    let mut without_changes = read.clone();
+    for part in &mut without_changes.parts {
+        // Other parts may go onto joints by the labels that changes give.
+        for change in &mut part.changes {
+            *change = PartChange { joint: change.joint.clone(), label: change.label.clone(), ..PartChange::default() };
+        }
+        part.changes.retain(|change| change.label.is_some());
+    }
+    let before = files.put_together(path, text, read).ok()?.rig;
+    let plain = files.put_together(path, text, without_changes).ok()?.rig;
+    let rigs = PartRigs { own: &own, before: &before, plain: &plain, parts: &parts };
+    // Names are what people write; uids say it where a name means something else.
+    let texts = [true, false].into_iter().filter_map(|names| template::write_parts_over(rig, &rigs, text, names));
+    texts.into_iter().find(|text| says(text))
 }
 
 fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), StoreError> {

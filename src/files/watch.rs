@@ -7,7 +7,7 @@
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    time::{Duration, SystemTime},
+    time::{Duration, Instant, SystemTime},
 };
 
 use super::{Disk, ReadError, read_capped};
@@ -16,8 +16,8 @@ use crate::rig::template;
 /// Time between two looks at a file that one should take.
 pub const LOOK: Duration = Duration::from_millis(10);
 
-/// Number of looks after which the content is read even if the file seems unchanged.
-const READ_EVERY: u32 = 50;
+/// Time after which the content is read even if the file seems unchanged: some file systems keep time and length.
+const READ_EVERY: Duration = Duration::from_millis(500);
 
 /// A file whose next content is awaited.
 #[derive(Debug, Clone)]
@@ -29,13 +29,14 @@ pub struct FileWatch {
     /// Content of the last look, if it is another.
     next: Option<Vec<u8>>,
     seen: Option<(u64, Option<SystemTime>)>,
-    looks: u32,
+    /// Time of the last look at the content.
+    read: Option<Instant>,
 }
 
 impl FileWatch {
     /// A watch of a file of at most `limit` bytes.
     pub fn new(path: &Path, limit: u64) -> Self {
-        Self { path: path.to_owned(), limit, known: None, next: None, seen: None, looks: 0 }
+        Self { path: path.to_owned(), limit, known: None, next: None, seen: None, read: None }
     }
 
     /// The file.
@@ -52,11 +53,17 @@ impl FileWatch {
     /// A file that is not there for the moment, as between two steps of a save, is waited for.
     pub fn look(&mut self, disk: &dyn Disk) -> Option<&[u8]> {
         let state = disk.entry(&self.path, true).ok().map(|entry| (entry.len, entry.modified));
-        self.looks = (self.looks + 1) % READ_EVERY;
-        if self.next.is_none() && state == self.seen && self.looks != 0 {
+        let is_recent = self.read.is_some_and(|read| read.elapsed() < READ_EVERY);
+        if self.next.is_none() && state == self.seen && is_recent {
             return None;
         }
-        let content = read_capped(disk, &self.path, self.limit).ok()?;
+        self.read = Some(Instant::now());
+        let content = match read_capped(disk, &self.path, self.limit) {
+            Ok(content) => content,
+            // A file may be emptied before it is written; one that stays empty is given out, too.
+            Err(ReadError::Empty { .. }) => Vec::new(),
+            Err(_) => return None,
+        };
         self.seen = state;
         if self.known.as_ref() == Some(&content) {
             self.next = None;

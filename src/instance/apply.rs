@@ -6,7 +6,8 @@ use bevy::{ecs::entity::EntityHashMap, prelude::*, transform::components::Transf
 use rayon::prelude::*;
 
 use super::{
-    BuiltTemplate, RigBuilt, RigFailed, RigInstance, RigTemplate, RigTemplates, RigUpdated, RunningTemplate, Users,
+    BuiltTemplate, ExposedNodes, RigBuilt, RigFailed, RigInstance, RigTemplate, RigTemplates, RigUpdated,
+    RunningTemplate, TemplateError, Users,
 };
 use crate::{
     plugins::{
@@ -17,7 +18,7 @@ use crate::{
     rig::{AttributeValues, BuiltNode, BuiltRig, PoseOffset, RestTransform, Uid},
     solve::{
         keep_pose::{KeptPose, PoseKeeper},
-        program::{Carry, ProgramNode, RigProgram, RigState},
+        program::{Carry, ProgramError, ProgramNode, RigProgram, RigState},
     },
 };
 
@@ -53,9 +54,22 @@ pub(super) fn take_outcomes(
 /// True if an instance may not run what it should.
 pub(super) fn is_due(
     templates: Res<RigTemplates>,
-    changed: Query<(), Or<(Changed<RigInstance>, Changed<InstanceMode>)>>,
+    changed: Query<(), Or<(Changed<RigInstance>, Changed<InstanceMode>, Changed<ExposedNodes>)>>,
+    unexposed: RemovedComponents<ExposedNodes>,
 ) -> bool {
-    templates.is_fresh || !changed.is_empty()
+    templates.is_fresh || !changed.is_empty() || !unexposed.is_empty()
+}
+
+/// An instance that does not run what it should.
+struct Due {
+    entity: Entity,
+    built: Arc<BuiltTemplate>,
+    program: Arc<RigProgram>,
+    mode: InstanceMode,
+    /// True if it has no nodes of that mode.
+    is_fresh: bool,
+    /// True if its template is another version than the one it runs.
+    is_other: bool,
 }
 
 /// An instance that goes on with another program.
@@ -80,22 +94,34 @@ struct Exchange {
 
 /// Gives every instance the program of its template: all of them in this frame.
 pub(super) fn update_instances(world: &mut World) {
-    let mut query =
-        world.query::<(Entity, &RigInstance, &InstanceMode, Option<&RunningTemplate>, Option<&RigRuntime>)>();
-    let mut due: Vec<(Entity, Arc<BuiltTemplate>, InstanceMode, bool)> = Vec::new();
+    let mut query = world.query::<(
+        Entity,
+        &RigInstance,
+        &InstanceMode,
+        Option<&ExposedNodes>,
+        Option<&RunningTemplate>,
+        Option<&RigRuntime>,
+    )>();
+    let (mut due, mut failed) = (Vec::new(), Vec::new());
     let templates = world.resource::<RigTemplates>();
-    for (entity, instance, mode, running, runtime) in query.iter(world) {
+    for (entity, instance, mode, exposed, running, runtime) in query.iter(world) {
         let Some(built) = templates.built.get(&instance.0.id()) else { continue };
-        let is_other_mode = runtime.is_none_or(|runtime| runtime.mode() != *mode);
-        if is_other_mode || running.is_none_or(|running| !Arc::ptr_eq(&running.0, built)) {
-            due.push((entity, built.clone(), *mode, is_other_mode));
+        let is_fresh = runtime.is_none_or(|runtime| runtime.mode() != *mode);
+        let is_other = running.is_none_or(|running| !Arc::ptr_eq(&running.0, built));
+        let program = program(built, *mode, exposed).unwrap_or_else(|source| {
+            failed.push((entity, TemplateError::CannotRun { file: None, source }));
+            built.lean.clone()
+        });
+        let runs_other = runtime.is_none_or(|runtime| !Arc::ptr_eq(runtime.state().program(), &program));
+        if is_fresh || is_other || runs_other {
+            due.push(Due { entity, built: built.clone(), program, mode: *mode, is_fresh, is_other });
         }
     }
     world.resource_mut::<RigTemplates>().is_fresh = false;
-    let (fresh, going): (Vec<_>, Vec<_>) = due.into_iter().partition(|(.., is_fresh)| *is_fresh);
-    for (entity, built, mode, _) in &fresh {
+    let (fresh, going): (Vec<Due>, Vec<Due>) = due.into_iter().partition(|due| due.is_fresh);
+    for Due { entity, built, program, mode, .. } in &fresh {
         world.entity_mut(*entity).despawn_related::<RigNodes>();
-        spawn_instance(world, *entity, program(built, *mode), *mode);
+        spawn_instance(world, *entity, program, *mode);
         describe(world, *entity, built);
         world.entity_mut(*entity).insert(RunningTemplate(built.clone()));
     }
@@ -109,50 +135,53 @@ pub(super) fn update_instances(world: &mut World) {
     for (entity, kept) in &kept {
         pose_controls(world, *entity, kept);
     }
-    for (entity, ..) in fresh {
+    for Due { entity, .. } in fresh {
         world.trigger(RigBuilt { entity });
     }
-    for (entity, built, ..) in going {
+    for Due { entity, built, .. } in going.into_iter().filter(|due| due.is_other) {
         let deviations = kept.remove(&entity).map(|kept| kept.deviations).unwrap_or_default();
         let poses = deviations.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect();
         world.trigger(RigUpdated { entity, changes: built.changes.clone(), ran: built.ran.clone(), poses });
     }
+    for (entity, error) in failed {
+        world.trigger(RigFailed { entity, error });
+    }
 }
 
-fn program(built: &BuiltTemplate, mode: InstanceMode) -> &Arc<RigProgram> {
-    match mode {
-        InstanceMode::Hierarchy => &built.whole,
-        InstanceMode::Direct => &built.lean,
+fn program(
+    built: &BuiltTemplate,
+    mode: InstanceMode,
+    exposed: Option<&ExposedNodes>,
+) -> Result<Arc<RigProgram>, ProgramError> {
+    match (mode, exposed) {
+        (InstanceMode::Hierarchy, _) => Ok(built.whole.clone()),
+        (InstanceMode::Direct, None) => Ok(built.lean.clone()),
+        (InstanceMode::Direct, Some(ExposedNodes(exposed))) => built.exposing(exposed),
     }
 }
 
 /// Lets instances go on with the programs of their templates. Returns instances whose nodes are described otherwise now, with
 /// `true` if the nodes themselves are others, and the poses of instances whose offsets are others now.
-fn exchange(
-    world: &mut World,
-    going: &[(Entity, Arc<BuiltTemplate>, InstanceMode, bool)],
-) -> (Vec<(Entity, Arc<BuiltTemplate>, bool)>, EntityHashMap<KeptPose>) {
-    let wanted: EntityHashMap<(&Arc<BuiltTemplate>, InstanceMode)> =
-        going.iter().map(|(entity, built, mode, _)| (*entity, (built, *mode))).collect();
+fn exchange(world: &mut World, going: &[Due]) -> (Vec<(Entity, Arc<BuiltTemplate>, bool)>, EntityHashMap<KeptPose>) {
+    let wanted: EntityHashMap<&Due> = going.iter().map(|due| (due.entity, due)).collect();
     let mut query = world.query::<(Entity, &mut RigRuntime, &mut RunningTemplate)>();
     let mut exchanges: Vec<Exchange> = Vec::new();
     let mut descriptions: Vec<(Arc<BuiltTemplate>, Arc<BuiltTemplate>, bool)> = Vec::new();
     let (mut steps, mut others) = (Vec::new(), Vec::new());
     for (entity, runtime, mut running) in query.iter_mut(world) {
-        let Some((built, mode)) = wanted.get(&entity) else { continue };
-        let before = std::mem::replace(&mut running.0, (*built).clone());
+        let Some(Due { built, program: to, .. }) = wanted.get(&entity) else { continue };
+        let before = std::mem::replace(&mut running.0, built.clone());
         let known = descriptions.iter().find(|(from, to, _)| Arc::ptr_eq(from, &before) && Arc::ptr_eq(to, built));
         let is_alike = known.map(|(.., is_alike)| *is_alike).unwrap_or_else(|| {
             let is_alike = has_same_description(&before.built, &built.built);
-            descriptions.push((before, (*built).clone(), is_alike));
+            descriptions.push((before, built.clone(), is_alike));
             is_alike
         });
-        let to = program(built, *mode);
         let from = runtime.state().program();
         // The rest of the document may have changed, and the program not.
         if Arc::ptr_eq(from, to) {
             if !is_alike {
-                others.push((entity, (*built).clone(), false));
+                others.push((entity, built.clone(), false));
             }
             continue;
         }
@@ -168,7 +197,7 @@ fn exchange(
             exchanges.len() - 1
         });
         if exchanges[number].is_other || !is_alike {
-            others.push((entity, (*built).clone(), exchanges[number].is_other));
+            others.push((entity, built.clone(), exchanges[number].is_other));
         }
         steps.push(Step { entity, runtime, program: to, exchange: number, kept: None });
     }

@@ -15,6 +15,7 @@ use crate::{
     files::PartFiles,
     rig::{
         Rig, SourceError,
+        part::PartSocket,
         template::{Template, text_of, write_template, write_template_over},
     },
 };
@@ -25,6 +26,7 @@ pub struct RigTemplate {
     /// True if the text has parts, whose content the rig has.
     has_parts: bool,
     rig: Arc<Rig>,
+    sockets: Arc<[PartSocket]>,
     /// The text that the rig was read from; empty for a rig that was made by code.
     text: Arc<str>,
 }
@@ -32,7 +34,7 @@ pub struct RigTemplate {
 impl RigTemplate {
     /// A template of a rig.
     pub fn new(rig: Rig) -> Self {
-        Self { has_parts: false, rig: Arc::new(rig), text: Arc::from("") }
+        Self { has_parts: false, rig: Arc::new(rig), sockets: Arc::from([]), text: Arc::from("") }
     }
 
     /// The template that a text holds. Its parts are those that come with Rigsmith.
@@ -53,12 +55,18 @@ impl RigTemplate {
 
     fn of(template: Template, content: &[u8]) -> Result<Self, SourceError> {
         let has_parts = !template.instances.is_empty();
-        Ok(Self { has_parts, rig: Arc::new(template.rig), text: Arc::from(text_of(content)?) })
+        let (rig, sockets, text) = (Arc::new(template.rig), template.sockets.into(), Arc::from(text_of(content)?));
+        Ok(Self { has_parts, rig, sockets, text })
     }
 
     /// The rig.
     pub fn rig(&self) -> &Arc<Rig> {
         &self.rig
+    }
+
+    /// Places that other things hang on: those of the template itself and of its parts.
+    pub fn sockets(&self) -> &Arc<[PartSocket]> {
+        &self.sockets
     }
 
     /// Replaces the rig; a save changes the text only where the rig differs from it.

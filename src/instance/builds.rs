@@ -18,7 +18,9 @@ use crate::{
     files::{PartFiles, RealDisk, TemplateWatch},
     processor::{BuildError, Builder, Modules, SourceText},
     rig::{
-        BuiltRig, Rig, Uid, template,
+        BuiltRig, Rig, Uid,
+        part::PartSocket,
+        template,
         update::{Change, Take, update, with_identities},
     },
     solve::program::{CompileOptions, Exposed, Keep, ProgramCache, ProgramError, RigProgram},
@@ -37,6 +39,12 @@ pub struct BuiltTemplate {
     pub whole: Arc<RigProgram>,
     /// Program with joints and controls, for instances in [`InstanceMode::Direct`](crate::plugins::runtime::InstanceMode).
     pub lean: Arc<RigProgram>,
+    /// Places that other things hang on.
+    pub sockets: Arc<[PartSocket]>,
+    /// The same places as the file has them.
+    file_sockets: Arc<[PartSocket]>,
+    /// Programs with joints and some nodes, for instances with [`ExposedNodes`](super::ExposedNodes).
+    some: Mutex<Vec<(Vec<Exposed>, Arc<RigProgram>)>>,
     /// Differences from the build before.
     pub changes: Arc<[Change]>,
     /// Tags of the commands that ran, in their order.
@@ -49,6 +57,34 @@ impl BuiltTemplate {
     pub(crate) fn is_of(&self, file: &Rig) -> bool {
         *self.source == *file
     }
+}
+
+impl BuiltTemplate {
+    /// Program with joints, and those nodes besides. It is compiled once.
+    ///
+    /// # Errors
+    /// A node that the rig does not have.
+    pub fn exposing(&self, exposed: &[Exposed]) -> Result<Arc<RigProgram>, ProgramError> {
+        let mut some = self.some.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, known)) = some.iter().find(|(known, _)| known == exposed) {
+            return Ok(known.clone());
+        }
+        let program = Arc::new(RigProgram::compile(&self.built, &self.options(exposed.to_vec()))?);
+        some.push((exposed.to_vec(), program.clone()));
+        Ok(program)
+    }
+
+    fn options(&self, exposed: Vec<Exposed>) -> CompileOptions {
+        lean_options(exposed, &self.sockets, &self.built)
+    }
+}
+
+/// Options of a program with joints, sockets and those nodes.
+fn lean_options(mut exposed: Vec<Exposed>, sockets: &[PartSocket], built: &BuiltRig) -> CompileOptions {
+    let joints = sockets.iter().filter_map(|socket| socket.joint);
+    let there = joints.filter(|joint| built.nodes.iter().any(|node| node.uid == *joint));
+    exposed.extend(there.map(Exposed::Uid));
+    CompileOptions { keep: Keep::DeformAndExposed(exposed), ..CompileOptions::default() }
 }
 
 type Id = AssetId<RigTemplate>;
@@ -262,7 +298,8 @@ impl TemplateBuild {
 
     fn built(&mut self, template: &RigTemplate) -> Result<Arc<BuiltTemplate>, TemplateError> {
         let source = template.rig();
-        if let Some(good) = self.good.as_ref().filter(|good| good.source == *source) {
+        let is_same = |good: &&Arc<BuiltTemplate>| good.source == *source && good.file_sockets == *template.sockets();
+        if let Some(good) = self.good.as_ref().filter(is_same) {
             return Ok(good.clone());
         }
         let mut identities = HashMap::new();
@@ -286,16 +323,30 @@ impl TemplateBuild {
             return Err(self.placed(template, &of_file.unwrap_or(error)));
         }
         let built = self.builder.shared_built();
-        let mut program = |keep: Keep| {
-            let options = CompileOptions { keep, ..CompileOptions::default() };
-            self.programs.get(&built, &options)
-        };
-        let programs: Result<_, ProgramError> =
-            program(Keep::All).and_then(|whole| Ok((whole, program(Keep::DeformAndExposed(vec![Exposed::Controls]))?)));
-        let (whole, lean) = programs.map_err(|source| TemplateError::CannotRun { file: self.file.clone(), source })?;
         self.identities.extend(identities);
+        let file_sockets = template.sockets().clone();
+        let sockets: Arc<[PartSocket]> = file_sockets.iter().map(|socket| self.named_first(socket, &rig)).collect();
+        let mut program = |options: &CompileOptions| self.programs.get(&built, options);
+        let programs: Result<_, ProgramError> = program(&CompileOptions::default())
+            .and_then(|whole| Ok((whole, program(&lean_options(vec![Exposed::Controls], &sockets, &built))?)));
+        let (whole, lean) = programs.map_err(|source| TemplateError::CannotRun { file: self.file.clone(), source })?;
         let (source, changes, ran) = (source.clone(), changes.into(), report.executed.into());
-        Ok(Arc::new(BuiltTemplate { rig, source, built, whole, lean, changes, ran }))
+        let some = Mutex::default();
+        let template = BuiltTemplate { rig, source, built, whole, lean, sockets, file_sockets, some, changes, ran };
+        // What instances expose is compiled here, and not in the frame that takes the template over.
+        let before = self.good.as_ref().map(|good| good.some.lock().unwrap_or_else(PoisonError::into_inner).clone());
+        for (exposed, _) in before.into_iter().flatten() {
+            // A node that is gone is told by the instance that wants it.
+            let _ = template.exposing(&exposed);
+        }
+        Ok(Arc::new(template))
+    }
+
+    /// A socket whose joint has the uid that it got first.
+    fn named_first(&self, socket: &PartSocket, rig: &Rig) -> PartSocket {
+        let renamed = socket.joint.filter(|joint| rig.joint(*joint).is_none());
+        let first = renamed.and_then(|joint| self.identities.get(&joint).copied());
+        PartSocket { joint: first.or(socket.joint), ..socket.clone() }
     }
 
     /// An error of a command at its place in the text.

@@ -107,6 +107,11 @@ impl RigSource {
         self
     }
 
+    /// The template as it was built last.
+    pub(super) fn built(&self) -> Option<&Arc<BuiltTemplate>> {
+        self.seen.as_ref()
+    }
+
     /// Takes note that the template was saved from the rig, as it was then.
     pub fn rebase(&mut self, saved: Arc<Rig>) {
         self.base = Some(saved);

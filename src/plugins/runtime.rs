@@ -11,6 +11,7 @@
 //! writes the `Transform`s of all nodes that moved. The document's pose is passed on only where the document changes.
 
 mod hand_over;
+mod hung;
 mod inputs;
 mod spawn;
 mod systems;
@@ -48,7 +49,7 @@ impl Plugin for RuntimePlugin {
                 )
                     .chain()
                     .in_set(RigSystems::Solve),
-                (systems::scatter_globals, systems::correct_globals, hand_over::hand_over)
+                (systems::scatter_globals, systems::correct_globals, hand_over::hand_over, hung::place_hung)
                     .chain()
                     .in_set(RigSystems::Scatter),
             ),

@@ -1,6 +1,7 @@
 //! Automatic weights, computed in the background and bound as one undoable edit.
 
 mod bends;
+mod body;
 mod late;
 
 use std::{
@@ -17,8 +18,11 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-pub use self::bends::FittedPush;
 use self::bends::{TriedBend, push_edits, tried_bends};
+pub use self::{
+    bends::FittedPush,
+    body::{BodyBasis, InstanceBody, InstanceSkin},
+};
 use super::{
     RigSystems,
     commands::{Built, RigModules},

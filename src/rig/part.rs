@@ -4,16 +4,25 @@
 //! of other joints refer to it or to its commands; the joints behind the last one needed are extras. Besides, a part is
 //! connected through its sockets.
 
+mod change;
 mod error;
 mod instance;
+mod option;
+mod overrides;
 mod resize;
+mod socket;
 
 use std::{collections::HashMap, fmt};
 
+pub use change::PartChange;
 pub use error::PartError;
-pub use instance::{MirrorParams, Part, PartChange, PartInstance};
+pub(in crate::rig) use instance::switch_name;
+pub use instance::{MirrorParams, Part, PartInstance};
+pub use option::{OptionError, OptionForm, PartOption};
+pub use overrides::PartOverride;
 pub(in crate::rig) use resize::MOST_JOINTS;
 pub use resize::PartChain;
+pub use socket::{PartSocket, SocketError};
 
 use crate::rig::{
     NodeRef, Rig, RigJoint, TagKind, Uid,

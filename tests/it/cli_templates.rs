@@ -222,3 +222,129 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     assert!(glb() == first_bytes, "back to the first bytes");
     assert!(watch.0.wait().unwrap().success());
 }
+
+#[test]
+fn overrides_sockets_and_options_are_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = "(format: 2, name: \"arm\", kind: \"part\", author: \"Ada\", sockets: [(name: \"hand\", joint: \"arm\")], \
+                options: [(name: \"size\", default: 0.5, form: Slider(min: 0, max: 1), sets: [(tag: \"control/arm\", param: \"relative_size\")])], \
+                joints: [(label: \"arm\", tags: [Feature(kind: \"fk\", name: \"fk\"), control(feature: \"fk\")])])";
+    fs::write(folder.path().join("arm.rig.ron"), part).unwrap();
+    let whole = "(format: 2, name: \"man\", joints: [(label: \"body\")], parts: [(part: \"arm.rig.ron\", name: \"left\", parent: \"body\", \
+                 options: {\"size\": 0.7}, off: [\"fk\"], changes: [(tag: \"control/arm\", params: (shape: \"star\")), \
+                 (joint: \"arm\", translation: (1, 0, 0))])])";
+    fs::write(folder.path().join("man.rig.ron"), whole).unwrap();
+    let (code, said) = rigsmith(folder.path(), &["info", "man.rig.ron"]);
+    assert_eq!(code, 0, "{said}");
+    for line in [
+        "option size: value = 0.7",
+        "feature fk: enabled = false",
+        "tag control/arm: shape = \"star\"",
+        "joint arm: translation = (1.0, 0.0, 0.0)",
+        "socket left.hand on arm",
+    ] {
+        assert!(said.contains(line), "{line}: {said}");
+    }
+    let (_, info) = json(folder.path(), &["info", "man.rig.ron"]);
+    let overrides = info["overrides"].as_array().unwrap();
+    assert_eq!(overrides.len(), 4);
+    assert_eq!((&overrides[0]["part"], &overrides[2]["field"]), (&"left".into(), &"shape".into()));
+    let (_, listed) = json(folder.path(), &["list"]);
+    let arm = &listed["templates"][0];
+    assert_eq!((&arm["sockets"][0]["name"], &arm["options"][0]["default"]), (&"hand".into(), &"0.5".into()));
+    let (_, said) = rigsmith(folder.path(), &["list"]);
+    for word in ["Ada", "fk", "hand", "size"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+}
+
+#[test]
+fn the_version_that_was_taken_over_is_the_base_of_the_next_update() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "v1.rig.ron"]).0, 0);
+    let v1 = fs::read_to_string(at("v1.rig.ron")).unwrap();
+    let mine = v1.replace("\"square\"", "\"cube\"");
+    fs::write(at("mine.rig.ron"), &mine).unwrap();
+    fs::write(at("v2.rig.ron"), v1.replace("(0, 1, 0)", "(0, 2, 0)")).unwrap();
+    fs::write(at("v3.rig.ron"), v1.replace("(0, 1, 0)", "(0, 3, 0)")).unwrap();
+    // Nobody knows the base: every difference is a conflict.
+    let (code, told) = json(folder.path(), &["update", "mine.rig.ron", "--from", "v2.rig.ron", "-o", "out.rig.ron"]);
+    assert_eq!((code, &told["conflicts"]), (1, &Value::from(2)), "{told}");
+    let first =
+        ["update", "mine.rig.ron", "--from", "v2.rig.ron", "--base", "v1.rig.ron", "--keep-base", "-o", "out.rig.ron"];
+    assert_eq!(rigsmith(folder.path(), &first).0, 0);
+    assert!(at("out.rig.ron.base").exists());
+    let next = ["update", "out.rig.ron", "--from", "v3.rig.ron", "-o", "next.rig.ron"];
+    let (code, told) = json(folder.path(), &next);
+    assert_eq!((code, &told["conflicts"]), (0, &Value::from(0)), "{told}");
+    assert!(told["base"].as_str().unwrap().ends_with("out.rig.ron.base"));
+    let text = fs::read_to_string(at("next.rig.ron")).unwrap();
+    assert!(text.contains("cube") && text.contains("(0, 3.0, 0)"), "{text}");
+    assert!(at("next.rig.ron.base").exists(), "and so it goes on");
+    let (_, listed) = json(folder.path(), &["list"]);
+    assert_eq!(listed["templates"].as_array().unwrap().len(), 6, "a base is no template of its own");
+}
+
+#[test]
+fn joints_are_turned_and_rigs_hung_where_one_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let chain = |name: &str| {
+        format!(
+            "(format: 2, name: \"{name}\", joints: [(label: \"{name}_1\", translation: (0, 1, 0)), (label: \"{name}_2\", parent: \"{name}_1\", translation: (0.3, 0, 0)), (label: \"{name}_3\", parent: \"{name}_2\", translation: (0.3, 0, 0))])"
+        )
+    };
+    for name in ["a", "b", "c"] {
+        fs::write(folder.path().join(format!("{name}.rig.ron")), chain(name)).unwrap();
+    }
+    let files = ["a.rig.ron", "b.rig.ron", "c.rig.ron"];
+    let merge = |parents: &[&str]| {
+        let given = parents.iter().flat_map(|parent| ["--parent", parent]);
+        let args: Vec<&str> = ["merge"].into_iter().chain(files).chain(given).chain(["-o", "all.rig.ron"]).collect();
+        rigsmith(folder.path(), &args)
+    };
+    let (code, said) = merge(&["a_3", "c:b_2"]);
+    assert_eq!(code, 0, "{said}");
+    let all = rig(folder.path(), "all.rig.ron");
+    let above = |rig: &Rig, label: &str| {
+        let parent = rig.joint(rig.find_label(label).unwrap()).unwrap().parent?;
+        rig.joint(parent)?.data.label.clone()
+    };
+    assert_eq!((above(&all, "b_1").as_deref(), above(&all, "c_1").as_deref()), (Some("a_3"), Some("b_2")));
+    assert!(merge(&["a_3", "a_2"]).0 != 0 && merge(&["b:a_3", "b.rig.ron:a_2"]).0 != 0, "one parent for each");
+
+    // The Y axis along the bones, which lie along X.
+    let extract = [
+        "extract",
+        "a.rig.ron",
+        "--joints",
+        "a_1",
+        "--hierarchy",
+        "--orient",
+        "y",
+        "--kind",
+        "template",
+        "-o",
+        "turned.rig.ron",
+    ];
+    let (code, said) = rigsmith(folder.path(), &extract);
+    assert_eq!(code, 0, "{said}");
+    let turned = rig(folder.path(), "turned.rig.ron");
+    assert_eq!(turned.about().kind, "template");
+    let second = turned.joint(turned.find_label("a_2").unwrap()).unwrap().data.rest.translation;
+    assert!(second.distance(glam::Vec3::new(0.0, 0.3, 0.0)) < 1e-5, "{second}");
+    let before = rig(folder.path(), "a.rig.ron");
+    for label in ["a_1", "a_2", "a_3"] {
+        let place = |rig: &Rig| rig.position(rig.find_label(label).unwrap());
+        assert!(place(&before).distance(place(&turned)) < 1e-5, "{label} stands where it stood");
+    }
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "part.rig.ron"]).0, 0);
+    let inject =
+        ["inject", "part.rig.ron", "a.rig.ron", "--joints", "a_1,a_2,a_3", "--orient", "y", "-o", "fk.rig.ron"];
+    let (code, said) = rigsmith(folder.path(), &inject);
+    assert_eq!(code, 0, "{said}");
+    let injected = rig(folder.path(), "fk.rig.ron");
+    let second = injected.joint(injected.find_label("a_2").unwrap()).unwrap().data.rest.translation;
+    assert!(second.distance(glam::Vec3::new(0.0, 0.3, 0.0)) < 1e-5, "{second}");
+    builds(&injected);
+}

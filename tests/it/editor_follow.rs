@@ -233,3 +233,31 @@ fn a_broken_save_changes_nothing_and_is_told() {
     fs::write(&window.file, CHAIN.replace("0.3", "0.35")).expect("the template is written");
     window.until("the offer", |window| window.offer().is_some());
 }
+
+#[test]
+fn a_project_remembers_the_version_that_its_rig_follows() {
+    let mut window = Window::new();
+    window.raise("c", 0.1);
+    let project = window.file.with_file_name("chain.rigsmith.ron");
+    window.send(ActionRequest(Action::Save));
+    window.send(DialogAnswer(Answer::Path(project.clone())));
+    window.until("the project", |_| project.exists());
+    window.settle();
+    // Somebody changes the template; the project is opened again.
+    window.save("0.3, 0)", "0.5, 0)");
+    let before = window.rig();
+    window.send(OpenRequest::File(project));
+    window.until("the opened project", |window| window.rig() != before && window.source().is_some());
+    window.until("the offer", |window| window.offer().is_some());
+    let changes: Vec<(String, bool)> = window
+        .offer()
+        .into_iter()
+        .flat_map(|offer| offer.changes.iter())
+        .map(|c| (c.to_string(), c.conflict))
+        .collect();
+    // What was changed in the project is its own, and no conflict.
+    assert!(changes.len() == 1 && changes[0].0.contains('b') && !changes[0].1, "{changes:?}");
+    window.send(OfferAnswer::Take(Take::Mine));
+    window.until("the update", |window| window.height("b") == 0.5);
+    assert_eq!(window.height("c"), 0.1);
+}

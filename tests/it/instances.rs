@@ -1,5 +1,8 @@
 //! Characters of a game: instances of templates, and templates whose files are saved while they move.
 
+mod meshes;
+mod reloads;
+
 use std::{
     collections::BTreeMap,
     fs,
@@ -40,9 +43,15 @@ struct Game {
 
 impl Game {
     fn new(plugin: RigInstancePlugin, assets: &Path) -> Self {
+        Self::with(plugin, assets, |_| {})
+    }
+
+    /// A game with more than instances.
+    fn with(plugin: RigInstancePlugin, assets: &Path, more: impl FnOnce(&mut App)) -> Self {
         let mut app = App::new();
         let files = AssetPlugin { file_path: assets.display().to_string(), ..default() };
         app.add_plugins((MinimalPlugins, files, TransformPlugin, plugin)).init_resource::<Told>();
+        more(&mut app);
         app.add_observer(|_: On<RigBuilt>, mut told: ResMut<Told>| told.built += 1)
             .add_observer(|failed: On<RigFailed>, mut told: ResMut<Told>| told.failed.push(failed.error.to_string()))
             .add_observer(|updated: On<rigsmith::instance::RigUpdated>, mut told: ResMut<Told>| {

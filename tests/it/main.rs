@@ -72,6 +72,7 @@ mod gltf;
 mod gltf_torture;
 mod heads;
 mod influences;
+mod inputs;
 mod instances;
 mod journal;
 mod journal_kill;
@@ -94,7 +95,9 @@ mod obj_torture;
 #[cfg(feature = "editor")]
 mod panels;
 mod part_instances;
+mod part_overrides;
 mod part_sizes;
+mod part_sockets;
 mod parts;
 mod parts_more;
 mod picking;
@@ -106,6 +109,8 @@ mod processor;
 mod project;
 mod random;
 mod references;
+#[cfg(feature = "remote")]
+mod remote;
 #[cfg(feature = "render")]
 mod render;
 mod rig_text;
@@ -117,6 +122,7 @@ mod skin_built;
 mod skin_file;
 mod solvers;
 mod sources;
+mod stages;
 mod stroke;
 mod surface;
 mod surface_refresh;
@@ -129,6 +135,7 @@ mod tools;
 mod transfer;
 mod update;
 mod voxels;
+mod watched_folder;
 mod weights;
 mod weights_bodies;
 #[cfg(all(feature = "editor", feature = "cli"))]

@@ -21,6 +21,7 @@ use rigsmith::{
             history::HistoryPanel,
             log::{LogBook, LogPanel},
             poses::PosesPanel,
+            process::ProcessPanel,
             properties::PropertiesPanel,
             skinning::{SkinningPanel, SkinningParts},
             toasts::Toasts,
@@ -31,6 +32,7 @@ use rigsmith::{
         document::Hovered,
         runtime::RigRuntime,
         skinning::{PartBinding, SkinningJob, held_objects},
+        stage::RigStage,
     },
     prelude::*,
 };
@@ -599,4 +601,29 @@ fn the_controls_panel_poses_resets_and_switches() {
     desk.click("◀");
     desk.frames(2);
     assert!(desk.says(&format!("{} of {all} commands", all - 1)));
+}
+
+#[test]
+fn the_stage_of_a_rig_is_chosen_in_the_process_panel() {
+    let mut desk = Desk::new(ProcessPanel::default());
+    let rig = rigsmith::rig::template::read_template(crate::template_text::CHAIN.as_bytes()).unwrap().rig;
+    let count = rig.len();
+    let entity = desk.rig;
+    desk.app.world_mut().entity_mut(entity).insert(rig);
+    desk.app.world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });
+    desk.frames(3);
+    let stage = |desk: &Desk| *desk.app.world().get::<RigStage>(entity).unwrap();
+    assert_eq!(stage(&desk), RigStage::Built);
+    for (name, wanted) in [("Edit", RigStage::Edit), ("Deleted", RigStage::Deleted), ("Built", RigStage::Built)] {
+        let now = stage(&desk).name();
+        let combo = desk.seen.iter().find(|seen| seen.value == now || seen.label == now).expect("the stage").rect;
+        desk.time += 1.0;
+        desk.click_at(combo.center());
+        desk.frames(2);
+        desk.click(name);
+        desk.frames(3);
+        assert_eq!(stage(&desk), wanted);
+        let joints = desk.rig().len();
+        assert_eq!(joints, if wanted == RigStage::Deleted { 0 } else { count });
+    }
 }

@@ -15,7 +15,7 @@ use rigsmith::{
 
 use super::{bench::HANG, template_text::apply};
 
-const FINGER: &str = r#"(
+pub(super) const FINGER: &str = r#"(
     format: 2,
     name: "finger",
     kind: "part",
@@ -36,7 +36,7 @@ const FINGER: &str = r#"(
 "#;
 
 /// A hand with as many fingers, on one side of the character.
-fn hand(name: &str, fingers: usize, mirror: bool, changes: &str) -> String {
+pub(super) fn hand(name: &str, fingers: usize, mirror: bool, changes: &str) -> String {
     let mut text = format!(
         "(\n    format: 2,\n    name: \"{name}\",\n    joints: [\n        // The palm.\n        (label: \"palm\", translation: ({}, 1, 0), tags: [control(creation: (name: \"palm\"))]),\n    ],\n    parts: [\n",
         if mirror { -0.5 } else { 0.5 }
@@ -53,7 +53,7 @@ fn hand(name: &str, fingers: usize, mirror: bool, changes: &str) -> String {
     text
 }
 
-fn load(path: &Path) -> Rig {
+pub(super) fn load(path: &Path) -> Rig {
     load_template(&RealDisk, path).unwrap_or_else(|error| panic!("{error}")).rig
 }
 
@@ -190,8 +190,8 @@ fn a_save_leaves_parts_to_their_files() {
     assert_eq!(store_rig_over(&RealDisk, &out, &rig, &[&path]).unwrap(), Vec::<String>::new());
     assert_eq!(fs::read_to_string(&out).unwrap(), text.replace("(0.5, 1, 0)", "(0.5, 2.0, 0)"));
     // What cannot be said of a part is written out, and told; nothing is lost.
-    let finger = rig.find_label("f1_bone_2").unwrap();
-    apply(&mut rig, RigEdit::SetLabel(finger, Some("knuckle".into())));
+    let finger = rig.find_label("f1_bone_3").unwrap();
+    apply(&mut rig, RigEdit::RemoveJoint(finger));
     let notes = store_rig_over(&RealDisk, &out, &rig, &[&path]).unwrap();
     assert!(notes.len() == 1 && notes[0].contains("written out"), "{notes:?}");
     assert_eq!(write_template(&load(&out)), write_template(&rig));

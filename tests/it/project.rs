@@ -7,7 +7,8 @@ use proptest::prelude::*;
 use rigsmith::{
     files::{
         Fault, FaultPlan, FaultyDisk, FileKind, LoadError, LoadedProject, MeshShape, MeshState, MeshToSave,
-        ProjectNote, ProjectToSave, RealDisk, load_model, load_project, stem, store_model, store_project,
+        ProjectNote, ProjectTemplate, ProjectToSave, RealDisk, load_model, load_project, stem, store_model,
+        store_project,
     },
     mesh::{
         gltf::GltfWriteSettings,
@@ -213,11 +214,11 @@ fn a_newer_format_opens_and_says_what_it_does_not_know() {
         .replacen("format: 1,", "format: 4, lights: [(x: 1)],", 1)
         .replacen("mode: \"Pose\"", "fog: 0.5, mode: \"Pose\"", 1)
         .replacen("skins: [", "muscles: [], skins: [", 1)
-        .replacen("format: 1,", "format: 3, meaning: 42,", 1);
+        .replacen("format: 1,", "format: 4, meaning: 42,", 1);
     let read = read_project(text.as_bytes()).unwrap();
     assert_eq!(read.project, frozen());
     let told = read.notes.join("\n");
-    for part in ["project has format 4", "`lights`", "`fog`", "`muscles`", "template has format 3"] {
+    for part in ["project has format 4", "`lights`", "`fog`", "`muscles`", "template has format 4"] {
         assert!(told.contains(part), "{part}: {told}");
     }
     let line = place(&text, "meaning: 42").0;
@@ -299,8 +300,8 @@ fn to_save(loaded: LoadedProject) -> ProjectToSave {
         },
     });
     let meshes = meshes.collect();
-    let LoadedProject { name, rigs, view, journal, .. } = loaded;
-    ProjectToSave { name, rigs, meshes, view, journal }
+    let LoadedProject { name, rigs, templates, view, journal, .. } = loaded;
+    ProjectToSave { name, rigs, meshes, templates, view, journal }
 }
 
 /// A cube held by two joints, posed.
@@ -333,6 +334,7 @@ fn cube(mesh: &Path) -> ProjectToSave {
         name: "hero".into(),
         rigs: vec![bench.rig],
         meshes: vec![mesh],
+        templates: Vec::new(),
         view: frozen().view,
         journal: frozen().journal,
     }
@@ -524,4 +526,38 @@ fn a_character_with_a_skeleton_of_its_own_goes_through_a_project() {
     assert_eq!(loaded.rigs, project.rigs);
     assert!(!loaded.rigs[0].skin(uid).unwrap().at_rest, "the file's own bind pose");
     assert_eq!(loaded.meshes[0].nodes[..], project.meshes[0].nodes[..]);
+}
+
+const FOLLOWS: &str = include_str!("../frozen/format-3.rigsmith.ron");
+
+#[test]
+fn the_template_that_a_rig_follows_is_kept_with_its_version() {
+    let read = read_project(FOLLOWS.as_bytes()).unwrap();
+    assert_eq!(read.notes, Vec::<String>::new());
+    let template = &read.project.templates[0];
+    let height = |rig: &Rig| rig.walk().next().unwrap().data.rest.translation.y;
+    assert_eq!((template.path.as_str(), height(&template.base)), ("parts/chain.rig.ron", 1.0));
+    assert_eq!(height(&read.project.rigs[0].rig), 2.0);
+    assert_eq!(write_project(&read.project), FOLLOWS);
+    for (from, to, what) in [
+        (
+            "rig: \"00000000000000a0\",\n            path",
+            "rig: \"00000000000000b0\",\n            path",
+            "which is not in the file",
+        ),
+        ("base: (\n                format: 1", "base: (\n                format: 0", "format 0"),
+        ("path: \"parts", "way: 1, path: \"parts", "way"),
+    ] {
+        let error = read_project(FOLLOWS.replacen(from, to, 1).as_bytes()).unwrap_err();
+        assert!(error.to_string().contains(what) && error.line > 30, "{what}: {error}");
+    }
+    // On the disk its path goes with the project's folder.
+    let folder = Folder::new();
+    let mut project = cube(&folder.mesh());
+    let file = folder.mesh().with_file_name("t.rig.ron");
+    let followed = ProjectTemplate { rig: project.rigs[0].uid(), path: file, base: Arc::new(template.base.clone()) };
+    project.templates = vec![followed.clone()];
+    folder.save(&project);
+    let path = folder.0.path().join("work/../meshes/t.rig.ron");
+    assert_eq!(folder.load().templates, [ProjectTemplate { path, ..followed }]);
 }

@@ -48,6 +48,7 @@ impl Studio {
     fn of(is_live: bool, text: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("t.rig.ron");
+        fs::write(folder.path().join("link.rig.ron"), written_part(0)).unwrap();
         fs::write(&file, text).unwrap();
         let mut app = headless_app(1);
         app.add_plugins(RigInstancePlugin::live()).init_resource::<Told>();
@@ -327,6 +328,20 @@ fn written(joints: &[Option<Wrote>]) -> String {
             joint.name, at.x, at.y, at.z, joint.turn - turn, joint.size
         ));
     }
+    text.push_str("    ],\n    parts: [(part: \"link.rig.ron\", name: \"link\", prefix: \"link_\")],\n)\n");
+    text
+}
+
+/// The part that the template uses, in one of many versions: places, values and the number of its joints.
+fn written_part(version: u64) -> String {
+    let mut text = String::from("(\n    format: 2,\n    name: \"link\",\n    joints: [\n");
+    for joint in 0..2 + version % 3 {
+        let parent = joint.checked_sub(1).map_or(String::new(), |above| format!("parent: \"{above}\", "));
+        let (place, size) = (0.1 + 0.01 * (version % 7) as f32, 0.5 + 0.1 * (version % 5) as f32);
+        text.push_str(&format!(
+            "        (label: \"{joint}\", {parent}translation: (0, {place:?}, 0), tags: [control(relative_size: {size:?})]),\n"
+        ));
+    }
     text.push_str("    ],\n)\n");
     text
 }
@@ -412,6 +427,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
     });
     let first = write_template(studio.rig());
     let (mut done, mut is_mixed, mut reloads, mut offers, mut held) = (0usize, false, 0, 0, 0);
+    let (mut version, mut parts) = (0, 0);
     for step in 0..steps {
         let controls: Vec<Uid> = {
             let built = &studio.app.world().get::<Built>(studio.rig).unwrap().0;
@@ -439,12 +455,22 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
             _ => {
                 let known = studio.built();
                 let was = written(&joints);
-                let mut means_other = rewrite(&mut joints, dice, step);
-                while written(&joints) == was {
-                    means_other |= rewrite(&mut joints, dice, step);
-                }
+                let is_part = dice.below(4) == 0;
+                let mut means_other = false;
                 studio.app.world_mut().resource_mut::<Listed>().0.clear();
-                studio.save(&written(&joints));
+                if is_part {
+                    let next =
+                        (1..).map(|more| version + more).find(|next| written_part(*next) != written_part(version));
+                    version = next.unwrap_or_default();
+                    fs::write(studio.file.with_file_name("link.rig.ron"), written_part(version)).unwrap();
+                    parts += 1;
+                } else {
+                    means_other = rewrite(&mut joints, dice, step);
+                    while written(&joints) == was {
+                        means_other |= rewrite(&mut joints, dice, step);
+                    }
+                    studio.save(&written(&joints));
+                }
                 studio.until("the template", |world, _| {
                     world.resource::<RigTemplates>().built(&known.0).is_some_and(|now| !Arc::ptr_eq(now, &known.1))
                         || world.resource::<Told>().failed.len() > 3
@@ -493,8 +519,8 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
             studio.request(Change::Do(operation));
         }
     }
-    assert!(reloads > steps / 10, "{reloads}");
-    println!("{steps} steps, {reloads} reloads, {offers} of them offered, {held} joints held");
+    assert!(reloads > steps / 10 && parts > steps / 40, "{reloads} reloads, {parts} of them of the part");
+    println!("{steps} steps, {reloads} reloads, {parts} of the part, {offers} offered, {held} joints held");
     assert!(held > steps / 10, "{held}");
     for _ in 0..steps * 2 {
         studio.request(Change::Undo);

@@ -38,7 +38,7 @@ pub(super) fn plain(mut rig: Rig) -> String {
 }
 
 /// RON text without blanks, comments and last commas.
-fn without_blanks(text: &str) -> String {
+pub(super) fn without_blanks(text: &str) -> String {
     let (mut out, mut rest) = (String::new(), text);
     while let Some(c) = rest.chars().next() {
         let length = match c {

@@ -15,7 +15,7 @@ use crate::{
         history::RigHistory,
         surface::{RigMesh, RigMeshes},
     },
-    rig::{Uid, step::Step},
+    rig::{Rig, Uid, step::Step},
 };
 
 /// Component of the edited rig with its file and journal.
@@ -27,6 +27,8 @@ pub struct OpenDocument {
     pub project: Option<PathBuf>,
     /// The template that was opened; its text is what a template is saved over.
     pub(in crate::editor) template: Option<PathBuf>,
+    /// The version of the template that a project's rig took over last.
+    pub(in crate::editor) base: Option<Arc<Rig>>,
     pub(super) saved: SavedAt,
     pub(super) journal: Journal,
     /// Meshes of the project that were not found; they are saved again unchanged.

@@ -91,6 +91,8 @@ pub(in crate::editor) struct LoadedDocument {
     pub missing: Vec<MeshToSave>,
     pub view: Option<ProjectView>,
     pub project: Option<std::path::PathBuf>,
+    /// Template that the rig of a project follows, and the version that it took over last.
+    pub followed: Option<(std::path::PathBuf, Arc<Rig>)>,
     pub origin: Origin,
     pub notes: Vec<String>,
     /// Facts that people should look after.
@@ -117,6 +119,7 @@ impl LoadedDocument {
             missing: Vec::new(),
             view: None,
             project: None,
+            followed: None,
             origin: Origin::Empty,
             notes: Vec::new(),
             warnings: Vec::new(),
@@ -249,7 +252,9 @@ pub(in crate::editor) fn project(path: &Path) -> Result<LoadedDocument, OpenErro
     if rigs.next().is_some() {
         return Err(OpenError::SeveralRigs(path.to_owned()));
     }
+    let followed = loaded.templates.into_iter().find(|template| template.rig == rig.uid());
     let mut opened = LoadedDocument::named(stem(path), rig);
+    opened.followed = followed.map(|template| (template.path, template.base));
     for LoadedMesh { uid, rig, path, nodes, shape } in loaded.meshes {
         match shape {
             MeshState::Open { model, .. } => {
@@ -320,6 +325,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
         missing,
         view: kept,
         project,
+        followed,
         origin,
         notes,
         mut warnings,
@@ -346,9 +352,10 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     let places = places(world, project.clone().filter(|_| pending.is_none()));
     let is_recovered = work.is_some();
     let opened = work.as_ref().map_or(&origin, |work| work.recovered.origin());
-    let template = match opened {
-        Origin::Template { path, .. } => Some(path.clone()),
-        _ => None,
+    let (template, base) = match (opened, followed) {
+        (Origin::Template { path, .. }, _) => (Some(path.clone()), None),
+        (_, Some((path, base))) => (Some(path), Some(base)),
+        _ => (None, None),
     };
     let (bundle, journal) = match work {
         Some(work) => {
@@ -366,7 +373,8 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     };
     let sink = watched(journal.clone());
     let saved = if is_recovered { SavedAt::Nowhere } else { SavedAt::Step(None) };
-    let document = OpenDocument { name: title.clone(), project, template, saved, journal, missing, is_placed: false };
+    let document =
+        OpenDocument { name: title.clone(), project, template, base, saved, journal, missing, is_placed: false };
     let entity = world.spawn((bundle, sink, document)).id();
     for (mesh, source) in meshes {
         world.spawn((mesh, source, SkinOf(entity)));

@@ -24,7 +24,7 @@ use super::{
 use crate::{
     editor::{notice::Notice, settings::EditorSettings},
     files::{
-        Disk, FileKind, MeshShape, MeshToSave, ProjectToSave, RealDisk,
+        Disk, FileKind, MeshShape, MeshToSave, ProjectTemplate, ProjectToSave, RealDisk,
         journal::{Journal, SaveMark},
         project_files, read_capped, save_atomic, save_set, stem, store_model, store_rig_over, store_skin,
     },
@@ -159,7 +159,10 @@ pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(Pro
     }
     open.extend(document.missing.iter().cloned());
     let name = document.name.clone();
-    Some((ProjectToSave { name, rigs: vec![data], meshes: open, view, journal: None }, is_bundled))
+    let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(document.base.as_ref());
+    let followed = document.template.clone().zip(base.cloned());
+    let templates = followed.map(|(path, base)| ProjectTemplate { rig: data.uid(), path, base }).into_iter().collect();
+    Some((ProjectToSave { name, rigs: vec![data], meshes: open, templates, view, journal: None }, is_bundled))
 }
 
 /// Saves the project.

@@ -12,6 +12,7 @@ use crate::{
     plugins::{
         commands::{BuildRequest, BuildStep, Processor},
         picking::{Pick, PickRequest},
+        stage::{RigStage, StageRequest},
     },
     processor::{BuildRange, Builder, CommandState, CommandStatus, ListEntry},
     rig::{TagKind, Uid},
@@ -58,6 +59,7 @@ impl EditorPanel for ProcessPanel {
         };
         let builder = processor.builder();
         self.refresh(&shown, processor.last_changed(), builder);
+        stages(ui, &shown, world.get::<RigStage>(shown.entity), requests);
         self.steps(ui, &shown, processor.follows(), builder, requests);
         self.find();
         let reveal = (self.follow && self.cursor != builder.cursor())
@@ -233,6 +235,29 @@ impl ProcessPanel {
             Click::Breakpoint => requests.send(ask(BuildStep::Breakpoint(row.entry.command, !row.is_breakpoint))),
         }
     }
+}
+
+/// Stage of the rig, and the choice of another.
+fn stages(ui: &mut Ui, shown: &DisplayedRig, now: Option<&RigStage>, requests: &mut Requests) {
+    ui.horizontal(|ui| {
+        let label = ui.label("Stage");
+        let name = now.map_or("not built", |stage| stage.name());
+        let combo = egui::ComboBox::from_id_salt("stage").selected_text(name).show_ui(ui, |ui| {
+            for stage in RigStage::ALL {
+                let tip = match stage {
+                    RigStage::Skeleton => "The joints in their pose; no command is in effect",
+                    RigStage::Edit => "The joints at rest, to be edited; no command runs",
+                    RigStage::Built => "All commands are in effect, and follow every edit",
+                    RigStage::Deleted => "No joints; another stage, or Ctrl+Z, brings them back",
+                };
+                let is_now = now == Some(&stage);
+                if ui.selectable_label(is_now, stage.name()).on_hover_text(tip).clicked() && !is_now {
+                    requests.send(StageRequest { rig: shown.entity, stage });
+                }
+            }
+        });
+        combo.response.labelled_by(label.id);
+    });
 }
 
 /// Module of a command, with the name that it gives.

@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use super::{
-    LoadedMesh, LoadedProject, MeshShape, MeshState, ProjectNote,
+    LoadedMesh, LoadedProject, MeshShape, MeshState, ProjectNote, ProjectTemplate,
     path::{below, located},
 };
 use crate::{
@@ -30,7 +30,13 @@ use crate::{
 /// [`LoadError`] for errors in the project file itself.
 pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadError> {
     let read = load_project_file(disk, path)?;
-    let Project { name, meshes: references, rigs: entries, view, journal } = read.project;
+    let Project { name, meshes: references, rigs: entries, templates, view, journal } = read.project;
+    let templates = templates.into_iter().map(|template| ProjectTemplate {
+        rig: template.rig,
+        path: located(path, &template.path),
+        base: Arc::new(template.base),
+    });
+    let templates = templates.collect();
     let mut notes: Vec<ProjectNote> = read.notes.into_iter().map(ProjectNote::File).collect();
     let (mut rigs, skins): (Vec<Rig>, Vec<Vec<SkinReference>>) =
         entries.into_iter().map(|entry| (entry.rig, entry.skins)).unzip();
@@ -48,7 +54,7 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
         }
         meshes.push(mesh);
     }
-    Ok(LoadedProject { name, rigs, meshes, view, journal, notes })
+    Ok(LoadedProject { name, rigs, meshes, templates, view, journal, notes })
 }
 
 /// Weights of a mesh from their file; `None`, with a note, if it cannot be read.

@@ -7,7 +7,7 @@ use crate::{
     files::{Disk, FileSet, StoreError, save_set, stem, verify},
     rig::{
         Rig, SkinData,
-        project::{self, MeshReference, Project, ProjectRig, SkinReference, write_project},
+        project::{self, MeshReference, Project, ProjectRig, SkinReference, TemplateReference, write_project},
         skin::{SkinError, SkinFile, SkinJoint, content_hash},
     },
 };
@@ -76,8 +76,14 @@ pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
             nodes: mesh.nodes.to_vec(),
         });
     }
+    let templates = project.templates.iter().map(|template| TemplateReference {
+        rig: template.rig,
+        path: reference(disk, path, &template.path, &mut notes),
+        base: (*template.base).clone(),
+    });
+    let templates = templates.collect();
     let (name, view, journal) = (project.name.clone(), project.view.clone(), project.journal.clone());
-    let text = write_project(&Project { name, meshes, rigs, view, journal });
+    let text = write_project(&Project { name, meshes, rigs, templates, view, journal });
     if text.len() > project::MAX_BYTES {
         return Err(StoreError::ProjectTooLarge { path: path.into(), mebibytes: text.len() >> 20 });
     }

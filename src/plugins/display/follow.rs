@@ -25,9 +25,11 @@ use crate::{
     plugins::{
         commands::{Built, BuiltEntities},
         document::JointEntities,
+        runtime::RigRuntime,
+        skinning::{InstanceBody, InstanceSkin},
         surface::{RigMesh, SkinOf},
     },
-    rig::{Rig, deform::DeformSkeleton},
+    rig::{Rig, Uid, deform::DeformSkeleton},
 };
 
 /// Picture of a mesh.
@@ -115,16 +117,21 @@ pub(super) fn place_meshes(
 pub(super) fn start_jobs(
     mut commands: Commands,
     display: Res<MeshDisplay>,
-    mut meshes: Query<(Entity, Ref<RigMesh>, &SkinOf, Option<&mut Displayed>)>,
+    mut meshes: Query<(Entity, Ref<RigMesh>, &SkinOf, Option<Ref<InstanceSkin>>, Option<&mut Displayed>)>,
     rigs: Query<Ref<Rig>>,
+    bodies: Query<(), With<InstanceBody>>,
     images: Res<Assets<Image>>,
 ) {
-    for (entity, mesh, of, displayed) in &mut meshes {
-        let Ok(rig) = rigs.get(of.0) else { continue };
-        if displayed.is_some() && !(display.is_changed() || mesh.is_changed() || rig.is_changed()) {
+    for (entity, mesh, of, shared, displayed) in &mut meshes {
+        let (skin, is_other) = match (rigs.get(of.0), shared) {
+            (Ok(rig), _) => (rig.skin(mesh.uid).cloned(), rig.is_changed()),
+            (Err(_), Some(shared)) => (Some(shared.0.clone()), shared.is_changed()),
+            (Err(_), None) if bodies.contains(of.0) => (None, false),
+            (Err(_), None) => continue,
+        };
+        if displayed.is_some() && !(display.is_changed() || mesh.is_changed() || is_other) {
             continue;
         }
-        let skin = rig.skin(mesh.uid).cloned();
         let surface = LayerKey { skin: skin.clone(), colors: display.weights };
         let edges = LayerKey { skin, colors: WeightColors::Off };
         let start = |displayed: &mut Displayed| {
@@ -275,9 +282,19 @@ pub(super) fn follow_skins(
     mut commands: Commands,
     mut displays: Query<(&mut Displayed, Ref<SkinOf>)>,
     rigs: Query<(Entity, Ref<Rig>, Ref<JointEntities>, Option<Ref<Built>>, Option<Ref<BuiltEntities>>)>,
+    bodies: Query<(Entity, Ref<InstanceBody>, &RigRuntime), Without<Rig>>,
     mut bind_assets: ResMut<Assets<SkinnedMeshInverseBindposes>>,
 ) {
     for (mut displayed, of) in &mut displays {
+        if let Ok((entity, body, runtime)) = bodies.get(of.0) {
+            if displayed.fresh || of.is_changed() || body.is_changed() {
+                let skeleton = DeformSkeleton::new(&body.rig, Some(&body.built));
+                let program = runtime.state().program();
+                let joint = |uid: Uid| program.node(uid).and_then(|slot| runtime.entity(slot));
+                follow_joints(&mut displayed, entity, &body.rig, &skeleton, &joint, &mut commands, &mut bind_assets);
+            }
+            continue;
+        }
         let Ok((entity, rig, joints, built, created)) = rigs.get(of.0) else { continue };
         let is_rebuilt = built.as_ref().is_some_and(|built| built.is_changed())
             || created.as_ref().is_some_and(|created| created.is_changed());
@@ -285,18 +302,31 @@ pub(super) fn follow_skins(
             continue;
         }
         let skeleton = DeformSkeleton::new(&rig, built.as_ref().map(|built| &*built.0));
-        // Pieces of joints without an entity or with a singular rest transform follow the rig itself.
-        let held = skeleton.joints().iter().map(|joint| {
-            let found = joints.get(joint.uid).or_else(|| created.as_ref()?.get(joint.uid));
-            let bind = Mat4::from(bevy::math::Affine3A::from(joint.rest).inverse());
-            found.filter(|_| bind.is_finite()).map_or((entity, Mat4::IDENTITY), |joint| (joint, bind))
-        });
-        let held: Vec<(Entity, Mat4)> = held.collect();
-        let held = BindTargets { rig_entity: entity, rig: &rig, skeleton: &skeleton, joints: &held };
-        let displayed = displayed.bypass_change_detection();
-        for shown in displayed.surface.pieces.iter_mut().chain(&mut displayed.edges.pieces) {
-            follow_skin(shown, &held, &mut commands, &mut bind_assets);
-        }
+        let joint = |uid: Uid| joints.get(uid).or_else(|| created.as_ref()?.get(uid));
+        follow_joints(&mut displayed, entity, &rig, &skeleton, &joint, &mut commands, &mut bind_assets);
+    }
+}
+
+/// Links the pieces of a mesh to the entities of its joints.
+fn follow_joints(
+    displayed: &mut Mut<Displayed>,
+    entity: Entity,
+    rig: &Rig,
+    skeleton: &DeformSkeleton,
+    joint: &dyn Fn(Uid) -> Option<Entity>,
+    commands: &mut Commands,
+    bind_assets: &mut Assets<SkinnedMeshInverseBindposes>,
+) {
+    // Pieces of joints without an entity or with a singular rest transform follow the rig itself.
+    let held = skeleton.joints().iter().map(|one| {
+        let bind = Mat4::from(bevy::math::Affine3A::from(one.rest).inverse());
+        joint(one.uid).filter(|_| bind.is_finite()).map_or((entity, Mat4::IDENTITY), |joint| (joint, bind))
+    });
+    let held: Vec<(Entity, Mat4)> = held.collect();
+    let held = BindTargets { rig_entity: entity, rig, skeleton, joints: &held };
+    let displayed = displayed.bypass_change_detection();
+    for shown in displayed.surface.pieces.iter_mut().chain(&mut displayed.edges.pieces) {
+        follow_skin(shown, &held, commands, bind_assets);
     }
 }
 

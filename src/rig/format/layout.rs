@@ -11,7 +11,7 @@ use super::{
 const COLUMNS: usize = 100;
 
 /// Blanks before the items of a bracket.
-const INDENT: usize = 4;
+pub(in crate::rig) const INDENT: usize = 4;
 
 /// The text in its layout. Text in its layout already stays as it is, to the byte.
 ///
@@ -48,6 +48,14 @@ pub(in crate::rig) fn value_laid_out(text: &str, indent: usize, before: usize) -
     layout.out
 }
 
+/// One value on one line, as far as no comment or blank line is in it.
+pub(in crate::rig) fn value_on_one_line(text: &str) -> String {
+    let Some(tree) = Tree::parse(text) else { return text.to_owned() };
+    let mut layout = Layout { columns: usize::MAX, ..Layout::new(&tree) };
+    layout.value(tree.root(), 0, 0);
+    layout.out
+}
+
 struct Layout<'t, 'a> {
     tree: &'t Tree<'a>,
     /// Columns of every node on one line.
@@ -56,6 +64,8 @@ struct Layout<'t, 'a> {
     breaks: Vec<usize>,
     /// True for a whole file, which never stands on one line.
     is_file: bool,
+    /// Most columns of a line with several items.
+    columns: usize,
     out: String,
 }
 
@@ -73,7 +83,14 @@ impl<'t, 'a> Layout<'t, 'a> {
                 }
             };
         }
-        Self { tree, widths, breaks: breaks(tree.text), is_file: false, out: String::with_capacity(tree.text.len()) }
+        Self {
+            tree,
+            widths,
+            breaks: breaks(tree.text),
+            is_file: false,
+            columns: COLUMNS,
+            out: String::with_capacity(tree.text.len()),
+        }
     }
 
     /// Writes a value; its first line has `before` columns already.
@@ -129,7 +146,7 @@ impl<'t, 'a> Layout<'t, 'a> {
             return true;
         }
         let is_outer = self.is_file && (id == self.tree.root() || is_list_of_file());
-        !is_outer && !self.has_break(node.inside, node.range.end) && before + self.widths[id] < COLUMNS
+        !is_outer && !self.has_break(node.inside, node.range.end) && before + self.widths[id] < self.columns
     }
 
     fn has_break(&self, start: usize, end: usize) -> bool {

@@ -19,8 +19,8 @@ use crate::rig::{Rig, Uid};
 
 /// Highest format that this version reads; written only for content that needs it.
 ///
-/// Format 2 adds values of attributes, and poses of nodes that are not joints, format 3 adds clips. A project is written in the
-/// first format that can hold it.
+/// Format 2 adds values of attributes, and poses of nodes that are not joints; format 3 adds clips, and the templates that rigs
+/// follow. A project is written in the first format that can hold it.
 pub const FORMAT: u32 = 3;
 
 /// Largest size in bytes of a project that is read.
@@ -35,6 +35,8 @@ pub struct Project {
     pub meshes: Vec<MeshReference>,
     /// Rigs of the project.
     pub rigs: Vec<ProjectRig>,
+    /// Templates that rigs of the project follow.
+    pub templates: Vec<TemplateReference>,
     /// View of the project: camera, tool and display settings.
     pub view: ProjectView,
     /// Journal that continues from this file.
@@ -66,6 +68,17 @@ pub struct ProjectRig {
     pub rig: Rig,
     /// Weights, one file a mesh.
     pub skins: Vec<SkinReference>,
+}
+
+/// Template that a rig of a project follows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TemplateReference {
+    /// The rig.
+    pub rig: Uid,
+    /// Path of the template's file: relative to the project's folder with `/` between names, or absolute.
+    pub path: String,
+    /// The version of the template that the rig took over last, with what its parts brought: base of the next update.
+    pub base: Rig,
 }
 
 /// Reference to the weights of a mesh: a `.skin` file beside the project.

@@ -34,14 +34,14 @@ pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};
 pub use text_patch::write_template_over;
-pub(crate) use text_patch::{says_the_same, write_own_over};
+pub(crate) use text_patch::{PartRigs, says_the_same, write_parts_over};
 pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{quoted, vector, write_without_poses};
 
 use crate::rig::{
     Rig, Uid,
-    part::{PartChain, PartInstance},
+    part::{OptionForm, PartChain, PartInstance, PartOption, PartSocket},
 };
 
 /// The newest format that is read and written. A file that the program writes by itself says the oldest format that holds
@@ -86,6 +86,42 @@ pub struct TemplateHeader {
     /// Needs of a part from the rig that it is dropped into; `None` for other templates.
     #[serde(default)]
     pub needs: Option<NeedsSummary>,
+    /// Places that others hang on.
+    #[serde(default)]
+    pub sockets: Vec<SocketSummary>,
+    /// Values that uses of the template as a part may set.
+    #[serde(default)]
+    pub options: Vec<OptionSummary>,
+}
+
+/// A socket in a template's header: see [`PartSocket`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SocketSummary {
+    /// Name of the socket.
+    pub name: String,
+    /// Label of its joint.
+    pub joint: String,
+}
+
+/// An option in a template's header: see [`PartOption`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OptionSummary {
+    /// Name of the option.
+    pub name: String,
+    /// The value without it, as RON.
+    #[serde(deserialize_with = "written")]
+    pub default: String,
+    /// Description for people.
+    #[serde(default)]
+    pub description: String,
+    /// Form of the value.
+    #[serde(default)]
+    pub form: Option<OptionForm>,
+}
+
+/// Reads a value as it is written.
+fn written<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    Ok(Box::<ron::value::RawValue>::deserialize(deserializer)?.trim().get_ron().to_owned())
 }
 
 /// Needs of a part from its host, in a template's header: see [`PartNeeds`](crate::rig::part::PartNeeds).
@@ -122,6 +158,10 @@ pub struct Template {
     pub rig: Rig,
     /// Chains that take other numbers of joints where the template is used as a part.
     pub chains: Vec<PartChain>,
+    /// Places that others hang on: those of the template itself, and, once its parts are in the rig, those of the parts.
+    pub sockets: Vec<PartSocket>,
+    /// Values that its uses as a part may set.
+    pub options: Vec<PartOption>,
     /// Parts that have not been put into the rig yet: see [`Template::with_parts`].
     pub parts: Vec<PartInstance>,
     /// Parts that have been put into the rig.

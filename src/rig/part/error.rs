@@ -1,5 +1,6 @@
 //! Errors of putting a part into a rig.
 
+use super::{OptionError, SocketError};
 use crate::rig::{EditError, Uid, operations::OperationError};
 
 /// Reason why a part does not fit the rig that uses it, or an instance does not fit its part.
@@ -108,6 +109,12 @@ pub enum PartError {
         /// Uid of the tag.
         tag: Uid,
     },
+    /// A socket that is not there.
+    #[error(transparent)]
+    Socket(#[from] SocketError),
+    /// An option that the part does not have, or a value that it does not take.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// An edit that the host refused.
     #[error(transparent)]
     Edit(#[from] EditError),

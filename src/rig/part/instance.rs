@@ -4,19 +4,15 @@
 //! it has uids that follow from those of the instance and of the part's joints and tags, so that a part can be used many times,
 //! and a later version of it changes what it changes and no more: see [`update`](crate::rig::update).
 
-use std::{
-    borrow::Cow,
-    collections::{BTreeMap, HashMap},
-};
+use std::collections::{BTreeMap, HashMap};
 
+use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket};
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
-    format::tree::{Tree, with_field},
     label::mirrored_label,
     nearest::did_you_mean,
     operations::{Draft, MirrorPlane, drop_part},
-    part::{PartChain, PartError},
-    reference::{NameKind, NameScope, Names, bind_names, given_name, map_references, map_text_fields},
+    reference::map_text_fields,
     remap::mirror_names,
 };
 
@@ -27,6 +23,10 @@ pub struct Part {
     pub rig: Rig,
     /// Chains that take other numbers of joints.
     pub chains: Vec<PartChain>,
+    /// Places that other parts hang on.
+    pub sockets: Vec<PartSocket>,
+    /// Values that its uses may set.
+    pub options: Vec<PartOption>,
 }
 
 /// A part in a template.
@@ -46,7 +46,12 @@ pub struct PartInstance {
     pub counts: Vec<(String, usize)>,
     /// Label of the joint that its own joints hang on.
     pub parent: Option<String>,
-    /// Place of its own joints, below `parent`.
+    /// Socket that its own joints hang on, in place of a parent: `name` of the template itself, `instance.name` of a part
+    /// that stands before.
+    pub socket: Option<String>,
+    /// Values of the part's options, as RON.
+    pub options: Vec<(String, String)>,
+    /// Place of its own joints, below the parent or the socket.
     pub rest: RestTransform,
     /// True if `rest` is a place in the rig's space, instead of one below `parent`.
     pub is_world: bool,
@@ -60,26 +65,6 @@ pub struct PartInstance {
     pub changes: Vec<PartChange>,
     /// Place in the template's text, in bytes.
     pub offset: usize,
-}
-
-/// A difference of an instance from its part: of a joint or of a tag.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PartChange {
-    /// Label of a joint of the part.
-    pub joint: Option<String>,
-    /// A tag of the part: `module/name`, `module/label of its joint`, or its uid; where several are called so, with the
-    /// number of one behind it, as in `point/hand_l#2`.
-    pub tag: Option<String>,
-    /// Turns the tag on or off.
-    pub enabled: Option<bool>,
-    /// Parameters of the tag that have another value, as RON: `(size: 2.0)`.
-    pub params: Option<String>,
-    /// Another place of the joint.
-    pub translation: Option<[f32; 3]>,
-    /// Another rotation of the joint, as angles about X, Y and Z in degrees.
-    pub rotation: Option<[f32; 3]>,
-    /// Tags that the joint has besides.
-    pub tags: Vec<TagData>,
 }
 
 /// Gives the parameters of a module for the other side of the character; `None` if it does not know the module.
@@ -97,17 +82,25 @@ impl PartInstance {
         Uid::derived([own.as_str(), source.as_str()])
     }
 
-    /// Puts the part into a rig. Returns notes.
+    /// Puts the part, of which `fitted` is what comes here, into a rig, below a socket if there is one. Returns notes.
     ///
     /// # Errors
-    /// Joints that are not there, a part that needs more of them, unknown features or tags.
-    pub fn put_into(&self, rig: &mut Rig, part: &Part, mirror: MirrorParams) -> Result<Vec<String>, PartError> {
-        let part = &self.prepared(self.resized(part)?, mirror);
+    /// Joints that are not there, a part that needs more of them, unknown features, tags or options.
+    pub fn put_into(
+        &self,
+        rig: &mut Rig,
+        part: &Part,
+        fitted: &Rig,
+        mirror: MirrorParams,
+        socket: Option<&PartSocket>,
+    ) -> Result<Vec<String>, PartError> {
+        let options = self.option_changes(part, mirror)?;
+        let part = fitted;
         let mut uids = UidSource::seeded(self.uid.0);
         let mut draft = Draft::new(rig, &mut uids, None);
         let mut joints = self.known_joints(&draft)?;
         if self.onto.is_empty() || self.adds {
-            self.add_joints(&mut draft, part, &mut joints)?;
+            self.add_joints(&mut draft, part, socket, &mut joints)?;
         }
         if joints.len() > part.len() {
             return Err(PartError::TooManyJoints { given: joints.len(), count: part.len() });
@@ -115,10 +108,66 @@ impl PartInstance {
         let bindings = BTreeMap::new();
         drop_part(&mut draft, part, &joints, &bindings, &mut |_, uid| self.uid_of(uid))?;
         self.turn_off(&mut draft, part)?;
-        for change in &self.changes {
+        for change in options.iter().chain(&self.changes) {
             self.change(&mut draft, part, &joints, change)?;
         }
         Ok(draft.finish().notes.into_iter().map(|note| format!("part {}: {note}", self.title())).collect())
+    }
+
+    /// Sockets of the part as they are in `rig`, under the instance's name. The part need not be in the rig yet.
+    pub fn sockets_in(&self, rig: &Rig, part: &Part, fitted: &Rig) -> Vec<PartSocket> {
+        let plane = MirrorPlane::sagittal(1.0);
+        let here = |socket: &PartSocket| {
+            let place = fitted.walk().position(|joint| Some(joint.data.uid) == socket.joint)?;
+            let joint = match self.onto.get(place) {
+                Some(label) => rig.find_label(label)?,
+                None if self.onto.is_empty() || self.adds => self.uid_of(socket.joint?),
+                None => return None,
+            };
+            let sided = mirrored_label(&socket.name).filter(|_| self.mirror);
+            let name = format!("{}.{}", self.title(), sided.as_ref().unwrap_or(&socket.name));
+            let rest = match self.mirror {
+                true => RestTransform::from_affine(&plane.mirrored_affine(&socket.rest.affine())),
+                false => socket.rest,
+            };
+            Some(PartSocket { name, joint: Some(joint), rest, ..socket.clone() })
+        };
+        part.sockets.iter().filter_map(here).collect()
+    }
+
+    /// Changes that the instance's options make.
+    fn option_changes(&self, part: &Part, mirror: MirrorParams) -> Result<Vec<PartChange>, OptionError> {
+        let mut changes = Vec::new();
+        for (name, value) in &self.options {
+            let Some(option) = part.options.iter().find(|option| option.name == *name) else {
+                let known: Vec<&str> = part.options.iter().map(|option| option.name.as_str()).collect();
+                return Err(OptionError::Unknown { name: name.clone(), nearest: did_you_mean(name, known) });
+            };
+            option.check(value)?;
+            for (tag, param) in &option.sets {
+                // The option names tags as the part's file does.
+                let in_file = PartInstance::default().find_tag(&part.rig, tag);
+                let tag =
+                    in_file.map_err(|reason| OptionError::Target { name: name.clone(), reason: Box::new(reason) })?;
+                let params = format!("({param}: {value})");
+                let module = part.rig.find_tag(tag).and_then(|(_, tag)| match &tag.kind {
+                    TagKind::Command { module, .. } => Some(module),
+                    TagKind::Feature { .. } => None,
+                });
+                let mirrored = module.filter(|_| self.mirror).and_then(|module| mirror(module, &params));
+                let params = Some(mirrored.unwrap_or(params));
+                changes.push(PartChange { tag: Some(tag.to_string()), params, ..PartChange::default() });
+            }
+        }
+        Ok(changes)
+    }
+
+    /// The part with the joints, names and values that it has here, before its changes.
+    ///
+    /// # Errors
+    /// A chain that the part does not have, or that takes another number of joints.
+    pub fn fitted(&self, part: &Part, mirror: MirrorParams) -> Result<Rig, PartError> {
+        Ok(self.prepared(self.resized(part)?, mirror))
     }
 
     /// The part with as many joints as it has here: as many as it goes onto, where nothing else is said.
@@ -192,11 +241,22 @@ impl PartInstance {
     }
 
     /// Adds the joints that the part brings, beyond the first ones, which are there.
-    fn add_joints(&self, draft: &mut Draft, part: &Rig, joints: &mut Vec<Uid>) -> Result<(), PartError> {
+    fn add_joints(
+        &self,
+        draft: &mut Draft,
+        part: &Rig,
+        socket: Option<&PartSocket>,
+        joints: &mut Vec<Uid>,
+    ) -> Result<(), PartError> {
         let parent = self.parent.as_deref().map(|label| labelled(draft.rig(), label)).transpose()?;
+        let parent = socket.and_then(|socket| socket.joint).or(parent);
         let globals = draft.rig().rest_globals();
         let below = globals.into_iter().find(|(uid, _)| self.is_world && parent == Some(*uid));
-        let place = below.map_or(self.rest.affine(), |(_, global)| global.inverse() * self.rest.affine());
+        let place = match (below, socket) {
+            (Some((_, global)), _) => global.inverse() * self.rest.affine(),
+            (None, Some(socket)) => socket.rest.affine() * self.rest.affine(),
+            (None, None) => self.rest.affine(),
+        };
         let mut of: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
         for joint in part.walk().skip(joints.len()) {
             let (uid, rest) = (self.uid_of(joint.data.uid), joint.data.rest);
@@ -215,13 +275,7 @@ impl PartInstance {
     }
 
     fn turn_off(&self, draft: &mut Draft, part: &Rig) -> Result<(), PartError> {
-        let names = |tag: &TagData| match &tag.kind {
-            TagKind::Feature { kind, name, switch, .. } => {
-                let name = if name.is_empty() { kind } else { name };
-                Some(if switch.is_empty() { name.clone() } else { format!("{name}.{switch}") })
-            }
-            TagKind::Command { .. } => None,
-        };
+        let names = switch_name;
         for off in &self.off {
             let tags = || part.walk().flat_map(|joint| &joint.data.tags);
             let found: Vec<Uid> =
@@ -236,111 +290,13 @@ impl PartInstance {
         }
         Ok(())
     }
-
-    fn change(&self, draft: &mut Draft, part: &Rig, joints: &[Uid], change: &PartChange) -> Result<(), PartError> {
-        let places: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
-        if let Some(name) = &change.tag {
-            let tag = self.uid_of(self.find_tag(part, name)?);
-            if let Some(enabled) = change.enabled {
-                set_tag(draft, tag, |tag| tag.enabled = enabled)?;
-            }
-            if let Some(others) = &change.params {
-                // Names are those of the part first, then those of the template.
-                let (bound, _) = bind_names(others, &PartNames { part, host: draft.rig() });
-                let others = &map_references(&bound, |reference| {
-                    for (_, uid) in reference.uids_mut() {
-                        match places.get(uid) {
-                            Some(joint) => *uid = *joint,
-                            None if part.is_taken(*uid) => *uid = self.uid_of(*uid),
-                            None => {}
-                        }
-                    }
-                });
-                set_tag(draft, tag, |tag| {
-                    if let TagKind::Command { params, .. } = &mut tag.kind {
-                        *params = with_params(params, others);
-                    }
-                })?;
-            }
-        }
-        let Some(label) = &change.joint else { return Ok(()) };
-        let is_called = |joint: &&(usize, &crate::rig::RigJoint)| {
-            let known = joint.1.data.label.as_deref();
-            known == Some(label) || known.and_then(|known| known.strip_prefix(self.prefix.as_str())) == Some(label)
-        };
-        let walked: Vec<_> = part.walk().enumerate().collect();
-        let Some((place, _)) = walked.iter().find(is_called) else {
-            let known: Vec<&str> = walked.iter().filter_map(|(_, joint)| joint.data.label.as_deref()).collect();
-            return Err(PartError::UnknownJoint { label: label.clone(), nearest: did_you_mean(label, known) });
-        };
-        let Some(joint) = joints.get(*place).copied() else {
-            return Err(PartError::UnusedJoint { label: label.clone() });
-        };
-        if let Some(mut rest) = draft.rig().joint(joint).map(|joint| joint.data.rest) {
-            rest.translation = change.translation.map_or(rest.translation, Into::into);
-            rest.rotation = change.rotation.map_or(rest.rotation, |angles| crate::rig::degrees(angles.into()));
-            draft.apply(RigEdit::SetRest(joint, rest))?;
-        }
-        for tag in &change.tags {
-            let tag = Box::new(TagData { uid: self.uid_of(tag.uid), ..tag.clone() });
-            let edit = RigEdit::AddTag { joint, tag, index: usize::MAX };
-            draft.apply(edit)?;
-        }
-        Ok(())
-    }
-
-    /// The tag of the part that is called so.
-    fn find_tag(&self, part: &Rig, name: &str) -> Result<Uid, PartError> {
-        let mut called: Vec<(String, Uid)> = Vec::new();
-        for joint in part.walk() {
-            for tag in &joint.data.tags {
-                called.push((tag.uid.to_string(), tag.uid));
-                let TagKind::Command { module, params, .. } = &tag.kind else { continue };
-                let plain = |name: &str| name.strip_prefix(self.prefix.as_str()).unwrap_or(name).to_owned();
-                let given = given_name(params).map(|name| plain(&name));
-                let label = joint.data.label.as_deref().map(plain);
-                called.extend(given.into_iter().chain(label).map(|name| (format!("{module}/{name}"), tag.uid)));
-            }
-        }
-        let (plain, number) = match name.rsplit_once('#').map(|(plain, number)| (plain, number.parse::<usize>())) {
-            Some((plain, Ok(number))) => (plain, Some(number)),
-            _ => (name, None),
-        };
-        let mut found: Vec<Uid> = called.iter().filter(|(known, _)| known == plain).map(|(_, uid)| *uid).collect();
-        found.dedup();
-        if let Some(number) = number {
-            found = number.checked_sub(1).and_then(|at| found.get(at).copied()).into_iter().collect();
-        }
-        match found[..] {
-            [tag] => Ok(tag),
-            [] => {
-                let known: Vec<&str> = called.iter().map(|(known, _)| known.as_str()).collect();
-                Err(PartError::UnknownTag { name: name.to_owned(), nearest: did_you_mean(name, known) })
-            }
-            _ => Err(PartError::AmbiguousTag { name: name.to_owned(), count: found.len() }),
-        }
-    }
 }
 
-/// Names in a part, then those in the template that uses it.
-struct PartNames<'a> {
-    part: &'a Rig,
-    host: &'a Rig,
-}
-
-impl Names for PartNames<'_> {
-    fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
-        self.part.name_of(kind, uid).or_else(|| self.host.name_of(kind, uid))
-    }
-
-    fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
-        let found = self.part.find(scope, kind, name);
-        if found.is_empty() { self.host.find(scope, kind, name) } else { found }
-    }
-
-    fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {
-        self.part.all(scope, kind).into_iter().chain(self.host.all(scope, kind)).collect()
-    }
+/// Name by which an instance turns a feature of its part off, or a switch of one; `None` for a command.
+pub(in crate::rig) fn switch_name(tag: &TagData) -> Option<String> {
+    let TagKind::Feature { kind, name, switch, .. } = &tag.kind else { return None };
+    let name = if name.is_empty() { kind } else { name };
+    Some(if switch.is_empty() { name.clone() } else { format!("{name}.{switch}") })
 }
 
 fn unknown_chain(name: &str, chains: &[PartChain]) -> PartError {
@@ -359,22 +315,11 @@ fn labelled(rig: &Rig, label: &str) -> Result<Uid, PartError> {
     })
 }
 
-fn set_tag(draft: &mut Draft, tag: Uid, change: impl FnOnce(&mut TagData)) -> Result<(), PartError> {
+pub(super) fn set_tag(draft: &mut Draft, tag: Uid, change: impl FnOnce(&mut TagData)) -> Result<(), PartError> {
     let Some((joint, found)) = draft.rig().find_tag(tag) else {
         return Err(PartError::UnusedTag { tag });
     };
     let (joint, mut found) = (joint.data.uid, found.clone());
     change(&mut found);
     Ok(draft.apply(RigEdit::SetTag(joint, Box::new(found)))?)
-}
-
-/// Parameters with other values for some of them.
-fn with_params(params: &str, others: &str) -> String {
-    let mut out = params.to_owned();
-    let Some(others) = Tree::parse(others) else { return out };
-    for item in &others.node(others.root()).items {
-        let Some(key) = item.key else { continue };
-        out = with_field(&out, key, others.written(item.value));
-    }
-    out
 }

@@ -14,7 +14,7 @@ use crate::{
             scene::{EditedRig, Scene, joints},
         },
     },
-    plugins::document::ShowRest,
+    plugins::{document::ShowRest, stage::RigStage},
 };
 
 /// Shows the rest pose while it is edited.
@@ -22,14 +22,15 @@ pub(super) fn show_rest(
     mode: Res<Mode>,
     tool: Res<GizmoTool>,
     active: Option<Res<ActiveRig>>,
-    mut rigs: Query<(Entity, &mut ShowRest)>,
+    mut rigs: Query<(Entity, &mut ShowRest, Option<&RigStage>)>,
     mut redraw: MessageWriter<RequestRedraw>,
 ) {
     let is_dragged = tool.drag.as_ref().map(|drag| matches!(drag.from, Start::Rest(_)));
     let wanted = is_dragged.unwrap_or(edits_rest(*mode));
-    for (rig, mut show_rest) in &mut rigs {
+    for (rig, mut show_rest, stage) in &mut rigs {
         let is_active = active.as_ref().is_some_and(|active| active.0 == rig);
-        if show_rest.set_if_neq(ShowRest(wanted && is_active)) {
+        let is_edited = stage == Some(&RigStage::Edit);
+        if show_rest.set_if_neq(ShowRest(is_edited || wanted && is_active)) {
             // Joints follow in the next frame, which has to be requested: otherwise it would come with the next
             // movement of the pointer.
             redraw.write(RequestRedraw);

@@ -10,6 +10,7 @@ use serde::{Deserialize, Deserializer, de::Error as _, de::IgnoredAny};
 
 use super::{
     FORMAT, JournalReference, MAX_BYTES, MeshReference, Project, ProjectRig, ProjectView, ReadProject, SkinReference,
+    TemplateReference,
 };
 use crate::rig::{
     AttributeValues, EditError, Rig, RigEdit, SourceError, StoredPose, Uid,
@@ -32,9 +33,21 @@ struct ProjectFile {
     #[serde(default)]
     rigs: Vec<RigFile>,
     #[serde(default)]
+    templates: Vec<TemplateFile>,
+    #[serde(default)]
     view: ProjectView,
     #[serde(default)]
     journal: Option<JournalReference>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TemplateFile {
+    rig: Uid,
+    path: String,
+    /// The base is read separately, as a template from the text.
+    #[serde(rename = "base")]
+    _base: IgnoredAny,
 }
 
 #[derive(Deserialize)]
@@ -86,14 +99,15 @@ pub fn read_project(bytes: &[u8]) -> Result<ReadProject, SourceError> {
     let known = PROJECT.readable(text, &fields, 1, &mut notes)?;
     let file: ProjectFile = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
     let places = Places::new(text, &fields);
-    let ProjectFile { name, meshes, rigs, mut view, journal, .. } = file;
+    let ProjectFile { name, meshes, rigs, templates, mut view, journal, .. } = file;
     let rigs = read_rigs(&places, rigs, &meshes, &mut notes)?;
+    let templates = read_templates(&places, templates, &rigs, &mut notes)?;
     check_meshes(&places, &meshes, &rigs)?;
     if view.camera.is_some_and(|camera| !camera.is_finite()) {
         view.camera = None;
         notes.push("the view's camera is not finite; the whole character is shown instead".to_owned());
     }
-    Ok(ReadProject { project: Project { name, meshes, rigs, view, journal }, notes })
+    Ok(ReadProject { project: Project { name, meshes, rigs, templates, view, journal }, notes })
 }
 
 fn check_meshes(places: &Places, meshes: &[MeshReference], rigs: &[ProjectRig]) -> Result<(), SourceError> {
@@ -110,6 +124,29 @@ fn check_meshes(places: &Places, meshes: &[MeshReference], rigs: &[ProjectRig]) 
         }
     }
     Ok(())
+}
+
+fn read_templates(
+    places: &Places,
+    files: Vec<TemplateFile>,
+    rigs: &[ProjectRig],
+    notes: &mut Vec<String>,
+) -> Result<Vec<TemplateReference>, SourceError> {
+    let mut found: Vec<TemplateReference> = Vec::with_capacity(files.len());
+    let mut bases = Templates { text: places.text, line: 1, counted: 0 };
+    for (TemplateFile { rig, path, .. }, element) in files.into_iter().zip(places.elements(places.top("templates"))) {
+        if !rigs.iter().any(|known| known.rig.uid() == rig) {
+            let message = format!("the template is of the rig {rig}, which is not in the file; correct it");
+            return Err(places.error(element, "rig", message));
+        }
+        if found.iter().any(|known| known.rig == rig) {
+            let message = format!("rig {rig} follows two templates; keep one of them");
+            return Err(places.error(element, "rig", message));
+        }
+        let base = bases.read(places.within(element, "base").map(|field| &places.fields[field]), notes)?;
+        found.push(TemplateReference { rig, path, base });
+    }
+    Ok(found)
 }
 
 fn read_rigs(
@@ -251,8 +288,9 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
     }
     const OFFSET: &[&str] = &["joint", "translation", "rotation", "scale"];
     match (field.depth, path) {
-        (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "view", "journal"]),
+        (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "templates", "view", "journal"]),
         (3, ["meshes", "", ""]) => Some(&["uid", "rig", "path", "hash", "nodes"]),
+        (3, ["templates", "", ""]) => Some(&["rig", "path", "base"]),
         (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips"]),
         (5, ["skins", "rigs", ""]) => Some(&["mesh", "path", "hash", "at_rest"]),
         (5, ["pose", "rigs", ""]) => Some(OFFSET),

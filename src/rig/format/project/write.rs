@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{FORMAT, Project, ProjectRig, ProjectView};
+use super::{FORMAT, Project, ProjectRig, ProjectView, TemplateReference};
 use crate::rig::{
     Rig,
     animation::NodeNames,
@@ -22,7 +22,8 @@ pub fn write_project(project: &Project) -> String {
 }
 
 fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
-    let format = project.rigs.iter().map(|entry| needed_format(&entry.rig)).max().unwrap_or(1);
+    let of_rigs = project.rigs.iter().map(|entry| needed_format(&entry.rig)).max().unwrap_or(1);
+    let format = if project.templates.is_empty() { of_rigs } else { FORMAT };
     writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
     writeln!(out, "    meshes: [")?;
     for mesh in &project.meshes {
@@ -42,6 +43,19 @@ fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
         write_rig(out, rig)?;
     }
     writeln!(out, "    ],")?;
+    if !project.templates.is_empty() {
+        writeln!(out, "    templates: [")?;
+        for TemplateReference { rig, path, base } in &project.templates {
+            write!(
+                out,
+                "        (\n            rig: \"{rig}\",\n            path: {},\n            base: ",
+                quoted(path)
+            )?;
+            write_indented(out, &write_without_poses(base), "            ");
+            writeln!(out, ",\n        ),")?;
+        }
+        writeln!(out, "    ],")?;
+    }
     write_view(out, &project.view)?;
     if let Some(journal) = &project.journal {
         writeln!(out, "    journal: (file: {}, last: {}),", quoted(&journal.file), journal.last)?;

@@ -1,5 +1,7 @@
 //! Contents of a template file as they are deserialised, and the names of its fields.
 
+use std::collections::BTreeMap;
+
 use ron::value::RawValue;
 use serde::Deserialize;
 
@@ -10,6 +12,7 @@ use crate::rig::{
         poses::{PoseFile, no_rotation, no_scale},
         scan::Field,
     },
+    part::OptionForm,
 };
 
 #[derive(Deserialize)]
@@ -36,6 +39,10 @@ pub(super) struct TemplateFile {
     pub(super) needs: Option<NeedsSummary>,
     #[serde(default)]
     pub(super) chains: Vec<ChainFile>,
+    #[serde(default)]
+    pub(super) sockets: Vec<SocketFile>,
+    #[serde(default)]
+    pub(super) options: Vec<OptionFile>,
     #[serde(default)]
     pub(super) groups: Vec<GroupFile>,
     #[serde(default)]
@@ -71,6 +78,39 @@ pub(super) struct InputFile {
     pub(super) rotation: (f32, f32, f32, f32),
     #[serde(default = "no_scale")]
     pub(super) scale: (f32, f32, f32),
+}
+
+/// A place that others hang on.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SocketFile {
+    pub(super) name: String,
+    pub(super) joint: String,
+    #[serde(default)]
+    pub(super) translation: (f32, f32, f32),
+    #[serde(default)]
+    pub(super) rotation: (f32, f32, f32),
+}
+
+/// A value that a part lets its uses set.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OptionFile {
+    pub(super) name: String,
+    pub(super) default: Box<RawValue>,
+    #[serde(default)]
+    pub(super) description: String,
+    #[serde(default)]
+    pub(super) form: Option<OptionForm>,
+    pub(super) sets: Vec<OptionTargetFile>,
+}
+
+/// A parameter that an option sets.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OptionTargetFile {
+    pub(super) tag: String,
+    pub(super) param: String,
 }
 
 /// A chain of a part that takes other numbers of joints.
@@ -113,6 +153,10 @@ pub(super) struct PartFile {
     #[serde(default)]
     pub(super) parent: Option<String>,
     #[serde(default)]
+    pub(super) socket: Option<String>,
+    #[serde(default)]
+    pub(super) options: BTreeMap<String, Box<RawValue>>,
+    #[serde(default)]
     pub(super) world: bool,
     #[serde(default)]
     pub(super) translation: (f32, f32, f32),
@@ -143,12 +187,41 @@ pub(super) struct PartChangeFile {
     #[serde(default)]
     pub(super) params: Option<Box<RawValue>>,
     #[serde(default)]
+    pub(super) unset: Vec<String>,
+    #[serde(default)]
+    pub(super) comment: Option<String>,
+    #[serde(default)]
+    pub(super) removed: bool,
+    #[serde(default)]
+    pub(super) label: Option<String>,
+    #[serde(default)]
+    pub(super) locked: Option<bool>,
+    #[serde(default)]
     pub(super) translation: Option<(f32, f32, f32)>,
     #[serde(default)]
-    pub(super) rotation: Option<(f32, f32, f32)>,
+    pub(super) rotation: Option<Box<RawValue>>,
+    #[serde(default)]
+    pub(super) scale: Option<(f32, f32, f32)>,
     #[serde(default)]
     pub(super) tags: Option<Box<RawValue>>,
 }
+
+/// Names of the fields of a difference.
+pub(super) const PART_CHANGE_FIELDS: [&str; 13] = [
+    "joint",
+    "tag",
+    "enabled",
+    "params",
+    "unset",
+    "comment",
+    "removed",
+    "label",
+    "locked",
+    "translation",
+    "rotation",
+    "scale",
+    "tags",
+];
 
 fn one() -> f32 {
     1.0
@@ -242,6 +315,8 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "features",
             "needs",
             "chains",
+            "sockets",
+            "options",
             "groups",
             "inputs",
             "joints",
@@ -257,6 +332,8 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "count",
             "counts",
             "parent",
+            "socket",
+            "options",
             "world",
             "translation",
             "rotation",
@@ -266,11 +343,12 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "off",
             "changes",
         ]),
+        (3, Some("sockets")) => Some(&["name", "joint", "translation", "rotation"]),
+        (3, Some("options")) => Some(&["name", "default", "description", "form", "sets"]),
+        (5, Some("sets")) if above == Some("options") => Some(&["tag", "param"]),
         (3, Some("chains")) => Some(&["name", "joints", "min", "max"]),
         (5, Some("counts")) if above == Some("parts") => Some(&["chain", "count"]),
-        (5, Some("changes")) if above == Some("parts") => {
-            Some(&["joint", "tag", "enabled", "params", "translation", "rotation", "tags"])
-        }
+        (5, Some("changes")) if above == Some("parts") => Some(&PART_CHANGE_FIELDS),
         (3, Some("poses")) => Some(&["uid", "name", "offsets", "values"]),
         (5, Some("offsets")) if above == Some("poses") => Some(&["joint", "translation", "rotation", "scale"]),
         (5, Some("values")) if above == Some("poses") => Some(&["node", "name", "value"]),

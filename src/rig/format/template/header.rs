@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use super::{
     FeatureSummary, TemplateHeader,
     shorthand::{Declarations, TagForm},
-    write::{feature_summaries, needs_summary},
+    write::{feature_summaries, features_of, needs_summary},
 };
-use crate::rig::{Rig, Uid};
+use crate::rig::{Rig, Uid, part::PartInstance};
 
 /// The header with the uid that follows from the name, and, where the file is complete and says none, the number of
 /// joints and the named features. What parts bring is in other files: see [`TemplateHeader::complete_from`].
@@ -37,6 +37,33 @@ impl TemplateHeader {
         self.joint_count = rig.len();
         self.features = feature_summaries(rig);
         self.needs = needs_summary(rig);
+    }
+}
+
+impl TemplateHeader {
+    /// Sets the number of joints and the named features of a template with parts, each as it is [fitted](PartInstance::fitted).
+    pub fn complete_from_parts(&mut self, own: &Rig, parts: &[(PartInstance, Rig)]) {
+        self.joint_count = own.len();
+        let mut features: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
+        let mut add = |rig: &Rig, joints: usize| {
+            for FeatureSummary { kind, name, switches } in features_of(rig.walk().take(joints)) {
+                features.entry((kind, name)).or_default().extend(switches);
+            }
+        };
+        add(own, own.len());
+        for (instance, part) in parts {
+            // Joints of a part beyond those that it goes onto stay out, with their tags, unless it adds them.
+            let there = instance.onto.len();
+            let joints = if there == 0 || instance.adds { part.len() } else { there.min(part.len()) };
+            self.joint_count += joints.saturating_sub(there);
+            add(part, joints);
+        }
+        let summary = |((kind, name), mut switches): ((String, String), Vec<String>)| {
+            switches.sort_unstable();
+            switches.dedup();
+            FeatureSummary { kind, name, switches }
+        };
+        self.features = features.into_iter().map(summary).collect();
     }
 }
 

@@ -25,7 +25,6 @@ use crate::rig::{
     format::scan::{self, Field},
     format::source::{parse_ron, ron_options, utf8},
     format::version::{Format, blanked},
-    part::{PartChain, PartInstance},
     reference::{bind_names, refresh_names},
 };
 
@@ -75,9 +74,8 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
             return Err(in_source(faults));
         }
     };
-    let (rig, chains, parts) = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
-    let parts = parts_in(&explicit, parts);
-    Ok((Template { rig, chains, parts, instances: Vec::new(), notes }, in_source(faults)))
+    let template = build(&Places { text, fields: &fields }, file, notes, &mut faults);
+    Ok((in_text(&explicit, template), in_source(faults)))
 }
 
 /// Reads a template that stands in another file, where its first line has the number `first_line`.
@@ -95,19 +93,20 @@ fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, Sou
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
     let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
     let mut faults = Vec::new();
-    let (rig, chains, parts) = build(&Places { text, fields: &fields }, file, &mut notes, &mut faults);
+    let template = build(&Places { text, fields: &fields }, file, notes, &mut faults);
     match faults.into_iter().next() {
         Some(fault) => Err(fault),
-        None => Ok(Template { rig, chains, parts: parts_in(explicit, parts), instances: Vec::new(), notes }),
+        None => Ok(in_text(explicit, template)),
     }
 }
 
-/// Part instances with their places in the source.
-fn parts_in(explicit: &Explicit, mut parts: Vec<PartInstance>) -> Vec<PartInstance> {
-    for part in &mut parts {
-        part.offset = explicit.in_source(part.offset);
+/// A template with the places in the source of what is checked later.
+fn in_text(explicit: &Explicit, mut template: Template) -> Template {
+    let parts = template.parts.iter_mut().map(|part| &mut part.offset);
+    for offset in parts.chain(template.sockets.iter_mut().map(|socket| &mut socket.offset)) {
+        *offset = explicit.in_source(*offset);
     }
-    parts
+    template
 }
 
 /// Reads the header alone; the rest may be missing or invalid. `bytes` may be the first part of a file.
@@ -131,13 +130,8 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
     Ok(complete(header, text))
 }
 
-/// The rig of a file, without what is at fault.
-fn build(
-    places: &Places,
-    file: TemplateFile,
-    notes: &mut Vec<String>,
-    faults: &mut Vec<SourceError>,
-) -> (Rig, Vec<PartChain>, Vec<PartInstance>) {
+/// The template of a file, without what is at fault.
+fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &mut Vec<SourceError>) -> Template {
     let mut rig = Rig::new(file.uid, file.name.clone());
     rig.about = RigAbout {
         name: file.name,
@@ -168,22 +162,24 @@ fn build(
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
     add_joints(&mut rig, format, file.joints, places, &mut seen, faults);
-    let chains = parts::chains(&rig, file.chains, notes);
+    let chains = parts::chains(&rig, file.chains, &mut notes);
+    let mut sockets = parts::sockets(places, file.sockets, faults);
+    let options = parts::options(places, file.options, faults);
     add_poses(&mut rig, file.poses, &mut |uid, nth, field, message| {
         faults.push(places.error(uid, nth, field, message));
     });
-    if !instances.is_empty() {
+    if instances.is_empty() {
+        parts::place_sockets(&rig, &mut sockets, places.text, faults);
         // References may name what parts bring.
-        return (rig, chains, instances);
+        bind_references(&mut rig, &mut notes);
+        if file.features.is_some_and(|features| feature_summaries(&rig) != sorted(features)) {
+            notes.push("the header lists other features than the tags; saving corrects it".to_owned());
+        }
+        if file.needs.is_some() && file.needs != needs_summary(&rig) {
+            notes.push("the header says other needs than the part has; saving corrects it".to_owned());
+        }
     }
-    bind_references(&mut rig, notes);
-    if file.features.is_some_and(|features| feature_summaries(&rig) != sorted(features)) {
-        notes.push("the header lists other features than the tags; saving corrects it".to_owned());
-    }
-    if file.needs.is_some() && file.needs != needs_summary(&rig) {
-        notes.push("the header says other needs than the part has; saving corrects it".to_owned());
-    }
-    (rig, chains, instances)
+    Template { rig, chains, sockets, options, parts: instances, instances: Vec::new(), notes }
 }
 
 /// Adds uids to references that people wrote as names alone, and updates the names beside uids.

@@ -1,8 +1,10 @@
 //! Saving over a text: only what changed is written, so that comments, blank lines, the order and the style of what a
 //! person wrote stay, and one changed value is one changed line.
 
+mod labels;
 mod lists;
 mod order;
+mod parts;
 pub(super) mod patch;
 
 use std::{
@@ -28,7 +30,9 @@ use crate::rig::{
     },
     reference::{bind_names, given_name, refresh_names, without_uids},
 };
+use labels::header_labels;
 use order::reordered;
+pub(crate) use parts::{PartRigs, write_parts_over};
 use patch::Patch;
 
 /// The text of a rig's template, as changes of a text of the same rig. `None` if `source` is no template of this rig, or
@@ -41,34 +45,14 @@ pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
     let wanted = comparable(read_text(&write_template(rig), 1).ok()?.rig);
     let is_right = |text: &str| read_text(text, 1).is_ok_and(|read| comparable(read.rig) == wanted);
     let declared = Declarations::find(source)?;
-    let text = Rewriter::new(rig, &before, &declared).text();
+    let mut rewriter = Rewriter::new(rig, &before, &declared);
+    header_labels(&mut rewriter.patch, &declared.tree, &before, rig);
+    let text = rewriter.text();
     if is_right(&text) {
         return Some(text);
     }
     let text = reordered(rig, &text)?;
     is_right(&text).then_some(text)
-}
-
-/// The text of a template with parts, as changes of a text of the same rig; what its parts bring is left to them. `before` is
-/// the rig that the text makes with its parts, and `own` the one without. The text may say something else than `rig` where
-/// that differs in what the parts bring: read it to see.
-pub(crate) fn write_own_over(rig: &Rig, before: &Rig, own: &Rig, source: &str) -> Option<String> {
-    let is_own = |uid: Uid| own.is_taken(uid) || !before.is_taken(uid);
-    let stripped = |rig: &Rig| {
-        let data = |joint: &RigJoint| {
-            let mut data = joint.data.clone();
-            data.tags.retain(|tag| is_own(tag.uid));
-            (data.uid, (data, joint.parent))
-        };
-        let joints = rig.walk().filter(|joint| is_own(joint.data.uid)).map(data).collect();
-        let mut out = rig.clone();
-        out.groups.retain(|group| is_own(group.uid));
-        out.inputs.retain(|input| is_own(input.uid));
-        out.set_joints(joints, |parent| rig.children(parent).to_vec());
-        out
-    };
-    let (rig, before) = (stripped(rig), stripped(before));
-    Some(Rewriter::new(&rig, &before, &Declarations::find(source)?).text())
 }
 
 /// True if the templates of two rigs say the same.
@@ -165,6 +149,8 @@ impl NamesInUse {
 struct Rewriter<'d, 'a> {
     rig: &'d Rig,
     before: &'d Rig,
+    /// The rig with what parts bring, which the header counts, before and now.
+    whole: [&'d Rig; 2],
     declared: &'d Declarations<'a>,
     /// True in a text that leaves uids out: it gets names.
     with_names: bool,
@@ -178,6 +164,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         Self {
             rig,
             before,
+            whole: [before, rig],
             declared,
             with_names,
             names: Rc::new(NamesInUse::of(rig)),
@@ -219,18 +206,18 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         if old.preview != new.preview {
             self.patch.set_or_remove(root, "preview", new.preview.as_deref().map(quoted).as_deref());
         }
-        let tree = self.tree();
+        let (tree, [before, rig]) = (self.tree(), self.whole);
         if let Some(count) = tree.field(root, "joint_count")
             && tree.written(count.value) != rig.len().to_string()
         {
             self.patch.set(root, "joint_count", &rig.len().to_string());
         }
-        if tree.field(root, "features").is_some() && feature_summaries(rig) != feature_summaries(self.before) {
+        if tree.field(root, "features").is_some() && feature_summaries(rig) != feature_summaries(before) {
             self.patch.set(root, "features", &feature_list(rig));
         }
         if tree.field(root, "needs").is_some()
             && let Some(needs) = needs_text(rig)
-            && needs_text(self.before).as_ref() != Some(&needs)
+            && needs_text(before).as_ref() != Some(&needs)
         {
             self.patch.set(root, "needs", &needs);
         }

@@ -2,22 +2,23 @@
 
 use std::{collections::HashSet, fmt, sync::Arc};
 
-use bevy::math::Vec3;
+use bevy::math::{Quat, Vec3};
 use ron::value::RawValue;
 use serde::Serialize;
 
 use super::{
     super::{
         FORMAT, Template,
-        file::{ChainFile, PartChangeFile, PartFile},
+        file::{ChainFile, OptionFile, OptionTargetFile, PartChangeFile, PartFile, SocketFile},
+        shorthand::Declarations,
     },
     Places, bind_references, read_text,
 };
 use crate::rig::{
-    RestTransform, Rig, RigEdit, SourceError, Uid, degrees,
+    RestTransform, Rig, RigEdit, SourceError, TagData, TagKind, Uid, degrees,
     format::{scan::Field, source::ron_text},
     label::mirrored_label,
-    part::{MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance},
+    part::{MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption, PartSocket},
 };
 
 /// Chains of a part. One that does not fit the joints is told and left out.
@@ -44,6 +45,77 @@ pub(super) fn chains(rig: &Rig, files: Vec<ChainFile>, notes: &mut Vec<String>) 
     known
 }
 
+/// Places in the text of the elements of a list of the file.
+fn elements<'p>(places: &'p Places, list: &'static str) -> impl Iterator<Item = usize> + 'p {
+    let is_name = move |field: &&Field| {
+        let parent = field.parent.map(|parent| places.fields[parent].name);
+        field.depth == 3 && field.name == "name" && parent == Some(list)
+    };
+    places.fields.iter().filter(is_name).map(|field| field.start)
+}
+
+/// Sockets of a file, without their joints.
+pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<SourceError>) -> Vec<PartSocket> {
+    let mut offsets = elements(places, "sockets");
+    let mut found: Vec<PartSocket> = Vec::with_capacity(files.len());
+    for SocketFile { name, joint, translation, rotation } in files {
+        let offset = offsets.next().unwrap_or_default();
+        let rest = RestTransform {
+            translation: <[f32; 3]>::from(translation).into(),
+            rotation: degrees(<[f32; 3]>::from(rotation).into()),
+            scale: Vec3::ONE,
+        };
+        let fault = if name.is_empty() || name.contains('.') {
+            "a socket has a name without points".to_owned()
+        } else if found.iter().any(|other| other.name == name) {
+            format!("two sockets are called \"{name}\"; give the second another name")
+        } else if !rest.is_valid() {
+            "the place of the socket is not finite; correct the numbers".to_owned()
+        } else {
+            found.push(PartSocket { name, label: joint, joint: None, rest, offset });
+            continue;
+        };
+        faults.push(SourceError::at(places.text, offset, fault));
+    }
+    found
+}
+
+/// Gives sockets their joints. One without a joint is told and left out.
+pub(super) fn place_sockets(rig: &Rig, sockets: &mut Vec<PartSocket>, text: &str, faults: &mut Vec<SourceError>) {
+    sockets.retain_mut(|socket| match socket.in_rig(rig) {
+        Ok(placed) => {
+            *socket = placed;
+            true
+        }
+        Err(error) => {
+            faults.push(SourceError::at(text, socket.offset, error.to_string()));
+            false
+        }
+    });
+}
+
+/// Options of a file.
+pub(super) fn options(places: &Places, files: Vec<OptionFile>, faults: &mut Vec<SourceError>) -> Vec<PartOption> {
+    let mut offsets = elements(places, "options");
+    let mut found: Vec<PartOption> = Vec::with_capacity(files.len());
+    for OptionFile { name, default, description, form, sets } in files {
+        let offset = offsets.next().unwrap_or_default();
+        let default = default.trim().get_ron().to_owned();
+        let sets = sets.into_iter().map(|OptionTargetFile { tag, param }| (tag, param)).collect();
+        let option = PartOption { name, default, description, form, sets };
+        let fault = if found.iter().any(|other| other.name == option.name) {
+            format!("two options are called \"{}\"; give the second another name", option.name)
+        } else if let Err(error) = option.check(&option.default) {
+            format!("the default does not fit: {error}")
+        } else {
+            found.push(option);
+            continue;
+        };
+        faults.push(SourceError::at(places.text, offset, fault));
+    }
+    found
+}
+
 /// The part instances of a file, with their places in the text.
 pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<SourceError>) -> Vec<PartInstance> {
     let is_part = |field: &&Field| {
@@ -63,6 +135,9 @@ pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<
             fault(format!("two uses of \"{}\" are called the same; give each a `name`", file.part));
             continue;
         }
+        if file.socket.is_some() && (file.parent.is_some() || !file.onto.is_empty()) {
+            fault("a part hangs on a socket, below a parent, or goes onto joints; leave out the others".to_owned());
+        }
         if !file.onto.is_empty() && file.parent.is_some() {
             fault("a part goes onto joints, or below a parent with its own; leave out `onto` or `parent`".to_owned());
         }
@@ -80,7 +155,7 @@ pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<
         }
         let mut changes = Vec::with_capacity(file.changes.len());
         for change in file.changes {
-            match change_of(change) {
+            match change_of(uid, change) {
                 Ok(change) => changes.push(change),
                 Err(error) => fault(error.to_string()),
             }
@@ -93,6 +168,8 @@ pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<
             adds: file.adds,
             counts,
             parent: file.parent,
+            socket: file.socket,
+            options: file.options.into_iter().map(|(name, value)| (name, value.trim().get_ron().to_owned())).collect(),
             rest,
             is_world: file.world,
             prefix: file.prefix,
@@ -111,12 +188,18 @@ enum PartChangeError {
     /// A change of neither a joint nor a tag, or of both.
     #[error("a change of a part is one of a `joint` or of a `tag`; name one of the two")]
     Subject,
-    /// A place or tags for a tag.
-    #[error("a tag of a part has no place and no tags; change the `joint`")]
+    /// A place, a label or tags for a tag.
+    #[error("a tag of a part has no place, no label and no tags; change the `joint`")]
     TagFields,
     /// A switch or parameters for a joint.
     #[error("a joint of a part has no parameters; change the `tag`")]
     JointFields,
+    /// A rotation with another number of numbers.
+    #[error("a rotation has three angles in degrees, or the four numbers of a quaternion")]
+    Rotation,
+    /// A place that is not finite.
+    #[error("the place of a joint is not finite, or its rotation not of length 1; correct the numbers")]
+    Place,
     /// Tags that cannot be read.
     #[error("{}", .0.message)]
     Tags(#[from] SourceError),
@@ -137,31 +220,86 @@ struct TaggedJoint<'a> {
     tags: &'a RawValue,
 }
 
-fn change_of(file: PartChangeFile) -> Result<PartChange, PartChangeError> {
+/// A difference of the instance with that uid.
+fn change_of(instance: Uid, file: PartChangeFile) -> Result<PartChange, PartChangeError> {
     if file.joint.is_none() == file.tag.is_none() {
         return Err(PartChangeError::Subject);
     }
-    if file.tag.is_some() && (file.translation.is_some() || file.rotation.is_some() || file.tags.is_some()) {
+    let is_of_joint = file.translation.is_some()
+        || file.rotation.is_some()
+        || file.scale.is_some()
+        || file.label.is_some()
+        || file.locked.is_some()
+        || file.tags.is_some();
+    if file.tag.is_some() && is_of_joint {
         return Err(PartChangeError::TagFields);
     }
-    if file.joint.is_some() && (file.enabled.is_some() || file.params.is_some()) {
+    let is_of_tag = file.enabled.is_some()
+        || file.params.is_some()
+        || file.comment.is_some()
+        || file.removed
+        || !file.unset.is_empty();
+    if file.joint.is_some() && is_of_tag {
         return Err(PartChangeError::JointFields);
     }
-    let mut tags = Vec::new();
-    if let (Some(text), Some(joint)) = (&file.tags, &file.joint) {
-        let joints = &[TaggedJoint { label: joint, tags: text }];
-        let read = read_text(&ron_text(&TagTemplate { format: FORMAT, name: "part", joints }), 1)?;
-        tags = read.rig.walk().next().map(|joint| joint.data.tags.clone()).unwrap_or_default();
+    let tags = match (&file.tags, &file.joint) {
+        (Some(text), Some(joint)) => added_tags(instance, joint, text)?,
+        _ => Vec::new(),
+    };
+    let rotation = file.rotation.map(|text| rotation_of(text.get_ron())).transpose()?;
+    let rest = RestTransform {
+        translation: file.translation.map_or(Vec3::ZERO, |at| <[f32; 3]>::from(at).into()),
+        rotation: rotation.unwrap_or_default(),
+        scale: file.scale.map_or(Vec3::ONE, |factors| <[f32; 3]>::from(factors).into()),
+    };
+    if !rest.is_valid() {
+        return Err(PartChangeError::Place);
     }
     Ok(PartChange {
         joint: file.joint,
         tag: file.tag,
         enabled: file.enabled,
         params: file.params.map(|params| params.trim().get_ron().to_owned()),
+        unset: file.unset,
+        comment: file.comment,
+        removed: file.removed,
+        label: file.label,
+        locked: file.locked,
         translation: file.translation.map(Into::into),
-        rotation: file.rotation.map(Into::into),
+        rotation,
+        scale: file.scale.map(Into::into),
         tags,
     })
+}
+
+/// Tags that an instance adds to a joint. One whose uid is written has that in the rig; that of another follows from the
+/// instance and its names.
+fn added_tags(instance: Uid, joint: &str, tags: &RawValue) -> Result<Vec<TagData>, PartChangeError> {
+    let joints = &[TaggedJoint { label: joint, tags }];
+    let text = ron_text(&TagTemplate { format: FORMAT, name: "part", joints });
+    let read = read_text(&text, 1)?;
+    let written: HashSet<Uid> = Declarations::find(&text).map_or_else(HashSet::new, |declared| {
+        declared.tags.iter().flatten().filter(|tag| tag.is_written).map(|tag| tag.uid).collect()
+    });
+    let of_instance = PartInstance { uid: instance, ..PartInstance::default() };
+    let uid_of = |uid: Uid| if written.contains(&uid) { uid } else { of_instance.uid_of(uid) };
+    let mut tags = read.rig.walk().next().map(|joint| joint.data.tags.clone()).unwrap_or_default();
+    for tag in &mut tags {
+        tag.uid = uid_of(tag.uid);
+        if let TagKind::Command { feature: Some(feature), .. } = &mut tag.kind {
+            *feature = uid_of(*feature);
+        }
+    }
+    Ok(tags)
+}
+
+/// A rotation written as three angles in degrees, or as a quaternion.
+fn rotation_of(text: &str) -> Result<Quat, PartChangeError> {
+    if let Ok(angles) = ron::from_str::<(f32, f32, f32)>(text) {
+        return Ok(degrees(<[f32; 3]>::from(angles).into()));
+    }
+    let (x, y, z, w) = ron::from_str(text).map_err(|_| PartChangeError::Rotation)?;
+    Ok(Quat::from_xyzw(x, y, z, w))
 }
 
 impl Template {
@@ -175,10 +313,22 @@ impl Template {
         part: &mut dyn FnMut(&str) -> Result<Arc<Part>, E>,
         mirror: MirrorParams,
     ) -> Result<Self, SourceError> {
+        let mut of_parts: Vec<PartSocket> = Vec::new();
         for instance in std::mem::take(&mut self.parts) {
-            let put = part(&instance.part).and_then(|part| Ok(instance.put_into(&mut self.rig, &part, mirror)?));
+            let put = part(&instance.part).and_then(|part| {
+                let among = self.sockets.iter().chain(&of_parts);
+                let socket = instance.socket.as_deref().map(|name| PartSocket::find(name, among, &self.rig));
+                let socket = socket.transpose().map_err(PartError::from)?;
+                let fitted = instance.fitted(&part, mirror)?;
+                let brought = instance.sockets_in(&self.rig, &part, &fitted);
+                let notes = instance.put_into(&mut self.rig, &part, &fitted, mirror, socket.as_ref())?;
+                Ok((notes, brought))
+            });
             match put {
-                Ok(notes) => self.notes.extend(notes),
+                Ok((notes, brought)) => {
+                    self.notes.extend(notes);
+                    of_parts.extend(brought);
+                }
                 Err(error) => {
                     let message = format!("part \"{}\": {error}", instance.title());
                     return Err(SourceError::at(source, instance.offset, message));
@@ -186,6 +336,12 @@ impl Template {
             }
             self.instances.push(instance);
         }
+        let mut faults = Vec::new();
+        place_sockets(&self.rig, &mut self.sockets, source, &mut faults);
+        if let Some(fault) = faults.into_iter().next() {
+            return Err(fault);
+        }
+        self.sockets.extend(of_parts);
         if !self.instances.is_empty() {
             pair_sides(&mut self.rig);
         }

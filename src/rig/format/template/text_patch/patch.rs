@@ -1,14 +1,15 @@
 //! Changes of single fields and list elements of a text.
 
 use std::{
-    collections::{HashMap, HashSet},
+    cmp::Reverse,
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     ops::Range,
 };
 
 use crate::rig::{
     Uid,
     format::{
-        layout::value_laid_out,
+        layout::{INDENT, value_laid_out, value_on_one_line},
         template::shorthand::Declaration,
         tree::{Item, NodeId, Tree},
     },
@@ -18,16 +19,40 @@ use crate::rig::{
 pub(in crate::rig::format::template) struct Patch<'d, 'a> {
     tree: &'d Tree<'a>,
     changes: Vec<(Range<usize>, String)>,
+    /// Items that come and go, by the bracket that they are in.
+    items: BTreeMap<NodeId, ItemChanges>,
+}
+
+/// Changes of the items of a bracket.
+#[derive(Default)]
+struct ItemChanges {
+    /// Numbers of the items that go.
+    removed: BTreeSet<usize>,
+    /// The items that come.
+    added: Vec<Added>,
+}
+
+/// An item that comes into a bracket.
+struct Added {
+    /// Number of the item behind which it comes; `None` before the first.
+    behind: Option<usize>,
+    text: String,
+    /// True for a text that stands as it is where it has a line of its own; others get their layout.
+    is_line: bool,
 }
 
 impl<'d, 'a> Patch<'d, 'a> {
     pub fn new(tree: &'d Tree<'a>) -> Self {
-        Self { tree, changes: Vec::new() }
+        Self { tree, changes: Vec::new(), items: BTreeMap::new() }
     }
 
     /// The text with all changes.
     pub fn text(mut self) -> String {
-        self.changes.sort_by_key(|(range, _)| (range.start, range.end));
+        for (node, items) in std::mem::take(&mut self.items) {
+            self.change_items(node, &items);
+        }
+        // What comes at a place stands before what is changed there, and what goes is cut out whole.
+        self.changes.sort_by_key(|(range, _)| (range.start, !range.is_empty(), Reverse(range.end)));
         let source = self.tree.text;
         let mut out = String::with_capacity(source.len());
         let mut at = 0;
@@ -44,12 +69,20 @@ impl<'d, 'a> Patch<'d, 'a> {
         out
     }
 
-    /// Writes another value in place of one, in its layout.
+    /// Writes another value in place of one: in its layout where that has lines of its own, else on the line.
     pub fn replace(&mut self, node: NodeId, value: &str) {
         let range = self.tree.node(node).range.clone();
         let (line, indent) = self.line_of(range.start);
-        let before = self.tree.text[line..range.start].chars().count();
-        self.changes.push((range, value_laid_out(value, indent, before)));
+        let start = &self.tree.text[line..range.start];
+        let key = start.trim().trim_end_matches(':').trim_end();
+        let is_key = key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        let comma = self.tree.text[range.end..].starts_with(',');
+        let is_last = self.tree.text[self.line_end(range.end + usize::from(comma))..].starts_with('\n');
+        let text = match is_key && is_last || self.tree.text[range.clone()].contains('\n') {
+            true => value_laid_out(value, indent, start.chars().count()),
+            false => value_on_one_line(value),
+        };
+        self.changes.push((range, text));
     }
 
     /// Sets a field to a value.
@@ -64,9 +97,9 @@ impl<'d, 'a> Patch<'d, 'a> {
     pub fn set_or_remove(&mut self, node: NodeId, field: &str, value: Option<&str>) {
         match (value, self.tree.field(node, field)) {
             (Some(value), _) => self.set(node, field, value),
-            (None, Some(item)) => {
-                let range = self.block(item);
-                self.changes.push((range, String::new()));
+            (None, Some(_)) => {
+                let place = self.tree.node(node).items.iter().position(|item| item.key == Some(field));
+                self.remove(node, place);
             }
             (None, None) => {}
         }
@@ -94,6 +127,47 @@ impl<'d, 'a> Patch<'d, 'a> {
         }
     }
 
+    /// Takes elements out of the list that is the value of a field, and puts others behind its last one, each on one line. An
+    /// empty list goes with its field.
+    pub fn exchange(&mut self, node: NodeId, field: &str, gone: &[usize], fresh: &[String]) {
+        let Some(list) = self.tree.field(node, field).map(|item| item.value) else {
+            if !fresh.is_empty() {
+                self.add_list(node, field, fresh);
+            }
+            return;
+        };
+        let count = self.tree.node(list).items.len();
+        if fresh.is_empty() && !gone.is_empty() && gone.len() == count {
+            return self.set_or_remove(node, field, None);
+        }
+        self.remove(list, gone.iter().copied());
+        for text in fresh {
+            let added = Added { behind: count.checked_sub(1), text: text.clone(), is_line: true };
+            self.items.entry(list).or_default().added.push(added);
+        }
+    }
+
+    /// Adds a field with a list to a struct: on one line, or with a line for each of several where the fields have lines.
+    fn add_list(&mut self, node: NodeId, field: &str, elements: &[String]) {
+        let items = &self.tree.node(node).items;
+        let text = match items.last().filter(|last| elements.len() > 1 && self.is_alone(last)) {
+            Some(last) => {
+                let blanks = self.indentation(last.start);
+                let lines: String =
+                    elements.iter().map(|element| format!("{blanks}{:INDENT$}{element},\n", "")).collect();
+                format!("{field}: [\n{lines}{blanks}]")
+            }
+            None => format!("{field}: [{}]", elements.join(", ")),
+        };
+        let added = Added { behind: items.len().checked_sub(1), text, is_line: true };
+        self.items.entry(node).or_default().added.push(added);
+    }
+
+    /// Takes items out of a bracket.
+    fn remove(&mut self, node: NodeId, places: impl IntoIterator<Item = usize>) {
+        self.items.entry(node).or_default().removed.extend(places);
+    }
+
     /// Puts text before the first item of a struct.
     pub fn put_first(&mut self, node: NodeId, text: &str) {
         self.insert(node, None, text);
@@ -113,12 +187,12 @@ impl<'d, 'a> Patch<'d, 'a> {
         let set: HashSet<Uid> = wanted.iter().copied().collect();
         let elements = self.tree.elements(node, field);
         let mut places: HashMap<Uid, usize> = HashMap::new();
-        for (place, (item, declared)) in elements.iter().zip(there).enumerate() {
+        let list = self.tree.field(node, field).map(|field| field.value);
+        for (place, (_, declared)) in elements.iter().zip(there).enumerate() {
             if set.contains(&declared.uid) {
                 places.insert(declared.uid, place);
             } else {
-                let range = self.block(item);
-                self.changes.push((range, String::new()));
+                list.into_iter().for_each(|list| self.remove(list, [place]));
             }
         }
         // New ones, each with the element of the text behind which it comes.
@@ -139,7 +213,6 @@ impl<'d, 'a> Patch<'d, 'a> {
         if added.is_empty() {
             return;
         }
-        let list = self.tree.field(node, field).map(|field| field.value);
         match list.filter(|_| !places.is_empty()) {
             Some(list) => {
                 for (anchor, uid) in added {
@@ -166,33 +239,80 @@ impl<'d, 'a> Patch<'d, 'a> {
 
     /// Inserts an item behind another one, or before the first.
     fn insert(&mut self, node: NodeId, behind: Option<usize>, text: &str) {
+        self.items.entry(node).or_default().added.push(Added { behind, text: text.to_owned(), is_line: false });
+    }
+
+    /// Writes which items of a bracket go, and which come behind those that stay.
+    fn change_items(&mut self, node: NodeId, changes: &ItemChanges) {
         let tree = self.tree;
-        let value = tree.node(node);
-        if value.bracket.is_none() {
-            return self.changes.push((value.range.end..value.range.end, format!("({text})")));
+        let (items, inside) = (&tree.node(node).items, tree.node(node).inside);
+        if tree.node(node).bracket.is_none() {
+            let texts: Vec<&str> = changes.added.iter().map(|added| added.text.as_str()).collect();
+            let end = tree.node(node).range.end;
+            return self.changes.push((end..end, format!("({})", texts.join(", "))));
         }
-        let Some(behind) = behind.map(|behind| &value.items[behind]) else {
-            let text = match value.items.first() {
-                Some(first) if self.is_alone(first) => {
-                    let blanks = self.indentation(first.start);
-                    format!("\n{blanks}{},", laid_out_item(text, blanks.len()))
-                }
-                Some(_) => format!("{text}, "),
-                None => text.to_owned(),
-            };
-            return self.changes.push((value.inside..value.inside, text));
+        let stays = |place: &usize| !changes.removed.contains(place);
+        let last = (0..items.len()).rev().find(stays);
+        let end_of = |item: &Item| tree.node(item.value).range.end;
+        let ends_with_comma = items.last().is_some_and(|item| item.has_comma);
+        // The end of a line takes the comma before it along; elsewhere everything that goes has its own.
+        let cut_from = last.and_then(|last| Some((&items[last], items.get(last + 1)?)));
+        let is_joined = |(item, next): &(&Item, &Item)| {
+            !self.is_alone(next) && tree.text[item.end..next.start].trim_matches(' ').is_empty()
         };
-        let end = tree.node(behind.value).range.end;
-        let comma = if behind.has_comma { "," } else { "" };
-        if !behind.has_comma {
-            self.changes.push((end..end, ",".to_owned()));
+        let cut_from = cut_from.filter(is_joined).map(|(item, _)| item);
+        for place in &changes.removed {
+            let mut range = self.block(&items[*place]);
+            if let Some(item) = cut_from.filter(|_| last.is_some_and(|last| *place == last + 1)) {
+                range.start = if ends_with_comma { item.end } else { end_of(item) };
+            }
+            self.changes.push((range, String::new()));
         }
-        if !self.is_alone(behind) {
-            return self.changes.push((behind.end..behind.end, format!(" {text}{comma}")));
+        let mut added: BTreeMap<Option<usize>, Vec<&Added>> = BTreeMap::new();
+        for item in &changes.added {
+            let behind = item.behind.and_then(|behind| (0..=behind).rev().find(stays));
+            added.entry(behind).or_default().push(item);
         }
-        let blanks = self.indentation(behind.start);
-        let at = self.line_end(behind.end);
-        self.changes.push((at..at, format!("\n{blanks}{}{comma}", laid_out_item(text, blanks.len()))));
+        let on_line = |item: &Added, blanks: &str| match item.is_line {
+            true => format!("\n{blanks}{}", item.text),
+            false => format!("\n{blanks}{}", laid_out_item(&item.text, blanks.len())),
+        };
+        for (behind, added) in added {
+            let texts = || added.iter().map(|item| item.text.as_str());
+            let Some(item) = behind.map(|behind| &items[behind]) else {
+                let text = match items.first() {
+                    Some(first) if self.is_alone(first) => {
+                        let blanks = self.indentation(first.start);
+                        added.iter().map(|item| format!("{},", on_line(item, blanks))).collect()
+                    }
+                    _ if last.is_some() => texts().map(|text| format!("{text}, ")).collect(),
+                    _ => texts().collect::<Vec<_>>().join(", "),
+                };
+                self.changes.push((inside..inside, text));
+                continue;
+            };
+            let value_end = end_of(item);
+            if self.is_alone(item) {
+                let blanks = self.indentation(item.start);
+                let lines: Vec<String> = added.iter().map(|item| on_line(item, blanks)).collect();
+                let comma = if item.has_comma { "," } else { "" };
+                if !item.has_comma {
+                    self.changes.push((value_end..value_end, ",".to_owned()));
+                }
+                let at = self.line_end(item.end);
+                self.changes.push((at..at, format!("{}{comma}", lines.join(","))));
+            } else if behind != last || ends_with_comma {
+                let text: String = texts().map(|text| format!(" {text},")).collect();
+                self.changes.push((item.end..item.end, text));
+            } else {
+                let text: String = texts().map(|text| format!(", {text}")).collect();
+                // Where something behind the item goes without leaving its line, the comma stays and does for the first.
+                match item.has_comma && cut_from.is_none() {
+                    true => self.changes.push((item.end..item.end, format!("{},", &text[1..]))),
+                    false => self.changes.push((value_end..value_end, text)),
+                }
+            }
+        }
     }
 
     /// Range of an item that is taken out: with its lines and the comments right above where it has lines of its own.

@@ -1,0 +1,38 @@
+//! Entities that an app hangs on joints of instances without a hierarchy.
+
+use bevy::prelude::*;
+
+use super::NodeSlot;
+
+/// Writes the world transforms of entities below joints in [`InstanceMode::Direct`](super::InstanceMode): these have no local
+/// transforms, so Bevy's propagation ends there.
+pub(super) fn place_hung(
+    joints: Query<(Ref<GlobalTransform>, Ref<Children>), (With<NodeSlot>, Without<Transform>)>,
+    mut hung: Query<(Ref<Transform>, &mut GlobalTransform, Option<Ref<Children>>), Without<NodeSlot>>,
+) {
+    for (joint, children) in &joints {
+        let is_moved = joint.is_changed() || children.is_changed();
+        for child in &children {
+            place(*child, &joint, is_moved, &mut hung);
+        }
+    }
+}
+
+/// Places an entity and what is below it, as far as something moved.
+fn place(
+    entity: Entity,
+    above: &GlobalTransform,
+    is_moved: bool,
+    hung: &mut Query<(Ref<Transform>, &mut GlobalTransform, Option<Ref<Children>>), Without<NodeSlot>>,
+) {
+    let Ok((transform, mut global, children)) = hung.get_mut(entity) else { return };
+    let is_moved = is_moved || transform.is_changed();
+    if is_moved {
+        global.set_if_neq(above.mul_transform(*transform));
+    }
+    let (here, is_moved) = (*global, is_moved || children.as_ref().is_some_and(|children| children.is_changed()));
+    let children: Vec<Entity> = children.map(|children| children.to_vec()).unwrap_or_default();
+    for child in children {
+        place(child, &here, is_moved, hung);
+    }
+}

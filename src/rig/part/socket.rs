@@ -1,0 +1,70 @@
+//! Sockets: places of a part, or of a rig, that others hang on.
+
+use crate::rig::{RestTransform, Rig, Uid, nearest::did_you_mean};
+
+/// A place of a part, or of a rig, that other parts hang on, and that things of a game are attached to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartSocket {
+    /// Name: `hand` where the template itself has the socket, `left arm.hand` where a part of that name has it.
+    pub name: String,
+    /// Label of its joint in the file that has the socket.
+    pub label: String,
+    /// Its joint; `None` until the part that brings the joint is there.
+    pub joint: Option<Uid>,
+    /// Place relative to the joint.
+    pub rest: RestTransform,
+    /// Place in the text that has the socket, in bytes.
+    pub offset: usize,
+}
+
+/// Error of a socket.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SocketError {
+    /// No socket has the name.
+    #[error("there is no socket \"{name}\" before this part{nearest}")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// End of the sentence with similar names.
+        nearest: String,
+    },
+    /// The socket has no joint.
+    #[error("socket \"{name}\" is on joint \"{label}\", which is not there{nearest}")]
+    NoJoint {
+        /// The name of the socket.
+        name: String,
+        /// Label of the joint.
+        label: String,
+        /// End of the sentence with similar labels.
+        nearest: String,
+    },
+}
+
+impl PartSocket {
+    /// The socket with its joint, found by label.
+    ///
+    /// # Errors
+    /// A joint that the rig does not have.
+    pub fn in_rig(&self, rig: &Rig) -> Result<Self, SocketError> {
+        let found = self.joint.filter(|joint| rig.joint(*joint).is_some()).or_else(|| rig.find_label(&self.label));
+        let joint = found.ok_or_else(|| {
+            let known: Vec<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
+            let nearest = did_you_mean(&self.label, known);
+            SocketError::NoJoint { name: self.name.clone(), label: self.label.clone(), nearest }
+        })?;
+        Ok(Self { joint: Some(joint), ..self.clone() })
+    }
+
+    /// The socket with that name, with its joint.
+    ///
+    /// # Errors
+    /// A name that none has, and a socket without its joint.
+    pub fn find<'a>(name: &str, among: impl Iterator<Item = &'a Self> + Clone, rig: &Rig) -> Result<Self, SocketError> {
+        let found = among.clone().find(|socket| socket.name == name);
+        let socket = found.ok_or_else(|| {
+            let known: Vec<&str> = among.map(|socket| socket.name.as_str()).collect();
+            SocketError::Unknown { name: name.to_owned(), nearest: did_you_mean(name, known) }
+        })?;
+        socket.in_rig(rig)
+    }
+}
