@@ -49,7 +49,7 @@ pub use keep_clips::{ClipNote, keep_clips};
 pub use keep_poses::{PoseNote, keep_poses};
 pub use list::{BuildRange, ListEntry};
 pub use mirror::{mirrored_angles, mirrored_direction, mirrored_limits, mirrored_line, opposite};
-pub use module::{BuildLimits, DynModule, ModuleInfo, Modules, Parameter, Resize, RigModule};
+pub use module::{BuildLimits, DynModule, FormError, ModuleInfo, Modules, Parameter, Resize, RigModule};
 pub use resolve::ResolveError;
 pub use review::{SourceText, review};
 pub use scope::{BuildScope, Side};

@@ -1,12 +1,12 @@
 //! Modules: what a command tag can do, and the registry that finds them by name.
 
-use std::{any::TypeId, collections::BTreeMap, sync::Arc};
+use std::{any::TypeId, borrow::Cow, collections::BTreeMap, sync::Arc};
 
 use bevy::reflect::{Reflect, TypeInfo, Typed};
 use glam::Quat;
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::{BuildProblem, BuildScope, ModuleError, mirror};
+use super::{BuildProblem, BuildScope, ModuleError, form::read_module_form, mirror};
 use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_text};
 
 /// Module of commands: its fields are the parameters of the tag, [`RigModule::construct`] is the work.
@@ -98,6 +98,17 @@ type ResizeText = fn(&str, &Resize) -> Result<String, SourceError>;
 type CompleteText = fn(&str) -> Result<String, SourceError>;
 type PushText = fn(&str, f32) -> Result<Option<String>, SourceError>;
 
+/// Reason for which a module does not take a form.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FormError {
+    /// No module has the name.
+    #[error("there is no module \"{0}\"; the form of a module is called as the module, `NAME.ui.ron`")]
+    NoModule(String),
+    /// The text is no form of the module.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+}
+
 /// A registered module.
 #[derive(Debug, Clone)]
 pub struct ModuleInfo {
@@ -107,8 +118,8 @@ pub struct ModuleInfo {
     pub doc: &'static str,
     /// Parameters in order.
     pub parameters: Vec<Parameter>,
-    /// See [`RigModule::FORM`].
-    pub form: Option<&'static str>,
+    /// Text of the form: [`RigModule::FORM`], unless [another](Modules::set_form) was given.
+    pub form: Option<Cow<'static, str>>,
     /// See [`RigModule::ICON`].
     pub icon: Option<&'static str>,
     /// Identity of its type, for reflection.
@@ -195,7 +206,7 @@ impl Modules {
             name: M::NAME,
             doc: M::DOC,
             parameters: parameters::<M>(),
-            form: M::FORM,
+            form: M::FORM.map(Cow::Borrowed),
             icon: M::ICON,
             type_id: TypeId::of::<M>(),
             type_info: M::type_info(),
@@ -222,6 +233,17 @@ impl Modules {
         };
         self.by_name.insert(M::NAME, info);
         self
+    }
+
+    /// Gives a module another form, which has to fit its parameters.
+    ///
+    /// # Errors
+    /// Faults of the text with their place; [`FormError::NoModule`] for a name that no module has.
+    pub fn set_form(&mut self, name: &str, text: &str) -> Result<(), FormError> {
+        let module = self.by_name.get_mut(name).ok_or_else(|| FormError::NoModule(name.to_owned()))?;
+        read_module_form(text.as_bytes(), module)?;
+        module.form = Some(Cow::Owned(text.to_owned()));
+        Ok(())
     }
 
     /// The module of that name.

@@ -54,16 +54,17 @@ pub fn match_switch(
     let before = state.attribute(switch.control, &switch.attribute).unwrap_or_default();
     let mut attempt = Attempt { rig, state, offsets: Vec::new() };
     let kept = match &switch.matching {
-        Matching::IkFk { joints, .. } => joints.clone(),
+        Matching::IkFk { joints, held, .. } => joints.iter().chain(held).copied().collect(),
         Matching::Space { control } => vec![*control],
     };
     let wanted = kept.iter().map(|node| attempt.global(*node)).collect::<Result<Vec<Trs>, _>>()?;
     attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
     let value = attempt.state.attribute(switch.control, &switch.attribute).unwrap_or(value);
     match &switch.matching {
-        Matching::IkFk { joints, fk, goal, goal_offset, pole } => {
-            let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
-            limb.hold(&mut attempt, &wanted, before, value)?;
+        Matching::IkFk { joints, fk, goal, goal_offset, pole, held } => {
+            let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole, held };
+            let (wanted, above) = wanted.split_at(joints.len());
+            limb.hold(&mut attempt, wanted, above, [before, value])?;
         }
         Matching::Space { control } => attempt.place(*control, &wanted[0], None)?,
     }

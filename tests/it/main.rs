@@ -22,6 +22,7 @@ mod cli_site;
 #[cfg(feature = "cli")]
 mod cli_templates;
 mod commands;
+mod control_sizes;
 mod custom_module;
 #[cfg(feature = "draw")]
 mod display;
@@ -72,6 +73,7 @@ mod gltf;
 mod gltf_torture;
 mod heads;
 mod influences;
+mod inputs;
 mod instances;
 mod journal;
 mod journal_kill;

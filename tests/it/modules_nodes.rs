@@ -131,7 +131,7 @@ fn every_module_is_documented_and_its_defaults_load() {
 #[test]
 fn every_form_edits_parameters_that_exist_and_all_of_them() {
     for module in modules::all().iter() {
-        let Some(text) = module.form else { panic!("{} has no form", module.name) };
+        let Some(text) = &module.form else { panic!("{} has no form", module.name) };
         let form = read_module_form(text.as_bytes(), module).unwrap_or_else(|error| panic!("{}: {error}", module.name));
         assert!(!form.title.is_empty());
         for parameter in &module.parameters {
@@ -142,7 +142,7 @@ fn every_form_edits_parameters_that_exist_and_all_of_them() {
         let icon = module.icon.unwrap_or_default();
         assert!(icon.contains("viewBox=\"0 0 24 24\"") && icon.contains("currentColor"), "icon of {}", module.name);
         let folder = format!("{}/assets/modules/{}", env!("CARGO_MANIFEST_DIR"), module.name);
-        assert_eq!(std::fs::read_to_string(format!("{folder}.ui.ron")).unwrap(), text);
+        assert_eq!(std::fs::read_to_string(format!("{folder}.ui.ron")).unwrap(), text.as_ref());
     }
 }
 

@@ -396,7 +396,7 @@ impl Values {
 
 /// The form of a module; one made of its parameters if it has none, or none that can be read.
 fn form_of(module: &ModuleInfo) -> Form {
-    let form = module.form.and_then(|form| read_module_form(form.as_bytes(), module).ok());
+    let form = module.form.as_ref().and_then(|form| read_module_form(form.as_bytes(), module).ok());
     form.unwrap_or_else(|| made_form(module))
 }
 
