@@ -5,13 +5,14 @@ use glam::{Quat, Vec3};
 use crate::{
     mesh::model::Trs,
     parameters,
-    processor::{Axis, BuildScope, ModuleError, NodeId, RigModule, mirrored_direction},
-    rig::{AimUp, Constraint, Scalar, Target, reference::NodeRefs},
+    processor::{Axis, BuildScope, Creation, ModuleError, NodeId, RigModule, mirrored_direction},
+    rig::{AimUp, Constraint, NodeType, Scalar, Target, reference::NodeRefs},
     solve::aim::{Aim, Up},
 };
 
 parameters! {
-    /// Turns two nodes so that each points at the other: the cylinder and the rod of a piston, a strut, a rope.
+    /// Turns two nodes so that each points at the other: the cylinder and the rod of a piston, a strut, a rope. Each points
+    /// at where the other hangs below its own parent. Role: `end`.
     ///
     /// ```
     /// # use rigsmith::{processor::RigModule, modules::piston::Piston};
@@ -78,6 +79,9 @@ impl Piston {
             Some(parent) => AimUp::Axis(scope.uid(parent), scope.global(parent).rotation.inverse() * direction),
             None => AimUp::Direction(direction),
         };
+        // Where the other end hangs: both point at once, so neither waits for the other.
+        let (place, above) = (scope.global(target), scope.parent(target));
+        let end = scope.spawn_at(NodeType::Null, "end", target, 0, above, place, &Creation::default())?;
         // The direction that points as built, whatever the node's axes.
         let aim = (global.rotation.inverse() * way).normalize();
         let solved = Aim { axis: aim, up_axis: self.up_axis.vector() }.solve(
@@ -89,7 +93,7 @@ impl Piston {
         let offset: Quat = (solved.inverse() * global.rotation).normalize();
         let constraint = Constraint::Aim {
             driven: scope.uid(node),
-            targets: vec![Target { node: scope.uid(target), weight: Scalar::Value(1.0), offset: Trs::IDENTITY }],
+            targets: vec![Target { node: scope.uid(end), weight: Scalar::Value(1.0), offset: Trs::IDENTITY }],
             aim,
             up: self.up_axis.vector(),
             world_up,

@@ -214,7 +214,7 @@ impl ReverseFoot {
             weight: Scalar::Value(1.0),
             keep_pose: false,
         };
-        scope.constrain(role, ankle, 0, follow)?;
+        scope.constrain("pivot", pivot, 0, follow)?;
         Ok(())
     }
 

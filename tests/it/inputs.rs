@@ -130,12 +130,10 @@ fn references_to_missing_inputs_are_errors_with_their_place() {
     let gone = place(&DRIVER.replace("@input wheel", "@input wheel#0123456789abcdef"));
     assert_eq!(gone.line, line, "{gone}");
     assert!(gone.message.contains("input"), "{gone}");
-    // An input stands outside: nothing moves it, and nothing hangs below it.
-    for tag in ["parent(node: \"@input wheel\", targets: \"@this\")", "control(creation: (parent: \"@input wheel\"))"] {
-        let text = DRIVER.replace("parent(targets: \"@input wheel\")", tag);
-        let refused = place(&text);
-        assert!(refused.message.contains("input") && refused.line == line, "{refused}");
-    }
+    // An input stands outside: nothing moves it.
+    let tag = "parent(node: \"@input wheel\", targets: \"@this\")";
+    let refused = place(&DRIVER.replace("parent(targets: \"@input wheel\")", tag));
+    assert!(refused.message.contains("input") && refused.line == line, "{refused}");
     // Faults of the list itself, all at once.
     let text = DRIVER
         .replace("name: \"gear\"", "uid: \"00000000000000aa\", name: \"wheel\"")

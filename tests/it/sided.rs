@@ -66,8 +66,8 @@ const SIDED: &[(&str, &str, &str)] = &[
     ("stretch", "(axis: (1.0, 1.0, 0.0))", "(axis: (-1.0,1.0,0.0))"),
     (
         "cone_reader",
-        "(axis: x, towards: Some((0.5, 1.0, 0.0)), output_attribute: \"up_l\")",
-        "(axis: neg_x, towards: Some((-0.5,1.0,0.0)), output_attribute: \"up_r\")",
+        "(axis: x, towards: (0.5, 1.0, 0.0), output_attribute: \"up_l\")",
+        "(axis: neg_x, towards: (-0.5,1.0,0.0), output_attribute: \"up_r\")",
     ),
     ("cone_reader", "(morph: \"arm_l\")", "(morph: \"arm_r\")"),
     (

@@ -32,7 +32,7 @@ fn a_piston_points_at_its_other_end() {
     let way = |puppet: &Puppet| (puppet.place("rod") - puppet.place("cylinder")).normalize();
     let axes = [first.inverse() * way(&puppet), second.inverse() * way(&puppet)];
     for place in [Vec3::new(0.8, 0.9, 0.2), Vec3::new(1.2, -0.3, -0.4), Vec3::new(0.1, 1.0, 0.0)] {
-        puppet.move_to("arm", place);
+        puppet.move_to("arm_control", place);
         for (label, axis) in ["cylinder", "rod"].into_iter().zip(axes) {
             let points = puppet.axis(label, axis);
             assert!(points.dot(way(&puppet)) > 0.99999, "{label} points along {points}, not {}", way(&puppet));
@@ -51,7 +51,7 @@ fn a_wheel_turns_once_a_circumference() {
         ])"#));
     let around = std::f32::consts::TAU * 0.3;
     for (share, wanted) in [(0.25, Vec3::Z), (0.5, Vec3::NEG_Y), (0.75, Vec3::NEG_Z), (3.0, Vec3::Y)] {
-        puppet.move_to("car", Vec3::new(0.0, 0.3, share * around));
+        puppet.move_to("car_control", Vec3::new(0.0, 0.3, share * around));
         let up = puppet.axis("wheel", Vec3::Y);
         assert!(up.distance(wanted) < 1e-3, "{share}: {up}");
     }
@@ -75,12 +75,12 @@ fn beads_hang_on_a_path() {
                 aim: x,
             ),
         ])"#));
-    puppet.set("a", "along", 0.25);
+    puppet.set("a_control", "along", 0.25);
     for (label, x) in [("bead_1", 0.5), ("bead_2", 1.0)] {
         assert!(puppet.place(label).distance(Vec3::X * x) < 1e-3, "{label}: {}", puppet.place(label));
         assert!(puppet.axis(label, Vec3::X).dot(Vec3::X) > 0.9999);
     }
-    puppet.move_by("b", Vec3::Y);
+    puppet.move_by("b_control", Vec3::Y);
     assert!(puppet.place("bead_2").y > 0.8, "{}", puppet.place("bead_2"));
     assert!(puppet.place("bead_1").y > 0.2 && puppet.axis("bead_1", Vec3::X).y > 0.3);
     let short = r#"(label: "a", tags: [control(), path(points: "@command control/a role:control")])"#;
@@ -98,11 +98,11 @@ fn a_button_rides_on_cloth() {
     let (off, angle, _) = puppet.off_rest();
     assert!(off < 1e-5 && angle < 0.05, "{off} {angle}");
     let rest = puppet.at(puppet.joint("button")).rotation;
-    for name in ["a", "b", "c"] {
+    for name in ["a_control", "b_control", "c_control"] {
         puppet.move_by(name, Vec3::new(0.2, 0.0, 1.0));
     }
     assert!(puppet.place("button").distance(Vec3::new(0.5, 0.3, 1.05)) < 1e-4, "{}", puppet.place("button"));
-    puppet.move_by("b", Vec3::new(-1.0, 0.0, -1.0));
+    puppet.move_by("b_control", Vec3::new(-1.0, 0.0, -1.0));
     let turned = puppet.at(puppet.joint("button")).rotation.angle_between(rest);
     assert!((turned - std::f32::consts::FRAC_PI_2).abs() < 1e-2, "{turned}");
     let line = r#"(label: "a"), (label: "b", translation: (1, 0, 0)), (label: "c", translation: (2, 0, 0), tags: [
@@ -137,10 +137,10 @@ fn readers_drive_correctives() {
     let read = |puppet: &Puppet, name: &str| puppet.state.attribute(numbers, name).unwrap();
     assert_eq!((read(&puppet, "raised"), puppet.state.morphs()[0]), (0.0, 0.0));
     assert!((read(&puppet, "rest") - 1.0).abs() < 1e-4);
-    puppet.turn("arm", Quat::from_rotation_z(-80f32.to_radians()));
+    puppet.turn("arm_control", Quat::from_rotation_z(-80f32.to_radians()));
     assert!(read(&puppet, "raised") > 0.9 && (read(&puppet, "aside") - 1.0).abs() < 1e-3);
     assert!(read(&puppet, "rest") < 1e-3);
-    puppet.turn("arm", Quat::from_rotation_x(70f32.to_radians()));
+    puppet.turn("arm_control", Quat::from_rotation_x(70f32.to_radians()));
     assert!((puppet.state.morphs()[0] - 1.0).abs() < 1e-3 && read(&puppet, "aside") < 1e-3);
     assert_eq!(read(&puppet, "raised"), 0.0);
     let twice = r#"(label: "a", tags: [rbf_reader(poses: [(morph: "x"), (morph: "y")])])"#;
@@ -158,7 +158,7 @@ fn hair_stays_off_the_head() {
         (label: "tip", parent: "hair", translation: (0, 1, 0)),
         (label: "ball", translation: (0, 2, 2), tags: [control()])"#;
     let mut puppet = Puppet::new(rig(joints));
-    puppet.move_to("ball", Vec3::new(0.0, 2.0, 0.2));
+    puppet.move_to("ball_control", Vec3::new(0.0, 2.0, 0.2));
     for _ in 0..60 {
         puppet.state.evaluate(1.0 / 60.0);
         let apart = puppet.place("tip").distance(Vec3::new(0.0, 2.0, 0.2));

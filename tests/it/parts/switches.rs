@@ -132,7 +132,7 @@ fn limbs_that_were_straightened_and_turned_stay_within_their_hinges() {
         puppet.set(settings, "ik_fk", 0.0);
         puppet.turn(upper, Quat::from_rotation_z(0.3));
         // Further than the hinge lets it.
-        puppet.turn(lower, Quat::from_rotation_x(2.5 * straighten));
+        puppet.turn(lower, Quat::from_rotation_x(straighten));
         let [root, mid, end] = joints.map(|joint| puppet.place(joint));
         assert!((mid - root).angle_between(end - mid) < 0.02, "{template}: the limb is straight");
         let places = |puppet: &Puppet| joints.map(|joint| (joint, puppet.at(puppet.joint(joint))));

@@ -153,11 +153,11 @@ fn readers() -> RigBuilder {
         Constraint::Spring {
             driven: uid("ear"),
             frequency: Scalar::Value(2.0),
-            damping: Scalar::Value(0.5),
+            damping: Scalar::Value(0.45),
             weight: Scalar::Value(1.0),
             translate: false,
             rotate: true,
-            motion: Scalar::Value(0.5),
+            motion: Scalar::Value(0.6),
             colliders: vec![Collider { node: uid("b"), end: Some(uid("c")), radius: 0.2 }],
         },
         Constraint::Cone {
@@ -220,7 +220,7 @@ fn numbers_of_readers_reach_programs_of_their_layout() {
     // By the constraint's place in the list.
     let changes: [(usize, Change); 16] = [
         (0, set!(Spring { frequency } => Scalar::Value(3.0))),
-        (0, set!(Spring { motion } => Scalar::Value(1.0))),
+        (0, set!(Spring { motion } => Scalar::Value(0.65))),
         (0, |constraint| match constraint {
             Constraint::Spring { colliders, .. } => colliders[0].radius = 0.9,
             _ => unreachable!(),
