@@ -7,6 +7,7 @@
 
 pub mod aim;
 pub mod ccd;
+pub mod collider;
 pub mod curve;
 pub mod expression;
 pub mod fabrik;
@@ -14,7 +15,9 @@ pub mod foot;
 pub mod keep_pose;
 pub mod limit;
 pub mod matching;
+pub mod pose_reader;
 pub mod program;
+pub mod rivet;
 pub mod rotate;
 pub mod spline;
 pub mod spring;
