@@ -7,7 +7,6 @@
 
 pub mod aim;
 pub mod ccd;
-pub mod collider;
 pub mod curve;
 pub mod expression;
 pub mod fabrik;
@@ -15,9 +14,7 @@ pub mod foot;
 pub mod keep_pose;
 pub mod limit;
 pub mod matching;
-pub mod pose_reader;
 pub mod program;
-pub mod rivet;
 pub mod rotate;
 pub mod spline;
 pub mod spring;

@@ -54,8 +54,8 @@ pub fn match_switch(
     state.evaluate(0.0);
     let mut attempt = Attempt { rig, state, offsets: Vec::new() };
     let kept = match &switch.matching {
-        Matching::IkFk { joints, fk, goal, goal_offset, pole, held } => {
-            let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole, held };
+        Matching::IkFk { joints, fk, goal, goal_offset, pole } => {
+            let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
             hold_limb(&mut attempt, &limb, switch, value)?
         }
         Matching::Space { control } => {
@@ -91,7 +91,6 @@ fn hold_limb(
     let wanted = limb.joints.iter().map(|node| attempt.global(*node)).collect::<Result<Vec<Trs>, _>>()?;
     let length: f32 = wanted.windows(2).map(|pair| pair[0].translation.distance(pair[1].translation)).sum();
     let followers = followers::followers(attempt, switch, limb, 1e-4 * length);
-    let above = limb.held.iter().map(|control| attempt.global(*control)).collect::<Result<Vec<Trs>, _>>()?;
     let behind = followers.iter().map(|of| attempt.global(of.joint)).collect::<Result<Vec<Trs>, _>>()?;
     attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
     let value = attempt.state.attribute(switch.control, &switch.attribute).unwrap_or(value);
@@ -99,12 +98,11 @@ fn hold_limb(
     for (follower, wanted) in followers.iter().zip(&behind) {
         follower.hold(attempt, wanted, length)?;
     }
-    limb.hold(attempt, &wanted, &above, [before, value])?;
+    limb.hold(attempt, &wanted, before, value)?;
     for (follower, wanted) in followers.iter().zip(&behind) {
         follower.hold(attempt, wanted, length)?;
     }
     let of_limb = limb.joints.iter().copied().zip(wanted);
-    let of_limb = of_limb.chain(limb.held.iter().copied().zip(above));
     Ok(of_limb.chain(followers.iter().map(|follower| follower.joint).zip(behind)).collect())
 }
 

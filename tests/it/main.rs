@@ -22,7 +22,6 @@ mod cli_site;
 #[cfg(feature = "cli")]
 mod cli_templates;
 mod commands;
-mod control_sizes;
 mod custom_module;
 #[cfg(feature = "draw")]
 mod display;

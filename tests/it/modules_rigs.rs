@@ -56,7 +56,6 @@ impl RigModule for Knob {
             color: [1.0; 3],
             size: 0.1,
             offset: Trs::IDENTITY,
-            fits: false,
             channels: Default::default(),
             limits: Limits::default(),
         };

@@ -4,7 +4,6 @@ pub mod biped;
 mod constraints;
 mod layouts;
 mod programs;
-mod readers;
 mod refusals;
 mod systems;
 

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     plugins::{
-        controls::{ControlsInUse, NodeVisible, outline::ControlNodes, size::ShapeFactor},
+        controls::{ControlsInUse, NodeVisible, outline::ControlNodes},
         document::{Hovered, Joint, JointEntities, NodeOf, Selection, Symmetry},
         schema::{Control, NodeLayer, RigNodes},
         surface::{RigMesh, RigMeshes},
@@ -196,8 +196,7 @@ pub(super) fn frame_planes(
 }
 
 /// A node that looks otherwise than in the frame before.
-type NodeRedrawn =
-    Or<(Changed<GlobalTransform>, Changed<NodeVisible>, Changed<Control>, Changed<NodeLayer>, Changed<ShapeFactor>)>;
+type NodeRedrawn = Or<(Changed<GlobalTransform>, Changed<NodeVisible>, Changed<Control>, Changed<NodeLayer>)>;
 
 /// Builds the pictures of rigs.
 pub(super) fn draw_rigs(
