@@ -80,6 +80,28 @@ pub fn match_switch(
     Ok(thrown)
 }
 
+/// Poses both the forward and the inverse controls of a limb so that its joints have the rig transforms `wanted`, whichever of
+/// the two holds the limb with the switch at `value`.
+///
+/// # Errors
+/// [`MatchError`] if the program lacks a node or an attribute of the switch.
+pub(super) fn hold_limb(
+    rig: &BuiltRig,
+    mut state: RigState,
+    switch: &SwitchData,
+    wanted: &[Trs],
+    value: f32,
+) -> Result<RigState, MatchError> {
+    let Matching::IkFk { joints, fk, goal, goal_offset, pole } = &switch.matching else { return Ok(state) };
+    let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
+    state.set_attribute(switch.control, &switch.attribute, 1.0)?;
+    let mut attempt = Attempt { rig, state, offsets: Vec::new() };
+    limb.hold(&mut attempt, wanted, 1.0, 1.0)?;
+    attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
+    attempt.state.evaluate(0.0);
+    Ok(attempt.state)
+}
+
 /// Angle between two rotations in degrees. It is computed from the vector part: the dot product of two quaternions has
 /// no digits left for small angles.
 pub(super) fn angle_between(a: &Trs, b: &Trs) -> f32 {
