@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 the input is at fault, 2 the command was used wrongly. With `--json` the result is one JSON
 //! object on standard output, errors included.
 
+mod animate;
 mod argument;
 mod build;
 mod check;
@@ -95,6 +96,8 @@ enum Command {
     Build(build::BuildArgs),
     /// Build a rig, pose it by its controls as an app does, and save the character or a picture
     Pose(pose::PoseArgs),
+    /// Put a clip, or the motion of another skeleton, onto a rig, and save the animated character or the clip
+    Animate(animate::AnimateArgs),
     /// List the modules of commands, or describe one
     Modules(modules::ModulesArgs),
     /// Take a picture of a mesh, a template or a project, without a window
@@ -267,6 +270,7 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Some(Command::Watch(args)) => watch::run(&args, cli.json),
         Some(Command::Build(args)) => build::run(&args),
         Some(Command::Pose(args)) => pose::run(&args),
+        Some(Command::Animate(args)) => animate::run(&args),
         Some(Command::Modules(args)) => Ok(modules::run(&args)),
         #[cfg(feature = "render")]
         Some(Command::Render(args)) => render::run(&args),

@@ -42,7 +42,8 @@ pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
 pub use load::{
-    FileKind, LoadError, load_animation, load_gestures, load_model, load_rig_text, load_skin, load_template, stem,
+    FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_rig_text,
+    load_skin, load_template, stem,
 };
 pub use parts::{BUNDLED_CHARACTERS, BUNDLED_PARTS, PartFileError, PartFiles, bundled_characters, bundled_parts};
 pub use project::{

@@ -6,6 +6,7 @@
 //! gives the same bits.
 
 pub mod aim;
+pub mod bake_clip;
 pub mod ccd;
 pub mod curve;
 pub mod expression;
@@ -15,6 +16,7 @@ pub mod keep_pose;
 pub mod limit;
 pub mod matching;
 pub mod program;
+pub mod retarget;
 pub mod rotate;
 pub mod spline;
 pub mod spring;

@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 use super::{Failure, Report, skin::load_rig};
 use crate::{
     files::{
-        FileKind, LoadError, PartFiles, RealDisk, load_animation, load_gestures, load_model, load_project, load_skin,
-        read_capped,
+        FileKind, LoadError, PartFiles, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project,
+        load_skin, read_capped,
     },
     mesh::{
         adjacency::{edges, islands, weld},
@@ -102,10 +102,12 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         }),
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
         Some(FileKind::Animation) => load_animation(&RealDisk, path).map(|read| found.remarks = read.notes),
+        Some(FileKind::Bvh) => load_motion(&RealDisk, path).map(|motion| found.remarks = motion.notes),
         Some(FileKind::Gestures) => load_gestures(&RealDisk, path).map(drop),
         None => {
             found.error = Some(
-                "Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .skin and .ron".to_owned(),
+                "Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron"
+                    .to_owned(),
             );
             Ok(())
         }

@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 use super::{Failure, Report, progress::spinning, sketch::describe_rig};
 use crate::{
     files::{
-        FileKind, RealDisk, load_animation, load_gestures, load_model, load_project, load_rig_text, load_skin,
-        load_template,
+        FileKind, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project, load_rig_text,
+        load_skin, load_template,
     },
     mesh::model::Model,
     rig::{
@@ -117,6 +117,16 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             report.set("kind", "animation");
             report.set("clips", read.clips.len());
         }
+        Some(FileKind::Bvh) => {
+            let motion = load_motion(&RealDisk, path)?;
+            let (joints, frames, seconds) = (motion.joints.len(), motion.frames(), motion.duration());
+            report.line(format!("motion of {joints} joints: {frames} frames, {seconds:.2} s"));
+            report.notes(motion.notes);
+            report.set("kind", "motion");
+            report.set("joints", joints);
+            report.set("frames", frames);
+            report.set("seconds", seconds);
+        }
         Some(FileKind::Gestures) => {
             let gestures = load_gestures(&RealDisk, path)?;
             report.line(format!("{} gestures", gestures.len()));
@@ -125,7 +135,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
         None => {
             let message = format!(
-                "`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .skin and .ron",
+                "`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron",
                 path.display()
             );
             return Err(Failure::Usage(message));

@@ -11,7 +11,14 @@ use crate::{
     },
     rig::{
         SourceError,
-        format::animation::{self, ReadAnimation, read_animation},
+        animation::{
+            joint_map::{self, NamePairs, read_joint_map},
+            motion::Motion,
+        },
+        format::{
+            animation::{self, ReadAnimation, read_animation},
+            bvh::{BvhError, read_bvh},
+        },
         project::{self, ReadProject, read_project},
         skin::{SkinFile, SkinFileError, content_hash},
         template::{self, Template},
@@ -24,6 +31,9 @@ const MAX_GLTF_BYTES: u64 = 4 << 30;
 
 /// Largest size in bytes of a `.rig` file that is read.
 const MAX_RIG_BYTES: u64 = 1 << 30;
+
+/// Largest size in bytes of a BVH file that is read.
+const MAX_BVH_BYTES: u64 = 4 << 30;
 
 /// Largest size in bytes of a material library that is read.
 const MAX_MTL_BYTES: u64 = 64 << 20;
@@ -43,6 +53,8 @@ pub enum FileKind {
     Template,
     /// Clips of a rig, `.anim.ron`.
     Animation,
+    /// Motion of a skeleton of its own, `.bvh`.
+    Bvh,
     /// Project, `.rigsmith.ron`.
     Project,
     /// Weights of a mesh, `.skin`.
@@ -62,6 +74,7 @@ impl FileKind {
             (".ron", Self::Gestures),
             (".rig", Self::RigText),
             (".skin", Self::Skin),
+            (".bvh", Self::Bvh),
             (".obj", Self::Obj),
             (".gltf", Self::Gltf),
             (".glb", Self::Glb),
@@ -112,6 +125,14 @@ pub enum LoadError {
         text: String,
         /// Error of the reader, with its place.
         source: SourceError,
+    },
+    /// The BVH file is invalid.
+    #[error("`{}`: {source}", path.display())]
+    Bvh {
+        /// The file.
+        path: PathBuf,
+        /// Error of the reader, with its line.
+        source: BvhError,
     },
     /// The `.skin` file is invalid.
     #[error("`{}`: {source}", path.display())]
@@ -188,6 +209,18 @@ pub fn load_animation(disk: &dyn Disk, path: &Path) -> Result<ReadAnimation, Loa
     read_animation(&bytes).map_err(|source| in_source(path, &bytes, source))
 }
 
+/// Reads the motion of a BVH file.
+pub fn load_motion(disk: &dyn Disk, path: &Path) -> Result<Motion, LoadError> {
+    let bytes = read_capped(disk, path, MAX_BVH_BYTES)?;
+    read_bvh(&bytes, &stem(path)).map_err(|source| LoadError::Bvh { path: path.into(), source })
+}
+
+/// Reads a map of joints.
+pub fn load_joint_map(disk: &dyn Disk, path: &Path) -> Result<NamePairs, LoadError> {
+    let bytes = read_capped(disk, path, joint_map::MAX_BYTES as u64)?;
+    read_joint_map(&bytes).map_err(|source| in_source(path, &bytes, source))
+}
+
 /// Reads a `.rig` text.
 pub fn load_rig_text(disk: &dyn Disk, path: &Path) -> Result<RigText, LoadError> {
     let bytes = read_capped(disk, path, MAX_RIG_BYTES)?;
@@ -225,7 +258,7 @@ pub(super) fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadE
 /// Name of a file without folder and endings.
 pub fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    for ending in [".rig.ron", ".rigsmith.ron", ".anim.ron", ".obj", ".gltf", ".glb", ".rig", ".ron", ".skin"] {
+    for ending in [".rig.ron", ".rigsmith.ron", ".anim.ron", ".obj", ".gltf", ".glb", ".rig", ".ron", ".skin", ".bvh"] {
         let split = name.len().saturating_sub(ending.len());
         if split > 0 && name.is_char_boundary(split) && name[split..].eq_ignore_ascii_case(ending) {
             return name[..split].to_owned();

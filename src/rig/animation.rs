@@ -6,6 +6,9 @@
 //! ([`PoseOffset`]), and values of attributes. Times are seconds.
 
 mod check;
+pub mod humanoid;
+pub mod joint_map;
+pub mod motion;
 mod names;
 mod sample;
 mod sampler;

@@ -1,8 +1,10 @@
 //! File formats of rigs: text and bytes on one side, plain data on the other. No code here opens a file.
 //!
-//! Templates (`.rig.ron`), clips (`.anim.ron`), projects (`.rigsmith.ron`), skeleton text (`.rig`) and weights (`.skin`).
+//! Templates (`.rig.ron`), clips (`.anim.ron`), projects (`.rigsmith.ron`), skeleton text (`.rig`), weights (`.skin`) and
+//! motion capture (`.bvh`).
 
 pub mod animation;
+pub mod bvh;
 pub(super) mod layout;
 mod poses;
 pub mod project;

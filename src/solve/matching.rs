@@ -56,7 +56,7 @@ pub fn match_switch(
     let kept = match &switch.matching {
         Matching::IkFk { joints, fk, goal, goal_offset, pole } => {
             let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
-            hold_limb(&mut attempt, &limb, switch, value)?
+            throw_limb(&mut attempt, &limb, switch, value)?
         }
         Matching::Space { control } => {
             let wanted = attempt.global(*control)?;
@@ -79,9 +79,31 @@ pub fn match_switch(
     Ok(thrown)
 }
 
+/// Poses both the forward and the inverse controls of a limb so that its joints have the rig transforms `wanted`, whichever of
+/// the two holds the limb with the switch at `value`.
+///
+/// # Errors
+/// [`MatchError`] if the program lacks a node or an attribute of the switch.
+pub(super) fn hold_limb(
+    rig: &BuiltRig,
+    mut state: RigState,
+    switch: &SwitchData,
+    wanted: &[Trs],
+    value: f32,
+) -> Result<RigState, MatchError> {
+    let Matching::IkFk { joints, fk, goal, goal_offset, pole } = &switch.matching else { return Ok(state) };
+    let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
+    state.set_attribute(switch.control, &switch.attribute, 1.0)?;
+    let mut attempt = Attempt { rig, state, offsets: Vec::new() };
+    limb.hold(&mut attempt, wanted, 1.0, 1.0)?;
+    attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
+    attempt.state.evaluate(0.0);
+    Ok(attempt.state)
+}
+
 /// Throws the switch of a limb and poses controls so that the limb, and the joints behind it that the switch weighs, stay;
 /// returns these joints with their former rig transforms.
-fn hold_limb(
+fn throw_limb(
     attempt: &mut Attempt<'_>,
     limb: &limb::Limb<'_>,
     switch: &SwitchData,

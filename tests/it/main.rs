@@ -6,9 +6,12 @@
 mod animation;
 mod bench;
 mod build_limits;
+mod bvh;
 mod choices;
 #[cfg(feature = "cli")]
 mod cli;
+#[cfg(feature = "cli")]
+mod cli_animate;
 #[cfg(feature = "cli")]
 mod cli_build;
 #[cfg(feature = "cli")]
@@ -57,6 +60,7 @@ mod fill;
 mod fit;
 mod fit_data;
 mod fuzz_animation;
+mod fuzz_bvh;
 mod fuzz_gestures;
 mod fuzz_gltf;
 mod fuzz_journal;
@@ -113,6 +117,7 @@ mod references;
 mod remote;
 #[cfg(feature = "render")]
 mod render;
+mod retarget;
 mod rig_text;
 mod runtime;
 mod schema;

@@ -46,11 +46,27 @@ fn said(mut rig: Rig) -> String {
         rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.clone()))).collect();
     for (joint, mut tag) in tags {
         if let TagKind::Command { params, .. } = &mut tag.kind {
-            *params = sorted(&without_blanks(params));
+            *params = unbound(&sorted(&without_blanks(params)));
             apply(&mut rig, RigEdit::SetTag(joint, Box::new(tag)));
         }
     }
     plain(rig)
+}
+
+/// Parameters whose references have names alone: reading binds a name to the uid that it stands for.
+fn unbound(params: &str) -> String {
+    let mut pieces = params.split('#');
+    let mut text = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let digits = piece.chars().take_while(char::is_ascii_hexdigit).count();
+        if digits == 16 {
+            text.push_str(&piece[16..]);
+        } else {
+            text.push('#');
+            text.push_str(piece);
+        }
+    }
+    text
 }
 
 /// Parameters in the order of their names.

@@ -23,6 +23,12 @@ pub(in crate::editor) enum OpenError {
         /// Name of the file.
         name: String,
     },
+    /// The file has the motion of a skeleton, which is no document.
+    #[error("{name} has only motion; put it onto a rig with `rigsmith animate`")]
+    MotionAlone {
+        /// Name of the file.
+        name: String,
+    },
     /// The file's name ends in `.ron`, like a list of gestures.
     #[error("{name} is neither template nor project; those end in .rig.ron and .rigsmith.ron")]
     Gestures {

@@ -1,6 +1,6 @@
 //! Constraints as entities: the node that each drives, the nodes that it reads, and their order of evaluation.
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use bevy::prelude::*;
 
@@ -36,13 +36,14 @@ pub(super) fn follow_constraints(
                 }
             }
         }
-        let mut is_reordered = false;
+        // Nodes with a constraint that came to the end of their list: the ones after it are put behind it again.
+        let mut reordered: HashSet<Uid> = HashSet::new();
         for constraint in constraints {
             let entity_of = |node: Uid| joints.get(node).or_else(|| known.get(node));
-            if !is_reordered
-                && let Some(mirrored) = known.constraints.get(&constraint.uid)
+            if let Some(mirrored) = known.constraints.get(&constraint.uid)
                 && Arc::ptr_eq(&mirrored.constraint, &constraint.constraint)
                 && mirrored.uids.iter().zip(&mirrored.nodes).all(|(uid, entity)| entity_of(*uid) == *entity)
+                && !mirrored.uids.first().is_some_and(|driven| reordered.contains(driven))
             {
                 continue;
             }
@@ -56,9 +57,12 @@ pub(super) fn follow_constraints(
             let read: Vec<Uid> = read.collect();
             let uids: Vec<Uid> = driven.iter().chain(&read).copied().collect();
             let nodes: Vec<Option<Entity>> = uids.iter().map(|node| entity_of(*node)).collect();
-            if !is_reordered
-                && known.constraints.get(&constraint.uid).is_some_and(|known| known.is_same(constraint, &nodes))
-            {
+            let is_behind = driven.is_some_and(|driven| reordered.contains(&driven));
+            if let Some(mirrored) = known.constraints.get(&constraint.uid).filter(|m| m.is_same(constraint, &nodes)) {
+                if let Some(driven) = driven.filter(|_| is_behind).and_then(entity_of) {
+                    let mut target = commands.entity(mirrored.entity);
+                    target.try_remove::<Constrains>().try_insert(Constrains(driven));
+                }
                 continue;
             }
             let weights = weights(&constraint.constraint);
@@ -75,17 +79,15 @@ pub(super) fn follow_constraints(
                     mirrored.entity
                 }
                 None => {
-                    // Later constraints are inserted again after this one, so that the constraints of a node keep their
-                    // order.
-                    is_reordered = true;
                     let named = (constraint.uid, Name::new(constraint.constraint.kind()), ChildOf(rig_entity));
                     let entity = commands.spawn((named, bundle)).id();
                     index.insert(entity, rig_entity, constraint.uid, EntityPart::Constraint);
                     entity
                 }
             };
-            if let Some(driven) = driven.and_then(entity_of) {
-                commands.entity(entity).try_insert(Constrains(driven));
+            if let Some(driven_entity) = driven.and_then(entity_of) {
+                commands.entity(entity).try_insert(Constrains(driven_entity));
+                reordered.extend(driven);
             }
             if let Some(tag) = tags.get(constraint.command) {
                 commands.entity(entity).try_insert(CreatedBy(tag));

@@ -138,8 +138,9 @@ fn gather(
             let value = told.get(&*state.program().attributes()[slot].name).copied();
             if let Some(value) = value.filter(|value| !values[slot].is_nan() && *value != values[slot]) {
                 state.set_attribute_at(slot, value);
-                // Written again after the run if the program changes the value.
+                // Written again after the run, which may do nothing, if the value is not allowed or driven.
                 values[slot] = value;
+                *has_rewritten = true;
             }
         }
     }
@@ -193,7 +194,9 @@ pub(super) fn scatter_attributes(
     mut holders: Query<&mut Attributes>,
 ) {
     for mut runtime in &mut rigs {
-        let RigRuntime { state, attributes, values, .. } = runtime.bypass_change_detection();
+        let RigRuntime { state, attributes, values, mode, has_rewritten, .. } = runtime.bypass_change_detection();
+        // In a hierarchy it is needed for transforms, too.
+        *has_rewritten &= *mode == InstanceMode::Hierarchy;
         for (entity, slots) in attributes.iter() {
             let Ok(mut told) = holders.get_mut(*entity) else { continue };
             for slot in slots {

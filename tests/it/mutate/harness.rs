@@ -20,7 +20,8 @@ const POOL: usize = 256;
 /// Mutants that a test tries, on every machine the same ones.
 const MUTANTS: u64 = 4000;
 /// Targets, each with a folder of findings of its own.
-const TARGETS: [&str; 9] = ["animation", "gestures", "gltf", "journal", "obj", "project", "rig", "skin", "template"];
+const TARGETS: [&str; 10] =
+    ["animation", "bvh", "gestures", "gltf", "journal", "obj", "project", "rig", "skin", "template"];
 
 /// Extent of a run.
 #[derive(Debug, Clone, Copy)]

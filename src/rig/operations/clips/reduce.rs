@@ -24,6 +24,11 @@ impl Default for KeyTolerance {
 }
 
 impl KeyTolerance {
+    /// Keys that are needed for a track to stay within the tolerance.
+    pub fn reduced(&self, track: &Track, property: &Property) -> Vec<Key> {
+        reduced(track, property, self.of(property))
+    }
+
     fn of(&self, property: &Property) -> f32 {
         match property {
             Property::Translation => self.distance,

@@ -1,0 +1,137 @@
+//! Names that skeletons give to the bones of a human.
+//!
+//! Known are the names of Mixamo (`mixamorig:LeftUpLeg`), Unreal (`thigh_l`), VRM (`J_Bip_L_UpperLeg`, `leftUpperLeg`), CMU
+//! (`LeftUpLeg`, `LHipJoint`), MakeHuman (`upperleg01.L`, `UpLeg_L`), Rigify (`DEF-thigh.L`), Biped (`Bip01 L Thigh`) and the
+//! templates of this crate (`thigh_l`).
+
+use super::{BodySide, Finger, HumanBone, LimbBone};
+
+/// Bone that a name means, and a rank: among several joints for a bone the lowest counts.
+pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
+    let name = name.rsplit([':', '|']).next().unwrap_or(name);
+    // MakeHuman's motions have helpers of that form, from a joint to where the next one begins.
+    if name.starts_with("__") {
+        return None;
+    }
+    let words = words(name);
+    let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let prefixes: [&[&str]; 8] =
+        [&["j", "bip"], &["mixamorig"], &["def"], &["org"], &["bip", "1"], &["bip", "01"], &["bip", "001"], &["bip"]];
+    for prefix in prefixes {
+        if words.len() > prefix.len() && words.starts_with(prefix) {
+            words.drain(..prefix.len());
+        }
+    }
+    let mut side = None;
+    words.retain(|word| {
+        let of = match *word {
+            "l" | "left" | "lft" => BodySide::Left,
+            "r" | "right" | "rgt" | "rt" => BodySide::Right,
+            // The centre of VRM's names.
+            "c" => return false,
+            _ => return true,
+        };
+        side = Some(of);
+        false
+    });
+    let (number, stem) = numbered(&words);
+    let side_of = |bone: LimbBone, rank: usize| Some((HumanBone::Limb(side?, bone), rank));
+    if let Some((finger, number)) = finger(&words) {
+        return (1..=3)
+            .contains(&number)
+            .then_some(())
+            .and(side)
+            .map(|side| (HumanBone::Finger(side, finger, number), 0));
+    }
+    if number > 1 && side.is_some() {
+        return None;
+    }
+    match (stem.as_str(), side) {
+        ("hips" | "pelvis", None) => Some((HumanBone::Hips, 0)),
+        ("hip" | "cog", None) => Some((HumanBone::Hips, 1)),
+        ("head", None) if number <= 1 => Some((HumanBone::Head, 0)),
+        ("neck", None) if number <= 1 => Some((HumanBone::Neck, 0)),
+        ("upperarm" | "uparm" | "uarm", _) => side_of(LimbBone::UpperArm, 0),
+        ("arm", _) => side_of(LimbBone::UpperArm, 1),
+        ("clavicle" | "collar" | "collarbone", _) => side_of(LimbBone::Shoulder, 0),
+        ("shoulder", _) => side_of(LimbBone::Shoulder, 1),
+        ("forearm" | "lowerarm" | "loarm" | "lowarm" | "larm", _) => side_of(LimbBone::LowerArm, 0),
+        ("elbow", _) => side_of(LimbBone::LowerArm, 1),
+        ("hand", _) => side_of(LimbBone::Hand, 0),
+        ("wrist", _) => side_of(LimbBone::Hand, 1),
+        ("thigh" | "upleg" | "upperleg" | "uleg", _) => side_of(LimbBone::UpperLeg, 0),
+        ("shin" | "calf" | "shank" | "lowerleg" | "loleg" | "lowleg" | "lleg", _) => side_of(LimbBone::LowerLeg, 0),
+        ("leg", _) => side_of(LimbBone::LowerLeg, 1),
+        ("knee", _) => side_of(LimbBone::LowerLeg, 2),
+        ("foot", _) => side_of(LimbBone::Foot, 0),
+        ("ankle", _) => side_of(LimbBone::Foot, 1),
+        ("toebase" | "toes" | "toe" | "ball", _) => side_of(LimbBone::Toes, 0),
+        _ => None,
+    }
+}
+
+/// Words of a name in small letters: split at signs, before capitals and around numbers.
+fn words(name: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut before = ' ';
+    let chars: Vec<char> = name.chars().collect();
+    for (at, c) in chars.iter().copied().enumerate() {
+        if !c.is_alphanumeric() {
+            before = c;
+            continue;
+        }
+        let is_new = !before.is_alphanumeric()
+            || c.is_numeric() != before.is_numeric()
+            || (c.is_uppercase() && before.is_lowercase())
+            // The side in `LFoot`.
+            || (c.is_uppercase()
+                && before.is_uppercase()
+                && chars.get(at + 1).is_some_and(|next| next.is_lowercase()));
+        if is_new {
+            words.push(String::new());
+        }
+        if let Some(word) = words.last_mut() {
+            word.extend(c.to_lowercase());
+        }
+        before = c;
+    }
+    words
+}
+
+/// Number at the end of a name, 0 without one, and the words before it as one.
+fn numbered(words: &[&str]) -> (u32, String) {
+    let number = words.last().and_then(|word| word.parse::<u32>().ok());
+    let stem = &words[..words.len() - usize::from(number.is_some())];
+    (number.unwrap_or(0), stem.concat())
+}
+
+/// Finger and number of its joint.
+fn finger(words: &[&str]) -> Option<(Finger, u8)> {
+    // VRM and Rigify: `indexProximal`, `f_index`; Mixamo: `HandIndex1`.
+    let rest: Vec<&str> = words.iter().copied().filter(|word| !matches!(*word, "f" | "hand" | "finger")).collect();
+    let kind = match *rest.first()? {
+        "thumb" => Finger::Thumb,
+        "index" => Finger::Index,
+        "middle" | "mid" => Finger::Middle,
+        "ring" => Finger::Ring,
+        "little" | "pinky" => Finger::Little,
+        // MakeHuman: `finger2-1` is the index finger.
+        number if words.first() == Some(&"finger") => {
+            let kinds = [Finger::Thumb, Finger::Index, Finger::Middle, Finger::Ring, Finger::Little];
+            let kind = number.parse::<usize>().ok()?.checked_sub(1).and_then(|number| kinds.get(number))?;
+            return Some((*kind, rest.get(1)?.parse().ok()?));
+        }
+        _ => return None,
+    };
+    let number = match rest.get(1..).unwrap_or_default() {
+        [number] => match *number {
+            "metacarpal" if kind == Finger::Thumb => 1,
+            "proximal" => 1 + u8::from(kind == Finger::Thumb),
+            "intermediate" => 2,
+            "distal" => 3,
+            number => number.parse().ok()?,
+        },
+        _ => return None,
+    };
+    Some((kind, number))
+}

@@ -1,0 +1,225 @@
+//! Maps of a motion's joints to those of a rig.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bevy::math::Vec3;
+use serde::Serialize;
+
+use super::{
+    humanoid::{HumanBone, HumanJoints, SkeletonJoint, by_names, by_shape},
+    motion::Motion,
+};
+use crate::rig::{NodeKind, Rig, SourceError, Uid, nearest::did_you_mean, parse_ron, utf8};
+
+/// Largest map file in bytes.
+pub const MAX_BYTES: usize = 4 << 20;
+
+/// Way in which a skeleton's bones were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FoundBy {
+    /// By a map that was given.
+    Map,
+    /// By the names of its joints.
+    Names,
+    /// By its shape.
+    Shape,
+    /// Not at all: joints of the same names are mapped.
+    Labels,
+}
+
+/// Joints of a motion for joints of a rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointMap {
+    /// Joints of the motion for bones of a human.
+    pub source: HumanJoints,
+    /// Joints of the rig for bones of a human, as indices in the order of [`Rig::walk`].
+    pub target: HumanJoints,
+    /// Further pairs: joint of the motion and of the rig, which turn alike.
+    pub pairs: Vec<(usize, usize)>,
+    /// Way in which the motion's bones were found.
+    pub found_by: FoundBy,
+}
+
+/// Reason why no map can be made.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum JointMapError {
+    /// The map names a joint that the motion does not have.
+    #[error("the motion has no joint \"{name}\"{nearest}")]
+    NoSource {
+        /// Name in the map.
+        name: String,
+        /// End of the sentence, with names that are near.
+        nearest: String,
+    },
+    /// The map names a joint that the rig does not have.
+    #[error("the rig has no joint \"{name}\"{nearest}")]
+    NoTarget {
+        /// Name in the map.
+        name: String,
+        /// End of the sentence, with names that are near.
+        nearest: String,
+    },
+    /// No joint of the motion is mapped.
+    #[error(
+        "no joint of the motion is mapped to the rig: neither are names alike nor is it a human; give a map with --map: [(\"joint of the motion\", \"joint of the rig\"), ...]"
+    )]
+    Nothing,
+}
+
+/// Pairs of names: joint of the motion, joint of the rig.
+pub type NamePairs = Vec<(String, String)>;
+
+/// Reads a map file: a RON list of pairs of names, `[("LeftUpLeg", "thigh_l")]`.
+///
+/// # Errors
+/// The text is no such list; the error has its place.
+pub fn read_joint_map(bytes: &[u8]) -> Result<NamePairs, SourceError> {
+    parse_ron(utf8(bytes, MAX_BYTES, "map of joints")?)
+}
+
+/// Text of a map file.
+pub fn write_joint_map(pairs: &[(String, String)]) -> String {
+    let mut text = "// Joint of the motion, joint of the rig.\n[\n".to_owned();
+    for (source, target) in pairs {
+        text.push_str(&format!("    ({source:?}, {target:?}),\n"));
+    }
+    text.push_str("]\n");
+    text
+}
+
+impl JointMap {
+    /// Map of a motion to a rig. Pairs that are given win over what names and shape say.
+    ///
+    /// # Errors
+    /// A given name is unknown, or nothing can be mapped.
+    pub fn new(motion: &Motion, rig: &Rig, given: &[(String, String)]) -> Result<Self, JointMapError> {
+        let (sources, targets) = (motion_joints(motion), rig_joints(rig));
+        let found = |joints: &[SkeletonJoint]| {
+            let named = by_names(joints);
+            if named.is_empty() { (shaped(joints), FoundBy::Shape) } else { (named, FoundBy::Names) }
+        };
+        let ((mut source, mut found_by), (target, _)) = (found(&sources), found(&targets));
+        let mut pairs = Vec::new();
+        if !given.is_empty() {
+            found_by = FoundBy::Map;
+            let bone_of =
+                |joint: usize| target.iter().find(|(_, joints)| joints.contains(&joint)).map(|(bone, _)| *bone);
+            let mut replaced: BTreeMap<HumanBone, BTreeSet<usize>> = BTreeMap::new();
+            for (from, to) in given {
+                let from = find(&sources, from).map_err(|(name, nearest)| JointMapError::NoSource { name, nearest })?;
+                let to = find(&targets, to).map_err(|(name, nearest)| JointMapError::NoTarget { name, nearest })?;
+                match bone_of(to) {
+                    Some(bone) => replaced.entry(bone).or_default().extend([from]),
+                    None => pairs.push((from, to)),
+                }
+            }
+            for (bone, joints) in replaced {
+                source.insert(bone, joints.into_iter().collect());
+            }
+        }
+        // Joints of the same name that are no bones of a human turn alike.
+        let taken: BTreeSet<usize> = target.values().flatten().copied().collect();
+        let is_human = source.keys().any(|bone| target.contains_key(bone));
+        for (to, joint) in targets.iter().enumerate().filter(|(to, _)| !is_human || !taken.contains(to)) {
+            let is_mapped = pairs.iter().any(|(_, known)| *known == to);
+            let from = sources.iter().position(|known| !joint.name.is_empty() && known.name == joint.name);
+            if let (Some(from), false) = (from, is_mapped) {
+                pairs.push((from, to));
+            }
+        }
+        if !is_human {
+            if pairs.is_empty() {
+                return Err(JointMapError::Nothing);
+            }
+            let found_by = if given.is_empty() { FoundBy::Labels } else { found_by };
+            return Ok(Self { source: HumanJoints::new(), target: HumanJoints::new(), pairs, found_by });
+        }
+        Ok(Self { source, target, pairs, found_by })
+    }
+
+    /// Bones that both skeletons have.
+    pub fn bones(&self) -> impl Iterator<Item = (HumanBone, &[usize], &[usize])> {
+        self.source.iter().filter_map(|(bone, source)| Some((*bone, &source[..], &self.target.get(bone)?[..])))
+    }
+
+    /// The map as pairs of names, with which a map file gives the same map. Joints without names are left out.
+    pub fn names(&self, motion: &Motion, rig: &Rig) -> NamePairs {
+        let targets = rig_joints(rig);
+        let mut pairs = NamePairs::new();
+        let mut add = |from: usize, to: usize| {
+            let (from, to) = (&motion.joints[from].name, &targets[to].name);
+            if !from.is_empty() && !to.is_empty() {
+                pairs.push((from.clone(), to.clone()));
+            }
+        };
+        for (_, source, target) in self.bones() {
+            for (place, from) in source.iter().enumerate() {
+                add(*from, target[(place * target.len() / source.len()).min(target.len() - 1)]);
+            }
+        }
+        self.pairs.iter().for_each(|(from, to)| add(*from, *to));
+        pairs
+    }
+
+    /// Names of the motion's joints that move nothing.
+    pub fn unmapped_source(&self, motion: &Motion) -> Vec<String> {
+        let used: BTreeSet<usize> = self
+            .bones()
+            .flat_map(|(_, source, _)| source)
+            .chain(self.pairs.iter().map(|(from, _)| from))
+            .copied()
+            .collect();
+        let unused = motion.joints.iter().enumerate().filter(|(at, _)| !used.contains(at));
+        unused.map(|(_, joint)| joint.name.clone()).collect()
+    }
+
+    /// Labels of the rig's joints that nothing moves.
+    pub fn unmapped_target(&self, rig: &Rig) -> Vec<String> {
+        let used: BTreeSet<usize> =
+            self.bones().flat_map(|(.., target)| target).chain(self.pairs.iter().map(|(_, to)| to)).copied().collect();
+        let joints =
+            rig.walk().enumerate().filter(|(at, joint)| joint.data.kind == NodeKind::Joint && !used.contains(at));
+        joints.map(|(_, joint)| joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string())).collect()
+    }
+}
+
+/// Joint of that name, or the name and the end of a sentence about it.
+fn find(joints: &[SkeletonJoint], name: &str) -> Result<usize, (String, String)> {
+    let nearest = || did_you_mean(name, joints.iter().map(|joint| &joint.name));
+    joints.iter().position(|joint| joint.name == name).ok_or_else(|| (name.to_owned(), nearest()))
+}
+
+/// Bones by shape, for a figure that faces along Z, or along the negative Y if it stands along Z.
+fn shaped(joints: &[SkeletonJoint]) -> HumanJoints {
+    let spread = |axis: Vec3| {
+        let along = joints.iter().map(|joint| joint.position.dot(axis));
+        along.clone().fold(f32::MIN, f32::max) - along.fold(f32::MAX, f32::min)
+    };
+    match spread(Vec3::Z) > 1.3 * spread(Vec3::Y) {
+        true => by_shape(joints, Vec3::Z, Vec3::NEG_Y),
+        false => by_shape(joints, Vec3::Y, Vec3::Z),
+    }
+}
+
+/// Joints of a motion at rest.
+pub fn motion_joints(motion: &Motion) -> Vec<SkeletonJoint> {
+    let joint = |(joint, rest): (&super::motion::MotionJoint, crate::mesh::model::Trs)| SkeletonJoint {
+        name: joint.name.clone(),
+        parent: joint.parent,
+        position: rest.translation,
+    };
+    motion.joints.iter().zip(motion.rest_globals()).map(joint).collect()
+}
+
+/// Joints of a rig at rest, in the order of [`Rig::walk`].
+pub fn rig_joints(rig: &Rig) -> Vec<SkeletonJoint> {
+    let places: Vec<(Uid, Vec3)> = rig.rest_globals().into_iter().map(|(uid, at)| (uid, at.translation)).collect();
+    let index: BTreeMap<Uid, usize> = places.iter().enumerate().map(|(at, (uid, _))| (*uid, at)).collect();
+    let joint = |(joint, (_, position)): (&crate::rig::RigJoint, &(Uid, Vec3))| SkeletonJoint {
+        name: joint.data.label.clone().unwrap_or_default(),
+        parent: joint.parent.and_then(|parent| index.get(&parent).copied()),
+        position: *position,
+    };
+    rig.walk().zip(&places).map(joint).collect()
+}

@@ -1,0 +1,119 @@
+//! Clips baked into transforms of nodes, for files that have neither controls nor constraints.
+
+use std::sync::Arc;
+
+use super::program::{RigProgram, RigState};
+use crate::{
+    mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
+    rig::{
+        Uid,
+        animation::{Key, Property, RigClip, SampledPose, Track},
+        operations::KeyTolerance,
+    },
+};
+
+/// Most frames of a baked clip.
+const FRAMES: f32 = 1e6;
+
+/// Node that is baked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BakedNode {
+    /// The node of the rig.
+    pub uid: Uid,
+    /// Place of the parent among the nodes, before the node's own.
+    pub parent: Option<usize>,
+    /// Transform relative to the parent at rest.
+    pub rest: Trs,
+}
+
+/// Poses an instance as a clip does at a moment, and evaluates it. Nodes that the clip does not animate stay.
+pub fn strike(state: &mut RigState, pose: &SampledPose) {
+    let program = state.program().clone();
+    for (uid, offset) in &pose.offsets {
+        if let Some(slot) = program.node(*uid) {
+            state.set_offset_at(slot, *offset);
+        }
+    }
+    for (uid, values) in &pose.values {
+        for (name, value) in values {
+            if let Some(slot) = program.attribute(*uid, name) {
+                state.set_attribute_at(slot, *value);
+            }
+        }
+    }
+    state.evaluate(0.0);
+}
+
+/// Plays a clip at a rate and gives the nodes' transforms relative to their parents as channels, whose targets are places among
+/// the nodes. Channels that stay at rest are left out, and keys without which a channel stays within the tolerance.
+///
+/// Time starts at zero with the clip. Takes some tens of microseconds a frame for a character.
+pub fn bake_clip(
+    program: &Arc<RigProgram>,
+    clip: &RigClip,
+    nodes: &[BakedNode],
+    rate: f32,
+    tolerance: &KeyTolerance,
+) -> Clip {
+    let mut state = RigState::new(program.clone());
+    let count = (clip.duration() * rate + 1e-3).floor().clamp(0.0, FRAMES) as usize;
+    let mut times: Vec<f32> = (0..=count).map(|frame| frame as f32 / rate).collect();
+    // The end lies between frames where the rate is not the clip's own.
+    if clip.duration() - times.last().copied().unwrap_or_default() > 1e-4 {
+        times.push(clip.duration());
+    }
+    let mut locals: Vec<Vec<Trs>> = vec![Vec::with_capacity(times.len()); nodes.len()];
+    for time in &times {
+        strike(&mut state, &clip.sample(clip.range[0] + time));
+        let globals: Vec<Option<Trs>> = nodes.iter().map(|node| state.global(node.uid)).collect();
+        for (at, node) in nodes.iter().enumerate() {
+            let local = match (globals[at], node.parent) {
+                (Some(global), None) => global,
+                (Some(global), Some(parent)) => globals[parent].map_or(node.rest, |parent| global.relative_to(&parent)),
+                (None, _) => node.rest,
+            };
+            locals[at].push(local);
+        }
+    }
+    let mut baked = Clip { name: clip.name.clone(), ..Clip::default() };
+    for (at, (node, locals)) in nodes.iter().zip(&locals).enumerate() {
+        let vector = |v: glam::Vec3| [v.x, v.y, v.z, 0.0];
+        let mut last = node.rest.rotation;
+        let rotation = |local: &Trs| {
+            let turn = if local.rotation.dot(last) < 0.0 { -local.rotation } else { local.rotation };
+            last = turn;
+            turn.to_array()
+        };
+        let properties = [
+            (
+                Property::Translation,
+                vector(node.rest.translation),
+                locals.iter().map(|at| vector(at.translation)).collect(),
+            ),
+            (Property::Rotation, node.rest.rotation.to_array(), locals.iter().map(rotation).collect::<Vec<[f32; 4]>>()),
+            (Property::Scale, vector(node.rest.scale), locals.iter().map(|at| vector(at.scale)).collect()),
+        ];
+        for (property, rest, values) in properties {
+            let key = |(time, value): (&f32, &[f32; 4])| Key { time: *time, value: *value, ..Key::number(*time, 0.0) };
+            let track = Track { keys: times.iter().zip(&values).map(key).collect() };
+            let keys = tolerance.reduced(&track, &property);
+            if let [only] = keys[..]
+                && only.value.iter().zip(rest).all(|(a, b)| (a - b).abs() < 1e-6)
+            {
+                continue;
+            }
+            let target = match property {
+                Property::Translation => ChannelTarget::Translation(at),
+                Property::Rotation => ChannelTarget::Rotation(at),
+                Property::Scale | Property::Attribute(_) => ChannelTarget::Scale(at),
+            };
+            baked.channels.push(Channel {
+                target,
+                interpolation: Interpolation::Linear,
+                times: keys.iter().map(|key| key.time).collect(),
+                values: keys.iter().flat_map(|key| key.value[..property.width()].to_vec()).collect(),
+            });
+        }
+    }
+    baked
+}

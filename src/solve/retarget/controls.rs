@@ -1,0 +1,294 @@
+//! A motion on controls: offsets of controls that put the joints where they are wanted.
+//!
+//! A limb with a switch gets the poses of its forward and of its inverse controls, so that the switch can be thrown at any
+//! frame. Any other joint is turned by the control that stands where it stands; the hips are moved by the one that carries all.
+
+use std::sync::Arc;
+
+use bevy::math::{Quat, Vec3};
+use rayon::prelude::*;
+
+use super::{RetargetError, body::Body, limbs::LimbKind, tracks::Keyed};
+use crate::{
+    mesh::model::Trs,
+    rig::{BuiltRig, Matching, NodeType, PoseOffset, SwitchData, animation::humanoid::HumanBone},
+    solve::{
+        matching::{angle_between, hold_limb, offset_towards},
+        program::{RigProgram, RigState},
+        rotate::scaled_axis,
+        weights::{multiply, relative},
+    },
+};
+
+/// Frames that are posed one after the other; the others are independent of them.
+const BLOCK: usize = 32;
+
+/// Part of posing a rig, in the order in which parts depend on one another.
+enum Step<'a> {
+    /// A joint, as an index of the figure and a slot, and the slot of the control that turns it.
+    Joint(Handle),
+    /// A joint that an attribute turns.
+    Dial(Dial),
+    /// A limb with its joints as indices of the figure, and the value of its switch.
+    Limb(&'a SwitchData, Vec<usize>, f32),
+}
+
+/// Attribute that turns one joint about an axis, such as the toes of a foot that follows its goal.
+struct Dial {
+    joint: usize,
+    joint_slot: usize,
+    attribute: usize,
+    /// Axis in the joint's space, and radians for one unit of the attribute.
+    axis: Vec3,
+    rate: f32,
+}
+
+struct Handle {
+    joint: usize,
+    joint_slot: usize,
+    control: usize,
+    /// Transform of the control in the joint's space at rest.
+    carried: Trs,
+    /// True if the control moves the joint, too.
+    moves: bool,
+    /// True if the joint's rotation is corrected after that of the control.
+    corrects: bool,
+}
+
+/// Offsets of the controls that the motion moves, and labels of joints that no control moves.
+pub(super) fn keyed(
+    built: &BuiltRig,
+    program: &Arc<RigProgram>,
+    body: &Body,
+    poses: &[Vec<Trs>],
+) -> Result<(Keyed, Vec<String>), RetargetError> {
+    let mut state = RigState::new(program.clone());
+    let limbs = limbs(built, body);
+    for (switch, _, value) in &limbs {
+        // A switch that the program lacks is told when the limb is posed.
+        let _ = state.set_attribute(switch.control, &switch.attribute, *value);
+    }
+    state.evaluate(0.0);
+    let (steps, unmoved) = steps(&state, body, &limbs);
+    let blocks: Vec<&[Vec<Trs>]> = poses.chunks(BLOCK).collect();
+    let dials: Vec<usize> =
+        steps.iter().filter_map(|step| if let Step::Dial(dial) = step { Some(dial.attribute) } else { None }).collect();
+    let posed: Vec<Result<Vec<Posed>, RetargetError>> = blocks
+        .par_iter()
+        .map(|block| {
+            let mut state = state.clone();
+            // The first pose is far from rest, which takes a second round.
+            if let Some(first) = block.first() {
+                state = strike(built, state, &steps, first)?;
+            }
+            let mut list = Vec::with_capacity(block.len());
+            for pose in *block {
+                state = strike(built, state, &steps, pose)?;
+                list.push(Posed {
+                    offsets: (0..program.nodes().len()).map(|slot| state.offset_at(slot)).collect(),
+                    dials: dials.iter().map(|slot| state.attribute_at(*slot)).collect(),
+                });
+            }
+            Ok(list)
+        })
+        .collect();
+    let mut frames: Vec<Posed> = Vec::with_capacity(poses.len());
+    for block in posed {
+        frames.extend(block?);
+    }
+    let mut keyed = Keyed::default();
+    for (slot, node) in program.nodes().iter().enumerate() {
+        if frames.iter().any(|frame| frame.offsets[slot] != PoseOffset::IDENTITY) {
+            keyed.nodes.push((node.uid, frames.iter().map(|frame| frame.offsets[slot]).collect()));
+        }
+    }
+    for (place, slot) in dials.iter().enumerate() {
+        let attribute = &program.attributes()[*slot];
+        let (node, name) = (program.nodes()[attribute.node].uid, attribute.name.to_string());
+        keyed.numbers.push((node, name, frames.iter().map(|frame| frame.dials[place]).collect()));
+    }
+    keyed.values =
+        limbs.iter().map(|(switch, _, value)| (switch.control, switch.attribute.to_string(), *value)).collect();
+    Ok((keyed, unmoved))
+}
+
+/// Offsets of all nodes, and the attributes that turn joints.
+struct Posed {
+    offsets: Vec<PoseOffset>,
+    dials: Vec<f32>,
+}
+
+/// Limbs with switches whose joints the motion moves: legs follow their goals, arms their forward controls.
+fn limbs<'a>(built: &'a BuiltRig, body: &Body) -> Vec<(&'a SwitchData, Vec<usize>, f32)> {
+    let limb = |switch: &'a Arc<SwitchData>| {
+        let Matching::IkFk { joints, .. } = &switch.matching else { return None };
+        let place = |uid: &crate::rig::Uid| body.target.joints.iter().position(|joint| joint.uid == *uid);
+        let joints: Vec<usize> = joints.iter().map(place).collect::<Option<_>>()?;
+        let is_leg = |limb: &super::limbs::Limb| limb.kind == LimbKind::Leg && joints.contains(&limb.target[2]);
+        let is_moved = joints.iter().all(|joint| body.is_moved(*joint));
+        is_moved.then(|| (&**switch, joints.clone(), f32::from(u8::from(body.limbs.iter().any(is_leg)))))
+    };
+    built.switches.iter().filter_map(limb).collect()
+}
+
+/// Steps for all joints that the motion moves, and labels of joints that nothing moves.
+fn steps<'a>(
+    state: &RigState,
+    body: &Body,
+    limbs: &[(&'a SwitchData, Vec<usize>, f32)],
+) -> (Vec<Step<'a>>, Vec<String>) {
+    let (program, moves) = (state.program(), Moves::find(state, body));
+    let (mut steps, mut unmoved) = (Vec::new(), Vec::new());
+    let hips = body.target.first(HumanBone::Hips);
+    let spine = body.target.bones.get(&HumanBone::Spine).map_or(&[][..], |spine| &spine[..]);
+    for (at, joint) in body.target.joints.iter().enumerate().filter(|(at, _)| body.is_moved(*at)) {
+        if let Some((switch, joints, value)) = limbs.iter().find(|(_, joints, _)| joints.contains(&at)) {
+            if joints.first() == Some(&at) {
+                steps.push(Step::Limb(*switch, joints.clone(), *value));
+            }
+            continue;
+        }
+        let above = std::iter::successors(joint.parent, |at| body.target.joints[*at].parent);
+        let above: Vec<usize> = above.filter_map(|at| program.node(body.target.joints[at].uid)).collect();
+        let Some((joint_slot, control)) =
+            program.node(joint.uid).and_then(|slot| Some((slot, moves.best(state, slot, &above)?)))
+        else {
+            match program.node(joint.uid).and_then(|slot| Dial::find(state, body, at, slot)) {
+                Some(dial) => steps.push(Step::Dial(dial)),
+                None => unmoved.push(joint.label.clone()),
+            }
+            continue;
+        };
+        let carried = relative(state.global_at(joint_slot), state.global_at(control));
+        // A curve lays the joints within a spine; only its end is where its control is.
+        let corrects = !spine.contains(&at) || spine.last() == Some(&at);
+        steps.push(Step::Joint(Handle { joint: at, joint_slot, control, carried, moves: hips == Some(at), corrects }));
+    }
+    (steps, unmoved)
+}
+
+/// Joints that each posable node turns.
+struct Moves {
+    /// Slot of the node, slots of the joints.
+    list: Vec<(usize, Vec<usize>)>,
+    /// Distance within which a control stands where a joint stands.
+    near: f32,
+}
+
+impl Moves {
+    /// Turns every node a little and looks which joints turn.
+    fn find(state: &RigState, body: &Body) -> Self {
+        let program = state.program();
+        let mut tried = state.clone();
+        let turn = PoseOffset::from_rotation(Quat::from_xyzw(0.12, 0.14, 0.1, 1.0).normalize());
+        let joints: Vec<usize> = body.target.joints.iter().filter_map(|joint| program.node(joint.uid)).collect();
+        let nodes = program.nodes().iter().enumerate();
+        let posable =
+            nodes.filter(|(_, node)| node.is_posable() && (node.kind == NodeType::Control || !node.is_driven));
+        let list = posable.map(|(slot, _)| {
+            tried.set_offset_at(slot, turn);
+            tried.evaluate(0.0);
+            let is_turned = |joint: &usize| angle_between(tried.global_at(*joint), state.global_at(*joint)) > 0.1;
+            let turned = joints.iter().copied().filter(is_turned).collect();
+            tried.set_offset_at(slot, PoseOffset::IDENTITY);
+            tried.evaluate(0.0);
+            (slot, turned)
+        });
+        Self { list: list.collect(), near: 2e-3 * body.target.height }
+    }
+
+    /// Node that turns a joint: of those at its place the one that carries most, else the one that carries least and turns no
+    /// joint above it.
+    fn best(&self, state: &RigState, joint: usize, above: &[usize]) -> Option<usize> {
+        let place = state.global_at(joint).translation;
+        let turning = || self.list.iter().filter(|(_, joints)| joints.contains(&joint));
+        let is_there = |slot: usize| state.global_at(slot).translation.distance(place) <= self.near;
+        let there = turning().filter(|(slot, _)| is_there(*slot));
+        let most = there.min_by_key(|(slot, joints)| (std::cmp::Reverse(joints.len()), *slot));
+        let below = || turning().filter(|(_, joints)| !joints.iter().any(|other| above.contains(other)));
+        most.or_else(|| below().min_by_key(|(slot, joints)| (joints.len(), *slot))).map(|(slot, _)| *slot)
+    }
+}
+
+/// Poses the controls.
+fn strike(built: &BuiltRig, mut state: RigState, steps: &[Step], pose: &[Trs]) -> Result<RigState, RetargetError> {
+    for step in steps {
+        match step {
+            Step::Joint(handle) => handle.place(&mut state, &pose[handle.joint]),
+            Step::Dial(dial) => dial.turn(&mut state, &pose[dial.joint]),
+            Step::Limb(switch, joints, value) => {
+                let wanted: Vec<Trs> = joints.iter().map(|joint| pose[*joint]).collect();
+                state = hold_limb(built, state, switch, &wanted, *value)?;
+            }
+        }
+    }
+    Ok(state)
+}
+
+impl Dial {
+    /// First attribute that turns the joint and no other one.
+    fn find(state: &RigState, body: &Body, joint: usize, joint_slot: usize) -> Option<Self> {
+        let program = state.program();
+        let joints: Vec<usize> = body.target.joints.iter().filter_map(|joint| program.node(joint.uid)).collect();
+        let attributes = program.attributes().iter().enumerate().filter(|(_, attribute)| attribute.is_settable);
+        for (attribute, _) in attributes {
+            let mut tried = state.clone();
+            let before = tried.attribute_at(attribute);
+            tried.set_attribute_at(attribute, before + 5.0);
+            tried.evaluate(0.0);
+            let by = tried.attribute_at(attribute) - before;
+            let is_turned = |slot: &usize| angle_between(tried.global_at(*slot), state.global_at(*slot)) > 0.05;
+            let mut turned = joints.iter().filter(|slot| is_turned(*slot));
+            if by == 0.0 || turned.next() != Some(&joint_slot) || turned.next().is_some() {
+                continue;
+            }
+            let turn = state.global_at(joint_slot).rotation.inverse() * tried.global_at(joint_slot).rotation;
+            let axis = scaled_axis(turn);
+            let angle = axis.length();
+            return Some(Self { joint, joint_slot, attribute, axis: axis / angle, rate: angle / by });
+        }
+        None
+    }
+
+    /// Turns the joint as far as its axis allows.
+    fn turn(&self, state: &mut RigState, wanted: &Trs) {
+        state.evaluate(0.0);
+        let way = (state.global_at(self.joint_slot).rotation.inverse() * wanted.rotation).normalize();
+        let way = if way.w < 0.0 { -way } else { way };
+        let angle = 2.0 * bevy::math::ops::atan2(way.xyz().dot(self.axis), way.w);
+        let value = state.attribute_at(self.attribute) + angle / self.rate;
+        if value.is_finite() {
+            state.set_attribute_at(self.attribute, value);
+            state.evaluate(0.0);
+        }
+    }
+}
+
+impl Handle {
+    /// Turns the joint, and moves it if the control does that.
+    fn place(&self, state: &mut RigState, wanted: &Trs) {
+        self.set(state, &multiply(wanted, &self.carried));
+        let off = angle_between(state.global_at(self.joint_slot), wanted);
+        if !self.corrects || off < 0.01 {
+            return;
+        }
+        let before = state.offset_at(self.control);
+        let carried = relative(state.global_at(self.joint_slot), state.global_at(self.control));
+        self.set(state, &multiply(wanted, &carried));
+        if angle_between(state.global_at(self.joint_slot), wanted) > 0.9 * off {
+            state.set_offset_at(self.control, before);
+            state.evaluate(0.0);
+        }
+    }
+
+    fn set(&self, state: &mut RigState, wanted: &Trs) {
+        state.evaluate(0.0);
+        let offset = state.offset_at(self.control);
+        let mut next = offset_towards(state.global_at(self.control), &offset, wanted);
+        if !self.moves {
+            next.translation = offset.translation;
+        }
+        state.set_offset_at(self.control, next);
+        state.evaluate(0.0);
+    }
+}
