@@ -65,37 +65,59 @@ pub(super) fn follow_constraints(
                 }
                 continue;
             }
-            let weights = weights(&constraint.constraint);
-            let targets = read.iter().enumerate().filter_map(|(number, node)| {
-                Some(ConstraintTarget {
-                    node: entity_of(*node)?,
-                    weight: weights.get(number).copied().unwrap_or(Some(1.0)),
-                })
-            });
-            let bundle = (ConstraintKind(constraint.constraint.kind()), ConstraintTargets(targets.collect()));
+            let kind = constraint.constraint.kind();
+            let sources = &nodes[driven.iter().count()..];
+            let targets = targets(&constraint.constraint, sources);
+            let driven_entity = driven.and_then(entity_of);
             let entity = match known.constraints.get(&constraint.uid) {
-                Some(mirrored) => {
-                    commands.entity(mirrored.entity).try_insert(bundle).try_remove::<Constrains>();
-                    mirrored.entity
+                // Components whose values stay the same are not written.
+                Some(before) => {
+                    let mut target = commands.entity(before.entity);
+                    if before.constraint.kind() != kind {
+                        target.try_insert(ConstraintKind(kind));
+                    }
+                    let had_driven = usize::from(before.constraint.drives().last().is_some());
+                    if self::targets(&before.constraint, before.nodes.get(had_driven..).unwrap_or_default()) != targets
+                    {
+                        target.try_insert(targets);
+                    }
+                    let is_other = before.nodes.first().copied().flatten() != driven_entity;
+                    if is_other || is_behind {
+                        target.try_remove::<Constrains>();
+                        if let Some(driven_entity) = driven_entity {
+                            target.try_insert(Constrains(driven_entity));
+                        }
+                        reordered.extend(driven);
+                    }
+                    before.entity
                 }
                 None => {
-                    let named = (constraint.uid, Name::new(constraint.constraint.kind()), ChildOf(rig_entity));
-                    let entity = commands.spawn((named, bundle)).id();
-                    index.insert(entity, rig_entity, constraint.uid, EntityPart::Constraint);
-                    entity
+                    let named = (constraint.uid, Name::new(kind), ChildOf(rig_entity));
+                    let mut fresh = commands.spawn((named, ConstraintKind(kind), targets));
+                    if let Some(driven_entity) = driven_entity {
+                        fresh.insert(Constrains(driven_entity));
+                        reordered.extend(driven);
+                    }
+                    if let Some(tag) = tags.get(constraint.command) {
+                        fresh.insert(CreatedBy(tag));
+                    }
+                    index.insert(fresh.id(), rig_entity, constraint.uid, EntityPart::Constraint);
+                    fresh.id()
                 }
             };
-            if let Some(driven_entity) = driven.and_then(entity_of) {
-                commands.entity(entity).try_insert(Constrains(driven_entity));
-                reordered.extend(driven);
-            }
-            if let Some(tag) = tags.get(constraint.command) {
-                commands.entity(entity).try_insert(CreatedBy(tag));
-            }
             let mirrored = MirroredConstraint { entity, constraint: constraint.constraint.clone(), uids, nodes };
             known.constraints.insert(constraint.uid, mirrored);
         }
     }
+}
+
+/// Targets of a constraint; `sources` are the entities of the nodes that it reads, in the order of [`Constraint::reads`].
+fn targets(constraint: &Constraint, sources: &[Option<Entity>]) -> ConstraintTargets {
+    let weights = weights(constraint);
+    let target = |(number, source): (usize, &Option<Entity>)| {
+        Some(ConstraintTarget { node: (*source)?, weight: weights.get(number).copied().unwrap_or(Some(1.0)) })
+    };
+    ConstraintTargets(sources.iter().enumerate().filter_map(target).collect())
 }
 
 /// Weights of the targets, in the order of [`Constraint::reads`]; `None` where an attribute gives the weight. Empty for
