@@ -96,7 +96,7 @@ impl Motion {
         let place = (time / self.frame_time).clamp(0.0, self.frames().saturating_sub(1) as f32);
         let (frame, share) = (place.floor(), place - place.floor());
         // Rounding puts a time beside its frame.
-        if share < 1e-3 || share > 1.0 - 1e-3 {
+        if !(1e-3..=1.0 - 1e-3).contains(&share) {
             return self.globals(place.round() as usize);
         }
         let (from, to) = (self.locals(frame as usize), self.locals(frame as usize + 1));

@@ -144,7 +144,7 @@ fn steps<'a>(
     for (at, joint) in body.target.joints.iter().enumerate().filter(|(at, _)| body.is_moved(*at)) {
         if let Some((switch, joints, value)) = limbs.iter().find(|(_, joints, _)| joints.contains(&at)) {
             if joints.first() == Some(&at) {
-                steps.push(Step::Limb(*switch, joints.clone(), *value));
+                steps.push(Step::Limb(switch, joints.clone(), *value));
             }
             continue;
         }
@@ -238,7 +238,7 @@ impl Dial {
             tried.evaluate(0.0);
             let by = tried.attribute_at(attribute) - before;
             let is_turned = |slot: &usize| angle_between(tried.global_at(*slot), state.global_at(*slot)) > 0.05;
-            let mut turned = joints.iter().filter(|slot| is_turned(*slot));
+            let mut turned = joints.iter().filter(|slot| is_turned(slot));
             if by == 0.0 || turned.next() != Some(&joint_slot) || turned.next().is_some() {
                 continue;
             }
