@@ -1,7 +1,7 @@
 //! Humanoid bones, and joints of skeletons that stand for them.
 //!
 //! A skeleton has for each bone the joints of a chain: an arm may have a twist joint between shoulder and elbow, a spine any
-//! number of joints. Limbs are found by their names ([`names`]); spine, neck and helper joints follow from the hierarchy.
+//! number of joints. Limbs are found by their names; spine, neck and helper joints follow from the hierarchy.
 
 mod names;
 mod shape;
