@@ -182,8 +182,9 @@ pub(super) fn adopt_writes(
         adoption.joints_spawned(&writes);
         adoption.joints_written(&writes);
         adoption.tags_written(&writes);
-        adoption.orders_written(&writes);
         adoption.despawned(&writes);
+        // Among the tags that are left: one of them may have been despawned in the same frame.
+        adoption.orders_written(&writes);
         let outcome = trial.finish();
         for reason in outcome.refused {
             warn!("{reason}");

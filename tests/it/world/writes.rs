@@ -84,6 +84,36 @@ fn writing_a_component_is_one_undoable_edit_and_an_equal_value_is_none() {
     assert_eq!(stage.get::<NodeLabel>(joint), Some(&NodeLabel("elbow".into())));
 }
 
+/// An order of tags counts although one of them is despawned in the same frame.
+#[test]
+fn tags_are_reordered_beside_one_that_is_despawned() {
+    let mut stage = chain();
+    let joint = stage.node(Uid(2)).unwrap();
+    let world = stage.app.world_mut();
+    let tags: Vec<Entity> = (0..4)
+        .map(|number| {
+            let command = CommandTag { module: "null".into(), params: "()".into() };
+            world.spawn((command, Tag { comment: format!("{number}"), ..default() }, TagOf(joint))).id()
+        })
+        .collect();
+    stage.app.update();
+    let before = text(&stage);
+    let world = stage.app.world_mut();
+    world.entity_mut(joint).insert_related::<TagOf>(0, &[tags[3]]);
+    world.entity_mut(tags[1]).despawn();
+    stage.app.update();
+    let comments = |stage: &Stage| -> Vec<String> {
+        stage.document().joint(Uid(2)).unwrap().data.tags.iter().map(|tag| tag.comment.clone()).collect()
+    };
+    assert_eq!(comments(&stage), ["3", "0", "2"]);
+    let told: Vec<Entity> = stage.get::<Tags>(joint).unwrap().iter().collect();
+    assert_eq!(told, [tags[3], tags[0], tags[2]]);
+    stage.change(Change::Undo);
+    assert_eq!(text(&stage), before);
+    assert_eq!(stage.get::<Tags>(joint).unwrap().len(), 4);
+    assert_eq!(comments(&stage), ["0", "1", "2", "3"]);
+}
+
 #[test]
 fn spawning_and_despawning_adds_and_deletes() {
     let mut stage = chain();

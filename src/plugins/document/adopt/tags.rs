@@ -181,10 +181,11 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 now.retain(|other| other != tag);
                 now.insert(at, *tag);
             }
-            if self.trial.edit(EntityWrite::TagOrder, edits)
-                && let Some(mirrored) = self.joints.joints.get_mut(&uid)
-            {
-                mirrored.tags = told;
+            let is_taken = self.trial.edit(EntityWrite::TagOrder, edits);
+            // Without tags in the mirror the follow system writes the document's order again.
+            self.trial.respawn |= !is_taken;
+            if let Some(mirrored) = self.joints.joints.get_mut(&uid) {
+                mirrored.tags = if is_taken { told } else { Vec::new() };
             }
         }
     }
