@@ -319,7 +319,7 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
 
 #[test]
 fn world_and_document_stay_equal_through_random_deeds() {
-    let steps: usize = std::env::var("RIGSMITH_STEPS").ok().and_then(|count| count.parse().ok()).unwrap_or(2000);
+    let steps: usize = std::env::var("RIGSMITH_STEPS").ok().and_then(|count| count.parse().ok()).unwrap_or(10_000);
     let templates = shipped();
     // The last one is edited for a while before it is built.
     let starts = [("arm", true), ("hand", true), ("spine", true), ("arm", false)];
