@@ -33,7 +33,7 @@ struct Picture {
     moves: &'static [Move],
 }
 
-/// Something an animator does.
+/// Move of an animator.
 enum Move {
     /// Sets the attribute of a node: label, name, value.
     Set(&'static str, &'static str, f32),

@@ -89,7 +89,7 @@ pub struct RemotePlugin {
     gate: Arc<Gate>,
 }
 
-/// Everything that the thread and the app share.
+/// State that the thread and the app share.
 struct Gate {
     listener: TcpListener,
     address: SocketAddr,

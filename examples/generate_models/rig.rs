@@ -31,7 +31,7 @@ impl Rig {
         }
     }
 
-    /// As a `.rig` file.
+    /// Text of a `.rig` file.
     pub fn text(&self, about: &str) -> String {
         let mut text = String::from("rig 1\n");
         for line in about.lines() {

@@ -129,15 +129,16 @@ impl WeightSettings {
 /// Numbers of points by the origin of their weights; the counts but `stiff` add up to `points`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WeightReport {
-    /// By heat on the surface.
+    /// Points bound by heat on the surface.
     pub by_surface: usize,
-    /// By geodesic voxel binding.
+    /// Points bound by geodesic voxel binding.
     pub by_voxels: usize,
-    /// By the sparse solve from their neighbours.
+    /// Points bound by the sparse solve from their neighbours.
     pub by_fill: usize,
-    /// By the nearest bone alone.
+    /// Points bound by the nearest bone alone.
     pub by_nearest: usize,
-    /// As rigid parts, or because only one joint deforms. Points held by locked joints count where the rest of them would.
+    /// Points bound as rigid parts, or because only one joint deforms. Points held by locked joints count where the rest
+    /// of them would.
     pub given: usize,
     /// All points.
     pub points: usize,
@@ -158,16 +159,16 @@ pub struct Locks<'a> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WeightError {
     /// There is nothing to bind to.
-    #[error("the rig has no joints: place at least one before binding")]
+    #[error("the rig has no joints; place at least one before binding")]
     NoJoints,
     /// A point that is not a number.
-    #[error("point {point} of the mesh is not finite: repair the mesh before binding")]
+    #[error("point {point} of the mesh is not finite; repair the mesh before binding")]
     Point {
         /// Index of the first such point.
         point: usize,
     },
     /// A joint that is not a number.
-    #[error("joint {joint} is not at a finite place: move it before binding")]
+    #[error("joint {joint} is not at a finite place; move it before binding")]
     Joint {
         /// Index of the first such joint.
         joint: usize,
@@ -204,7 +205,7 @@ pub enum WeightError {
     },
     /// Locks that do not fit the mesh or the rig.
     #[error(
-        "the locked weights are for {points} points and {joints} joints, the mesh and rig have others: bind without locks"
+        "the locked weights are for {points} points and {joints} joints, the mesh and rig have others; bind without locks"
     )]
     Locks {
         /// Number of points of the locked weights.

@@ -33,7 +33,7 @@ pub struct BuiltTemplate {
     pub rig: Arc<Rig>,
     /// The rig as the file has it.
     source: Arc<Rig>,
-    /// Its nodes and constraints.
+    /// Nodes and constraints.
     pub built: Arc<BuiltRig>,
     /// Program with all nodes, for instances in [`InstanceMode::Hierarchy`](crate::plugins::runtime::InstanceMode).
     pub whole: Arc<RigProgram>,
@@ -41,7 +41,7 @@ pub struct BuiltTemplate {
     pub lean: Arc<RigProgram>,
     /// Places that other things hang on.
     pub sockets: Arc<[PartSocket]>,
-    /// The same places as the file has them.
+    /// Places of the points as the file has them.
     file_sockets: Arc<[PartSocket]>,
     /// Programs with joints and some nodes, for instances with [`ExposedNodes`](super::ExposedNodes).
     some: Mutex<Vec<(Vec<Exposed>, Arc<RigProgram>)>>,
@@ -89,7 +89,7 @@ fn lean_options(mut exposed: Vec<Exposed>, sockets: &[PartSocket], built: &Built
 
 type Id = AssetId<RigTemplate>;
 
-/// Something for the thread to do.
+/// Work for the thread.
 pub(super) enum Work {
     /// Builds a template.
     Build { id: Id, template: RigTemplate, modules: Arc<Modules> },

@@ -40,7 +40,7 @@ parameters! {
         pub node: NodeRefs = NodeRef::this().into(),
         /// The nodes that they look at.
         pub targets: NodeRefs = NodeRefs::NONE,
-        /// For each target its share, a number from 0 or the name of an attribute; all the same if left out.
+        /// Share of each target: a number from 0 or the name of an attribute; all the same if left out.
         pub weights: Vec<Amount> = Vec::new(),
         /// The node that has the attributes; those that it lacks are added.
         pub control: NodeRefs = NodeRefs::NONE,

@@ -20,7 +20,7 @@ parameters! {
     pub struct AttributeModule {
         /// The nodes that get it.
         pub node: NodeRefs = NodeRef::this().into(),
-        /// Its name, unique on the node.
+        /// Name of the attribute, unique on the node.
         pub name: String = "value".to_owned(),
         /// Lowest value; open if left out.
         pub min: Option<f32> = None,

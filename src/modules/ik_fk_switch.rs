@@ -46,7 +46,7 @@ parameters! {
         pub control: NodeRefs = NodeRefs::NONE,
         /// Name of the attribute that switches: 0 forward, 1 inverse. Added if the control lacks it.
         pub attribute: String = "ik_fk".to_owned(),
-        /// Its value until somebody sets another, 0 to 1.
+        /// Value of the attribute until somebody sets another, 0 to 1.
         pub default: f32 = 1.0,
         /// The joints below the first follow the positions of their controls, too: needed for stretching.
         pub translate: bool = true,

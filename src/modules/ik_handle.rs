@@ -52,11 +52,11 @@ parameters! {
         pub orient_end: bool = true,
         /// Direction in the rig's space in which a straight chain bends; as built, or to the pole, if left out.
         pub prefer: Option<Vec3> = None,
-        /// For ccd: lowest and highest angles in degrees about X, Y and Z of each joint, from the first on.
+        /// Lowest and highest angles in degrees about X, Y and Z of each joint, from the first on; for ccd.
         pub limits: Vec<JointAngles> = Vec::new(),
-        /// For fabrik and ccd: rounds at most, 1 to 1000.
+        /// Rounds at most, 1 to 1000; for fabrik and ccd.
         pub iterations: u32 = 24,
-        /// For fabrik and ccd: distance from the goal that is near enough, as a share of the length.
+        /// Distance from the goal that is near enough, as a share of the length; for fabrik and ccd.
         pub tolerance: f32 = 1e-4,
         /// Goal and pole are hidden while an attribute as weight is 0: their attribute "visible" is driven.
         pub hide: bool = true,

@@ -19,7 +19,7 @@ use crate::{
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpMode {
-    /// In a direction of the rig.
+    /// Direction of the rig.
     #[default]
     Direction,
     /// Across the plane in which the chain bends; in the direction where it is straight.

@@ -116,7 +116,7 @@ pub enum LabelChoice {
     None,
     /// Labels of selected joints and of the hovered one.
     Selected,
-    /// As many labels as fit, those of selected joints first.
+    /// Labels, as many as fit, those of selected joints first.
     All,
 }
 

@@ -153,7 +153,7 @@ pub struct SkinningInput {
     pub joints: Vec<WeightJoint>,
     /// Uids of `joints`.
     pub uids: Vec<Uid>,
-    /// For each created joint, the node that it was made for.
+    /// Node that each created joint was made for.
     pub subjects: BTreeMap<Uid, Uid>,
     /// Locks of `joints`: locked joints keep their weights.
     pub locked: Vec<bool>,
@@ -244,7 +244,7 @@ fn object_points(mesh: &RigMesh, object: usize) -> Vec<Range<u32>> {
     points.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[run.len() - 1] + 1).collect()
 }
 
-/// For each object of a mesh the joint that holds all of its points, if one does: a helmet's head, a sword's hand.
+/// Joint of each object of a mesh that holds all of its points, if one does: a helmet's head, a sword's hand.
 pub fn held_objects(mesh: &RigMesh, skin: &SkinData) -> Vec<Option<Uid>> {
     let holder = |object: usize| {
         let mut holder = None;

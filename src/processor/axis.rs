@@ -25,7 +25,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// As a vector of length 1.
+    /// Axis as a vector of length 1.
     pub fn vector(self) -> Vec3 {
         match self {
             Self::X => Vec3::X,
@@ -37,7 +37,7 @@ impl Axis {
         }
     }
 
-    /// The same axis of the node on the other side of the character, whose X is turned over.
+    /// Axis of the node on the other side of the character, whose X is turned over.
     pub fn mirrored(self) -> Self {
         match self {
             Self::X => Self::NegX,

@@ -40,7 +40,7 @@ pub struct RunReport {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Due {
     Nothing,
-    /// Something that it read may have changed.
+    /// Input that the command read may have changed.
     Check,
     Run,
 }
@@ -439,7 +439,7 @@ impl Builder {
         snapshot::snapshot(&self.world, self.cursor() as u32)
     }
 
-    /// The same as [`Builder::built`], shared: a rig in which nothing has changed since the last call is the same in
+    /// Result of [`Builder::built`], shared: a rig in which nothing has changed since the last call is the same in
     /// memory, and of others only the nodes and constraints that have changed are read again.
     pub fn shared_built(&mut self) -> Arc<BuiltRig> {
         let place = self.cursor() as u32;

@@ -41,7 +41,7 @@ pub enum Exclusion {
 /// Reason why a build passes a command over.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SkipReason {
-    /// Its own tag, its feature or its joint's group is off.
+    /// Tag of the command, its feature or its joint's group is off.
     #[error(transparent)]
     Own(Exclusion),
     /// A reference that it cannot do without means something that is off.

@@ -72,7 +72,7 @@ impl DeformSkeleton {
         self.index.get(&joint).copied()
     }
 
-    /// For each joint of the weights, the index of the deform joint that holds its influences: the joint itself; while
+    /// Index, for each joint of the weights, of the deform joint that holds its influences: the joint itself; while
     /// it is not built, the nearest joint above it, or the node that it was created for (or the nearest joint above
     /// that). `None` for deleted joints.
     pub fn holders(&self, rig: &Rig, skin: &SkinData) -> Vec<Option<usize>> {

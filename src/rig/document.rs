@@ -66,7 +66,7 @@ pub struct SkinData {
     /// Space of the weights: `true` if they were computed for the mesh at rest; `false` if they came with the mesh file
     /// and belong to its points in the file's bind pose.
     pub at_rest: bool,
-    /// For each joint that a command created, the node that it was made for: it holds the share of a joint that is not
+    /// Node that each joint of a command was made for: it holds the share of a joint that is not
     /// built at the moment.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub subjects: BTreeMap<Uid, Uid>,
@@ -123,6 +123,17 @@ impl Rig {
         let joint = self.joints.get(self.tags.get(&uid)?)?;
         let tag = joint.data.tags.iter().find(|tag| tag.uid == uid)?;
         Some((joint, tag))
+    }
+
+    /// Disables tags of a scratch copy, in time linear in the tags of their joints. It is no edit: a document that people
+    /// see is changed by [`RigEdit`](super::RigEdit)s alone.
+    pub(crate) fn disable_tags(&mut self, tags: &HashSet<Uid>) {
+        let joints: HashSet<Uid> = tags.iter().filter_map(|tag| self.tags.get(tag).copied()).collect();
+        for joint in joints {
+            let Some(joint) = self.joints.get_mut(&joint) else { continue };
+            let found = joint.data.tags.iter_mut().filter(|tag| tags.contains(&tag.uid));
+            found.for_each(|tag| tag.enabled = false);
+        }
     }
 
     /// Returns `true` if a joint, group, tag, stored pose, clip, layer or input has that uid.

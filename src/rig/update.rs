@@ -30,13 +30,13 @@ pub use edits::{clip_edits, edits_between, pose_edits};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChangeKind {
-    /// Something is new.
+    /// New thing.
     Added,
-    /// Something is gone.
+    /// Thing that is gone.
     Removed,
     /// A field has another value.
     Changed,
-    /// Something has another name and is the same otherwise.
+    /// Thing with another name that is the same otherwise.
     Renamed,
 }
 

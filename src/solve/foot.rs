@@ -107,7 +107,7 @@ impl RigidMotion {
         self.rotation * point + self.translation
     }
 
-    /// This motion after a turn about a point at rest.
+    /// Motion after a turn about a point at rest.
     fn about(&self, pivot: Vec3, turn: Quat) -> Self {
         let rotation = (self.rotation * turn).normalize();
         Self { rotation, translation: self.apply(pivot) - rotation * pivot }

@@ -40,7 +40,7 @@ const TRIES: usize = 4;
 pub struct Deviation {
     /// The joint.
     pub joint: Uid,
-    /// Its label.
+    /// Label of the joint.
     pub label: Option<String>,
     /// Distance from its former place, in the rig's units.
     pub distance: f32,

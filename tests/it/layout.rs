@@ -1,6 +1,7 @@
 //! The directions between the parts of the sources, and rules that hold for every file.
 
 use std::{
+    collections::{BTreeMap, BTreeSet},
     fs,
     path::{Path, PathBuf},
 };
@@ -201,6 +202,45 @@ fn parts_depend_in_one_direction() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Parts of the crate that the column "uses" of the architecture's table gives to each part.
+fn allowed_uses() -> BTreeMap<String, BTreeSet<String>> {
+    let text = include_str!("../../ARCHITECTURE.md");
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| ")).filter(|row| row.starts_with("`src/"));
+    let quoted = |cell: &str| -> Vec<String> { cell.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
+    let mut allowed: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for row in rows {
+        let cells: Vec<&str> = row.trim_end_matches(" |").split(" | ").collect();
+        let (first, last) = (cells[0], cells.get(2).copied().unwrap_or_default());
+        for path in quoted(first).iter().filter_map(|path| path.strip_prefix("src/")) {
+            let part = path.split('/').next().unwrap_or_default().trim_end_matches(".rs");
+            allowed.entry(part.to_owned()).or_default().extend(quoted(last));
+        }
+    }
+    allowed
+}
+
+#[test]
+fn parts_use_what_the_architecture_says() {
+    let allowed = allowed_uses();
+    let parts: Vec<String> = allowed.keys().filter(|part| !part.is_empty() && *part != "main").cloned().collect();
+    assert!(parts.len() > 12, "the table was not read: {parts:?}");
+    for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).unwrap() {
+        let name = entry.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned();
+        assert!(parts.contains(&name) || name == "lib" || name == "main", "the table lacks src/{name}");
+    }
+    let mut wrong = Vec::new();
+    for part in &parts {
+        for (path, text) in sources(part) {
+            let code = shipped(&text);
+            for other in parts.iter().filter(|other| *other != part && !allowed[part].contains(*other)) {
+                let lines = mentions(&code, &format!("crate::{other}"));
+                wrong.extend(lines.into_iter().map(|line| format!("{}:{line} uses {other}", path.display())));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "say it in the table, or turn the dependency round:\n{}", wrong.join("\n"));
+}
+
 #[test]
 fn files_stay_readable_and_never_panic_on_purpose() {
     let mut wrong = Vec::new();
@@ -323,7 +363,34 @@ fn documentation_names_its_subject() {
                 }
                 count += 1;
                 let first = words.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
-                if ["What", "How", "Where", "Which", "Whether", "Those", "Who", "Whose", "Why", "That"].contains(&first)
+                if [
+                    "What",
+                    "How",
+                    "Where",
+                    "Which",
+                    "Whether",
+                    "Those",
+                    "Who",
+                    "Whose",
+                    "Why",
+                    "That",
+                    "Its",
+                    "Their",
+                    "It",
+                    "They",
+                    "This",
+                    "These",
+                    "Something",
+                    "Everything",
+                    "As",
+                    "For",
+                    "By",
+                    "Both",
+                    "Of",
+                    "In",
+                ]
+                .contains(&first)
+                    || words.starts_with("The same")
                 {
                     wrong.push(format!("{}:{line}: {words}", path.strip_prefix(root).unwrap().display()));
                 }

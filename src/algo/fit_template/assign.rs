@@ -19,7 +19,7 @@ const MOST_LEAVES: usize = 10;
 const MOST_BEARERS: usize = 5;
 /// Assignments of branches that are tried with all sides.
 const TRIED: usize = 100;
-/// The same for a template without sides.
+/// Assignments that are tried for a template without sides.
 const TRIED_FREE: usize = 2_000;
 /// Hypotheses that are kept.
 pub(super) const KEPT: usize = 6;
@@ -27,17 +27,17 @@ pub(super) const KEPT: usize = 6;
 const MOST_SPREAD: f32 = 0.6;
 /// Penalty of a limb that has no branch.
 const MISSING: f32 = 0.25;
-/// The same for a head, which hardly any figure lacks, and for a tail.
+/// Penalties of a missing head, which hardly any figure lacks, and for a tail.
 const MISSING_HEAD: f32 = 0.4;
 const MISSING_TAIL: f32 = 0.08;
-/// The same for a template without sides.
+/// Penalty of a missing limb in a template without sides.
 const MISSING_FREE: f32 = 0.5;
 /// Penalty of a branch that has no limb, for a branch as long as the body's reach.
 const UNUSED: f32 = 0.12;
 
 /// Weight of what remains of the alignment for a template without sides, whose limbs differ by their place alone.
 const RIGID: f32 = 6.0;
-/// The same for a template with sides, whose limbs may be posed.
+/// Weight of that alignment for a template with sides, whose limbs may be posed.
 pub(super) const POSED: f32 = 0.8;
 /// Penalty of a tail or an arm that is thicker than the head, for a factor of e.
 const THICKER: f32 = 0.12;
@@ -152,7 +152,7 @@ struct Search<'a> {
     ways: &'a [Vec<f32>],
 }
 
-/// For each limb the number of a leaf in the search's list.
+/// Number of a leaf in the search's list, for each limb.
 type Chosen = Vec<Option<usize>>;
 
 impl Search<'_> {

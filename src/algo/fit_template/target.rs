@@ -17,9 +17,9 @@ pub(super) enum Facing {
     Out,
     /// The winding's normal points in.
     In,
-    /// Both sides are empty: a thin sheet.
+    /// Thin sheet: both sides are empty.
     Thin,
-    /// Both sides are solid: an inner wall.
+    /// Inner wall: both sides are solid.
     Inner,
 }
 

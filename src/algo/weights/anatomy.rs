@@ -50,7 +50,7 @@ struct Hinge {
     along: Vec3,
     /// Unit vector from the joint to its back, perpendicular to `along`; zero if nothing tells it.
     back: Vec3,
-    /// For each joint of the skeleton, whether it belongs to the joint (`true`) or to what is above it.
+    /// Flag of each joint of the skeleton: whether it belongs to the joint (`true`) or to what is above it.
     sides: Vec<Option<bool>>,
 }
 
@@ -217,7 +217,7 @@ impl<'a> Tree<'a> {
         Some(Girdle { joint, limbs: pair.map(Limb::clone), others })
     }
 
-    /// For each joint whether it is one of some joints or below one.
+    /// Flag of each joint: whether it is one of some joints or below one.
     fn below(&self, above: &[usize]) -> Vec<bool> {
         let mut below = vec![false; self.joints.len()];
         for &joint in &self.order {

@@ -164,7 +164,7 @@ fn fill_nodes(
     filled
 }
 
-/// Both ends of all bones.
+/// Ends of all bones.
 fn ends(bones: &[BoneSegment]) -> impl Iterator<Item = Vec3> + '_ {
     bones.iter().flat_map(|b| [b.head, b.tail])
 }

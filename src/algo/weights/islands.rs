@@ -45,7 +45,7 @@ impl Islands {
         self.extents[island] < SPECK
     }
 
-    /// For each place whether its island can be bound by heat.
+    /// Flag of each place: whether its island can be bound by heat.
     pub fn trusted(&self, graph: &Graph, claims: &[Claim], method: Method) -> Vec<bool> {
         let mut area = vec![0f64; self.extents.len()];
         let mut seen = vec![0f64; self.extents.len()];

@@ -14,7 +14,7 @@ const AT_HOME: f32 = 0.7;
 
 /// The joints above the body, which carry a character through the world and hold no flesh.
 pub(crate) struct Roots {
-    /// For each joint, whether it hangs on a root by a bone that runs through the air.
+    /// Flag of each joint: whether it hangs on a root by a bone that runs through the air.
     pub hangs_in_air: Vec<bool>,
 }
 
@@ -91,7 +91,7 @@ impl Roots {
 /// The body parts of a surface of several that each joint holds flesh of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Homes {
-    /// For each island whether it is home to each joint; empty where everybody may hold it.
+    /// Flags of each island: whether it is home to each joint; empty where everybody may hold it.
     parts: Vec<Vec<bool>>,
 }
 

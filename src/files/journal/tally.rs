@@ -13,7 +13,7 @@ pub(super) struct Tally {
     is_sure: bool,
     /// Positions of changes that are lost.
     lost: Vec<u64>,
-    /// For each mark the number of changes before it, and whether their positions are certain.
+    /// Number of changes before each mark, and whether their positions are certain.
     marks: Vec<(usize, bool)>,
 }
 

@@ -335,7 +335,7 @@ struct BindTargets<'a> {
     rig_entity: Entity,
     rig: &'a Rig,
     skeleton: &'a DeformSkeleton,
-    /// For each joint of the skeleton: its entity, and the transform from the rig's space to the joint at rest.
+    /// Entity of each joint of the skeleton, and the transform from the rig's space to the joint at rest.
     joints: &'a [(Entity, Mat4)],
 }
 

@@ -52,7 +52,7 @@ impl Ink {
 pub enum Layer {
     /// Over the mesh, sorted among the pictures over it.
     Over,
-    /// In the scene: nearer objects hide it.
+    /// Lines in the scene: nearer objects hide it.
     Scene,
     /// At exactly this depth (see [`Ink::depths`]).
     Fixed(f32),

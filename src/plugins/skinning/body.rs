@@ -15,7 +15,7 @@ use crate::{
 pub struct InstanceBody {
     /// The rig.
     pub rig: Arc<Rig>,
-    /// Its nodes and constraints.
+    /// Nodes and constraints.
     pub built: Arc<BuiltRig>,
 }
 

@@ -62,7 +62,7 @@ pub(super) struct Refresh {
     pub(super) meshes: Vec<PosedMesh>,
     /// A surface of the same meshes that can be refitted, in any pose.
     pub(super) base: Option<Arc<Surface>>,
-    /// The same surface, if it has no other owner: it is refitted itself, which saves a copy.
+    /// Surface without another owner: it is refitted itself, which saves a copy.
     pub(super) spare: Option<Surface>,
     /// Buffer for points.
     pub(super) points: Vec<Vec3>,

@@ -46,7 +46,7 @@ impl Builder {
         self.find_all(*self.world.joints.first().ok_or(FindError::Empty)?, text, &references)
     }
 
-    /// The same for a tag of a joint, which is `@this`.
+    /// Nodes that a reference finds for a tag of a joint, which is `@this`: see [`find`](Self::find).
     ///
     /// # Errors
     /// See [`FindError`].

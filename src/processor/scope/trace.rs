@@ -9,7 +9,7 @@ use crate::{
     rig::{Uid, mix, reference::NodeRefs},
 };
 
-/// Something that a command read, with what it found.
+/// Read of a command, with what it found.
 #[derive(Debug, Clone)]
 pub(in crate::processor) enum Read {
     Cell(NodeId, Aspect, Option<Value>),

@@ -22,7 +22,7 @@ pub enum BodySide {
 }
 
 impl BodySide {
-    /// Both sides.
+    /// Pair of sides.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 }
 

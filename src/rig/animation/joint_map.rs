@@ -18,11 +18,11 @@ pub const MAX_BYTES: usize = 4 << 20;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FoundBy {
-    /// By a map that was given.
+    /// Map that was given.
     Map,
-    /// By the names of its joints.
+    /// Names of the joints.
     Names,
-    /// By its shape.
+    /// Shape of the skeleton.
     Shape,
     /// Not at all: joints of the same names are mapped.
     Labels,

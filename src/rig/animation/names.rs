@@ -65,7 +65,7 @@ pub struct OrphanedKeys {
     pub layer: Uid,
     /// The node that is gone.
     pub node: Uid,
-    /// Its last known names.
+    /// Last known names of the node.
     pub name: KnownNode,
     /// Number of its tracks.
     pub tracks: usize,

@@ -9,7 +9,7 @@ pub struct PartSocket {
     pub name: String,
     /// Label of its joint in the file that has the socket.
     pub label: String,
-    /// Its joint; `None` until the part that brings the joint is there.
+    /// Joint of the socket; `None` until the part that brings the joint is there.
     pub joint: Option<Uid>,
     /// Place relative to the joint.
     pub rest: RestTransform,

@@ -14,7 +14,7 @@ use crate::rig::{
 /// A field of something.
 pub(super) struct Field<'a, T> {
     pub name: String,
-    /// Its value as it is written; `None` where it has none.
+    /// Value as it is written; `None` where it has none.
     pub text: Box<dyn Fn(&T) -> Option<String> + 'a>,
     /// Takes it over from another one.
     pub take: Box<dyn Fn(&mut T, &T) + 'a>,

@@ -110,7 +110,7 @@ impl PoseKeeper {
         }
     }
 
-    /// For each joint its way to the target in lengths of the rig's diagonal, and its rotation to it in half radians.
+    /// Way of each joint to the target in lengths of the rig's diagonal, and its rotation to it in half radians.
     fn residual(&self, state: &RigState, joints: &[usize], targets: &[Trs]) -> Vec<f64> {
         let six = |joint: &usize| {
             let Pair { after, .. } = self.joints[*joint];

@@ -58,7 +58,7 @@ impl ProgramCache {
 /// Results that follow from constraints in use, kept so that a change of one constraint does not make it for the others again.
 #[derive(Debug)]
 pub(super) struct ByConstraint<T> {
-    /// By address. The weak reference keeps the address from being given to another constraint.
+    /// Values by address of their constraints. The weak reference keeps the address from being given to another one.
     known: HashMap<usize, (Weak<Constraint>, T)>,
     /// Number of entries after the last removal of those out of use.
     kept: usize,
@@ -77,7 +77,7 @@ impl<T: Clone> ByConstraint<T> {
         known.or_insert_with(|| (Arc::downgrade(constraint), make())).1.clone()
     }
 
-    /// The same where making it may fail; nothing is kept of a failure.
+    /// Value of a constraint where making it may fail; nothing is kept of a failure.
     pub fn try_of<E>(&mut self, constraint: &Arc<Constraint>, make: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
         match self.known.get(&Arc::as_ptr(constraint).addr()) {
             Some((_, known)) => Ok(known.clone()),

@@ -31,7 +31,7 @@ impl ContentHash {
         Self::with(rig, options, |constraint| of_constraint(constraint))
     }
 
-    /// The same with hashes of constraints that may be known: `of` gives what [`of_constraint`] does.
+    /// Hash of a rig, with hashes of constraints that may be known: `of` gives what [`of_constraint`] does.
     pub(super) fn with(rig: &BuiltRig, options: &CompileOptions, mut of: impl FnMut(&Arc<Constraint>) -> u128) -> Self {
         let mut hasher = Hasher::default();
         hasher.word(rig.nodes.len() as u64);

@@ -44,11 +44,11 @@ pub(super) struct Ends {
     pub attributes: usize,
     /// Attributes that can be set.
     pub settable: Vec<N>,
-    /// For each kept node its pose and the register of its driven local transform.
+    /// Pose of each kept node and the register of its driven local transform.
     pub nodes: Vec<(Pose, Option<X>)>,
 }
 
-/// Everything that a layout follows from.
+/// Shape of a program, from which its layout follows.
 #[derive(Debug, PartialEq)]
 pub(super) struct Shape {
     pub wires: Wires,
@@ -90,7 +90,7 @@ pub(super) struct Layout {
     fixed: Vec<u32>,
     /// Number of operations at the start that depend on attributes only: values that people set once rather than animate.
     pub settings: usize,
-    /// For each register of transforms the one to read in its stead.
+    /// Register to read in the stead of each register of transforms.
     same: Vec<X>,
     /// Final numbers of the registers and poses, and the registers in the order of their numbers.
     x: Numbers,

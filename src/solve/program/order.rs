@@ -24,7 +24,7 @@ pub(super) struct Wires {
     /// Registers that all operations read, and where each operation's begin.
     reads: Vec<u32>,
     starts: Vec<u32>,
-    /// The same of registers that operations write.
+    /// Registers that operations write, in the same form.
     writes: Vec<u32>,
     write_starts: Vec<u32>,
     /// Pose that each operation reads.

@@ -17,7 +17,7 @@ pub(super) trait Real:
     /// Result of a comparison, for each of the instances.
     type Mask: Copy;
 
-    /// The same number for all.
+    /// Number for all four.
     fn all(value: f32) -> Self;
 
     /// The square root.
@@ -100,7 +100,7 @@ impl<T: Real> Place<T> {
         }
     }
 
-    /// This transform with a pose offset on top.
+    /// Transform with a pose offset on top.
     #[inline(always)]
     pub fn with(&self, offset: &Self) -> Self {
         let Self { translation, rotation, scale } = self.place(offset);

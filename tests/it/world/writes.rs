@@ -1,4 +1,4 @@
-//! Both ways: writing, spawning and despawning entities is editing, undoable like any other edit.
+//! Writes of other code: writing, spawning and despawning entities is editing, undoable like any other edit.
 
 use bevy::prelude::*;
 use rigsmith::{

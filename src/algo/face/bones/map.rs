@@ -38,7 +38,7 @@ pub(crate) struct Half {
     pub jaw: [Vec3; 9],
 }
 
-/// Both halves of a face, in which places are looked up.
+/// Halves of a face, in which places are looked up.
 #[derive(Debug, Clone)]
 pub(crate) struct FaceMap {
     /// Left (+x), then right.

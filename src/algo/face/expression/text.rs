@@ -129,7 +129,7 @@ pub enum Part {
 /// Side of the face, or both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Sides {
-    /// Both sides.
+    /// Left and right side alike.
     #[default]
     Both,
     /// The character's left, +x.

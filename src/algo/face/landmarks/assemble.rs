@@ -39,7 +39,7 @@ fn corners(eye: &EyeOpening) -> (Vec2, Vec2) {
     (eye.outer - vec2(along.x * 0.015, 0.0), inner)
 }
 
-/// Both openings, if they were found and mirror each other closely.
+/// Openings of the eyes, if they were found and mirror each other closely.
 fn symmetric_openings(eyes: &[Option<EyeOpening>; 2], pose: &Pose) -> Option<[EyeOpening; 2]> {
     let [Some(right), Some(left)] = eyes else { return None };
     let flip = |place: Vec2| vec2(2.0 * pose.center.x - place.x, place.y);

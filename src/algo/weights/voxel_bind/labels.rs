@@ -105,8 +105,8 @@ pub(super) struct Limits {
 /// The nearest joints of all solid voxels.
 pub(super) struct Field {
     labels: usize,
-    /// For each voxel `labels` entries of joint and path length in tenths of a cell, nearest first; unused ones have
-    /// the length `u32::MAX`.
+    /// Entries of each voxel, `labels` in number, of joint and path length in tenths of a cell, nearest first; unused
+    /// ones have the length `u32::MAX`.
     entries: Vec<(u32, u32)>,
 }
 

@@ -33,7 +33,7 @@ impl SkinningParts {
     }
 }
 
-/// For one mesh the joint that holds each object, and the weights that say so.
+/// Joint of one mesh that holds each object, and the weights that say so.
 pub(super) struct HeldObjects {
     mesh: Uid,
     skin: Weak<SkinData>,

@@ -5,7 +5,7 @@ use thiserror::Error;
 /// Reason why a BVH file cannot be read. Lines count from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum BvhError {
-    /// Something other than the header at the start.
+    /// Start that is not the header.
     #[error("line {line}: found `{found}` where `HIERARCHY` was expected; a BVH file begins with that word")]
     NoHierarchy {
         /// The line.

@@ -20,10 +20,10 @@ use crate::rig::{
 /// Treatment of uids when a template is formatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum UidStyle {
-    /// As they are.
+    /// Uids as they are.
     #[default]
     Kept,
-    /// Everything has its uid, and so has every reference.
+    /// Uids of everything, and of every reference.
     Written,
     /// A uid that follows from names is left out, beside names in references, too, unless the template has parts.
     Derived,

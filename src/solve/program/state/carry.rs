@@ -99,7 +99,7 @@ impl Carry {
         Self { nodes, attributes, is_aligned, inputs, springs, is_in_place, changes }
     }
 
-    /// For each node slot of the new program the slot of the same node in the old one.
+    /// Slot, for each node slot of the new program, of the same node in the old one.
     pub fn nodes(&self) -> &[Option<usize>] {
         &self.nodes
     }
@@ -191,7 +191,8 @@ impl RigState {
         self.program = Arc::clone(program);
     }
 
-    /// As [`carry_over`](Self::carry_over), with correspondences from the other instance's program to this one's.
+    /// Takeover as in [`carry_over`](Self::carry_over), with the correspondences from the other instance's program to
+    /// this one's.
     pub fn carry_along(&mut self, other: &Self, carry: &Carry) {
         fn pairs(list: &[Option<usize>]) -> impl Iterator<Item = (usize, usize)> {
             list.iter().enumerate().filter_map(|(slot, from)| Some((slot, (*from)?)))

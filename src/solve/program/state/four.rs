@@ -281,7 +281,7 @@ impl Registers for Column<'_> {
     }
 }
 
-/// The same transform for all.
+/// Transform for all four.
 #[inline(always)]
 fn splat(trs: &Trs) -> Place<f32x4> {
     let Place { translation, rotation, scale } = Place::from(trs);

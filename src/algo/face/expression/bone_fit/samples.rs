@@ -28,7 +28,7 @@ const APART: usize = 7;
 pub(super) struct Mark {
     /// The point, or for landmarks the landmark itself.
     pub place: Vec3,
-    /// Its lip and lid.
+    /// Lip and lid of the sample.
     pub known: OpeningSide,
     /// Weight of the jaw bone there.
     pub jaw: f64,
