@@ -45,7 +45,7 @@ pub(super) fn below(disk: &dyn Disk, project: &Path, text: &str) -> Option<PathB
     let is_plain = path.file_name().is_some() && path.components().all(plain);
     let path = is_plain.then(|| located(project, text))?;
     match (disk.canonical(folder_of(project)), disk.canonical(&path)) {
-        (Ok(folder), Ok(target)) if !target.starts_with(folder) => None,
+        (Ok(folder), Ok(target)) if !target.starts_with(&folder) => None,
         // A file that is not there is told where it is read.
         _ => Some(path),
     }
