@@ -29,7 +29,7 @@ mod encode;
 mod error;
 mod frame;
 mod gap;
-mod lossy_history;
+mod lossy_timeline;
 mod place;
 mod read;
 mod restore;

@@ -16,10 +16,7 @@ use crate::{
         schema::Attributes,
     },
     processor::{Exclusion, FindError, RunReport},
-    rig::{
-        BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, feature::off_at,
-        nearest::did_you_mean,
-    },
+    rig::{BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::did_you_mean},
     solve::program::ProgramError,
 };
 
@@ -50,7 +47,7 @@ pub enum WriteValue {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PoseError {
     /// The text does not describe a write.
-    #[error("\"{0}\" sets nothing; write CONTROL.translate=(x,y,z), .rotate, .scale, or NODE.ATTRIBUTE=value")]
+    #[error("\"{0}\" sets nothing: write CONTROL.translate=(x,y,z), .rotate, .scale, or NODE.ATTRIBUTE=value")]
     Syntax(String),
     /// The rig is not built.
     #[error("the rig is not built; build it first")]
@@ -77,14 +74,12 @@ pub enum PoseError {
         off: Exclusion,
     },
     /// Several nodes have that name.
-    #[error("\"{name}\" may be any of {candidates}{off}; write one of these names")]
+    #[error("\"{name}\" may be any of {candidates}; write one of these names")]
     Ambiguous {
         /// Requested name.
         name: String,
         /// Names of the nodes that the requested name may mean.
         candidates: String,
-        /// Clause about the features that are off there, in brackets; empty if none is.
-        off: String,
     },
     /// The node has no such attribute.
     #[error("\"{node}\" has no attribute \"{attribute}\"{known}")]
@@ -360,8 +355,7 @@ impl Workbench {
             }
             _ => {
                 let names: Vec<&str> = found.iter().map(|node| &*node.name).collect();
-                let off = off_at(self.rig(), name).map_or_else(String::new, |off| format!(" ({off})"));
-                Err(PoseError::Ambiguous { name: name.to_owned(), candidates: names.join(", "), off })
+                Err(PoseError::Ambiguous { name: name.to_owned(), candidates: names.join(", ") })
             }
         }
     }

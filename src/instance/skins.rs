@@ -9,8 +9,7 @@ use crate::{
 };
 
 /// Skinned mesh below an instance, whose joints are the instance's nodes.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
-#[reflect(Component)]
+#[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoundTo(pub Entity);
 
 /// A skinned mesh below an instance follows it from now on.
@@ -80,8 +79,7 @@ pub(super) fn bind_skins(
 /// has the pieces of the mesh below it, as a [`RigMesh`](crate::plugins::surface::RigMesh) with the display plugin or a loaded
 /// scene has, and may be hidden.
 #[cfg(feature = "draw")]
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
-#[reflect(Component)]
+#[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
 #[require(Visibility)]
 pub struct SharedMesh(pub Entity);
 

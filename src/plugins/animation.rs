@@ -56,9 +56,7 @@ impl ClipPlayer {
 }
 
 /// Clips of a rig without a document.
-#[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
-#[reflect(opaque)]
-#[reflect(Component, Clone, Debug)]
+#[derive(Component, Debug, Clone, PartialEq, Default)]
 pub struct RigClips(pub Arc<[RigClip]>);
 
 /// Event that playback passed a marker of a clip.
@@ -76,8 +74,7 @@ pub struct MarkerReached {
 
 /// Root motion: movement of one node that is handed to the game in place of the pose. The node stands where it stands at the
 /// start of the clip, and the game multiplies the rig's `Transform` by `delta` after each frame.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Component)]
+#[derive(Component, Debug, Clone, Copy, PartialEq)]
 pub struct RootMotion {
     /// The node, whose parents the clip does not move.
     pub node: Uid,
@@ -93,8 +90,7 @@ impl RootMotion {
 }
 
 /// Keys that are set with each pose that is committed, in the same step of the history. On the entity of a rig.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Component)]
+#[derive(Component, Debug, Clone, Copy, PartialEq)]
 pub struct AutoKey {
     /// True to set keys.
     pub on: bool,

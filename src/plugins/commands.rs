@@ -8,7 +8,6 @@
 //! out of the history.
 
 mod constraints;
-mod guard;
 mod nodes;
 mod run;
 
@@ -50,7 +49,6 @@ impl Plugin for CommandsPlugin {
                 nodes::unsorted_rigs.pipe(nodes::order_siblings),
                 nodes::despawn_parked,
                 constraints::follow_constraints,
-                guard::keep_built,
                 (run::run_built, report_commands),
             )
                 .chain()

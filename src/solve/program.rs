@@ -76,7 +76,7 @@ pub enum Keep {
 }
 
 /// A node that a game wants to pose or to read.
-#[derive(bevy::reflect::Reflect, Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Exposed {
     /// The node with this uid.
     Uid(Uid),

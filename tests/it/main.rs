@@ -75,8 +75,6 @@ mod gizmo;
 mod gltf;
 mod gltf_torture;
 mod heads;
-#[cfg(feature = "cli")]
-mod hostile;
 mod influences;
 mod inputs;
 mod instances;

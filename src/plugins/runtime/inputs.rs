@@ -22,8 +22,7 @@ use crate::{
 ///     commands.entity(*driver).insert(RigInputs::from([("wheel", wheel)]));
 /// }
 /// ```
-#[derive(Component, Reflect, Debug, Clone, Default, PartialEq, Eq, Deref, DerefMut)]
-#[reflect(Component)]
+#[derive(Component, Debug, Clone, Default, PartialEq, Eq, Deref, DerefMut)]
 pub struct RigInputs(pub BTreeMap<String, Entity>);
 
 impl<const COUNT: usize> From<[(&str, Entity); COUNT]> for RigInputs {

@@ -27,15 +27,14 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 EntityPart::Joint if along.contains(&indexed.uid) => self.forget_joint(indexed.uid),
                 EntityPart::Joint => deleted.push(indexed.uid),
                 EntityPart::Node | EntityPart::Constraint => {
-                    let constraint = self.built.as_mut().and_then(|built| {
+                    if let Some(built) = &mut self.built {
                         built.nodes.remove(&indexed.uid);
-                        built.constraints.remove(&indexed.uid)
-                    });
+                        built.constraints.remove(&indexed.uid);
+                    }
                     self.trial.respawn = true;
-                    self.trial.refuse(match constraint {
-                        Some(mirrored) => EntityWriteError::CreatedConstraint { kind: mirrored.constraint.kind() },
-                        None => EntityWriteError::CreatedNode,
-                    });
+                    if indexed.part == EntityPart::Node {
+                        self.trial.refuse(EntityWriteError::CreatedNode);
+                    }
                 }
                 EntityPart::Tag | EntityPart::Group => {}
             }
