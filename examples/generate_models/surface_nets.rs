@@ -45,7 +45,7 @@ pub fn graded(keys: &[(f64, f64)]) -> Vec<f64> {
     nodes
 }
 
-/// Grid as [`graded`] makes it from 0 up, with the first cell astride the plane 0.
+/// Coordinates as [`graded`] makes them from 0 up, with the first cell astride the plane 0.
 pub fn graded_symmetric(keys: &[(f64, f64)]) -> Vec<f64> {
     let half = keys[0].1 / 2.0;
     let mut nodes = graded(keys);
@@ -64,7 +64,7 @@ fn edge_corners(edge: usize) -> [usize; 2] {
     [low, low | (1 << a)]
 }
 
-/// Sheet of every edge, for each pattern of inside corners (`u8::MAX` if it is not crossed), and how many there are.
+/// Sheet of every edge (`u8::MAX` if it is not crossed), for each pattern of inside corners, and how many there are.
 fn sheets() -> Vec<([u8; 12], u8)> {
     (0..256usize)
         .map(|inside| {

@@ -41,7 +41,7 @@ pub struct BuiltTemplate {
     pub lean: Arc<RigProgram>,
     /// Places that other things hang on.
     pub sockets: Arc<[PartSocket]>,
-    /// Places of the points as the file has them.
+    /// Places that other things hang on, as the file has them.
     file_sockets: Arc<[PartSocket]>,
     /// Programs with joints and some nodes, for instances with [`ExposedNodes`](super::ExposedNodes).
     some: Mutex<Vec<(Vec<Exposed>, Arc<RigProgram>)>>,

@@ -19,7 +19,7 @@ use crate::{
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpMode {
-    /// Direction of the rig.
+    /// Direction in the rig's space.
     #[default]
     Direction,
     /// Across the plane in which the chain bends; in the direction where it is straight.

@@ -66,8 +66,8 @@ pub struct SkinData {
     /// Space of the weights: `true` if they were computed for the mesh at rest; `false` if they came with the mesh file
     /// and belong to its points in the file's bind pose.
     pub at_rest: bool,
-    /// Node that each joint of a command was made for: it holds the share of a joint that is not
-    /// built at the moment.
+    /// Node that each joint of the weights was made for, where a command created the joint: it holds the share of a
+    /// joint that is not built at the moment.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub subjects: BTreeMap<Uid, Uid>,
 }

@@ -27,7 +27,7 @@ pub(super) const KEPT: usize = 6;
 const MOST_SPREAD: f32 = 0.6;
 /// Penalty of a limb that has no branch.
 const MISSING: f32 = 0.25;
-/// Penalties of a missing head, which hardly any figure lacks, and for a tail.
+/// Penalties of a missing head, which hardly any figure lacks, and of a missing tail.
 const MISSING_HEAD: f32 = 0.4;
 const MISSING_TAIL: f32 = 0.08;
 /// Penalty of a missing limb in a template without sides.

@@ -40,7 +40,7 @@ pub(super) struct FittedBody {
     pub(super) trunk: Quat,
     /// Mean distance between the model's and the mesh's surface, as a share of the height.
     pub(super) residual: f32,
-    /// Radius around each bone.
+    /// Mean distance between the surfaces around each bone, as a share of the height.
     pub(super) near: Vec<f32>,
     /// Residual of the start that was taken, and of the best one that faces elsewhere.
     pub(super) start: f32,

@@ -157,7 +157,7 @@ fn owners(joints: &[WeightJoint]) -> Vec<Option<u32>> {
     owners
 }
 
-/// Bones without others at the same place: the first one stays, because nothing tells them apart.
+/// Removal of bones at the place of another: the first one stays, because nothing tells them apart.
 fn drop_repeats(segments: &mut Vec<BoneSegment>, leaves: &mut Vec<(usize, usize)>) {
     let key = |s: &BoneSegment| [s.head, s.tail].map(|p| p.to_array().map(|c| (c + 0.0).to_bits()));
     let mut order: Vec<usize> = (0..segments.len()).collect();

@@ -11,7 +11,7 @@ use super::{WeightJoint, odds};
 /// angle folds unless the blend is at least as long as a quarter of a circle around the joint; without a half joint so
 /// long a blend would thin the limb.
 const HINGE: f32 = 0.5;
-/// Length of the blend of hips and shoulders, around which the body is too wide for a longer blend.
+/// Width of the blend of hips and shoulders, in the same factor, around which the body is too wide for a longer blend.
 const SOCKET: f32 = 1.0;
 /// A joint is a hinge if the bone above it is at least this share of the bone below it, a socket otherwise.
 const HINGED: f32 = 0.8;

@@ -52,7 +52,7 @@ impl Ink {
 pub enum Layer {
     /// Over the mesh, sorted among the pictures over it.
     Over,
-    /// Lines in the scene: nearer objects hide it.
+    /// Place in the scene: nearer objects hide the picture.
     Scene,
     /// At exactly this depth (see [`Ink::depths`]).
     Fixed(f32),

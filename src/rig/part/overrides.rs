@@ -18,7 +18,7 @@ pub struct PartOverride {
 }
 
 impl PartInstance {
-    /// Changes that the instance makes of its part, in the order of the file.
+    /// Changes that the instance makes to its part, in the order of the file.
     pub fn overrides(&self) -> Vec<PartOverride> {
         let mut list = Vec::new();
         let mut add = |target: &str, field: &str, value: String| {

@@ -17,7 +17,7 @@ pub(super) trait Real:
     /// Result of a comparison, for each of the instances.
     type Mask: Copy;
 
-    /// Number for all four.
+    /// Number for each of the instances.
     fn all(value: f32) -> Self;
 
     /// The square root.

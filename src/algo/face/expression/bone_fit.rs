@@ -73,11 +73,11 @@ pub struct FittedFace {
 /// Movements of the skin bones that belong to the jaw's, which are linear in its rotation matrix and its shift.
 #[derive(Default)]
 struct JawMovements {
-    /// Weight of the rotation of the skin below the mouth, less the identity.
+    /// Coefficients of the rotation of the skin below the mouth, less the identity.
     skin: Vec<DVec3>,
-    /// Weight of the rotation of the jaw bone, less the identity: what it moves need not be moved by others.
+    /// Coefficients of the rotation of the jaw bone, less the identity: what it moves need not be moved by others.
     rotation: Vec<DVec3>,
-    /// Weight of the jaw bone's shift.
+    /// Coefficients of the jaw bone's shift.
     shift: Vec<f64>,
 }
 

@@ -23,7 +23,7 @@ pub(super) struct MovingSkin {
     pub weights: Weights,
     /// Triangles with an area.
     pub triangles: Vec<[u32; 3]>,
-    /// Normals of the points at rest, of any length.
+    /// Normals of the triangles at rest, of any length.
     normals: Vec<Vec3>,
     /// Triangles that each bone moves.
     of_bone: Vec<Vec<u32>>,

@@ -28,7 +28,7 @@ const APART: usize = 7;
 pub(super) struct Mark {
     /// The point, or for landmarks the landmark itself.
     pub place: Vec3,
-    /// Lip and lid of the sample.
+    /// Lip and lid that the place is on.
     pub known: OpeningSide,
     /// Weight of the jaw bone there.
     pub jaw: f64,
