@@ -101,6 +101,7 @@ impl Random {
             soft: 0.1 * self.unit(),
             stretch: 1.0,
             max_stretch: 2.0,
+            pin: 0.0,
         }
     }
 }

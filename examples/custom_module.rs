@@ -53,6 +53,8 @@ impl RigModule for Pendulum {
                 weight: Scalar::Value(1.0),
                 translate: false,
                 rotate: true,
+                motion: Scalar::Value(1.0),
+                colliders: Vec::new(),
             };
             scope.constrain("swing", node, 0, spring)?;
         }

@@ -1,5 +1,6 @@
 //! Algorithms, one a file: plain functions over slices, with their errors and sources.
 
+pub mod control_size;
 pub mod face;
 pub mod fit;
 pub mod fit_template;

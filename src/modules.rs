@@ -7,6 +7,7 @@
 pub mod aim;
 pub mod attribute;
 pub mod blend;
+pub mod cone_reader;
 pub mod control;
 pub mod driven_key;
 pub mod duplicate_chain;
@@ -22,13 +23,18 @@ pub mod mirror_joints;
 pub mod morph;
 pub mod null;
 pub mod orient_joints;
+pub mod path;
+pub mod piston;
 pub mod pole_vector;
+pub mod rbf_reader;
 pub mod reverse_foot;
+pub mod rivet;
 pub mod space_switch;
 pub mod spline_ik;
 pub mod spring;
 pub mod stretch;
 pub mod twist;
+pub mod wheel;
 
 use crate::processor::Modules;
 
@@ -37,6 +43,7 @@ pub fn register(modules: &mut Modules) {
     modules.add::<aim::AimModule>();
     modules.add::<attribute::AttributeModule>();
     modules.add::<blend::BlendModule>();
+    modules.add::<cone_reader::ConeReader>();
     modules.add::<control::ControlModule>();
     modules.add::<driven_key::DrivenKey>();
     modules.add::<duplicate_chain::DuplicateChainModule>();
@@ -53,15 +60,20 @@ pub fn register(modules: &mut Modules) {
     modules.add::<follow::OrientModule>();
     modules.add::<orient_joints::OrientJointsModule>();
     modules.add::<follow::ParentModule>();
+    modules.add::<path::Path>();
+    modules.add::<piston::Piston>();
     modules.add::<follow::PointModule>();
     modules.add::<pole_vector::PoleVectorModule>();
+    modules.add::<rbf_reader::RbfReader>();
     modules.add::<reverse_foot::ReverseFoot>();
+    modules.add::<rivet::Rivet>();
     modules.add::<follow::ScaleModule>();
     modules.add::<space_switch::SpaceSwitch>();
     modules.add::<spline_ik::SplineIk>();
     modules.add::<spring::Spring>();
     modules.add::<stretch::Stretch>();
     modules.add::<twist::Twist>();
+    modules.add::<wheel::Wheel>();
 }
 
 /// Every module of this crate.

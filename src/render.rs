@@ -27,6 +27,7 @@ use crate::{
     plugins::{
         RigPlugins,
         commands::{BuildRequest, BuildStep},
+        controls::size::MeasuredShapes,
         display::{DisplayJob, DisplayPlugin, MeshDisplay, ViewportLights},
         document::EditRequest,
         document::Selection,
@@ -171,7 +172,8 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
         let loading = world.query::<&DisplayJob>().iter(world).next().is_some();
         let surface = world.get::<RigSurface>(entity);
         let surface = !has_mesh || surface.is_some_and(|surface| surface.ready().is_some() && !surface.is_stale());
-        if surface && !loading {
+        let measuring = world.get::<MeasuredShapes>(entity).is_some_and(MeasuredShapes::is_busy);
+        if surface && !loading && !measuring {
             return Ok(());
         }
         if Instant::now() > deadline {

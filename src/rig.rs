@@ -35,7 +35,7 @@ pub use built::{
     LayerDisplay, Limits, Matching, NodeType, Origin, SwitchData, VISIBLE,
 };
 pub use constraint::{
-    AimUp, AngleLimits, ChainSolver, Channel, Constraint, Dependency, KeyEase, Output, Scalar, Target,
+    AimUp, AngleLimits, ChainSolver, Channel, Collider, Constraint, Dependency, KeyEase, Output, Scalar, Target,
 };
 pub use document::{Rig, RigAbout, SkinData};
 pub use edit::{EditError, RigEdit};

@@ -8,6 +8,7 @@
 pub mod aim;
 pub mod bake_clip;
 pub mod ccd;
+pub mod collider;
 pub mod curve;
 pub mod expression;
 pub mod fabrik;
@@ -15,8 +16,10 @@ pub mod foot;
 pub mod keep_pose;
 pub mod limit;
 pub mod matching;
+pub mod pose_reader;
 pub mod program;
 pub mod retarget;
+pub mod rivet;
 pub mod rotate;
 pub mod spline;
 pub mod spring;

@@ -36,6 +36,7 @@ use super::{
 };
 use crate::plugins::{
     RigPlugins,
+    controls::size::MeasuredShapes,
     display::{DisplayJob, DisplayPlugin},
     document::{Change, EditRequest, Edited},
     drawing::DrawingPlugin,
@@ -260,6 +261,7 @@ fn keep_drawing(
     loading: Res<Loading>,
     jobs: Query<(), Or<(With<SkinningJob>, With<FitJob>, With<DisplayJob>)>>,
     surfaces: Query<&RigSurface>,
+    shapes: Query<&MeasuredShapes>,
     stroke: Res<StrokeTool>,
     time: Res<Time<Real>>,
     mut last: Local<(Duration, u32)>,
@@ -268,7 +270,11 @@ fn keep_drawing(
     let happened = events.read().any(|event| !matches!(event, WindowEvent::RequestRedraw(_)));
     let told = edited.read().count() + notices.read().count() > 0;
     let surface = surfaces.iter().any(|surface| surface.is_stale() || surface.ready().is_none());
-    let busy = loading.what().is_some() || !jobs.is_empty() || surface || stroke.is_busy();
+    let busy = loading.what().is_some()
+        || !jobs.is_empty()
+        || surface
+        || stroke.is_busy()
+        || shapes.iter().any(MeasuredShapes::is_busy);
     if happened || told || busy {
         trace!("drawing on: events {happened}, notices {told}, background {busy}");
         *last = (time.elapsed(), 0);

@@ -26,6 +26,7 @@ macro_rules! bundled {
 /// Parts that come with Rigsmith, by the names that templates call them.
 pub const BUNDLED_PARTS: &[(&str, &str)] = bundled![
     "arm",
+    "bendy_limb",
     "eye",
     "fk_chain",
     "front_leg",
@@ -34,11 +35,14 @@ pub const BUNDLED_PARTS: &[(&str, &str)] = bundled![
     "jaw",
     "leg",
     "leg_3joint",
+    "lips",
+    "neck_chain",
     "neck_head",
     "single_control",
     "spine",
     "spring_chain",
     "tail",
+    "tongue",
     "wing",
 ];
 

@@ -1,6 +1,6 @@
 //! `control`: what people take hold of.
 
-use bevy::reflect::Reflect;
+use bevy::{math::ops, reflect::Reflect};
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::{
     parameters,
     processor::{
         BuildScope, Creation, ModuleError, NodeId, Resize, RigModule, Side, check_finite, check_limits,
-        mirrored_angles, mirrored_direction,
+        mirrored_angles, mirrored_direction, opposite,
     },
     rig::{
         Channels, Constraint, ControlData, Limits, NodeType, Scalar, Target, degrees,
@@ -19,8 +19,32 @@ use crate::{
     },
 };
 
+/// Sine of the bend under which two bones count as straight.
+const STRAIGHT: f32 = 1e-3;
+
+/// Angle in degrees by which a hinge about X has to be bent as built to say in which sense it bends.
+const FLAT: f32 = 2.0;
+
+/// A node that turns about one axis.
+#[derive(Debug, Clone, Copy)]
+struct Hinge {
+    /// Rotation of the control in the rig's space: its X is the axis.
+    rotation: Quat,
+    /// Angle between the two bones as built, in degrees, and 1.0 if a turn about X bends them further, else -1.0.
+    bent: Option<(f32, f32)>,
+}
+
 /// sRGB colours of controls on the left, on the right and in the middle.
 pub const SIDE_COLORS: [[f32; 3]; 3] = [[0.25, 0.55, 1.0], [1.0, 0.3, 0.27], [1.0, 0.82, 0.2]];
+
+/// Colour of controls on a side.
+pub fn side_color(side: Side) -> [f32; 3] {
+    match side {
+        Side::Left => SIDE_COLORS[0],
+        Side::Right => SIDE_COLORS[1],
+        Side::Middle => SIDE_COLORS[2],
+    }
+}
 
 /// Directions of a control's axes.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -31,6 +55,30 @@ pub enum ControlAxes {
     Node,
     /// Like those of the rig.
     Rig,
+}
+
+/// Axis about which the control of a hinge turns.
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HingeAxis {
+    /// The axis about which the bones above and below the node are bent as built; the control's X lies along it. X of the
+    /// node where the bones are straight.
+    #[default]
+    Bend,
+    /// X of the node. A node that is built bent bends further in that sense, a straight one in that of a turn about X.
+    X,
+}
+
+/// Axis and range of the controls of hinges.
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HingeRange {
+    /// Axis of the turn.
+    pub axis: HingeAxis,
+    /// Least angle between the two bones in degrees, 0 where they are straight.
+    pub min: Option<f32>,
+    /// Greatest angle between the two bones in degrees.
+    pub max: Option<f32>,
 }
 
 /// Directions of a control's shape before its own rotation.
@@ -92,9 +140,22 @@ parameters! {
         pub channels: Channels = Channels::default(),
         /// Lowest and highest values of these; rotation in degrees.
         pub limits: Limits = Limits::default(),
+        /// Nodes among them whose controls turn about one axis only, such as elbows and knees.
+        pub hinges: NodeRefs = NodeRefs::NONE,
+        /// The axis of hinges (bend: about which the bones are bent as built; x: X of the node), and the least and the
+        /// greatest angle between the two bones in degrees, 0 where they are straight.
+        pub hinge: HingeRange = HingeRange::default(),
         /// Name, groups and label; by default those of the node.
         pub creation: Creation = Creation::default(),
     }
+}
+
+/// A control, and the node that stands on it as its node does.
+#[derive(Debug, Clone, Copy)]
+struct MadeControl {
+    control: NodeId,
+    /// The control itself, or a null on one whose axes lie otherwise.
+    carrier: NodeId,
 }
 
 impl RigModule for ControlModule {
@@ -109,19 +170,24 @@ impl RigModule for ControlModule {
         self.check(scope)?;
         let nodes = scope.resolve_some("at", &self.at)?;
         let parent = scope.resolve_parent("parent", &self.parent)?;
-        let mut controls: Vec<NodeId> = Vec::with_capacity(nodes.len());
+        let hinges = scope.resolve("hinges", &self.hinges)?;
+        if let Some(outside) = hinges.iter().find(|hinge| !nodes.contains(hinge)) {
+            let problem = format!("{} gets no control here; name nodes of \"at\"", scope.name(*outside));
+            return Err(ModuleError::reference("hinges", &self.hinges, problem));
+        }
+        let mut controls: Vec<MadeControl> = Vec::with_capacity(nodes.len());
         for (index, node) in nodes.iter().copied().enumerate() {
             let upper = if self.hierarchy { scope.upper_in(node, &nodes[..index]) } else { None };
             let above = match (upper, parent) {
-                (Some(upper), _) => Some(controls[upper]),
+                (Some(upper), _) => Some(controls[upper].control),
                 (None, Some(parent)) => parent,
                 (None, None) => scope.parent(node),
             };
             // The control of the node right above, whose space is that of the node's own parent.
             let parent_control =
-                upper.filter(|upper| scope.parent(node) == Some(nodes[*upper])).map(|upper| controls[upper]);
-            let control = self.make(scope, node, index, above, parent_control)?;
-            controls.push(control);
+                upper.filter(|upper| scope.parent(node) == Some(nodes[*upper])).map(|upper| controls[upper].carrier);
+            let hinge = if hinges.contains(&node) { Some(self.hinge(scope, node, &nodes)) } else { None };
+            controls.push(self.make(scope, node, index, above, parent_control, hinge)?);
         }
         Ok(())
     }
@@ -165,7 +231,55 @@ impl ControlModule {
         for part in self.color.unwrap_or_default() {
             scope.in_range("color", part, 0.0..=1.0)?;
         }
+        let (low, high) = (self.hinge.min.unwrap_or(-180.0), self.hinge.max.unwrap_or(180.0));
+        scope.in_range("hinge.min", low, -180.0..=180.0)?;
+        scope.in_range("hinge.max", high, low..=180.0)?;
         check_limits("limits", &self.limits)
+    }
+
+    /// The hinge of a node between two bones: how its control is turned, and how it is bent as built.
+    fn hinge(&self, scope: &mut BuildScope<'_>, node: NodeId, nodes: &[NodeId]) -> Hinge {
+        let global = scope.global(node);
+        let plain = Hinge { rotation: global.rotation, bent: None };
+        let own = scope.child_joints(node).into_iter().find(|child| nodes.contains(child));
+        let lower = match own {
+            Some(child) => Some(scope.position(child) - global.translation),
+            None => scope.bone(node),
+        };
+        let upper = scope.parent(node).map(|parent| global.translation - scope.position(parent));
+        let unit = |bone: Option<Vec3>| bone.and_then(Vec3::try_normalize);
+        let (Some(upper), Some(lower)) = (unit(upper), unit(lower)) else { return plain };
+        let x = global.rotation * Vec3::X;
+        let across = upper.cross(lower);
+        if self.hinge.axis == HingeAxis::X {
+            // Seen along the axis.
+            let flat = |bone: Vec3| bone - x * bone.dot(x);
+            let (upper, lower) = (flat(upper), flat(lower));
+            let bent = ops::atan2(upper.cross(lower).dot(x), upper.dot(lower)).to_degrees();
+            let sense = if bent < -FLAT { -1.0 } else { 1.0 };
+            return Hinge { bent: Some((bent * sense, sense)), ..plain };
+        }
+        let (Some(axis), true) = (across.try_normalize(), across.length() > STRAIGHT) else { return plain };
+        // The axis that is nearer to the node's own: a control turns in the sense in which its node does.
+        let sense = if axis.dot(x) < 0.0 { -1.0 } else { 1.0 };
+        let turn = match axis.dot(x).abs() {
+            near if near > 1.0 - 1e-6 => Quat::IDENTITY,
+            _ => Quat::from_rotation_arc(x, axis * sense),
+        };
+        let bent = ops::atan2(across.length(), upper.dot(lower)).to_degrees();
+        Hinge { rotation: (turn * global.rotation).normalize(), bent: Some((bent, sense)) }
+    }
+
+    /// Limits of the control of a hinge: the range of the bend, from how it is bent as built.
+    fn hinge_limits(&self, hinge: &Hinge) -> Limits {
+        let mut limits = self.limits;
+        if let Some((bent, sense)) = hinge.bent {
+            let low = self.hinge.min.map(|low| (low - bent).min(0.0));
+            let high = self.hinge.max.map(|high| (high - bent).max(0.0));
+            let opposed = |end: Option<f32>| end.map(opposite);
+            limits.rotate[0] = if sense < 0.0 { (opposed(high), opposed(low)) } else { (low, high) };
+        }
+        limits
     }
 
     fn make(
@@ -175,11 +289,19 @@ impl ControlModule {
         index: usize,
         above: Option<NodeId>,
         upper: Option<NodeId>,
-    ) -> Result<NodeId, ModuleError> {
-        let place = match self.axes {
-            ControlAxes::Node => scope.global(node),
-            ControlAxes::Rig => Trs { translation: scope.position(node), ..Trs::IDENTITY },
+        hinge: Option<Hinge>,
+    ) -> Result<MadeControl, ModuleError> {
+        let own = scope.global(node);
+        let place = match (self.axes, &hinge) {
+            (ControlAxes::Node, Some(hinge)) => Trs { rotation: hinge.rotation, ..own },
+            (ControlAxes::Node, None) => own,
+            (ControlAxes::Rig, _) => Trs { translation: own.translation, ..Trs::IDENTITY },
         };
+        let channels = match hinge {
+            Some(_) => Channels { rotate: [true, false, false], ..self.channels },
+            None => self.channels,
+        };
+        let limits = hinge.as_ref().map_or(self.limits, |hinge| self.hinge_limits(hinge));
         let creation = scope.creation_for(&self.creation, node, index);
         let control = if self.offset_group {
             let name = creation.name.as_ref().map(|name| format!("{name}_offset"));
@@ -191,17 +313,21 @@ impl ControlModule {
         };
         let data = ControlData {
             shape: self.shape.clone(),
-            color: self.color.unwrap_or_else(|| match scope.named_side(node) {
-                Side::Left => SIDE_COLORS[0],
-                Side::Right => SIDE_COLORS[1],
-                Side::Middle => SIDE_COLORS[2],
-            }),
+            color: self.color.unwrap_or_else(|| side_color(scope.named_side(node))),
             size: self.size.unwrap_or_else(|| self.relative_size * scope.bone_length(node)),
             offset: self.shape_offset(scope, node, place),
-            channels: self.channels,
-            limits: self.limits,
+            // A size that somebody wrote stays.
+            fits: self.size.is_none(),
+            channels,
+            limits,
         };
         scope.set_control(control, data);
+        let is_turned = self.follow && self.axes == ControlAxes::Node && place.rotation != own.rotation;
+        let carrier = match is_turned {
+            // A null that stands as the node does, below the control with axes of its own.
+            true => scope.spawn_at(NodeType::Null, "carrier", node, 0, Some(control), own, &self.carrier(&creation))?,
+            false => control,
+        };
         if self.follow {
             let constraint = match upper {
                 // A joint that may be driven together with the one above it, by inverse kinematics say, cannot follow in
@@ -209,18 +335,24 @@ impl ControlModule {
                 Some(upper) if self.axes == ControlAxes::Node && !self.follow_scale && !self.keep_pose => {
                     Constraint::Relative {
                         driven: scope.uid(node),
-                        source: scope.uid(control),
+                        source: scope.uid(carrier),
                         space: scope.uid(upper),
                         translate: true,
                         rotate: true,
                         weight: Scalar::Value(1.0),
                     }
                 }
-                _ => self.following(scope, node, control, place),
+                _ => self.following(scope, node, carrier, if is_turned { own } else { place }),
             };
             scope.constrain("follow", node, 0, constraint)?;
         }
-        Ok(control)
+        Ok(MadeControl { control, carrier })
+    }
+
+    /// Name, groups and label of the null that carries a node for its control.
+    fn carrier(&self, creation: &Creation) -> Creation {
+        let name = creation.name.as_ref().map(|name| format!("{name}_carrier"));
+        Creation { name, ..creation.clone() }
     }
 
     /// The node stands where its control says, in the rig's space.

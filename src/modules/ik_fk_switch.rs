@@ -62,12 +62,21 @@ parameters! {
         pub max_stretch: f32 = 2.0,
         /// Turn of two bones about the line to the goal in degrees; or an attribute's name.
         pub twist: Amount = Amount::Value(0.0),
+        /// 0 bends two bones towards the pole, 1 lengthens both so that their joint is at the pole; or an attribute's name.
+        pub pin: Amount = Amount::Value(0.0),
         /// The end turns with the goal, keeping how the two stand to each other as built.
         pub orient_end: bool = true,
         /// Direction in the rig's space in which a straight limb bends; as built, or to the pole, if left out.
         pub prefer: Option<Vec3> = None,
         /// Controls of the kinematics that has no effect are hidden: their attribute "visible" is driven.
         pub hide: bool = true,
+        /// More controls that are hidden with the forward ones.
+        pub forward_controls: NodeRefs = NodeRefs::NONE,
+        /// More controls that are hidden with the goal, such as those of a foot's pivots.
+        pub inverse_controls: NodeRefs = NodeRefs::NONE,
+        /// Controls above the limb that keep their place when the switch is thrown, such as that of a shoulder which turns
+        /// with the goal.
+        pub held: NodeRefs = NodeRefs::NONE,
         /// Name, group and label of the nulls that stand on the forward controls for the joints.
         pub creation: Creation = Creation::default(),
     }
@@ -141,18 +150,22 @@ impl RigModule for IkFkSwitch {
             stretch: self.stretch.clone(),
             max_stretch: self.max_stretch,
             twist: self.twist.clone(),
+            pin: self.pin.clone(),
             orient_end: self.orient_end,
             ..Ik::new(chain.clone(), goal)
         })?;
         if self.hide {
             // Between the ends of the switch both kinds are visible.
-            for node in &fk {
-                scope.show_where(*node, &weight, [(0.0, 1.0), (1.0, 0.0)])?;
+            let more = scope.resolve("forward_controls", &self.forward_controls)?;
+            for node in fk.iter().copied().chain(more) {
+                scope.show_where(node, &weight, [(0.0, 1.0), (1.0, 0.0)])?;
             }
-            for node in [Some(goal), pole].into_iter().flatten() {
+            let more = scope.resolve("inverse_controls", &self.inverse_controls)?;
+            for node in [Some(goal), pole].into_iter().flatten().chain(more) {
                 scope.show_where(node, &weight, [(0.0, 0.0), (1e-3, 1.0)])?;
             }
         }
+        let held = scope.resolve("held", &self.held)?;
         let switch = SwitchData {
             command: scope.command(),
             control: scope.uid(control),
@@ -163,6 +176,7 @@ impl RigModule for IkFkSwitch {
                 goal: scope.uid(goal),
                 goal_offset: scope.kept_offset(end, goal),
                 pole: pole.map(|pole| scope.uid(pole)),
+                held: held.iter().map(|control| scope.uid(*control)).collect(),
             },
         };
         scope.switch("switch", start, switch)

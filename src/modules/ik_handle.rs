@@ -48,6 +48,8 @@ parameters! {
         pub max_stretch: f32 = 2.0,
         /// Turn of two bones about the line to the goal in degrees; or an attribute's name.
         pub twist: Amount = Amount::Value(0.0),
+        /// 0 bends two bones towards the pole, 1 lengthens both so that their joint is at the pole; or an attribute's name.
+        pub pin: Amount = Amount::Value(0.0),
         /// The end turns with the goal, keeping how the two stand to each other as built.
         pub orient_end: bool = true,
         /// Direction in the rig's space in which a straight chain bends; as built, or to the pole, if left out.
@@ -94,6 +96,7 @@ impl RigModule for IkHandle {
             stretch: self.stretch.clone(),
             max_stretch: self.max_stretch,
             twist: self.twist.clone(),
+            pin: self.pin.clone(),
             orient_end: self.orient_end,
             limits: self.limits.clone(),
             iterations: self.iterations,

@@ -4,10 +4,11 @@ use glam::{Mat3, Quat, Vec3};
 
 use crate::{
     mesh::model::Trs,
+    modules::control::side_color,
     parameters,
     processor::{Amount, BuildScope, Creation, ModuleError, NodeId, RigModule, mirrored_direction},
     rig::{
-        AttributeKind, Channel, Constraint, KeyEase, NodeType, Output, Scalar, Target,
+        AttributeKind, Channel, Channels, Constraint, ControlData, KeyEase, Limits, NodeType, Output, Scalar, Target,
         reference::{NodeRef, NodeRefs},
     },
 };
@@ -51,6 +52,11 @@ parameters! {
         pub up: Vec3 = Vec3::Y,
         /// Degrees at which the roll moves on from ball to toe, until somebody sets others; 0 to 180.
         pub break_angle: f32 = 35.0,
+        /// A control beside each pivot, which turns the foot about it; their roles are `heel_control`, `toe_control`,
+        /// `outer_control`, `inner_control` and `ball_control`.
+        pub pivots: bool = false,
+        /// Half the width of these controls, as a share of the distance from ankle to toe tip.
+        pub pivot_size: f32 = 0.12,
         /// The ball's joint turns with the toes, which stay flat while the heel lifts.
         pub drive_ball: bool = true,
         /// Share of that, 0 to 1: a number or an attribute's name, such as that of ik_fk_switch.
@@ -73,6 +79,8 @@ struct Sole {
     frame: Quat,
     /// Y up, Z such that a turn about it tips outwards.
     tip: Quat,
+    /// Distance from ankle to toe tip along the ground.
+    length: f32,
 }
 
 impl RigModule for ReverseFoot {
@@ -95,12 +103,20 @@ impl RigModule for ReverseFoot {
         let make = |scope: &mut BuildScope<'_>, role: &str, parent: NodeId, place: Trs| {
             scope.spawn_at(NodeType::Null, role, ankle, 0, Some(parent), place, &self.creation)
         };
-        let heel = make(scope, "heel", control, at(sole.heel, sole.frame))?;
-        let toe_tip = make(scope, "toe_tip", heel, at(sole.toe, sole.frame))?;
-        let outer = make(scope, "outer", toe_tip, at(sole.outer, sole.tip))?;
-        let inner = make(scope, "inner", outer, at(sole.inner, sole.tip))?;
+        let size = self.pivot_size * sole.length;
+        let pivot = |scope: &mut BuildScope<'_>, [role, name]: [&str; 2], parent: NodeId, place: Trs| {
+            let node = make(scope, role, parent, place)?;
+            if self.pivots {
+                self.pivot_control(scope, [ankle, parent, node], name, place, size)?;
+            }
+            Ok(node)
+        };
+        let heel = pivot(scope, ["heel", "heel_control"], control, at(sole.heel, sole.frame))?;
+        let toe_tip = pivot(scope, ["toe_tip", "toe_control"], heel, at(sole.toe, sole.frame))?;
+        let outer = pivot(scope, ["outer", "outer_control"], toe_tip, at(sole.outer, sole.tip))?;
+        let inner = pivot(scope, ["inner", "inner_control"], outer, at(sole.inner, sole.tip))?;
         let swivel = make(scope, "swivel", inner, at(sole.ball, sole.frame))?;
-        let lift = make(scope, "ball", swivel, at(sole.ball, sole.frame))?;
+        let lift = pivot(scope, ["ball", "ball_control"], swivel, at(sole.ball, sole.frame))?;
         let toes = make(scope, "toes", swivel, at(sole.ball, sole.frame))?;
         let ankle_global = scope.global(ankle);
         make(scope, "goal", lift, at(ankle_global.translation, ankle_global.rotation))?;
@@ -161,6 +177,47 @@ impl RigModule for ReverseFoot {
 }
 
 impl ReverseFoot {
+    /// Makes the control that turns a foot about a pivot.
+    ///
+    /// The pivot follows its control and does not hang on it: the control above the goal is that of the whole foot, which
+    /// moves freely.
+    fn pivot_control(
+        &self,
+        scope: &mut BuildScope<'_>,
+        [ankle, parent, pivot]: [NodeId; 3],
+        role: &str,
+        place: Trs,
+        size: f32,
+    ) -> Result<(), ModuleError> {
+        let name = self.creation.name.as_ref().map(|name| format!("{name}_{role}"));
+        let creation = Creation { name, ..self.creation.clone() };
+        let control = scope.spawn_at(NodeType::Control, role, ankle, 0, Some(parent), place, &creation)?;
+        let side = scope.named_side(ankle);
+        let data = ControlData {
+            shape: "sphere".to_owned(),
+            color: side_color(side),
+            size,
+            offset: Trs::IDENTITY,
+            fits: true,
+            channels: Channels { translate: [false; 3], rotate: [true; 3], scale: [false; 3] },
+            limits: Limits::default(),
+        };
+        scope.set_control(control, data);
+        let target = Target { node: scope.uid(control), weight: Scalar::Value(1.0), offset: Trs::IDENTITY };
+        // Roll and bank turn the pivot on top of this.
+        let follow = Constraint::Transform {
+            driven: scope.uid(pivot),
+            targets: vec![target],
+            translate: [false; 3],
+            rotate: [true; 3],
+            scale: [false; 3],
+            weight: Scalar::Value(1.0),
+            keep_pose: false,
+        };
+        scope.constrain("pivot", pivot, 0, follow)?;
+        Ok(())
+    }
+
     fn sole(
         &self,
         scope: &mut BuildScope<'_>,
@@ -170,6 +227,7 @@ impl ReverseFoot {
     ) -> Result<Sole, ModuleError> {
         scope.in_range("heel_back", self.heel_back, 0.0..=f32::INFINITY)?;
         scope.in_range("width", self.width, 0.0..=f32::INFINITY)?;
+        scope.in_range("pivot_size", self.pivot_size, f32::MIN_POSITIVE..=f32::INFINITY)?;
         scope.in_range("break_angle", self.break_angle, 0.0..=180.0)?;
         let up = self.up.try_normalize().ok_or_else(|| {
             ModuleError::parameter("up", "has no direction; write that up from the sole, such as (0, 1, 0)")
@@ -204,6 +262,7 @@ impl ReverseFoot {
             outer,
             frame: Quat::from_mat3(&Mat3::from_cols(side, up, forward)).normalize(),
             tip: Quat::from_mat3(&Mat3::from_cols(up.cross(tip), up, tip)).normalize(),
+            length,
         })
     }
 }

@@ -37,6 +37,8 @@ parameters! {
         pub twist: Amount = Amount::Value(0.0),
         /// 0 leaves the chain as it is, 1 follows the curve; a number or an attribute's name.
         pub weight: Amount = Amount::Value(1.0),
+        /// The points are hidden while an attribute as weight is 0: their attribute "visible" is driven.
+        pub hide: bool = true,
     }
 }
 
@@ -64,12 +66,18 @@ impl RigModule for SplineIk {
             return Err(ModuleError::reference("points", &self.points, problem));
         }
         let control = scope.resolve_maybe("control", &self.control)?.or(points.last().copied());
+        let weight = scope.amount("weight", &self.weight, control, 0.0..=1.0, 1.0)?;
+        if self.hide {
+            for point in &points {
+                scope.show_where(*point, &weight, [(0.0, 0.0), (1e-3, 1.0)])?;
+            }
+        }
         let constraint = Constraint::Spline {
             joints: chain.iter().map(|joint| scope.uid(*joint)).collect(),
             points: points.iter().map(|point| scope.uid(*point)).collect(),
             stretch: scope.amount("stretch", &self.stretch, control, 0.0..=1.0, 0.0)?,
             twist: scope.amount("twist", &self.twist, control, f32::NEG_INFINITY..=f32::INFINITY, 0.0)?,
-            weight: scope.amount("weight", &self.weight, control, 0.0..=1.0, 1.0)?,
+            weight,
         };
         scope.constrain("spline", start, 0, constraint)?;
         Ok(())

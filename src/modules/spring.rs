@@ -2,9 +2,9 @@
 
 use crate::{
     parameters,
-    processor::{Amount, BuildScope, ModuleError, RigModule},
+    processor::{Amount, BuildScope, ModuleError, Resize, RigModule},
     rig::{
-        Constraint,
+        Collider, Constraint,
         reference::{NodeRef, NodeRefs},
     },
 };
@@ -30,6 +30,14 @@ parameters! {
         pub translate: bool = false,
         /// The direction lags in which the node's children lie.
         pub rotate: bool = true,
+        /// Share of the character's own motion in the world that counts, 0 to 1; a number or an attribute's name.
+        pub motion: Amount = Amount::Value(1.0),
+        /// Nodes that carry bodies which the tips do not enter: balls about them.
+        pub colliders: NodeRefs = NodeRefs::NONE,
+        /// For each collider the node to which its body reaches, in that order; balls if left out.
+        pub collider_ends: NodeRefs = NodeRefs::NONE,
+        /// Radius of each body in the rig's units, above 0; the last one holds for those that follow.
+        pub radii: Vec<f32> = vec![0.1],
         /// The control whose attributes the numbers may name; the first of the nodes if left out.
         pub control: NodeRefs = NodeRefs::NONE,
     }
@@ -51,6 +59,8 @@ impl RigModule for Spring {
         let frequency = scope.amount("frequency", &self.frequency, control, 1e-2..=60.0, 2.0)?;
         let damping = scope.amount("damping", &self.damping, control, 0.0..=10.0, 0.4)?;
         let weight = scope.amount("weight", &self.weight, control, 0.0..=1.0, 1.0)?;
+        let motion = scope.amount("motion", &self.motion, control, 0.0..=1.0, 1.0)?;
+        let colliders = self.bodies(scope)?;
         for node in nodes {
             let constraint = Constraint::Spring {
                 driven: scope.uid(node),
@@ -59,9 +69,46 @@ impl RigModule for Spring {
                 weight: weight.clone(),
                 translate: self.translate,
                 rotate: self.rotate,
+                motion: motion.clone(),
+                colliders: colliders.clone(),
             };
             scope.constrain("spring", node, 0, constraint)?;
         }
         Ok(())
+    }
+
+    fn resize(&mut self, change: &Resize) {
+        self.radii.iter_mut().for_each(|radius| *radius *= change.factor);
+    }
+}
+
+impl Spring {
+    /// Bodies of the colliders that are on.
+    fn bodies(&self, scope: &mut BuildScope<'_>) -> Result<Vec<Collider>, ModuleError> {
+        if self.colliders.is_empty() {
+            return Ok(Vec::new());
+        }
+        let nodes = scope.resolve_each("colliders", &self.colliders)?;
+        let ends = match self.collider_ends.is_empty() {
+            true => vec![None; nodes.len()],
+            false => scope.resolve_each("collider_ends", &self.collider_ends)?,
+        };
+        if ends.len() != nodes.len() {
+            let problem =
+                format!("finds {} nodes for {} colliders; give one for each, or none", ends.len(), nodes.len());
+            return Err(ModuleError::reference("collider_ends", &self.collider_ends, problem));
+        }
+        let Some(last) = self.radii.last().copied() else {
+            return Err(ModuleError::parameter("radii", "has no radius; write one, such as [0.1]"));
+        };
+        let mut bodies = Vec::with_capacity(nodes.len());
+        for (at, (node, end)) in nodes.into_iter().zip(ends).enumerate() {
+            let radius = self.radii.get(at).copied().unwrap_or(last);
+            scope.in_range("radii", radius, f32::MIN_POSITIVE..=f32::INFINITY)?;
+            if let Some(node) = node {
+                bodies.push(Collider { node: scope.uid(node), end: end.map(|end| scope.uid(end)), radius });
+            }
+        }
+        Ok(bodies)
     }
 }

@@ -4,6 +4,7 @@
 //! attribute like any other, so the controls of inverse kinematics hide while a limb follows the forward ones.
 
 pub mod outline;
+pub mod size;
 
 use std::collections::BTreeSet;
 
@@ -35,7 +36,11 @@ impl Plugin for ControlsPlugin {
             .add_message::<EditRequest>()
             .add_message::<EditRefused>()
             .add_systems(Update, throw_switches.in_set(RigSystems::Gesture))
-            .add_systems(PostUpdate, show_nodes.after(RigSystems::Solve));
+            .register_type::<size::ShapeFactor>()
+            .add_systems(
+                PostUpdate,
+                (show_nodes.after(RigSystems::Solve), size::measure_shapes.after(RigSystems::Surface)),
+            );
     }
 }
 

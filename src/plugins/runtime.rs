@@ -44,6 +44,7 @@ impl Plugin for RuntimePlugin {
             (
                 (
                     (inputs::check_inputs, inputs::read_inputs, systems::note_controls).chain(),
+                    systems::feel_motion,
                     systems::solve,
                     (systems::scatter_locals, systems::scatter_attributes, systems::scatter_morphs).chain(),
                 )
@@ -100,6 +101,8 @@ pub struct RigRuntime {
     is_due: bool,
     /// True if the next run writes all entities.
     all_due: bool,
+    /// Place of the rig in the world at the last run, for springs that feel its motion.
+    world: Option<Affine3A>,
     /// Extent of the joints at rest in the rig's space, in [`InstanceMode::Hierarchy`]: see [`rest_height`].
     height: f32,
 }
@@ -126,6 +129,7 @@ impl RigRuntime {
             controls: Vec::new(),
             written: Vec::new(),
             is_due: false,
+            world: None,
         }
     }
 
@@ -236,6 +240,7 @@ impl RigRuntime {
         let known = |node: &Uid| before.state.program().node(*node).is_some();
         self.posed = before.posed.iter().filter(|(node, _)| known(node)).map(|(node, at)| (*node, *at)).collect();
         self.valued = before.valued.iter().filter(|(node, _)| known(node)).map(|(n, v)| (*n, v.clone())).collect();
+        self.world = before.world;
         for (slot, from) in carry.nodes().iter().enumerate() {
             let Some((from, entity)) = from.and_then(|from| Some((from, before.entity(from)?))) else { continue };
             self.attach(slot, entity);

@@ -51,6 +51,8 @@ pub struct Ik {
     pub max_stretch: f32,
     /// Turn of two bones about the line from root to goal, in degrees.
     pub twist: Amount,
+    /// Share by which the middle joint of two bones goes to the pole.
+    pub pin: Amount,
     /// True if the end turns with the goal, as it was built relative to it.
     pub orient_end: bool,
     /// Limits of each joint for [`IkSolver::Ccd`].
@@ -76,6 +78,7 @@ impl Ik {
             stretch: Amount::Value(0.0),
             max_stretch: 2.0,
             twist: Amount::Value(0.0),
+            pin: Amount::Value(0.0),
             orient_end: true,
             limits: Vec::new(),
             iterations: 24,
@@ -146,11 +149,17 @@ impl BuildScope<'_> {
                     stretch: self.amount("stretch", &ik.stretch, control, 0.0..=1.0, 0.0)?,
                     max_stretch: ik.max_stretch,
                     twist: self.amount("twist", &ik.twist, control, f32::NEG_INFINITY..=f32::INFINITY, 0.0)?,
+                    // Nothing is pinned to a pole that is off.
+                    pin: match pole {
+                        Some(_) => self.amount("pin", &ik.pin, control, 0.0..=1.0, 0.0)?,
+                        None => Scalar::Value(0.0),
+                    },
                     orient_end,
                 }
             }
             None => {
-                for (name, amount) in [("soft", &ik.soft), ("stretch", &ik.stretch), ("twist", &ik.twist)] {
+                let numbers = [("soft", &ik.soft), ("stretch", &ik.stretch), ("twist", &ik.twist), ("pin", &ik.pin)];
+                for (name, amount) in numbers {
                     if *amount != Amount::Value(0.0) {
                         return Err(ModuleError::parameter(
                             name,
@@ -208,8 +217,8 @@ impl BuildScope<'_> {
         Ok(ik.limits.clone())
     }
 
-    /// The direction in which a chain bends, in the rig's space: as it was built, or else as asked for, or towards the
-    /// pole.
+    /// The direction in which a chain bends, in the rig's space: as it was built, unless another side is asked for; else as
+    /// asked for, or towards the pole.
     fn bend(&mut self, ik: &Ik) -> Result<Option<Vec3>, ModuleError> {
         let built = self.bend_of(&ik.chain);
         let points: Vec<Vec3> =
@@ -221,13 +230,14 @@ impl BuildScope<'_> {
             Some(across).filter(|across| across.length() > 1e-3 * direction.length()).and_then(Vec3::try_normalize)
         };
         if let Some(prefer) = ik.prefer {
-            let across = across(prefer).filter(|_| prefer.is_finite());
-            return across.map(Some).ok_or_else(|| {
+            let across = across(prefer).filter(|_| prefer.is_finite()).ok_or_else(|| {
                 ModuleError::parameter(
                     "prefer",
                     "points along the chain, or nowhere; write a direction across it, such as (0, 0, 1) for forwards",
                 )
-            });
+            })?;
+            // A chain that is built bent to that side keeps its plane where it is straightened, as a hinge does.
+            return Ok(Some(built.filter(|built| built.dot(across) > 0.0).unwrap_or(across)));
         }
         if built.is_some() {
             return Ok(built);

@@ -5,7 +5,7 @@ use crate::rig::{Attribute, AttributeKind, Constraint, KeyEase, NodeType, Output
 
 impl BuildScope<'_> {
     /// Drives the attribute [`VISIBLE`] of a control by an attribute, along two keys (value of `driver`, visibility) that
-    /// hold until the next. A node that is no control stands for the nearest control above it, such as that of a foot whose
+    /// hold until the next. A null stands for the control that carries it through nulls alone, such as that of a foot whose
     /// goal hangs below it. Nothing is driven for a constant `driver`, for the control that carries the attribute itself, and
     /// for a control whose visibility is driven already.
     ///
@@ -13,10 +13,12 @@ impl BuildScope<'_> {
     /// See [`BuildScope::constrain`].
     pub fn show_where(&mut self, node: NodeId, driver: &Scalar, keys: [(f32, f32); 2]) -> Result<(), ModuleError> {
         let mut above = Some(node);
-        while let Some(at) = above.filter(|at| self.kind(*at) != Some(NodeType::Control)) {
+        while let Some(at) = above.filter(|at| self.kind(*at) == Some(NodeType::Null)) {
             above = self.parent(at);
         }
-        let (Some(control), Some(carrier)) = (above, driver.node()) else { return Ok(()) };
+        // A null below a joint is no part of a control that happens to carry the joint, such as that of the whole rig.
+        let control = above.filter(|at| self.kind(*at) == Some(NodeType::Control));
+        let (Some(control), Some(carrier)) = (control, driver.node()) else { return Ok(()) };
         let is_driven = self.attributes(control).iter().any(|known| *known.name == *VISIBLE);
         if is_driven || self.uid(control) == carrier {
             return Ok(());

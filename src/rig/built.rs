@@ -60,6 +60,8 @@ pub enum Matching {
         goal_offset: Trs,
         /// The pole, if there is one.
         pole: Option<Uid>,
+        /// Controls above the limb that the switch would move, such as that of a shoulder which turns with the goal.
+        held: Vec<Uid>,
     },
     /// A control between several spaces, which stays in place.
     Space {
@@ -147,6 +149,8 @@ pub struct ControlData {
     pub size: f32,
     /// Transform of the shape relative to the control.
     pub offset: Trs,
+    /// True if the shape may be drawn larger than its size, so that it does not lie in the flesh of a mesh.
+    pub fits: bool,
     /// Channels that people move and set keys on.
     pub channels: Channels,
     /// Range of each channel; see [`Limits`].

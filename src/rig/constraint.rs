@@ -3,11 +3,14 @@
 //! Several constraints on one node run in the order of their creation; each starts from the result of those before it.
 //! A constraint reads the final transforms of other nodes in the same frame.
 
+mod dependencies;
+
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
+pub use self::dependencies::Dependency;
 use super::{Limits, Uid};
 use crate::mesh::model::Trs;
 
@@ -141,6 +144,17 @@ pub enum ChainSolver {
     Ccd(Vec<AngleLimits>),
 }
 
+/// A sphere about a node, or a capsule between two.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Collider {
+    /// The node in the middle of the sphere, or at the start of the capsule.
+    pub node: Uid,
+    /// The node at the end of the capsule.
+    pub end: Option<Uid>,
+    /// Radius in the rig's units.
+    pub radius: f32,
+}
+
 /// Destination of a driven number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Output {
@@ -242,6 +256,8 @@ pub enum Constraint {
         max_stretch: f32,
         /// Turn about the line from root to goal, in degrees.
         twist: Scalar,
+        /// Share by which the second joint goes to the pole: 0 not, 1 wholly, with bones as long as that needs.
+        pin: Scalar,
         /// The end's rotation in the goal's space; `None` if the end keeps its own rotation.
         orient_end: Option<Quat>,
     },
@@ -329,6 +345,10 @@ pub enum Constraint {
         translate: bool,
         /// Lag of the direction towards the node's children if `true`.
         rotate: bool,
+        /// Share of the motion of the rig in the world that the spring feels, 0 to 1.
+        motion: Scalar,
+        /// Bodies that the node's children do not enter.
+        colliders: Vec<Collider>,
     },
     /// A number driven by another along keys.
     DrivenKey {
@@ -373,15 +393,77 @@ pub enum Constraint {
         /// Turn on the ball about Y in degrees.
         swivel: Scalar,
     },
-}
-
-/// Data that a constraint depends on or changes.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Dependency {
-    /// The final transform of a node.
-    Node(Uid),
-    /// The value of an attribute.
-    Attribute(Uid, Arc<str>),
+    /// A number that says how near a direction of a node is to another: 1 within a cone, 0 beyond a wider one.
+    Cone {
+        /// The node whose direction counts.
+        source: Uid,
+        /// The direction, in the source's space.
+        axis: Vec3,
+        /// The node in whose space the cone stands; the parent of the source if `None`.
+        reference: Option<Uid>,
+        /// The middle of the cone, in the reference's space.
+        towards: Vec3,
+        /// Half the opening of the cone in degrees within which the number is 1.
+        inner: f32,
+        /// Half the opening of the cone in degrees outside of which the number is 0.
+        outer: f32,
+        /// Destination of the number.
+        output: Output,
+    },
+    /// Numbers that say how near the rotation of a node is to each of some poses: at a pose its number is 1 and the
+    /// others are 0 (interpolation by radial basis functions).
+    PoseReader {
+        /// The node whose rotation counts.
+        source: Uid,
+        /// The node against which the rotation is measured; the parent of the source if `None`.
+        reference: Option<Uid>,
+        /// Rotations of the source in the reference's space, with the destinations of their numbers. No two are alike.
+        poses: Vec<(Quat, Output)>,
+        /// Angle in degrees over which the influence of a pose fades.
+        radius: f32,
+    },
+    /// A number that says how far a node has gone along a direction since it was built.
+    Travel {
+        /// The node that goes.
+        source: Uid,
+        /// The node in whose space the way is measured; the rig if `None`.
+        reference: Option<Uid>,
+        /// The direction, in the reference's space, of length 1.
+        axis: Vec3,
+        /// Factor of the way, such as degrees a unit.
+        factor: f32,
+        /// Destination of the number.
+        output: Output,
+    },
+    /// A node on a smooth curve through nodes.
+    Path {
+        /// The driven node.
+        driven: Uid,
+        /// Nodes of the curve's control points, from start to end: two or more.
+        points: Vec<Uid>,
+        /// Place on the curve as a share of its length: 0 is the start, 1 the end.
+        share: Scalar,
+        /// The axis that points along the curve and the axis that is turned up, in the node's space; `None` keeps the
+        /// node's rotation.
+        aim: Option<[Vec3; 2]>,
+        /// Up direction in the rig's space.
+        up: Vec3,
+        /// Weight: 0 leaves the node unchanged, 1 follows.
+        weight: Scalar,
+    },
+    /// A node that rides on a triangle of nodes.
+    Rivet {
+        /// The driven node.
+        driven: Uid,
+        /// Corners of the triangle.
+        corners: [Uid; 3],
+        /// Shares of the corners in the foot of the node on the triangle's plane; their sum is 1.
+        shares: [f32; 3],
+        /// The node in the frame of the triangle at its foot, whose unit of length is the rig's.
+        offset: Trs,
+        /// Weight: 0 leaves the node unchanged, 1 follows.
+        weight: Scalar,
+    },
 }
 
 impl Constraint {
@@ -401,92 +483,11 @@ impl Constraint {
             Self::DrivenKey { .. } => "driven key",
             Self::Expression { .. } => "expression",
             Self::Foot { .. } => "foot",
-        }
-    }
-
-    /// Nodes and attributes that the constraint reads, besides the nodes that it drives and their parents; with
-    /// repetitions.
-    pub fn reads(&self) -> Vec<Dependency> {
-        let mut reads = Vec::new();
-        let scalar = |reads: &mut Vec<Dependency>, scalar: &Scalar| match scalar {
-            Scalar::Attribute { node, name, .. } | Scalar::Choice { node, name, .. } => {
-                reads.push(Dependency::Attribute(*node, name.clone()));
-            }
-            // A pose offset is an input: no constraint changes it.
-            Scalar::Value(_) | Scalar::Channel { .. } => {}
-        };
-        match self {
-            Self::Transform { targets, weight, .. } | Self::Aim { targets, weight, .. } => {
-                for target in targets {
-                    reads.push(Dependency::Node(target.node));
-                    scalar(&mut reads, &target.weight);
-                }
-                scalar(&mut reads, weight);
-                if let Self::Aim { world_up: AimUp::Node(node) | AimUp::Axis(node, _), .. } = self {
-                    reads.push(Dependency::Node(*node));
-                }
-            }
-            Self::Relative { source, space, weight, .. } => {
-                reads.extend([*source, *space].map(Dependency::Node));
-                scalar(&mut reads, weight);
-            }
-            Self::TwoBone { goal, pole, weight, soft, stretch, twist, .. } => {
-                reads.extend([Some(*goal), *pole].into_iter().flatten().map(Dependency::Node));
-                [weight, soft, stretch, twist].into_iter().for_each(|number| scalar(&mut reads, number));
-            }
-            Self::Chain { goal, pole, weight, .. } => {
-                reads.extend([Some(*goal), *pole].into_iter().flatten().map(Dependency::Node));
-                scalar(&mut reads, weight);
-            }
-            Self::Spline { points, stretch, twist, weight, .. } => {
-                reads.extend(points.iter().copied().map(Dependency::Node));
-                [stretch, twist, weight].into_iter().for_each(|number| scalar(&mut reads, number));
-            }
-            Self::Twist { source, reference, driven, .. } => {
-                reads.extend([Some(*source), *reference].into_iter().flatten().map(Dependency::Node));
-                driven.iter().for_each(|(_, share)| scalar(&mut reads, share));
-            }
-            Self::Stretch { start, end, volume, weight, .. } => {
-                reads.extend([*start, *end].map(Dependency::Node));
-                [volume, weight].into_iter().for_each(|number| scalar(&mut reads, number));
-            }
-            Self::Limit { .. } => {}
-            Self::Spring { frequency, damping, weight, .. } => {
-                [frequency, damping, weight].into_iter().for_each(|number| scalar(&mut reads, number));
-            }
-            Self::DrivenKey { driver, .. } => scalar(&mut reads, driver),
-            Self::Expression { inputs, .. } => inputs.iter().for_each(|(_, number)| scalar(&mut reads, number)),
-            Self::Foot { roll, break_angle, bank, toes, swivel, .. } => {
-                [roll, break_angle, bank, swivel].into_iter().for_each(|number| scalar(&mut reads, number));
-                toes.iter().for_each(|(_, number)| scalar(&mut reads, number));
-            }
-        }
-        reads
-    }
-
-    /// Nodes and attributes that the constraint changes.
-    pub fn drives(&self) -> Vec<Dependency> {
-        let nodes = |nodes: &[Uid]| nodes.iter().copied().map(Dependency::Node).collect();
-        match self {
-            Self::Transform { driven, .. }
-            | Self::Relative { driven, .. }
-            | Self::Aim { driven, .. }
-            | Self::Limit { driven, .. }
-            | Self::Spring { driven, .. } => nodes(&[*driven]),
-            Self::TwoBone { root, mid, end, .. } => nodes(&[*root, *mid, *end]),
-            Self::Chain { joints, .. } | Self::Spline { joints, .. } => nodes(joints),
-            Self::Twist { driven, .. } => driven.iter().map(|(node, _)| Dependency::Node(*node)).collect(),
-            Self::Stretch { driven, .. } => nodes(driven),
-            Self::DrivenKey { output, .. } | Self::Expression { output, .. } => match output {
-                Output::Channel(node, _) => nodes(&[*node]),
-                Output::Attribute(node, name) => vec![Dependency::Attribute(*node, name.clone())],
-                Output::Morph(_) => Vec::new(),
-            },
-            Self::Foot { heel, toe, ball, inner, outer, toes, .. } => {
-                let lifted = toes.as_ref().map(|(node, _)| *node);
-                let all = [Some(*heel), Some(*toe), Some(*ball), *inner, *outer, lifted];
-                all.into_iter().flatten().map(Dependency::Node).collect()
-            }
+            Self::Cone { .. } => "cone reader",
+            Self::PoseReader { .. } => "pose reader",
+            Self::Travel { .. } => "travel",
+            Self::Path { .. } => "path",
+            Self::Rivet { .. } => "rivet",
         }
     }
 }

@@ -54,8 +54,8 @@ pub fn match_switch(
     state.evaluate(0.0);
     let mut attempt = Attempt { rig, state, offsets: Vec::new() };
     let kept = match &switch.matching {
-        Matching::IkFk { joints, fk, goal, goal_offset, pole } => {
-            let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
+        Matching::IkFk { joints, fk, goal, goal_offset, pole, held } => {
+            let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole, held };
             throw_limb(&mut attempt, &limb, switch, value)?
         }
         Matching::Space { control } => {
@@ -86,17 +86,22 @@ pub fn match_switch(
 /// [`MatchError`] if the program lacks a node or an attribute of the switch.
 pub(super) fn hold_limb(
     rig: &BuiltRig,
-    mut state: RigState,
+    state: RigState,
     switch: &SwitchData,
     wanted: &[Trs],
     value: f32,
 ) -> Result<RigState, MatchError> {
-    let Matching::IkFk { joints, fk, goal, goal_offset, pole } = &switch.matching else { return Ok(state) };
-    let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole };
-    state.set_attribute(switch.control, &switch.attribute, 1.0)?;
+    let Matching::IkFk { joints, fk, goal, goal_offset, pole, held } = &switch.matching else { return Ok(state) };
+    let limb = limb::Limb { joints, fk, goal: *goal, goal_offset: *goal_offset, pole: *pole, held };
     let mut attempt = Attempt { rig, state, offsets: Vec::new() };
-    limb.hold(&mut attempt, wanted, 1.0, 1.0)?;
+    let above = limb.above(&mut attempt)?;
+    attempt.state.set_attribute(switch.control, &switch.attribute, 1.0)?;
+    limb.hold(&mut attempt, wanted, &above, [1.0, 1.0])?;
     attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
+    // A control above the limb that follows the goal stands elsewhere where the goal has less of an effect.
+    if !limb.is_above_held(&mut attempt, &above)? {
+        limb.hold(&mut attempt, wanted, &above, [value, value])?;
+    }
     attempt.state.evaluate(0.0);
     Ok(attempt.state)
 }
@@ -113,6 +118,7 @@ fn throw_limb(
     let wanted = limb.joints.iter().map(|node| attempt.global(*node)).collect::<Result<Vec<Trs>, _>>()?;
     let length: f32 = wanted.windows(2).map(|pair| pair[0].translation.distance(pair[1].translation)).sum();
     let followers = followers::followers(attempt, switch, limb, 1e-4 * length);
+    let above = limb.above(attempt)?;
     let behind = followers.iter().map(|of| attempt.global(of.joint)).collect::<Result<Vec<Trs>, _>>()?;
     attempt.state.set_attribute(switch.control, &switch.attribute, value)?;
     let value = attempt.state.attribute(switch.control, &switch.attribute).unwrap_or(value);
@@ -120,11 +126,12 @@ fn throw_limb(
     for (follower, wanted) in followers.iter().zip(&behind) {
         follower.hold(attempt, wanted, length)?;
     }
-    limb.hold(attempt, &wanted, before, value)?;
+    limb.hold(attempt, &wanted, &above, [before, value])?;
     for (follower, wanted) in followers.iter().zip(&behind) {
         follower.hold(attempt, wanted, length)?;
     }
     let of_limb = limb.joints.iter().copied().zip(wanted);
+    let of_limb = of_limb.chain(limb.held.iter().copied().zip(above));
     Ok(of_limb.chain(followers.iter().map(|follower| follower.joint).zip(behind)).collect())
 }
 

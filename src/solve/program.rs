@@ -24,6 +24,7 @@ mod lower;
 mod op;
 mod order;
 mod places;
+mod readers;
 mod run;
 mod state;
 
@@ -336,6 +337,7 @@ fn run_fixed(graph: &mut Graph<'_>, fixed: &[Op]) {
         springs: &mut [] as &mut [SpringState],
         scratch: &mut Scratch::default(),
         dt: 0.0,
+        frame: None,
     };
     fixed.iter().for_each(|op| machine.run(op));
 }

@@ -191,6 +191,15 @@ impl PointSpring {
         Self { position: target, velocity: Vec3::ZERO, target, left: 0.0 }
     }
 
+    /// Keeps the point by a share in the world while the space of its target moves: `rotation` and `translation` map
+    /// places of the space before to those of the space after.
+    pub fn carry(&mut self, rotation: Quat, translation: Vec3, share: f32) {
+        let towards = |from: Vec3, to: Vec3| from + (to - from) * share;
+        self.position = towards(self.position, rotation * self.position + translation);
+        self.target = towards(self.target, rotation * self.target + translation);
+        self.velocity = towards(self.velocity, rotation * self.velocity);
+    }
+
     fn is_finite(&self) -> bool {
         self.position.is_finite() && self.velocity.is_finite() && self.target.is_finite() && self.left.is_finite()
     }

@@ -40,6 +40,9 @@ pub struct TwoBone {
     pub stretch: f32,
     /// The greatest factor by which bones lengthen; under 1 counts as 1, infinity as no limit.
     pub max_stretch: f32,
+    /// Share by which the middle joint goes to the pole and the end to the goal, 0 (not) to 1 (wholly): both bones take
+    /// the lengths that this needs. Without a pole nothing is pinned.
+    pub pin: f32,
 }
 
 /// The solved limb, in the rig's space.
@@ -53,8 +56,10 @@ pub struct TwoBoneSolution {
     pub mid: Vec3,
     /// Position of the end joint.
     pub end: Vec3,
-    /// The factor of both bones' lengths, 1 or more.
+    /// The factor of both bones' lengths before the middle joint is pinned, 1 or more.
     pub stretch: f32,
+    /// Factors of the lengths of the upper and the lower bone.
+    pub lengths: [f32; 2],
 }
 
 impl TwoBone {
@@ -114,12 +119,57 @@ impl TwoBone {
         let solved_u = (aim * along_upper + bend * height) / upper_length;
         let solved_l = (aim * along_lower - bend * height) / lower_length;
         let mid = self.root + solved_u * (upper_length * stretch);
-        TwoBoneSolution {
+        let solution = TwoBoneSolution {
             root_rotation: (between_frames([u, bend_axis], [solved_u, solved_axis]) * self.root_rotation).normalize(),
             mid_rotation: (between_frames([l, bend_axis], [solved_l, solved_axis]) * self.mid_rotation).normalize(),
             mid,
             end: mid + solved_l * (lower_length * stretch),
             stretch,
+            lengths: [stretch; 2],
+        };
+        match self.pole {
+            Some(pole) if self.pin > 0.0 && pole.distance(self.root) < 1e18 => {
+                self.pinned(&solution, pole, [u, l, bend_axis, solved_axis], [upper_length, lower_length])
+            }
+            _ => solution,
+        }
+    }
+
+    /// The solved limb with its middle joint at the pole and its end at the goal, by the share `pin` of the way.
+    ///
+    /// `posed` has the directions of both posed bones and the posed and the solved axis of the bend. Bones that would
+    /// have no length leave the limb as it is.
+    fn pinned(
+        &self,
+        solution: &TwoBoneSolution,
+        pole: Vec3,
+        [u, l, bend_axis, solved_axis]: [Vec3; 4],
+        [upper_length, lower_length]: [f32; 2],
+    ) -> TwoBoneSolution {
+        let share = self.pin.min(1.0);
+        // At its end the way is met exactly.
+        let towards = |from: Vec3, to: Vec3| if share >= 1.0 { to } else { from + (to - from) * share };
+        let (mid, end) = (towards(solution.mid, pole), towards(solution.end, self.goal));
+        let (upper, lower) = (mid - self.root, end - mid);
+        let least = 1e-6 * (upper_length + lower_length);
+        if upper.length() <= least || lower.length() <= least {
+            return *solution;
+        }
+        let (Some(to_mid), Some(to_end)) = (direction(upper), direction(lower)) else { return *solution };
+        let across = to_end.cross(to_mid);
+        let axis = match direction(across) {
+            Some(axis) if across.length_squared() > STRAIGHT * STRAIGHT => axis,
+            _ => perpendicular_or_any(to_mid, &[solved_axis]),
+        };
+        // A limb that its pole has drawn straight bends about the axis of before; it does not turn over.
+        let flat = |bone: Vec3| perpendicular_or_any(bone, &[axis]);
+        TwoBoneSolution {
+            root_rotation: (between_frames([u, bend_axis], [to_mid, flat(to_mid)]) * self.root_rotation).normalize(),
+            mid_rotation: (between_frames([l, bend_axis], [to_end, flat(to_end)]) * self.mid_rotation).normalize(),
+            mid,
+            end,
+            stretch: solution.stretch,
+            lengths: [upper.length() / upper_length, lower.length() / lower_length],
         }
     }
 
@@ -152,6 +202,7 @@ impl TwoBone {
             mid: finite(self.mid),
             end: finite(self.end),
             stretch: 1.0,
+            lengths: [1.0; 2],
         }
     }
 }

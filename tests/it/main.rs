@@ -25,6 +25,7 @@ mod cli_site;
 #[cfg(feature = "cli")]
 mod cli_templates;
 mod commands;
+mod control_sizes;
 mod custom_module;
 #[cfg(feature = "draw")]
 mod display;

@@ -56,6 +56,7 @@ impl RigModule for Knob {
             color: [1.0; 3],
             size: 0.1,
             offset: Trs::IDENTITY,
+            fits: false,
             channels: Default::default(),
             limits: Limits::default(),
         };

@@ -1,7 +1,10 @@
 //! The templates that come with the crate: they stand as they rest, and move as an animator expects.
 
 mod biped;
+mod freedom;
+mod library;
 mod limbs;
+mod machines;
 mod off;
 mod switches;
 mod trunk;

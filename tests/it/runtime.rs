@@ -4,6 +4,7 @@ pub mod biped;
 mod constraints;
 mod layouts;
 mod programs;
+mod readers;
 mod refusals;
 mod systems;
 

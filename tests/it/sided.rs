@@ -64,6 +64,21 @@ const SIDED: &[(&str, &str, &str)] = &[
     ("space_switch", "(names: [\"hand_l\", \"root\"])", "(names: [\"hand_r\",\"root\"])"),
     ("spline_ik", "(twist: 5.0)", "(twist: -5.0)"),
     ("stretch", "(axis: (1.0, 1.0, 0.0))", "(axis: (-1.0,1.0,0.0))"),
+    (
+        "cone_reader",
+        "(axis: x, towards: (0.5, 1.0, 0.0), output_attribute: \"up_l\")",
+        "(axis: neg_x, towards: (-0.5,1.0,0.0), output_attribute: \"up_r\")",
+    ),
+    ("cone_reader", "(morph: \"arm_l\")", "(morph: \"arm_r\")"),
+    (
+        "path",
+        "(aim: x, up_axis: neg_y, direction: (0.5, 1.0, 0.0))",
+        "(aim: neg_x, up_axis: neg_y, direction: (-0.5,1.0,0.0))",
+    ),
+    ("path", "(aim: z, up_axis: x)", "(aim: z, up_axis: neg_x)"),
+    ("piston", "(up_axis: x, direction: (0.5, 1.0, 0.0))", "(up_axis: neg_x, direction: (-0.5,1.0,0.0))"),
+    ("rbf_reader", "(poses: [(rotate: (1.0, 2.0, 3.0), attribute: \"up_l\", channel: None, morph: \"\")])", ""),
+    ("wheel", "(direction: (0.5, 0.0, 1.0), channel: RotateY, reverse: true)", ""),
 ];
 
 #[test]

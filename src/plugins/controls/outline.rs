@@ -2,7 +2,7 @@
 
 use bevy::{ecs::system::SystemParam, math::Affine3A, prelude::*};
 
-use super::NodeVisible;
+use super::{NodeVisible, size::ShapeFactor};
 use crate::{
     algo::view::ViewPlane,
     plugins::schema::{Control, NodeLayer, RigNodes},
@@ -34,17 +34,18 @@ type Node = (
     &'static GlobalTransform,
     Option<&'static NodeVisible>,
     Option<&'static NodeLayer>,
+    Option<&'static ShapeFactor>,
 );
 
 impl ControlNodes<'_, '_> {
     /// Visible controls of a rig, in the order of its nodes. `to_rig` transforms world space to rig space.
     pub fn visible(&self, nodes: Option<&RigNodes>, to_rig: Affine3A) -> Vec<ControlOutline> {
         let controls = nodes.into_iter().flat_map(|nodes| nodes.iter()).filter_map(|node| self.nodes.get(node).ok());
-        let visible = controls.filter(|(_, _, _, visible, _)| visible.is_none_or(|visible| visible.0));
+        let visible = controls.filter(|(_, _, _, visible, ..)| visible.is_none_or(|visible| visible.0));
         visible
-            .map(|(uid, control, place, _, layer)| ControlOutline {
+            .map(|(uid, control, place, _, layer, factor)| ControlOutline {
                 uid: *uid,
-                lines: lines_of(&control.0, to_rig * place.affine()),
+                lines: sized_lines(&control.0, to_rig * place.affine(), factor.map_or(1.0, |factor| factor.0)),
                 color: layer.and_then(|layer| layer.0.color).unwrap_or(control.0.color),
                 display: layer.map_or(LayerDisplay::Normal, |layer| layer.0.display),
             })
@@ -55,9 +56,15 @@ impl ControlNodes<'_, '_> {
 /// Polylines of a control's shape, transformed by the control's `place`. A shape that is not in the library is a
 /// circle.
 pub fn lines_of(control: &ControlData, place: Affine3A) -> Vec<Vec<Vec3>> {
+    sized_lines(control, place, 1.0)
+}
+
+/// The same, with the shape enlarged by a factor.
+fn sized_lines(control: &ControlData, place: Affine3A, factor: f32) -> Vec<Vec<Vec3>> {
+    let size = control.size * factor;
     let place = place * control.offset.affine();
     let lines = shape(&control.shape).or_else(|| shape("circle")).unwrap_or_default();
-    let moved = |point: &Vec3| place.transform_point3(*point * control.size);
+    let moved = |point: &Vec3| place.transform_point3(*point * size);
     lines.iter().map(|line| line.iter().map(moved).collect()).collect()
 }
 

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     plugins::{
-        controls::{ControlsInUse, NodeVisible, outline::ControlNodes},
+        controls::{ControlsInUse, NodeVisible, outline::ControlNodes, size::ShapeFactor},
         document::{Hovered, Joint, JointEntities, NodeOf, Selection, Symmetry},
         schema::{Control, NodeLayer, RigNodes},
         surface::{RigMesh, RigMeshes},
@@ -196,7 +196,8 @@ pub(super) fn frame_planes(
 }
 
 /// A node that looks otherwise than in the frame before.
-type NodeRedrawn = Or<(Changed<GlobalTransform>, Changed<NodeVisible>, Changed<Control>, Changed<NodeLayer>)>;
+type NodeRedrawn =
+    Or<(Changed<GlobalTransform>, Changed<NodeVisible>, Changed<Control>, Changed<NodeLayer>, Changed<ShapeFactor>)>;
 
 /// Builds the pictures of rigs.
 pub(super) fn draw_rigs(

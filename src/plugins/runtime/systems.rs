@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::{ControlPose, DrivenMorphs, InstanceMode, NodeOf, NodeSlot, RigRuntime, spawn::transform};
 use crate::{
+    mesh::model::Trs,
     plugins::schema::Attributes,
     rig::{PoseOffset, RestTransform},
     solve::program::{LANES, RigState},
@@ -38,6 +39,24 @@ pub(super) fn note_controls(
             if let Ok(mut runtime) = rigs.get_mut(*rig) {
                 runtime.bypass_change_detection().is_due = true;
             }
+        }
+    }
+}
+
+/// Tells springs how their rigs have moved in the world since the last run.
+pub(super) fn feel_motion(mut rigs: Query<(Entity, &mut RigRuntime)>, places: TransformHelper) {
+    for (entity, mut runtime) in &mut rigs {
+        if !runtime.state.program().has_springs() {
+            continue;
+        }
+        let Ok(world) = places.compute_global_transform(entity) else { continue };
+        let (now, runtime) = (world.affine(), runtime.bypass_change_detection());
+        match runtime.world.replace(now) {
+            Some(before) if before != now => {
+                let (scale, rotation, translation) = (before.inverse() * now).to_scale_rotation_translation();
+                runtime.state.move_frame(&Trs { translation, rotation, scale });
+            }
+            _ => {}
         }
     }
 }

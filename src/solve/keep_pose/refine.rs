@@ -31,13 +31,23 @@ impl PoseKeeper {
             let columns: Vec<Vec<f64>> = (0..count)
                 .map(|number| {
                     let (slot, offset) = (handles[number / SIX], attempt.offset_at(handles[number / SIX]));
-                    let mut change = [0.0; SIX];
-                    change[number % SIX] = STEP;
-                    attempt.set_offset_at(slot, self.changed(&offset, &change));
+                    // A control at the end of its range moves the other way only.
+                    let is_moved = [STEP, -STEP].into_iter().find(|step| {
+                        let mut change = [0.0; SIX];
+                        change[number % SIX] = *step;
+                        attempt.set_offset_at(slot, self.changed(&offset, &change));
+                        let now = attempt.offset_at(slot);
+                        let turned = (offset.rotation.conjugate() * now.rotation).xyz().length();
+                        now.translation.distance(offset.translation) / self.size + 2.0 * turned > 0.5 * STEP
+                    });
+                    let Some(step) = is_moved else {
+                        attempt.set_offset_at(slot, offset);
+                        return vec![0.0; residual.len()];
+                    };
                     attempt.evaluate(0.0);
                     let moved = self.residual(attempt, &joints, targets);
                     attempt.set_offset_at(slot, offset);
-                    moved.iter().zip(&residual).map(|(moved, was)| (moved - was) / f64::from(STEP)).collect()
+                    moved.iter().zip(&residual).map(|(moved, was)| (moved - was) / f64::from(step)).collect()
                 })
                 .collect();
             attempt.evaluate(0.0);

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Attempt, MatchError, number};
+use super::{Attempt, MatchError, angle_between, number};
 use crate::{
     mesh::model::Trs,
     rig::{Constraint, Scalar, Uid},
@@ -16,15 +16,64 @@ pub(super) struct Limb<'a> {
     pub goal: Uid,
     pub goal_offset: Trs,
     pub pole: Option<Uid>,
+    /// Controls above the limb that keep their place.
+    pub held: &'a [Uid],
 }
 
 /// Tolerance of the end's position, as a share of the limb's length. The elbow of an almost straight limb moves many
 /// times as far as its end.
 const NEAR: f32 = 1e-6;
 
+/// Rounds in which the controls above a limb and its own are brought to agree.
+const ROUNDS: usize = 2;
+
 impl Limb<'_> {
-    /// Poses the controls so that the joints have the rig transforms `wanted` with the attribute at `after`.
-    pub fn hold(&self, attempt: &mut Attempt<'_>, wanted: &[Trs], before: f32, after: f32) -> Result<(), MatchError> {
+    /// Poses the controls so that the joints have the rig transforms `wanted`, and the controls above the limb those of
+    /// `above`, with the attribute at `after`.
+    pub fn hold(
+        &self,
+        attempt: &mut Attempt<'_>,
+        wanted: &[Trs],
+        above: &[Trs],
+        [before, after]: [f32; 2],
+    ) -> Result<(), MatchError> {
+        self.hold_limb(attempt, wanted, [before, after])?;
+        // A control above the limb may turn with the goal, and carries the limb.
+        for _ in 0..ROUNDS {
+            if self.is_above_held(attempt, above)? {
+                break;
+            }
+            for (control, wanted) in self.held.iter().zip(above) {
+                attempt.place(*control, wanted, None)?;
+            }
+            self.hold_limb(attempt, wanted, [before, after])?;
+        }
+        Ok(())
+    }
+
+    /// Rig transforms of the controls above the limb.
+    pub fn above(&self, attempt: &mut Attempt<'_>) -> Result<Vec<Trs>, MatchError> {
+        self.held.iter().map(|control| attempt.global(*control)).collect()
+    }
+
+    /// True if the controls above the limb have the rig transforms `above`.
+    pub fn is_above_held(&self, attempt: &mut Attempt<'_>, above: &[Trs]) -> Result<bool, MatchError> {
+        for (control, wanted) in self.held.iter().zip(above) {
+            let now = attempt.global(*control)?;
+            let near = 1e-6 * wanted.translation.length().max(1e-3);
+            if now.translation.distance(wanted.translation) > near || angle_between(&now, wanted) >= 1e-3 {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn hold_limb(
+        &self,
+        attempt: &mut Attempt<'_>,
+        wanted: &[Trs],
+        [before, after]: [f32; 2],
+    ) -> Result<(), MatchError> {
         let length: f32 = wanted.windows(2).map(|pair| pair[0].translation.distance(pair[1].translation)).sum();
         // The solver starts from the forward pose, so that pose has to agree unless it held the limb alone before.
         if after < 1.0 || before > 0.0 {
@@ -117,6 +166,9 @@ impl Limb<'_> {
         length: f32,
     ) -> Result<Vec3, MatchError> {
         let [root, mid, end] = [wanted[0], wanted[1], wanted[2]];
+        if solver.pin.as_ref().is_some_and(|pin| number(attempt, pin) > 0.0) {
+            return Ok(mid.translation);
+        }
         let built = |node: Option<Uid>| node.and_then(|node| attempt.built(node)).map(|global| global.translation);
         let far = match (built(self.pole), built(self.joints.get(1).copied())) {
             (Some(pole), Some(mid)) => pole.distance(mid),
@@ -148,6 +200,8 @@ struct Solver {
     is_soft: bool,
     prefer: Vec3,
     twist: Option<Scalar>,
+    /// The middle joint goes to the pole by this share.
+    pin: Option<Scalar>,
 }
 
 impl Solver {
@@ -155,7 +209,7 @@ impl Solver {
         let root_of = joints.first().copied();
         for built in &attempt.rig.constraints {
             match &*built.constraint {
-                Constraint::TwoBone { root, goal, orient_end, soft, prefer, twist, .. }
+                Constraint::TwoBone { root, goal, orient_end, soft, prefer, twist, pin, .. }
                     if Some(*root) == root_of && *goal == goal_of =>
                 {
                     let is_soft = *soft != Scalar::Value(0.0);
@@ -164,16 +218,17 @@ impl Solver {
                         is_soft,
                         prefer: *prefer,
                         twist: Some(twist.clone()),
+                        pin: Some(pin.clone()),
                     };
                 }
                 Constraint::Chain { joints: chain, goal, orient_end, .. } if chain == joints && *goal == goal_of => {
                     let orients = orient_end.is_some();
-                    return Self { orients, is_soft: false, prefer: Vec3::ZERO, twist: None };
+                    return Self { orients, is_soft: false, prefer: Vec3::ZERO, twist: None, pin: None };
                 }
                 _ => {}
             }
         }
-        Self { orients: true, is_soft: false, prefer: Vec3::ZERO, twist: None }
+        Self { orients: true, is_soft: false, prefer: Vec3::ZERO, twist: None, pin: None }
     }
 }
 

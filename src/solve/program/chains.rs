@@ -44,6 +44,7 @@ pub(super) fn two_bone<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
         soft: machine.n(op.soft),
         stretch: machine.n(op.stretch),
         max_stretch: op.max_stretch,
+        pin: machine.n(op.pin),
     }
     .solve();
     let twist = machine.n(op.twist);
@@ -59,8 +60,8 @@ pub(super) fn two_bone<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     after[0].rotation = (parent.rotation.conjugate() * upper).normalize();
     after[1].rotation = (upper.conjugate() * lower).normalize();
     // Bones keep their direction in the joint above, whatever its scale.
-    after[1].translation = before[1].translation * solution.stretch;
-    after[2].translation = before[2].translation * solution.stretch;
+    after[1].translation = before[1].translation * solution.lengths[0];
+    after[2].translation = before[2].translation * solution.lengths[1];
     if let Some(offset) = op.orient_end {
         after[2].rotation = (lower.conjugate() * (goal.rotation * offset)).normalize();
     }

@@ -11,6 +11,7 @@ use crate::{
     mesh::model::Trs,
     solve::{
         aim::Up,
+        collider::Capsule,
         rotate::{EulerOrder, arc, direction, slerp},
         spring::{PointSpring, Spring},
         weights::{blend, blend_points, relative},
@@ -135,9 +136,24 @@ pub(super) fn spring<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
     let weight = share(machine.n(op.weight));
     let motion = Spring { frequency: machine.n(op.frequency), damping: machine.n(op.damping) };
     let dt = machine.dt;
+    let frame = machine.frame.map(|frame| (frame, share(machine.n(op.motion))));
+    let bodies = &machine.tables.colliders[op.colliders.range()];
+    let capsules = bodies.iter().map(|body| Capsule {
+        start: machine.registers.x(body.start).translation,
+        end: machine.registers.x(body.end).translation,
+        radius: body.radius,
+    });
+    machine.scratch.capsules.clear();
+    machine.scratch.capsules.extend(capsules);
     let state = &mut machine.springs[op.state as usize];
+    if let Some((frame, felt)) = frame
+        && felt > 0.0
+    {
+        state.origin.carry(frame.rotation, frame.translation, felt);
+        state.tip.carry(frame.rotation, frame.translation, felt);
+    }
     let wanted = place(&parent, &input);
-    let sprung = swing(op, &motion, state, &wanted, dt);
+    let sprung = swing(op, &motion, state, &wanted, dt, &machine.scratch.capsules);
     let local = if weight > 0.0 {
         let local = relative(&parent, &sprung);
         let mut out = input;
@@ -155,7 +171,7 @@ pub(super) fn spring<R: Registers>(machine: &mut Machine<'_, R>, at: u32) {
 }
 
 /// Rig transform of a spring whose target is `wanted`.
-fn swing(op: &SpringOp, motion: &Spring, state: &mut SpringState, wanted: &Trs, dt: f32) -> Trs {
+fn swing(op: &SpringOp, motion: &Spring, state: &mut SpringState, wanted: &Trs, dt: f32, bodies: &[Capsule]) -> Trs {
     let mut out = *wanted;
     if !state.started {
         *state = SpringState { started: true, ..SpringState::default() };
@@ -167,12 +183,47 @@ fn swing(op: &SpringOp, motion: &Spring, state: &mut SpringState, wanted: &Trs, 
     }
     if let Some(tip) = op.tip {
         let arm = wanted.rotation * (wanted.scale * tip);
-        let swung = advance(motion, &mut state.tip, out.translation + arm, dt, arm.length());
+        // Time passes from where the bodies left the point; without time nothing of it changes.
+        if dt > 0.0 {
+            stop_at(bodies, &mut state.tip, out.translation);
+        }
+        let free = advance(motion, &mut state.tip, out.translation + arm, dt, arm.length());
+        let swung = match direction(free - out.translation) {
+            Some(way) if !bodies.is_empty() => outside(bodies, out.translation + way * arm.length(), out.translation),
+            _ => free,
+        };
         if let (Some(from), Some(to)) = (direction(arm), direction(swung - out.translation)) {
             out.rotation = (arc(from, to, Vec3::ZERO) * wanted.rotation).normalize();
         }
     }
     out
+}
+
+/// Rounds in which a bone of fixed length leaves all bodies.
+const ROUNDS: usize = 8;
+
+/// The end of a bone of fixed length from `origin`, turned out of all bodies.
+fn outside(bodies: &[Capsule], end: Vec3, origin: Vec3) -> Vec3 {
+    let mut point = end;
+    for _ in 0..ROUNDS {
+        let before = point;
+        point = bodies.iter().fold(point, |point, body| body.turn_out(origin, point));
+        if point == before {
+            break;
+        }
+    }
+    point
+}
+
+/// Takes a point out of all bodies, and stops its motion into them.
+fn stop_at(bodies: &[Capsule], state: &mut PointSpring, origin: Vec3) {
+    for body in bodies {
+        let pushed = body.push_out(state.position, state.position - origin);
+        if let Some(way) = direction(pushed - state.position) {
+            state.position = pushed;
+            state.velocity -= way * state.velocity.dot(way).min(0.0);
+        }
+    }
 }
 
 /// Advances a point; stops it when its motion is too small to be seen.

@@ -154,12 +154,10 @@ impl<'a> Graph<'a> {
     fn declare_attributes(&mut self) {
         let mut driven: Vec<(Uid, &str)> = Vec::new();
         for constraint in &self.rig.constraints {
-            use crate::rig::Constraint::{DrivenKey, Expression};
-            if let DrivenKey { output, .. } | Expression { output, .. } = &*constraint.constraint
-                && let Output::Attribute(node, name) = output
-            {
-                driven.push((*node, name));
-            }
+            driven.extend(constraint.constraint.outputs().filter_map(|output| match output {
+                Output::Attribute(node, name) => Some((*node, &**name)),
+                _ => None,
+            }));
         }
         for (at, node) in self.rig.nodes.iter().enumerate() {
             for (number, attribute) in node.attributes.iter().enumerate() {

@@ -1,6 +1,7 @@
 //! Lowering of constraints to operations.
 
 mod chains;
+mod readers;
 
 use std::sync::Arc;
 
@@ -18,7 +19,7 @@ use super::{
 };
 use crate::{
     mesh::model::Trs,
-    rig::{AimUp, AngleLimits, Constraint, KeyEase, Output, Scalar, Target, Uid},
+    rig::{AimUp, AngleLimits, Collider, Constraint, KeyEase, Output, Scalar, Target, Uid},
     solve::{
         aim::Aim,
         curve::{Curve, CurveKey, Extrapolation, Interpolation},
@@ -110,8 +111,8 @@ impl Lower<'_, '_> {
                 self.push(Op::Limit(at as u32), node);
                 Ok(())
             }
-            Constraint::Spring { driven, frequency, damping, weight, translate, rotate } => {
-                self.spring(*driven, [frequency, damping, weight], *translate, *rotate)
+            Constraint::Spring { driven, frequency, damping, weight, translate, rotate, motion, colliders } => {
+                self.spring(*driven, [frequency, damping, weight, motion], *translate, *rotate, colliders)
             }
             Constraint::DrivenKey { driver, keys, ease, output } => {
                 let interpolation = match ease {
@@ -142,6 +143,11 @@ impl Lower<'_, '_> {
                 self.output(Op::Expression(at as u32), output, out)
             }
             Constraint::Foot { .. } => self.foot(),
+            Constraint::Cone { .. }
+            | Constraint::PoseReader { .. }
+            | Constraint::Travel { .. }
+            | Constraint::Path { .. }
+            | Constraint::Rivet { .. } => self.reader(),
         }
     }
 
@@ -282,9 +288,10 @@ impl Lower<'_, '_> {
     fn spring(
         &mut self,
         driven: Uid,
-        [frequency, damping, weight]: [&Scalar; 3],
+        [frequency, damping, weight, motion]: [&Scalar; 4],
         translate: bool,
         rotate: bool,
+        colliders: &[Collider],
     ) -> Result<(), ProgramError> {
         let node = self.driven("driven node", driven)?;
         let rig = self.graph.rig;
@@ -293,10 +300,25 @@ impl Lower<'_, '_> {
         let tip = Some(if count > 0.0 { sum / count } else { Vec3::Y }).filter(|_| rotate);
         let tip = tip.map(|tip| if tip.length_squared() > 0.0 { tip } else { Vec3::Y });
         let [frequency, damping, weight] = [self.scalar(frequency)?, self.scalar(damping)?, self.scalar(weight)?];
+        let motion = self.scalar(motion)?;
+        let colliders = self.colliders(colliders)?;
         let (input, out) = self.graph.take_local(node, self.at, translate);
         let (parent, state) = (self.graph.parent(node), self.graph.tables.springs.len() as u32);
         let constraint = rig.constraints[self.at].uid;
-        let op = SpringOp { constraint, input, parent, frequency, damping, weight, translate, tip, state, out };
+        let op = SpringOp {
+            constraint,
+            input,
+            parent,
+            frequency,
+            damping,
+            weight,
+            motion,
+            colliders,
+            translate,
+            tip,
+            state,
+            out,
+        };
         self.graph.tables.springs.push(op);
         self.push(Op::Spring(state), node);
         Ok(())
@@ -358,22 +380,29 @@ impl Lower<'_, '_> {
         Ok(out)
     }
 
-    /// Writes a calculated number to its output.
+    /// Adds the operation that calculates a number, and writes the number to its output.
     fn output(&mut self, op: Op, output: &Output, value: N) -> Result<(), ProgramError> {
+        let node = match output {
+            Output::Channel(node, _) | Output::Attribute(node, _) => self.driven("driven node", *node)?,
+            Output::Morph(_) => self.graph.rig.nodes.len(),
+        };
+        self.push(op, node);
+        self.write(output, value)
+    }
+
+    /// Writes a calculated number to its output.
+    fn write(&mut self, output: &Output, value: N) -> Result<(), ProgramError> {
         match output {
             Output::Channel(node, channel) => {
                 let node = self.driven("driven node", *node)?;
-                self.push(op, node);
                 self.graph.drive_channel(node, self.at, *channel, value);
                 Ok(())
             }
             Output::Attribute(node, name) => {
                 let node = self.driven("driven node", *node)?;
-                self.push(op, node);
                 self.graph.drive_attribute(self.at, node, name, value)
             }
             Output::Morph(name) => {
-                self.push(op, self.graph.rig.nodes.len());
                 self.graph.drive_morph(name, value);
                 Ok(())
             }

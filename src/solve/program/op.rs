@@ -5,9 +5,11 @@
 //! only those whose inputs changed gives the same bits as running all.
 
 mod operands;
+mod readers;
 mod same;
 
 pub(super) use operands::Operand;
+pub(super) use readers::{ColliderReg, ConeOp, PathOp, ReaderOp, RivetOp, TravelOp};
 
 use std::sync::Arc;
 
@@ -152,6 +154,11 @@ pub(super) enum Op {
     Spline(u32),
     Limit(u32),
     Spring(u32),
+    Cone(u32),
+    Reader(u32),
+    Travel(u32),
+    Path(u32),
+    Rivet(u32),
 }
 
 /// Parameters of operations.
@@ -177,6 +184,12 @@ pub(super) struct Tables {
     pub splines: Vec<SplineOp>,
     pub limits: Vec<LimitOp>,
     pub springs: Vec<SpringOp>,
+    pub colliders: Vec<ColliderReg>,
+    pub cones: Vec<ConeOp>,
+    pub readers: Vec<ReaderOp>,
+    pub travels: Vec<TravelOp>,
+    pub paths: Vec<PathOp>,
+    pub rivets: Vec<RivetOp>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -291,6 +304,7 @@ pub(super) struct TwoBoneOp {
     pub stretch: N,
     pub max_stretch: f32,
     pub twist: N,
+    pub pin: N,
     pub orient_end: Option<Quat>,
 }
 
@@ -346,6 +360,8 @@ pub(super) struct SpringOp {
     pub frequency: N,
     pub damping: N,
     pub weight: N,
+    pub motion: N,
+    pub colliders: Span,
     pub translate: bool,
     /// Position of the node's children in its own space, if the spring swings.
     pub tip: Option<Vec3>,

@@ -6,6 +6,7 @@ use super::{
     chains, constraints,
     op::{N, Op, Pose, Span, Tables, X},
     places::{Place, times, unit},
+    readers,
     state::SpringState,
 };
 use crate::{
@@ -13,6 +14,7 @@ use crate::{
     rig::{Channel, PoseOffset},
     solve::{
         ccd::CcdJoint,
+        collider::Capsule,
         foot::FootControls,
         rotate::{EulerOrder, about},
         stretch::Stretch,
@@ -32,6 +34,7 @@ pub(super) struct Scratch {
     pub posed: Vec<(Vec3, Quat)>,
     pub joints: Vec<CcdJoint>,
     pub values: Vec<f32>,
+    pub capsules: Vec<Capsule>,
 }
 
 /// Transforms and numbers of one instance.
@@ -110,6 +113,8 @@ pub(super) struct Machine<'a, R> {
     pub scratch: &'a mut Scratch,
     /// Seconds since the last run.
     pub dt: f32,
+    /// Map from the rig's space of the last run to that of now, both seen from the world; `None` if the rig stands still.
+    pub frame: Option<Trs>,
 }
 
 impl<R: Registers> Machine<'_, R> {
@@ -238,6 +243,11 @@ impl<R: Registers> Machine<'_, R> {
             Op::Spline(at) => chains::spline(self, at),
             Op::Limit(at) => constraints::limit(self, at),
             Op::Spring(at) => constraints::spring(self, at),
+            Op::Cone(at) => readers::cone(self, at),
+            Op::Reader(at) => readers::poses(self, at),
+            Op::Travel(at) => readers::travel(self, at),
+            Op::Path(at) => readers::path(self, at),
+            Op::Rivet(at) => readers::rivet(self, at),
         }
     }
 

@@ -67,6 +67,8 @@ pub struct RigState {
     memory: Memory,
     poses: Vec<PoseOffset>,
     springs: Vec<SpringState>,
+    /// Map from the rig's space of the last evaluation to that of now, both seen from the world.
+    frame: Option<Trs>,
     /// Registers; only the first of them with [`Memory::Results`].
     x: Vec<Trs>,
     n: Vec<f32>,
@@ -125,8 +127,9 @@ impl Workspace {
     fn run(&mut self, state: &mut RigState, first: usize, dt: f32) {
         let registers =
             Alone::<false> { x: &mut self.x, n: &mut self.n, poses: &state.poses, changed: false, moved: &mut [] };
-        let RigState { program, springs, .. } = state;
-        let mut machine = Machine { tables: &program.tables, registers, springs, scratch: &mut self.scratch, dt };
+        let RigState { program, springs, frame, .. } = state;
+        let (tables, scratch) = (&program.tables, &mut self.scratch);
+        let mut machine = Machine { tables, registers, springs, scratch, dt, frame: *frame };
         program.ops[first..].iter().for_each(|op| machine.run(op));
     }
 }
@@ -154,6 +157,7 @@ impl RigState {
             memory,
             poses: vec![PoseOffset::IDENTITY; program.poses],
             springs: vec![SpringState::default(); program.layout.spring_ops.len()],
+            frame: None,
             x: program.x[..transforms].to_vec(),
             n: program.n[..numbers].to_vec(),
             dirty: vec![0; operations.div_ceil(64)],
@@ -176,7 +180,25 @@ impl RigState {
 
     /// Returns `true` if an evaluation would change anything: an input changed, or, if time passes, a spring moves.
     pub fn is_dirty(&self, dt: f32) -> bool {
-        self.any_dirty || (dt > 0.0 && self.springs.iter().any(|spring| !spring.is_settled()))
+        self.any_dirty || self.frame.is_some() || (dt > 0.0 && self.springs.iter().any(|spring| !spring.is_settled()))
+    }
+
+    /// Tells that the rig has moved in the world since the last evaluation: `motion` is the rig's space of now, seen from
+    /// that of before. Springs that feel it stay behind. Several motions before an evaluation add up; the scale of the
+    /// motion counts for nothing, and one that is not finite is left out.
+    pub fn move_frame(&mut self, motion: &Trs) {
+        let rotation = motion.rotation.conjugate().normalize();
+        let back = Trs { translation: rotation * -motion.translation, rotation, scale: Vec3::ONE };
+        if self.springs.is_empty() || !valid(&back) {
+            return;
+        }
+        let before = self.frame.unwrap_or(Trs::IDENTITY);
+        let frame = Trs {
+            translation: rotation * before.translation + back.translation,
+            rotation: (rotation * before.rotation).normalize(),
+            scale: Vec3::ONE,
+        };
+        self.frame = Some(frame);
     }
 
     /// Makes the next evaluation run everything.
@@ -334,13 +356,15 @@ impl RigState {
     fn settle(&mut self) {
         self.any_dirty = false;
         self.all_dirty = false;
+        self.frame = None;
     }
 
     fn evaluate_whole(&mut self, dt: f32, scratch: &mut Scratch) {
-        let Self { program, dirty, x, n, poses, springs, moved, .. } = self;
-        if dt > 0.0 {
+        let Self { program, dirty, x, n, poses, springs, moved, frame, .. } = self;
+        let frame = *frame;
+        if dt > 0.0 || frame.is_some() {
             for (op, state) in program.layout.spring_ops.iter().zip(springs.iter()) {
-                if *op != u32::MAX && !state.is_settled() {
+                if *op != u32::MAX && (frame.is_some() || !state.is_settled()) {
                     mark(dirty, &[*op]);
                 }
             }
@@ -351,13 +375,13 @@ impl RigState {
             moved.fill(u64::MAX);
             let tables = &program.tables;
             let registers = Alone::<false> { x, n, poses, changed: false, moved: &mut [] };
-            let mut machine = Machine { tables, registers, springs, scratch, dt };
+            let mut machine = Machine { tables, registers, springs, scratch, dt, frame };
             program.ops.iter().for_each(|op| machine.run(op));
             return;
         }
         let tables = &program.tables;
         let registers = Alone::<true> { x, n, poses, changed: false, moved };
-        let mut machine = Machine { tables, registers, springs, scratch, dt };
+        let mut machine = Machine { tables, registers, springs, scratch, dt, frame };
         for word in 0..dirty.len() {
             while dirty[word] != 0 {
                 let bit = dirty[word].trailing_zeros() as usize;

@@ -271,6 +271,7 @@ fn limb(rig: &mut RigBuilder, name: &str, parent: [&str; 2], places: [Vec3; 4], 
         stretch: Scalar::attribute(node, "stretch"),
         max_stretch: 2.0,
         twist: Scalar::Value(0.0),
+        pin: Scalar::Value(0.0),
         orient_end: Some(end),
     });
     for part in parts {

@@ -156,6 +156,7 @@ fn arm(change: impl FnOnce(&mut Constraint)) -> RigBuilder {
         stretch: Scalar::Value(0.0),
         max_stretch: 3.0,
         twist: Scalar::Value(0.0),
+        pin: Scalar::Value(0.0),
         orient_end: Some(Quat::IDENTITY),
     };
     change(&mut constraint);
@@ -359,6 +360,8 @@ fn a_spring_lags_swings_and_settles() {
         weight: Scalar::Value(1.0),
         translate: false,
         rotate: true,
+        motion: Scalar::Value(0.0),
+        colliders: Vec::new(),
     });
     let mut state = state(&rig);
     assert!(!state.evaluate(0.1), "nothing moves, so nothing runs");

@@ -5,11 +5,14 @@ use std::sync::Arc;
 
 use bevy::math::{Quat, Vec3};
 use rigsmith::{
+    mesh::model::Trs,
     modules,
     processor::Builder,
-    rig::{BuiltRig, Constraint, PoseOffset, Scalar},
+    rig::{BuiltRig, Channel, Collider, Constraint, NodeType, Output, PoseOffset, Scalar},
     solve::program::{Carry, CompileOptions, ProgramCache, RigProgram, RigState},
 };
+
+use super::{biped::RigBuilder, controls, turned};
 
 /// Everything in a program but its number.
 fn content(program: &RigProgram) -> String {
@@ -134,4 +137,138 @@ fn exchanged_programs_run_what_differs() {
     let moved: Vec<usize> = state.moved().collect();
     assert!(moved.contains(&finger), "{moved:?}");
     assert!(moved.len() < 40, "{} nodes moved", moved.len());
+}
+
+/// Readers, springs with bodies, and nodes on curves and triangles, between a few controls.
+fn readers() -> RigBuilder {
+    let places = [("a", Vec3::ZERO), ("b", Vec3::X), ("c", Vec3::Y), ("d", Vec3::new(0.3, 0.2, 1.0))];
+    let mut rig = controls(&places);
+    for label in ["ear", "train", "button", "wheel", "lid", "brow"] {
+        rig.node(label, NodeType::Joint, "a", Vec3::new(0.2, 0.4, 0.1));
+    }
+    rig.node("tip", NodeType::Joint, "ear", Vec3::new(0.2, 1.4, 0.1));
+    let uid = |label: &str| rig.uid(label);
+    let channel = |label: &str, channel| Output::Channel(uid(label), channel);
+    let list = [
+        Constraint::Spring {
+            driven: uid("ear"),
+            frequency: Scalar::Value(2.0),
+            damping: Scalar::Value(0.45),
+            weight: Scalar::Value(1.0),
+            translate: false,
+            rotate: true,
+            motion: Scalar::Value(0.6),
+            colliders: vec![Collider { node: uid("b"), end: Some(uid("c")), radius: 0.2 }],
+        },
+        Constraint::Cone {
+            source: uid("a"),
+            axis: Vec3::Y,
+            reference: None,
+            towards: Vec3::Y,
+            inner: 5.0,
+            outer: 60.0,
+            output: channel("lid", Channel::RotateX),
+        },
+        Constraint::PoseReader {
+            source: uid("b"),
+            reference: Some(uid("a")),
+            poses: vec![
+                (Quat::IDENTITY, channel("lid", Channel::RotateY)),
+                (Quat::from_rotation_x(0.6), channel("brow", Channel::RotateZ)),
+            ],
+            radius: 30.0,
+        },
+        Constraint::Travel {
+            source: uid("d"),
+            reference: None,
+            axis: Vec3::Z,
+            factor: 30.0,
+            output: channel("wheel", Channel::RotateX),
+        },
+        Constraint::Path {
+            driven: uid("train"),
+            points: ["a", "b", "c"].map(uid).to_vec(),
+            share: Scalar::Value(0.4),
+            aim: Some([Vec3::Z, Vec3::Y]),
+            up: Vec3::Z,
+            weight: Scalar::Value(0.9),
+        },
+        Constraint::Rivet {
+            driven: uid("button"),
+            corners: ["a", "b", "c"].map(uid),
+            shares: [0.5, 0.25, 0.25],
+            offset: Trs { translation: Vec3::Z * 0.1, ..Trs::IDENTITY },
+            weight: Scalar::Value(0.8),
+        },
+    ];
+    list.into_iter().for_each(|constraint| _ = rig.constrain(constraint));
+    rig
+}
+
+/// Every number of a reader reaches programs that share its layout.
+#[test]
+fn numbers_of_readers_reach_programs_of_their_layout() {
+    type Change = fn(&mut Constraint);
+    macro_rules! set {
+        ($kind:ident { $field:ident } => $value:expr) => {
+            |constraint: &mut Constraint| match constraint {
+                Constraint::$kind { $field, .. } => *$field = $value,
+                _ => unreachable!(),
+            }
+        };
+    }
+    // By the constraint's place in the list.
+    let changes: [(usize, Change); 16] = [
+        (0, set!(Spring { frequency } => Scalar::Value(3.0))),
+        (0, set!(Spring { motion } => Scalar::Value(0.65))),
+        (0, |constraint| match constraint {
+            Constraint::Spring { colliders, .. } => colliders[0].radius = 0.9,
+            _ => unreachable!(),
+        }),
+        (1, set!(Cone { axis } => Vec3::new(0.2, 1.0, 0.0))),
+        (1, set!(Cone { towards } => Vec3::new(0.0, 1.0, 0.4))),
+        (1, set!(Cone { outer } => 80.0)),
+        (2, set!(PoseReader { radius } => 50.0)),
+        (2, |constraint| match constraint {
+            Constraint::PoseReader { poses, .. } => poses[1].0 = Quat::from_rotation_z(0.7),
+            _ => unreachable!(),
+        }),
+        (3, set!(Travel { axis } => Vec3::new(0.5, 0.0, 1.0))),
+        (3, set!(Travel { factor } => 90.0)),
+        (4, set!(Path { share } => Scalar::Value(0.7))),
+        (4, set!(Path { aim } => None)),
+        (4, set!(Path { up } => Vec3::X)),
+        (4, set!(Path { weight } => Scalar::Value(0.3))),
+        (5, set!(Rivet { shares } => [0.2, 0.4, 0.4])),
+        (5, set!(Rivet { offset } => Trs { translation: Vec3::Z * 0.3, ..Trs::IDENTITY })),
+    ];
+    let options = CompileOptions::default();
+    for (number, (at, change)) in changes.into_iter().enumerate() {
+        let mut rig = readers().rig;
+        let mut cache = ProgramCache::default();
+        let mut state = RigState::new(cache.get(&rig, &options).unwrap());
+        for (label, turn) in [("a", 0.4), ("b", 0.2), ("d", 0.1)] {
+            let offset = PoseOffset { translation: Vec3::splat(0.2), ..turned(Vec3::X, turn * 90.0) };
+            state.set_offset_at(state.program().find_label(label).unwrap(), offset);
+        }
+        state.evaluate(0.0);
+        let before = state.globals().to_vec();
+        let mut constraint = (*rig.constraints[at].constraint).clone();
+        change(&mut constraint);
+        rig.constraints[at].constraint = Arc::new(constraint);
+        let program = cache.get(&rig, &options).unwrap();
+        assert_eq!(content(&program), content(&RigProgram::compile(&rig, &options).unwrap()), "change {number}");
+        let carry = Carry::between(state.program(), &program);
+        assert!(carry.is_partial(), "change {number}");
+        let mut fresh = RigState::new(Arc::clone(&program));
+        fresh.carry_over(&state);
+        fresh.evaluate(0.0);
+        state.exchange(&program, &carry);
+        state.evaluate(0.0);
+        assert_eq!(state.globals(), fresh.globals(), "change {number}");
+        // A spring's numbers count from the next moment on.
+        if at > 0 {
+            assert_ne!(state.globals(), before, "change {number} changes nothing");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use super::{biped::biped, *};
 use proptest::prelude::*;
 use rigsmith::{
-    rig::{BuiltRig, Constraint, Uid},
+    rig::{BuiltRig, Channel, Collider, Constraint, Output, Uid},
     solve::program::{ContentHash, Exposed, Keep, LANES, Memory, ProgramCache},
 };
 
@@ -62,10 +62,71 @@ fn sprung() -> BuiltRig {
             weight: Scalar::Value(0.8),
             translate: label == "spine_2",
             rotate: true,
+            motion: Scalar::Value(if label == "head" { 1.0 } else { 0.4 }),
+            colliders: vec![Collider {
+                node: rig.find_label("arm_L_goal").unwrap().uid,
+                end: (label == "head").then(|| rig.find_label("arm_R_goal").unwrap().uid),
+                radius: 0.3,
+            }],
         });
         rig.constraints.push(constraint);
     }
+    read(&mut rig);
     rig
+}
+
+/// Adds readers of poses and ways, and nodes on a curve and on a triangle.
+fn read(rig: &mut BuiltRig) {
+    let uid = |label: &str| rig.find_label(label).unwrap_or_else(|| panic!("no {label}")).uid;
+    let channel = |label: &str, channel| Output::Channel(uid(label), channel);
+    let list = [
+        Constraint::Cone {
+            source: uid("head_control"),
+            axis: Vec3::Y,
+            reference: None,
+            towards: Vec3::Y,
+            inner: 5.0,
+            outer: 40.0,
+            output: channel("jaw_control", Channel::RotateX),
+        },
+        Constraint::PoseReader {
+            source: uid("head_control"),
+            reference: Some(uid("chest")),
+            poses: vec![
+                (Quat::IDENTITY, channel("jaw_control", Channel::RotateY)),
+                (Quat::from_rotation_x(0.6), channel("jaw_control", Channel::RotateZ)),
+            ],
+            radius: 30.0,
+        },
+        Constraint::Travel {
+            source: uid("arm_L_goal"),
+            reference: Some(uid("chest")),
+            axis: Vec3::X,
+            factor: 60.0,
+            output: channel("finger_control_R_1_1", Channel::RotateX),
+        },
+        Constraint::Path {
+            driven: uid("finger_R_0_2"),
+            points: vec![uid("arm_L_goal"), uid("chest"), uid("arm_R_goal")],
+            share: Scalar::Value(0.3),
+            aim: Some([Vec3::Y, Vec3::Z]),
+            up: Vec3::Z,
+            weight: Scalar::Value(0.9),
+        },
+        Constraint::Rivet {
+            driven: uid("finger_R_2_2"),
+            corners: [uid("arm_L_goal"), uid("chest"), uid("arm_R_goal")],
+            shares: [0.2, 0.3, 0.5],
+            offset: Trs { translation: Vec3::Z * 0.1, ..Trs::IDENTITY },
+            weight: Scalar::Value(1.0),
+        },
+    ];
+    for (number, constraint) in list.into_iter().enumerate() {
+        let mut built = rig.constraints[0].clone();
+        built.uid = Uid(950_000 + number as u64);
+        built.constraint = Arc::new(constraint);
+        rig.constraints.push(built);
+    }
 }
 
 #[track_caller]
@@ -112,6 +173,20 @@ proptest! {
                 }
             }
             let dt = frames as f32 / 60.0;
+            if frames > 0 {
+                // The rig walks, in some frames.
+                let motion = Trs {
+                    translation: Vec3::new(0.03, 0.0, 0.01 * number as f32),
+                    rotation: Quat::from_rotation_y(0.02),
+                    scale: Vec3::ONE,
+                };
+                let [a, b, c, d] = &mut lanes;
+                for state in [&mut changed, &mut whole, &mut game, &mut crowd, a, c] {
+                    state.move_frame(&motion);
+                }
+                b.move_frame(&Trs { translation: Vec3::X, ..Trs::IDENTITY });
+                d.move_frame(&Trs::IDENTITY);
+            }
             whole.mark_all();
             for state in [&mut changed, &mut whole, &mut game, &mut crowd] {
                 state.evaluate(dt);

@@ -136,6 +136,7 @@ fn what_is_missing_is_named() {
                 stretch: Scalar::Value(0.0),
                 max_stretch: 1.0,
                 twist: Scalar::Value(0.0),
+                pin: Scalar::Value(0.0),
                 orient_end: None,
             });
         }),

@@ -187,3 +187,44 @@ fn a_crowd_is_the_same_as_one() {
         }
     }
 }
+
+/// A chain of springs on a rig that walks: in both modes its tips stay behind and settle.
+#[test]
+fn springs_feel_the_walk_of_their_rig() {
+    let mut rig = biped();
+    let head = rig.find_label("finger_L_0_1").unwrap().uid;
+    let mut constraint = rig.constraints[0].clone();
+    constraint.uid = rigsmith::rig::Uid(987_654);
+    constraint.constraint = Arc::new(Constraint::Spring {
+        driven: head,
+        frequency: Scalar::Value(2.0),
+        damping: Scalar::Value(0.5),
+        weight: Scalar::Value(1.0),
+        translate: true,
+        rotate: false,
+        motion: Scalar::Value(1.0),
+        colliders: Vec::new(),
+    });
+    rig.constraints.push(constraint);
+    for (mode, keep) in [(InstanceMode::Hierarchy, Keep::All), (InstanceMode::Direct, in_games())] {
+        let options = CompileOptions { keep, ..CompileOptions::default() };
+        let program = Arc::new(RigProgram::compile(&rig, &options).unwrap());
+        let mut app = app();
+        // The rig stands on something that moves, and is twice as large.
+        let cart = app.world_mut().spawn(Transform::IDENTITY).id();
+        let rig = instance(&mut app, &program, mode, Transform::from_scale(Vec3::splat(2.0)));
+        app.world_mut().entity_mut(rig).insert(ChildOf(cart));
+        for _ in 0..3 {
+            app.update();
+        }
+        let rest = world_position(&app, rig, "finger_L_0_1");
+        app.world_mut().get_mut::<Transform>(cart).unwrap().translation.x += 1.0;
+        app.update();
+        let lagging = world_position(&app, rig, "finger_L_0_1");
+        assert!(lagging.x - rest.x < 0.5, "{mode:?}: it went {} at once", lagging.x - rest.x);
+        for _ in 0..400 {
+            app.update();
+        }
+        near(world_position(&app, rig, "finger_L_0_1"), rest + Vec3::X, 1e-3);
+    }
+}

@@ -18,6 +18,7 @@ fn limb(root: Vec3, mid: Vec3, end: Vec3) -> TwoBone {
         soft: 0.0,
         stretch: 0.0,
         max_stretch: f32::INFINITY,
+        pin: 0.0,
     }
 }
 
@@ -250,6 +251,7 @@ fn two_bone_answers_anything_with_numbers() {
             soft: HARD[i % 9],
             stretch: HARD[i / 9 % 9],
             max_stretch: HARD[i / 81 % 9],
+            pin: HARD[i / 729 % 9],
         };
         let solved = limb.solve();
         assert!(is_unit(solved.root_rotation) && is_unit(solved.mid_rotation), "{limb:?}: {solved:?}");

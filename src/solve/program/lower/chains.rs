@@ -33,6 +33,7 @@ impl Lower<'_, '_> {
             stretch,
             max_stretch,
             twist,
+            pin,
             orient_end,
         } = &*rig.constraints[self.at].constraint
         else {
@@ -41,9 +42,10 @@ impl Lower<'_, '_> {
         let nodes = self.joints(&[*root, *mid, *end])?;
         let goal = self.goal(*goal, orient_end.is_some())?;
         let pole = self.pole(*pole)?;
-        let can_stretch = *stretch != Scalar::Value(0.0);
+        let can_stretch = [stretch, pin].iter().any(|share| **share != Scalar::Value(0.0));
         let [weight, soft, stretch, twist] =
             [self.scalar(weight)?, self.scalar(soft)?, self.scalar(stretch)?, self.scalar(twist)?];
+        let pin = self.scalar(pin)?;
         let links = [self.link(nodes[0], false), self.link(nodes[1], can_stretch), self.link(nodes[2], can_stretch)];
         let op = TwoBoneOp {
             parent: self.graph.parent(nodes[0]),
@@ -56,6 +58,7 @@ impl Lower<'_, '_> {
             stretch,
             max_stretch: *max_stretch,
             twist,
+            pin,
             orient_end: orient_end.map(unit),
         };
         self.graph.tables.two_bones.push(op);

@@ -119,7 +119,7 @@ impl Op {
                 f(ReadX(&mut op.parent));
                 f(ReadX(&mut op.goal));
                 op.pole.iter_mut().for_each(|pole| f(ReadX(pole)));
-                [&mut op.weight, &mut op.soft, &mut op.stretch, &mut op.twist]
+                [&mut op.weight, &mut op.soft, &mut op.stretch, &mut op.twist, &mut op.pin]
                     .into_iter()
                     .for_each(|value| f(ReadN(value)));
                 links(&mut op.links, &mut f);
@@ -148,7 +148,48 @@ impl Op {
                 let op = &mut tables.springs[*at as usize];
                 f(ReadX(&mut op.input));
                 f(ReadX(&mut op.parent));
-                [&mut op.frequency, &mut op.damping, &mut op.weight].into_iter().for_each(|value| f(ReadN(value)));
+                [&mut op.frequency, &mut op.damping, &mut op.weight, &mut op.motion]
+                    .into_iter()
+                    .for_each(|value| f(ReadN(value)));
+                for collider in &mut tables.colliders[op.colliders.range()] {
+                    f(ReadX(&mut collider.start));
+                    f(ReadX(&mut collider.end));
+                }
+                f(WriteX(&mut op.out));
+            }
+            Self::Cone(at) => {
+                let op = &mut tables.cones[*at as usize];
+                f(ReadX(&mut op.source));
+                f(ReadX(&mut op.reference));
+                f(WriteN(&mut op.out));
+            }
+            Self::Reader(at) => {
+                let op = &mut tables.readers[*at as usize];
+                f(ReadX(&mut op.source));
+                f(ReadX(&mut op.reference));
+                op.outs.iter_mut().for_each(|out| f(WriteN(out)));
+            }
+            Self::Travel(at) => {
+                let op = &mut tables.travels[*at as usize];
+                f(ReadX(&mut op.source));
+                f(ReadX(&mut op.reference));
+                f(WriteN(&mut op.out));
+            }
+            Self::Path(at) => {
+                let op = &mut tables.paths[*at as usize];
+                f(ReadX(&mut op.input));
+                f(ReadX(&mut op.parent));
+                tables.points[op.points.range()].iter_mut().for_each(|point| f(ReadX(point)));
+                f(ReadN(&mut op.share));
+                f(ReadN(&mut op.weight));
+                f(WriteX(&mut op.out));
+            }
+            Self::Rivet(at) => {
+                let op = &mut tables.rivets[*at as usize];
+                f(ReadX(&mut op.input));
+                f(ReadX(&mut op.parent));
+                op.corners.iter_mut().for_each(|corner| f(ReadX(corner)));
+                f(ReadN(&mut op.weight));
                 f(WriteX(&mut op.out));
             }
         }

@@ -67,7 +67,20 @@ impl Op {
                 let (a, b) = (tables.limits[*a as usize], others.limits[*b as usize]);
                 base(&a.base, &b.base) && a == super::LimitOp { base: a.base, ..b }
             }
-            (Self::Spring(a), Self::Spring(b)) => tables.springs[*a as usize] == others.springs[*b as usize],
+            (Self::Spring(a), Self::Spring(b)) => {
+                let (a, b) = (tables.springs[*a as usize], others.springs[*b as usize]);
+                let is_same = tables.colliders[a.colliders.range()] == others.colliders[b.colliders.range()];
+                is_same && a == super::SpringOp { colliders: a.colliders, ..b }
+            }
+            (Self::Cone(a), Self::Cone(b)) => tables.cones[*a as usize] == others.cones[*b as usize],
+            (Self::Reader(a), Self::Reader(b)) => tables.readers[*a as usize] == others.readers[*b as usize],
+            (Self::Travel(a), Self::Travel(b)) => tables.travels[*a as usize] == others.travels[*b as usize],
+            (Self::Path(a), Self::Path(b)) => {
+                let (a, b) = (tables.paths[*a as usize], others.paths[*b as usize]);
+                let is_same = tables.points[a.points.range()] == others.points[b.points.range()];
+                is_same && a == super::PathOp { points: a.points, ..b }
+            }
+            (Self::Rivet(a), Self::Rivet(b)) => tables.rivets[*a as usize] == others.rivets[*b as usize],
             // Inline parameters, and operations that are of different kinds.
             (a, b) => a == b,
         }

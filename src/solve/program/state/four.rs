@@ -58,6 +58,7 @@ struct RunContext<'a> {
     springs: [&'a mut [SpringState]; LANES],
     scratch: &'a mut Scratch,
     dt: f32,
+    frames: [Option<Trs>; LANES],
 }
 
 impl Four {
@@ -65,11 +66,13 @@ impl Four {
     pub fn evaluate(&mut self, mut states: [&mut RigState; LANES], dt: f32) {
         let first = self.take(&states);
         let program = states[0].program.clone();
+        let frames = states.each_ref().map(|state| state.frame);
         let mut context = RunContext {
             tables: &program.tables,
             springs: states.each_mut().map(|state| state.springs.as_mut_slice()),
             scratch: &mut self.scratch,
             dt,
+            frames,
         };
         program.ops[first..].iter().for_each(|op| self.registers.run(op, &mut context));
         self.give(states);
@@ -190,8 +193,9 @@ impl Columns {
     fn run_each(&mut self, op: &Op, context: &mut RunContext) {
         for (lane, springs) in context.springs.iter_mut().enumerate() {
             let registers = Column { columns: self, lane };
-            let mut machine =
-                Machine { tables: context.tables, registers, springs, scratch: context.scratch, dt: context.dt };
+            let RunContext { tables, dt, frames, .. } = *context;
+            let frame = frames[lane];
+            let mut machine = Machine { tables, registers, springs, scratch: context.scratch, dt, frame };
             machine.run(op);
         }
     }
