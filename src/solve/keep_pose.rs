@@ -114,6 +114,9 @@ impl PoseKeeper {
         let free = joints.iter().copied().filter(|pair| !to.nodes()[pair.after].is_driven);
         let mut handles: Vec<Pair> = controls.chain(free).collect();
         handles.retain(|pair| to.nodes()[pair.after].is_posable());
+        // A node comes after those that it stands on, whatever the order in which commands made them.
+        let depth = |slot: usize| std::iter::successors(nodes[slot].parent, |slot| nodes[*slot].parent).count();
+        handles.sort_by_key(|pair| depth(pair.after));
         let fresh = slots(NodeType::Control)
             .filter(|slot| to.nodes()[*slot].is_posable() && from.node(to.nodes()[*slot].uid).is_none())
             .collect();
@@ -202,11 +205,14 @@ impl PoseKeeper {
                     self.place(attempt, pair.after, &wanted);
                 }
             }
+            // Controls that stand on others which come later are off until the next round.
             let error = self.error(attempt, targets);
-            if error >= best.0 {
+            if error < best.0 {
+                best = (error, attempt.clone());
+            }
+            if error == 0.0 {
                 break;
             }
-            best = (error, attempt.clone());
         }
         *attempt = best.1;
         // What was at rest and helps nothing is at rest again.
