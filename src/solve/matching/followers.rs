@@ -4,7 +4,7 @@
 use super::{Attempt, MatchError, angle_between, limb::Limb, number};
 use crate::{
     mesh::model::Trs,
-    rig::{Constraint, Scalar, SwitchData, Uid},
+    rig::{Constraint, NodeType, Scalar, SwitchData, Uid},
 };
 
 /// Angle in degrees below which a joint counts as held.
@@ -31,7 +31,9 @@ pub(super) fn followers(attempt: &Attempt<'_>, switch: &SwitchData, limb: &Limb<
     };
     let turned = attempt.rig.constraints.iter().filter_map(|built| match &*built.constraint {
         Constraint::Transform { driven, targets, rotate: [true, true, true], weight, keep_pose: false, .. } => {
-            let target = targets.first().filter(|_| targets.len() == 1 && !limb.joints.contains(driven))?;
+            let is_joint = attempt.rig.node(*driven).is_some_and(|node| node.kind == NodeType::Joint);
+            let is_behind = is_joint && !limb.joints.contains(driven);
+            let target = targets.first().filter(|_| targets.len() == 1 && is_behind)?;
             Some((*driven, target, weight))
         }
         _ => None,
