@@ -12,7 +12,7 @@ use crate::{
         label::mirror_label,
         reference::{NodeRef, NodeRefs},
     },
-    solve::pose_reader::PoseReader,
+    solve::pose_reader::{PoseReader, PoseReaderError},
 };
 
 parameters! {
@@ -81,7 +81,7 @@ impl RigModule for RbfReader {
         let rotations: Vec<Quat> = poses.iter().map(|(rotation, _)| *rotation).collect();
         let radius = self.radius.unwrap_or_else(|| nearest(&rotations).to_degrees());
         PoseReader::new(&rotations, radius.to_radians())
-            .map_err(|error| ModuleError::parameter("poses", error.to_string()))?;
+            .map_err(|error| ModuleError::parameter(parameter(error), error.to_string()))?;
         let constraint = Constraint::PoseReader {
             source: scope.uid(source),
             reference: reference.map(|node| scope.uid(node)),
@@ -121,6 +121,14 @@ impl RbfReader {
                 "each drives one thing: write an attribute, a channel such as RotateX, or a morph target",
             )),
         }
+    }
+}
+
+/// Parameter that an error is about.
+fn parameter(error: PoseReaderError) -> &'static str {
+    match error {
+        PoseReaderError::Radius(_) => "radius",
+        PoseReaderError::Count(_) | PoseReaderError::Alike(..) => "poses",
     }
 }
 

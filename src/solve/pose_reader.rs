@@ -67,19 +67,24 @@ impl PoseReader {
         if count == 0 || count > MOST_POSES {
             return Err(PoseReaderError::Count(count));
         }
-        if !(radius > 0.0 && radius.is_finite()) {
+        let poses: Vec<Quat> = poses.iter().map(|pose| unit(*pose)).collect();
+        let is_radius = radius > 0.0 && radius.is_finite();
+        // Poses that are alike come first: a radius that follows from them is no better.
+        let least = 0.02 * if is_radius { radius.min(1.0) } else { 1.0 };
+        for (number, first) in poses.iter().enumerate() {
+            let alike = poses[..number].iter().position(|second| angle(*first, *second) < least);
+            if let Some(other) = alike {
+                return Err(PoseReaderError::Alike(other + 1, number + 1));
+            }
+        }
+        if !is_radius {
             return Err(PoseReaderError::Radius(radius));
         }
-        let poses: Vec<Quat> = poses.iter().map(|pose| unit(*pose)).collect();
         let mut matrix = vec![0.0_f64; count * 2 * count];
         let width = 2 * count;
         for (row, first) in poses.iter().enumerate() {
             for (column, second) in poses.iter().enumerate() {
-                let angle = angle(*first, *second);
-                if row < column && angle < 0.02 * radius.min(1.0) {
-                    return Err(PoseReaderError::Alike(row + 1, column + 1));
-                }
-                matrix[row * width + column] = f64::from(bell(angle, radius));
+                matrix[row * width + column] = f64::from(bell(angle(*first, *second), radius));
             }
             matrix[row * width + count + row] = 1.0;
         }
