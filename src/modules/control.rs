@@ -262,12 +262,13 @@ impl ControlModule {
         let (Some(axis), true) = (across.try_normalize(), across.length() > STRAIGHT) else { return plain };
         // The axis that is nearer to the node's own: a control turns in the sense in which its node does.
         let sense = if axis.dot(x) < 0.0 { -1.0 } else { 1.0 };
-        let turn = match axis.dot(x).abs() {
-            near if near > 1.0 - 1e-6 => Quat::IDENTITY,
-            _ => Quat::from_rotation_arc(x, axis * sense),
+        // A node with its X along the axis is as it is, not nearly so by rounding.
+        let rotation = match axis.dot(x).abs() {
+            near if near > 1.0 - 1e-6 => global.rotation,
+            _ => (Quat::from_rotation_arc(x, axis * sense) * global.rotation).normalize(),
         };
         let bent = ops::atan2(across.length(), upper.dot(lower)).to_degrees();
-        Hinge { rotation: (turn * global.rotation).normalize(), bent: Some((bent, sense)) }
+        Hinge { rotation, bent: Some((bent, sense)) }
     }
 
     /// Limits of the control of a hinge: the range of the bend, from how it is bent as built.
