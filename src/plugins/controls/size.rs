@@ -43,6 +43,17 @@ impl MeasuredShapes {
     pub fn is_busy(&self) -> bool {
         self.task.is_some()
     }
+
+    /// Starts the task for these meshes and this built rig.
+    fn measure(&mut self, meshes: Vec<Arc<Model>>, built: &Arc<BuiltRig>) {
+        (self.meshes, self.built) = (meshes.clone(), Some(built.clone()));
+        let (built, surface) = (built.clone(), self.surface.clone());
+        self.task = Some(AsyncComputeTaskPool::get().spawn(async move {
+            let surface = surface.unwrap_or_else(|| Arc::new(surface_of(&meshes)));
+            let factors = shape_factors(&built, &surface);
+            Measured { surface, factors }
+        }));
+    }
 }
 
 struct Measured {
@@ -73,8 +84,15 @@ pub(super) fn measure_shapes(
         }
     }
     for (rig, bound, built, entities, measured) in &mut rigs {
+        let mut now: Vec<(Uid, Arc<Model>)> =
+            bound.iter().filter_map(|mesh| meshes.get(mesh).ok()).map(|mesh| (mesh.uid, mesh.rest.clone())).collect();
+        now.sort_by_key(|(uid, _)| *uid);
+        let now: Vec<Arc<Model>> = now.into_iter().map(|(_, model)| model).collect();
         let Some(mut measured) = measured else {
-            commands.entity(rig).insert(MeasuredShapes::default());
+            // The task runs from the first frame on, so that an app which waits for it does not sleep before.
+            let mut first = MeasuredShapes::default();
+            first.measure(now, &built.0);
+            commands.entity(rig).insert(first);
             continue;
         };
         let unseen = measured.bypass_change_detection();
@@ -86,10 +104,6 @@ pub(super) fn measure_shapes(
         if unseen.task.is_some() {
             continue;
         }
-        let mut now: Vec<(Uid, Arc<Model>)> =
-            bound.iter().filter_map(|mesh| meshes.get(mesh).ok()).map(|mesh| (mesh.uid, mesh.rest.clone())).collect();
-        now.sort_by_key(|(uid, _)| *uid);
-        let now: Vec<Arc<Model>> = now.into_iter().map(|(_, model)| model).collect();
         let is_known =
             now.len() == unseen.meshes.len() && now.iter().zip(&unseen.meshes).all(|(a, b)| Arc::ptr_eq(a, b));
         let is_built = unseen.built.as_ref().is_some_and(|known| Arc::ptr_eq(known, &built.0));
@@ -99,13 +113,7 @@ pub(super) fn measure_shapes(
         if !is_known {
             unseen.surface = None;
         }
-        (unseen.meshes, unseen.built) = (now.clone(), Some(built.0.clone()));
-        let (built, surface) = (built.0.clone(), unseen.surface.clone());
-        unseen.task = Some(AsyncComputeTaskPool::get().spawn(async move {
-            let surface = surface.unwrap_or_else(|| Arc::new(surface_of(&now)));
-            let factors = shape_factors(&built, &surface);
-            Measured { surface, factors }
-        }));
+        unseen.measure(now, &built.0);
     }
 }
 
