@@ -114,6 +114,12 @@ impl Maker {
             "driven_key",
             "expression",
             "morph",
+            "cone_reader",
+            "rbf_reader",
+            "piston",
+            "wheel",
+            "path",
+            "rivet",
         ];
         let module = self.random.pick(MODULES);
         let (any, joint) = (self.reference(rig, true), self.reference(rig, false));
@@ -189,6 +195,23 @@ impl Maker {
                 "(text: \"x * {number:?}\", inputs: [(name: \"x\", node: {control:?}, channel: TranslateX)], \
                  output: {joint:?}, output_channel: TranslateZ)"
             ),
+            "cone_reader" => format!(
+                "(source: {joint:?}, towards: (0.0, 1.0, 0.0), outer: 60.0, output: {control:?}, output_channel: RotateY)"
+            ),
+            "rbf_reader" => format!(
+                "(source: {joint:?}, poses: [(attribute: \"{name}\"), (rotate: (0.0, 80.0, {number:?}), channel: RotateX)], \
+                 output: {other:?})"
+            ),
+            "piston" => format!("(first: {control:?}, second: {other:?})"),
+            "wheel" => format!("(source: {control:?}, radius: {:?}, output: {joint:?})", number + 0.1),
+            "path" => {
+                let points = format!("{control} + {other}");
+                format!("(node: {joint:?}, points: {points:?}, share: {:?})", number / 5.0)
+            }
+            "rivet" => {
+                let corners = format!("{control} + {other} + @joint #{b}");
+                format!("(node: {joint:?}, corners: {corners:?})")
+            }
             _ => format!("(control: {control:?}, morph: \"smile\", attribute: \"{name}\")"),
         };
         (module.to_owned(), params)
