@@ -14,7 +14,7 @@ const HINGES: [(&str, &str, f32, f32); 9] = [
     ("biped", "arm_fk_r_2", -16.0, 149.0),
     ("parts/leg", "leg_fk_l_2", -160.7, 4.3),
     ("biped", "leg_fk_r_2", -160.7, 4.3),
-    ("parts/leg_3joint", "leg_fk_l_2", -83.3, 81.7),
+    ("parts/leg_3joint", "leg_fk_l_2", -88.3, 76.7),
     ("parts/front_leg", "front_fk_l_2", -36.3, 128.7),
     ("parts/hand", "index_l_2", -31.9, 103.1),
     ("parts/hand", "index_l_3", -15.0, 120.0),
