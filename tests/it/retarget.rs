@@ -12,7 +12,7 @@ use rigsmith::{
     modules,
     processor::Builder,
     rig::{
-        BuiltRig, Rig,
+        BuiltRig, Rig, RigEdit, TagData, TagKind,
         animation::{
             humanoid::{BodySide, HumanBone, LimbBone},
             joint_map::{JointMap, JointMapError, read_joint_map, write_joint_map},
@@ -236,6 +236,39 @@ fn forward_and_inverse_controls_agree() {
         for (at, uid) in uids.iter().enumerate() {
             let off = state.global(*uid).unwrap().translation.distance(inverse[at].translation);
             assert!(off < 2e-3, "{} at {time}: {off}", labels[at]);
+        }
+    }
+}
+
+/// Shoulders that follow the goals of their hands are posed so that the motion is the same.
+#[test]
+fn shoulders_that_follow_their_hands_move_as_the_motion_says() {
+    let Some(data) = test_data() else { return };
+    let (motion, plain) = (motion(&data, "makehuman_walk1"), shipped("biped"));
+    let mut automatic = plain.clone();
+    let mut changed = 0;
+    for joint in plain.walk() {
+        for tag in &joint.data.tags {
+            let TagKind::Command { module, params, feature } = &tag.kind else { continue };
+            if module == "attribute" && params.contains("name: \"auto\"") {
+                let params = params.replace("name: \"auto\"", "name: \"auto\", default: 1.0");
+                let kind = TagKind::Command { module: module.clone(), params, feature: *feature };
+                let tag = TagData { kind, ..tag.clone() };
+                automatic.apply(&RigEdit::SetTag(joint.data.uid, Box::new(tag))).unwrap();
+                changed += 1;
+            }
+        }
+    }
+    assert_eq!(changed, 2);
+    let played = [plain, automatic].map(|rig| Played::new(rig, &motion, &RetargetSettings::default()));
+    let labels = ["clavicle_l", "clavicle_r", "forearm_l", "forearm_r", "hand_l", "hand_r"];
+    let times = played[0].times();
+    let [wanted, found] = [0, 1].map(|at| played[at].globals(&times, &labels));
+    for ((wanted, found), time) in wanted.iter().zip(&found).zip(&times) {
+        for (at, label) in labels.iter().enumerate() {
+            let off = found[at].translation.distance(wanted[at].translation);
+            let turned = found[at].rotation.angle_between(wanted[at].rotation);
+            assert!(off < 2e-3 && turned < 0.01, "{label} at {time}: {off} and {turned}");
         }
     }
 }
