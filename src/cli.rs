@@ -12,6 +12,7 @@ mod convert;
 mod demo;
 #[cfg(feature = "render")]
 mod device_selection;
+mod explanation;
 mod face;
 mod fit;
 mod format;
@@ -33,7 +34,10 @@ mod switches;
 mod update;
 mod watch;
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -103,6 +107,37 @@ enum Command {
     /// Take a picture of a mesh, a template or a project, without a window
     #[cfg(feature = "render")]
     Render(render::RenderArgs),
+}
+
+impl Command {
+    /// The file that the command works on: the first one that is named.
+    fn subject(&self) -> Option<&Path> {
+        match self {
+            Self::Edit(args) => args.file.as_deref(),
+            Self::Sketch(args) => Some(&args.gestures),
+            Self::Skin(args) => Some(&args.mesh),
+            Self::Fit(args) => Some(&args.mesh),
+            Self::Face(args) => Some(&args.mesh),
+            Self::Convert(args) => Some(&args.input),
+            Self::Info(args) => Some(&args.file),
+            Self::Check(args) => args.files.first().map(PathBuf::as_path),
+            Self::Format(args) => args.files.first().map(PathBuf::as_path),
+            Self::New(args) => Some(&args.output),
+            Self::List(args) => args.folder.as_deref(),
+            Self::Merge(args) => args.rigs.first().map(PathBuf::as_path),
+            Self::Inject(args) => Some(&args.rig),
+            Self::Extract(args) => Some(&args.rig),
+            Self::Watch(args) => Some(&args.template),
+            Self::Diff(args) => Some(&args.to),
+            Self::Update(args) => Some(&args.rig),
+            Self::Build(args) => Some(&args.rig),
+            Self::Pose(args) => Some(&args.rig),
+            Self::Animate(args) => Some(&args.clip),
+            Self::Modules(_) => None,
+            #[cfg(feature = "render")]
+            Self::Render(args) => Some(&args.file),
+        }
+    }
 }
 
 /// Arguments of `edit`.
@@ -237,10 +272,11 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Ok(cli) => cli,
         // Help and version are results; only wrong usage is reported as JSON.
         Err(error) if error.use_stderr() && std::env::args().any(|argument| argument == "--json") => {
-            return report::finish(Err(Failure::Usage(error.to_string().trim_end().to_owned())), true);
+            return report::finish(Err(Failure::Usage(error.to_string().trim_end().to_owned())), true, "");
         }
         Err(error) => error.exit(),
     };
+    let subject = cli.command.as_ref().and_then(Command::subject).map(|path| path.display().to_string());
     let result = match cli.command {
         None if cli.json => demo::run(None),
         None => match window(WindowRequest::default()) {
@@ -275,5 +311,5 @@ pub fn main(window: OpenWindow) -> ExitCode {
         #[cfg(feature = "render")]
         Some(Command::Render(args)) => render::run(&args),
     };
-    report::finish(result, cli.json)
+    report::finish(result, cli.json, subject.as_deref().unwrap_or("command line"))
 }

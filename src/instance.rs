@@ -159,18 +159,22 @@ impl Plugin for RigInstancePlugin {
 
 /// Makes an entity a character of a template. Its nodes are spawned when the template is loaded and built, as
 /// [`InstanceMode`] says; [`RigBuilt`] tells it. Taking the component off despawns them; another mode spawns others, unposed.
-#[derive(Component, Debug, Clone, PartialEq, Eq)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
+#[reflect(Component)]
 #[require(InstanceMode, Transform)]
 pub struct RigInstance(pub Handle<RigTemplate>);
 
 /// Nodes that an instance in [`InstanceMode::Direct`] has as entities besides its joints and sockets. Without this component it
 /// has all controls; instances with the same nodes share a program. A node that the template does not have is told
 /// ([`RigFailed`]), and the instance has all controls then.
-#[derive(Component, Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq, Default)]
+#[reflect(Component)]
 pub struct ExposedNodes(pub Vec<Exposed>);
 
 /// The built template that an instance runs.
-#[derive(Component, Debug, Clone)]
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct RunningTemplate(Arc<BuiltTemplate>);
 
 impl RunningTemplate {

@@ -15,9 +15,10 @@
 //! | `Transform` of a joint or created node | the program, and the document where its pose changes | becomes the node's pose in the same frame, within the channels and limits of a control; a driven node answers with what its constraints make of it |
 //! | [`Attributes`](schema::Attributes) | the program, and the document where its values change | drives the rig in the same frame; a driven value is put back |
 //! | `GlobalTransform` of a node | propagation, corrected where Bevy would shear | overwritten |
-//! | [`Null`](schema::Null) | the document, for joints without weights, and the build, for created nulls | on a spawned joint: a joint without weights; elsewhere it stands until the document or the build writes it |
-//! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`Parked`](schema::Parked), [`commands::CommandReport`], [`commands::Built`], [`commands::BuildFailure`], [`commands::RunFailure`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; an inserted `Uid` is put back and told, the others stand until the build writes them |
-//! | [`CreatedBy`](schema::CreatedBy), [`Constrains`](schema::Constrains), [`NodeOf`](schema::NodeOf) | the build, and the document for its joints | stands until the build or the document writes it; nothing else follows from it |
+//! | [`Null`](schema::Null) | the document, for joints without weights, and the build, for created nulls | on a joint: an edit, it is without weights; on a created node it is put back and told |
+//! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`Parked`](schema::Parked), [`commands::CommandReport`], [`commands::Built`], [`commands::BuildFailure`], [`commands::RunFailure`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; what is inserted or removed is put back in the same frame and told ([`document::EntityWriteError::BuiltContent`]); reports and failures stand until the next build |
+//! | [`CreatedBy`](schema::CreatedBy), [`Constrains`](schema::Constrains), [`NodeOf`](schema::NodeOf) | the build, and the document for its joints | put back in the same frame and told |
+//! | a despawned constraint | | spawned again and told: change the command instead |
 //! | [`RigNodes`](schema::RigNodes), [`LocalGroups`](schema::LocalGroups), [`GroupMembers`](schema::GroupMembers), [`FeatureCommands`](schema::FeatureCommands), [`CreatedNodes`](schema::CreatedNodes), [`NodeConstraints`](schema::NodeConstraints) | Bevy, as the other side of a relation | write the relation instead |
 //! | [`NodeSlot`](schema::NodeSlot) | the instance of a game | immutable |
 //! | [`ControlPose`](schema::ControlPose) | games and animations, of instances without a hierarchy | drives the node in the same frame, within the channels and limits of a control |
@@ -27,7 +28,17 @@
 //! | label, group, rest and parent of a created node, and the node itself | the build | put back and told: change the command instead |
 //! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame; what is shown already is none; unknown names are told by [`face::Expressed`] |
 //! | [`animation::ClipPlayer`] | a person or a game; its time by the playback | plays from there |
-//! | `Name` of joints, groups and nodes | the label or name | stands until that changes |
+//! | `Name` of joints and groups | the label or name | an edit of the label or name; of a created node it stands until the build writes it |
+//! | [`document::ShowRest`], [`document::Symmetry`], [`animation::AutoKey`] | the editor | takes effect with the next edit |
+//! | [`selection::Hovered`] | picking | stands until the pointer moves |
+//! | [`stage::RigStage`] | the build | immutable; send a [`stage::StageRequest`] |
+//! | [`runtime::RigInputs`] | games | read each frame: where the entities of a template's inputs stand |
+//! | [`animation::RigClips`], [`animation::RootMotion`], [`animation::ClipTargets`] | games | takes effect in the same frame; the movement in `RootMotion` is written each frame |
+//! | [`surface::RigMeshes`] | Bevy, as the other side of a relation | write [`surface::SkinOf`] instead |
+//! | [`runtime::DrivenMorphs`] | whoever binds a mesh; its weights by the rig | drives other morph targets; weights are overwritten |
+//! | [`face::Face`], [`fit::FittedRig`] | the analysis of a mesh and the fit | opaque; taking it off ends expressions, or corrections of the fit |
+//! | [`RigInstance`](crate::instance::RigInstance), [`RigSource`](crate::instance::RigSource), [`ExposedNodes`](crate::instance::ExposedNodes), `SharedMesh` (feature `draw`) | games | another template or other nodes are spawned; taking it off despawns what came of it |
+//! | [`RunningTemplate`](crate::instance::RunningTemplate), [`UpdateOffer`](crate::instance::UpdateOffer), [`BoundTo`](crate::instance::BoundTo) | instances | opaque; stands until the template, the offer or the mesh changes |
 
 pub mod animation;
 pub mod commands;

@@ -91,7 +91,7 @@ pub struct Fit {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// No shapes to fit.
-    #[error("there are no shapes to fit: give at least one")]
+    #[error("there are no shapes to fit; give at least one")]
     NoShapes,
     /// A shape with another number of points than the mesh.
     #[error("shape {shape} has {has} points, the mesh {points}: shapes must be of the same mesh in the same order")]
@@ -104,7 +104,7 @@ pub enum FitError {
         points: usize,
     },
     /// A displacement that is not finite.
-    #[error("shape {shape} is not finite at point {point}: repair the shape")]
+    #[error("shape {shape} is not finite at point {point}; repair the shape")]
     Shape {
         /// Index of the first such shape.
         shape: usize,
@@ -112,7 +112,7 @@ pub enum FitError {
         point: usize,
     },
     /// A point that is not finite.
-    #[error("point {point} of the mesh is not finite: repair the mesh")]
+    #[error("point {point} of the mesh is not finite; repair the mesh")]
     Point {
         /// Index of the first such point.
         point: usize,
@@ -124,13 +124,13 @@ pub enum FitError {
         triangle: usize,
     },
     /// Shapes that are all equal to the mesh at rest.
-    #[error("no shape moves any point: give displacements from the rest mesh that are not all zero")]
+    #[error("no shape moves any point; give displacements from the rest mesh that are not all zero")]
     NothingMoves,
     /// A request for zero bones.
-    #[error("no bones were asked for: ask for at least one")]
+    #[error("no bones were asked for; ask for at least one")]
     NoBones,
     /// More bones than moving points.
-    #[error("{bones} bones were asked for, but the shapes move {moving} points only: ask for fewer bones")]
+    #[error("{bones} bones were asked for, but the shapes move {moving} points only; ask for fewer bones")]
     TooManyBones {
         /// Number of bones requested.
         bones: usize,
@@ -138,7 +138,7 @@ pub enum FitError {
         moving: usize,
     },
     /// Zero or too many influences.
-    #[error("{influences} influences a point were asked for: ask for 1 to {MAX_INFLUENCES}")]
+    #[error("{influences} influences a point were asked for; ask for 1 to {MAX_INFLUENCES}")]
     Influences {
         /// Number of influences requested.
         influences: usize,
@@ -152,13 +152,13 @@ pub enum FitError {
         bones: usize,
     },
     /// A position that is not finite.
-    #[error("bone {bone} is not at a finite place: move it first")]
+    #[error("bone {bone} is not at a finite place; move it first")]
     Start {
         /// Index of the first such bone.
         bone: usize,
     },
     /// Weights of another mesh or other bones.
-    #[error("the weights are for {points} points and joint {joint}, the mesh or the bones are others: bind again")]
+    #[error("the weights are for {points} points and joint {joint}, the mesh or the bones are others; bind again")]
     Weights {
         /// Number of points of the weights.
         points: usize,

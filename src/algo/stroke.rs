@@ -123,7 +123,7 @@ pub enum ChainChoice {
 pub enum StrokeError {
     /// A stroke with fewer than two different finite points.
     #[error(
-        "the stroke has {finite} usable points of {given}, which make no line: draw at least two different points in the view"
+        "the stroke has {finite} usable points of {given}, which make no line; draw at least two different points in the view"
     )]
     TooShort {
         /// Number of points given.
@@ -132,7 +132,7 @@ pub enum StrokeError {
         finite: usize,
     },
     /// A stroke without a point over the mesh.
-    #[error("the stroke does not cross the mesh in this view: draw it over the mesh, or turn the view")]
+    #[error("the stroke does not cross the mesh in this view; draw it over the mesh, or turn the view")]
     Misses,
 }
 

@@ -65,7 +65,7 @@ pub enum TransferError {
         weights: usize,
     },
     /// A source without weights.
-    #[error("no finite point of the source mesh has weights: bind it first")]
+    #[error("no finite point of the source mesh has weights; bind it first")]
     NoWeights,
 }
 

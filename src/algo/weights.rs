@@ -159,16 +159,16 @@ pub struct Locks<'a> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WeightError {
     /// There is nothing to bind to.
-    #[error("the rig has no joints: place at least one before binding")]
+    #[error("the rig has no joints; place at least one before binding")]
     NoJoints,
     /// A point that is not a number.
-    #[error("point {point} of the mesh is not finite: repair the mesh before binding")]
+    #[error("point {point} of the mesh is not finite; repair the mesh before binding")]
     Point {
         /// Index of the first such point.
         point: usize,
     },
     /// A joint that is not a number.
-    #[error("joint {joint} is not at a finite place: move it before binding")]
+    #[error("joint {joint} is not at a finite place; move it before binding")]
     Joint {
         /// Index of the first such joint.
         joint: usize,
@@ -205,7 +205,7 @@ pub enum WeightError {
     },
     /// Locks that do not fit the mesh or the rig.
     #[error(
-        "the locked weights are for {points} points and {joints} joints, the mesh and rig have others: bind without locks"
+        "the locked weights are for {points} points and {joints} joints, the mesh and rig have others; bind without locks"
     )]
     Locks {
         /// Number of points of the locked weights.

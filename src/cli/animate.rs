@@ -45,7 +45,7 @@ pub(super) struct AnimateArgs {
     /// The rig: a .rig.ron, a template by its name, a project (.rigsmith.ron), or a skeleton in a .glb, .gltf or .rig
     rig: PathBuf,
     /// The motion: clips of a rig (.anim.ron), or a motion capture file (.bvh) of any skeleton
-    clip: PathBuf,
+    pub clip: PathBuf,
     /// A mesh to bind to the rig, for .glb and .png
     #[arg(long)]
     mesh: Option<PathBuf>,

@@ -9,8 +9,8 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, convert::mark_joints, progress::Progress, skin,
-    switches::SwitchArgs,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, convert::mark_joints, explanation::Explanation,
+    progress::Progress, skin, switches::SwitchArgs,
 };
 use crate::{
     files::{FileKind, RealDisk, load_model, store_model, store_rig},
@@ -28,7 +28,7 @@ use crate::{
 #[derive(Args, Debug)]
 pub(super) struct BuildArgs {
     /// The rig: a .rig.ron
-    rig: PathBuf,
+    pub rig: PathBuf,
     /// A mesh to bind to what is built
     #[arg(long)]
     mesh: Option<PathBuf>,
@@ -89,7 +89,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     if let Some(error) = outcome.error {
         report.at_fault = true;
         report.notes.push(format!("`{}`: {error} (tag {})", args.rig.display(), error.command));
-        report.set("error", error.to_string());
+        report.fault = Some(Explanation::at(args.rig.display().to_string(), &error.to_string()));
         return Ok(report);
     }
     // Checked even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.

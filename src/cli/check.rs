@@ -8,7 +8,7 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Report, skin::load_rig};
+use super::{Failure, Report, explanation::Explanation, skin::load_rig};
 use crate::{
     files::{
         FileKind, LoadError, PartFiles, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project,
@@ -33,7 +33,7 @@ use crate::{
 pub(super) struct CheckArgs {
     /// The files
     #[arg(required = true)]
-    files: Vec<PathBuf>,
+    pub files: Vec<PathBuf>,
 }
 
 /// Problems of one file.
@@ -60,7 +60,15 @@ pub(super) fn run(args: &CheckArgs) -> Result<Report, Failure> {
         for remark in &found.remarks {
             report.line(format!("  {remark}"));
         }
-        report.at_fault |= found.error.is_some();
+        if let Some(error) = &found.error {
+            report.at_fault = true;
+            let first = found.problems.first();
+            let place = first.map(|problem| format!("{}:{}:{}", path.display(), problem.line, problem.column));
+            let what = first.map_or(error.as_str(), |problem| problem.message.as_str());
+            report
+                .fault
+                .get_or_insert_with(|| Explanation::at(place.unwrap_or_else(|| path.display().to_string()), what));
+        }
         let problems = found.problems.iter();
         let problems = problems.map(|p| json!({ "line": p.line, "column": p.column, "message": p.message }));
         list.push(json!({

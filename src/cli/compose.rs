@@ -24,7 +24,7 @@ use crate::{
 pub(super) struct MergeArgs {
     /// The rigs, `.rig.ron`: all others come into the first
     #[arg(required = true, num_args = 2..)]
-    rigs: Vec<PathBuf>,
+    pub rigs: Vec<PathBuf>,
     /// Joint on which the roots of the others hang; they stay roots without it. `FILE:LABEL` says it of one of the others, and
     /// may be given for several; a joint that another one brought counts, too
     #[arg(long, value_name = "[FILE:]LABEL")]
@@ -42,7 +42,7 @@ pub(super) struct InjectArgs {
     /// The template, such as a part
     template: PathBuf,
     /// The rig
-    rig: PathBuf,
+    pub rig: PathBuf,
     /// Labels or uids of the joints, in the order in which they take the template's tags
     #[arg(long, value_delimiter = ',', required = true, value_name = "LABEL,...")]
     joints: Vec<String>,
@@ -80,7 +80,7 @@ enum ExtractKind {
 #[derive(Args, Debug)]
 pub(super) struct ExtractArgs {
     /// The rig
-    rig: PathBuf,
+    pub rig: PathBuf,
     /// Labels or uids of the joints
     #[arg(long, value_delimiter = ',', required = true, value_name = "LABEL,...")]
     joints: Vec<String>,

@@ -22,7 +22,7 @@ use crate::{
 #[derive(Args, Debug)]
 pub(super) struct ConvertArgs {
     /// The file to read
-    input: PathBuf,
+    pub input: PathBuf,
     /// The file to write
     output: Output,
     #[command(flatten)]

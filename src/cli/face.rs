@@ -33,7 +33,7 @@ use crate::{
 #[derive(Args, Debug)]
 pub(super) struct FaceArgs {
     /// The mesh: a head, or a body whose head is found. .obj, .gltf or .glb
-    mesh: PathBuf,
+    pub mesh: PathBuf,
     /// Number of bones on the facial skin: the density. Jaw and eyes come on top
     #[arg(long, value_name = "K", default_value_t = 40)]
     bones: usize,

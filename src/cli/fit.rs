@@ -31,7 +31,7 @@ use crate::{
 #[derive(Args, Debug)]
 pub(super) struct FitArgs {
     /// The mesh: .obj, .gltf or .glb; a skeleton in it is ignored
-    mesh: PathBuf,
+    pub mesh: PathBuf,
     /// The template: biped, quadruped, bird or a .rig.ron; the one whose limbs the mesh shows if left out
     #[arg(long, value_name = "NAME|FILE")]
     template: Option<PathBuf>,

@@ -16,7 +16,7 @@ use crate::{
 pub(super) struct FormatArgs {
     /// The templates, `.rig.ron`
     #[arg(required = true)]
-    files: Vec<PathBuf>,
+    pub files: Vec<PathBuf>,
     /// Change nothing, and fail if a file is not in its layout
     #[arg(long)]
     check: bool,

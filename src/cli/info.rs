@@ -15,7 +15,7 @@ use crate::{
     rig::{
         Rig, Uid, UidSource,
         character::import_rig_text,
-        part::{PartInstance, PartOverride},
+        part::{PartInstance, PartNeeds, PartOverride},
     },
 };
 
@@ -23,7 +23,7 @@ use crate::{
 #[derive(Args, Debug)]
 pub(super) struct InfoArgs {
     /// The file
-    file: PathBuf,
+    pub file: PathBuf,
 }
 
 pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
@@ -64,6 +64,13 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
                 report.line(format!("socket {} on {}", socket.name, socket.label));
             }
             report.set("sockets", template.sockets.iter().map(|socket| socket.name.clone()).collect::<Vec<_>>());
+            if about.kind == "part" {
+                let needs = PartNeeds::of(&template.rig);
+                report.line(format!("needs joints: {}", needs.joints.join(", ")));
+                let places: Vec<String> = needs.sockets.iter().map(ToString::to_string).collect();
+                report.line(format!("hangs on: {}", places.join(", ")));
+                report.set("needs", json!({ "joints": needs.joints, "sockets": places }));
+            }
             for option in &template.options {
                 let about = if option.description.is_empty() { "" } else { ": " };
                 report.line(format!("option {} = {}{about}{}", option.name, option.default, option.description));

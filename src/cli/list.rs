@@ -28,7 +28,7 @@ use crate::{
 pub(super) struct ListArgs {
     /// The folder; folders in it count, too. Without one: the working folder, the folders of the site, and what comes with
     /// Rigsmith
-    folder: Option<PathBuf>,
+    pub folder: Option<PathBuf>,
 }
 
 /// Bytes of a file that are read first: a header of usual length.

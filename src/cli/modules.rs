@@ -3,7 +3,7 @@
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::Report;
+use super::{Report, explanation::Explanation};
 use crate::{modules, rig::nearest::did_you_mean};
 
 /// Arguments of `rigsmith modules`.
@@ -28,9 +28,15 @@ pub(super) fn run(args: &ModulesArgs) -> Report {
     }
     for name in args.names.iter().filter(|name| modules.get(name).is_none()) {
         let nearest = did_you_mean(name, modules.iter().map(|module| module.name));
-        report.notes.push(format!("there is no module \"{name}\"{nearest}; `rigsmith modules` lists all"));
+        let fault = format!("there is no module \"{name}\"{nearest}; `rigsmith modules` lists all");
+        report.fault.get_or_insert_with(|| Explanation::at("command line".to_owned(), &fault));
+        report.notes.push(fault);
         report.at_fault = true;
     }
-    report.list = Some(Value::Array(list));
+    if report.at_fault {
+        report.set("modules", list);
+    } else {
+        report.list = Some(Value::Array(list));
+    }
     report
 }

@@ -15,7 +15,7 @@ pub(super) struct NewArgs {
     kind: KindArg,
     /// The file to write, `.rig.ron`; one that is there stays
     #[arg(short, long)]
-    output: PathBuf,
+    pub output: PathBuf,
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy)]

@@ -48,7 +48,7 @@ impl PoseSteps {
 #[derive(Args, Debug)]
 pub(super) struct PoseArgs {
     /// The rig: a .rig.ron, or a project (.rigsmith.ron), whose pose is kept
-    rig: PathBuf,
+    pub rig: PathBuf,
     /// A mesh to bind to what is built
     #[arg(long)]
     mesh: Option<PathBuf>,

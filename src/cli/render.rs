@@ -34,7 +34,7 @@ use crate::{
 #[derive(Args, Debug)]
 pub(super) struct RenderArgs {
     /// A mesh (.obj, .gltf, .glb), a skeleton (.rig.ron, .rig) or a project (.rigsmith.ron)
-    file: PathBuf,
+    pub file: PathBuf,
     /// The picture to write, a .png
     #[arg(short, long)]
     output: Output,

@@ -3,8 +3,9 @@
 use std::{borrow::Cow, fmt::Write as _, io::Write, path::Path, process::ExitCode};
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
+use super::explanation::Explanation;
 use crate::{
     files::{LoadError, LoadShapesError, StoreError},
     headless::WorkbenchError,
@@ -23,6 +24,8 @@ pub(super) struct Report {
     pub list: Option<Value>,
     /// Marks a result that reports a fault of the input.
     pub at_fault: bool,
+    /// Fault of the input, for programs.
+    pub fault: Option<Explanation>,
 }
 
 impl Report {
@@ -96,8 +99,8 @@ struct InSource {
     place: SourceSpan,
 }
 
-/// Prints the result and returns the exit code.
-pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
+/// Prints the result and returns the exit code. `subject` is the file that the command works on.
+pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str) -> ExitCode {
     let (code, answer) = match result {
         Ok(report) => {
             let mut code = u8::from(report.at_fault);
@@ -115,6 +118,9 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
             }
             let mut answer = Map::from_iter([("ok".to_owned(), Value::from(!report.at_fault))]);
             answer.extend(report.json);
+            if let Some(fault) = &report.fault {
+                answer.insert("error".to_owned(), fault.json());
+            }
             if !report.notes.is_empty() {
                 answer.insert("notes".to_owned(), report.notes.into());
             }
@@ -124,13 +130,13 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool) -> ExitCode {
             if !json {
                 complain(&format!("error: {message}\n\nFor more information, try 'rigsmith --help'."));
             }
-            (2, failed(&message))
+            (2, failed(&of_usage(&message)))
         }
         Err(Failure::Input(error)) => {
             if !json {
                 show(error.as_ref());
             }
-            (1, failed(&error.to_string()))
+            (1, failed(&Explanation::of_error(error.as_ref(), subject)))
         }
     };
     let is_written = !json || print_json(&Value::Object(answer));
@@ -192,8 +198,16 @@ fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-fn failed(message: &str) -> Map<String, Value> {
-    Map::from_iter([("ok".to_owned(), Value::from(false)), ("error".to_owned(), json!(message))])
+fn failed(error: &Explanation) -> Map<String, Value> {
+    Map::from_iter([("ok".to_owned(), Value::from(false)), ("error".to_owned(), error.json())])
+}
+
+/// A wrong use of the command. The parser of the command line tells the fault first, then usage and help.
+fn of_usage(message: &str) -> Explanation {
+    let fault = message.strip_prefix("error: ").unwrap_or(message);
+    let fault = fault.split("\n\n").next().unwrap_or(fault);
+    let fault = fault.split_whitespace().collect::<Vec<&str>>().join(" ");
+    Explanation::at("command line".to_owned(), &fault)
 }
 
 /// True for characters that a terminal obeys instead of showing them.
@@ -264,6 +278,8 @@ fn piece_of_line(path: &Path, text: &str, offset: usize, message: &str, what: &s
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]

@@ -25,7 +25,7 @@ pub(super) struct SketchArgs {
     /// The mesh: .obj, .gltf or .glb. The sketch begins with its skeleton, if it has one
     mesh: PathBuf,
     /// The gestures, a list in RON such as [Stroke(points: [(0.0, 0.9), (0.0, 1.4)], joints: 3)]
-    gestures: PathBuf,
+    pub gestures: PathBuf,
     /// Output file: .rig, .rig.ron, or the skinned character as .glb or .gltf
     #[arg(short, long)]
     output: Output,

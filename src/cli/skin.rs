@@ -33,7 +33,7 @@ pub(super) struct SkinArgs {
     /// The skeleton: .rig.ron, .rig, or a .glb or .gltf that has one
     rig: PathBuf,
     /// The mesh: .obj, .gltf or .glb. A skeleton in it is left aside
-    mesh: PathBuf,
+    pub mesh: PathBuf,
     /// Output file: .glb or .gltf, or only the weights as .skin
     #[arg(short, long)]
     output: Output,

@@ -8,7 +8,7 @@ use std::{
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, InPlaceArgs, Report};
+use super::{Failure, InPlaceArgs, Report, explanation::Explanation};
 use crate::{
     files::{Disk, FileKind, RealDisk, StoreError, load_template, save_atomic, store_rig_over},
     modules,
@@ -27,14 +27,14 @@ pub(super) struct DiffArgs {
     /// The one template, `.rig.ron`
     from: PathBuf,
     /// The other one
-    to: PathBuf,
+    pub to: PathBuf,
 }
 
 /// Arguments of `rigsmith update`.
 #[derive(Args, Debug)]
 pub(super) struct UpdateArgs {
     /// The rig, `.rig.ron`
-    rig: PathBuf,
+    pub rig: PathBuf,
     /// The template in its new version
     #[arg(long)]
     from: PathBuf,
@@ -109,10 +109,11 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let conflicts = updated.conflicts();
     report.set("conflicts", conflicts);
     if conflicts > 0 && args.take.is_none() {
-        report.notes.push(format!(
-            "both sides changed {conflicts} {}: say --take theirs or --take mine; nothing was written",
-            if conflicts == 1 { "field" } else { "fields" }
-        ));
+        let fields = if conflicts == 1 { "field" } else { "fields" };
+        let fault =
+            format!("both sides changed {conflicts} {fields}, and nothing was written; say --take theirs or mine");
+        report.fault = Some(Explanation::at(args.rig.display().to_string(), &fault));
+        report.notes.push(fault);
         report.at_fault = true;
         return Ok(report);
     }

@@ -10,7 +10,12 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{ExportArgs, Failure, InPlaceArgs, Report, SEED, WeightArgs, build::character_of, report::print};
+use super::{
+    ExportArgs, Failure, InPlaceArgs, Report, SEED, WeightArgs,
+    build::character_of,
+    explanation::Explanation,
+    report::{print, print_json},
+};
 use crate::{
     files::{FileKind, LOOK, LoadError, PartFiles, RealDisk, TemplateWatch, store_model},
     headless::Workbench,
@@ -22,7 +27,7 @@ use crate::{
 #[derive(Args, Debug)]
 pub(super) struct WatchArgs {
     /// The template, `.rig.ron`
-    template: PathBuf,
+    pub template: PathBuf,
     /// A mesh to bind to what is built
     #[arg(long)]
     mesh: Option<PathBuf>,
@@ -69,7 +74,10 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
                 builds += 1;
                 told
             }
-            Err(Failure::Input(error)) => json!({ "ok": false, "error": error.to_string() }),
+            Err(Failure::Input(error)) => {
+                let subject = args.template.display().to_string();
+                json!({ "ok": false, "error": Explanation::of_error(error.as_ref(), &subject).json() })
+            }
             Err(usage) => return Err(usage),
         };
         is_heard = watch.say(&told);
@@ -167,10 +175,11 @@ impl Watch<'_> {
     /// Says at once what happened; `false` if nobody can read it any more.
     fn say(&self, told: &Value) -> bool {
         if self.is_json {
-            return print([told.to_string().as_str()]);
+            return print_json(told);
         }
-        if let Some(error) = told["error"].as_str() {
-            return print([format!("not taken over: {error}").as_str()]);
+        if let Some(error) = told.get("error") {
+            let [what, place, remedy] = ["what", "where", "do"].map(|part| error[part].as_str().unwrap_or_default());
+            return print([format!("not taken over: {place}: {what}; {remedy}").as_str()]);
         }
         let ran: Vec<&str> = told["ran"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
         let names = ran.iter().take(NAMED).copied().collect::<Vec<_>>().join(", ");

@@ -29,7 +29,7 @@ mod encode;
 mod error;
 mod frame;
 mod gap;
-mod lossy_timeline;
+mod lossy_history;
 mod place;
 mod read;
 mod restore;

@@ -143,11 +143,28 @@ pub enum LoadError {
         source: SkinFileError,
     },
     /// The reader panicked.
-    #[error("`{}`: the file broke the reader; it is damaged in a way that is not foreseen: export it again", path.display())]
+    #[error("`{}`: the file broke the reader; it is damaged in a way that is not foreseen; export it again", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
     },
+}
+
+impl LoadError {
+    /// The file; `None` for glTF, whose errors hold its name.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Read(error) => Some(error.path()),
+            Self::Gltf(_) => None,
+            Self::Kind { path, .. }
+            | Self::Obj { path, .. }
+            | Self::RigText { path, .. }
+            | Self::Source { path, .. }
+            | Self::Bvh { path, .. }
+            | Self::Skin { path, .. }
+            | Self::Broken { path } => Some(path),
+        }
+    }
 }
 
 /// Reads a mesh: `.obj`, `.gltf` or `.glb`.

@@ -75,6 +75,19 @@ pub enum ReadError {
 }
 
 impl ReadError {
+    /// The path as given.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Missing { path, .. }
+            | Self::IsFolder { path }
+            | Self::NotAFile { path }
+            | Self::Empty { path }
+            | Self::NoAccess { path, .. }
+            | Self::TooLarge { path, .. }
+            | Self::Io { path, .. } => path,
+        }
+    }
+
     pub(super) fn new(disk: &dyn Disk, path: &Path, source: io::Error) -> Self {
         let hint = match source.kind() {
             ErrorKind::NotFound | ErrorKind::NotADirectory => Some(hint(disk, path)),

@@ -91,7 +91,7 @@ pub enum StoreError {
         source: SkinError,
     },
     /// The file would have no content.
-    #[error("`{}` was not written: {what}; nothing was changed", path.display())]
+    #[error("`{}` was not written, and nothing was changed: {what}", path.display())]
     Nothing {
         /// The file.
         path: PathBuf,
@@ -99,7 +99,7 @@ pub enum StoreError {
         what: &'static str,
     },
     /// Rigsmith's own reader refuses the bytes that were to be written.
-    #[error("`{}` was not written, because it could not be read again ({source}); nothing was changed; save in another format and report this", path.display())]
+    #[error("`{}` was not written, because it could not be read again ({source}), and nothing was changed; save in another format and report this", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -107,7 +107,7 @@ pub enum StoreError {
         source: Box<LoadError>,
     },
     /// Rigsmith's own reader finds less content than was to be written.
-    #[error("`{}` was not written, because only {read} of {written} {what} could be read again; nothing was changed; save in another format and report this", path.display())]
+    #[error("`{}` was not written, because only {read} of {written} {what} could be read again, and nothing was changed; save in another format and report this", path.display())]
     Lost {
         /// The file.
         path: PathBuf,
@@ -126,6 +126,25 @@ pub enum StoreError {
         /// Endings that fit, in words.
         wanted: &'static str,
     },
+}
+
+impl StoreError {
+    /// The file that was to be written.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Save(error) => error.path(),
+            Self::Gltf { path, .. }
+            | Self::RigText { path, .. }
+            | Self::TooLarge { path, .. }
+            | Self::ProjectTooLarge { path, .. }
+            | Self::AnimationTooLarge { path, .. }
+            | Self::Skin { path, .. }
+            | Self::Nothing { path, .. }
+            | Self::Unreadable { path, .. }
+            | Self::Lost { path, .. }
+            | Self::Kind { path, .. } => path,
+        }
+    }
 }
 
 /// Saves a model as `.glb`, `.gltf` (with its buffer and images beside it) or `.obj` (with its materials), after

@@ -16,7 +16,10 @@ use crate::{
         schema::Attributes,
     },
     processor::{Exclusion, FindError, RunReport},
-    rig::{BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::did_you_mean},
+    rig::{
+        BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, feature::off_at,
+        nearest::did_you_mean,
+    },
     solve::program::ProgramError,
 };
 
@@ -47,7 +50,7 @@ pub enum WriteValue {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PoseError {
     /// The text does not describe a write.
-    #[error("\"{0}\" sets nothing: write CONTROL.translate=(x,y,z), .rotate, .scale, or NODE.ATTRIBUTE=value")]
+    #[error("\"{0}\" sets nothing; write CONTROL.translate=(x,y,z), .rotate, .scale, or NODE.ATTRIBUTE=value")]
     Syntax(String),
     /// The rig is not built.
     #[error("the rig is not built; build it first")]
@@ -74,12 +77,14 @@ pub enum PoseError {
         off: Exclusion,
     },
     /// Several nodes have that name.
-    #[error("\"{name}\" may be any of {candidates}; write one of these names")]
+    #[error("\"{name}\" may be any of {candidates}{off}; write one of these names")]
     Ambiguous {
         /// Requested name.
         name: String,
         /// Names of the nodes that the requested name may mean.
         candidates: String,
+        /// Clause about the features that are off there, in brackets; empty if none is.
+        off: String,
     },
     /// The node has no such attribute.
     #[error("\"{node}\" has no attribute \"{attribute}\"{known}")]
@@ -355,7 +360,8 @@ impl Workbench {
             }
             _ => {
                 let names: Vec<&str> = found.iter().map(|node| &*node.name).collect();
-                Err(PoseError::Ambiguous { name: name.to_owned(), candidates: names.join(", ") })
+                let off = off_at(self.rig(), name).map_or_else(String::new, |off| format!(" ({off})"));
+                Err(PoseError::Ambiguous { name: name.to_owned(), candidates: names.join(", "), off })
             }
         }
     }

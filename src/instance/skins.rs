@@ -9,7 +9,8 @@ use crate::{
 };
 
 /// Skinned mesh below an instance, whose joints are the instance's nodes.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[reflect(Component)]
 pub struct BoundTo(pub Entity);
 
 /// A skinned mesh below an instance follows it from now on.
@@ -79,7 +80,8 @@ pub(super) fn bind_skins(
 /// has the pieces of the mesh below it, as a [`RigMesh`](crate::plugins::surface::RigMesh) with the display plugin or a loaded
 /// scene has, and may be hidden.
 #[cfg(feature = "draw")]
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[reflect(Component)]
 #[require(Visibility)]
 pub struct SharedMesh(pub Entity);
 

@@ -33,7 +33,9 @@ pub const UPDATE: &str = "Update from template";
 /// both changed the same field to different values; such an update, and every one of a rig that is not live, is an
 /// [`UpdateOffer`] until an [`AcceptUpdate`]. Undoing the step brings the base back, and nothing more is taken over until the
 /// file changes again. An update that cannot be built is taken back and told ([`RigFailed`]).
-#[derive(Component, Debug, Clone)]
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 #[require(Transform)]
 pub struct RigSource {
     /// The template.
@@ -136,7 +138,9 @@ impl RigSource {
 }
 
 /// An update that waits for an [`AcceptUpdate`].
-#[derive(Component, Debug, Clone)]
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct UpdateOffer {
     /// Changes that it would make; conflicts have the value now and that of the template.
     pub changes: Arc<[Difference]>,

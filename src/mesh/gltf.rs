@@ -128,6 +128,32 @@ pub enum GltfError {
 }
 
 impl GltfError {
+    /// The file's name as given to the reader; `None` for models to write.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::Container { file, .. }
+            | Self::Json { file, .. }
+            | Self::Invalid { file, .. }
+            | Self::Extension { file, .. }
+            | Self::External { file, .. }
+            | Self::TooLarge { file, .. } => Some(file),
+            Self::Model { .. } | Self::Unweighted { .. } => None,
+        }
+    }
+
+    /// Place in the file: a JSON pointer, line and column of the JSON, or a byte offset.
+    pub fn place(&self) -> Option<String> {
+        match self {
+            Self::Container { offset, .. } => Some(format!("byte {offset}")),
+            Self::Json { line, column, .. } => Some(format!("{line}:{column}")),
+            Self::Invalid { place, .. } | Self::External { place, .. } | Self::TooLarge { place, .. } => {
+                Some(place.clone())
+            }
+            Self::Extension { .. } => Some("/extensionsRequired".to_owned()),
+            Self::Model { .. } | Self::Unweighted { .. } => None,
+        }
+    }
+
     /// An error at a JSON pointer; the file's name is added where the reader returns.
     fn at(place: impl Into<String>, what: impl Into<String>) -> Self {
         Self::Invalid { file: String::new(), place: place.into(), what: what.into() }

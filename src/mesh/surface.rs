@@ -57,7 +57,7 @@ pub struct SurfacePoint {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SurfaceError {
     /// The positions are not those of the mesh that the surface was built from.
-    #[error("the surface was built from {expected} points but is refitted with {found}: build it again")]
+    #[error("the surface was built from {expected} points but is refitted with {found}; build it again")]
     PointCount {
         /// Number of points that the surface was built from.
         expected: usize,
@@ -66,7 +66,7 @@ pub enum SurfaceError {
     },
     /// A position is not finite or too far from the origin to have a bounding box.
     #[error(
-        "point {point} is not finite or further than 1e18 from the origin: repair the pose, or build the surface again to leave out its triangles"
+        "point {point} is not finite or further than 1e18 from the origin; repair the pose, or build the surface again to leave out its triangles"
     )]
     Point {
         /// Index of the first such point that a triangle of the surface uses.

@@ -39,7 +39,7 @@ pub enum VoxelizeError {
     },
     /// The box contains no triangle with finite corners.
     #[error(
-        "there is no triangle with finite corners to make voxels of: check that the mesh has faces near the skeleton"
+        "there is no triangle with finite corners to make voxels of; check that the mesh has faces near the skeleton"
     )]
     NoSurface,
 }

@@ -56,7 +56,9 @@ impl ClipPlayer {
 }
 
 /// Clips of a rig without a document.
-#[derive(Component, Debug, Clone, PartialEq, Default)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct RigClips(pub Arc<[RigClip]>);
 
 /// Event that playback passed a marker of a clip.
@@ -74,7 +76,8 @@ pub struct MarkerReached {
 
 /// Root motion: movement of one node that is handed to the game in place of the pose. The node stands where it stands at the
 /// start of the clip, and the game multiplies the rig's `Transform` by `delta` after each frame.
-#[derive(Component, Debug, Clone, Copy, PartialEq)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
+#[reflect(Component)]
 pub struct RootMotion {
     /// The node, whose parents the clip does not move.
     pub node: Uid,
@@ -90,7 +93,8 @@ impl RootMotion {
 }
 
 /// Keys that are set with each pose that is committed, in the same step of the history. On the entity of a rig.
-#[derive(Component, Debug, Clone, Copy, PartialEq)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
+#[reflect(Component)]
 pub struct AutoKey {
     /// True to set keys.
     pub on: bool,

@@ -8,6 +8,7 @@
 //! out of the history.
 
 mod constraints;
+mod guard;
 mod nodes;
 mod run;
 
@@ -49,6 +50,7 @@ impl Plugin for CommandsPlugin {
                 nodes::unsorted_rigs.pipe(nodes::order_siblings),
                 nodes::despawn_parked,
                 constraints::follow_constraints,
+                guard::keep_built,
                 (run::run_built, report_commands),
             )
                 .chain()

@@ -19,7 +19,10 @@ use super::{
     schema::{Attributes, Control, NodeLayer},
 };
 use crate::{
-    rig::{AttributeKind, BuiltRig, Matching, Rig, SwitchData, Uid, nearest::did_you_mean, operations::Operation},
+    rig::{
+        AttributeKind, BuiltRig, Matching, Rig, SwitchData, Uid, feature::off_at, nearest::did_you_mean,
+        operations::Operation,
+    },
     solve::matching::{MatchError, match_switch},
 };
 
@@ -94,6 +97,26 @@ pub enum SwitchError {
         name: String,
         /// Requested value.
         value: String,
+        /// Possible values.
+        known: String,
+    },
+    /// The switch is not built, because something is off.
+    #[error("switch \"{name}\" is not built: {off}; turn it on")]
+    Off {
+        /// Requested name.
+        name: String,
+        /// Clause about the group or the features that are off.
+        off: String,
+    },
+    /// The switch has no such value while something is off.
+    #[error("switch \"{name}\" has no value \"{value}\": {off}; turn it on, or write one of: {known}")]
+    NoValueOff {
+        /// The name of the switch.
+        name: String,
+        /// Requested value.
+        value: String,
+        /// Clause about the features that are off.
+        off: String,
         /// Possible values.
         known: String,
     },
@@ -193,7 +216,11 @@ pub fn find_switches(
             None => possible.extend(choices),
         }
     }
+    let off = if found.is_empty() { off_at(rig, name) } else { None };
     if found.is_empty() && possible.is_empty() {
+        if let Some(off) = off {
+            return Err(SwitchError::Off { name: name.to_owned(), off });
+        }
         let known: Vec<String> = built.switches.iter().filter_map(|switch| name_of(built, switch)).collect();
         let nearest = did_you_mean(name, known.iter().map(String::as_str));
         return Err(SwitchError::NoSwitch { name: name.to_owned(), nearest, known: names(built) });
@@ -202,7 +229,11 @@ pub fn find_switches(
         let mut seen = BTreeSet::new();
         possible.retain(|value| seen.insert(*value));
         let (name, value) = (name.to_owned(), value.to_owned());
-        return Err(SwitchError::NoValue { name, value, known: possible.join(", ") });
+        let known = possible.join(", ");
+        return Err(match off {
+            Some(off) => SwitchError::NoValueOff { name, value, off, known },
+            None => SwitchError::NoValue { name, value, known },
+        });
     }
     Ok(found)
 }

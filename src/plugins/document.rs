@@ -68,11 +68,13 @@ impl Plugin for DocumentPlugin {
 }
 
 /// True to show a rig at rest while its rest pose is edited. The pose stays in the document.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Component)]
 pub struct ShowRest(pub bool);
 
 /// Plane of live mirroring of a rig; `None` while mirroring is off.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Component)]
 pub struct Symmetry(pub Option<MirrorPlane>);
 
 /// Request for one change of a rig. Requests are carried out in the order in which they are sent.

@@ -129,7 +129,9 @@ pub struct FaceReport {
 }
 
 /// Analysis of a mesh's face; beside the mesh, and not saved: it is computed again when it is needed.
-#[derive(Component, Clone)]
+#[derive(Component, Reflect, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Clone)]
 pub struct Face {
     /// The analysis of the mesh.
     pub analysis: Arc<FaceAnalysis>,

@@ -162,7 +162,7 @@ pub enum FitFailure {
     #[error("the mesh belongs to no rig; it may have been closed")]
     NoRig,
     /// Neither the rig nor the request has joints.
-    #[error("there is no skeleton to fit: name a template")]
+    #[error("there is no skeleton to fit; name a template")]
     NoTemplate,
     /// There is no template with the name.
     #[error("there is no template \"{name}\"{nearest}")]
@@ -241,7 +241,9 @@ impl Drop for FitJob {
 }
 
 /// Fit that can still be corrected, on the rig's entity: moving a joint at rest fits the joints around it again.
-#[derive(Component, Clone)]
+#[derive(Component, Reflect, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Clone)]
 pub struct FittedRig {
     /// Report of the present fit.
     pub report: Arc<FitReport>,

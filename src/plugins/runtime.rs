@@ -10,8 +10,8 @@
 //! by a person, an animation or a game, and becomes the node's pose offset before the program runs. The program then
 //! writes the `Transform`s of all nodes that moved. The document's pose is passed on only where the document changes.
 
+mod attachments;
 mod hand_over;
-mod hung;
 mod inputs;
 mod spawn;
 mod systems;
@@ -50,7 +50,12 @@ impl Plugin for RuntimePlugin {
                 )
                     .chain()
                     .in_set(RigSystems::Solve),
-                (systems::scatter_globals, systems::correct_globals, hand_over::hand_over, hung::place_hung)
+                (
+                    systems::scatter_globals,
+                    systems::correct_globals,
+                    hand_over::hand_over,
+                    attachments::place_attachments,
+                )
                     .chain()
                     .in_set(RigSystems::Scatter),
             ),

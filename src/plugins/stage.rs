@@ -45,8 +45,9 @@ impl Plugin for StagePlugin {
 }
 
 /// Stage of a rig; on rigs that are built, or that a [`StageRequest`] has been sent for. Other code reads it.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[component(immutable)]
+#[reflect(Component)]
 pub enum RigStage {
     /// The joints of the template in their pose; no command is in effect.
     Skeleton,

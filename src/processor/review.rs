@@ -1,10 +1,13 @@
 //! Problems of a rig's commands, all at once.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+};
 
 use super::{BuildError, BuildProblem, Builder, ModuleError, Modules};
 use crate::rig::{
-    Field, Rig, RigEdit, SourceError, TagData, TagKind, Uid, fields,
+    Field, Rig, SourceError, TagKind, Uid, fields,
     reference::{GroupScope, references_in},
     same_place,
     template::Explicit,
@@ -18,13 +21,16 @@ const MOST: usize = 200;
 /// cannot do without it are passed over: each fault is told once.
 pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
     let mut problems = Vec::new();
-    let mut rig = rig.clone();
-    let mut off = Vec::new();
+    let mut off = HashSet::new();
+    let mut judged: HashMap<(&str, &str), Option<BuildProblem>> = HashMap::new();
     for joint in rig.walk() {
         for tag in &joint.data.tags {
             let TagKind::Command { module, params, .. } = &tag.kind else { continue };
-            let loaded = modules.load(module, params).map(drop);
-            if let Err(problem) = loaded.and_then(|()| Ok(known_groups(&rig, params)?)) {
+            // Equal commands have equal problems: a template may hold one command thousands of times.
+            let problem = judged
+                .entry((module.as_str(), params.as_str()))
+                .or_insert_with(|| problem_before_run(rig, modules, module, params));
+            if let Some(problem) = problem.clone() {
                 problems.push(BuildError {
                     command: tag.uid,
                     joint: joint.data.uid,
@@ -32,24 +38,32 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
                     module: module.as_str().into(),
                     problem,
                 });
-                off.push((joint.data.uid, tag.clone()));
+                off.insert(tag.uid);
             }
         }
     }
     let order: Vec<Uid> = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
-    off.into_iter().for_each(|(joint, tag)| switch_off(&mut rig, joint, tag));
+    let mut rig = rig.clone();
+    rig.disable_tags(&off);
     let mut builder = Builder::new(modules.clone());
     for _ in 0..MOST {
         builder.sync(&rig);
         let Some(error) = builder.run_all().error else { break };
-        let tags = rig.joint(error.joint).map(|joint| joint.data.tags.clone()).unwrap_or_default();
-        let Some(tag) = tags.into_iter().find(|tag| tag.uid == error.command) else { break };
-        switch_off(&mut rig, error.joint, tag);
+        if rig.find_tag(error.command).is_none() {
+            break;
+        }
+        rig.disable_tags(&HashSet::from([error.command]));
         problems.push(error);
     }
     let places: HashMap<Uid, usize> = order.into_iter().enumerate().map(|(place, tag)| (tag, place)).collect();
     problems.sort_by_key(|error| places.get(&error.command).copied());
     problems
+}
+
+/// Problem of a command that is found without running it: in its module, its parameters, or the groups that these name.
+fn problem_before_run(rig: &Rig, modules: &Modules, module: &str, params: &str) -> Option<BuildProblem> {
+    let loaded = modules.load(module, params).map(drop);
+    loaded.and_then(|()| Ok(known_groups(rig, params)?)).err()
 }
 
 /// Refuses local groups that the rig does not have: in references, and as the group of what is made.
@@ -77,11 +91,6 @@ fn known_groups(rig: &Rig, params: &str) -> Result<(), ModuleError> {
         }
     }
     Ok(())
-}
-
-fn switch_off(rig: &mut Rig, joint: Uid, tag: TagData) {
-    // The tag was just there: nothing can be refused.
-    let _ = rig.apply(&RigEdit::SetTag(joint, Box::new(TagData { enabled: false, ..tag })));
 }
 
 /// The text of a template, in which the places of problems are looked up.

@@ -125,6 +125,17 @@ impl Rig {
         Some((joint, tag))
     }
 
+    /// Disables tags of a scratch copy, in time linear in the tags of their joints. It is no edit: a document that people
+    /// see is changed by [`RigEdit`](super::RigEdit)s alone.
+    pub(crate) fn disable_tags(&mut self, tags: &HashSet<Uid>) {
+        let joints: HashSet<Uid> = tags.iter().filter_map(|tag| self.tags.get(tag).copied()).collect();
+        for joint in joints {
+            let Some(joint) = self.joints.get_mut(&joint) else { continue };
+            let found = joint.data.tags.iter_mut().filter(|tag| tags.contains(&tag.uid));
+            found.for_each(|tag| tag.enabled = false);
+        }
+    }
+
     /// Returns `true` if a joint, group, tag, stored pose, clip, layer or input has that uid.
     pub fn is_taken(&self, uid: Uid) -> bool {
         self.joints.contains_key(&uid)

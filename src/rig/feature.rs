@@ -80,7 +80,7 @@ pub enum FeatureError {
     #[error("the feature \"{0}\" has no switch \"{1}\"{2}")]
     NoSwitch(String, String, String),
     /// A switch of a choice, which another one turns off.
-    #[error("\"{switch}\" is one of a choice of the feature \"{feature}\": turn on {others} instead")]
+    #[error("\"{switch}\" is one of a choice of the feature \"{feature}\"; turn on {others} instead")]
     Chosen {
         /// Name of the feature.
         feature: String,
@@ -104,6 +104,34 @@ pub fn is_active(rig: &Rig, joint: &JointData, tag: &TagData) -> bool {
 
 fn feature_enabled(rig: &Rig, feature: Uid) -> bool {
     rig.find_tag(feature).is_none_or(|(_, tag)| tag.enabled || !matches!(tag.kind, TagKind::Feature { .. }))
+}
+
+/// The local group that is off, or the features that are off, on the joints of a local group or of a label with this
+/// name; a clause such as `the feature ik is off`, or `None`.
+pub fn off_at(rig: &Rig, name: &str) -> Option<String> {
+    let named = |uid: Uid| rig.group(uid).filter(|group| group.name == name);
+    let is_meant = |joint: &JointData| joint.label.as_deref() == Some(name) || joint.group.and_then(named).is_some();
+    let mut features: BTreeSet<&str> = BTreeSet::new();
+    for joint in rig.walk().map(|joint| &joint.data).filter(|joint| is_meant(joint)) {
+        if let Some(group) = joint.group.and_then(|group| rig.group(group)).filter(|group| !group.enabled) {
+            return Some(format!("the group {} is off", group.name));
+        }
+        let commands = joint.tags.iter().filter_map(|tag| match &tag.kind {
+            TagKind::Command { feature, .. } => *feature,
+            TagKind::Feature { .. } => None,
+        });
+        let off = commands.filter_map(|feature| rig.find_tag(feature)).filter(|(_, feature)| !feature.enabled);
+        features.extend(off.filter_map(|(_, feature)| match &feature.kind {
+            TagKind::Feature { name, .. } if !name.is_empty() => Some(name.as_str()),
+            _ => None,
+        }));
+    }
+    let features: Vec<&str> = features.into_iter().collect();
+    match features[..] {
+        [] => None,
+        [feature] => Some(format!("the feature {feature} is off")),
+        _ => Some(format!("the features {} are off", features.join(", "))),
+    }
 }
 
 /// The commands of a feature tag, in the order of the document, with their joints.

@@ -42,7 +42,7 @@ impl fmt::Display for Uid {
 
 /// Error for a text that is not a [`Uid`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("\"{0}\" is no uid: write 16 hexadecimal digits, such as 00c0ffee00c0ffee")]
+#[error("\"{0}\" is no uid; write 16 hexadecimal digits, such as 00c0ffee00c0ffee")]
 pub struct UidError(pub String);
 
 impl FromStr for Uid {

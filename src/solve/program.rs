@@ -77,7 +77,7 @@ pub enum Keep {
 }
 
 /// A node that a game wants to pose or to read.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, PartialEq, Eq)]
 pub enum Exposed {
     /// The node with this uid.
     Uid(Uid),

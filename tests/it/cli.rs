@@ -20,6 +20,14 @@ impl Answer {
     }
 }
 
+/// The parts of a reported error, none of which may be empty, as one text.
+pub(super) fn explained(json: &Value) -> String {
+    let part = |name: &str| json["error"][name].as_str().unwrap_or_else(|| panic!("no {name}: {json}"));
+    let parts = ["where", "what", "do"].map(part);
+    assert!(json["ok"] == false && parts.iter().all(|part| !part.trim().is_empty()), "{json}");
+    parts.join("; ")
+}
+
 fn rigsmith(folder: &Path, args: &[&str]) -> Answer {
     let output = Command::new(env!("CARGO_BIN_EXE_rigsmith")).current_dir(folder).args(args).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
@@ -37,7 +45,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 /// A box from -1 to 1, as quads.
-const BOX: &str = "o box\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
+pub(super) const BOX: &str = "o box\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
     f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
 const SPINE: &str = "[Stroke(points: [(0.0, -0.8), (0.0, 0.8)], joints: 3), Label(\"tip\")]";
@@ -257,7 +265,7 @@ fn bad_input_is_said_and_exits_with_1() {
         args.insert(0, "--json");
         let json = rigsmith(folder.path(), &args).json();
         assert_eq!(json["ok"], false);
-        assert!(json["error"].as_str().unwrap().contains(wanted), "{args:?}: {json}");
+        assert!(explained(&json).contains(wanted), "{args:?}: {json}");
     }
 }
 

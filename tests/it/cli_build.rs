@@ -287,7 +287,7 @@ fn the_first_failing_command_stops_the_build() {
         assert_eq!(json.code, 1);
         let json = json.json();
         assert_eq!(json["ok"], false);
-        assert!(json["error"].as_str().unwrap().contains(wanted[0]), "{json}");
+        assert!(crate::cli::explained(&json).contains(wanted[0]), "{json}");
         let commands = json["commands"].as_array().unwrap();
         assert_eq!(commands[place]["state"], "failed", "{file}");
         assert!(commands[place]["error"].as_str().unwrap().contains(wanted[0]), "{file}: {}", commands[place]);
@@ -393,7 +393,7 @@ const FAULTY: &str = r#"(
             parent: "0000000000000001",
             label: "arm",
             group: "0000000000000099", // not in the file
-            translation: (0.5, 0.0, 0.0),
+            translation: (0.5, nil, 0.0), // float
             rotation: (0.0, 0.0, 0.0, 3.0), // not of length 1
             tags: [
                 Command(uid: "0000000000000023", module: "limit", params: ()), // all open
@@ -421,6 +421,7 @@ fn check_tells_all_faults_at_once_with_their_lines() {
         let found = told.iter().any(|(line, message)| *line == number && message.contains(wanted));
         assert!(found, "line {number}: {wanted}: {told:#?}");
     }
+    assert_eq!(told.len(), FAULTY.lines().filter(|line| line.contains("// ")).count(), "each once: {told:#?}");
     // The column is that in the file, where no uids stand beside the names.
     let sieze = problems.iter().find(|problem| problem["message"].to_string().contains("sieze")).unwrap();
     let line = FAULTY.lines().nth(sieze["line"].as_u64().unwrap() as usize - 1).unwrap();
@@ -500,6 +501,8 @@ fn modules_are_listed_with_parameters_and_defaults() {
     assert!(some.out.starts_with("null: ") && some.out.contains("\nspring: "), "{}", some.out);
     assert!(some.out.contains("frequency = 2.0"), "{}", some.out);
     assert_eq!(rigsmith(folder.path(), &["--json", "modules", "spring"]).json().as_array().unwrap().len(), 1);
+    let unknown = rigsmith(folder.path(), &["--json", "modules", "sprign"]);
+    assert!(crate::cli::explained(&unknown.json()).contains("did you mean \"spring\"?"), "{}", unknown.out);
     let wrong = rigsmith(folder.path(), &["modules", "sprign"]);
     assert_eq!(wrong.code, 1);
     assert!(wrong.err.contains("sprign") && wrong.err.contains("spring"), "{}", wrong.err);

@@ -341,7 +341,7 @@ fn wrong_inputs_are_refused_and_write_nothing() {
     let folder = folder();
     fs::write(folder.path().join("broken.rig.ron"), CRANE.replace("control(follow_scale", "controll(follow_scale"))
         .unwrap();
-    let arm = bundled("parts/arm");
+    let (arm, biped) = (bundled("parts/arm"), bundled("biped"));
     let crane = "crane.rig.ron";
     let wrong_sets: &[(&str, i32, &str)] = &[
         ("lift", 2, "sets nothing"),
@@ -379,6 +379,9 @@ fn wrong_inputs_are_refused_and_write_nothing() {
         (vec![&arm, "--switch", "arm_x=fk"], 1, "arm_settings_l"),
         (vec![&arm, "--switch", "arm_l=wk"], 1, "ik"),
         (vec![&arm, "--switch", "arm_l=nan"], 1, "ik"),
+        (vec![&biped, "--group", "arm_r=off", "--switch", "arm_r=fk"], 1, "the group arm_r is off; turn it on"),
+        (vec![&biped, "--feature", "ik=off", "--switch", "arm_r=fk"], 1, "the feature ik is off; turn it on"),
+        (vec![&biped, "--feature", "ik=off", "--set", "hand_r.rotate=(0,0,9)"], 1, "ik is off"),
         (vec![crane, "--group", "arm=off", "--set", "lift.rotate=(0,0,9)"], 1, "in the group arm, which is off"),
     ]);
     let names = |folder: &Path| -> BTreeSet<String> {

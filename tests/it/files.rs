@@ -158,8 +158,8 @@ fn what_cannot_be_saved_is_said_with_a_remedy() {
     assert_eq!(fs::read(at("protected")).unwrap(), OLD);
     assert_eq!(temps(folder.path()), 0);
     for (fault, at_step, expected) in [
-        (Fault::NoSpace, "write", "the disk is full; free some space"),
-        (Fault::NoSpace, "sync", "the disk is full; free some space"),
+        (Fault::NoSpace, "write", "the disk is full, and what was there is unchanged; free some space"),
+        (Fault::NoSpace, "sync", "the disk is full, and what was there is unchanged; free some space"),
         (Fault::NoAccess, "create", "choose another folder"),
         (Fault::Io, "sync", "waiting for the disk failed"),
     ] {

@@ -4,7 +4,7 @@
 use super::{
     gltf::{compose, data},
     mutate::run_fuzz,
-    prerequisites::data_folder,
+    prerequisites::test_data,
 };
 use glam::Vec3;
 use rigsmith::mesh::{
@@ -140,7 +140,7 @@ fn fuzz_gltf() {
     let mut bins: Vec<Vec<u8>> = files.iter().map(|file| file.bin.clone()).collect();
     let mut seeds: Vec<Vec<u8>> = files.iter().enumerate().map(|(i, file)| file.gltf(&format!("{i}.bin"))).collect();
     seeds.extend(files.iter().map(|file| file.glb()));
-    for path in data_folder().into_iter().flat_map(data::skinned_files) {
+    for path in test_data().into_iter().flat_map(data::skinned_files) {
         let bytes = std::fs::read(&path).unwrap();
         if bytes.len() > 80_000 {
             continue;

@@ -7,7 +7,7 @@ use rigsmith::mesh::{
     obj::{ObjArrays, ObjError, ObjSettings, read_mtl, read_obj, to_model, write_obj},
 };
 
-use crate::{mutate::run_fuzz, prerequisites::data_folder};
+use crate::{mutate::run_fuzz, prerequisites::test_data};
 
 const SEEDS: &[&str] = &[
     "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/1/1 4/2/1\n",
@@ -107,7 +107,7 @@ fn check_written(model: &Model) {
 #[test]
 fn changed_files_never_panic() {
     let mut seeds: Vec<Vec<u8>> = SEEDS.iter().map(|seed| seed.as_bytes().to_vec()).collect();
-    if let Some(data) = data_folder() {
+    if let Some(data) = test_data() {
         for folder in ["tinyobjloader", "tobj", "assimp_invalid"] {
             let mut paths: Vec<PathBuf> = (fs::read_dir(data.join("obj_torture").join(folder)).unwrap())
                 .map(|entry| entry.unwrap().path())

@@ -76,6 +76,8 @@ mod gizmo;
 mod gltf;
 mod gltf_torture;
 mod heads;
+#[cfg(feature = "cli")]
+mod hostile;
 mod influences;
 mod inputs;
 mod instances;

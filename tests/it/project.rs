@@ -444,6 +444,26 @@ fn broken_weights_are_told_and_the_rest_opens() {
         assert_eq!(loaded.rigs[0].stored_poses(), project.rigs[0].stored_poses());
         assert!(matches!(&loaded.meshes[0].shape, MeshState::Open { changed: false, .. }));
     }
+    // A link that leads out of the project's folder is as good as a path that does.
+    #[cfg(unix)]
+    {
+        fs::remove_file(folder.project()).unwrap();
+        let _ = fs::remove_file(&skin);
+        folder.save(&project);
+        let elsewhere = folder.0.path().join("elsewhere.skin");
+        fs::rename(&skin, &elsewhere).unwrap();
+        std::os::unix::fs::symlink(&elsewhere, &skin).unwrap();
+        let loaded = folder.load();
+        assert!(loaded.notes[0].to_string().contains("below the project"), "{:?}", loaded.notes);
+        assert!(loaded.rigs[0].skins().next().is_none());
+    }
+    // A mesh far away is told and opened.
+    let _ = fs::remove_file(&skin);
+    folder.save(&project);
+    let far = folder.0.path().join("meshes/cube.obj").display().to_string();
+    fs::write(folder.project(), folder.text().replace("../meshes/cube.obj", &far)).unwrap();
+    let loaded = folder.load();
+    assert!(loaded.notes.len() == 1 && loaded.notes[0].to_string().contains("is far from"), "{:?}", loaded.notes);
     // Weights of another save: still those of this mesh.
     fs::remove_file(&skin).unwrap();
     folder.save(&project);

@@ -56,6 +56,37 @@ fn every_component_of_the_table_is_registered() {
     }
 }
 
+/// Every component that inspectors and remote tools can name is in the table.
+#[test]
+fn every_registered_component_is_told() {
+    let mut app = App::new();
+    app.add_plugins((
+        MinimalPlugins,
+        AssetPlugin::default(),
+        TransformPlugin,
+        RigPlugins,
+        RigInstancePlugin::default(),
+    ));
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let names = told_components();
+    let registered = registry.iter().filter(|of| of.data::<ReflectComponent>().is_some());
+    // The editor's own components describe its windows, not rigs.
+    let own = registered
+        .map(|of| of.type_info().type_path_table())
+        .filter(|table| table.path().starts_with("rigsmith::") && !table.path().starts_with("rigsmith::editor::"));
+    let missing: Vec<&str> = own
+        .map(|table| table.path())
+        .filter(|path| {
+            let name = path.rsplit("::").next().unwrap();
+            !names.contains(name)
+        })
+        .collect();
+    assert!(missing.is_empty(), "the table of `plugins` lacks {missing:?}");
+    for name in ["RigInstance", "RigSource", "UpdateOffer", "RigInputs", "RigStage"] {
+        assert!(registry.get_with_short_type_path(name).is_some(), "{name} is not registered");
+    }
+}
+
 /// Every component of the schema is in the table, and registered.
 #[test]
 fn every_component_of_the_schema_is_told() {

@@ -12,7 +12,7 @@ use std::{
 
 use rigsmith::{editor::report::WindowReport, files::FileKind, render::adapter};
 
-use crate::prerequisites::{data_folder, skip};
+use crate::prerequisites::{skip, test_data};
 
 /// A display of its own, gone with the test.
 struct Display {
@@ -234,7 +234,7 @@ fn missing() -> Option<&'static str> {
 
 /// A mesh and the places of joints that strokes are drawn along: pelvis, head, shoulder, elbow, hand, hip, knee, ankle.
 fn subject(folder: &Path) -> (PathBuf, [[f32; 3]; 8]) {
-    if let Some(body) = data_folder().map(|data| data.join("bodies/female_young")) {
+    if let Some(body) = test_data().map(|data| data.join("bodies/female_young")) {
         let text = std::fs::read_to_string(body.join("joints.json")).unwrap();
         let all: serde_json::Value = serde_json::from_str(&text).unwrap();
         let at = |name: &str| [0, 1, 2].map(|i| all["game_engine"][name]["head"][i].as_f64().unwrap() as f32);

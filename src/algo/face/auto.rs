@@ -132,16 +132,16 @@ pub type FaceProgress<'a> = &'a (dyn Fn(FaceStep, f32) -> bool + Sync);
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaceError {
     /// No points or triangles.
-    #[error("the mesh has no points or no triangles: open a head")]
+    #[error("the mesh has no points or no triangles; open a head")]
     Empty,
     /// Index of a point that is not finite.
-    #[error("point {0} of the mesh is not finite: repair the mesh")]
+    #[error("point {0} of the mesh is not finite; repair the mesh")]
     NotFinite(usize),
     /// Index of a triangle with a corner that does not exist.
     #[error("triangle {0} has a corner past the last point: the mesh is damaged")]
     Triangle(usize),
     /// A request for zero bones.
-    #[error("0 bones make no face: ask for at least 1")]
+    #[error("0 bones make no face; ask for at least 1")]
     NoBones,
     /// Cancelled by the progress callback.
     #[error("placing the face was cancelled")]

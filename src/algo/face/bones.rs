@@ -130,10 +130,10 @@ pub struct FaceBones {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaceBonesError {
     /// A request for zero bones.
-    #[error("no facial bones were asked for: ask for one at least")]
+    #[error("no facial bones were asked for; ask for one at least")]
     NoBones,
     /// A mask with fewer vertices than bones.
-    #[error("{bones} facial bones do not fit on a facial mask of {vertices} vertices: ask for fewer")]
+    #[error("{bones} facial bones do not fit on a facial mask of {vertices} vertices; ask for fewer")]
     TooManyBones {
         /// Number of bones requested.
         bones: usize,
@@ -141,10 +141,10 @@ pub enum FaceBonesError {
         vertices: usize,
     },
     /// A mask without vertices.
-    #[error("the facial mask is empty: check which way the head looks (up and forward)")]
+    #[error("the facial mask is empty; check which way the head looks (up and forward)")]
     EmptyMask,
     /// More fixed bones than bones in all.
-    #[error("{fixed} bones are fixed but only {bones} were asked for: ask for more or free some")]
+    #[error("{fixed} bones are fixed but only {bones} were asked for; ask for more or free some")]
     TooManyFixed {
         /// Number of fixed places.
         fixed: usize,
@@ -152,7 +152,7 @@ pub enum FaceBonesError {
         bones: usize,
     },
     /// A point or fixed place that is not finite.
-    #[error("{what} {index} is not finite: repair it first")]
+    #[error("{what} {index} is not finite; repair it first")]
     NotFinite {
         /// Kind of the point: "point" or "fixed bone".
         what: &'static str,

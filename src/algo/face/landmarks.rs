@@ -62,19 +62,19 @@ impl Landmarks {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LandmarkError {
     /// No points or triangles.
-    #[error("the mesh has no skin triangles to find a face on: give a head mesh")]
+    #[error("the mesh has no skin triangles to find a face on; give a head mesh")]
     Empty,
     /// A coordinate that is not finite.
-    #[error("point {point} is not finite: repair the mesh")]
+    #[error("point {point} is not finite; repair the mesh")]
     NotFinite {
         /// Index of the point.
         point: usize,
     },
     /// No depth, no width or no height.
-    #[error("the mesh is flat, a head has depth: check the axes and the mesh")]
+    #[error("the mesh is flat, a head has depth; check the axes and the mesh")]
     Flat,
     /// No part of the mesh that looks like a front.
-    #[error("no face was found looking along -z: check which axis is forward, and that the mesh is a head")]
+    #[error("no face was found looking along -z; check which axis is forward, and that the mesh is a head")]
     NoFront,
 }
 

@@ -40,13 +40,13 @@ const PRUNE: f32 = 0.002;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaceWeightsError {
     /// A point that is not finite.
-    #[error("point {point} of the mesh is not finite: repair the mesh before binding")]
+    #[error("point {point} of the mesh is not finite; repair the mesh before binding")]
     Point {
         /// Index of the first such point.
         point: usize,
     },
     /// A bone that is not finite.
-    #[error("facial bone {bone} is not at a finite place: move it before binding")]
+    #[error("facial bone {bone} is not at a finite place; move it before binding")]
     Bone {
         /// Index of the first such bone.
         bone: usize,

@@ -154,13 +154,13 @@ impl fmt::Display for LimbKind {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum FitError {
     /// No triangle has three finite corners and an area.
-    #[error("the mesh has no usable triangle: fit needs the surface of a figure")]
+    #[error("the mesh has no usable triangle; give the surface of a figure")]
     NoSurface,
     /// The mesh has no volume to put a skeleton into.
-    #[error("the mesh is flat: fit needs the surface of a figure with a volume")]
+    #[error("the mesh is flat; give the surface of a figure with a volume")]
     Flat,
     /// The template has no chain of joints.
-    #[error("the template has no chain of joints to fit: choose one with at least two joints")]
+    #[error("the template has no chain of joints to fit; choose one with at least two joints")]
     NoChain,
     /// A joint of the template is not finite.
     #[error("joint {joint} of the template has a position that is not finite")]
@@ -183,7 +183,7 @@ pub enum FitError {
     Direction(&'static str),
     /// The mesh shows too few limbs.
     #[error(
-        "the mesh shows {found} limbs where the template has {wanted}: choose another template or a part of the mesh"
+        "the mesh shows {found} limbs where the template has {wanted}; choose another template or a part of the mesh"
     )]
     TooFewLimbs {
         /// Ends of branches in the mesh.

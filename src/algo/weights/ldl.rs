@@ -11,6 +11,13 @@ use faer::{
 /// Number of right-hand sides of a block.
 pub(crate) const LANES: usize = 8;
 
+/// Multiplications of a factorisation, in units of the size to the power of 1.5. Surfaces take 10 to 20 (George 1973,
+/// nested dissection of a plane grid); what takes far more is no surface.
+const MOST_WORK: f64 = 200.0;
+
+/// Sizes below this count as this: small matrices may be dense.
+const LEAST_SIZE: f64 = 1000.0;
+
 /// One row of a block of right-hand sides.
 pub(crate) type Lane = [f64; LANES];
 
@@ -33,7 +40,8 @@ pub(crate) struct Ldl {
 }
 
 impl Ldl {
-    /// Factorises; `None` if the matrix is not positive definite or too large for the index type.
+    /// Factorises; `None` if the matrix is not positive definite, too large for the index type, or no surface's: a soup of
+    /// triangles that connect points at random fills the factor, with work that grows with the cube of its points.
     pub fn new(matrix: &Symmetric) -> Option<Self> {
         let n = matrix.diagonal.len();
         let (order, inverse) = minimum_degree(matrix)?;
@@ -66,6 +74,10 @@ impl Ldl {
         for &c in &count {
             total = total.checked_add(c)?;
             starts.push(total);
+        }
+        let work: f64 = count.iter().map(|&c| f64::from(c) * f64::from(c)).sum();
+        if work > MOST_WORK * (n as f64).max(LEAST_SIZE) * (n as f64).max(LEAST_SIZE).sqrt() {
+            return None;
         }
         let mut rows = vec![0u32; total as usize];
         let mut values = vec![0f64; total as usize];

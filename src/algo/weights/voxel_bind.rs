@@ -75,7 +75,7 @@ pub enum VoxelError {
     #[error(transparent)]
     Mesh(#[from] VoxelizeError),
     /// There is nothing to bind to.
-    #[error("there is no bone with finite ends to bind to: place joints first")]
+    #[error("there is no bone with finite ends to bind to; place joints first")]
     NoBones,
     /// The progress callback asked to stop.
     #[error("binding was cancelled")]

@@ -88,7 +88,7 @@ pub enum SaveError {
         path: PathBuf,
     },
     /// The disk, the quota or the largest file size is exhausted.
-    #[error("cannot save `{}` ({bytes} bytes): the disk is full; free some space or choose another disk; what was there is unchanged", path.display())]
+    #[error("cannot save `{}` ({bytes} bytes): the disk is full, and what was there is unchanged; free some space or choose another disk", path.display())]
     NoSpace {
         /// The path as given.
         path: PathBuf,
@@ -98,7 +98,7 @@ pub enum SaveError {
         source: io::Error,
     },
     /// The folder may not be written to.
-    #[error("cannot save `{}`: no permission to write in `{}`; choose another folder or allow writing there; what was there is unchanged", path.display(), folder.display())]
+    #[error("cannot save `{}`: no permission to write in `{}`, and what was there is unchanged; choose another folder or allow writing there", path.display(), folder.display())]
     NoAccess {
         /// The path as given.
         path: PathBuf,
@@ -108,7 +108,7 @@ pub enum SaveError {
         source: io::Error,
     },
     /// Any other failure.
-    #[error("cannot save `{}`: {step} failed ({source}); what was there is unchanged; try again or choose another disk", path.display())]
+    #[error("cannot save `{}`: {step} failed ({source}), and what was there is unchanged; try again or choose another disk", path.display())]
     Io {
         /// The path as given.
         path: PathBuf,
@@ -128,6 +128,23 @@ pub enum SaveError {
 }
 
 impl SaveError {
+    /// The file that was to be saved.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::NoName { path }
+            | Self::IsFolder { path }
+            | Self::NotAFile { path }
+            | Self::NoFolder { path, .. }
+            | Self::WriteProtected { path }
+            | Self::LinkLoop { path }
+            | Self::Occupied { path }
+            | Self::NoSpace { path, .. }
+            | Self::NoAccess { path, .. }
+            | Self::Io { path, .. }
+            | Self::Unconfirmed { path, .. } => path,
+        }
+    }
+
     pub(super) fn new(path: &Path, folder: &Path, bytes: usize, step: SaveStep, source: io::Error) -> Self {
         let path = path.to_path_buf();
         match source.kind() {

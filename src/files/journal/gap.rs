@@ -29,7 +29,7 @@ pub enum Damage {
     #[error("the frame around the record is damaged, its content is whole")]
     Frame,
     /// The record is of a kind that this version does not have.
-    #[error("the record is of a kind that this version does not know: update to recover it")]
+    #[error("the record is of a kind that this version does not know; update to recover it")]
     UnknownKind,
     /// The checksum fits, but the content is invalid at this place.
     #[error("the content of the record makes no sense")]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{
     Content, Damage, Gap, Origin, RecordCount, RecordKind, SaveMark,
     encode::Header,
-    lossy_timeline::LossyTimeline,
+    lossy_history::LossyHistory,
     scan::{Item, Scan},
     tally::Tally,
     text::{SkinsIn, StepIn, read_rig, read_step, read_value},
@@ -29,7 +29,7 @@ pub enum JournalError {
     #[error("this is not a journal: it does not begin with RIGJRNL, and holds no records")]
     NotAJournal,
     /// The journal was written by a later version.
-    #[error("the journal has format {found}, this version reads up to {known}: update to recover the work in it")]
+    #[error("the journal has format {found}, this version reads up to {known}; update to recover the work in it")]
     Newer {
         /// Format of the file.
         found: u32,
@@ -190,7 +190,7 @@ pub fn recover(bytes: &[u8]) -> Result<Recovered, JournalError> {
             tally: Tally::default(),
             one_way: Vec::new(),
         },
-        stacks: LossyTimeline::default(),
+        stacks: LossyHistory::default(),
         skins: SkinsIn::new(),
     };
     for item in scan {
@@ -208,7 +208,7 @@ pub fn recover(bytes: &[u8]) -> Result<Recovered, JournalError> {
 /// State of the reader: the result so far, and the steps and weights that the next records refer to.
 struct Reader {
     recovered: Recovered,
-    stacks: LossyTimeline,
+    stacks: LossyHistory,
     skins: SkinsIn,
 }
 

@@ -17,11 +17,14 @@ pub enum ProjectNote {
     /// A mesh cannot be loaded.
     #[error("a mesh of the project is not there: {0}; put it back and open the project again, its weights are kept")]
     MeshMissing(Arc<LoadError>),
+    /// A mesh lies neither below the project's folder nor in one beside it.
+    #[error("the mesh `{0}` is far from the project's folder; put it below if the project came from elsewhere")]
+    MeshOutside(String),
     /// A mesh differs from the one with which the project was saved.
     #[error("the mesh `{}` has changed since the project was saved", .0.display())]
     MeshChanged(PathBuf),
     /// The project refers to weights outside of its folder.
-    #[error("the weights `{0}` are not below the project's folder: put them there")]
+    #[error("the weights `{0}` are not below the project's folder; put them there")]
     WeightsOutside(String),
     /// The file of weights differs from the one that the project was saved with.
     #[error("the weights `{}` were saved at another time than the project; they are used", .0.display())]

@@ -4,7 +4,7 @@ use std::{path::Path, sync::Arc};
 
 use super::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, ProjectNote, ProjectTemplate,
-    path::{below, located},
+    path::{below, leads_away, located},
 };
 use crate::{
     algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
@@ -59,7 +59,7 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
 
 /// Weights of a mesh from their file; `None`, with a note, if it cannot be read.
 fn read_skin(disk: &dyn Disk, project: &Path, skin: &SkinReference, notes: &mut Vec<ProjectNote>) -> Option<SkinFile> {
-    let Some(path) = below(project, &skin.path) else {
+    let Some(path) = below(disk, project, &skin.path) else {
         notes.push(ProjectNote::WeightsOutside(skin.path.clone()));
         return None;
     };
@@ -86,6 +86,9 @@ fn open_mesh(
     notes: &mut Vec<ProjectNote>,
 ) -> (LoadedMesh, Option<SkinData>) {
     let MeshReference { uid, rig: rig_uid, path, hash, mut nodes } = reference;
+    if leads_away(&path) {
+        notes.push(ProjectNote::MeshOutside(path.clone()));
+    }
     let path = located(project, &path);
     let data = |file: &SkinFile, weights: Weights, at_rest: bool| {
         let joints = file.joints().iter().map(|joint| Uid(joint.uid)).collect();

@@ -37,11 +37,25 @@ pub(super) fn located(project: &Path, text: &str) -> PathBuf {
     folder_of(project).join(text)
 }
 
-/// Path of a file from a project's reference `text`; `None` if the reference leads out of the project's folder.
-pub(super) fn below(project: &Path, text: &str) -> Option<PathBuf> {
+/// Path of a file from a project's reference `text`; `None` if the reference, or a link that it names, leads out of the
+/// project's folder.
+pub(super) fn below(disk: &dyn Disk, project: &Path, text: &str) -> Option<PathBuf> {
     let plain = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
     let path = Path::new(text);
-    (path.file_name().is_some() && path.components().all(plain)).then(|| located(project, text))
+    let is_plain = path.file_name().is_some() && path.components().all(plain);
+    let path = is_plain.then(|| located(project, text))?;
+    match (disk.canonical(folder_of(project)), disk.canonical(&path)) {
+        (Ok(folder), Ok(target)) if !target.starts_with(&folder) => None,
+        // A file that is not there is told where it is read.
+        _ => Some(path),
+    }
+}
+
+/// True for references that lead further than to folders beside the project's: absolute ones, and those that go up more
+/// than once. A project from elsewhere may name any file of the machine by them.
+pub(super) fn leads_away(text: &str) -> bool {
+    let path = Path::new(text);
+    path.is_absolute() || path.components().filter(|part| *part == Component::ParentDir).count() > 1
 }
 
 /// An absolute path without `.` and `..`.

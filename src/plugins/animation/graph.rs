@@ -36,7 +36,8 @@ pub fn target_id(node: Uid) -> AnimationTargetId {
 }
 
 /// Rig whose nodes Bevy's `AnimationPlayer` animates, which is on the same entity.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Component)]
 pub struct ClipTargets;
 
 /// Gives the nodes of rigs with [`ClipTargets`] their identities for Bevy's animation, and those of instances without a

@@ -16,10 +16,14 @@ use crate::{
     rig::{Constraint, Dependency, Scalar, Uid},
 };
 
-/// Spawns, updates and despawns the entities of constraints so that they match the build.
+/// Spawns, updates and despawns the entities of constraints so that they match the build, and the nodes of which some may
+/// have been spawned again.
 pub(super) fn follow_constraints(
     mut commands: Commands,
-    mut rigs: Query<(Entity, &Built, &JointEntities, &TagEntities, &mut BuiltEntities), Changed<Built>>,
+    mut rigs: Query<
+        (Entity, &Built, &JointEntities, &TagEntities, &mut BuiltEntities),
+        Or<(Changed<Built>, Changed<JointEntities>)>,
+    >,
     mut index: ResMut<EntityIndex>,
 ) {
     for (rig_entity, built, joints, tags, mut known) in &mut rigs {
@@ -105,14 +109,20 @@ pub(super) fn follow_constraints(
                     fresh.id()
                 }
             };
-            let mirrored = MirroredConstraint { entity, constraint: constraint.constraint.clone(), uids, nodes };
+            let mirrored = MirroredConstraint {
+                entity,
+                command: constraint.command,
+                constraint: constraint.constraint.clone(),
+                uids,
+                nodes,
+            };
             known.constraints.insert(constraint.uid, mirrored);
         }
     }
 }
 
 /// Targets of a constraint; `sources` are the entities of the nodes that it reads, in the order of [`Constraint::reads`].
-fn targets(constraint: &Constraint, sources: &[Option<Entity>]) -> ConstraintTargets {
+pub(super) fn targets(constraint: &Constraint, sources: &[Option<Entity>]) -> ConstraintTargets {
     let weights = weights(constraint);
     let target = |(number, source): (usize, &Option<Entity>)| {
         Some(ConstraintTarget { node: (*source)?, weight: weights.get(number).copied().unwrap_or(Some(1.0)) })

@@ -7,7 +7,7 @@ use bevy::{
     prelude::*,
 };
 
-use super::Built;
+use super::{Built, guard::role_of};
 use crate::{
     plugins::{
         document::{
@@ -225,13 +225,9 @@ impl Writer<'_, '_, '_> {
         let differs = |of: fn(&BuiltNode, &BuiltNode) -> bool| before.is_none_or(|before| !of(before, node));
         let mut target = self.commands.entity(entity);
         if differs(|a, b| a.origin == b.origin)
-            && let Some(origin) = &node.origin
+            && let (Some(origin), Some(role)) = (&node.origin, role_of(node))
         {
-            target.try_insert(CreatedRole {
-                role: origin.role.to_string(),
-                subject: origin.subject,
-                number: origin.number,
-            });
+            target.try_insert(role);
             if let Some(tag) = self.tags.get(origin.command) {
                 target.try_insert(CreatedBy(tag));
             }

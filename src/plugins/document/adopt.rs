@@ -47,6 +47,7 @@ pub(super) struct EntityEdits(pub Vec<(Entity, Vec<RigEdit>)>);
 pub(super) struct View {
     joint: Has<Joint>,
     null: Has<Null>,
+    name: Option<&'static Name>,
     label: Option<&'static NodeLabel>,
     in_group: Option<&'static InGroup>,
     rest: Option<&'static RestTransform>,
@@ -67,6 +68,8 @@ pub(super) struct View {
 
 type JointWritten = Or<(
     Added<Joint>,
+    Added<Null>,
+    Changed<Name>,
     Changed<NodeLabel>,
     Changed<InGroup>,
     Changed<RestTransform>,
@@ -83,10 +86,20 @@ type TagWritten =
 pub(super) struct WrittenEntities<'w, 's> {
     nodes: Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>)>, JointWritten, Allow<Disabled>)>,
     tags: Query<'w, 's, Entity, (TagWritten, Allow<Disabled>)>,
-    groups: Query<'w, 's, Entity, (Or<(Changed<LocalGroup>, Changed<GroupOf>)>, Allow<Disabled>)>,
+    groups: Query<
+        'w,
+        's,
+        Entity,
+        (
+            (Or<(Changed<LocalGroup>, Changed<GroupOf>, Changed<Name>)>, Or<(With<LocalGroup>, With<GroupOf>)>),
+            Allow<Disabled>,
+        ),
+    >,
     uid: RemovedComponents<'w, 's, Uid>,
     of_joints: (
         RemovedComponents<'w, 's, Joint>,
+        RemovedComponents<'w, 's, Null>,
+        RemovedComponents<'w, 's, Name>,
         RemovedComponents<'w, 's, NodeLabel>,
         RemovedComponents<'w, 's, InGroup>,
         RemovedComponents<'w, 's, RestTransform>,
@@ -119,10 +132,9 @@ impl WrittenEntities<'_, '_> {
         touched.tags.extend(self.tags.iter());
         touched.groups.extend(self.groups.iter());
         touched.uids.extend(self.uid.read());
-        let (joint, label, group, rest, child_of) = &mut self.of_joints;
-        touched
-            .joints
-            .extend(joint.read().chain(label.read()).chain(group.read()).chain(rest.read()).chain(child_of.read()));
+        let (joint, null, name, label, group, rest, child_of) = &mut self.of_joints;
+        let markers = joint.read().chain(null.read()).chain(name.read()).chain(label.read());
+        touched.joints.extend(markers.chain(group.read()).chain(rest.read()).chain(child_of.read()));
         let (tag, command, feature, tag_of, in_feature) = &mut self.of_tags;
         touched.tags.extend(
             tag.read().chain(command.read()).chain(feature.read()).chain(tag_of.read()).chain(in_feature.read()),

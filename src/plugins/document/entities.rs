@@ -173,6 +173,8 @@ pub(in crate::plugins) struct MirroredNode {
 #[derive(Debug, Clone)]
 pub(in crate::plugins) struct MirroredConstraint {
     pub entity: Entity,
+    /// Uid of the command that creates the constraint.
+    pub command: Uid,
     pub constraint: Arc<crate::rig::Constraint>,
     /// The driven node and the nodes that it reads.
     pub uids: Vec<Uid>,

@@ -55,6 +55,18 @@ pub enum EntityWriteError {
     /// A created node was despawned.
     #[error("a created node was despawned and comes back; switch off or delete its command instead")]
     CreatedNode,
+    /// A constraint was despawned.
+    #[error("a constraint of the kind {kind} was despawned and comes back; switch off or delete its command instead")]
+    CreatedConstraint {
+        /// Kind of the constraint.
+        kind: &'static str,
+    },
+    /// A component that only a build writes was inserted, replaced or removed.
+    #[error("components of \"{name}\" that the build gives stay as they are built; change the command instead")]
+    BuiltContent {
+        /// Name of the node, or kind of the constraint.
+        name: String,
+    },
     /// A created node was written.
     #[error("\"{name}\" was created by a command and stays as that says; change the command")]
     CreatedContent {
@@ -111,6 +123,9 @@ pub enum EntityWrite {
     /// The label of a joint was written.
     #[error("a write to a label")]
     Label,
+    /// The kind of a joint was written: with weights or without.
+    #[error("a write to the kind of a joint")]
+    Kind,
     /// The group of a joint was written.
     #[error("a write to a group")]
     Group,

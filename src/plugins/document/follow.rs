@@ -103,10 +103,7 @@ pub(in crate::plugins) fn follow_rigs(
             let old_rest = std::mem::replace(&mut mirrored.rest, data.rest);
             if mirrored.kind != data.kind {
                 mirrored.kind = data.kind;
-                match data.kind {
-                    NodeKind::Null => commands.entity(entity).try_insert(Null),
-                    NodeKind::Joint => commands.entity(entity).try_remove::<Null>(),
-                };
+                write_kind(&mut commands, entity, data.kind);
             }
             describe(&mut commands, mirrored, data.label.as_deref(), data.group, groups.bypass_change_detection());
             let is_posed_otherwise = known.posed.get(&data.uid) != offset;
@@ -157,6 +154,13 @@ pub(super) fn write_label(commands: &mut Commands, entity: Entity, label: Option
     match label {
         Some(label) => commands.entity(entity).try_insert((NodeLabel(label.to_owned()), Name::new(label.to_owned()))),
         None => commands.entity(entity).try_remove::<(NodeLabel, Name)>(),
+    };
+}
+
+pub(super) fn write_kind(commands: &mut Commands, entity: Entity, kind: NodeKind) {
+    match kind {
+        NodeKind::Null => commands.entity(entity).try_insert(Null),
+        NodeKind::Joint => commands.entity(entity).try_remove::<Null>(),
     };
 }
 

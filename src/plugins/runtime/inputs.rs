@@ -22,7 +22,8 @@ use crate::{
 ///     commands.entity(*driver).insert(RigInputs::from([("wheel", wheel)]));
 /// }
 /// ```
-#[derive(Component, Debug, Clone, Default, PartialEq, Eq, Deref, DerefMut)]
+#[derive(Component, Reflect, Debug, Clone, Default, PartialEq, Eq, Deref, DerefMut)]
+#[reflect(Component)]
 pub struct RigInputs(pub BTreeMap<String, Entity>);
 
 impl<const COUNT: usize> From<[(&str, Entity); COUNT]> for RigInputs {

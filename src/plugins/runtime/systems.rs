@@ -165,8 +165,11 @@ fn gather(
     }
 }
 
-/// True if two transforms differ only by rounding.
+/// True if two transforms differ only by rounding; those with infinite or undefined numbers are near nothing.
 pub(crate) fn is_near(a: &Transform, b: &Transform) -> bool {
+    if !(a.is_finite() && b.is_finite()) {
+        return false;
+    }
     let size = a.translation.abs().max_element().max(1e-3);
     (a.translation - b.translation).abs().max_element() <= 1e-6 * size
         && (a.scale - b.scale).abs().max_element() <= 1e-6 * a.scale.abs().max_element().max(1e-3)

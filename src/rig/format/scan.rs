@@ -75,6 +75,27 @@ fn end_at(fields: &mut [Field], field: Option<usize>, end: usize) {
     }
 }
 
+/// Start of the last bracket or string that is open at the end of a text whose brackets fit otherwise: such a text is cut
+/// short. `None` for whole texts, and for those in which a bracket closes one of another kind.
+pub(crate) fn cut_short(text: &str) -> Option<usize> {
+    let mut open: Vec<Token> = Vec::new();
+    for token in tokens(text) {
+        let is_string = token.text.starts_with('"');
+        if is_string && token.start + token.text.len() == text.len() && !(token.text.len() > 1 && text.ends_with('"')) {
+            return Some(token.start);
+        }
+        match token.text {
+            "(" | "[" | "{" => open.push(token),
+            closing @ (")" | "]" | "}") => match (open.pop()?.text, closing) {
+                ("(", ")") | ("[", "]") | ("{", "}") => {}
+                _ => return None,
+            },
+            _ => {}
+        }
+    }
+    open.last().map(|token| token.start)
+}
+
 /// Starts of the elements of the outermost list, in bytes.
 pub(crate) fn elements(text: &str) -> Vec<usize> {
     let mut starts = Vec::new();

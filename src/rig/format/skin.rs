@@ -87,7 +87,7 @@ pub struct SkinFile {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SkinError {
     /// The mesh has other points than the weights.
-    #[error("the mesh has {points} points but the weights are for {weights}: bind the mesh again")]
+    #[error("the mesh has {points} points but the weights are for {weights}; bind the mesh again")]
     PointCount {
         /// Points of the mesh.
         points: usize,
@@ -95,7 +95,7 @@ pub enum SkinError {
         weights: usize,
     },
     /// The lists of the weights contradict each other.
-    #[error("the weights of point {point} lie outside the list of influences: bind the mesh again")]
+    #[error("the weights of point {point} lie outside the list of influences; bind the mesh again")]
     Layout {
         /// The first such point.
         point: usize,

@@ -3,6 +3,8 @@
 use ron::{Options, extensions::Extensions};
 use serde::{Serialize, de::DeserializeOwned};
 
+use super::scan::cut_short;
+
 /// Error in a text file, with its place.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("line {line}, column {column}: {message}")]
@@ -31,8 +33,17 @@ impl SourceError {
         }
     }
 
+    /// Fault of a text that is cut short; `None` for others.
+    pub(crate) fn cut_short(text: &str) -> Option<Self> {
+        let message = "the file is cut short: nothing closes what begins here; take a backup, or close it";
+        cut_short(text).map(|at| Self::at(text, at, message))
+    }
+
     /// An error of the RON reader, with its remedy.
     pub(crate) fn from_ron(text: &str, error: &ron::error::SpannedError) -> Self {
+        if let Some(fault) = Self::cut_short(text) {
+            return fault;
+        }
         let hint = match &error.code {
             ron::Error::NoSuchStructField { .. } | ron::Error::NoSuchEnumVariant { .. } => {
                 "; remove it or correct its name"

@@ -8,7 +8,7 @@ use super::{Draft, OperationError};
 use crate::rig::{EditError, JointData, RigEdit, Uid, label::mirrored_label};
 
 /// A plane to mirror across, in the rig's space.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(bevy::reflect::Reflect, Debug, Clone, Copy, PartialEq)]
 pub struct MirrorPlane {
     /// A point of the plane.
     pub point: Vec3,

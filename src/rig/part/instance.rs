@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket};
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
+    format::tree::with_field,
     label::mirrored_label,
     nearest::did_you_mean,
     operations::{Draft, MirrorPlane, drop_part},
@@ -149,7 +150,7 @@ impl PartInstance {
                 let in_file = PartInstance::default().find_tag(&part.rig, tag);
                 let tag =
                     in_file.map_err(|reason| OptionError::Target { name: name.clone(), reason: Box::new(reason) })?;
-                let params = format!("({param}: {value})");
+                let params = with_field("()", param, value);
                 let module = part.rig.find_tag(tag).and_then(|(_, tag)| match &tag.kind {
                     TagKind::Command { module, .. } => Some(module),
                     TagKind::Feature { .. } => None,

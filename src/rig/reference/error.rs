@@ -80,7 +80,7 @@ pub enum ReferenceProblem {
         nearest: Vec<String>,
     },
     /// A name that several objects have.
-    #[error("{} {kind}s are called \"{name}\": write {name}#UID with one of {}", candidates.len(), uids(candidates))]
+    #[error("{} {kind}s are called \"{name}\"; write {name}#UID with one of {}", candidates.len(), uids(candidates))]
     Ambiguous {
         /// Kind of the named object.
         kind: NameKind,

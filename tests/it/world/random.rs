@@ -5,16 +5,20 @@ use std::collections::BTreeMap;
 use bevy::prelude::*;
 use rigsmith::{
     plugins::{
-        commands::{Attributes, BuildStep, Built},
+        commands::{Attributes, BuildStep, Built, BuiltEntities},
         controls::SwitchRequest,
         document::{GroupEntities, JointEntities, TagEntities},
         history::RigHistory,
         runtime::RigRuntime,
-        schema::{CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, Tag, TagOf, Tags},
+        schema::{
+            CommandTag, Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, FeatureTag,
+            GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeLayer, NodeOf, Null, Parked, Tag, TagOf,
+            Tags,
+        },
     },
     prelude::*,
     rig::{
-        PoseOffset, RestTransform, TagKind,
+        BuiltRig, ControlData, LayerData, NodeKind, NodeType, PoseOffset, RestTransform, TagKind,
         feature::{combined_features, set_feature},
         template::write_template,
     },
@@ -45,6 +49,9 @@ fn check(stage: &mut Stage, what: &str) {
             let name = stage.get::<Name>(entity).map(Name::as_str);
             assert_eq!(name, data.label.as_deref(), "{what}: the name of {}", data.uid);
             assert_eq!(stage.get::<Uid>(entity), Some(&data.uid), "{what}");
+            assert_eq!(stage.get::<NodeOf>(entity), Some(&NodeOf(stage.rig)), "{what}: the rig of {}", data.uid);
+            let is_null = stage.get::<Null>(entity).is_some();
+            assert_eq!(is_null, data.kind == NodeKind::Null, "{what}: the kind of {}", data.uid);
             assert_eq!(stage.get::<NodeLabel>(entity).map(|label| &label.0), data.label.as_ref(), "{what}");
             assert_eq!(stage.get::<RestTransform>(entity), Some(&data.rest), "{what}");
             let group = stage.get::<InGroup>(entity).map(|group| *stage.get::<Uid>(group.0).unwrap());
@@ -83,6 +90,7 @@ fn check(stage: &mut Stage, what: &str) {
         let order: Vec<Entity> = children.iter().filter(|child| wanted.contains(child)).collect();
         assert_eq!(&order, wanted, "{what}: the order of siblings");
     }
+    check_built(stage, &built, what);
     let is_running = stage.get::<RigRuntime>(stage.rig).is_some();
     for node in built.nodes.iter().filter(|node| is_running && !node.attributes.is_empty()) {
         let values = stage.get::<Attributes>(stage.node(node.uid).unwrap()).unwrap();
@@ -101,18 +109,116 @@ fn check(stage: &mut Stage, what: &str) {
     let groups = world.query::<&LocalGroup>().iter(world).count();
     let tags = world.query::<&TagOf>().iter(world).count();
     let count = rig.walk().map(|joint| joint.data.tags.len()).sum::<usize>();
-    assert_eq!((groups, tags), (rig.groups().len(), count), "{what}: entities without a document");
+    // The neighbour has one group, one tag and two joints.
+    assert_eq!((groups, tags), (rig.groups().len() + 1, count + 1), "{what}: entities without a document");
     let authored = world.query_filtered::<Entity, (With<Joint>, Without<rigsmith::plugins::schema::CreatedRole>)>();
     let mut authored = authored;
-    assert_eq!(authored.iter(world).count(), joints.len(), "{what}: joints without a document");
+    assert_eq!(authored.iter(world).count(), joints.len() + 2, "{what}: joints without a document");
     if stage.get::<RigRuntime>(stage.rig).is_some() {
         let off = stage.off();
         assert!(off <= NEAR, "{what}: {off}");
     }
 }
 
+/// Fails unless created nodes and constraints are told as they are built, whatever somebody else did to them.
+fn check_built(stage: &Stage, built: &BuiltRig, what: &str) {
+    for node in &built.nodes {
+        let entity = stage.node(node.uid).unwrap_or_else(|| panic!("{what}: {} has no entity", node.name));
+        let pose = stage.get::<Transform>(entity).unwrap_or_else(|| panic!("{what}: {} has no place", node.name));
+        assert!(pose.is_finite(), "{what}: {} is at {pose:?}", node.name);
+        let layer = stage.get::<NodeLayer>(entity).map(|layer| &layer.0);
+        assert_eq!(layer, node.layer.as_deref(), "{what}: the layer of {}", node.name);
+        let Some(origin) = &node.origin else { continue };
+        assert_eq!(stage.get::<NodeOf>(entity), Some(&NodeOf(stage.rig)), "{what}: the rig of {}", node.name);
+        let control = stage.get::<Control>(entity).map(|control| &control.0);
+        assert_eq!(control, node.control.as_deref(), "{what}: the control {}", node.name);
+        let kinds = (stage.get::<Joint>(entity).is_some(), stage.get::<Null>(entity).is_some());
+        assert_eq!(kinds, (node.kind == NodeType::Joint, node.kind == NodeType::Null), "{what}: {}", node.name);
+        let role = stage.get::<CreatedRole>(entity).map(|role| (&*role.role, role.subject, role.number));
+        assert_eq!(role, Some((&*origin.role, origin.subject, origin.number)), "{what}: {}", node.name);
+        let by = stage.get::<CreatedBy>(entity).and_then(|by| stage.get::<Uid>(by.0)).copied();
+        assert_eq!(by, Some(origin.command), "{what}: the command of {}", node.name);
+        assert!(stage.get::<Parked>(entity).is_none(), "{what}: {} is parked", node.name);
+    }
+    for constraint in &built.constraints {
+        let entity = stage.get::<BuiltEntities>(stage.rig).unwrap().constraint(constraint.uid);
+        let entity = entity.unwrap_or_else(|| panic!("{what}: constraint {} has no entity", constraint.uid));
+        let kind = stage.get::<ConstraintKind>(entity).map(|kind| kind.0);
+        assert_eq!(kind, Some(constraint.constraint.kind()), "{what}: constraint {}", constraint.uid);
+        let by = stage.get::<CreatedBy>(entity).and_then(|by| stage.get::<Uid>(by.0)).copied();
+        assert_eq!(by, Some(constraint.command), "{what}: the command of constraint {}", constraint.uid);
+        let targets = stage.get::<ConstraintTargets>(entity).unwrap();
+        let is_there = |node: Entity| stage.app.world().get_entity(node).is_ok();
+        assert!(targets.0.iter().all(|target| is_there(target.node)), "{what}: the targets of {}", constraint.uid);
+        let is_of_rig = |of: &Constrains| stage.get::<NodeOf>(of.0) == Some(&NodeOf(stage.rig));
+        let drives = !constraint.constraint.drives().is_empty();
+        assert_eq!(stage.get::<Constrains>(entity).is_some_and(is_of_rig), drives, "{what}: {}", constraint.uid);
+    }
+}
+
+/// Takes one of the components off that describe a rig.
+fn take_off(entity: &mut EntityWorldMut, number: usize) {
+    match number % 22 {
+        0 => entity.remove::<Joint>(),
+        1 => entity.remove::<Null>(),
+        2 => entity.remove::<NodeOf>(),
+        3 => entity.remove::<NodeLabel>(),
+        4 => entity.remove::<InGroup>(),
+        5 => entity.remove::<RestTransform>(),
+        6 => entity.remove::<Transform>(),
+        7 => entity.remove::<Name>(),
+        8 => entity.remove::<Uid>(),
+        9 => entity.remove::<ChildOf>(),
+        10 => entity.remove::<Tag>(),
+        11 => entity.remove::<CommandTag>(),
+        12 => entity.remove::<FeatureTag>(),
+        13 => entity.remove::<TagOf>(),
+        14 => entity.remove::<InFeature>(),
+        15 => entity.remove::<LocalGroup>(),
+        16 => entity.remove::<GroupOf>(),
+        17 => entity.remove::<(Control, NodeLayer)>(),
+        18 => entity.remove::<(CreatedBy, CreatedRole)>(),
+        19 => entity.remove::<(ConstraintKind, ConstraintTargets)>(),
+        20 => entity.remove::<Constrains>(),
+        _ => entity.remove::<Attributes>(),
+    };
+}
+
+fn control() -> ControlData {
+    ControlData {
+        shape: "mine".into(),
+        color: [1.0; 3],
+        size: 1.0,
+        offset: default(),
+        channels: default(),
+        limits: default(),
+        fits: false,
+    }
+}
+
+fn layer() -> LayerData {
+    LayerData { name: "mine".into(), visible: false, display: default(), color: None }
+}
+
+/// Puts one of the components on that only a build or a document writes.
+fn put_on(entity: &mut EntityWorldMut, number: usize, other: Entity) {
+    match number % 10 {
+        0 => entity.insert(NodeOf(other)),
+        1 => entity.insert(Parked),
+        2 => entity.insert(Control(control())),
+        3 => entity.insert(NodeLayer(layer())),
+        4 => entity.insert(CreatedRole { role: "mine".into(), subject: Uid(1), number: 0 }),
+        5 => entity.insert(CreatedBy(other)),
+        6 => entity.insert(ConstraintKind("mine")),
+        7 => entity.insert(ConstraintTargets(Vec::new())),
+        8 => entity.insert(Constrains(other)),
+        _ => entity.insert(Null),
+    };
+}
+
 /// One random deed: its name, and whether the app has taken it up.
 fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
+    let (other_rig, other_joint, other_group) = stage.neighbour();
     let rig = stage.document().clone();
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let tags: Vec<Uid> = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
@@ -127,11 +233,16 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
     let group_entity =
         group.and_then(|group| stage.get::<GroupEntities>(stage.rig).unwrap().get(group)).filter(is_alive);
     let created: Vec<Entity> = stage
-        .get::<rigsmith::plugins::commands::BuiltEntities>(stage.rig)
+        .get::<BuiltEntities>(stage.rig)
         .map(|built| built.iter().map(|(_, entity)| entity).filter(is_alive).collect())
         .unwrap_or_default();
     let number = random.below(1000);
-    let what = random.below(32);
+    let constraints: Vec<Entity> =
+        (stage.get::<Built>(stage.rig).map(|built| built.0.clone()).unwrap_or_default().constraints.iter())
+            .filter_map(|constraint| stage.get::<BuiltEntities>(stage.rig)?.constraint(constraint.uid))
+            .filter(is_alive)
+            .collect();
+    let what = random.below(40);
     let rig_entity = stage.rig;
     let world = stage.app.world_mut();
     let translation = Vec3::new(0.0, 0.1 + number as f32 * 1e-3, 0.02);
@@ -306,6 +417,64 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
                 stage.edit(set_feature(&rig, &feature.key, random.chance(2)).unwrap_or_default());
             }
         }
+        (32, ..) => {
+            let entities = [entity, tag_entity, group_entity, random.of(&created), random.of(&constraints)];
+            let pick = random.below(5);
+            if let Some(entity) = entities[pick] {
+                // What lost its place in a rig is a game's own entity from then on.
+                take_off(&mut stage.app.world_mut().entity_mut(entity), number);
+            }
+        }
+        (33, ..) => {
+            let entities = [entity, random.of(&created), random.of(&constraints)];
+            if let Some(entity) = entities[random.below(3)] {
+                let other = random.of(&[other_rig, other_joint]).unwrap();
+                put_on(&mut stage.app.world_mut().entity_mut(entity), number, other);
+            }
+        }
+        (34, ..) if !constraints.is_empty() => {
+            world.entity_mut(constraints[number % constraints.len()]).despawn();
+        }
+        (35, ..) => {
+            let entity = if number.is_multiple_of(2) { entity } else { random.of(&created) };
+            if let Some(mut transform) = entity.and_then(|entity| world.get_mut::<Transform>(entity)) {
+                match number % 3 {
+                    0 => transform.translation.x = f32::NAN,
+                    1 => transform.rotation = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+                    _ => transform.scale = Vec3::splat(f32::INFINITY),
+                }
+            }
+        }
+        (36, Some(entity), ..) => {
+            world.entity_mut(entity).insert(Name::new(format!("m{number}")));
+        }
+        (37, _, _, Some(group)) => {
+            world.entity_mut(group).insert(Name::new(format!("m{number}")));
+        }
+        (38, Some(entity), ..) => {
+            let is_null = world.get::<Null>(entity).is_some();
+            let mut entity = world.entity_mut(entity);
+            if is_null {
+                entity.remove::<Null>()
+            } else {
+                entity.insert(Null)
+            };
+        }
+        (39, ..) => match (number % 4, entity, tag_entity, group_entity) {
+            (0, Some(entity), ..) => {
+                world.entity_mut(entity).insert(ChildOf(other_joint));
+            }
+            (1, _, Some(tag), _) => {
+                world.entity_mut(tag).insert(TagOf(other_joint));
+            }
+            (2, _, _, Some(group)) => {
+                world.entity_mut(group).insert(GroupOf(other_rig));
+            }
+            (3, Some(entity), ..) => {
+                world.entity_mut(entity).insert(InGroup(other_group));
+            }
+            _ => {}
+        },
         _ => {}
     }
     // Sometimes several in one frame.
@@ -315,6 +484,38 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
         stage.app.update();
     }
     (format!("deed {what} ({number}) on joint {joint:?}, tag {tag:?}, group {group:?}"), is_seen)
+}
+
+impl Stage {
+    /// Another rig of the same world, spawned when it is first asked for, with its first joint and its group.
+    fn neighbour(&mut self) -> (Entity, Entity, Entity) {
+        let name = Name::new("neighbour");
+        let world = self.app.world_mut();
+        let mut rigs = world.query_filtered::<(Entity, &Name), With<Rig>>();
+        let found = rigs.iter(world).find(|(_, known)| **known == name).map(|(rig, _)| rig);
+        let rig = match found {
+            Some(rig) => rig,
+            None => self.with_neighbour(),
+        };
+        let document = self.get::<Rig>(rig).unwrap();
+        let (root, group) = (document.roots()[0], document.groups()[0].uid);
+        let joint = self.get::<JointEntities>(rig).unwrap().get(root).unwrap();
+        let group = self.get::<GroupEntities>(rig).unwrap().get(group).unwrap();
+        (rig, joint, group)
+    }
+
+    fn with_neighbour(&mut self) -> Entity {
+        let rig = self.app.world_mut().spawn(Rig::new(Uid(0xBE51DE), "neighbour")).id();
+        self.app.update();
+        let world = self.app.world_mut();
+        let group = LocalGroup { name: "n".into(), color: [1.0; 3], enabled: true };
+        world.spawn((group, GroupOf(rig)));
+        let root = world.spawn((Joint, Transform::default(), ChildOf(rig))).id();
+        world.spawn((Joint, Transform::from_xyz(0.0, 1.0, 0.0), ChildOf(root)));
+        world.spawn((CommandTag { module: "null".into(), params: "()".into() }, TagOf(root)));
+        self.app.update();
+        rig
+    }
 }
 
 #[test]
@@ -328,6 +529,9 @@ fn world_and_document_stay_equal_through_random_deeds() {
         let mut random = Random(7 + number as u64);
         let mut stage = if is_built { Stage::built(rig) } else { Stage::new(rig) };
         let first = write_template(stage.document());
+        let (other, _, _) = stage.neighbour();
+        let of_other = |stage: &Stage| write_template(stage.get::<Rig>(other).unwrap());
+        let beside = of_other(&stage);
         let mut deeds: Vec<String> = Vec::new();
         for round in 0..steps / 4 {
             let (deed, is_seen) = step(&mut stage, &mut random);
@@ -338,6 +542,7 @@ fn world_and_document_stay_equal_through_random_deeds() {
             }
         }
         stage.app.update();
+        assert_eq!(of_other(&stage), beside, "rig {number}: another rig is not touched");
         loop {
             let (names, done) = stage.get::<RigHistory>(stage.rig).unwrap().steps();
             let Some(last) = done.checked_sub(1) else { break };

@@ -37,14 +37,21 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 self.commands.entity(entity).try_insert(GroupOf(self.trial.rig_entity));
                 self.trial.refuse(EntityWriteError::GroupRig { name: data.name.clone() });
             }
+            // Inspectors write the name of an entity.
+            let name = view.name.map(Name::as_str).filter(|name| *name != data.name && !name.is_empty());
             let told = view.group.map(|group| GroupData {
                 uid,
-                name: group.name.clone(),
+                name: name.filter(|_| group.name == data.name).unwrap_or(&group.name).to_owned(),
                 color: group.color,
                 enabled: group.enabled,
             });
             let is_taken = match &told {
-                Some(told) if *told == data => continue,
+                Some(told) if *told == data => {
+                    if view.name.is_none_or(|name| name.as_str() != data.name) {
+                        self.commands.entity(entity).try_insert(Name::new(data.name.clone()));
+                    }
+                    continue;
+                }
                 Some(told) => self.trial.edit(EntityWrite::LocalGroup, vec![RigEdit::SetLocalGroup(told.clone())]),
                 None => {
                     self.trial.refuse(EntityWriteError::GroupContent { name: data.name.clone() });
@@ -53,6 +60,10 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             };
             match told.filter(|_| is_taken) {
                 Some(told) => {
+                    let group = LocalGroup { name: told.name.clone(), color: told.color, enabled: told.enabled };
+                    if view.group != Some(&group) {
+                        self.commands.entity(entity).try_insert(group);
+                    }
                     self.commands.entity(entity).try_insert(Name::new(told.name.clone()));
                     self.groups.groups.insert(uid, (entity, told));
                 }

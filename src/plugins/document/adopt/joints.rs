@@ -7,13 +7,13 @@ use bevy::prelude::*;
 use super::{
     super::{
         entities::{EntityPart, MirroredJoint},
-        follow::{rest_of, write_group, write_label},
+        follow::{rest_of, write_group, write_kind, write_label},
     },
     Adoption, EntityWrite, EntityWriteError,
     sorting::RigWrites,
 };
 use crate::{
-    plugins::schema::{Joint, NodeOf},
+    plugins::schema::{Joint, NodeLabel, NodeOf},
     rig::{JointData, NodeKind, RigEdit, Uid},
 };
 
@@ -50,7 +50,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         }
         let group_entity = view.in_group.map(|group| group.0);
         let rest = rest_of(view.rest, view.transform);
-        let label = view.label.map(|label| label.0.clone()).filter(|label| !label.is_empty());
+        let name = view.name.map(|name| name.as_str().to_owned());
+        let label = view.label.map(|label| label.0.clone()).or(name).filter(|label| !label.is_empty());
         let group = group_entity.and_then(|group| self.uid_of(group, EntityPart::Group));
         let kind = if view.null { NodeKind::Null } else { NodeKind::Joint };
         let asked = view.uid.copied();
@@ -89,18 +90,37 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 self.trial.refuse(EntityWriteError::JointMarker(uid));
             }
             let mut next = mirrored.clone();
-            let label = view.label.map(|label| label.0.clone()).filter(|label| !label.is_empty());
+            let kind = if view.null { NodeKind::Null } else { NodeKind::Joint };
+            if kind != mirrored.kind {
+                if self.trial.edit(EntityWrite::Kind, vec![RigEdit::SetKind(uid, kind)]) {
+                    next.kind = kind;
+                } else {
+                    write_kind(self.commands, entity, mirrored.kind);
+                }
+            }
+            let mut label = view.label.map(|label| label.0.clone()).filter(|label| !label.is_empty());
+            let name = view.name.map(|name| name.as_str().to_owned()).filter(|name| !name.is_empty());
+            if label == mirrored.label && name.is_some() && name != mirrored.label {
+                // Inspectors write the name of an entity.
+                label.clone_from(&name);
+            }
             if label != mirrored.label {
                 if self.trial.edit(EntityWrite::Label, vec![RigEdit::SetLabel(uid, label.clone())]) {
                     next.label.clone_from(&label);
                 }
-                // The `Name` follows the label; an empty label counts as none.
-                match &label {
-                    Some(label) if next.label == Some(label.clone()) => {
+            }
+            // Label and `Name` are equal; an empty label counts as none.
+            match &next.label {
+                Some(label) => {
+                    if view.label.is_none_or(|told| told.0 != *label) {
+                        self.commands.entity(entity).try_insert(NodeLabel(label.clone()));
+                    }
+                    if name.as_ref() != Some(label) {
                         self.commands.entity(entity).try_insert(Name::new(label.clone()));
                     }
-                    _ => write_label(self.commands, entity, next.label.as_deref()),
                 }
+                None if view.label.is_some() || view.name.is_some() => write_label(self.commands, entity, None),
+                None => {}
             }
             let told_group = view.in_group.map(|group| self.uid_of(group.0, EntityPart::Group));
             if told_group != mirrored.group.map(Some) {

@@ -27,14 +27,15 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 EntityPart::Joint if along.contains(&indexed.uid) => self.forget_joint(indexed.uid),
                 EntityPart::Joint => deleted.push(indexed.uid),
                 EntityPart::Node | EntityPart::Constraint => {
-                    if let Some(built) = &mut self.built {
+                    let constraint = self.built.as_mut().and_then(|built| {
                         built.nodes.remove(&indexed.uid);
-                        built.constraints.remove(&indexed.uid);
-                    }
+                        built.constraints.remove(&indexed.uid)
+                    });
                     self.trial.respawn = true;
-                    if indexed.part == EntityPart::Node {
-                        self.trial.refuse(EntityWriteError::CreatedNode);
-                    }
+                    self.trial.refuse(match constraint {
+                        Some(mirrored) => EntityWriteError::CreatedConstraint { kind: mirrored.constraint.kind() },
+                        None => EntityWriteError::CreatedNode,
+                    });
                 }
                 EntityPart::Tag | EntityPart::Group => {}
             }

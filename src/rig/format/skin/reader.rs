@@ -15,7 +15,7 @@ pub enum SkinFileError {
     #[error("this is not a skin file: it does not begin with RIGSKIN")]
     NotASkin,
     /// The file was written by a later version.
-    #[error("the skin file has format {found}, this version reads up to {known}: update to open it")]
+    #[error("the skin file has format {found}, this version reads up to {known}; update to open it")]
     Newer {
         /// Format of the file.
         found: u32,
@@ -23,7 +23,7 @@ pub enum SkinFileError {
         known: u32,
     },
     /// The file is shorter or longer than its header says.
-    #[error("the skin file should have {expected} bytes but has {found}: copy or save it again")]
+    #[error("the skin file should have {expected} bytes but has {found}; copy or save it again")]
     Length {
         /// Length in bytes according to the header, or length of the header itself.
         expected: u64,

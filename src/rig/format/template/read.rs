@@ -50,6 +50,9 @@ pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
 /// A text that cannot be read as a template at all, with the faults that were found before that.
 pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec<SourceError>> {
     let source = text_of(bytes).map_err(|error| vec![error])?;
+    if let Some(fault) = SourceError::cut_short(source) {
+        return Err(vec![fault]);
+    }
     let explicit = explicit(source);
     let (text, mut notes, mut faults) = (&*explicit.text, Vec::new(), Vec::new());
     let in_source = |faults: Vec<SourceError>| {
@@ -67,24 +70,61 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
         faults.push(SourceError::at(text, field.start, message));
     }
     let known = if unknown.is_empty() { readable } else { Cow::Owned(blanked(text, &unknown)) };
-    let file = match ron_options().from_str(&known) {
-        Ok(file) => file,
-        Err(error) => {
-            faults.push(SourceError::from_ron(text, &error));
-            return Err(in_source(faults));
-        }
+    let file = match read_without_faulty(text, &known, &fields, unknown, &mut faults) {
+        Some(file) => file,
+        None => return Err(in_source(faults)),
     };
     let template = build(&Places { text, fields: &fields }, file, notes, &mut faults);
     Ok((in_text(&explicit, template), in_source(faults)))
 }
 
+/// Largest number of bytes that are parsed again for the sake of further faults.
+const REPARSED: usize = 64 << 20;
+
+/// The file without the fields whose values are of a wrong type, each of which is a fault; `None` where one of them cannot
+/// be left out. `left_out` are the fields that `known` already lacks.
+fn read_without_faulty<'a>(
+    text: &str,
+    known: &str,
+    fields: &'a [Field<'a>],
+    mut left_out: Vec<&'a Field<'a>>,
+    faults: &mut Vec<SourceError>,
+) -> Option<TemplateFile> {
+    let mut readable = Cow::Borrowed(known);
+    for _ in 0..=(REPARSED / text.len().max(1)).clamp(1, 200) {
+        let error = match ron_options().from_str(&readable) {
+            Ok(file) => return Some(file),
+            Err(error) => error,
+        };
+        // The lack of a field that was left out is no fault of its own.
+        if let ron::Error::MissingStructField { field, .. } = &error.code
+            && left_out.iter().any(|left| left.name == *field)
+        {
+            return None;
+        }
+        let fault = SourceError::from_ron(text, &error);
+        let at = fault.offset;
+        faults.push(fault);
+        let around = fields.iter().filter(|field| field.value <= at && at < field.end);
+        let innermost = around.max_by_key(|field| field.start)?;
+        if left_out.iter().any(|left| left.start == innermost.start) {
+            return None;
+        }
+        left_out.push(innermost);
+        left_out.sort_by_key(|field| field.start);
+        readable = Cow::Owned(blanked(known, &left_out));
+    }
+    None
+}
+
 /// Reads a template that stands in another file, where its first line has the number `first_line`.
 pub(in crate::rig) fn read_text(source: &str, first_line: usize) -> Result<Template, SourceError> {
     let explicit = explicit(source);
-    match explicit.faults.first() {
+    let read = match explicit.faults.first() {
         Some(fault) => Err(fault.clone()),
         None => read_explicit(&explicit, first_line).map_err(|error| explicit.fault(error)),
-    }
+    };
+    read.map_err(|error| SourceError::cut_short(source).unwrap_or(error))
 }
 
 fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, SourceError> {

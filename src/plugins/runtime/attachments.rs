@@ -6,7 +6,7 @@ use super::NodeSlot;
 
 /// Writes the world transforms of entities below joints in [`InstanceMode::Direct`](super::InstanceMode): these have no local
 /// transforms, so Bevy's propagation ends there.
-pub(super) fn place_hung(
+pub(super) fn place_attachments(
     joints: Query<(Ref<GlobalTransform>, Ref<Children>), (With<NodeSlot>, Without<Transform>)>,
     mut hung: Query<(Ref<Transform>, &mut GlobalTransform, Option<Ref<Children>>), Without<NodeSlot>>,
 ) {

@@ -10,7 +10,7 @@ use crate::rig::step::Step;
 /// An undo does not say which step it takes back: it is the last one in effect. After a gap that may hide steps, undos
 /// and redos, that is known only of steps that were done since.
 #[derive(Default)]
-pub(super) struct LossyTimeline {
+pub(super) struct LossyHistory {
     done: Vec<Option<Arc<Step>>>,
     undone: Vec<Option<Arc<Step>>>,
     /// Index in `done` from which on the steps are certain.
@@ -19,7 +19,7 @@ pub(super) struct LossyTimeline {
     undone_sure: usize,
 }
 
-impl LossyTimeline {
+impl LossyHistory {
     /// Follows a gap in which records are lost.
     pub(super) fn lose(&mut self, gap: &Gap) {
         if gap.is_unclear() {
