@@ -19,6 +19,7 @@ use bevy::{
         settings::{RenderCreation, WgpuSettings},
         view::screenshot::{Screenshot, ScreenshotCaptured},
     },
+    time::TimeUpdateStrategy,
     window::ExitCondition,
 };
 
@@ -32,11 +33,13 @@ use crate::{
         document::EditRequest,
         document::Selection,
         drawing::{BACKGROUND, DrawingPlugin, RigDrawing},
+        runtime::RigRuntime,
         surface::{RigMesh, RigSurface, SkinOf},
         task_pools,
         viewport::{FIELD_OF_VIEW, RigViewport, framing},
     },
     rig::{Rig, RigEdit, Uid, operations::Operation},
+    solve::program::RigState,
 };
 
 /// Settings of a picture.
@@ -60,6 +63,9 @@ pub struct PictureSettings {
     pub build: bool,
     /// Blend of the joints of a point.
     pub deform: Deform,
+    /// State in which the built rig is shown, its springs on their way, if it is one of the same program; in its pose at
+    /// rest if `None`.
+    pub state: Option<RigState>,
     /// Least and greatest corner of the box that fills the picture, in the rig's space; the whole character if `None`.
     pub bounds: Option<[Vec3; 2]>,
 }
@@ -76,6 +82,7 @@ impl Default for PictureSettings {
             background: BACKGROUND,
             build: false,
             deform: Deform::default(),
+            state: None,
             bounds: None,
         }
     }
@@ -138,6 +145,8 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
         .insert_resource(settings.display)
         .insert_resource(settings.drawing.clone())
         .insert_resource(ClearColor(settings.background))
+        // No time passes in a picture, so that springs stand where they are on every machine.
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO))
         .init_resource::<CapturedPicture>();
     app.finish();
     app.cleanup();
@@ -182,6 +191,13 @@ pub fn take_picture(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings) 
         std::thread::sleep(Duration::from_millis(1));
     };
     settle(&mut app)?;
+    if let Some(state) = &settings.state
+        && let Some(mut runtime) = app.world_mut().get_mut::<RigRuntime>(entity)
+        && runtime.go_on_from(state)
+    {
+        app.update();
+        settle(&mut app)?;
+    }
     if has_mesh && settings.deform == Deform::DualQuaternion {
         freeze_dual(app.world_mut(), entity);
         settle(&mut app)?;

@@ -195,7 +195,7 @@ fn write(args: &PoseArgs, output: &Output, bench: &mut Workbench, report: &mut R
 
 #[cfg(feature = "render")]
 fn picture(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
-    super::render::picture_of(bench.posed_document()?, args.mesh.as_deref(), &args.weights, args.deform, output, report)
+    super::render::picture_of(bench, args.mesh.as_deref(), &args.weights, args.deform, output, report)
 }
 
 #[cfg(not(feature = "render"))]

@@ -157,6 +157,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     if let Some(pose) = &args.pose {
         strike(&mut scene.rig, pose)?;
     }
+    let mut state = None;
     let is_built = args.build || !args.steps.is_empty();
     if is_built {
         let writes = pose::parsed(&args.steps)?;
@@ -164,6 +165,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
         let mut bench = Workbench::with_rig(SEED, scene.rig);
         pose::run_steps(&mut bench, &args.steps, &writes)?;
         scene.rig = bench.posed_document()?;
+        state = Some(bench.runtime()?.state().clone());
     }
     let (rig, meshes) = (scene.rig, scene.meshes);
     let (weights, selected) = match args.weights.as_deref() {
@@ -203,6 +205,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
         },
         selected,
         build: is_built,
+        state,
         deform: args.deform.deform(),
         ..PictureSettings::default()
     };
@@ -219,16 +222,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Draws a posed rig, with a mesh skinned to its built joints if there is one.
+/// Draws a rig as it stands on a workbench, with a mesh skinned to its built joints if there is one.
 pub(super) fn picture_of(
-    rig: Rig,
+    posed: &Workbench,
     mesh: Option<&Path>,
     weights: &WeightArgs,
     deform: DeformArgs,
     output: &Path,
     report: &mut Report,
 ) -> Result<(), Failure> {
-    let mut bench = Workbench::with_rig(SEED, rig);
+    let mut bench = Workbench::with_rig(SEED, posed.posed_document()?);
     bench.build(BuildStep::All);
     let mut meshes = Vec::new();
     if let Some(mesh) = mesh {
@@ -241,7 +244,8 @@ pub(super) fn picture_of(
         skin::describe_weights(report, &bound);
         meshes.extend(bench.mesh().cloned());
     }
-    let settings = PictureSettings { build: true, deform: deform.deform(), ..PictureSettings::default() };
+    let state = Some(posed.runtime()?.state().clone());
+    let settings = PictureSettings { build: true, state, deform: deform.deform(), ..PictureSettings::default() };
     let picture = |error| Failure::Input(Box::new(error));
     let rig = bench.rig().clone();
     let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;

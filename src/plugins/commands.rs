@@ -52,6 +52,7 @@ impl Plugin for CommandsPlugin {
                 constraints::follow_constraints,
                 guard::keep_built,
                 (run::run_built, report_commands),
+                nodes::note_revisions,
             )
                 .chain()
                 .in_set(RigSystems::Build)
@@ -192,6 +193,9 @@ fn build_rigs(
         }
     }
     for (entity, edits, complete) in changed {
+        if complete && edits.iter().all(RigEdit::is_of_motion) {
+            continue;
+        }
         let Ok((rig, Some(mut processor), built, failed)) = rigs.get_mut(entity) else { continue };
         let processor = &mut *processor;
         match complete && edits.len() < 16 {

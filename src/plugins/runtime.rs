@@ -255,6 +255,18 @@ impl RigRuntime {
         }
     }
 
+    /// Takes over the inputs, the results and the springs of a state of the same program, which the next frame writes to
+    /// the entities; returns false, and changes nothing, if the state is one of another program.
+    pub fn go_on_from(&mut self, state: &RigState) -> bool {
+        let is_same = self.state.hash() == state.hash();
+        if is_same {
+            self.state.clone_from(state);
+            self.is_due = true;
+            self.all_due = self.mode == InstanceMode::Hierarchy;
+        }
+        is_same
+    }
+
     /// Goes on with another program of the same rig: poses, attribute values, the motion of springs and the entities of
     /// nodes stay. `carry` is [`Carry::between`] the two programs. Nodes that are new have no entities yet, and those of
     /// nodes that are gone are left alone: see [`furnish_instance`].

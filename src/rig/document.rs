@@ -10,8 +10,8 @@ use bevy::{math::Affine3, prelude::*};
 use crate::{
     mesh::model::Weights,
     rig::{
-        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, RigInput, RigJoint, StoredPose, TagData, Uid,
-        animation::RigClip,
+        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint, StoredPose,
+        TagData, Uid, animation::RigClip,
     },
 };
 
@@ -37,6 +37,8 @@ pub struct Rig {
     pub(super) values: AttributeValues,
     pub(super) poses: Vec<StoredPose>,
     pub(super) clips: Vec<RigClip>,
+    /// Renewed by each edit of anything but pose, values, stored poses and clips.
+    pub(super) revision: Revision,
 }
 
 /// Header of a template, for people.
@@ -81,6 +83,11 @@ impl Rig {
     /// Identity.
     pub fn uid(&self) -> Uid {
         self.uid
+    }
+
+    /// Mark of everything but pose, attribute values, stored poses and clips.
+    pub fn revision(&self) -> &Revision {
+        &self.revision
     }
 
     /// Name, version, author and the like.
@@ -128,6 +135,7 @@ impl Rig {
     /// Disables tags of a scratch copy, in time linear in the tags of their joints. It is no edit: a document that people
     /// see is changed by [`RigEdit`](super::RigEdit)s alone.
     pub(crate) fn disable_tags(&mut self, tags: &HashSet<Uid>) {
+        self.revision = Revision::default();
         let joints: HashSet<Uid> = tags.iter().filter_map(|tag| self.tags.get(tag).copied()).collect();
         for joint in joints {
             let Some(joint) = self.joints.get_mut(&joint) else { continue };
@@ -260,6 +268,7 @@ impl Rig {
             let places: HashMap<Uid, usize> = order(*parent).into_iter().zip(0..).collect();
             list.sort_by_key(|uid| places.get(uid).copied().unwrap_or(usize::MAX));
         }
+        self.revision = Revision::default();
         self.tags.clear();
         self.joints.clear();
         self.roots = children.remove(&None).unwrap_or_default();

@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 use crate::{
     mesh::model::Weights,
     rig::{
-        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigInput, RigJoint, StoredPose,
-        TagData, TagKind, Uid,
+        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
+        StoredPose, TagData, TagKind, Uid,
         animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
         document::{RigAbout, SkinData},
         format::source::ron_options,
@@ -232,11 +232,26 @@ impl RigEdit {
             _ => false,
         }
     }
+
+    /// True if the edit changes nothing but pose, attribute values, stored poses or clips, which no command reads.
+    pub fn is_of_motion(&self) -> bool {
+        match self {
+            Self::SetOffset(..) | Self::SetAttributeValue(..) => true,
+            Self::AddStoredPose(..) | Self::RemoveStoredPose(..) | Self::SetStoredPose(..) => true,
+            Self::AddClip(..) | Self::RemoveClip(..) | Self::SetClipAbout(..) => true,
+            Self::AddLayer { .. } | Self::RemoveLayer { .. } | Self::SetLayer { .. } | Self::SetKeys { .. } => true,
+            Self::Batch(edits) => edits.iter().all(Self::is_of_motion),
+            _ => false,
+        }
+    }
 }
 
 impl Rig {
     /// Applies an edit and returns its exact inverse, order of siblings included.
     pub fn apply(&mut self, edit: &RigEdit) -> Result<RigEdit, EditError> {
+        if !edit.is_of_motion() {
+            self.revision = Revision::default();
+        }
         Ok(match edit {
             RigEdit::AddJoint { joint, parent, index } => self.add_joint(joint, *parent, *index)?,
             RigEdit::RemoveJoint(uid) => self.remove_joint(*uid)?,

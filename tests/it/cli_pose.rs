@@ -440,6 +440,16 @@ fn pictures_show_the_pose_and_its_controls_on_a_gpu() {
     assert!(differing(&rest, &up) > 500, "the mesh follows");
     let stored = picture(&["pose", "crane.rigsmith.ron", "--pose", "up", "--mesh", "block.obj"], "stored.png");
     assert!(differing(&rest, &stored) > 500, "a stored pose is drawn");
+    let chain = bundled("parts/spring_chain");
+    let bend = format!("{FIRST}.rotate=(60,0,0)");
+    let mut swinging = |command: &str, frames: &str| {
+        picture(&[command, &chain, "--set", &bend, "--frames", frames], &format!("{command}_{frames}.png"))
+    };
+    for command in ["pose", "render"] {
+        let (early, late) = (swinging(command, "3"), swinging(command, "1200"));
+        assert!(differing(&early, &late) > 200, "{command}: springs are drawn on their way");
+        assert!(differing(&early, &swinging(command, "3")) == 0, "{command}: no time passes in a picture");
+    }
     let wrong = rigsmith(folder.path(), &["render", "crane.rig.ron", "--set", "lift", "-o", "no.png"]);
     assert!(wrong.code == 2 && !folder.path().join("no.png").exists(), "{}", wrong.err);
 }

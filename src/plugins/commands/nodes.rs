@@ -26,7 +26,7 @@ use crate::{
 type FollowedNodes<'a> = (
     Entity,
     &'a Rig,
-    Option<&'a Built>,
+    Option<Ref<'a, Built>>,
     &'a mut JointEntities,
     &'a TagEntities,
     &'a GroupEntities,
@@ -44,9 +44,11 @@ pub(super) fn follow_nodes(
     mut index: ResMut<EntityIndex>,
 ) {
     for (rig_entity, rig, built, mut joints, tags, groups, mut known, is_running) in &mut rigs {
-        let built = built.map(|built| &*built.0);
-        let nodes = built.map_or(&[][..], |built| &built.nodes);
         let joints = joints.bypass_change_detection();
+        if joints.follow(rig) && !built.as_ref().is_some_and(DetectChanges::is_changed) {
+            continue;
+        }
+        let nodes = built.as_ref().map_or(&[][..], |built| &built.0.nodes);
         let known = known.bypass_change_detection();
         park(&mut commands, known, nodes);
         let mut writer = Writer { commands: &mut commands, rig: rig_entity, tags, groups };
@@ -116,10 +118,21 @@ pub(super) fn follow_nodes(
 /// Rigs whose joints may stand in another order than in the document: the document or the build changed, or somebody
 /// wrote the parent of a node.
 pub(super) fn unsorted_rigs(
-    rigs: Query<Entity, (With<Rig>, Or<(Changed<Built>, Changed<Rig>, Changed<Children>)>)>,
+    edited: Query<(Entity, &Rig, &JointEntities), Changed<Rig>>,
+    rebuilt: Query<Entity, (With<Rig>, Or<(Changed<Built>, Changed<Children>)>)>,
     nodes: Query<&NodeOf, Changed<Children>>,
 ) -> BTreeSet<Entity> {
-    rigs.iter().chain(nodes.iter().map(|of| of.0)).collect()
+    let edited = edited.iter().filter(|(_, rig, joints)| !joints.follow(rig)).map(|(entity, ..)| entity);
+    edited.chain(&rebuilt).chain(nodes.iter().map(|of| of.0)).collect()
+}
+
+/// Notes that the entities of a rig follow its document, after all systems that write them.
+pub(super) fn note_revisions(mut rigs: Query<(&Rig, &mut JointEntities), Changed<Rig>>) {
+    for (rig, mut joints) in &mut rigs {
+        if !joints.follow(rig) {
+            joints.bypass_change_detection().revision = Some(rig.revision().clone());
+        }
+    }
 }
 
 /// Puts the joints below each node into the order that the document gives them. Created nodes keep their places among

@@ -54,7 +54,9 @@ pub(super) fn run_built(
             // The document changed, but the build is the same.
             Some(mut runtime) if !built.is_changed() => {
                 let target = runtime.bypass_change_detection();
-                attach(target, joints, nodes);
+                if !joints.follow(rig) {
+                    attach(target, joints, nodes);
+                }
                 target.pose_from(rig, is_posed);
                 continue;
             }

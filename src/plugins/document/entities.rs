@@ -11,7 +11,9 @@ use std::{
 
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
-use crate::rig::{BuiltConstraint, BuiltNode, GroupData, NodeKind, PoseOffset, RestTransform, TagData, Uid};
+use crate::rig::{
+    BuiltConstraint, BuiltNode, GroupData, NodeKind, PoseOffset, RestTransform, Revision, Rig, TagData, Uid,
+};
 
 /// The parts of a rig that have entities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +78,8 @@ pub struct JointEntities {
     pub(super) joints: HashMap<Uid, MirroredJoint>,
     /// Pose offsets of the document that the joints' transforms were last set to.
     pub(super) posed: BTreeMap<Uid, PoseOffset>,
+    /// Revision of the document that all entities of the rig follow; `None` if one of them has to be written again.
+    pub(in crate::plugins) revision: Option<Revision>,
 }
 
 /// Entity of a joint and the values last written to it.
@@ -96,6 +100,11 @@ impl JointEntities {
     /// The entity of a joint.
     pub fn get(&self, joint: Uid) -> Option<Entity> {
         self.joints.get(&joint).map(|mirrored| mirrored.entity)
+    }
+
+    /// True if the entities of joints, tags, groups and created nodes follow the document in everything but its pose.
+    pub(in crate::plugins) fn follow(&self, rig: &Rig) -> bool {
+        self.revision.as_ref().is_some_and(|revision| revision.is_same(rig.revision()))
     }
 
     pub(in crate::plugins) fn mirrored_mut(&mut self, joint: Uid) -> Option<&mut MirroredJoint> {

@@ -1,6 +1,6 @@
 //! Entities of joints, groups and tags follow the document: a component is written only where its value changed.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use bevy::prelude::*;
 
@@ -45,8 +45,13 @@ pub(in crate::plugins) fn follow_rigs(
         if uid != Some(&rig.uid()) {
             commands.entity(rig_entity).try_insert(rig.uid());
         }
-        follow_groups(&mut commands, rig_entity, rig, groups.bypass_change_detection(), &mut index);
         let known = joints.bypass_change_detection();
+        let is_posed = !show_rest.is_some_and(|show_rest| show_rest.0);
+        if known.follow(rig) {
+            follow_pose(known, rig, is_posed, is_running, &mut places);
+            continue;
+        }
+        follow_groups(&mut commands, rig_entity, rig, groups.bypass_change_detection(), &mut index);
         let mut is_other = false;
         let mut gone: Vec<(Uid, Entity)> = (known.joints.iter())
             .filter(|(uid, _)| rig.joint(**uid).is_none())
@@ -64,7 +69,6 @@ pub(in crate::plugins) fn follow_rigs(
             known.posed.remove(&uid);
             is_other = true;
         }
-        let is_posed = !show_rest.is_some_and(|show_rest| show_rest.0);
         for joint in rig.walk() {
             let data = &joint.data;
             let offset = rig.offset(data.uid).filter(|_| is_posed);
@@ -129,6 +133,31 @@ pub(in crate::plugins) fn follow_rigs(
         if is_other {
             joints.set_changed();
         }
+    }
+}
+
+/// Writes the transforms of joints that the document poses otherwise than before.
+fn follow_pose(
+    known: &mut JointEntities,
+    rig: &Rig,
+    is_posed: bool,
+    is_running: bool,
+    places: &mut Query<(&mut Transform, &mut RestTransform), With<Joint>>,
+) {
+    let touched: BTreeSet<Uid> = known.posed.keys().chain(rig.pose().keys()).copied().collect();
+    for uid in touched {
+        let offset = rig.offset(uid).filter(|_| is_posed);
+        let (Some(joint), Some(mirrored)) = (rig.joint(uid), known.joints.get(&uid)) else { continue };
+        if known.posed.get(&uid) == offset {
+            continue;
+        }
+        // The program of a running rig writes the transforms of all its nodes.
+        if let Ok((mut pose, _)) = places.get_mut(mirrored.entity)
+            && !is_running
+        {
+            pose.set_if_neq(offset.copied().unwrap_or_default().on(&joint.data.rest));
+        }
+        known.set_posed(uid, offset);
     }
 }
 
@@ -212,6 +241,9 @@ pub(in crate::plugins) fn follow_tags(
 ) {
     for (rig_entity, rig, mut joints, mut tags) in &mut rigs {
         let (joints, known) = (joints.bypass_change_detection(), &mut *tags.bypass_change_detection());
+        if joints.follow(rig) {
+            continue;
+        }
         let mut gone: Vec<Uid> = known.tags.keys().filter(|uid| rig.find_tag(**uid).is_none()).copied().collect();
         gone.sort_unstable();
         for uid in gone {
