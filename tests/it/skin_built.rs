@@ -9,15 +9,19 @@ mod places;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::prerequisites::BODIES;
-use bevy::math::{Affine3A, Vec3};
+use bevy::{
+    math::{Affine3A, Vec3},
+    prelude::{Entity, Transform},
+};
 use rigsmith::{
     algo::weights::WeightSettings,
     headless::Workbench,
     plugins::{
-        commands::{BuildRequest, BuildStep},
+        commands::{BuildRequest, BuildStep, BuiltEntities},
         document::{Change, EditRequest},
     },
-    rig::{BuiltRig, Constraint, Rig, RigEdit, TagKind, Uid, deform::DeformSkeleton},
+    rig::{BuiltRig, Constraint, NodeType, RestTransform, Rig, RigEdit, TagKind, Uid, deform::DeformSkeleton},
+    solve::program::RigState,
 };
 
 use figure::{Figure, carry};
@@ -38,6 +42,9 @@ const KNOWN: [(&str, [(i32, usize); 4]); 8] = [
     ("male_muscular_action", [(11, 0), (11, 0), (13, 0), (10, 0)]),
     ("male_young", [(10, 0), (11, 0), (13, 0), (11, 0)]),
 ];
+
+/// Endings of the labels of both sides.
+const SIDES: [&str; 2] = ["_l", "_r"];
 
 /// The bundled biped, and the seven bodies where there is data.
 fn figures() -> impl Iterator<Item = Figure> {
@@ -146,17 +153,17 @@ fn weights_wait_for_joints_that_are_not_built() {
 }
 
 /// Bends the joints of a figure: for each the loss of volume, in hundredths, and the folds.
-fn bends(figure: &Figure, what: &str, known: &[(&str, [(i32, usize); 4])], wrong: &mut Vec<String>) {
-    let mut line = format!("{:<22} {what:<10}", figure.name);
+fn bends(figure: &Figure, side: &str, known: &[(&str, [(i32, usize); 4])], wrong: &mut Vec<String>) {
+    let mut line = format!("{:<22} {side:<3}", figure.name);
     let known = known.iter().find(|(name, _)| *name == figure.name).map(|(_, known)| known);
     for (number, joint) in Joint::ALL.into_iter().enumerate() {
-        let bent = joint.bend(figure, "_l");
+        let bent = joint.bend(figure, side);
         let folds = measure::folds(figure, &bent);
-        let loss = (100.0 * measure::loss(figure, joint, "_l", &bent)).round() as i32;
+        let loss = (100.0 * measure::loss(figure, joint, side, &bent)).round() as i32;
         line += &format!("  {joint:?} {loss:>3} % {folds:>2}");
         let (most, folded) = known.map_or((15, 0), |known| known[number]);
         if loss > most || folds > folded {
-            wrong.push(format!("{}, {what}: {joint:?} loses {loss} %, {folds} folds", figure.name));
+            wrong.push(format!("{}: {joint:?}{side} loses {loss} %, {folds} folds", figure.name));
         }
     }
     println!("{line}");
@@ -167,7 +174,9 @@ fn bends(figure: &Figure, what: &str, known: &[(&str, [(i32, usize); 4])], wrong
 fn bent_limbs_keep_what_they_kept() {
     let mut wrong = Vec::new();
     for figure in figures() {
-        bends(&figure, "template", &KNOWN, &mut wrong);
+        for side in SIDES {
+            bends(&figure, side, &KNOWN, &mut wrong);
+        }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
@@ -176,12 +185,46 @@ fn bent_limbs_keep_what_they_kept() {
 #[test]
 fn limbs_are_bent_by_a_right_angle() {
     for figure in figures() {
-        for joint in Joint::ALL {
-            let bent = joint.bend(&figure, "_l");
-            let angle = joint.angle(&figure, "_l", &bent).to_degrees();
-            assert!((angle - 90.0).abs() < 3.0, "{}: {joint:?} turns by {angle}", figure.name);
+        for (joint, side) in Joint::ALL.into_iter().flat_map(|joint| SIDES.map(|side| (joint, side))) {
+            let bent = joint.bend(&figure, side);
+            let angle = joint.angle(&figure, side, &bent).to_degrees();
+            assert!((angle - 90.0).abs() < 3.0, "{}: {joint:?}{side} turns by {angle}", figure.name);
         }
     }
+}
+
+/// Entities of an app whose controls are written stand where the measured states are, so that what is measured is seen.
+#[test]
+fn entities_bend_as_measured() {
+    for figure in figures() {
+        let mut bench = figure.bench(None);
+        assert!(bench.build(BuildStep::All).error.is_none());
+        for (joint, side) in Joint::ALL.into_iter().flat_map(|joint| SIDES.map(|side| (joint, side))) {
+            let bent = joint.bend(&figure, side);
+            pose_entities(&mut bench, &bent);
+            for node in bench.nodes().unwrap() {
+                let wanted = bent.global(node.node.uid).unwrap().translation;
+                let off = node.entity.translation.distance(wanted);
+                assert!(off < 1e-4, "{}, {joint:?}{side}: {} is off by {off}", figure.name, node.node.name);
+            }
+        }
+    }
+}
+
+/// Writes the `Transform`s of all controls so that they are posed as in a state.
+fn pose_entities(bench: &mut Workbench, state: &RigState) {
+    let rig = bench.rig_entity();
+    let entities = bench.app_mut().world().get::<BuiltEntities>(rig).unwrap();
+    let nodes = state.program().nodes().iter().enumerate().filter(|(_, node)| node.kind == NodeType::Control);
+    let posed: Vec<(Entity, Transform)> = nodes
+        .map(|(slot, node)| {
+            (entities.get(node.uid).unwrap(), state.offset_at(slot).on(&RestTransform::from(node.base)))
+        })
+        .collect();
+    for (entity, transform) in posed {
+        *bench.app_mut().world_mut().get_mut::<Transform>(entity).unwrap() = transform;
+    }
+    bench.app_mut().update();
 }
 
 /// Hands and feet are where their controls are, in the bundled body and in the others.
