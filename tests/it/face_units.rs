@@ -54,13 +54,29 @@ impl Posable {
 /// Points of the face proper in the heads with true shapes; the others are neck, back of the head and inside.
 const FACE: usize = 9409;
 
-/// Mean residual (root mean square, of the shape's), cosine and amplitude over all shapes.
-fn beside_truth(name: &str) -> Option<[f64; 3]> {
+/// Regions of the face by the bone that moves a point most, in the order of [`Region`].
+const REGIONS: [&str; 8] = ["forehead", "brow", "lid", "nose", "cheek", "lip", "jaw", "temple"];
+
+/// Region of each point of the face; `None` for points that no bone of skin moves.
+fn regions(head: &Posable) -> Vec<Option<usize>> {
+    let region = |point: usize| {
+        let most = head.face.weights.of(point).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let bone = head.face.bones.get((most.0 as usize).checked_sub(2)?)?;
+        Some(bone.region as usize).filter(|region| *region < REGIONS.len())
+    };
+    (0..FACE).map(region).collect()
+}
+
+/// Mean residual (root mean square, of the shape's), cosine and amplitude over all shapes, and the amplitude in each region:
+/// the size of all shapes together there, beside the true one.
+fn beside_truth(name: &str) -> Option<([f64; 3], [f64; REGIONS.len()])> {
     let folder = test_data()?;
     let (points, triangles) = heads::mesh(&folder.join(format!("heads/{name}.obj")));
     let head = Posable::new(&points, &triangles);
     let units = ExpressionSet::bundled().unit_set();
+    let regions = regions(&head);
     let mut sums = [0.0; 3];
+    let mut of_regions = [[0.0; 2]; REGIONS.len()];
     let mut count = 0.0;
     for (shape, truth) in true_shapes(&folder) {
         // Lips that meet only come together where the jaw is open.
@@ -85,12 +101,22 @@ fn beside_truth(name: &str) -> Option<[f64; 3]> {
             "{name} {shape}: residual {:.2}, cosine {:.2}, amplitude {:.2}",
             measured[0], measured[1], measured[2]
         );
+        for ((moved, truth), region) in moved.iter().zip(&truth).zip(&regions) {
+            if let Some(region) = region {
+                of_regions[*region][0] += f64::from(moved.dot(*truth));
+                of_regions[*region][1] += f64::from(truth.length_squared());
+            }
+        }
         sums.iter_mut().zip(measured).for_each(|(sum, value)| *sum += value);
         count += 1.0;
     }
     let mean = sums.map(|sum| sum / count);
     println!("{name}: residual {:.3}, cosine {:.3}, amplitude {:.3}", mean[0], mean[1], mean[2]);
-    Some(mean)
+    let sizes = of_regions.map(|[along, square]| along / square);
+    for (region, size) in REGIONS.iter().zip(sizes) {
+        println!("{name}, {region}: amplitude {size:.2}");
+    }
+    Some((mean, sizes))
 }
 
 #[test]
@@ -99,9 +125,12 @@ fn units_do_what_the_true_shapes_do() {
     for (name, most) in
         [("ict_neutral", 0.44), ("ict_identity_1", 0.44), ("ict_identity_2", 0.46), ("ict_identity_3", 0.49)]
     {
-        let Some([residual, cosine, amplitude]) = beside_truth(name) else { return };
+        let Some(([residual, cosine, amplitude], regions)) = beside_truth(name) else { return };
         assert!(residual <= most, "{name}: {residual} of the shapes is left");
         assert!(cosine >= 0.89, "{name}: cosine {cosine}");
-        assert!((0.8..=1.1).contains(&amplitude), "{name}: amplitude {amplitude}");
+        assert!((0.85..=1.15).contains(&amplitude), "{name}: amplitude {amplitude}");
+        for (region, size) in REGIONS.iter().zip(regions) {
+            assert!((0.8..=1.2).contains(&size), "{name}, {region}: amplitude {size}");
+        }
     }
 }
