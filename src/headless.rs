@@ -5,7 +5,7 @@
 
 pub mod posing;
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::{Duration, Instant}};
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 
@@ -72,6 +72,20 @@ pub enum WorkbenchError {
     /// The workbench has no mesh.
     #[error("no mesh is open; open one first")]
     NoMesh,
+}
+
+/// Pauses between two looks at a job in the background, which needs the processors more than whoever waits: a sixteenth of
+/// the time that the job has taken.
+struct Pause(Instant);
+
+impl Pause {
+    fn new() -> Self {
+        Self(Instant::now())
+    }
+
+    fn rest(&self) {
+        std::thread::sleep((self.0.elapsed() / 16).clamp(Duration::from_micros(500), Duration::from_millis(10)));
+    }
 }
 
 impl Workbench {
@@ -152,6 +166,7 @@ impl Workbench {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.forget_refusals();
         self.app.world_mut().write_message(BindRequest { mesh, settings, parts });
+        let pause = Pause::new();
         loop {
             self.app.update();
             let bound = self.app.world_mut().resource_mut::<Messages<Bound>>().drain().last();
@@ -164,7 +179,7 @@ impl Workbench {
             if let Some(job) = self.app.world().get::<SkinningJob>(mesh) {
                 progress(job.progress());
             }
-            std::thread::sleep(Duration::from_millis(1));
+            pause.rest();
         }
     }
 
@@ -187,6 +202,7 @@ impl Workbench {
         let mut request = FitRequest::new(mesh);
         ask(&mut request);
         self.app.world_mut().write_message(request);
+        let pause = Pause::new();
         loop {
             self.app.update();
             let fitted = self.app.world_mut().resource_mut::<Messages<Fitted>>().drain().last();
@@ -199,7 +215,7 @@ impl Workbench {
             if let Some(job) = self.app.world().get::<FitJob>(mesh) {
                 progress(job.progress());
             }
-            std::thread::sleep(Duration::from_millis(1));
+            pause.rest();
         }
     }
 
@@ -214,6 +230,7 @@ impl Workbench {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.forget_refusals();
         self.app.world_mut().write_message(FaceRequest { mesh, settings, fit });
+        let pause = Pause::new();
         loop {
             self.app.update();
             let placed = self.app.world_mut().resource_mut::<Messages<FacePlaced>>().drain().last();
@@ -222,7 +239,7 @@ impl Workbench {
                 self.app.update();
                 let report = placed.result?;
                 while self.app.world().get::<FacePreparation>(mesh).is_some() {
-                    std::thread::sleep(Duration::from_millis(1));
+                    pause.rest();
                     self.app.update();
                 }
                 return self.refused().map_or(Ok(report), Err);
@@ -232,7 +249,7 @@ impl Workbench {
             {
                 progress(step, job.progress());
             }
-            std::thread::sleep(Duration::from_millis(1));
+            pause.rest();
         }
     }
 
@@ -241,6 +258,7 @@ impl Workbench {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.forget_refusals();
         self.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
+        let pause = Pause::new();
         loop {
             self.app.update();
             let told = self.app.world_mut().resource_mut::<Messages<Expressed>>().drain().last();
@@ -248,7 +266,7 @@ impl Workbench {
                 told.map_or(Ok(()), |told| told.result)?;
                 return self.refused().map_or(Ok(()), Err);
             }
-            std::thread::sleep(Duration::from_millis(1));
+            pause.rest();
         }
     }
 

@@ -133,7 +133,8 @@ impl Surface {
         resolve(&mut crossings, |slot| self.tree.slot(slot).1, out);
     }
 
-    /// True if a triangle crosses `ray` at a distance from `from` to `to`: cheaper than asking for the first hit.
+    /// True if a triangle crosses `ray` at a distance from `from` to `to`: cheaper than asking for the first hit. A ray that
+    /// runs along hundreds of triangles, as within a flat mesh, crosses none.
     pub fn crosses(&self, ray: &Ray, from: f32, to: f32) -> bool {
         self.prepare(ray).is_some_and(|(frame, boxes)| self.tree.crosses(&frame, &boxes, from, to))
     }

@@ -442,7 +442,7 @@ fn pictures_show_the_pose_and_its_controls_on_a_gpu() {
     assert!(differing(&rest, &stored) > 500, "a stored pose is drawn");
     let chain = bundled("parts/spring_chain");
     let bend = format!("{FIRST}.rotate=(60,0,0)");
-    let mut swinging = |command: &str, frames: &str| {
+    let swinging = |command: &str, frames: &str| {
         picture(&[command, &chain, "--set", &bend, "--frames", frames], &format!("{command}_{frames}.png"))
     };
     for command in ["pose", "render"] {

@@ -14,6 +14,9 @@ use super::tree::{DEPTH, Tree};
 /// Largest number of waiting children: seven a level.
 const STACK: usize = (WIDTH - 1) * DEPTH + 1;
 
+/// Leaves that a ray may meet without a crossing. A ray through a mesh of a million triangles meets some dozens.
+const MOST_LEAVES: usize = 384;
+
 /// Stack of children to visit, the best on top, each with a bound of the distances in it (less is better).
 struct Waiting {
     children: [(f32, Child); STACK],
@@ -119,10 +122,12 @@ impl Tree {
         }
     }
 
-    /// True if a triangle is crossed at a distance between `from` and `to`.
+    /// True if a triangle is crossed at a distance between `from` and `to`. A ray that meets [`MOST_LEAVES`] leaves and
+    /// crosses none of their triangles runs along a flat surface, and crosses nothing.
     pub fn crosses(&self, frame: &Frame, boxes: &BoxRay, from: f32, to: f32) -> bool {
         let between = |crossing: &Crossing| (f64::from(from)..f64::from(to)).contains(&crossing.distance);
         let mut waiting = Waiting::new(self);
+        let mut leaves = 0;
         while let Some((_, child)) = waiting.pop() {
             match child.target() {
                 Target::Node(index) => {
@@ -135,8 +140,9 @@ impl Tree {
                 Target::Leaf(index, two) => {
                     let mut found = false;
                     self.test(index, two, frame, |crossing| found |= between(&crossing));
-                    if found {
-                        return true;
+                    leaves += 1;
+                    if found || leaves == MOST_LEAVES {
+                        return found;
                     }
                 }
             }
