@@ -5,6 +5,7 @@
 
 mod animate;
 mod argument;
+mod binding;
 mod build;
 mod check;
 mod compose;
@@ -180,6 +181,9 @@ struct WeightArgs {
     /// Let parts bend that one joint holds in their whole size; otherwise they move with that joint alone
     #[arg(long)]
     bend_parts: bool,
+    /// Let joints claim skin although they hang outside of the mesh or do not deform, by their labels; may be repeated
+    #[arg(long, value_name = "LABEL[,LABEL...]")]
+    claim: Vec<String>,
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy)]

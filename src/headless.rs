@@ -12,7 +12,7 @@ use bevy::{prelude::*, time::TimeUpdateStrategy};
 use crate::{
     algo::{
         face::auto::{AutoSettings, FaceStep},
-        weights::{WeightReport, WeightSettings},
+        weights::WeightSettings,
     },
     mesh::{model::Model, shapes::Shapes},
     plugins::{
@@ -25,7 +25,7 @@ use crate::{
         },
         fit::{FitFailure, FitJob, FitReport, FitRequest, FitTemplates, Fitted},
         gesture::{Gesture, GestureAnswer, GestureScript},
-        skinning::{BindRequest, Bound, PartBinding, SkinningError, SkinningJob},
+        skinning::{BindRequest, Bound, MeshPart, PartBinding, SkinningError, SkinningJob, SkinningReport},
         surface::{RigMesh, SkinOf},
         task_pools,
     },
@@ -156,16 +156,28 @@ impl Workbench {
         self.app.update();
     }
 
-    /// Computes weights for the mesh; `parts` are the objects that a person decided about. `progress` is called with the finished share, 0 to 1, now and then.
+    /// Computes weights for the mesh; `parts` are the parts that a person decided about. `progress` is called with the finished
+    /// share, 0 to 1, now and then.
     pub fn skin(
         &mut self,
         settings: WeightSettings,
-        parts: Vec<(usize, PartBinding)>,
+        parts: Vec<(MeshPart, PartBinding)>,
         progress: &mut dyn FnMut(f32),
-    ) -> Result<WeightReport, WorkbenchError> {
+    ) -> Result<SkinningReport, WorkbenchError> {
+        self.skin_with(|request| (request.settings, request.parts) = (settings, parts), progress)
+    }
+
+    /// Computes weights for the mesh, as [`Workbench::skin`] does. `ask` completes the request.
+    pub fn skin_with(
+        &mut self,
+        ask: impl FnOnce(&mut BindRequest),
+        progress: &mut dyn FnMut(f32),
+    ) -> Result<SkinningReport, WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.forget_refusals();
-        self.app.world_mut().write_message(BindRequest { mesh, settings, parts });
+        let mut request = BindRequest::new(mesh);
+        ask(&mut request);
+        self.app.world_mut().write_message(request);
         let pause = Pause::new();
         loop {
             self.app.update();

@@ -29,6 +29,7 @@ mod islands;
 pub(crate) mod laplacian;
 pub(crate) mod ldl;
 mod odds;
+mod report;
 mod roots;
 mod sight;
 mod twist;
@@ -42,7 +43,10 @@ use crate::mesh::model::Weights;
 use bind::{Bound, Source};
 use finish::Shaping;
 use twist::Limbs;
-pub use twist::late_shares;
+pub use {
+    report::{IdleJoint, IdleReason, StiffPiece, WeightReport},
+    twist::late_shares,
+};
 
 /// A joint as the binding sees it, in the space of the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,6 +107,9 @@ pub struct WeightSettings {
     pub stiff_parts: bool,
     /// Ranges of points whose parts bend although [`WeightSettings::stiff_parts`] would hold them stiff.
     pub bending: Vec<Range<u32>>,
+    /// Indices of joints that claim skin although they hang outside of the mesh or do not deform. Such a joint holds what
+    /// lies nearer to it than to others, which may be nothing.
+    pub claims: Vec<usize>,
 }
 
 impl Default for WeightSettings {
@@ -115,6 +122,7 @@ impl Default for WeightSettings {
             prune: 0.002,
             stiff_parts: true,
             bending: Vec::new(),
+            claims: Vec::new(),
         }
     }
 }
@@ -124,26 +132,6 @@ impl WeightSettings {
     pub(crate) fn blend(&self) -> f32 {
         if self.smoothing.is_finite() { self.smoothing.clamp(0.01, 100.0) } else { 1.0 }
     }
-}
-
-/// Numbers of points by the origin of their weights; the counts but `stiff` add up to `points`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct WeightReport {
-    /// Points bound by heat on the surface.
-    pub by_surface: usize,
-    /// Points bound by geodesic voxel binding.
-    pub by_voxels: usize,
-    /// Points bound by the sparse solve from their neighbours.
-    pub by_fill: usize,
-    /// Points bound by the nearest bone alone.
-    pub by_nearest: usize,
-    /// Points bound as rigid parts, or because only one joint deforms. Points held by locked joints count where the rest
-    /// of them would.
-    pub given: usize,
-    /// All points.
-    pub points: usize,
-    /// Points of parts that move as one ([`WeightSettings::stiff_parts`]), also counted by where their weights come from.
-    pub stiff: usize,
 }
 
 /// Joints whose weights stay as they are; the others share what these leave.
@@ -203,6 +191,14 @@ pub enum WeightError {
         /// Index of the first such part.
         part: usize,
     },
+    /// A joint that is to claim skin and does not exist.
+    #[error("joint {joint} is to claim skin, but there are only {joints} joints")]
+    Claim {
+        /// Index of the first such joint.
+        joint: usize,
+        /// Number of joints.
+        joints: usize,
+    },
     /// Locks that do not fit the mesh or the rig.
     #[error(
         "the locked weights are for {points} points and {joints} joints, the mesh and rig have others; bind without locks"
@@ -243,21 +239,26 @@ pub fn skin_weights(
     progress: &(dyn Fn(f32) -> bool + Sync),
 ) -> Result<(Weights, WeightReport), WeightError> {
     check::input(points, triangles, joints, rigid, locks.as_ref())?;
+    check::claims(joints, &settings.claims)?;
+    let (joints, claims) = &claiming(joints, &settings.claims);
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
     step(0.0)?;
     let shaping = Shaping::new(points.len(), rigid, locks, settings);
     let mut report = WeightReport { points: points.len(), ..WeightReport::default() };
     let limbs = Limbs::new(joints, &shaping.free_joints(joints));
     let finish = |of: &dyn Fn(usize) -> Vec<(u32, f32)>| shaping.finish(|point| of(point).into_iter(), points.len());
+    let is_locked = |joint: usize| locks.is_some_and(|locks| locks.joints[joint]);
     if let [only] = limbs.free[..] {
         report.given = points.len();
-        return Ok((finish(&|point| limbs.spread(points[point], [(only, 1.0)].into_iter())), report));
+        let result = finish(&|point| limbs.spread(points[point], [(only, 1.0)].into_iter()));
+        report.idle_joints = report::idle_joints(joints, &result, is_locked, |_| None);
+        return Ok((result, report));
     }
     // Rigid parts neither spread heat nor hide bones.
     let soft: Vec<[u32; 3]> =
         triangles.iter().copied().filter(|t| !t.iter().any(|&p| shaping.is_given(p as usize))).collect();
-    let Bound { place, weights, sources, stiff } =
-        bind::bind(points, &soft, &limbs.joints, &limbs.free, settings, progress)?;
+    let Bound { place, weights, sources, stiff, gaps } =
+        bind::bind(points, &soft, (&limbs.joints, &limbs.claims(claims)), &limbs.free, settings, progress)?;
     for (point, &place) in place.iter().enumerate() {
         let count = match sources[place as usize] {
             _ if shaping.is_given(point) => &mut report.given,
@@ -267,9 +268,24 @@ pub fn skin_weights(
             Source::Nearest | Source::None => &mut report.by_nearest,
         };
         *count += 1;
-        report.stiff += usize::from(stiff[place as usize] && !shaping.is_given(point));
     }
+    report.stiff_pieces = stiff.pieces(&place, &shaping, &limbs);
+    report.stiff = report.stiff_pieces.iter().map(|piece| piece.points).sum();
     let result = finish(&|point| limbs.spread(points[point], weights.of(place[point] as usize)));
+    let outside = |joint: usize| limbs.index(joint).and_then(|core| gaps.outside(core));
+    report.idle_joints = report::idle_joints(joints, &result, is_locked, outside);
     step(1.0)?;
     Ok((result, report))
+}
+
+/// The joints with those that claim skin as deforming ones, and a flag of each joint: whether it claims skin.
+fn claiming(joints: &[WeightJoint], claims: &[usize]) -> (Vec<WeightJoint>, Vec<bool>) {
+    let (mut joints, mut flags) = (joints.to_vec(), vec![false; joints.len()]);
+    // Without a joint that deforms all do.
+    let any_deforms = joints.iter().any(|joint| joint.deforms);
+    for &joint in claims {
+        flags[joint] = true;
+        joints[joint].deforms |= any_deforms;
+    }
+    (joints, flags)
 }

@@ -9,8 +9,8 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, convert::mark_joints, explanation::Explanation,
-    progress::Progress, skin, switches::SwitchArgs,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, binding::bind, convert::mark_joints,
+    explanation::Explanation, skin, switches::SwitchArgs,
 };
 use crate::{
     files::{FileKind, RealDisk, load_model, store_model, store_rig},
@@ -169,10 +169,7 @@ pub(super) fn character_of(
         let model = load_model(&RealDisk, mesh)?;
         report.notes(model.notes.iter().cloned());
         own.open(model, true)?;
-        let mut progress = Progress::new("skinning");
-        let bound = own.skin(weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
-        drop(progress);
-        skin::describe_weights(report, &bound);
+        bind(&mut own, weights.settings(), &weights.claim, Vec::new(), report)?;
         let edits = edits_between(bench.rig(), own.rig()).map_err(|error| Failure::Input(Box::new(error)))?;
         if !edits.is_empty() {
             bench.operate(Operation::Edits(edits))?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Failure, Report, SEED, WindowError, sketch::skin};
+use super::{Failure, Report, SEED, WindowError, binding::bind};
 use crate::{
     algo::weights::WeightSettings,
     files::{ReadError, RealDisk, read_capped, save_atomic},
@@ -38,7 +38,7 @@ pub(super) fn run(reason: Option<&WindowError>) -> Result<Report, Failure> {
     report.line(format!("sketched {} joints with {strokes} gestures into {faces} faces", bench.rig().len()));
     let template = write_template(bench.rig());
     save_new(Path::new("biped.rig.ron"), template.as_bytes(), "the template", &mut report)?;
-    skin(&mut bench, WeightSettings::default(), &mut report)?;
+    bind(&mut bench, WeightSettings::default(), &[], Vec::new(), &mut report)?;
     let glb = write_glb(&bench.character(), &GltfWriteSettings::default());
     let glb = glb.map_err(|error| Failure::Input(Box::new(error)))?;
     if save_new(Path::new("biped.glb"), &glb, "the character", &mut report)? {

@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 
 use super::{
     ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
+    binding::bind,
     progress::{Progress, spinning},
-    sketch,
 };
 use crate::{
     algo::fit_template::FitSymmetry,
@@ -130,7 +130,7 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
         if let Some(error) = bench.build(BuildStep::All).error {
             return Err(Failure::Input(Box::new(error)));
         }
-        sketch::skin(&mut bench, args.weights.settings(), &mut report)?;
+        bind(&mut bench, args.weights.settings(), &args.weights.claim, Vec::new(), &mut report)?;
         let write = || store_model(&RealDisk, &args.output, &bench.character(), &args.export.settings());
         report.notes(spinning("writing", write)?);
     }

@@ -7,10 +7,11 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::{
-    ArgumentError, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, device_selection,
+    ArgumentError, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
+    binding::bind,
+    device_selection,
     pose::{self, PoseSteps},
-    progress::{Progress, spinning},
-    skin,
+    progress::spinning,
 };
 use crate::{
     algo::view::View,
@@ -238,10 +239,7 @@ pub(super) fn picture_of(
         let model = load_model(&RealDisk, mesh)?;
         report.notes(model.notes.iter().cloned());
         bench.open(model, true)?;
-        let mut progress = Progress::new("skinning");
-        let bound = bench.skin(weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
-        drop(progress);
-        skin::describe_weights(report, &bound);
+        bind(&mut bench, weights.settings(), &weights.claim, Vec::new(), report)?;
         meshes.extend(bench.mesh().cloned());
     }
     let state = Some(posed.runtime()?.state().clone());

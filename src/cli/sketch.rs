@@ -8,10 +8,7 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
-    progress::{Progress, spinning},
-};
+use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, binding::bind, progress::spinning};
 use crate::{
     files::{FileKind, RealDisk, bundled_characters, load_gestures, load_model, stem, store_model, store_rig},
     headless::Workbench,
@@ -86,26 +83,13 @@ fn save(
     match kind {
         FileKind::Template | FileKind::RigText => report.notes(store_rig(&RealDisk, path, bench.rig())?),
         _ => {
-            skin(bench, args.weights.settings(), report)?;
+            bind(bench, args.weights.settings(), &args.weights.claim, Vec::new(), report)?;
             let write = || store_model(&RealDisk, path, &bench.character(), &args.export.settings());
             report.notes(spinning("writing", write)?);
         }
     }
     report.line(format!("wrote {}", path.display()));
     report.set("output", path.display().to_string());
-    Ok(())
-}
-
-/// Binds the mesh with automatic weights.
-pub(super) fn skin(
-    bench: &mut Workbench,
-    settings: crate::algo::weights::WeightSettings,
-    report: &mut Report,
-) -> Result<(), Failure> {
-    let mut progress = Progress::new("skinning");
-    let weights = bench.skin(settings, Vec::new(), &mut |part| progress.at(part))?;
-    drop(progress);
-    super::skin::describe_weights(report, &weights);
     Ok(())
 }
 

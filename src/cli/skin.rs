@@ -10,16 +10,13 @@ use serde_json::json;
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
-    progress::{Progress, spinning},
+    binding::{bind, chosen_parts},
+    progress::spinning,
 };
 use crate::{
-    algo::{
-        transfer::{TransferMesh, TransferSettings, transfer_weights},
-        weights::WeightReport,
-    },
+    algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
     files::{FileKind, RealDisk, load_model, load_rig_text, load_skin, load_template, stem, store_model, store_skin},
     headless::Workbench,
-    plugins::skinning::PartBinding,
     rig::{
         Rig, SkinData, Uid, UidSource,
         character::{import_rig_text, import_skeleton},
@@ -43,12 +40,12 @@ pub(super) struct SkinArgs {
     /// Save the weights to a .skin file, too; it may be neither an input nor the output
     #[arg(long, value_name = "FILE")]
     save_weights: Option<PathBuf>,
-    /// Let an object of the mesh move with one joint only, by their names: OBJECT=JOINT
-    #[arg(long, value_name = "OBJECT=JOINT")]
+    /// Let a part of the mesh move with one joint only: an object, or a part as the report names it, and a joint's label
+    #[arg(long, value_name = "PART=JOINT")]
     rigid: Vec<String>,
-    /// Let an object of the mesh bend, by its name, although one joint holds all of it; may be repeated
-    #[arg(long, value_name = "OBJECT")]
-    bend: Vec<String>,
+    /// Let parts of the mesh bend, by the names in the report, although one joint holds all of them; may be repeated
+    #[arg(long, visible_alias = "bend", value_name = "PART[,PART...]")]
+    blend: Vec<String>,
     #[command(flatten)]
     weights: WeightArgs,
     #[command(flatten)]
@@ -83,15 +80,10 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
     }
     let mut bench = Workbench::with_rig(SEED, rig);
     bench.open(model, true)?;
-    let parts = chosen_parts(args, &bench)?;
+    let parts = chosen_parts(&args.rigid, &args.blend, &bench)?;
     match &args.weights_from {
         Some(path) => take_weights(&mut bench, path, &mut report)?,
-        None => {
-            let mut progress = Progress::new("skinning");
-            let weights = bench.skin(args.weights.settings(), parts, &mut |part| progress.at(part))?;
-            drop(progress);
-            describe_weights(&mut report, &weights);
-        }
+        None => bind(&mut bench, args.weights.settings(), &args.weights.claim, parts, &mut report)?,
     }
     let weights_file = if FileKind::of(&args.output) == Some(FileKind::Skin) { Some(&args.output) } else { None };
     for path in weights_file.into_iter().chain(&args.save_weights) {
@@ -133,30 +125,6 @@ pub(super) fn load_rig(path: &Path, report: &mut Report) -> Result<Rig, Failure>
         rig.apply(edit).map_err(|error| Failure::Input(format!("`{}`: {error}", path.display()).into()))?;
     }
     Ok(rig)
-}
-
-/// Objects that `--rigid` and `--bend` decide about.
-fn chosen_parts(args: &SkinArgs, bench: &Workbench) -> Result<Vec<(usize, PartBinding)>, Failure> {
-    let Some(mesh) = bench.mesh() else { return Ok(Vec::new()) };
-    let number = |option: &str, object: &str| {
-        mesh.rest.objects.iter().position(|known| known.name == object).ok_or_else(|| {
-            let names: Vec<&str> = mesh.rest.objects.iter().map(|object| object.name.as_str()).collect();
-            Failure::Input(
-                format!("{option}: the mesh has no object \"{object}\"; it has: {}", names.join(", ")).into(),
-            )
-        })
-    };
-    let rigid = |text: &String| {
-        let (object, joint) = text
-            .split_once('=')
-            .ok_or_else(|| Failure::Usage(format!("--rigid {text}: write OBJECT=JOINT, both by name")))?;
-        let joint = bench.rig().find_label(joint).ok_or_else(|| {
-            Failure::Input(format!("--rigid {text}: the rig has no joint with the label \"{joint}\"").into())
-        })?;
-        Ok((number(&format!("--rigid {text}"), object)?, PartBinding::Rigid(joint)))
-    };
-    let bends = |object: &String| Ok((number("--bend", object)?, PartBinding::Bends));
-    args.rigid.iter().map(rigid).chain(args.bend.iter().map(bends)).collect()
 }
 
 /// Weights of the workbench's mesh, for a file.
@@ -238,27 +206,4 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
     };
     bench.bind(SkinData { joints, weights, at_rest: true, subjects })?;
     Ok(())
-}
-
-/// Adds the origins of the points' weights to the report.
-pub(super) fn describe_weights(report: &mut Report, weights: &WeightReport) {
-    report.line(format!(
-        "{} points weighted: {} over the surface, {} through voxels, {} filled, {} by the nearest bone, {} given",
-        weights.points, weights.by_surface, weights.by_voxels, weights.by_fill, weights.by_nearest, weights.given
-    ));
-    if weights.stiff > 0 {
-        report.line(format!("{} points of parts that one joint holds move as one", weights.stiff));
-    }
-    report.set(
-        "weights",
-        json!({
-            "points": weights.points,
-            "by_surface": weights.by_surface,
-            "by_voxels": weights.by_voxels,
-            "by_fill": weights.by_fill,
-            "by_nearest": weights.by_nearest,
-            "given": weights.given,
-            "stiff": weights.stiff,
-        }),
-    );
 }

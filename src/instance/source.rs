@@ -342,7 +342,7 @@ pub(super) fn bind_meshes(
         for entity in of.iter() {
             let Ok(mesh) = meshes.get(entity) else { continue };
             if rig.skin(mesh.uid).is_none() && asked.insert(entity) {
-                requests.write(BindRequest { mesh: entity, settings: default(), parts: Vec::new() });
+                requests.write(BindRequest::new(entity));
             }
         }
     }

@@ -3,6 +3,8 @@
 mod bends;
 mod body;
 mod late;
+mod parts;
+mod report;
 
 use std::{
     collections::BTreeMap,
@@ -18,10 +20,15 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-use self::bends::{TriedBend, push_edits, tried_bends};
 pub use self::{
     bends::FittedPush,
     body::{BodyBasis, InstanceBody, InstanceSkin},
+    parts::{MeshPart, MeshParts},
+    report::{IdleJoint, RigidPart, SkinningReport},
+};
+use self::{
+    bends::{TriedBend, push_edits, tried_bends},
+    parts::{object_points, runs},
 };
 use super::{
     RigSystems,
@@ -33,7 +40,7 @@ use super::{
     surface::{RigMesh, SkinOf},
 };
 use crate::{
-    algo::weights::{Locks, TwistBone, WeightError, WeightJoint, WeightReport, WeightSettings, skin_weights},
+    algo::weights::{Locks, TwistBone, WeightError, WeightJoint, WeightSettings, skin_weights},
     mesh::model::Weights,
     processor::Modules,
     rig::{
@@ -63,16 +70,26 @@ pub struct BindRequest {
     pub mesh: Entity,
     /// Settings of the computation.
     pub settings: WeightSettings,
-    /// Objects of the mesh that a person decided about: the object's number in the model, and how it is bound.
-    pub parts: Vec<(usize, PartBinding)>,
+    /// Parts of the mesh that a person decided about, and how each is bound. A piece of an object is bound as is chosen for
+    /// the piece; otherwise later choices count.
+    pub parts: Vec<(MeshPart, PartBinding)>,
+    /// Joints that claim skin although they hang outside of the mesh or do not deform.
+    pub claims: Vec<Uid>,
 }
 
-/// Binding of one object of a mesh, in place of what the computation would choose for it.
+impl BindRequest {
+    /// A request that leaves everything to the computation.
+    pub fn new(mesh: Entity) -> Self {
+        Self { mesh, settings: WeightSettings::default(), parts: Vec::new(), claims: Vec::new() }
+    }
+}
+
+/// Binding of one part of a mesh, in place of what the computation would choose for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PartBinding {
-    /// The object moves with one joint only.
+    /// The part moves with one joint only.
     Rigid(Uid),
-    /// The object bends, also if one joint holds all of it or it hangs on a joint in its file.
+    /// The part bends, also if one joint holds all of it or it hangs on a joint in its file.
     Bends,
 }
 
@@ -82,7 +99,7 @@ pub struct Bound {
     /// The mesh.
     pub mesh: Entity,
     /// Report of the computation, or the reason why it failed.
-    pub result: Result<WeightReport, SkinningError>,
+    pub result: Result<SkinningReport, SkinningError>,
 }
 
 /// Reason why a mesh was not bound; a sentence for people without its full stop.
@@ -124,7 +141,7 @@ pub struct BoundSkin {
     /// Weights over the joints of the rig.
     pub skin: Arc<SkinData>,
     /// Report of the computation.
-    pub report: WeightReport,
+    pub report: SkinningReport,
     /// Lengths by which half joints have to leave a bend so that the mesh keeps its volume.
     pub pushes: Vec<FittedPush>,
 }
@@ -163,6 +180,12 @@ pub struct SkinningInput {
     pub rigid: Vec<(Range<u32>, u32)>,
     /// Ranges of points of objects that bend in any case.
     pub bending: Vec<Range<u32>>,
+    /// Indices of joints that claim skin although they would be idle.
+    pub claims: Vec<usize>,
+    /// Parts of `rigid` with their number of points and the joint's index.
+    given: Vec<(MeshPart, usize, usize)>,
+    /// Parts of `bending`.
+    bending_parts: Vec<MeshPart>,
     bends: Vec<TriedBend>,
 }
 
@@ -176,7 +199,7 @@ impl SkinningInput {
         built: Option<&BuiltRig>,
         modules: Option<&Modules>,
         mesh: &RigMesh,
-        parts: &[(usize, PartBinding)],
+        parts: &[(MeshPart, PartBinding)],
     ) -> Self {
         let skeleton = DeformSkeleton::new(rig, built);
         let joints = skeleton.joints().iter().map(|joint| WeightJoint {
@@ -191,28 +214,62 @@ impl SkinningInput {
         let uids = skeleton.joints().iter().map(|joint| joint.uid).collect();
         let is_locked = |uid: Uid| rig.joint(uid).is_some_and(|joint| joint.data.locked);
         let locked = skeleton.joints().iter().map(|joint| is_locked(joint.subject.unwrap_or(joint.uid))).collect();
-        let carried = mesh.rest.objects.iter().enumerate().filter_map(|(object, data)| {
-            let joint = mesh.nodes.get(data.node?)?;
-            Some((object, *joint))
-        });
-        let carried = carried
-            .filter(|(object, _)| parts.iter().all(|(other, _)| other != object))
-            .map(|(object, joint)| (object, PartBinding::Rigid(joint)));
-        let (mut ranges, mut bending) = (Vec::new(), Vec::new());
-        for (object, binding) in parts.iter().copied().chain(carried) {
-            let runs = object_points(mesh, object);
-            match binding {
-                PartBinding::Bends => bending.extend(runs),
-                PartBinding::Rigid(joint) => {
-                    let Some(joint) = skeleton.index(joint) else { continue };
-                    ranges.extend(runs.into_iter().map(|run| (run, joint as u32)));
-                }
-            }
-        }
         let existing = rig.skin(mesh.uid).map(|skin| replaced_joints(&skin.weights, &skeleton.holders(rig, skin)));
         let subjects = skeleton.subjects();
         let bends = built.map_or_else(Vec::new, |built| tried_bends(rig, built, &skeleton, modules));
-        Self { joints, uids, subjects, locked, existing, rigid: ranges, bending, bends }
+        let mut input = Self {
+            joints,
+            uids,
+            subjects,
+            locked,
+            existing,
+            rigid: Vec::new(),
+            bending: Vec::new(),
+            claims: Vec::new(),
+            given: Vec::new(),
+            bending_parts: Vec::new(),
+            bends,
+        };
+        input.choose(mesh, &skeleton, &bindings(mesh, parts));
+        input
+    }
+
+    /// Lets joints claim skin although they would be idle; joints that are not in the skeleton are left out.
+    pub fn claim(&mut self, joints: &[Uid]) {
+        let index = |joint: &Uid| self.uids.iter().position(|uid| uid == joint);
+        self.claims.extend(joints.iter().filter_map(index));
+    }
+
+    /// Takes the bindings of parts; of several for a point the last one counts.
+    fn choose(&mut self, mesh: &RigMesh, skeleton: &DeformSkeleton, bindings: &[(MeshPart, PartBinding)]) {
+        if bindings.is_empty() {
+            return;
+        }
+        let is_piece = |(part, _): &(MeshPart, PartBinding)| matches!(part, MeshPart::Piece(_));
+        let pieces = bindings.iter().any(is_piece).then(|| MeshParts::new(mesh));
+        let mut binding_of = vec![u32::MAX; mesh.rest.points.len()];
+        for (number, (part, _)) in bindings.iter().enumerate() {
+            let runs = match (part, &pieces) {
+                (MeshPart::Object(object), _) => object_points(mesh, *object),
+                (part, pieces) => pieces.as_ref().map_or_else(Vec::new, |pieces| pieces.points(mesh, *part)),
+            };
+            runs.into_iter().for_each(|run| binding_of[run.start as usize..run.end as usize].fill(number as u32));
+        }
+        for (number, (part, binding)) in bindings.iter().enumerate() {
+            let runs = runs(&binding_of, number as u32);
+            match binding {
+                _ if runs.is_empty() => {}
+                PartBinding::Bends => {
+                    self.bending_parts.push(*part);
+                    self.bending.extend(runs);
+                }
+                PartBinding::Rigid(joint) => {
+                    let Some(joint) = skeleton.index(*joint) else { continue };
+                    self.given.push((*part, runs.iter().map(Range::len).sum(), joint));
+                    self.rigid.extend(runs.into_iter().map(|run| (run, joint as u32)));
+                }
+            }
+        }
     }
 
     /// Computes the weights of a mesh.
@@ -225,23 +282,29 @@ impl SkinningInput {
         let any_locked = self.locked.iter().any(|locked| *locked);
         let locks = self.existing.as_ref().filter(|_| any_locked);
         let locks = locks.map(|weights| Locks { weights, joints: &self.locked });
-        let settings = &WeightSettings { bending: self.bending.clone(), ..settings.clone() };
+        let claims = settings.claims.iter().chain(&self.claims).copied().collect();
+        let settings = &WeightSettings { bending: self.bending.clone(), claims, ..settings.clone() };
         let (weights, report) =
             skin_weights(&mesh.rest.points, &mesh.triangles, &self.joints, &self.rigid, locks, settings, progress)?;
         let (weights, pushes) = self.try_bends(mesh, weights, settings, &|_| false, &|_| true);
         let (joints, subjects) = (self.uids.clone(), self.subjects.clone());
         let skin = Arc::new(SkinData { joints, weights, at_rest: true, subjects });
-        Ok(BoundSkin { skin, report, pushes })
+        Ok(BoundSkin { skin, report: self.report(mesh, report), pushes })
     }
 }
 
-/// Points of an object of a mesh, as runs of following numbers.
-fn object_points(mesh: &RigMesh, object: usize) -> Vec<Range<u32>> {
-    let points = mesh.rest.parts.iter().filter(|part| part.object == object).flat_map(|part| &part.vertices);
-    let mut points: Vec<u32> = points.copied().collect();
-    points.sort_unstable();
-    points.dedup();
-    points.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[run.len() - 1] + 1).collect()
+/// Bindings of parts in the order in which they count: objects that hang on a joint in their file, unless a person decided
+/// about them, objects that a person decided about, and pieces.
+fn bindings(mesh: &RigMesh, parts: &[(MeshPart, PartBinding)]) -> Vec<(MeshPart, PartBinding)> {
+    let carried = mesh.rest.objects.iter().enumerate().filter_map(|(object, data)| {
+        let joint = mesh.nodes.get(data.node?)?;
+        Some((MeshPart::Object(object), PartBinding::Rigid(*joint)))
+    });
+    let carried = carried.filter(|(object, _)| parts.iter().all(|(other, _)| other != object));
+    let is_object = |part: &MeshPart| matches!(part, MeshPart::Object(_));
+    let objects = parts.iter().filter(|(part, _)| is_object(part));
+    let pieces = parts.iter().filter(|(part, _)| !is_object(part));
+    carried.chain(objects.chain(pieces).copied()).collect()
 }
 
 /// Joint of each object of a mesh that holds all of its points, if one does: a helmet's head, a sword's hand.
@@ -284,7 +347,8 @@ fn start_skinning(
         let cancelled = Arc::new(AtomicBool::new(false));
         let (told, stop) = (progress.clone(), cancelled.clone());
         let task = AsyncComputeTaskPool::get().spawn(async move {
-            let input = SkinningInput::new(&rig, built.as_deref(), modules.as_deref(), &mesh, &request.parts);
+            let mut input = SkinningInput::new(&rig, built.as_deref(), modules.as_deref(), &mesh, &request.parts);
+            input.claim(&request.claims);
             input.compute(&mesh, &request.settings, &|part| {
                 told.store(part.to_bits(), Ordering::Relaxed);
                 !stop.load(Ordering::Relaxed)

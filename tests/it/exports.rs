@@ -58,7 +58,7 @@ fn bodies_skinned_to_game_engine() {
         bench.operate(Operation::Edits(game_engine(&body))).unwrap();
         bench.open(load_model(&RealDisk, &body.join("body.obj")).unwrap(), true).unwrap();
         let report = bench.skin(WeightSettings::default(), Vec::new(), &mut |_| ()).unwrap();
-        assert_eq!(report.points, 13_380);
+        assert_eq!(report.weights.points, 13_380);
         let path = folder.join(format!("body_{name}.glb"));
         store_model(&RealDisk, &path, &bench.character(), &GltfWriteSettings::default()).unwrap();
         let back = load_model(&RealDisk, &path).unwrap();

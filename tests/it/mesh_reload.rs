@@ -34,7 +34,7 @@ impl Bench {
         bench.app.update();
         let positions = vec![Vec3::ZERO, Vec3::Y, Vec3::Y * 2.0];
         bench.change(Change::Do(Operation::Chain { positions, parent: None }));
-        let request = BindRequest { mesh, settings: default(), parts: Vec::new() };
+        let request = BindRequest::new(mesh);
         bench.app.world_mut().write_message(request);
         bench.until::<Bound>();
         bench.app.update();

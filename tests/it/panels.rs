@@ -23,7 +23,7 @@ use rigsmith::{
             poses::PosesPanel,
             process::ProcessPanel,
             properties::PropertiesPanel,
-            skinning::{SkinningPanel, SkinningParts},
+            skinning::{SkinningClaims, SkinningPanel, SkinningParts, SkinningResults},
             toasts::Toasts,
         },
     },
@@ -31,7 +31,7 @@ use rigsmith::{
         commands::{BuildRequest, BuildStep, Built},
         document::Hovered,
         runtime::RigRuntime,
-        skinning::{PartBinding, SkinningJob, held_objects},
+        skinning::{MeshPart, PartBinding, SkinningJob, held_objects},
         stage::RigStage,
     },
     prelude::*,
@@ -390,13 +390,69 @@ fn parts_tell_what_holds_them_and_keep_to_choices() {
     assert!(says(&desk, "Automatic: moves with low"), "{:?}", desk.seen);
     // The joint of a choice holds the object after the next computation.
     desk.select(&joints[1..]);
-    desk.app.world_mut().resource_mut::<SkinningParts>().0.insert((Uid(97), 0), PartBinding::Rigid(joints[1]));
+    let key = (Uid(97), MeshPart::Object(0));
+    desk.app.world_mut().resource_mut::<SkinningParts>().0.insert(key, PartBinding::Rigid(joints[1]));
     desk.frames(2);
     assert!(says(&desk, "Moves with high"), "{:?}", desk.seen);
     desk.click("Skin");
     wait(&mut desk, mesh);
     let mesh = desk.app.world().get::<RigMesh>(mesh).unwrap();
     assert_eq!(held_objects(mesh, desk.rig().skin(Uid(97)).unwrap())[0], Some(joints[1]));
+}
+
+/// A box clicked free bends after the next computation and can be made rigid again; a joint far above the boxes is idle until
+/// it claims skin.
+#[test]
+fn rigid_parts_and_idle_joints_have_a_choice_each() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    desk.resize(360.0, 1400.0);
+    let boxes = boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]], [[-0.1, 1.05, -0.1], [0.1, 1.2, 0.1]]]);
+    let mesh = RigMesh::new(Uid(97), boxes, Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(desk.rig))).id();
+    let joints = desk.chain(&["low", "high", "far"]);
+    desk.frames(2);
+    desk.click("Skin");
+    wait(&mut desk, mesh);
+    open(&mut desk, "Rigid parts (");
+    let first = {
+        let report = desk.app.world().resource::<SkinningResults>().get(mesh).unwrap().as_ref().unwrap();
+        assert!(report.idle_joints.iter().any(|idle| idle.joint == joints[2]), "{report:?}");
+        report.rigid_parts[0].clone()
+    };
+    assert_eq!(desk.find("rigid").on, Some(true));
+    desk.click("rigid");
+    desk.frames(2);
+    let key = (Uid(97), first.part);
+    assert_eq!(desk.app.world().resource::<SkinningParts>().0.get(&key), Some(&PartBinding::Bends));
+    desk.click("Skin");
+    wait(&mut desk, mesh);
+    let bends = |desk: &Desk| {
+        let report = desk.app.world().resource::<SkinningResults>().get(mesh).unwrap().as_ref().unwrap();
+        let is_rigid = report.rigid_parts.iter().any(|rigid| rigid.part == first.part);
+        !is_rigid && report.bending_parts.iter().any(|(part, name)| *part == first.part && *name == first.name)
+    };
+    assert!(bends(&desk));
+    assert_eq!(desk.find("rigid").on, Some(false), "the row stays");
+    desk.click("rigid");
+    desk.frames(2);
+    assert!(desk.app.world().resource::<SkinningParts>().0.is_empty());
+    open(&mut desk, "Rigid parts (");
+    open(&mut desk, "Idle joints (");
+    desk.click("claims skin");
+    desk.frames(2);
+    assert_eq!(desk.app.world().resource::<SkinningClaims>().0.len(), 1);
+    desk.click("claims skin");
+    desk.frames(2);
+    assert!(desk.app.world().resource::<SkinningClaims>().0.is_empty());
+}
+
+/// Clicks the header that begins with a text.
+#[track_caller]
+fn open(desk: &mut Desk, header: &str) {
+    let seen = desk.seen.iter().find(|seen| seen.label.starts_with(header));
+    let label = seen.unwrap_or_else(|| panic!("{header:?} is not among {:?}", desk.seen)).label.clone();
+    desk.click(&label);
+    desk.frames(30);
 }
 
 fn wait(desk: &mut Desk, mesh: Entity) {

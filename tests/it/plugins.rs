@@ -4,7 +4,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use bevy::{ecs::schedule::ScheduleLabel, prelude::*};
 use rigsmith::{
-    algo::weights::WeightSettings,
     headless::headless_app,
     mesh::{model::Weights, ray::Ray},
     plugins::{
@@ -209,7 +208,7 @@ fn skinning_runs_in_the_background_and_can_be_stopped() {
     let mut bench = RigBench::new();
     let joints = bench.chain(&[[0.0, 0.1, 0.0], [0.0, 0.9, 0.0]]);
     let mesh = bench.open(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]);
-    let request = || BindRequest { mesh, settings: WeightSettings::default(), parts: Vec::new() };
+    let request = || BindRequest::new(mesh);
     bench.app.world_mut().write_message(request());
     bench.app.update();
     bench.wait("the weights", |bench| bench.rig().skin(Uid(99)).is_some());
@@ -296,11 +295,7 @@ fn a_late_result_never_cuts_off_undone_steps() {
     let start = |bench: &mut RigBench| {
         bench.messages::<Bound>();
         bench.messages::<ResultHeld>();
-        bench.app.world_mut().write_message(BindRequest {
-            mesh,
-            settings: WeightSettings::default(),
-            parts: Vec::new(),
-        });
+        bench.app.world_mut().write_message(BindRequest::new(mesh));
         bench.app.update();
         assert!(bench.app.world().get::<SkinningJob>(mesh).is_some(), "so many points are not skinned in a frame");
         for _ in 0..2 {

@@ -437,7 +437,7 @@ fn check(body: &Body) -> Vec<String> {
         faults.extend(found.into_iter().map(|fault| format!("{}, {sketch:?}: {fault}", body.name)));
     }
     println!("{}: {bad} of {} sketches at fault, {} faults", body.name, all.len(), faults.len());
-    let report = bench.bench.skin(WeightSettings::default(), Vec::new(), &mut |_| ()).unwrap();
+    let report = bench.bench.skin(WeightSettings::default(), Vec::new(), &mut |_| ()).unwrap().weights;
     let covered = report.by_surface + report.by_voxels + report.by_fill + report.by_nearest + report.given;
     if covered != report.points {
         faults.push(format!("{}: {covered} of {} points have weights", body.name, report.points));

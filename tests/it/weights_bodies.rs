@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use glam::{Quat, Vec3};
 use rigsmith::{
-    algo::weights::{WeightJoint, WeightReport, WeightSettings, skin_weights},
+    algo::weights::{IdleReason, WeightJoint, WeightReport, WeightSettings, skin_weights},
     mesh::{
         gltf::{ExternalFile, read_gltf},
         model::Weights,
@@ -272,6 +272,10 @@ fn characters_of_many_parts_are_bound_part_by_part() {
         parent.is_some_and(|parent| all.held[all.nodes[parent] as usize] > 0.0)
     };
     assert_eq!(all.claims_of_helpers(|node| all.held[node] == 0.0 && !is_slot(node)), 0);
+    // Poles of knees and elbows are told with their distance from the body.
+    let reasons = all.report.idle_joints.iter().map(|idle| idle.reason);
+    let far = reasons.filter(|reason| matches!(reason, IdleReason::Outside { distance } if *distance > 0.1)).count();
+    assert!(far >= 2, "{:?}", all.report.idle_joints);
 }
 
 /// Errors against the weights of the files, as measured.

@@ -12,6 +12,7 @@ use super::{
     heat,
     islands::Islands,
     laplacian::Graph,
+    report::Stiffness,
     sight::Sight,
     voxel_bind::{VoxelError, VoxelSettings, geodesic_voxel_weights},
 };
@@ -36,58 +37,79 @@ pub(crate) struct Bound {
     pub weights: Weights,
     /// Origin of the weights of each place.
     pub sources: Vec<Source>,
-    /// True for places of parts that move as one.
-    pub stiff: Vec<bool>,
+    /// Holders of the parts that move as one.
+    pub stiff: Stiffness,
+    /// Places of the joints beside the surface.
+    pub gaps: Gaps,
 }
 
-/// Binds checked input to the joints in `free`.
+/// Binds checked input to the joints in `free`. Beside the joints stands a flag of each: whether it claims skin even outside
+/// of the surface.
 pub(crate) fn bind(
     points: &[Vec3],
     triangles: &[[u32; 3]],
-    joints: &[WeightJoint],
+    (joints, claims): (&[WeightJoint], &[bool]),
     free: &[u32],
     settings: &WeightSettings,
     progress: &(dyn Fn(f32) -> bool + Sync),
 ) -> Result<Bound, WeightError> {
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
     let (place, count) = adjacency::weld(points);
-    let (places, joints) = unit_frame(points, &place, count, joints);
+    let (places, joints, scale) = unit_frame(points, &place, count, joints);
     let mut takes_part = vec![false; joints.len()];
     for &joint in free {
         takes_part[joint as usize] = true;
     }
-    let job = Job { joints: &joints, takes_part: &takes_part, settings, progress };
+    let job = Job { joints: &joints, takes_part: &takes_part, claims, settings, progress };
     let triangles: Vec<[u32; 3]> =
         triangles.iter().map(|t| t.map(|p| place[p as usize])).filter(|[a, b, c]| a != b && b != c && c != a).collect();
     let graph = Graph::new(&places, &triangles);
     step(0.1)?;
     let anatomy = Anatomy::new(&joints);
-    let (weights, sources) = if count <= coarse::LIMIT {
-        let (weights, sources, _) = job.run(&places, &triangles, &graph)?;
-        (weights, sources)
+    let (weights, sources, sight) = if count <= coarse::LIMIT {
+        let (weights, sources, _, sight) = job.run(&places, &triangles, &graph)?;
+        (weights, sources, sight)
     } else {
         let coarse = Coarse::new(&places, &triangles, &graph);
         let coarse_graph = Graph::new(&coarse.points, &coarse.triangles);
-        let (weights, sources, claims) = job.run(&coarse.points, &coarse.triangles, &coarse_graph)?;
+        let (weights, sources, claims, sight) = job.run(&coarse.points, &coarse.triangles, &coarse_graph)?;
         let none = Claim::default();
         let bound = |c: usize| if sources[c] == Source::Surface { &claims[c] } else { &none };
         let weights = coarse.spread(&weights, &graph, settings.blend(), bound);
-        (weights, coarse.cluster.iter().map(|&c| sources[c as usize]).collect())
+        (weights, coarse.cluster.iter().map(|&c| sources[c as usize]).collect(), sight)
     };
     let weights = anatomy.share(&places, weights);
-    if !settings.stiff_parts {
-        return Ok(Bound { place, weights, sources, stiff: vec![false; count] });
+    let (mut weights, mut stiff) = (weights, Stiffness::default());
+    if settings.stiff_parts {
+        let bending = settings.bending.iter().cloned().flatten();
+        let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
+        (weights, stiff) = Islands::new(&places, &triangles).stiffened(&weights, &bending);
     }
-    let bending = settings.bending.iter().cloned().flatten();
-    let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
-    let (weights, stiff) = Islands::new(&places, &triangles).stiffened(&weights, &bending);
-    Ok(Bound { place, weights, sources, stiff })
+    Ok(Bound { place, weights, sources, stiff, gaps: Gaps { sight, joints, scale } })
+}
+
+/// Joints and the surface in one frame, which is `scale` times as large as the points are.
+pub(crate) struct Gaps {
+    sight: Sight,
+    joints: Vec<WeightJoint>,
+    scale: f32,
+}
+
+impl Gaps {
+    /// Distance from a joint outside of the surface to the surface, in the unit of the points. Of a mesh that is bound
+    /// through a coarser surface, the distance is to that.
+    pub fn outside(&self, joint: usize) -> Option<f32> {
+        let head = self.joints[joint].head;
+        let gap = self.sight.gap(head).filter(|_| !self.sight.encloses(head))?;
+        Some(gap / self.scale)
+    }
 }
 
 /// Input of a binding that a mesh and its coarse stand-in share.
 struct Job<'a> {
     joints: &'a [WeightJoint],
     takes_part: &'a [bool],
+    claims: &'a [bool],
     settings: &'a WeightSettings,
     progress: &'a (dyn Fn(f32) -> bool + Sync),
 }
@@ -97,18 +119,18 @@ impl Job<'_> {
         if (self.progress)(share) { Ok(()) } else { Err(WeightError::Cancelled) }
     }
 
-    /// Binds a surface without duplicate points, of unit size: weights, where they come from, and the claims.
+    /// Binds a surface without duplicate points, of unit size: weights, where they come from, the claims, and what is seen.
     fn run(
         &self,
         places: &[Vec3],
         triangles: &[[u32; 3]],
         graph: &Graph,
-    ) -> Result<(Weights, Vec<Source>, Vec<Claim>), WeightError> {
+    ) -> Result<(Weights, Vec<Source>, Vec<Claim>, Sight), WeightError> {
         let method = self.settings.method;
         let islands = Islands::new(places, triangles);
         let sight = Sight::new(places, triangles, &islands);
         self.step(0.2)?;
-        let bones = bones::build(self.joints, self.takes_part, places, &graph.areas, &sight);
+        let bones = bones::build(self.joints, self.takes_part, self.claims, places, &graph.areas, &sight);
         self.step(0.25)?;
         let mut weights = empty(places.len());
         let mut sources = vec![Source::None; places.len()];
@@ -138,7 +160,7 @@ impl Job<'_> {
                 mark(&weights, &mut sources, source);
             }
         }
-        Ok((weights, sources, claims))
+        Ok((weights, sources, claims, sight))
     }
 
     /// Weights of all places by voxels; none if the mesh has no volume to speak of.
@@ -154,8 +176,14 @@ impl Job<'_> {
     }
 }
 
-/// Moves everything to the origin and the longest side to length 2, so that no tolerance depends on the unit.
-fn unit_frame(points: &[Vec3], place: &[u32], count: usize, joints: &[WeightJoint]) -> (Vec<Vec3>, Vec<WeightJoint>) {
+/// Moves everything to the origin and the longest side to length 2, so that no tolerance depends on the unit. Returns the
+/// places, the joints and the scale.
+fn unit_frame(
+    points: &[Vec3],
+    place: &[u32],
+    count: usize,
+    joints: &[WeightJoint],
+) -> (Vec<Vec3>, Vec<WeightJoint>, f32) {
     let low = points.iter().fold(Vec3::INFINITY, |m, &p| m.min(p * 0.5));
     let high = points.iter().fold(Vec3::NEG_INFINITY, |m, &p| m.max(p * 0.5));
     let center = if points.is_empty() { Vec3::ZERO } else { low + high };
@@ -168,7 +196,7 @@ fn unit_frame(points: &[Vec3], place: &[u32], count: usize, joints: &[WeightJoin
         places[place as usize] = fit(point);
     }
     let joints = joints.iter().map(|j| WeightJoint { head: fit(j.head), tail: j.tail.map(fit), ..*j }).collect();
-    (places, joints)
+    (places, joints, scale)
 }
 
 fn empty(count: usize) -> Weights {

@@ -45,10 +45,12 @@ impl Bones {
 }
 
 /// Builds the bones of the joints that take part, in a frame where the surface has unit size. `areas` are those around
-/// the points of the welded surface that `sight` sees.
+/// the points of the welded surface that `sight` sees. Joints for which `claims` is true have bones and may hold any part
+/// even if they hang in the air.
 pub(crate) fn build(
     joints: &[WeightJoint],
     takes_part: &[bool],
+    claims: &[bool],
     points: &[Vec3],
     areas: &[f32],
     sight: &Sight,
@@ -81,16 +83,19 @@ pub(crate) fn build(
     for (index, joint) in joints.iter().enumerate() {
         let Some(parent) = joint.parent else { continue };
         let Some(owner) = owners[parent] else { continue };
-        if carries[index] && !helpers[index] && !(behind[index] && leads_on[parent]) {
+        let is_claimed =
+            claims[parent] && (helpers[parent] || !helpers[index]) && joints[parent].head.distance(joint.head) > SAME;
+        if (is_claimed || carries[index] && !helpers[index]) && !(behind[index] && leads_on[parent]) {
             segments.push(BoneSegment { joint: owner, head: joints[parent].head, tail: joint.head });
         }
     }
     let mut leaves = Vec::new();
     for (index, joint) in joints.iter().enumerate() {
-        if children[index] > 0 || helpers[index] {
+        let Some(owner) = owners[index] else { continue };
+        let is_leaf = children[index] == 0 && !helpers[index];
+        if !is_leaf && !(claims[index] && segments.iter().all(|segment| segment.joint != owner)) {
             continue;
         }
-        let Some(owner) = owners[index] else { continue };
         let tail = joint.tail.filter(|t| t.distance(joint.head) > SAME);
         if tail.is_none() {
             leaves.push((segments.len(), index));
@@ -106,8 +111,8 @@ pub(crate) fn build(
                 .filter_map(|(j, o)| Some(BoneSegment { joint: (*o)?, head: j.head, tail: j.head })),
         );
     }
-    drop_repeats(&mut segments, &mut leaves);
-    let homes = Homes::new(joints.len(), &segments, points, sight);
+    drop_repeats(&mut segments, &mut leaves, claims);
+    let homes = Homes::new(claims, &segments, points, sight);
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, sight);
@@ -157,11 +162,12 @@ fn owners(joints: &[WeightJoint]) -> Vec<Option<u32>> {
     owners
 }
 
-/// Removal of bones at the place of another: the first one stays, because nothing tells them apart.
-fn drop_repeats(segments: &mut Vec<BoneSegment>, leaves: &mut Vec<(usize, usize)>) {
+/// Removal of bones at the place of another: one of a joint that claims skin stays, or else the first one, because nothing
+/// tells them apart.
+fn drop_repeats(segments: &mut Vec<BoneSegment>, leaves: &mut Vec<(usize, usize)>, claims: &[bool]) {
     let key = |s: &BoneSegment| [s.head, s.tail].map(|p| p.to_array().map(|c| (c + 0.0).to_bits()));
     let mut order: Vec<usize> = (0..segments.len()).collect();
-    order.sort_by_key(|&i| (key(&segments[i]), i));
+    order.sort_by_key(|&i| (key(&segments[i]), !claims[segments[i].joint as usize], i));
     let mut keep = vec![true; segments.len()];
     for pair in order.windows(2) {
         if key(&segments[pair[0]]) == key(&segments[pair[1]]) {

@@ -57,6 +57,14 @@ pub(crate) fn input(
     }
 }
 
+/// The first joint that is to claim skin and does not exist.
+pub(crate) fn claims(joints: &[WeightJoint], claims: &[usize]) -> Result<(), WeightError> {
+    match claims.iter().find(|claim| **claim >= joints.len()) {
+        Some(&joint) => Err(WeightError::Claim { joint, joints: joints.len() }),
+        None => Ok(()),
+    }
+}
+
 /// A joint whose parent does not exist or whose ancestors come back to itself.
 fn broken_parent(joints: &[WeightJoint]) -> Option<usize> {
     // The walk in which each joint was reached first; meeting one's own walk again is a loop.

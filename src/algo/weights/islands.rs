@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 
-use super::{Method, claim::Claim, laplacian::Graph};
+use super::{Method, claim::Claim, laplacian::Graph, report::Stiffness};
 use crate::mesh::{adjacency, model::Weights};
 
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
@@ -60,9 +60,10 @@ impl Islands {
     }
 
     /// Weights with which parts stay as stiff as they are: a part that one joint holds in nearly its whole size (helmet,
-    /// eye, sword) moves with that joint, and each small part moves as one. Tells for each place whether it is of such
-    /// a part. A surface in one piece stays as it is, and so do the parts that have one of the `bending` places.
-    pub fn stiffened(&self, weights: &Weights, bending: &[u32]) -> (Weights, Vec<bool>) {
+    /// eye, sword) moves with that joint, and each small part moves as one. The holder of a small part is the joint with
+    /// the largest share. A surface in one piece stays as it is, and so do the parts that have one of the `bending`
+    /// places.
+    pub fn stiffened(&self, weights: &Weights, bending: &[u32]) -> (Weights, Stiffness) {
         let mut sums: Vec<BTreeMap<u32, f32>> = vec![BTreeMap::new(); self.extents.len()];
         let mut counts = vec![0usize; self.extents.len()];
         for (place, &island) in self.of.iter().enumerate() {
@@ -95,6 +96,9 @@ impl Islands {
                 None => stiff.push(weights.of(place)),
             }
         }
-        (stiff, self.of.iter().map(|island| rows[*island as usize].is_some()).collect())
+        let strongest =
+            |row: &Vec<(u32, f32)>| row.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+        let holders = rows.iter().map(|row| row.as_ref().and_then(strongest)).collect();
+        (stiff, Stiffness { of: self.of.clone(), holders })
     }
 }

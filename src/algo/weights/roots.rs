@@ -99,11 +99,11 @@ pub(crate) struct Homes {
 const SAMPLES: usize = 32;
 
 impl Homes {
-    /// Looks where the bones of `joints` joints run.
-    pub fn new(joints: usize, segments: &[BoneSegment], points: &[Vec3], sight: &Sight) -> Self {
+    /// Looks where the bones of joints run. Joints for which `claims` is true and that are at home nowhere may hold all parts.
+    pub fn new(claims: &[bool], segments: &[BoneSegment], points: &[Vec3], sight: &Sight) -> Self {
         let mut parts = vec![Vec::new(); sight.islands()];
         for part in sight.parts() {
-            let mut at_home = vec![false; joints];
+            let mut at_home = vec![false; claims.len()];
             for segment in segments {
                 let is_home = &mut at_home[segment.joint as usize];
                 let is_within = |place| sight.is_within(part, place);
@@ -112,6 +112,11 @@ impl Homes {
                     || segment.head != segment.tail && share(segment.head, segment.tail, is_within) >= AT_HOME;
             }
             parts[part] = if at_home.contains(&true) { at_home } else { Vec::new() };
+        }
+        for joint in (0..claims.len()).filter(|&joint| claims[joint]) {
+            if parts.iter().all(|part: &Vec<bool>| part.get(joint) != Some(&true)) {
+                parts.iter_mut().filter_map(|part| part.get_mut(joint)).for_each(|is_home| *is_home = true);
+            }
         }
         let bearers: Vec<usize> = (0..parts.len()).filter(|&part| !parts[part].is_empty()).collect();
         let mut members = vec![Vec::new(); parts.len()];

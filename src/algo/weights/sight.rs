@@ -85,6 +85,11 @@ impl Sight {
         (0..self.islands.len()).filter(|island| self.islands[*island].is_some())
     }
 
+    /// Distance from a place to the surface; `None` without triangles.
+    pub fn gap(&self, place: Vec3) -> Option<f32> {
+        self.whole.closest_point(place).map(|nearest| nearest.distance)
+    }
+
     /// Distance from a place to a large island; infinite to others.
     pub fn distance(&self, island: usize, place: Vec3) -> f32 {
         let nearest = self.islands[island].as_ref().and_then(|island| island.closest_point(place));

@@ -82,6 +82,21 @@ impl Limbs {
         }
     }
 
+    /// Index among all joints of the rig of one of [`Limbs::joints`].
+    pub fn place(&self, core: u32) -> usize {
+        self.places[core as usize] as usize
+    }
+
+    /// Index in [`Limbs::joints`] of a joint of the rig; `None` for twist and half joints.
+    pub fn index(&self, joint: usize) -> Option<usize> {
+        self.places.binary_search(&(joint as u32)).ok()
+    }
+
+    /// Flags of all joints of the rig as flags of [`Limbs::joints`].
+    pub fn claims(&self, claims: &[bool]) -> Vec<bool> {
+        self.places.iter().map(|place| claims[*place as usize]).collect()
+    }
+
     /// Influences of the bound joints at a point as influences of all joints.
     pub fn spread(&self, point: Vec3, influences: impl Iterator<Item = (u32, f32)>) -> Vec<(u32, f32)> {
         let mut row = Vec::new();

@@ -8,11 +8,7 @@ use image::{ImageFormat, RgbImage};
 use super::AnimateArgs;
 use crate::{
     algo::view::View,
-    cli::{
-        Failure, Report,
-        progress::{Progress, spinning},
-        skin,
-    },
+    cli::{Failure, Report, binding::bind, progress::spinning},
     files::{RealDisk, load_model, save_atomic},
     headless::Workbench,
     plugins::drawing::RigDrawing,
@@ -41,10 +37,7 @@ pub(super) fn draw(
         let model = load_model(&RealDisk, mesh)?;
         report.notes(model.notes.iter().cloned());
         bench.open(model, true)?;
-        let mut progress = Progress::new("skinning");
-        let bound = bench.skin(args.weights.settings(), Vec::new(), &mut |part| progress.at(part))?;
-        drop(progress);
-        skin::describe_weights(report, &bound);
+        bind(bench, args.weights.settings(), &args.weights.claim, Vec::new(), report)?;
     }
     let count = u32::from(args.frames);
     let poses: Vec<SampledPose> = (0..count)

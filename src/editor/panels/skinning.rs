@@ -1,5 +1,6 @@
 //! Skinning panel: a button that computes weights for every mesh, and a report of the results.
 
+mod findings;
 mod parts;
 
 use bevy::prelude::*;
@@ -7,6 +8,7 @@ use bevy_egui::egui::{
     self, Button, Checkbox, CollapsingHeader, ComboBox, DragValue, ProgressBar, RichText, ScrollArea, Slider, Ui,
 };
 
+pub use findings::SkinningClaims;
 pub use parts::SkinningParts;
 
 use super::{
@@ -25,7 +27,7 @@ use crate::{
     plugins::{
         RigSystems,
         landing::ResultHeld,
-        skinning::{BindRequest, Bound, SkinningError, SkinningJob},
+        skinning::{BindRequest, Bound, SkinningError, SkinningJob, SkinningReport},
         surface::{RigMesh, RigMeshes},
     },
     rig::{NodeKind, Rig, SkinData, Uid},
@@ -39,6 +41,7 @@ impl Plugin for SkinningPanelPlugin {
         app.init_resource::<SkinningSettings>()
             .init_resource::<SkinningResults>()
             .init_resource::<SkinningParts>()
+            .init_resource::<SkinningClaims>()
             .add_message::<ActionRequest>()
             .add_message::<CancelSkinning>()
             .add_message::<Notice>()
@@ -55,11 +58,11 @@ pub struct SkinningSettings(pub WeightSettings);
 
 /// Result of the last computation of each mesh.
 #[derive(Resource, Debug, Default)]
-pub struct SkinningResults(Vec<(Entity, Result<WeightReport, SkinningError>)>);
+pub struct SkinningResults(Vec<(Entity, Result<SkinningReport, SkinningError>)>);
 
 impl SkinningResults {
     /// The last result for a mesh.
-    pub fn get(&self, mesh: Entity) -> Option<&Result<WeightReport, SkinningError>> {
+    pub fn get(&self, mesh: Entity) -> Option<&Result<SkinningReport, SkinningError>> {
         self.0.iter().find(|(known, _)| *known == mesh).map(|(_, result)| result)
     }
 }
@@ -75,7 +78,7 @@ fn skin(
     rigs: Query<(&Rig, Option<&RigMeshes>)>,
     jobs: Query<&SkinningJob>,
     models: Query<&RigMesh>,
-    (settings, parts): (Res<SkinningSettings>, Res<SkinningParts>),
+    (settings, parts, claims): (Res<SkinningSettings>, Res<SkinningParts>, Res<SkinningClaims>),
     mut commands: Commands,
 ) {
     if !actions.read().any(|request| request.0 == Action::Skin) {
@@ -95,7 +98,8 @@ fn skin(
     }
     for mesh in meshes {
         let parts = models.get(mesh).map(|model| parts.of(model.uid)).unwrap_or_default();
-        commands.write_message(BindRequest { mesh, settings: settings.0.clone(), parts });
+        let claims = claims.0.iter().copied().collect();
+        commands.write_message(BindRequest { mesh, settings: settings.0.clone(), parts, claims });
     }
 }
 
@@ -132,7 +136,7 @@ fn tell_results(
     for Bound { mesh, result } in bound.read() {
         let name = meshes.get(*mesh).map_or("The mesh", |mesh| mesh_name(mesh));
         notices.write(match result {
-            Ok(report) => {
+            Ok(SkinningReport { weights: report, .. }) => {
                 let told = format!("{name} is skinned: {}.", covered(report.points, unweighted(report)));
                 if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told) }
             }
@@ -201,11 +205,12 @@ impl EditorPanel for SkinningPanel {
             skin_button(ui, &shown, meshes.len(), &running, requests);
             ui.add_space(4.0);
             settings(ui, world, requests);
-            for mesh in &meshes {
+            for entity in meshes {
                 ui.add_space(6.0);
-                self.mesh(ui, world, *mesh, &shown);
-                if let Some(mesh) = world.get::<RigMesh>(*mesh) {
+                self.mesh(ui, world, entity, &shown);
+                if let Some(mesh) = world.get::<RigMesh>(entity) {
                     parts::show(ui, world, mesh, &shown, &mut self.held, requests);
+                    findings::show(ui, world, (entity, mesh), &shown, requests);
                 }
             }
         });
@@ -301,7 +306,7 @@ impl SkinningPanel {
         });
         self.failure(ui, world, entity);
         if let Some(Ok(report)) = world.get_resource::<SkinningResults>().and_then(|results| results.get(entity)) {
-            for note in notes(report) {
+            for note in notes(&report.weights) {
                 ui.weak(note);
             }
         }

@@ -8,7 +8,7 @@ use std::sync::{
 
 use bevy::{prelude::*, tasks::AsyncComputeTaskPool};
 
-use super::{BoundSkin, SkinningInput, SkinningJob, held_objects};
+use super::{BoundSkin, SkinningInput, SkinningJob, SkinningReport, held_objects, parts::object_points};
 use crate::{
     algo::weights::{WeightReport, WeightSettings, late_shares},
     plugins::{
@@ -103,7 +103,7 @@ impl SkinningInput {
         let points = &mesh.rest.points;
         let mut is_fixed = vec![false; points.len()];
         let rigid = held_objects(mesh, skin).into_iter().enumerate().filter(|(_, holder)| holder.is_some());
-        for run in rigid.flat_map(|(object, _)| super::object_points(mesh, object)) {
+        for run in rigid.flat_map(|(object, _)| object_points(mesh, object)) {
             is_fixed[run.start as usize..run.end as usize].fill(true);
         }
         let existing = self.existing.clone().unwrap_or_default();
@@ -112,7 +112,8 @@ impl SkinningInput {
         let settings = WeightSettings { max_influences: most, prune: 0.0, ..WeightSettings::default() };
         let is_rigid = |point: usize| is_fixed[point];
         let (weights, pushes) = self.try_bends(mesh, weights, &settings, &is_rigid, &|bend| is_late[bend.half]);
-        let report = WeightReport { points: points.len(), given: points.len(), ..WeightReport::default() };
+        let weights_report = WeightReport { points: points.len(), given: points.len(), ..WeightReport::default() };
+        let report = SkinningReport { weights: weights_report, ..SkinningReport::default() };
         let (joints, subjects) = (self.uids.clone(), self.subjects.clone());
         let skin = Arc::new(SkinData { joints, weights, at_rest: true, subjects });
         BoundSkin { skin, report, pushes }

@@ -14,22 +14,21 @@ use crate::{
         panels::{displayed_rig::DisplayedRig, fields::labelled},
     },
     plugins::{
-        skinning::{PartBinding, held_objects},
+        skinning::{MeshPart, PartBinding, held_objects},
         surface::RigMesh,
     },
     rig::{SkinData, Uid},
 };
 
-/// Bindings that a person chose for objects of meshes, by the mesh's uid and the object's number; the next computation of
-/// weights keeps to them.
+/// Bindings that a person chose for parts of meshes, by the mesh's uid; the next computation of weights keeps to them.
 #[derive(Resource, Debug, Clone, PartialEq, Default)]
-pub struct SkinningParts(pub BTreeMap<(Uid, usize), PartBinding>);
+pub struct SkinningParts(pub BTreeMap<(Uid, MeshPart), PartBinding>);
 
 impl SkinningParts {
-    /// Choices for the objects of one mesh.
-    pub fn of(&self, mesh: Uid) -> Vec<(usize, PartBinding)> {
-        let range = self.0.range((mesh, 0)..=(mesh, usize::MAX));
-        range.map(|((_, object), binding)| (*object, *binding)).collect()
+    /// Choices for the parts of one mesh.
+    pub fn of(&self, mesh: Uid) -> Vec<(MeshPart, PartBinding)> {
+        let range = self.0.range((mesh, MeshPart::Object(0))..=(mesh, MeshPart::Piece(usize::MAX)));
+        range.map(|((_, part), binding)| (*part, *binding)).collect()
     }
 }
 
@@ -58,7 +57,7 @@ pub(super) fn show(
     let held = shown.rig.skin(mesh.uid).map(|skin| held_by(known, mesh, skin));
     CollapsingHeader::new(format!("Parts ({})", objects.len())).id_salt(("parts", mesh.uid)).show(ui, |ui| {
         for (number, object) in objects.iter().enumerate() {
-            let key = (mesh.uid, number);
+            let key = (mesh.uid, MeshPart::Object(number));
             let holder = held.and_then(|held| held.get(number).copied().flatten());
             let automatic = match holder {
                 Some(joint) => format!("Automatic: moves with {}", shown.name(joint)),
