@@ -17,6 +17,7 @@
 //! | `GlobalTransform` of a node | propagation, corrected where Bevy would shear | overwritten |
 //! | [`Null`](schema::Null) | the document, for joints without weights, and the build, for created nulls | on a joint: an edit, it is without weights; on a created node it is put back and told |
 //! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`Parked`](schema::Parked), [`commands::CommandReport`], [`commands::Built`], [`commands::BuildFailure`], [`commands::RunFailure`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; what is inserted or removed is put back in the same frame and told ([`document::EntityWriteError::BuiltContent`]); reports and failures stand until the next build |
+//! | [`controls::size::ShapeFactor`] | the measurement of shapes on a mesh | stands until the mesh or the build changes |
 //! | [`CreatedBy`](schema::CreatedBy), [`Constrains`](schema::Constrains), [`NodeOf`](schema::NodeOf) | the build, and the document for its joints | put back in the same frame and told |
 //! | a despawned constraint | | spawned again and told: change the command instead |
 //! | [`RigNodes`](schema::RigNodes), [`LocalGroups`](schema::LocalGroups), [`GroupMembers`](schema::GroupMembers), [`FeatureCommands`](schema::FeatureCommands), [`CreatedNodes`](schema::CreatedNodes), [`NodeConstraints`](schema::NodeConstraints) | Bevy, as the other side of a relation | write the relation instead |

@@ -29,7 +29,7 @@ parameters! {
     pub struct ConeReader {
         /// The node whose direction counts.
         pub source: NodeRefs = NodeRef::this().into(),
-        /// Its axis that looks: x, y, z, neg_x, neg_y or neg_z.
+        /// Axis of the node that looks: x, y, z, neg_x, neg_y or neg_z.
         pub axis: Axis = Axis::Y,
         /// The node that carries the cone; the parent of the source if left out.
         pub reference: NodeRefs = NodeRefs::NONE,

@@ -34,7 +34,7 @@ parameters! {
         pub motion: Amount = Amount::Value(1.0),
         /// Nodes that carry bodies which the tips do not enter: balls about them.
         pub colliders: NodeRefs = NodeRefs::NONE,
-        /// For each collider the node to which its body reaches, in that order; balls if left out.
+        /// Nodes to which the bodies of the colliders reach, in their order; balls if left out.
         pub collider_ends: NodeRefs = NodeRefs::NONE,
         /// Radius of each body in the rig's units, above 0; the last one holds for those that follow.
         pub radii: Vec<f32> = vec![0.1],

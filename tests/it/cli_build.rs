@@ -399,7 +399,7 @@ const FAULTY: &str = r#"(
                 Command(uid: "0000000000000023", module: "limit", params: ()), // all open
                 Command(uid: "0000000000000024", module: "ik_handle",
                     feature: "0000000000000035", // not in the file
-                    params: (end: "@joint arm", goal: "@joint arm")),
+                    params: (end: "@joint arm", goal: "@joint arm")), // start and end are the same joint
             ],
         ),
     ],

@@ -59,7 +59,7 @@ pub fn lines_of(control: &ControlData, place: Affine3A) -> Vec<Vec<Vec3>> {
     sized_lines(control, place, 1.0)
 }
 
-/// The same, with the shape enlarged by a factor.
+/// Outline of a control whose shape is enlarged by a factor.
 fn sized_lines(control: &ControlData, place: Affine3A, factor: f32) -> Vec<Vec<Vec3>> {
     let size = control.size * factor;
     let place = place * control.offset.affine();

@@ -133,7 +133,10 @@ impl WrittenEntities<'_, '_> {
         touched.groups.extend(self.groups.iter());
         touched.uids.extend(self.uid.read());
         let (joint, null, name, label, group, rest, child_of) = &mut self.of_joints;
-        let markers = joint.read().chain(null.read()).chain(name.read()).chain(label.read());
+        // Groups have names, too.
+        let names: Vec<Entity> = name.read().collect();
+        touched.groups.extend(&names);
+        let markers = joint.read().chain(null.read()).chain(names).chain(label.read());
         touched.joints.extend(markers.chain(group.read()).chain(rest.read()).chain(child_of.read()));
         let (tag, command, feature, tag_of, in_feature) = &mut self.of_tags;
         touched.tags.extend(

@@ -62,14 +62,25 @@ impl Format {
     }
 }
 
-/// Text with blanks in place of the given fields, so that lines and columns stay.
+/// White space of RON with as many bytes as a character; a line feed stays.
+fn blank(c: char) -> &'static str {
+    match (c, c.len_utf8()) {
+        ('\n', _) => "\n",
+        (_, 1) => " ",
+        (_, 2) => "\u{85}",
+        (_, 3) => "\u{200e}",
+        _ => "\u{85}\u{85}",
+    }
+}
+
+/// Text with blanks in place of the given fields, so that lines, columns and offsets in bytes stay.
 pub(super) fn blanked(text: &str, without: &[&Field]) -> String {
     let mut out = String::with_capacity(text.len());
     let mut at = 0;
     for field in without.iter().filter(|field| field.start < field.end) {
         let from = field.start.max(at);
         out.push_str(&text[at..from]);
-        out.extend(text[from..field.end.max(from)].chars().map(|c| if c == '\n' { '\n' } else { ' ' }));
+        out.extend(text[from..field.end.max(from)].chars().map(blank));
         at = field.end.max(from);
     }
     out.push_str(&text[at..]);

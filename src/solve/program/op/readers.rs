@@ -15,7 +15,7 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct ColliderReg {
     pub start: X,
-    /// The same as the start for a sphere.
+    /// End of the body; that of a sphere is its start.
     pub end: X,
     pub radius: f32,
 }
@@ -24,9 +24,9 @@ pub(in super::super) struct ColliderReg {
 pub(in super::super) struct ConeOp {
     pub source: X,
     pub reference: X,
-    /// In the source's space.
+    /// Axis that looks, in the source's space.
     pub axis: Vec3,
-    /// In the reference's space.
+    /// Middle of the cone, in the reference's space.
     pub towards: Vec3,
     pub cone: Cone,
     pub out: N,
