@@ -9,6 +9,7 @@
 //! | --- | --- | --- |
 //! | `Rig` | the edit path ([`document`]) | only with [`document::EditRequest`]; a replaced component is another document without its history |
 //! | [`NodeLabel`](schema::NodeLabel), [`InGroup`](schema::InGroup), [`RestTransform`](crate::rig::RestTransform), `ChildOf` of a joint | the document | an edit, one step of the history a frame; a value that the document refuses is put back and told once |
+//! | [`RestTransform`](crate::rig::RestTransform) of a node of a game's instance | the instance: the built rest pose, below the built parent; that of a joint of the document is the document's instead | no effect on the pose; overwritten by the next template |
 //! | [`LocalGroup`](schema::LocalGroup), [`Tag`](schema::Tag), [`CommandTag`](schema::CommandTag), [`FeatureTag`](schema::FeatureTag), [`TagOf`](schema::TagOf), [`GroupOf`](schema::GroupOf), the order of [`Tags`](schema::Tags), [`InFeature`](schema::InFeature) | the document | an edit, as above |
 //! | a spawned [`Joint`](schema::Joint) below a rig or joint, a tag on a joint, a group of a rig | | added to the document; the entity stays the same and gets a [`Uid`](crate::rig::Uid) |
 //! | a despawned joint, tag or group | | deleted, joints with their subtree; undoing spawns others |
