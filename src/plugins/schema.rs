@@ -194,7 +194,8 @@ pub struct Control(pub ControlData);
 pub struct NodeLayer(pub LayerData);
 
 /// Values of a node's attributes by name, as they are in effect. Writing a value drives the rig in the same frame, as
-/// writing a control's `Transform` does; the value of an attribute that a constraint drives is restored.
+/// writing a control's `Transform` does; the value of an attribute that a constraint drives is restored in the same frame, and
+/// told once.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
 #[reflect(Component)]
 pub struct Attributes(pub BTreeMap<String, f32>);
