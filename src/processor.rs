@@ -25,6 +25,7 @@ mod keep_poses;
 mod list;
 mod mirror;
 mod module;
+mod parameter_faults;
 mod parameters;
 mod resolve;
 mod review;

@@ -1,6 +1,7 @@
 //! `rigsmith check`: problems in files.
 
 use std::{
+    collections::HashSet,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -21,7 +22,7 @@ use crate::{
     modules,
     processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, SourceText, review},
     rig::{
-        Rig, SourceError, TagData, TagKind,
+        Rig, SourceError, TagData, TagKind, Uid,
         feature::{FeatureKinds, undecided_choices},
         template,
     },
@@ -151,7 +152,7 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     }
     let explicit = template::explicit(&text);
     let places = SourceText::new(&explicit);
-    let (commands, failing) = problems_of_commands(&rig, &places);
+    let CommandProblems { listed: commands, problems, commands: failing } = problems_of_commands(&rig, &places);
     let unknown = FeatureKinds::default().unknown_in(&rig);
     let unknown_kinds = unknown.len();
     let kinds: Vec<SourceError> = unknown
@@ -184,7 +185,7 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     found.error = (!told.is_empty()).then(|| told.join(", "));
     found.remarks = remarks;
     found.remarks.extend(remarks_on_rig(&rig));
-    let unlisted = failing - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len();
+    let unlisted = problems - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len();
     if unlisted > 0 {
         found.remarks.push(format!("{unlisted} more problems are not listed"));
     }
@@ -203,16 +204,27 @@ fn counted(faults: &[SourceError]) -> String {
 /// The most problems of one kind whose places are looked for and listed.
 const LISTED: usize = 200;
 
-/// The first problems of commands with their places, and the number of all.
-fn problems_of_commands(rig: &Rig, places: &SourceText) -> (Vec<SourceError>, usize) {
+/// Problems of the commands of a rig.
+struct CommandProblems {
+    /// The first of them, with their places.
+    listed: Vec<SourceError>,
+    /// Number of all.
+    problems: usize,
+    /// Number of commands that have any.
+    commands: usize,
+}
+
+fn problems_of_commands(rig: &Rig, places: &SourceText) -> CommandProblems {
     let modules = Arc::new(modules::all());
     let problems = review(rig, &modules);
     if problems.is_empty() {
-        let of_program: Vec<SourceError> = problem_of_program(rig, &modules, places).into_iter().collect();
-        let count = of_program.len();
-        return (of_program, count);
+        let listed: Vec<SourceError> = problem_of_program(rig, &modules, places).into_iter().collect();
+        let count = listed.len();
+        return CommandProblems { listed, problems: count, commands: count };
     }
-    (problems.iter().take(LISTED).map(|problem| places.locate(rig, problem)).collect(), problems.len())
+    let commands: HashSet<Uid> = problems.iter().map(|problem| problem.command).collect();
+    let listed = problems.iter().take(LISTED).map(|problem| places.locate(rig, problem)).collect();
+    CommandProblems { listed, problems: problems.len(), commands: commands.len() }
 }
 
 /// Problem that keeps a fully built rig from moving, such as constraints that wait for each other by way of a parent;
@@ -227,7 +239,7 @@ fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, places: &SourceText) ->
     let error = BuildError {
         command: *uid,
         joint: joint.data.uid,
-        joint_label: joint.data.label.clone().unwrap_or_default().into(),
+        joint_label: joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()).into(),
         module: module.as_str().into(),
         problem: BuildProblem::Module(ModuleError::other(problem.to_string())),
     };

@@ -21,8 +21,8 @@ use crate::{
 #[derive(Args, Debug, Clone, Default)]
 pub(super) struct PoseSteps {
     /// Writes one value: CONTROL.translate=(x,y,z), CONTROL.rotate=(x,y,z) in degrees, CONTROL.scale=(x,y,z), all
-    /// relative to rest in the control's own axes, or NODE.ATTRIBUTE=value; CONTROL is a name, a label or a reference
-    /// (@...); may be repeated
+    /// relative to rest in the control's own axes, or NODE.ATTRIBUTE=value with a number or the name of a choice;
+    /// CONTROL is a name, a label or a reference (@...); may be repeated
     #[arg(long = "set", value_name = "NODE.CHANNEL=VALUE", allow_hyphen_values = true)]
     pub set: Vec<String>,
     /// Throws a switch before anything is set, without a jump: NAME=ik, fk or the name of a space; NAME is a local

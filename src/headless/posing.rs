@@ -10,21 +10,23 @@ use crate::{
     mesh::model::Trs,
     plugins::{
         commands::{BuildDone, BuildRequest, BuildStep, BuiltEntities, Processor, RunFailure},
-        controls::{SwitchError, SwitchRequest, find_switches},
+        controls::{SwitchError, SwitchRequest, find_switches, number_of},
         document::JointEntities,
         runtime::{RigRuntime, is_near},
         schema::Attributes,
     },
     processor::{Exclusion, FindError, RunReport},
     rig::{
-        BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, feature::off_at,
-        nearest::did_you_mean,
+        AttributeKind, BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid,
+        feature::off_at,
+        nearest::{did_you_mean, listed},
     },
     solve::program::ProgramError,
 };
 
 /// Value to write to an entity: `CONTROL.translate=(x,y,z)`, `.rotate=(x,y,z)` in degrees about X, Y and Z in that
-/// order, `.scale=(x,y,z)`, all relative to the control's rest pose, in its own axes; or `NODE.ATTRIBUTE=value`.
+/// order, `.scale=(x,y,z)`, all relative to the control's rest pose, in its own axes; or `NODE.ATTRIBUTE=value` with a
+/// number, or the name of a choice where the attribute has choices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlWrite {
     /// The node: a name, a label, or a reference that begins with `@`.
@@ -44,6 +46,34 @@ pub enum WriteValue {
     Scale(Vec3),
     /// Attribute by name, and its value.
     Attribute(String, f32),
+    /// Attribute by name, and its value as text: the name of one of its choices, or a number. A name wins.
+    AttributeText(String, String),
+}
+
+impl WriteValue {
+    /// Name of the attribute that is set; `None` for a channel of a control.
+    fn attribute(&self) -> Option<&str> {
+        match self {
+            Self::Attribute(name, _) | Self::AttributeText(name, _) => Some(name),
+            Self::Translate(_) | Self::Rotate(_) | Self::Scale(_) => None,
+        }
+    }
+
+    /// The value for a node, with the number in place of the text of an attribute.
+    fn on(&self, node: &BuiltNode) -> Result<Self, PoseError> {
+        let Self::AttributeText(attribute, text) = self else { return Ok(self.clone()) };
+        let kind = node.attributes.iter().find(|known| *known.name == **attribute).map(|known| &known.kind);
+        let choices: Vec<&str> = match kind {
+            Some(AttributeKind::Choice(names)) => names.iter().map(String::as_str).collect(),
+            _ => Vec::new(),
+        };
+        if let Some(number) = number_of(&choices, text) {
+            return Ok(Self::Attribute(attribute.clone(), number));
+        }
+        let known = if choices.is_empty() { "a number".to_owned() } else { listed(&choices, "or") };
+        let (node, attribute, value) = (node.name.to_string(), attribute.clone(), text.clone());
+        Err(PoseError::NoValue { node, attribute, value, known })
+    }
 }
 
 /// Reason why a control was not posed.
@@ -96,6 +126,18 @@ pub enum PoseError {
         /// Attributes of the node, as the rest of a sentence.
         known: String,
     },
+    /// The attribute takes no such value.
+    #[error("\"{attribute}\" of \"{node}\" has no value \"{value}\"; write {known}")]
+    NoValue {
+        /// The node.
+        node: String,
+        /// The attribute.
+        attribute: String,
+        /// Requested value.
+        value: String,
+        /// Possible values, as a list in words.
+        known: String,
+    },
     /// A reference finds no node.
     #[error(transparent)]
     Reference(#[from] FindError),
@@ -126,7 +168,8 @@ impl FromStr for ControlWrite {
             "rotate" => WriteValue::Rotate(vector()?),
             "scale" => WriteValue::Scale(vector()?),
             "" => return Err(wrong()),
-            attribute => WriteValue::Attribute(attribute.to_owned(), number(value)?),
+            _ if value.trim().is_empty() => return Err(wrong()),
+            attribute => WriteValue::AttributeText(attribute.to_owned(), value.trim().to_owned()),
         };
         if node.is_empty() { Err(wrong()) } else { Ok(Self { node, value }) }
     }
@@ -208,13 +251,14 @@ impl Workbench {
         let mut found = Vec::with_capacity(writes.len());
         for write in writes {
             let node = self.find_node(&write.node, &write.value)?;
-            found.push((self.entity(node.uid).ok_or(PoseError::NotBuilt)?, node, &write.value));
+            let value = write.value.on(&node)?;
+            found.push((self.entity(node.uid).ok_or(PoseError::NotBuilt)?, node, value));
         }
         for (entity, node, value) in found {
             let world = self.app.world_mut();
             if let WriteValue::Attribute(name, value) = value {
                 if let Some(mut attributes) = world.get_mut::<Attributes>(entity) {
-                    attributes.0.insert(name.clone(), *value);
+                    attributes.0.insert(name, value);
                 }
                 continue;
             }
@@ -223,13 +267,13 @@ impl Workbench {
             let Some(mut transform) = world.get_mut::<Transform>(entity) else { continue };
             let before = PoseOffset::between(&rest, &transform);
             let offset = match value {
-                WriteValue::Translate(translation) => PoseOffset { translation: *translation, ..before },
+                WriteValue::Translate(translation) => PoseOffset { translation, ..before },
                 WriteValue::Rotate(degrees) => {
                     let [x, y, z] = degrees.to_array().map(f32::to_radians);
                     PoseOffset { rotation: Quat::from_euler(EulerRot::XYZ, x, y, z), ..before }
                 }
-                WriteValue::Scale(scale) => PoseOffset { scale: *scale, ..before },
-                WriteValue::Attribute(..) => before,
+                WriteValue::Scale(scale) => PoseOffset { scale, ..before },
+                WriteValue::Attribute(..) | WriteValue::AttributeText(..) => before,
             };
             *transform = offset.on(&rest);
         }
@@ -289,9 +333,9 @@ impl Workbench {
     fn find_node(&self, name: &str, value: &WriteValue) -> Result<BuiltNode, PoseError> {
         let built = self.built().ok_or(PoseError::NotBuilt)?;
         let state = self.runtime()?.state();
-        let (what, is_meant): (&'static str, Box<dyn Fn(&BuiltNode) -> bool>) = match value {
-            WriteValue::Attribute(..) => ("node", Box::new(|node: &BuiltNode| !node.attributes.is_empty())),
-            _ => ("control", Box::new(|node: &BuiltNode| node.kind == NodeType::Control)),
+        let (what, is_meant): (&'static str, Box<dyn Fn(&BuiltNode) -> bool>) = match value.attribute() {
+            Some(_) => ("node", Box::new(|node: &BuiltNode| !node.attributes.is_empty())),
+            None => ("control", Box::new(|node: &BuiltNode| node.kind == NodeType::Control)),
         };
         let of_kind = || built.nodes.iter().filter(|node| is_meant(node));
         let mut found: Vec<&BuiltNode> = if name.starts_with('@') {
@@ -306,17 +350,17 @@ impl Workbench {
                 named
             }
         };
-        if let WriteValue::Attribute(attribute, _) = value {
+        if let Some(attribute) = value.attribute() {
             let with: Vec<&BuiltNode> = found
                 .iter()
                 .copied()
-                .filter(|node| node.attributes.iter().any(|known| *known.name == **attribute))
+                .filter(|node| node.attributes.iter().any(|known| *known.name == *attribute))
                 .collect();
             if with.is_empty()
                 && let Some(node) = found.first()
             {
                 let known = did_you_mean(attribute, node.attributes.iter().map(|attribute| attribute.name.to_string()));
-                let (node, attribute) = (node.name.to_string(), attribute.clone());
+                let (node, attribute) = (node.name.to_string(), attribute.to_owned());
                 return Err(PoseError::NoAttribute { node, attribute, known });
             }
             found = with;

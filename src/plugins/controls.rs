@@ -249,7 +249,7 @@ fn choices<'a>(built: &'a BuiltRig, switch: &SwitchData) -> Vec<&'a str> {
 }
 
 /// The number of a value that is one of `choices`, or a number itself.
-fn number_of(choices: &[&str], value: &str) -> Option<f32> {
+pub(crate) fn number_of(choices: &[&str], value: &str) -> Option<f32> {
     let number = choices.iter().position(|choice| *choice == value).map(|number| number as f32);
     number.or_else(|| value.parse().ok().filter(|number: &f32| number.is_finite()))
 }

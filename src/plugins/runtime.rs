@@ -11,6 +11,7 @@
 //! writes the `Transform`s of all nodes that moved. The document's pose is passed on only where the document changes.
 
 mod attachments;
+mod driven;
 mod hand_over;
 mod inputs;
 mod spawn;
@@ -27,7 +28,7 @@ pub use self::{
     spawn::{furnish_instance, spawn_instance},
 };
 pub use super::schema::{ControlPose, NodeOf, NodeSlot, RigNodes};
-use super::{RigSystems, configure_sets};
+use super::{RigSystems, configure_sets, document::EditRefused};
 use crate::{
     rig::{AttributeValues, NodeType, PoseOffset, Rig, Uid},
     solve::program::{Carry, Memory, RigProgram, RigState},
@@ -39,13 +40,13 @@ pub struct RuntimePlugin;
 impl Plugin for RuntimePlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_systems(
+        app.add_message::<EditRefused>().add_systems(
             PostUpdate,
             (
                 (
                     (inputs::check_inputs, inputs::read_inputs, systems::note_controls).chain(),
                     systems::feel_motion,
-                    systems::solve,
+                    (systems::solve, driven::tell_driven).chain(),
                     (systems::scatter_locals, systems::scatter_attributes, systems::scatter_morphs).chain(),
                 )
                     .chain()
@@ -99,6 +100,8 @@ pub struct RigRuntime {
     attributes: BTreeMap<Entity, Vec<u32>>,
     /// Attribute values last written to or read from entities.
     values: Vec<f32>,
+    /// Attributes that constraints drive and other code wrote: holder and slot, until they are told.
+    driven_writes: Vec<(Entity, u32)>,
     /// Pose offsets of the document that were last passed on.
     posed: BTreeMap<Uid, PoseOffset>,
     valued: AttributeValues,
@@ -125,6 +128,7 @@ impl RigRuntime {
             has_rewritten: false,
             attributes: BTreeMap::new(),
             values: vec![f32::NAN; program.attributes().len()],
+            driven_writes: Vec::new(),
             posed: BTreeMap::new(),
             valued: AttributeValues::new(),
             all_due: mode == InstanceMode::Hierarchy,
@@ -273,6 +277,7 @@ impl RigRuntime {
     pub fn exchange(&mut self, program: &Arc<RigProgram>, carry: &Carry) {
         if carry.is_aligned() {
             self.state.exchange(program, carry);
+            self.forget_driven();
             // Results that no operation computes any more have other values, too.
             self.all_due |= self.mode == InstanceMode::Hierarchy && !carry.is_partial();
             if self.mode == InstanceMode::Hierarchy {
@@ -283,6 +288,17 @@ impl RigRuntime {
         let mut fresh = Self::new(Arc::clone(program), self.mode);
         fresh.carry_along(self, carry);
         *self = fresh;
+    }
+
+    /// Lets the next run write all driven attributes. A build writes its defaults to the same entities, which is no write
+    /// of other code.
+    fn forget_driven(&mut self) {
+        let driven = self.values.iter_mut().zip(self.state.program().attributes());
+        driven.filter(|(_, attribute)| !attribute.is_settable).for_each(|(value, _)| *value = f32::NAN);
+        if !self.attributes.is_empty() {
+            self.is_due = true;
+            self.has_rewritten = true;
+        }
     }
 }
 

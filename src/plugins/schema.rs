@@ -11,7 +11,7 @@
 //! | joint | [`Joint`], `Uid`, `RestTransform`, `Transform`, [`NodeOf`] the rig, `ChildOf`; [`NodeLabel`], [`InGroup`], [`Null`] |
 //! | tag | [`Tag`], `Uid`, [`TagOf`] a joint, and [`CommandTag`] or [`FeatureTag`]; [`InFeature`] |
 //! | created node | [`CreatedBy`] a command, [`CreatedRole`], `Uid`, `RestTransform`, `Transform`, [`NodeOf`], `ChildOf`, and [`Control`], [`Null`] or [`Joint`]; [`NodeLabel`], [`InGroup`], [`NodeLayer`], [`Attributes`] |
-//! | node of a game's instance | [`NodeSlot`], `Uid`, [`NodeOf`] the instance, `RestTransform` below the built parent, and [`Joint`], [`Null`] or [`Control`]; [`NodeLabel`], [`NodeLayer`], [`CreatedRole`]. With a hierarchy: `Transform`, `ChildOf`; without one: the `GlobalTransform` of joints, and the [`ControlPose`] of nodes that can be posed |
+//! | node of a game's instance | [`NodeSlot`], `Uid`, [`NodeOf`] the instance, `RestTransform` below the built parent (that of a joint in the editor is the document's), and [`Joint`], [`Null`] or [`Control`]; [`NodeLabel`], [`NodeLayer`], [`CreatedRole`]. With a hierarchy: `Transform`, `ChildOf`; without one: the `GlobalTransform` of joints, and the [`ControlPose`] of nodes that can be posed |
 //! | constraint | [`Constrains`] a node, [`ConstraintKind`], [`ConstraintTargets`], [`CreatedBy`] a command, `Uid` |
 
 use std::collections::BTreeMap;
@@ -21,7 +21,8 @@ use bevy::prelude::*;
 use crate::rig::{ControlData, LayerData, PoseOffset, RestTransform, Uid};
 
 /// Joint of the document, or one that a command created. Its [`Transform`] is the pose and its [`RestTransform`] the
-/// rest pose, both relative to its parent.
+/// rest pose, both relative to its parent. Where commands turn a joint of the document or hang it elsewhere, the rest pose
+/// is the document's in the editor and the built one in a game: see [`RestTransform`].
 ///
 /// Spawning an entity with this component below a rig or one of its joints adds a joint to the document; its rest pose
 /// is the `RestTransform`, or the `Transform` where that was left out.
@@ -193,7 +194,8 @@ pub struct Control(pub ControlData);
 pub struct NodeLayer(pub LayerData);
 
 /// Values of a node's attributes by name, as they are in effect. Writing a value drives the rig in the same frame, as
-/// writing a control's `Transform` does; the value of an attribute that a constraint drives is restored.
+/// writing a control's `Transform` does; the value of an attribute that a constraint drives is restored in the same frame, and
+/// told once.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
 #[reflect(Component)]
 pub struct Attributes(pub BTreeMap<String, f32>);

@@ -104,7 +104,7 @@ impl BuildScope<'_> {
             (false, true) => format!("a number that is not above {}", range.end()),
             (false, false) => "a finite number".to_owned(),
         };
-        Err(ModuleError::parameter(parameter, format!("is {value}; write {needed}")))
+        Err(ModuleError::OutOfRange { parameter: parameter.to_owned(), value, needed })
     }
 
     /// An attribute of a node as a number that constraints follow, added with that kind and value if the node does not

@@ -24,6 +24,16 @@ pub enum ModuleError {
         /// Problem, and what to write instead.
         problem: String,
     },
+    /// A number outside of its range, whatever the other parameters are.
+    #[error("{parameter}: is {value}; write {needed}")]
+    OutOfRange {
+        /// The parameter.
+        parameter: String,
+        /// The number.
+        value: f32,
+        /// Numbers that are allowed, in words.
+        needed: String,
+    },
     /// A reference that the command cannot do without means something that is off: no failure, the build passes the
     /// command over.
     #[error("{parameter}: {off}")]

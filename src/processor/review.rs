@@ -5,69 +5,140 @@ use std::{
     sync::Arc,
 };
 
-use super::{BuildError, BuildProblem, Builder, ModuleError, Modules};
+use super::{
+    BuildError, BuildProblem, Builder, ModuleError, Modules,
+    parameter_faults::{SurveyedParams, field_of, survey_params, without_field},
+};
 use crate::rig::{
-    Field, Rig, SourceError, TagKind, Uid, fields,
+    Field, Rig, RigEdit, SourceError, TagData, TagKind, Uid, fields,
     reference::{GroupScope, references_in},
     same_place,
     template::Explicit,
 };
 
-/// Largest number of failing commands that a review looks for.
+/// Largest number of failing commands that a review looks for, and of runs for further faults of theirs.
 const MOST: usize = 200;
 
 /// The problems of all commands of a rig, in the order of the build list: those whose module or parameters are wrong,
 /// switched off or not, and those that fail when they run. A command that fails is left out for the rest, and those that
-/// cannot do without it are passed over: each fault is told once.
+/// cannot do without it are passed over: each fault is told once. A command has several problems where several of its
+/// parameters cannot be read, name what is not there, or are out of range.
 pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
-    let mut problems = Vec::new();
-    let mut off = HashSet::new();
-    let mut judged: HashMap<(&str, &str), Option<BuildProblem>> = HashMap::new();
-    for joint in rig.walk() {
-        for tag in &joint.data.tags {
-            let TagKind::Command { module, params, .. } = &tag.kind else { continue };
-            // Equal commands have equal problems: a template may hold one command thousands of times.
-            let problem = judged
-                .entry((module.as_str(), params.as_str()))
-                .or_insert_with(|| problem_before_run(rig, modules, module, params));
-            if let Some(problem) = problem.clone() {
-                problems.push(BuildError {
-                    command: tag.uid,
-                    joint: joint.data.uid,
-                    joint_label: joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()).into(),
-                    module: module.as_str().into(),
-                    problem,
-                });
-                off.insert(tag.uid);
-            }
-        }
-    }
+    let (mut problems, mut repaired) = problems_before_run(rig, modules);
     let order: Vec<Uid> = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
-    let mut rig = rig.clone();
-    rig.disable_tags(&off);
+    let mut running = rig.clone();
+    running.disable_tags(&problems.iter().map(|error| error.command).collect());
     let mut builder = Builder::new(modules.clone());
     for _ in 0..MOST {
-        builder.sync(&rig);
+        builder.sync(&running);
         let Some(error) = builder.run_all().error else { break };
-        if rig.find_tag(error.command).is_none() {
+        if running.find_tag(error.command).is_none() {
             break;
         }
-        rig.disable_tags(&HashSet::from([error.command]));
+        running.disable_tags(&HashSet::from([error.command]));
+        repaired.extend(repaired_by_default(rig, &error));
         problems.push(error);
     }
+    problems.extend(further_problems(rig, &running, &mut builder, repaired));
     let places: HashMap<Uid, usize> = order.into_iter().enumerate().map(|(place, tag)| (tag, place)).collect();
     problems.sort_by_key(|error| places.get(&error.command).copied());
     problems
 }
 
-/// Problem of a command that is found without running it: in its module, its parameters, or the groups that these name.
-fn problem_before_run(rig: &Rig, modules: &Modules, module: &str, params: &str) -> Option<BuildProblem> {
-    let loaded = modules.load(module, params).map(drop);
-    loaded.and_then(|()| Ok(known_groups(rig, params)?)).err()
+/// Problems of commands that are found without running them, and these commands with their readable parameters.
+fn problems_before_run(rig: &Rig, modules: &Modules) -> (Vec<BuildError>, Vec<Repaired>) {
+    let (mut problems, mut repaired) = (Vec::new(), Vec::new());
+    let mut judged: HashMap<(&str, &str), SurveyedParams> = HashMap::new();
+    for joint in rig.walk() {
+        for tag in &joint.data.tags {
+            let TagKind::Command { module, params, .. } = &tag.kind else { continue };
+            // Equal commands have equal problems: a template may hold one command thousands of times.
+            let survey = judged
+                .entry((module.as_str(), params.as_str()))
+                .or_insert_with(|| survey_before_run(rig, modules, module, params));
+            if survey.problems.is_empty() {
+                continue;
+            }
+            problems.extend(survey.problems.iter().map(|problem| BuildError {
+                command: tag.uid,
+                joint: joint.data.uid,
+                joint_label: joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()).into(),
+                module: module.as_str().into(),
+                problem: problem.clone(),
+            }));
+            let rest = survey.rest.as_ref().filter(|_| repaired.len() < MOST);
+            repaired.extend(rest.map(|rest| Repaired { command: tag.uid, params: rest.clone(), only_ranges: true }));
+        }
+    }
+    (problems, repaired)
 }
 
-/// Refuses local groups that the rig does not have: in references, and as the group of what is made.
-fn known_groups(rig: &Rig, params: &str) -> Result<(), ModuleError> {
+/// Command that failed, with its faulty parameters left out.
+struct Repaired {
+    command: Uid,
+    params: String,
+    /// True if parameters are left out that say where the command works: what else it says then may follow from that.
+    only_ranges: bool,
+}
+
+/// A command whose number is out of range, with the default in place of that number.
+fn repaired_by_default(rig: &Rig, error: &BuildError) -> Option<Repaired> {
+    let BuildProblem::Module(ModuleError::OutOfRange { parameter, .. }) = &error.problem else { return None };
+    let (_, tag) = rig.find_tag(error.command)?;
+    let TagKind::Command { params, .. } = &tag.kind else { return None };
+    let params = without_field(params, field_of(parameter))?;
+    Some(Repaired { command: error.command, params, only_ranges: false })
+}
+
+/// Problems of commands that are found when these run without the parameters whose faults are known. `running` is the
+/// rig without all commands that fail.
+fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: Vec<Repaired>) -> Vec<BuildError> {
+    let mut found = Vec::new();
+    let mut runs = 0;
+    for mut next in repaired {
+        while runs < MOST
+            && let Some(trial) = with_params(rig, running, &next)
+        {
+            runs += 1;
+            builder.sync(&trial);
+            let Some(error) = builder.run_all().error.filter(|error| error.command == next.command) else { break };
+            let left = match &error.problem {
+                BuildProblem::Module(ModuleError::OutOfRange { parameter, .. }) => {
+                    without_field(&next.params, field_of(parameter))
+                }
+                _ if next.only_ranges => break,
+                _ => None,
+            };
+            found.push(error);
+            let Some(params) = left else { break };
+            next.params = params;
+        }
+    }
+    found
+}
+
+/// The running rig together with a repaired command; `None` if that command is not there.
+fn with_params(rig: &Rig, running: &Rig, repaired: &Repaired) -> Option<Rig> {
+    let (joint, tag) = rig.find_tag(repaired.command)?;
+    let TagKind::Command { module, feature, .. } = &tag.kind else { return None };
+    let kind = TagKind::Command { module: module.clone(), params: repaired.params.clone(), feature: *feature };
+    let mut trial = running.clone();
+    trial.apply(&RigEdit::SetTag(joint.data.uid, Box::new(TagData { kind, ..tag.clone() }))).ok()?;
+    Some(trial)
+}
+
+/// Problems of a command that are found without running it: in its module, its parameters, or the groups that these name.
+fn survey_before_run(rig: &Rig, modules: &Modules, module: &str, params: &str) -> SurveyedParams {
+    let mut survey = survey_params(rig, modules, module, params);
+    if modules.get(module).is_some() {
+        survey.problems.extend(unknown_groups(rig, params).into_iter().map(BuildProblem::Module));
+    }
+    survey
+}
+
+/// Local groups that the rig does not have: in references, and as the group of what is made.
+fn unknown_groups(rig: &Rig, params: &str) -> Vec<ModuleError> {
+    let mut problems = Vec::new();
     let fields = fields(params);
     let is_unknown = |uid: &Uid| rig.group(*uid).is_none();
     for found in references_in(params) {
@@ -80,17 +151,17 @@ fn known_groups(rig: &Rig, params: &str) -> Result<(), ModuleError> {
             let field = fields.iter().rfind(|field| field.value <= found.range.start && found.range.end <= field.end);
             let parameter = field.map_or("params", |field| field.name);
             let problem = format!("the rig has no local group {group}; refer to another, or add it under `groups`");
-            return Err(ModuleError::reference(parameter, &references, problem));
+            problems.push(ModuleError::reference(parameter, &references, problem));
         }
     }
     for field in fields.iter().filter(|field| field.name == "local_group") {
         let value = params[field.value..field.end].split('"').nth(1);
         if let Some(group) = value.and_then(|text| text.parse().ok()).filter(is_unknown) {
             let problem = format!("the rig has no local group {group}; choose another, or leave it out");
-            return Err(ModuleError::parameter("local_group", problem));
+            problems.push(ModuleError::parameter("local_group", problem));
         }
     }
-    Ok(())
+    problems
 }
 
 /// The text of a template, in which the places of problems are looked up.
@@ -121,7 +192,8 @@ impl<'a> SourceText<'a> {
     /// beside the names that people write alone.
     pub fn locate(&self, rig: &Rig, error: &BuildError) -> SourceError {
         let (text, found) = (&*self.explicit.text, &self.fields);
-        let message = format!("{}: {}", error.module, error.problem);
+        let named = |problem: &str| format!("{} on joint {}: {problem}", error.module, error.joint_label);
+        let message = named(&error.problem.to_string());
         let Some(tag) = declaration(text, found, error.command) else { return self.at(0, message) };
         let at_tag = tag.end - text[tag.value..tag.end].trim_start().len();
         let params = found.iter().find(|field| field.bracket == tag.bracket && field.name == "params");
@@ -135,14 +207,16 @@ impl<'a> SourceText<'a> {
                     TagKind::Feature { .. } => None,
                 });
                 let offset = read.map_or(inner.offset, |read| same_place(read, written, inner.offset));
-                self.at(start + offset, format!("{}: {}", error.module, inner.message))
+                self.at(start + offset, named(&inner.message))
             }
             BuildProblem::Module(
-                ModuleError::Reference { parameter, .. } | ModuleError::Parameter { parameter, .. },
+                ModuleError::Reference { parameter, .. }
+                | ModuleError::Parameter { parameter, .. }
+                | ModuleError::OutOfRange { parameter, .. },
             ) => {
-                let first = parameter.split([',', ' ', '[', '.']).next().unwrap_or_default();
-                let named = fields(written).into_iter().find(|field| field.name == first);
-                self.at(named.map_or(at_tag, |field| start + field.start), message)
+                let first = field_of(parameter);
+                let faulty = fields(written).into_iter().find(|field| field.name == first);
+                self.at(faulty.map_or(at_tag, |field| start + field.start), message)
             }
             _ => self.at(at_tag, message),
         }

@@ -8,7 +8,12 @@ use crate::{
     rig::{TagData, Uid},
 };
 
-/// Rest transform of a joint, relative to its parent (or to the rig for a root).
+/// Rest transform of a joint or created node, relative to its parent (or to the rig for a root).
+///
+/// Joints of the document have different values in the editor and in a game. Where the rig is a document, as in the
+/// editor, the value is the document's: before any command, below the parent in the document. On a game's instance it
+/// is the built one: behind all commands (`orient_joints` turns, `insert_joints` hangs elsewhere), below the built
+/// parent, as [`BuiltNode::base`](crate::rig::BuiltNode::base) says. Created nodes have the built one in both.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[reflect(Component)]
 pub struct RestTransform {

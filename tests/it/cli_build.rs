@@ -430,6 +430,68 @@ fn check_tells_all_faults_at_once_with_their_lines() {
     assert!((place..place + "sieze: 2.0".len()).contains(&column), "column {column} in {line}");
 }
 
+/// Commands with several faults each; the comment at the end of a line is what is told of it.
+const SEVERAL: &str = r#"(
+    format: 2,
+    name: "several",
+    joints: [
+        (
+            label: "root",
+            translation: (0, 1, 0),
+            tags: [
+                half_joint(
+                    at: "@joint rot", // there is no joint "rot"; did you mean "root"?
+                    share: 3.0, // share: is 3; write a number from 0 to 1
+                    push: 7.0, // push: is 7; write a number from -1 to 1
+                    creation: (lable: "half"), // lable
+                ),
+                ik_handle(
+                    start: "@joint rooot", // there is no joint "rooot"; did you mean "root"?
+                    end: "@joint arrm", // there is no joint "arrm"; did you mean "arm"?
+                    goal: "@this",
+                    sfot: 1.0, // sfot
+                ),
+                contrl(), // contrl on joint root: there is no module "contrl"; did you mean "control"?
+                Feature(kind: "lim", name: "Arm"), // the feature "Arm" on joint root is of the kind "lim"
+            ],
+        ),
+        (
+            label: "arm",
+            parent: "root",
+            translation: (0.5, 0, 0),
+            tags: [
+                half_joint(
+                    share: -1.0, // share: is -1; write a number from 0 to 1
+                    push: 7.0, // push: is 7; write a number from -1 to 1
+                ),
+            ],
+        ),
+    ],
+)"#;
+
+#[test]
+fn check_tells_all_faults_of_one_commands_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("several.rig.ron"), SEVERAL).unwrap();
+    let answer = rigsmith(folder.path(), &["check", "several.rig.ron", "--json"]);
+    assert_eq!(answer.code, 1, "{}", answer.err);
+    let json = answer.json();
+    let file = &json["files"][0];
+    let problems = file["problems"].as_array().unwrap();
+    let wanted: Vec<(usize, &str)> = SEVERAL
+        .lines()
+        .enumerate()
+        .filter_map(|(number, line)| Some((number + 1, line.split_once("// ")?.1)))
+        .collect();
+    for (line, words) in &wanted {
+        let is_told =
+            |problem: &&Value| problem["line"] == *line && problem["message"].as_str().unwrap().contains(words);
+        assert_eq!(problems.iter().filter(is_told).count(), 1, "line {line}: {words}: {file:#}");
+    }
+    assert_eq!(problems.len(), wanted.len(), "each once: {file:#}");
+    assert!(file["error"].as_str().unwrap().contains("4 commands cannot be built"), "{file:#}");
+}
+
 #[test]
 fn wrong_usage_of_build_exits_with_2_and_bad_input_with_1() {
     let folder = with_arm();

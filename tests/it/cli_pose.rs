@@ -17,8 +17,8 @@ use serde_json::Value;
 
 use crate::cli_build::rigsmith;
 
-/// A turned root with a control and an attribute, a boom whose control has a name and a label, and a hook that the
-/// attribute turns by a quarter.
+/// A turned root with a control and two attributes, a boom whose control has a name and a label, and a hook that one
+/// attribute turns by a quarter, and the other, a choice, moves outwards.
 const CRANE: &str = r#"(
     format: 2,
     name: "crane",
@@ -31,6 +31,7 @@ const CRANE: &str = r#"(
             tags: [
                 control(creation: (name: "base")),
                 attribute(node: "@command control/base role:control", name: "turn", min: 0.0, max: 1.0, default: 0.0),
+                attribute(node: "@command control/base role:control", name: "mode", choices: ["slow", "fast", "0"]),
             ],
         ),
         (
@@ -49,6 +50,14 @@ const CRANE: &str = r#"(
             group: "arm",
             translation: (0.5, 0, 0),
             tags: [
+                driven_key(
+                    driver: "@command control/base role:control",
+                    driver_attribute: "mode",
+                    keys: [(0.0, 0.0), (2.0, 1.0)],
+                    ease: Linear,
+                    output: "@this",
+                    output_channel: TranslateX,
+                ),
                 driven_key(
                     driver: "@command control/base role:control",
                     driver_attribute: "turn",
@@ -198,6 +207,19 @@ fn controls_are_named_by_name_label_or_reference() {
     assert!(place(&forward, "hand_l").distance(rest) < 1e-4);
     let turned = quat(&node(&forward, "hand_l")["rotation"]).angle_between(quat(&node(&goal, "hand_l")["rotation"]));
     assert!((turned.to_degrees() - 30.0).abs() < 0.1, "{turned}");
+}
+
+/// A choice is set by its name or by its number. The name wins where it looks like a number.
+#[test]
+fn choices_are_set_by_name() {
+    let folder = folder();
+    let hook = |set: &str| place(&pose(folder.path(), "crane.rig.ron", &["--set", set]), "hook").x;
+    let rest = hook("base.mode=slow");
+    let table = [("base.mode=fast", 0.5), ("base.mode = 1", 0.5), ("base.mode=0", 1.0)];
+    for (set, wanted) in table {
+        let moved = hook(set) - rest;
+        assert!((moved - wanted).abs() < 1e-5, "{set}: {moved}");
+    }
 }
 
 #[test]
@@ -353,7 +375,10 @@ fn wrong_inputs_are_refused_and_write_nothing() {
         ("lift.rotate=(inf,0,0)", 2, "sets nothing"),
         ("lift.rotate=1,2,3", 2, "sets nothing"),
         (".rotate=(1,2,3)", 2, "sets nothing"),
-        ("base.turn=much", 2, "sets nothing"),
+        ("base.turn=", 2, "sets nothing"),
+        ("base.turn=much", 1, "write a number"),
+        ("base.turn=nan", 1, "write a number"),
+        ("base.mode=fats", 1, "write \"slow\", \"fast\" or \"0\""),
         ("lifd.rotate=(0,0,0)", 1, "lift"),
         ("base.trun=1", 1, "turn"),
         ("lift.turn=1", 1, "lift"),

@@ -14,12 +14,17 @@ use std::{
 
 use bevy::{asset::AssetPlugin, ecs::system::RunSystemOnce, mesh::skinning::SkinnedMesh, prelude::*};
 use rigsmith::{
+    headless::Workbench,
     instance::{
         BoundTo, InstanceNodes, RigBuilt, RigFailed, RigInstance, RigInstancePlugin, RigTemplate, RunningTemplate,
         SkinBound, TemplateFiles,
     },
-    plugins::runtime::{ControlPose, HandOver, InstanceMode, OutsideTransform, RigNodes, RigRuntime},
-    rig::{Uid, UidSource, template::read_template},
+    plugins::{
+        commands::BuildStep,
+        document::JointEntities,
+        runtime::{ControlPose, HandOver, InstanceMode, OutsideTransform, RigNodes, RigRuntime},
+    },
+    rig::{RestTransform, Uid, UidSource, template::read_template},
 };
 
 use super::{
@@ -173,6 +178,30 @@ fn an_instance_is_built_posed_and_taken_away() {
         game.app.world_mut().entity_mut(instance).remove::<RigInstance>();
         game.app.update();
         assert!(game.app.world().get_entity(end).is_err() && game.app.world().get::<RigRuntime>(instance).is_none());
+    }
+}
+
+/// The rest transform of a joint is that of the document in an app with documents, and the built one in a game.
+#[test]
+fn the_rest_of_a_joint_is_the_built_one_in_an_instance() {
+    let tag = "translation: (0, 1, 0), tags: [insert_joints(count: 1), control(";
+    let text = TWO.replace("translation: (0, 1, 0), tags: [control(", tag);
+    let rest = |world: &World, joint: Entity| world.get::<RestTransform>(joint).unwrap().translation;
+    let document = read_template(text.as_bytes()).unwrap().rig;
+    let end = document.walk().find(|joint| joint.data.label.as_deref() == Some("a_end")).unwrap().data.uid;
+    let mut bench = Workbench::with_rig(1, document);
+    assert_eq!(bench.build(BuildStep::All).error, None);
+    let rig = bench.rig_entity();
+    let world = bench.app_mut().world();
+    let joint = world.get::<JointEntities>(rig).unwrap().get(end).unwrap();
+    assert_eq!(rest(world, joint), Vec3::new(0.0, 0.5, 0.0));
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut game = Game::still();
+        let instance = game.open(&saved(folder.path(), &text), mode);
+        let joint = game.node(instance, "a_end");
+        let built = rest(game.app.world(), joint);
+        assert!(built.distance(Vec3::new(0.0, 0.25, 0.0)) < 1e-6, "{mode:?}: {built}");
     }
 }
 

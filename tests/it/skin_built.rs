@@ -16,10 +16,12 @@ use bevy::{
 use rigsmith::{
     algo::weights::WeightSettings,
     headless::Workbench,
+    modules::half_joint::HalfJoint,
     plugins::{
         commands::{BuildRequest, BuildStep, BuiltEntities},
         document::{Change, EditRequest},
     },
+    processor::RigModule,
     rig::{BuiltRig, Constraint, NodeType, RestTransform, Rig, RigEdit, TagKind, Uid, deform::DeformSkeleton},
     solve::program::RigState,
 };
@@ -252,18 +254,15 @@ fn hands_and_feet_reach_their_goals() {
 
 /// Lengths of half joints in a rig, by the name that their command gives them.
 fn pushes(rig: &Rig) -> BTreeMap<String, f32> {
-    let tags = rig.walk().flat_map(|joint| &joint.data.tags).collect::<Vec<_>>();
-    let found = tags.into_iter().filter_map(|tag| match &tag.kind {
-        TagKind::Command { module, params, .. } if *module == "half_joint" => {
-            let params = params.replace("fit_push:", "fitted:");
-            let after = |key: &str| params.split_once(key).map(|(_, rest)| rest.trim_start());
-            let name = after("name:")?.split('"').nth(1)?.to_owned();
-            let number = after("push:")?.split([',', ')']).next()?.trim().parse().ok()?;
-            Some((name, number))
+    let reader = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+    let tags = rig.walk().flat_map(|joint| &joint.data.tags);
+    let halves = tags.filter_map(|tag| match &tag.kind {
+        TagKind::Command { module, params, .. } if *module == HalfJoint::NAME => {
+            Some(reader.from_str::<HalfJoint>(params).unwrap())
         }
         _ => None,
     });
-    found.collect()
+    halves.filter_map(|half| Some((half.creation.name?, half.push))).collect()
 }
 
 /// Binding gives half joints the lengths that the mesh asks for, in the same step as the weights, unless a command says that

@@ -294,6 +294,8 @@ fn kinds_of_feature_are_registered_from_outside_and_unknown_ones_told() {
     let unknown = kinds.unknown_in(&desk.rig);
     assert_eq!(unknown.iter().map(|unknown| unknown.tag).collect::<Vec<_>>(), [IK_L, IK_R]);
     assert!(unknown[1].to_string().contains("did you mean \"spine\"?"), "{}", unknown[1]);
+    assert!(unknown[1].to_string().starts_with("the feature \"S\" on joint "), "{}", unknown[1]);
+    assert!(!unknown[1].to_string().contains(&IK_R.to_string()), "{}", unknown[1]);
     let wing = FeatureKind { icon: "wing.svg".into(), ..FeatureKind::new("wing", "Wing", "Feathers.") };
     assert_eq!(kinds.register(wing.clone()), None);
     assert_eq!(kinds.get("wing"), Some(&wing));

@@ -67,6 +67,19 @@ pub enum EntityWriteError {
         /// Name of the node, or kind of the constraint.
         name: String,
     },
+    /// An attribute that a constraint drives was written.
+    #[error(
+        "attribute \"{attribute}\" of \"{node}\" is driven by {driver} and stays as that says; write what drives it, or \
+         change the command"
+    )]
+    DrivenAttribute {
+        /// Name of the node.
+        node: String,
+        /// Name of the attribute.
+        attribute: String,
+        /// Command or constraint that drives it, in words.
+        driver: String,
+    },
     /// A created node was written.
     #[error("\"{name}\" was created by a command and stays as that says; change the command")]
     CreatedContent {

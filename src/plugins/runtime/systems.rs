@@ -123,8 +123,18 @@ fn gather(
     poses: &Query<&ControlPose>,
     attributes: &Query<&Attributes>,
 ) {
-    let RigRuntime { state, controls, mode, shown, rewritten, has_rewritten, attributes: holders, values, .. } =
-        runtime;
+    let RigRuntime {
+        state,
+        controls,
+        mode,
+        shown,
+        rewritten,
+        has_rewritten,
+        attributes: holders,
+        values,
+        driven_writes,
+        ..
+    } = runtime;
     for (slot, entity) in controls.iter() {
         let at = *slot as usize;
         match mode {
@@ -156,7 +166,9 @@ fn gather(
             let slot = *slot as usize;
             let value = told.get(&*state.program().attributes()[slot].name).copied();
             if let Some(value) = value.filter(|value| !values[slot].is_nan() && *value != values[slot]) {
-                state.set_attribute_at(slot, value);
+                if !state.set_attribute_at(slot, value) {
+                    driven_writes.push((*entity, slot as u32));
+                }
                 // Written again after the run, which may do nothing, if the value is not allowed or driven.
                 values[slot] = value;
                 *has_rewritten = true;

@@ -30,12 +30,16 @@ pub struct FeatureKinds {
 
 /// A feature whose kind is not registered. It works as any other; only its icon and form are missing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("feature tag {tag} of joint {joint} is of the kind \"{kind}\", which is not registered{hint}")]
+#[error("the feature \"{name}\" on joint {joint_label} is of the kind \"{kind}\", which is not registered{hint}")]
 pub struct UnknownKind {
     /// The joint that carries the tag.
     pub joint: Uid,
+    /// Label of the joint, or its uid where it has none.
+    pub joint_label: String,
     /// The tag.
     pub tag: Uid,
+    /// Name of the feature.
+    pub name: String,
     /// The kind it names.
     pub kind: String,
     /// The end of the sentence: kinds that may be meant.
@@ -100,11 +104,13 @@ impl FeatureKinds {
 
     /// The features of a rig whose kinds are not registered.
     pub fn unknown_in(&self, rig: &Rig) -> Vec<UnknownKind> {
-        let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(move |tag| (joint.data.uid, tag)));
+        let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(move |tag| (&joint.data, tag)));
         tags.filter_map(|(joint, tag)| match &tag.kind {
-            TagKind::Feature { kind, .. } if self.get(kind).is_none() => Some(UnknownKind {
-                joint,
+            TagKind::Feature { kind, name, .. } if self.get(kind).is_none() => Some(UnknownKind {
+                joint: joint.uid,
+                joint_label: joint.label.clone().unwrap_or_else(|| joint.uid.to_string()),
                 tag: tag.uid,
+                name: name.clone(),
                 kind: kind.clone(),
                 hint: did_you_mean(kind, self.kinds.keys()),
             }),

@@ -1,7 +1,12 @@
 //! Parts and abilities beyond the plain limb: pivots of feet, pinned elbows, shoulders that follow, necks, lips, tongues.
 
+use std::collections::BTreeSet;
+
 use bevy::math::{Quat, Vec3};
-use rigsmith::rig::{NodeType, PoseOffset, template::read_template};
+use rigsmith::{
+    files::{RealDisk, load_template},
+    rig::{NodeType, PoseOffset, part::PartNeeds, template::read_template},
+};
 
 use super::Puppet;
 
@@ -236,4 +241,28 @@ fn a_bendy_limb_bends_and_keeps_its_tangents() {
     assert!(after.distance(before) > 0.03, "{before} {after}");
     near(puppet.place("limb_1"), Vec3::Y, 1e-4, "the start");
     near(puppet.place("limb_5"), end, 1e-3, "the end");
+}
+
+/// A description says in words which joints a part needs, where it hangs, and where others hang on it.
+#[test]
+fn descriptions_of_parts_name_their_needs_and_sockets() {
+    let parts = super::files().into_iter().filter(|(name, _)| name.starts_with("parts/"));
+    let mut count = 0;
+    for (name, path) in parts {
+        let template = load_template(&RealDisk, &path).unwrap();
+        let (needs, text) = (PartNeeds::of(&template.rig), &template.rig.about().description);
+        let words: BTreeSet<&str> = text.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+        let missing = needs.joints.iter().filter(|joint| !words.contains(joint.as_str())).collect::<Vec<_>>();
+        assert!(missing.is_empty(), "{name} needs {missing:?}: {text}");
+        for place in needs.sockets.iter().map(ToString::to_string) {
+            let ends = text.match_indices(&place).map(|(at, _)| text[at + place.len()..].chars().next());
+            let is_told = ends.into_iter().any(|next| next.is_none_or(|c| !c.is_alphanumeric() && c != '_'));
+            assert!(is_told, "{name} hangs on {place}: {text}");
+        }
+        for socket in &template.sockets {
+            assert!(words.contains(socket.name.as_str()), "others hang on {} of {name}: {text}", socket.name);
+        }
+        count += 1;
+    }
+    assert_eq!(count, super::BUNDLED_PARTS.len());
 }

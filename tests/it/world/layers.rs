@@ -178,23 +178,34 @@ mod drawn {
         assert_eq!(click(&mut stage, control), [control]);
     }
 
-    /// A command can drive the visibility: a hidden control escapes a click, also where the click selected it before.
+    /// A command drives the visibility: a hidden control escapes a click, also where the click selected it before.
     #[test]
     fn a_hidden_control_escapes_a_click() {
         let (mut stage, control) = stage();
-        let params = "(node: \"@any type:control\", name: \"visible\", min: 0.0, max: 1.0, default: 1.0)";
-        let kind = TagKind::Command { module: "attribute".into(), params: params.into(), feature: None };
-        let tag = TagData { uid: Uid(79), enabled: true, comment: String::new(), kind };
-        stage.edit(vec![RigEdit::AddTag { joint: Uid(2), tag: Box::new(tag), index: 2 }]);
+        let commands = [
+            ("attribute", "(node: \"@any type:control\", name: \"shown\", min: 0.0, max: 1.0, default: 1.0)"),
+            ("attribute", "(node: \"@any type:control\", name: \"visible\", min: 0.0, max: 1.0, default: 1.0)"),
+            (
+                "driven_key",
+                "(driver: \"@any type:control\", driver_attribute: \"shown\", keys: [(0.0, 0.0), (1.0, 1.0)], \
+                 output: \"@any type:control\", output_attribute: \"visible\")",
+            ),
+        ];
+        let tags = commands.iter().zip(79..).zip(2..).map(|(((module, params), uid), index)| {
+            let kind = TagKind::Command { module: (*module).into(), params: (*params).into(), feature: None };
+            let tag = TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind };
+            RigEdit::AddTag { joint: Uid(2), tag: Box::new(tag), index }
+        });
+        stage.edit(tags.collect());
         assert!(!tints(&mut stage).is_empty());
         assert_eq!(click(&mut stage, control), [control]);
-        let set = |stage: &mut Stage, value: f32| {
-            stage.edit(vec![RigEdit::SetAttributeValue(control, "visible".into(), Some(value))]);
+        let show = |stage: &mut Stage, value: f32| {
+            stage.edit(vec![RigEdit::SetAttributeValue(control, "shown".into(), Some(value))]);
         };
-        set(&mut stage, 0.0);
+        show(&mut stage, 0.0);
         assert!(tints(&mut stage).is_empty());
         assert!(!click(&mut stage, control).contains(&control));
-        set(&mut stage, 1.0);
+        show(&mut stage, 1.0);
         assert!(!tints(&mut stage).is_empty());
         assert_eq!(click(&mut stage, control), [control]);
     }

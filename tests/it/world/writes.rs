@@ -4,14 +4,14 @@ use bevy::prelude::*;
 use rigsmith::{
     plugins::{
         commands::{BuildStep, Built, BuiltEntities},
-        document::{GroupEntities, TagEntities},
+        document::{ChangeError, EntityWriteError, GroupEntities, TagEntities},
         schema::{
-            CommandTag, Constrains, ConstraintTargets, CreatedBy, FeatureTag, GroupOf, InFeature, InGroup, Joint,
-            LocalGroup, NodeLabel, Tag, TagOf, Tags,
+            Attributes, CommandTag, Constrains, ConstraintTargets, CreatedBy, FeatureTag, GroupOf, InFeature, InGroup,
+            Joint, LocalGroup, NodeLabel, Tag, TagOf, Tags,
         },
     },
     prelude::*,
-    rig::{RestTransform, TagKind, template::write_template},
+    rig::{RestTransform, TagData, TagKind, template::write_template},
 };
 
 use super::{NEAR, Stage, shipped};
@@ -82,6 +82,55 @@ fn writing_a_component_is_one_undoable_edit_and_an_equal_value_is_none() {
     assert!(stage.app.world().get_entity(group).is_err());
     stage.change(Change::Redo);
     assert_eq!(stage.get::<NodeLabel>(joint), Some(&NodeLabel("elbow".into())));
+}
+
+/// A value that a command drives is put back in the same frame, and told once, with the command. A build that writes its
+/// defaults is told nothing.
+#[test]
+fn a_driven_attribute_is_put_back_and_told_once() {
+    let mut rig = chain().document().clone();
+    let commands = [
+        ("attribute", "(name: \"in\", default: 0.25)"),
+        ("attribute", "(name: \"out\")"),
+        ("driven_key", "(driver_attribute: \"in\", ease: Linear, output: \"@this\", output_attribute: \"out\")"),
+    ];
+    let tag = |uid: u64, (module, params): (&str, &str)| {
+        let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
+        Box::new(TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind })
+    };
+    for (index, command) in commands.into_iter().enumerate() {
+        rig.apply(&RigEdit::AddTag { joint: Uid(2), tag: tag(70 + index as u64, command), index }).unwrap();
+    }
+    let mut stage = Stage::built(rig);
+    let joint = stage.node(Uid(2)).unwrap();
+    let out = |stage: &Stage| stage.get::<Attributes>(joint).unwrap().0["out"];
+    let write = |stage: &mut Stage, name: &str, value: f32| {
+        stage.app.world_mut().get_mut::<Attributes>(joint).unwrap().0.insert(name.into(), value);
+        stage.app.update();
+    };
+    let refused = |stage: &mut Stage| -> Vec<EditRefused> {
+        stage.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().collect()
+    };
+    assert!((out(&stage) - 0.25).abs() < 1e-6, "{}", out(&stage));
+    assert!(refused(&mut stage).is_empty());
+    let mut told = Vec::new();
+    for value in [0.5, 0.75, f32::NAN] {
+        write(&mut stage, "out", value);
+        assert!((out(&stage) - 0.25).abs() < 1e-6, "{value} became {}", out(&stage));
+        told.extend(refused(&mut stage));
+    }
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert_eq!(told[0].rig, stage.rig);
+    let reason = &told[0].reason;
+    assert!(matches!(reason, ChangeError::Entity(EntityWriteError::DrivenAttribute { .. })), "{reason:?}");
+    let text = reason.to_string();
+    assert!(text.contains("\"out\" of \"j2\" is driven by the command driven_key on joint j2"), "{text}");
+    // Another value of the same node drives.
+    write(&mut stage, "in", 1.0);
+    assert!((out(&stage) - 1.0).abs() < 1e-6, "{}", out(&stage));
+    stage.edit(vec![RigEdit::SetTag(Uid(2), tag(71, ("attribute", "(name: \"out\", default: 0.5)")))]);
+    (0..3).for_each(|_| stage.app.update());
+    assert!(refused(&mut stage).is_empty());
 }
 
 /// An order of tags counts although one of them is despawned in the same frame.
