@@ -29,7 +29,7 @@ pub(crate) enum Source {
 }
 
 /// Weights of all places.
-pub(crate) struct Bound {
+pub(crate) struct BoundSurface {
     /// The place of each point: points at one position share one.
     pub place: Vec<u32>,
     /// Weights of each place.
@@ -48,7 +48,7 @@ pub(crate) fn bind(
     free: &[u32],
     settings: &WeightSettings,
     progress: &(dyn Fn(f32) -> bool + Sync),
-) -> Result<Bound, WeightError> {
+) -> Result<BoundSurface, WeightError> {
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
     let (place, count) = adjacency::weld(points);
     let (places, joints) = unit_frame(points, &place, count, joints);
@@ -76,12 +76,12 @@ pub(crate) fn bind(
     };
     let weights = anatomy.share(&places, weights);
     if !settings.stiff_parts {
-        return Ok(Bound { place, weights, sources, stiff: vec![false; count] });
+        return Ok(BoundSurface { place, weights, sources, stiff: vec![false; count] });
     }
     let bending = settings.bending.iter().cloned().flatten();
     let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
     let (weights, stiff) = Islands::new(&places, &triangles).stiffened(&weights, &bending);
-    Ok(Bound { place, weights, sources, stiff })
+    Ok(BoundSurface { place, weights, sources, stiff })
 }
 
 /// Input of a binding that a mesh and its coarse stand-in share.
