@@ -8,8 +8,8 @@
 //! Distances are hundredths of the mesh's height: of the joints of the body, of the fingers, and the largest one. `variants`
 //! compares the fit of each mesh with those of the mesh turned, scaled, shuffled, decimated, subdivided and damaged.
 
-#[path = "../tests/it/fit_data/known.rs"]
-mod known;
+#[path = "../tests/it/fit_data/known_joints.rs"]
+mod known_joints;
 #[expect(dead_code, reason = "tests use more of it")]
 #[path = "../tests/it/random.rs"]
 mod random;
@@ -23,7 +23,7 @@ use rigsmith::{
 };
 
 use self::{
-    known::{Figure, figures, is_finger, template_joints},
+    known_joints::{Figure, figures, is_finger, template_joints},
     random::Random,
 };
 

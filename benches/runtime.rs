@@ -36,7 +36,7 @@ use rigsmith::{
     plugins::runtime::{ControlPose, InstanceMode, NodeOf, NodeSlot, RigRuntime, RuntimePlugin, spawn_instance},
     processor::Builder,
     rig::{BuiltRig, NodeType, PoseOffset},
-    solve::program::{CompileOptions, Exposed, Keep, LANES, Memory, RigProgram, RigState},
+    solve::program::{CompileOptions, ExposedNode, Keep, LANES, Memory, RigProgram, RigState},
 };
 
 /// Instances in a crowd.
@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rig = Builder::build(&load_template(&RealDisk, &path)?.rig, &Arc::new(modules::all()))?;
     let compile = |keep| RigProgram::compile(&rig, &CompileOptions { keep, ..CompileOptions::default() }).map(Arc::new);
     let all = compile(Keep::All)?;
-    let game = compile(Keep::DeformAndExposed(vec![Exposed::Controls]))?;
+    let game = compile(Keep::DeformAndExposed(vec![ExposedNode::Controls]))?;
     let joints = game.nodes().iter().filter(|node| node.kind == NodeType::Joint).count();
     let controls = controls(&game);
     let mut report = vec![

@@ -37,7 +37,7 @@ use rigsmith::{
 
 /// Settings from the command line.
 #[derive(Resource, Clone, Default)]
-struct Wanted {
+struct ShowSettings {
     out: Option<String>,
     joint: Option<String>,
     pose: bool,
@@ -46,7 +46,7 @@ struct Wanted {
 }
 
 fn main() -> AppExit {
-    let mut wanted = Wanted::default();
+    let mut wanted = ShowSettings::default();
     let mut display = MeshDisplay::default();
     let (mut file, mut bind) = (String::from("assets/models/biped.obj"), false);
     let mut words = std::env::args().skip(1);
@@ -125,7 +125,7 @@ fn main() -> AppExit {
 
 /// Chooses the joint to colour, and bends the joints once there are weights.
 fn choose(
-    wanted: Res<Wanted>,
+    wanted: Res<ShowSettings>,
     rigs: Query<&Rig>,
     mut display: ResMut<MeshDisplay>,
     mut joints: Query<&mut Transform, With<Joint>>,
@@ -148,7 +148,7 @@ fn choose(
 /// Takes the picture when all is on the screen.
 fn picture(
     mut commands: Commands,
-    mut wanted: ResMut<Wanted>,
+    mut wanted: ResMut<ShowSettings>,
     jobs: Query<(), Or<(With<DisplayJob>, With<SkinningJob>)>>,
     cameras: Query<&RenderTarget>,
 ) {

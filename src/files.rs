@@ -16,7 +16,7 @@
 //!
 //! Readers and writers elsewhere in the crate take bytes or `Read`, and never a path.
 
-mod allowed;
+mod allowed_folders;
 mod atomic;
 mod disk;
 mod disk_error;
@@ -34,7 +34,7 @@ mod store;
 mod verify;
 mod watch;
 
-pub use allowed::{AllowedError, AllowedFolders};
+pub use allowed_folders::{AllowedError, AllowedFolders};
 pub use atomic::{FileSet, SaveError, SaveStep, is_temp_name, remove_stale_temps, save_atomic, save_set};
 pub use disk::{Disk, DiskFile, Entry, EntryKind, Hold, RealDisk};
 pub use disk_error::DiskError;

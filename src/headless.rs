@@ -5,7 +5,11 @@
 
 pub mod posing;
 
-use std::{collections::BTreeMap, sync::Arc, time::{Duration, Instant}};
+use std::{
+    collections::BTreeMap,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 

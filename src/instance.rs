@@ -71,7 +71,7 @@ use crate::{
     },
     processor::PoseNote,
     rig::{PoseOffset, RestTransform, SourceError, Uid, update::Change},
-    solve::program::{Exposed, ProgramError},
+    solve::program::{ExposedNode, ProgramError},
 };
 
 /// Plugin of instances. Add it after Bevy's [`AssetPlugin`] and [`RigPlugins`](crate::plugins::RigPlugins) where an app has
@@ -169,7 +169,7 @@ pub struct RigInstance(pub Handle<RigTemplate>);
 /// ([`RigFailed`]), and the instance has all controls then.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq, Default)]
 #[reflect(Component)]
-pub struct ExposedNodes(pub Vec<Exposed>);
+pub struct ExposedNodes(pub Vec<ExposedNode>);
 
 /// The built template that an instance runs.
 #[derive(Component, Reflect, Debug, Clone)]

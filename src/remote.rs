@@ -39,7 +39,7 @@ use bevy::{app::MainScheduleOrder, ecs::schedule::ScheduleLabel, prelude::*};
 use serde_json::Value;
 
 pub use self::error::RemoteError;
-use self::{answers::Pending, error::CallError, schema::Verb};
+use self::{answers::PendingCall, error::CallError, schema::Verb};
 use crate::{
     files::AllowedFolders,
     instance::{RigInstancePlugin, UpdateInstances},
@@ -201,7 +201,7 @@ impl Plugin for RemotePlugin {
 pub struct RemoteServer {
     gate: Arc<Gate>,
     calls: Mutex<Receiver<Call>>,
-    pending: Vec<Pending>,
+    pending: Vec<PendingCall>,
     /// Events of instances since the last look.
     signs: Vec<answers::Sign>,
 }

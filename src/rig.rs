@@ -4,7 +4,7 @@
 
 pub mod animation;
 pub mod bake;
-mod built;
+mod built_rig;
 pub mod character;
 mod constraint;
 pub mod deform;
@@ -31,7 +31,7 @@ mod uid;
 pub mod update;
 pub mod version;
 
-pub use built::{
+pub use built_rig::{
     Attribute, AttributeKind, BuiltConstraint, BuiltInput, BuiltNode, BuiltRig, Channels, ControlData, LayerData,
     LayerDisplay, Limits, Matching, NodeType, Origin, SwitchData, VISIBLE,
 };

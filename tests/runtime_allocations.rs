@@ -9,7 +9,7 @@ use bevy::{ecs::schedule::SingleThreadedExecutor, prelude::*};
 use rigsmith::{
     plugins::runtime::{ControlPose, InstanceMode, RigRuntime, RuntimePlugin, spawn_instance},
     rig::PoseOffset,
-    solve::program::{CompileOptions, Exposed, Keep, Memory, RigProgram, RigState},
+    solve::program::{CompileOptions, ExposedNode, Keep, Memory, RigProgram, RigState},
 };
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
@@ -37,7 +37,7 @@ fn allocations(frames: usize, mut call: impl FnMut(usize)) -> usize {
 /// Allocations of a frame's systems, with `count` instances that all move.
 fn frame_allocations(count: usize, frames: usize, mode: InstanceMode) -> usize {
     let keep = match mode {
-        InstanceMode::Direct => Keep::DeformAndExposed(vec![Exposed::Controls]),
+        InstanceMode::Direct => Keep::DeformAndExposed(vec![ExposedNode::Controls]),
         InstanceMode::Hierarchy => Keep::All,
     };
     let program = compile(keep);
@@ -77,8 +77,8 @@ fn frame_allocations(count: usize, frames: usize, mode: InstanceMode) -> usize {
 fn nothing_is_allocated_once_warm() {
     for (keep, memory) in [
         (Keep::All, Memory::Whole),
-        (Keep::DeformAndExposed(vec![Exposed::Controls]), Memory::Whole),
-        (Keep::DeformAndExposed(vec![Exposed::Controls]), Memory::Results),
+        (Keep::DeformAndExposed(vec![ExposedNode::Controls]), Memory::Whole),
+        (Keep::DeformAndExposed(vec![ExposedNode::Controls]), Memory::Results),
     ] {
         let program = compile(keep);
         let posable: Vec<usize> = (0..program.nodes().len()).filter(|at| program.nodes()[*at].is_posable()).collect();

@@ -99,7 +99,7 @@ pub fn transfer_weights(
         (0..graph.len()).into_par_iter().map(|n| origin.closest(graph.place(n))).collect();
 
     let mut known: Vec<Option<Sparse>> = vec![None; graph.len()];
-    let mut origins = vec![From::Inpainted; graph.len()];
+    let mut origins = vec![WeightOrigin::Inpainted; graph.len()];
     for island in graph.islands() {
         let cosine = |n: u32| closest[n as usize].as_ref().map_or(0.0, |c| c.normal.dot(normals[n as usize]));
         let near = |n: u32| closest[n as usize].as_ref().is_some_and(|c| c.distance <= limit);
@@ -112,7 +112,7 @@ pub fn transfer_weights(
             let trusted = near(n) && (blind || cosine(n) * side >= settings.cosine);
             if found.same || (trusted && !found.influences.is_empty()) {
                 known[n as usize] = Some(found.influences.clone());
-                origins[n as usize] = if found.same { From::Copied } else { From::Matched };
+                origins[n as usize] = if found.same { WeightOrigin::Copied } else { WeightOrigin::Matched };
             }
         }
     }
@@ -126,7 +126,7 @@ pub fn transfer_weights(
             continue;
         };
         let (influences, count) = match (&known[node], &inpainted[node], &closest[node]) {
-            (Some(influences), ..) if origins[node] == From::Copied => (influences.clone(), &mut report.copied),
+            (Some(influences), ..) if origins[node] == WeightOrigin::Copied => (influences.clone(), &mut report.copied),
             (Some(influences), ..) => (influences.clone(), &mut report.matched),
             (None, Some(influences), _) => (influences.clone(), &mut report.inpainted),
             (None, None, Some(found)) if !found.influences.is_empty() => {
@@ -141,7 +141,7 @@ pub fn transfer_weights(
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum From {
+enum WeightOrigin {
     Copied,
     Matched,
     Inpainted,

@@ -40,7 +40,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use crate::mesh::model::Weights;
-use bind::{Bound, Source};
+use bind::{BoundSurface, Source};
 use finish::Shaping;
 use twist::Limbs;
 pub use {
@@ -257,7 +257,7 @@ pub fn skin_weights(
     // Rigid parts neither spread heat nor hide bones.
     let soft: Vec<[u32; 3]> =
         triangles.iter().copied().filter(|t| !t.iter().any(|&p| shaping.is_given(p as usize))).collect();
-    let Bound { place, weights, sources, stiff, gaps } =
+    let BoundSurface { place, weights, sources, stiff, gaps } =
         bind::bind(points, &soft, (&limbs.joints, &limbs.claims(claims)), &limbs.free, settings, progress)?;
     for (point, &place) in place.iter().enumerate() {
         let count = match sources[place as usize] {

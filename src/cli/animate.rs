@@ -35,7 +35,7 @@ use crate::{
     },
     solve::{
         bake_clip::{BakedNode, bake_clip},
-        retarget::{Onto, RetargetError, RetargetSettings, Retargeted, measure_feet, retarget},
+        retarget::{MotionTarget, RetargetError, RetargetSettings, RetargetedMotion, measure_feet, retarget},
     },
 };
 
@@ -115,11 +115,11 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     let is_motion = FileKind::of(&args.clip) == Some(FileKind::Bvh);
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
     let onto = match args.onto {
-        Some(OntoArg::Joints) => Onto::Joints,
-        None if !has_commands => Onto::Joints,
-        Some(OntoArg::Controls) | None => Onto::Controls,
+        Some(OntoArg::Joints) => MotionTarget::Joints,
+        None if !has_commands => MotionTarget::Joints,
+        Some(OntoArg::Controls) | None => MotionTarget::Controls,
     };
-    if is_motion && onto == Onto::Joints && has_commands {
+    if is_motion && onto == MotionTarget::Joints && has_commands {
         report
             .notes
             .push("--onto joints: the commands of the rig are left out, so that joints can have keys".to_owned());
@@ -228,7 +228,12 @@ fn add(bench: &mut Workbench, clip: RigClip) -> Result<RigClip, Failure> {
 }
 
 /// A motion on the rig, with its clip added to the document.
-fn moved(args: &AnimateArgs, onto: Onto, bench: &mut Workbench, report: &mut Report) -> Result<Vec<RigClip>, Failure> {
+fn moved(
+    args: &AnimateArgs,
+    onto: MotionTarget,
+    bench: &mut Workbench,
+    report: &mut Report,
+) -> Result<Vec<RigClip>, Failure> {
     let motion = spinning("reading the motion", || load_motion(&RealDisk, &args.clip))?;
     report.notes(motion.notes.iter().cloned());
     let given = args.map.as_deref().map(|path| load_joint_map(&RealDisk, path)).transpose()?.unwrap_or_default();
@@ -249,7 +254,7 @@ fn moved(args: &AnimateArgs, onto: Onto, bench: &mut Workbench, report: &mut Rep
     };
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let done = spinning("retargeting", || retarget(bench.rig(), built, &motion, &map, &settings))?;
-    let Retargeted { clip, keys, stances, unmoved, notes } = done;
+    let RetargetedMotion { clip, keys, stances, unmoved, notes } = done;
     report.notes(notes);
     if !unmoved.is_empty() {
         report

@@ -13,7 +13,7 @@ use crate::{
     files::{RealDisk, stem, store_rig, store_rig_over},
     rig::{
         Rig, RigAbout, RigEdit, Uid, UidSource,
-        extract::{self, Extracted},
+        extract::{self, Extraction},
         nearest::{did_you_mean, listed},
         operations::{Axis, Operation, TagOperation},
     },
@@ -194,7 +194,7 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
     let mut uids = uids_of(std::slice::from_ref(&rig));
     let name = stem(&args.output);
     let extracted = extract::extract(&rig, &joints, &name, args.new_uids.then_some(&mut uids));
-    let Extracted { rig: mut out, left } = extracted.map_err(|error| Failure::Input(Box::new(error)))?;
+    let Extraction { rig: mut out, left } = extracted.map_err(|error| Failure::Input(Box::new(error)))?;
     if args.kind == ExtractKind::Template {
         let about = RigAbout { kind: "template".to_owned(), ..out.about().clone() };
         out.apply(&RigEdit::SetAbout(Box::new(about))).map_err(|error| Failure::Input(Box::new(error)))?;

@@ -38,7 +38,7 @@ const FIRST_BYTES: u64 = 8 << 10;
 const MOST: usize = 10_000;
 
 /// A template by its header.
-struct Listed {
+struct ListedTemplate {
     file: String,
     header: Result<TemplateHeader, HeaderError>,
 }
@@ -53,7 +53,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
         elsewhere.extend(in_folder(folder, false, &mut report)?);
     }
     elsewhere.retain(|other| listed.iter().all(|own| own.file != other.file));
-    let mut bundled: Vec<Listed> = BUNDLED_CHARACTERS.iter().chain(BUNDLED_PARTS).map(of_bundled).collect();
+    let mut bundled: Vec<ListedTemplate> = BUNDLED_CHARACTERS.iter().chain(BUNDLED_PARTS).map(of_bundled).collect();
     bundled.sort_by(|a, b| a.file.cmp(&b.file));
     if args.folder.is_none() {
         listed.append(&mut elsewhere);
@@ -77,7 +77,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
 }
 
 /// The templates in a folder and in those below it, in the order of their paths.
-fn in_folder(top: &Path, is_needed: bool, report: &mut Report) -> Result<Vec<Listed>, Failure> {
+fn in_folder(top: &Path, is_needed: bool, report: &mut Report) -> Result<Vec<ListedTemplate>, Failure> {
     let mut paths = Vec::new();
     let mut folders = vec![top.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -105,13 +105,13 @@ fn in_folder(top: &Path, is_needed: bool, report: &mut Report) -> Result<Vec<Lis
     paths.sort();
     let listed = paths.par_iter().map_init(
         || PartFiles::new(&RealDisk),
-        |files, path| Listed { file: path.display().to_string(), header: header(path, files) },
+        |files, path| ListedTemplate { file: path.display().to_string(), header: header(path, files) },
     );
     Ok(listed.collect())
 }
 
 /// A template that comes with Rigsmith.
-fn of_bundled((name, text): &(&str, &str)) -> Listed {
+fn of_bundled((name, text): &(&str, &str)) -> ListedTemplate {
     let header = template::read_header(text.as_bytes()).map_err(HeaderError::from);
     let completed = header.map(|mut header| {
         let none = BTreeMap::new();
@@ -122,13 +122,13 @@ fn of_bundled((name, text): &(&str, &str)) -> Listed {
         }
         header
     });
-    Listed { file: (*name).to_owned(), header: completed }
+    ListedTemplate { file: (*name).to_owned(), header: completed }
 }
 
 /// The newest version of each template, and where it is.
-fn newest<'a>(all: impl Iterator<Item = &'a Listed>) -> BTreeMap<Uid, (&'a str, &'a str)> {
+fn newest<'a>(all: impl Iterator<Item = &'a ListedTemplate>) -> BTreeMap<Uid, (&'a str, &'a str)> {
     let mut newest: BTreeMap<Uid, (&str, &str)> = BTreeMap::new();
-    for Listed { file, header } in all {
+    for ListedTemplate { file, header } in all {
         let Ok(header) = header else { continue };
         let known = newest.entry(header.uid).or_insert((&header.version, file));
         if compare(known.0, &header.version) == Ordering::Less {
@@ -139,8 +139,8 @@ fn newest<'a>(all: impl Iterator<Item = &'a Listed>) -> BTreeMap<Uid, (&'a str, 
 }
 
 /// Tells a template in a line; returns what programs read of it.
-fn tell(one: &Listed, newest: &BTreeMap<Uid, (&str, &str)>, report: &mut Report) -> Value {
-    let Listed { file, header } = one;
+fn tell(one: &ListedTemplate, newest: &BTreeMap<Uid, (&str, &str)>, report: &mut Report) -> Value {
+    let ListedTemplate { file, header } = one;
     let header = match header {
         Ok(header) => header,
         Err(error) => {

@@ -30,8 +30,8 @@ use self::{
 };
 pub use self::{
     document::{MeshSource, OpenDocument, StateFolder},
-    open::Loading,
-    save::Saving,
+    open::LoadJob,
+    save::SaveJob,
 };
 use super::{
     ActiveRig,
@@ -59,8 +59,8 @@ impl Plugin for FilesPlugin {
             .add_message::<JournalTrouble>()
             .add_message::<WindowCloseRequested>()
             .add_message::<FileDragAndDrop>()
-            .init_resource::<Loading>()
-            .init_resource::<Saving>()
+            .init_resource::<LoadJob>()
+            .init_resource::<SaveJob>()
             .init_resource::<Dialog>()
             .init_resource::<StateFolder>()
             .init_resource::<recovery::Recovery>()
@@ -85,7 +85,7 @@ pub enum OpenRequest {
 
 /// Action that follows once unsaved changes are saved or discarded.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Then {
+pub enum FollowUp {
     /// Opens another document.
     Open(OpenRequest),
     /// Replaces the document by the one that was loaded in the meantime and is held.
@@ -152,8 +152,8 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     recovery::poll(world);
     document::watch_places(world);
     show_title(world);
-    let busy = world.resource::<Loading>().what().is_some()
-        || world.resource::<Saving>().what().is_some()
+    let busy = world.resource::<LoadJob>().what().is_some()
+        || world.resource::<SaveJob>().what().is_some()
         || world.resource::<recovery::Recovery>().is_looking();
     if busy && let Some(mut redraw) = world.get_resource_mut::<Messages<RequestRedraw>>() {
         redraw.write(RequestRedraw);
@@ -194,7 +194,7 @@ fn act(world: &mut World, action: Action) {
         Action::Save => save(world, None),
         Action::SaveAs => ask_path(world, Purpose::Save, None),
         Action::Export => ask_path(world, Purpose::Export, None),
-        Action::Quit => after_asking(world, Then::Quit),
+        Action::Quit => after_asking(world, FollowUp::Quit),
         _ => {}
     }
 }
@@ -212,11 +212,11 @@ fn request_open(world: &mut World, request: OpenRequest) {
             return;
         }
     }
-    after_asking(world, Then::Open(request));
+    after_asking(world, FollowUp::Open(request));
 }
 
 /// Proceeds at once if no unsaved changes would be lost; otherwise asks.
-pub(super) fn after_asking(world: &mut World, then: Then) {
+pub(super) fn after_asking(world: &mut World, then: FollowUp) {
     match active(world).filter(|rig| is_unsaved(world, *rig)) {
         Some(rig) => {
             let name = world.get::<OpenDocument>(rig).map(|document| document.name.clone()).unwrap_or_default();
@@ -227,18 +227,18 @@ pub(super) fn after_asking(world: &mut World, then: Then) {
 }
 
 /// Proceeds; unsaved changes are discarded.
-fn proceed(world: &mut World, then: Then) {
+fn proceed(world: &mut World, then: FollowUp) {
     match then {
-        Then::Open(request) => open::start(world, request),
-        Then::Land => open::land_held(world),
-        Then::Recover(journal) => recovery::start(world, journal),
-        Then::Quit => quit(world),
+        FollowUp::Open(request) => open::start(world, request),
+        FollowUp::Land => open::land_held(world),
+        FollowUp::Recover(journal) => recovery::start(world, journal),
+        FollowUp::Quit => quit(world),
     }
 }
 
 /// Ends the journal, so that no recovery is offered the next time, and closes the window.
 fn quit(world: &mut World) {
-    if world.resource_mut::<Saving>().wait_for(Then::Quit) {
+    if world.resource_mut::<SaveJob>().wait_for(FollowUp::Quit) {
         return;
     }
     document::close_journal(world, true);
@@ -246,7 +246,7 @@ fn quit(world: &mut World) {
 }
 
 /// Saves the project to its file, or asks for one.
-fn save(world: &mut World, then: Option<Then>) {
+fn save(world: &mut World, then: Option<FollowUp>) {
     let Some(rig) = active(world) else { return };
     match world.get::<OpenDocument>(rig).and_then(|document| document.project.clone()) {
         Some(path) => save::project(world, path, then),
@@ -254,7 +254,7 @@ fn save(world: &mut World, then: Option<Then>) {
     }
 }
 
-fn ask_path(world: &mut World, purpose: Purpose, then: Option<Then>) {
+fn ask_path(world: &mut World, purpose: Purpose, then: Option<FollowUp>) {
     let Some(rig) = active(world) else { return };
     let suggestion = save::suggestion(world, rig, purpose);
     world.resource_mut::<Dialog>().ask(Question::Path { purpose, suggestion, then });
@@ -264,7 +264,7 @@ fn dialog_answered(world: &mut World, question: Question, answer: Answer) {
     match (question, answer) {
         (Question::Unsaved { then, .. }, Answer::Save) => save(world, Some(then)),
         (Question::Unsaved { then, .. }, Answer::Discard) => proceed(world, then),
-        (Question::Unsaved { then: Then::Land, .. }, _) => open::drop_held(world),
+        (Question::Unsaved { then: FollowUp::Land, .. }, _) => open::drop_held(world),
         (Question::Open, Answer::Path(path)) => request_open(world, OpenRequest::File(path)),
         (Question::Path { purpose, suggestion, then }, Answer::Path(path)) => {
             let path = save::completed(&path, purpose);
@@ -289,7 +289,7 @@ fn dialog_answered(world: &mut World, question: Question, answer: Answer) {
         (Question::Fit(fit), Answer::Fit) => template::put(world, &fit, fit.ratio()),
         (Question::Fit(fit), Answer::AsItIs) => template::put(world, &fit, 1.0),
         (Question::Recover(list), answer) => recovery::answered(world, list, answer),
-        (Question::Path { then: Some(Then::Land), .. }, _) => open::drop_held(world),
+        (Question::Path { then: Some(FollowUp::Land), .. }, _) => open::drop_held(world),
         _ => {}
     }
 }

@@ -11,7 +11,7 @@ use bevy::{
 use super::{
     ActiveRig,
     files::{
-        Loading, Then, after_asking,
+        FollowUp, LoadJob, after_asking,
         dialog::{Answer, Dialog, Question},
         loading::{
             Context, LoadedDocument, LoadedFile, MeshSource, OpenError, Work, begin, bundled_model, document, hash_of,
@@ -25,8 +25,8 @@ use crate::{
     files::{
         Disk, FileKind, RealDisk,
         journal::{
-            Basis, Condition, MAX_JOURNAL, Origin, PendingJournal, RecordKind, Recovered, Restored, journal_beside,
-            pending_journal, pending_journals, project_beside, recover,
+            Basis, Condition, MAX_JOURNAL, Origin, PendingJournal, RecordKind, RecoveredJournal, RestoredRig,
+            journal_beside, pending_journal, pending_journals, project_beside, recover,
         },
         load_model, read_capped, stem,
     },
@@ -83,7 +83,7 @@ pub(super) fn poll(world: &mut World) {
     }
     if world.resource::<Recovery>().found.is_empty()
         || world.resource::<Dialog>().question().is_some()
-        || world.resource::<Loading>().what().is_some()
+        || world.resource::<LoadJob>().what().is_some()
         || !world.contains_resource::<ActiveRig>()
     {
         return;
@@ -99,7 +99,7 @@ pub(super) fn answered(world: &mut World, mut list: Vec<PendingJournal>, answer:
         Answer::Recover(journal) => {
             list.retain(|pending| pending.path != journal);
             world.resource_mut::<Recovery>().found = list;
-            after_asking(world, Then::Recover(journal));
+            after_asking(world, FollowUp::Recover(journal));
         }
         Answer::Forget(journal) => {
             list.retain(|pending| pending.path != journal);
@@ -169,7 +169,7 @@ fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
 }
 
 /// Adds warnings about lost work.
-fn tell_losses(recovered: &Recovered, restored: &Restored, basis: Basis, opened: &mut LoadedDocument) {
+fn tell_losses(recovered: &RecoveredJournal, restored: &RestoredRig, basis: Basis, opened: &mut LoadedDocument) {
     if let Some(reason) = &restored.replayed.refused {
         let total = recovered.changes().len();
         opened.warnings.push(format!(
@@ -214,7 +214,7 @@ fn tell_losses(recovered: &Recovered, restored: &Restored, basis: Basis, opened:
 }
 
 /// An empty rig with the meshes that were open, if they can be opened again.
-fn with_meshes(recovered: &Recovered) -> LoadedDocument {
+fn with_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
     let context: Context = ron::from_str(recovered.context()).unwrap_or_default();
     let name = match (context.name.is_empty(), recovered.origin().path()) {
         (false, _) => context.name,

@@ -26,7 +26,7 @@ use super::{
 use crate::{
     files::{RealDisk, journal::Journal, store_project},
     plugins::journal::RigJournal,
-    rig::step::{Committed, SinkError, StepSink},
+    rig::step::{Commit, SinkError, StepSink},
 };
 
 /// Plugin that saves the work when the renderer or the program fails.
@@ -129,10 +129,10 @@ fn rescue(world: &mut World, rig: Entity) -> Result<PathBuf, WriteError> {
 static WATCHED: Mutex<Weak<Journal>> = Mutex::new(Weak::new());
 
 /// A journal that is flushed when the program panics.
-struct Watched(Arc<Journal>);
+struct WatchedJournal(Arc<Journal>);
 
-impl StepSink for Watched {
-    fn record(&self, committed: Committed) {
+impl StepSink for WatchedJournal {
+    fn record(&self, committed: Commit) {
         self.0.record(committed);
     }
 
@@ -149,7 +149,7 @@ impl StepSink for Watched {
 pub(super) fn watched(journal: Journal) -> RigJournal {
     let journal = Arc::new(journal);
     *WATCHED.lock().unwrap_or_else(PoisonError::into_inner) = Arc::downgrade(&journal);
-    RigJournal::new(Watched(journal))
+    RigJournal::new(WatchedJournal(journal))
 }
 
 /// Flushes the journal before the panic is handled.

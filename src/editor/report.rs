@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     ActiveRig,
     camera::ViewportSight,
-    files::{Loading, dialog::Dialog},
+    files::{LoadJob, dialog::Dialog},
     mode::Mode,
     notice::StatusLine,
     pointer::ViewportArea,
@@ -84,7 +84,7 @@ fn write(
     rigs: Query<(&Rig, &Selection, &RigHistory, &JointEntities, Option<&RigMeshes>, Option<&RigSurface>)>,
     places: Query<&GlobalTransform>,
     jobs: Query<(), Or<(With<SkinningJob>, With<FitJob>)>>,
-    (mode, loading, status): (Res<Mode>, Res<Loading>, Res<StatusLine>),
+    (mode, loading, status): (Res<Mode>, Res<LoadJob>, Res<StatusLine>),
     (area, sight, dialog): (Res<ViewportArea>, Res<ViewportSight>, Res<Dialog>),
 ) {
     let mut report = WindowReport {

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_egui::egui;
 
-use super::{ActiveRig, files::Loading, next_step::next_step, notice::StatusLine, style};
+use super::{ActiveRig, files::LoadJob, next_step::next_step, notice::StatusLine, style};
 use crate::{
     plugins::{
         document::Selection,
@@ -49,7 +49,7 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World) {
 
 /// Description of background work.
 fn doing(world: &World) -> Option<String> {
-    if let Some(loading) = world.get_resource::<Loading>()
+    if let Some(loading) = world.get_resource::<LoadJob>()
         && let Some(what) = loading.what()
     {
         return Some(format!("Opening {what}"));

@@ -5,12 +5,12 @@
 //! included. A record is with the kernel within milliseconds, which survives the death of the process, and on the disk
 //! a moment later, which survives a power cut; neither holds up the caller. A clean [`close`](Journal::close) removes
 //! the file, so that a file whose process is dead holds unsaved work: [`pending_journals`] lists them, [`recover`]
-//! reads one, [`Recovered::restore`] restores the rig, and [`Journal::resume`] continues with it.
+//! reads one, [`RecoveredJournal::restore`] restores the rig, and [`Journal::resume`] continues with it.
 //!
 //! **Damage.** Each record has a checksum of its own, so that [`recover`] reads every sound record and lists the
-//! [`Gap`]s between them; [`Recovered::restore`] applies all changes that the rig still accepts and lists the others.
-//! Only a whole journal whose changes are all saved is ever removed without asking. [`Journal::resume`] keeps a damaged
-//! one under the ending `.damaged`, and deleting it is for people to decide.
+//! [`Gap`]s between them; [`RecoveredJournal::restore`] applies all changes that the rig still accepts and lists the
+//! others. Only a whole journal whose changes are all saved is ever removed without asking. [`Journal::resume`] keeps a
+//! damaged one under the ending `.damaged`, and deleting it is for people to decide.
 //!
 //! **Saving.** [`Journal::saving`] records the content that the project file is about to get (the hash of its
 //! [`project_files`](crate::files::project_files)) and the number of changes in it; after the file is in place,
@@ -52,9 +52,9 @@ pub use place::{
     Condition, JournalPlaces, PendingJournal, file_hash_at, journal_beside, pending_journal, pending_journals,
     project_beside,
 };
-pub use read::{Basis, Ending, JournalError, MAX_JOURNAL, Recovered, recover};
-pub use restore::{Restored, SkipReason, Skipped};
-pub use writer::{Journal, JournalStart, Resumed};
+pub use read::{Basis, Ending, JournalError, MAX_JOURNAL, RecoveredJournal, recover};
+pub use restore::{RestoredRig, SkipReason, SkippedChange};
+pub use writer::{Journal, JournalStart, ResumedJournal};
 
 pub use crate::rig::skin::content_hash as file_hash;
 
@@ -126,7 +126,7 @@ struct Content {
     context: String,
     /// Position of the first change.
     first: u64,
-    changes: Vec<crate::rig::step::Committed>,
+    changes: Vec<crate::rig::step::Commit>,
     marks: Vec<SaveMark>,
 }
 

@@ -61,7 +61,7 @@ pub(super) fn is_due(
 }
 
 /// An instance that does not run what it should.
-struct Due {
+struct DueInstance {
     entity: Entity,
     built: Arc<BuiltTemplate>,
     program: Arc<RigProgram>,
@@ -114,12 +114,12 @@ pub(super) fn update_instances(world: &mut World) {
         });
         let runs_other = runtime.is_none_or(|runtime| !Arc::ptr_eq(runtime.state().program(), &program));
         if is_fresh || is_other || runs_other {
-            due.push(Due { entity, built: built.clone(), program, mode: *mode, is_fresh, is_other });
+            due.push(DueInstance { entity, built: built.clone(), program, mode: *mode, is_fresh, is_other });
         }
     }
     world.resource_mut::<RigTemplates>().is_fresh = false;
-    let (fresh, going): (Vec<Due>, Vec<Due>) = due.into_iter().partition(|due| due.is_fresh);
-    for Due { entity, built, program, mode, .. } in &fresh {
+    let (fresh, going): (Vec<DueInstance>, Vec<DueInstance>) = due.into_iter().partition(|due| due.is_fresh);
+    for DueInstance { entity, built, program, mode, .. } in &fresh {
         world.entity_mut(*entity).despawn_related::<RigNodes>();
         spawn_instance(world, *entity, program, *mode);
         describe(world, *entity, built);
@@ -135,10 +135,10 @@ pub(super) fn update_instances(world: &mut World) {
     for (entity, kept) in &kept {
         pose_controls(world, *entity, kept);
     }
-    for Due { entity, .. } in fresh {
+    for DueInstance { entity, .. } in fresh {
         world.trigger(RigBuilt { entity });
     }
-    for Due { entity, built, .. } in going.into_iter().filter(|due| due.is_other) {
+    for DueInstance { entity, built, .. } in going.into_iter().filter(|due| due.is_other) {
         let deviations = kept.remove(&entity).map(|kept| kept.deviations).unwrap_or_default();
         let poses = deviations.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect();
         world.trigger(RigUpdated { entity, changes: built.changes.clone(), ran: built.ran.clone(), poses });
@@ -162,14 +162,17 @@ fn program(
 
 /// Lets instances go on with the programs of their templates. Returns instances whose nodes are described otherwise now, with
 /// `true` if the nodes themselves are others, and the poses of instances whose offsets are others now.
-fn exchange(world: &mut World, going: &[Due]) -> (Vec<(Entity, Arc<BuiltTemplate>, bool)>, EntityHashMap<KeptPose>) {
-    let wanted: EntityHashMap<&Due> = going.iter().map(|due| (due.entity, due)).collect();
+fn exchange(
+    world: &mut World,
+    going: &[DueInstance],
+) -> (Vec<(Entity, Arc<BuiltTemplate>, bool)>, EntityHashMap<KeptPose>) {
+    let wanted: EntityHashMap<&DueInstance> = going.iter().map(|due| (due.entity, due)).collect();
     let mut query = world.query::<(Entity, &mut RigRuntime, &mut RunningTemplate)>();
     let mut exchanges: Vec<Exchange> = Vec::new();
     let mut descriptions: Vec<(Arc<BuiltTemplate>, Arc<BuiltTemplate>, bool)> = Vec::new();
     let (mut steps, mut others) = (Vec::new(), Vec::new());
     for (entity, runtime, mut running) in query.iter_mut(world) {
-        let Some(Due { built, program: to, .. }) = wanted.get(&entity) else { continue };
+        let Some(DueInstance { built, program: to, .. }) = wanted.get(&entity) else { continue };
         let before = std::mem::replace(&mut running.0, built.clone());
         let known = descriptions.iter().find(|(from, to, _)| Arc::ptr_eq(from, &before) && Arc::ptr_eq(to, built));
         let is_alike = known.map(|(.., is_alike)| *is_alike).unwrap_or_else(|| {

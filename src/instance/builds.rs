@@ -23,7 +23,7 @@ use crate::{
         template,
         update::{Change, Take, update, with_identities},
     },
-    solve::program::{CompileOptions, Exposed, Keep, ProgramCache, ProgramError, RigProgram},
+    solve::program::{CompileOptions, ExposedNode, Keep, ProgramCache, ProgramError, RigProgram},
 };
 
 /// A template with what its commands make of it.
@@ -44,7 +44,7 @@ pub struct BuiltTemplate {
     /// Places that other things hang on, as the file has them.
     file_sockets: Arc<[PartSocket]>,
     /// Programs with joints and some nodes, for instances with [`ExposedNodes`](super::ExposedNodes).
-    some: Mutex<Vec<(Vec<Exposed>, Arc<RigProgram>)>>,
+    some: Mutex<Vec<(Vec<ExposedNode>, Arc<RigProgram>)>>,
     /// Differences from the build before.
     pub changes: Arc<[Change]>,
     /// Tags of the commands that ran, in their order.
@@ -64,7 +64,7 @@ impl BuiltTemplate {
     ///
     /// # Errors
     /// A node that the rig does not have.
-    pub fn exposing(&self, exposed: &[Exposed]) -> Result<Arc<RigProgram>, ProgramError> {
+    pub fn exposing(&self, exposed: &[ExposedNode]) -> Result<Arc<RigProgram>, ProgramError> {
         let mut some = self.some.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, known)) = some.iter().find(|(known, _)| known == exposed) {
             return Ok(known.clone());
@@ -74,16 +74,16 @@ impl BuiltTemplate {
         Ok(program)
     }
 
-    fn options(&self, exposed: Vec<Exposed>) -> CompileOptions {
+    fn options(&self, exposed: Vec<ExposedNode>) -> CompileOptions {
         lean_options(exposed, &self.sockets, &self.built)
     }
 }
 
 /// Options of a program with joints, sockets and those nodes.
-fn lean_options(mut exposed: Vec<Exposed>, sockets: &[PartSocket], built: &BuiltRig) -> CompileOptions {
+fn lean_options(mut exposed: Vec<ExposedNode>, sockets: &[PartSocket], built: &BuiltRig) -> CompileOptions {
     let joints = sockets.iter().filter_map(|socket| socket.joint);
     let there = joints.filter(|joint| built.nodes.iter().any(|node| node.uid == *joint));
-    exposed.extend(there.map(Exposed::Uid));
+    exposed.extend(there.map(ExposedNode::Uid));
     CompileOptions { keep: Keep::DeformAndExposed(exposed), ..CompileOptions::default() }
 }
 
@@ -328,7 +328,7 @@ impl TemplateBuild {
         let sockets: Arc<[PartSocket]> = file_sockets.iter().map(|socket| self.named_first(socket, &rig)).collect();
         let mut program = |options: &CompileOptions| self.programs.get(&built, options);
         let programs: Result<_, ProgramError> = program(&CompileOptions::default())
-            .and_then(|whole| Ok((whole, program(&lean_options(vec![Exposed::Controls], &sockets, &built))?)));
+            .and_then(|whole| Ok((whole, program(&lean_options(vec![ExposedNode::Controls], &sockets, &built))?)));
         let (whole, lean) = programs.map_err(|source| TemplateError::CannotRun { file: self.file.clone(), source })?;
         let (source, changes, ran) = (source.clone(), changes.into(), report.executed.into());
         let some = Mutex::default();

@@ -105,13 +105,13 @@ struct WatchedFolder {
     looked: Option<Instant>,
     /// The files, unless a task looks at them.
     files: Option<FolderFiles>,
-    task: Option<Task<(FolderFiles, Vec<Saved>)>>,
+    task: Option<Task<(FolderFiles, Vec<SavedFile>)>>,
     /// Texts of expressions and units.
     faces: BTreeMap<PathBuf, String>,
 }
 
 /// Content of a saved file; `None` for one that is gone.
-struct Saved {
+struct SavedFile {
     file: PathBuf,
     content: Option<Vec<u8>>,
 }
@@ -148,7 +148,7 @@ impl Kind {
 
 impl FolderFiles {
     /// Looks at all files. Returns those with another content.
-    fn look(&mut self) -> Vec<Saved> {
+    fn look(&mut self) -> Vec<SavedFile> {
         let (mut found, mut folders) = (Vec::new(), vec![self.folder.clone()]);
         while let Some(folder) = folders.pop() {
             // A folder that is not there has no files.
@@ -165,14 +165,14 @@ impl FolderFiles {
         self.watches.retain(|file, _| {
             let is_there = found.contains(file);
             if !is_there {
-                saved.push(Saved { file: file.clone(), content: None });
+                saved.push(SavedFile { file: file.clone(), content: None });
             }
             is_there
         });
         for file in found {
             let watch = self.watches.entry(file.clone()).or_insert_with(|| FileWatch::new(&file, MAX_BYTES as u64));
             if let Some(content) = watch.look(&RealDisk) {
-                saved.push(Saved { content: Some(content.to_vec()), file });
+                saved.push(SavedFile { content: Some(content.to_vec()), file });
             }
         }
         saved
@@ -200,7 +200,7 @@ fn follow_folder(
     let Some((files, saved)) = folder.task.as_mut().and_then(check_ready) else { return };
     folder.task = None;
     folder.files = Some(files);
-    for Saved { file, content } in saved {
+    for SavedFile { file, content } in saved {
         let text = content.map(String::from_utf8).transpose().map_err(|_| FolderError::Text);
         let taken = text.and_then(|text| match (Kind::of(&file), text) {
             (Some(Kind::Form), Some(text)) => Ok(take_form(modules.as_deref_mut(), &file, &text)?),

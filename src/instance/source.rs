@@ -16,7 +16,7 @@ use crate::{
     rig::{
         Rig,
         operations::Operation,
-        step::{Committed, Step},
+        step::{Commit, Step},
         update::{Change as Difference, Take, Update, clip_edits, edits_between, pose_edits, update},
         version::VersionChange,
     },
@@ -57,12 +57,12 @@ pub struct RigSource {
     notes: Arc<[PoseNote]>,
     /// True if the build had failed before the update.
     had_failed: bool,
-    steps: Vec<Accepted>,
+    steps: Vec<AcceptedUpdate>,
 }
 
 /// Step of an update, with the bases before and after it.
 #[derive(Debug, Clone)]
-struct Accepted {
+struct AcceptedUpdate {
     step: Arc<Step>,
     before: Option<Arc<Rig>>,
     after: Arc<Rig>,
@@ -180,15 +180,15 @@ pub(super) fn follow_steps(
         let (Ok(mut source), Some(committed)) = (sources.get_mut(*rig), committed) else { continue };
         let known = source.steps.iter().find(|known| Arc::ptr_eq(&known.step, committed.step())).cloned();
         match (committed, known) {
-            (Committed::Done(step), _) if *name == UPDATE => {
+            (Commit::Done(step), _) if *name == UPDATE => {
                 let Some(built) = source.pending.take() else { continue };
                 let (before, after) = (source.base.take(), built.rig.clone());
                 source.base = Some(after.clone());
-                source.steps.push(Accepted { step: step.clone(), before, after });
+                source.steps.push(AcceptedUpdate { step: step.clone(), before, after });
                 source.trial = Some(built);
             }
-            (Committed::Undone(_), Some(known)) => source.base = known.before,
-            (Committed::Redone(_), Some(known)) => source.base = Some(known.after),
+            (Commit::Undone(_), Some(known)) => source.base = known.before,
+            (Commit::Redone(_), Some(known)) => source.base = Some(known.after),
             _ => {}
         }
     }

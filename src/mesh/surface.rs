@@ -12,7 +12,7 @@ mod closest;
 mod crossing;
 mod node;
 mod packet;
-mod pending;
+mod pending_surface;
 mod traverse;
 mod tree;
 mod volumes;
@@ -20,7 +20,7 @@ mod volumes;
 use glam::Vec3;
 use rayon::prelude::*;
 
-pub use pending::{PendingSurface, hits_brute};
+pub use pending_surface::{PendingSurface, hits_brute};
 pub use volumes::{Volume, volumes};
 
 use crate::mesh::ray::{Hit, Ray};

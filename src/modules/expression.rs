@@ -7,7 +7,7 @@ use crate::{
     parameters,
     processor::{BuildScope, ModuleError, RigModule},
     rig::{Channel, Constraint, label::mirror_label, reference::NodeRefs},
-    solve::expression::Expression as Compiled,
+    solve::expression::Expression as CompiledExpression,
 };
 
 parameters! {
@@ -81,7 +81,8 @@ impl RigModule for Expression {
                 ));
             }
         }
-        Compiled::new(&self.text, &names).map_err(|error| ModuleError::parameter("text", error.to_string()))?;
+        CompiledExpression::new(&self.text, &names)
+            .map_err(|error| ModuleError::parameter("text", error.to_string()))?;
         let mut inputs = Vec::with_capacity(self.inputs.len());
         for input in &self.inputs {
             let parameter = format!("inputs, {}", input.name);

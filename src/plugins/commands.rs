@@ -29,7 +29,7 @@ pub use super::{
 use crate::{
     modules,
     processor::{BuildError, BuildRange, Builder, CommandStatus, Modules, RigModule, RunReport},
-    rig::{BuiltRig, Rig, RigEdit, Uid, step::Committed},
+    rig::{BuiltRig, Rig, RigEdit, Uid, step::Commit},
 };
 
 /// Plugin that builds rigs: runs the commands of tags and spawns entities for what they create.
@@ -186,8 +186,8 @@ fn build_rigs(
         });
         let entry = &mut changed[at];
         match &message.committed {
-            Some(Committed::Done(step) | Committed::Redone(step)) => entry.1.extend(step.forward.iter().cloned()),
-            Some(Committed::Undone(step)) => entry.1.extend(step.backward.iter().cloned()),
+            Some(Commit::Done(step) | Commit::Redone(step)) => entry.1.extend(step.forward.iter().cloned()),
+            Some(Commit::Undone(step)) => entry.1.extend(step.backward.iter().cloned()),
             // A preview, or its end, lists no edits: the builder compares the whole document.
             None => entry.2 = false,
         }

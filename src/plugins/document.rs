@@ -22,7 +22,7 @@ use super::{
     RigSystems,
     animation::AutoKey,
     configure_sets,
-    history::{Recorded, RigHistory},
+    history::{RecordedOperation, RigHistory},
 };
 pub use super::{
     schema::{Joint, NodeLabel, NodeOf},
@@ -32,7 +32,7 @@ use crate::rig::{
     Rig, UidSource,
     feature::FeatureKinds,
     operations::{MirrorPlane, Operation},
-    step::Committed,
+    step::Commit,
 };
 
 /// Adds rigs, their joint entities and the edit path.
@@ -119,7 +119,7 @@ pub struct Edited {
     /// Short name of the step that was done, undone or redone.
     pub name: Cow<'static, str>,
     /// Committed change; `None` if the operation had nothing to do or is only previewed.
-    pub committed: Option<Committed>,
+    pub committed: Option<Commit>,
     /// True if a preview began, changed or ended.
     pub preview: bool,
     /// Notes for people, a sentence each: copied tags that found no place, for example.
@@ -160,7 +160,7 @@ fn apply_edits(
         let done = |name, committed| Edited { rig, name, committed, preview: false, notes: Vec::new() };
         let previewed =
             |name: &'static str| Edited { rig, name: name.into(), committed: None, preview: true, notes: Vec::new() };
-        let recorded = |Recorded { name, step, notes }| Edited { notes, ..done(name, step.map(Committed::Done)) };
+        let recorded = |RecordedOperation { name, step, notes }| Edited { notes, ..done(name, step.map(Commit::Done)) };
         // A write to an entity concerns that entity only; live mirroring does not apply to it.
         let plane = symmetry.0.filter(|_| !is_of_entities);
         let keyed = |operation| auto_key.map_or(Cow::Borrowed(operation), |auto_key| auto_key.keyed(operation));
@@ -173,12 +173,12 @@ fn apply_edits(
                 .undo(&mut document, &mut selected)
                 .ok_or(ChangeError::NothingToUndo)
                 .and_then(|undone| Ok(undone?))
-                .map(|step| done(step.name.clone(), Some(Committed::Undone(step)))),
+                .map(|step| done(step.name.clone(), Some(Commit::Undone(step)))),
             Change::Redo => history
                 .redo(&mut document, &mut selected)
                 .ok_or(ChangeError::NothingToRedo)
                 .and_then(|redone| Ok(redone?))
-                .map(|step| done(step.name.clone(), Some(Committed::Redone(step)))),
+                .map(|step| done(step.name.clone(), Some(Commit::Redone(step)))),
             Change::Preview(operation) => history
                 .preview(&mut document, &mut uids, symmetry.0, &keyed(operation))
                 .map(previewed)

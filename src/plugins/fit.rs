@@ -198,13 +198,13 @@ pub enum FitFailure {
 pub struct FitJob {
     progress: Arc<AtomicU32>,
     cancelled: Arc<AtomicBool>,
-    task: Task<Result<Finished, FitFailure>>,
+    task: Task<Result<FinishedFit, FitFailure>>,
     /// The rig that the fit started from.
     from: Arc<Rig>,
     /// Last step and number of undone steps when the fit was asked for.
     history: HistoryState,
     /// Finished fit that waits to be committed.
-    held: Option<Finished>,
+    held: Option<FinishedFit>,
 }
 
 /// Last step of a history and its number of undone steps: a new step discards those.
@@ -271,7 +271,7 @@ pub struct EndFit {
     pub cancel: bool,
 }
 
-struct Finished {
+struct FinishedFit {
     fitted: FittedRig,
     target: Rig,
 }
@@ -344,17 +344,19 @@ fn land(
                 continue;
             }
             (Ok(_), Ok((rig, _))) if !is_same_skeleton(rig, &job.from) => Err(FitFailure::Changed),
-            (Ok(Finished { mut fitted, target }), Ok((rig, history))) => match fitted.edits(rig, &target, &modules.0) {
-                Ok(changes) => {
-                    let report = fitted.report.clone();
-                    fitted.before = history.last().cloned();
-                    let operation = Operation::Named { name: FIT, edits: changes };
-                    commands.write_message(EditRequest::operation(of.0, operation));
-                    commands.entity(of.0).try_insert(fitted);
-                    Ok(report)
+            (Ok(FinishedFit { mut fitted, target }), Ok((rig, history))) => {
+                match fitted.edits(rig, &target, &modules.0) {
+                    Ok(changes) => {
+                        let report = fitted.report.clone();
+                        fitted.before = history.last().cloned();
+                        let operation = Operation::Named { name: FIT, edits: changes };
+                        commands.write_message(EditRequest::operation(of.0, operation));
+                        commands.entity(of.0).try_insert(fitted);
+                        Ok(report)
+                    }
+                    Err(error) => Err(error.into()),
                 }
-                Err(error) => Err(error.into()),
-            },
+            }
         };
         answers.write(Fitted { mesh: entity, result });
         commands.entity(entity).try_remove::<FitJob>();

@@ -8,7 +8,7 @@ use super::selection::Selection;
 use crate::rig::{
     EditError, Rig, RigEdit, Uid, UidSource,
     operations::{MirrorPlane, Operation, OperationError, Outcome},
-    step::{Committed, Step, UndoStacks},
+    step::{Commit, Step, UndoStacks},
 };
 
 /// Steps done to a rig and steps that can be redone, with the preview of a drag.
@@ -28,7 +28,7 @@ struct Preview {
 
 /// Outcome of a recorded operation.
 #[derive(Debug, Clone)]
-pub struct Recorded {
+pub struct RecordedOperation {
     /// Short name of the operation.
     pub name: Cow<'static, str>,
     /// Recorded step; `None` if the operation changed nothing.
@@ -65,7 +65,7 @@ impl RigHistory {
         uids: &mut UidSource,
         symmetry: Option<MirrorPlane>,
         operation: &Operation,
-    ) -> Result<Recorded, OperationError> {
+    ) -> Result<RecordedOperation, OperationError> {
         self.cancel_preview(rig);
         let outcome = operation.run(rig, uids, symmetry)?;
         Ok(self.record(selection, operation.name(), outcome))
@@ -90,7 +90,7 @@ impl RigHistory {
     }
 
     /// Records the preview as one step; `None` without a preview.
-    pub fn commit_preview(&mut self, selection: &mut Selection) -> Option<Recorded> {
+    pub fn commit_preview(&mut self, selection: &mut Selection) -> Option<RecordedOperation> {
         let Preview { name, outcome } = self.preview.take()?;
         Some(self.record(selection, name, outcome))
     }
@@ -118,7 +118,7 @@ impl RigHistory {
     }
 
     /// Records an operation whose edits have already been applied.
-    fn record(&mut self, selection: &mut Selection, name: &'static str, outcome: Outcome) -> Recorded {
+    fn record(&mut self, selection: &mut Selection, name: &'static str, outcome: Outcome) -> RecordedOperation {
         let before = selection.0.clone();
         let after = outcome
             .selected
@@ -126,14 +126,14 @@ impl RigHistory {
         let name = Cow::Borrowed(name);
         // An operation without effect makes no step: undoing it would seem to do nothing.
         if outcome.edits.is_empty() && after == before {
-            return Recorded { name, step: None, notes: outcome.notes };
+            return RecordedOperation { name, step: None, notes: outcome.notes };
         }
         let step = Step { name: name.clone(), forward: outcome.edits, backward: outcome.inverses, before, after };
         let step = Arc::new(step);
         selection.0.clone_from(&step.after);
         self.discarded += u64::from(self.can_redo());
-        self.stacks.follow(&Committed::Done(step.clone()));
-        Recorded { name, step: Some(step), notes: outcome.notes }
+        self.stacks.follow(&Commit::Done(step.clone()));
+        RecordedOperation { name, step: Some(step), notes: outcome.notes }
     }
 
     /// Undoes the last step and returns it; `None` without a step. A preview is reverted first.
@@ -144,7 +144,7 @@ impl RigHistory {
             return Some(Err(error));
         }
         selection.0.clone_from(&step.before);
-        self.stacks.follow(&Committed::Undone(step.clone()));
+        self.stacks.follow(&Commit::Undone(step.clone()));
         Some(Ok(step))
     }
 
@@ -156,7 +156,7 @@ impl RigHistory {
             return Some(Err(error));
         }
         selection.0.clone_from(&step.after);
-        self.stacks.follow(&Committed::Redone(step.clone()));
+        self.stacks.follow(&Commit::Redone(step.clone()));
         Some(Ok(step))
     }
 

@@ -14,7 +14,7 @@ use bevy::prelude::*;
 use super::{RigSystems, configure_sets, document::Edited, history::RigHistory, selection::Selection};
 use crate::rig::{
     Rig,
-    step::{Committed, Replayed, SinkError, StepSink},
+    step::{Commit, Replay, SinkError, StepSink},
 };
 
 /// Plugin of journals; does nothing for rigs without a [`RigJournal`].
@@ -47,7 +47,7 @@ impl RigJournal {
     }
 
     /// Hands over a change that was made outside the edit path of the plugins.
-    pub fn record(&self, committed: Committed) {
+    pub fn record(&self, committed: Commit) {
         self.sink.record(committed);
     }
 
@@ -94,7 +94,7 @@ fn report_trouble(journals: Query<(Entity, &RigJournal)>, mut trouble: MessageWr
 }
 
 /// The components of a replayed rig: document, selection and history.
-pub fn replayed_bundle(replayed: &Replayed) -> (Rig, Selection, RigHistory) {
+pub fn replayed_bundle(replayed: &Replay) -> (Rig, Selection, RigHistory) {
     (
         replayed.rig.clone(),
         Selection(replayed.selection.clone().unwrap_or_default()),

@@ -23,7 +23,7 @@ use crate::{
     rig::{
         Rig, RigEdit, SkinData, Uid,
         operations::Operation,
-        step::{Committed, Step},
+        step::{Commit, Step},
     },
 };
 
@@ -98,16 +98,16 @@ pub enum ReloadError {
 /// Running exchange of a mesh.
 #[derive(Component)]
 pub struct ReloadJob {
-    task: Task<Result<Finished, ReloadError>>,
+    task: Task<Result<FinishedReload, ReloadError>>,
     /// The version, and the weights that are transferred to it.
     model: Arc<Model>,
     from: Option<Arc<SkinData>>,
     /// Finished exchange that waits to be committed.
-    held: Option<Finished>,
+    held: Option<FinishedReload>,
 }
 
 #[derive(Clone)]
-struct Finished {
+struct FinishedReload {
     mesh: RigMesh,
     skin: Option<Arc<SkinData>>,
     report: ReloadReport,
@@ -140,7 +140,7 @@ fn start(
     }
 }
 
-fn reloaded(before: &RigMesh, model: &Model, skin: Option<&SkinData>) -> Result<Finished, ReloadError> {
+fn reloaded(before: &RigMesh, model: &Model, skin: Option<&SkinData>) -> Result<FinishedReload, ReloadError> {
     if model.points.is_empty() {
         return Err(ReloadError::Empty);
     }
@@ -167,7 +167,7 @@ fn reloaded(before: &RigMesh, model: &Model, skin: Option<&SkinData>) -> Result<
             Some(Arc::new(SkinData { weights, at_rest: true, ..skin.clone() }))
         }
     };
-    Ok(Finished { mesh, skin, report })
+    Ok(FinishedReload { mesh, skin, report })
 }
 
 fn land(
@@ -200,7 +200,7 @@ fn land(
             }
         }
         commands.entity(entity).try_remove::<ReloadJob>();
-        let result = result.map(|Finished { mesh, skin, report }| {
+        let result = result.map(|FinishedReload { mesh, skin, report }| {
             match skin {
                 Some(skin) => {
                     let edits = vec![RigEdit::SetSkin(mesh.uid, Some(skin))];
@@ -234,7 +234,7 @@ fn exchange(
         for (entity, mesh, _, mut versions) in meshes.iter_mut().filter(|(_, _, of, _)| of.0 == *rig) {
             let step = committed.step();
             let is_own = |edit: &RigEdit| matches!(edit, RigEdit::SetSkin(uid, _) if *uid == mesh.uid);
-            if *name == RELOAD && matches!(committed, Committed::Done(_)) && step.forward.iter().any(is_own) {
+            if *name == RELOAD && matches!(committed, Commit::Done(_)) && step.forward.iter().any(is_own) {
                 let Some(next) = versions.next.take() else { continue };
                 versions.steps.push((step.clone(), mesh.clone(), next.clone()));
                 commands.entity(entity).try_insert(next);
@@ -243,7 +243,7 @@ fn exchange(
             let Some((_, before, after)) = versions.steps.iter().find(|(known, ..)| Arc::ptr_eq(known, step)) else {
                 continue;
             };
-            let version = if matches!(committed, Committed::Undone(_)) { before } else { after };
+            let version = if matches!(committed, Commit::Undone(_)) { before } else { after };
             commands.entity(entity).try_insert(version.clone());
         }
     }

@@ -2,7 +2,7 @@
 
 mod bends;
 mod body;
-mod late;
+mod late_joints;
 mod parts;
 mod report;
 
@@ -58,7 +58,7 @@ impl Plugin for SkinningPlugin {
         configure_sets(app);
         app.add_message::<BindRequest>().add_message::<Bound>().add_message::<ResultHeld>().add_systems(
             Update,
-            (start_skinning, late::start_late_shares, land_skinning).chain().in_set(RigSystems::Bind),
+            (start_skinning, late_joints::start_late_shares, land_skinning).chain().in_set(RigSystems::Bind),
         );
     }
 }
@@ -124,16 +124,16 @@ pub enum SkinningError {
 pub struct SkinningJob {
     progress: Arc<AtomicU32>,
     cancelled: Arc<AtomicBool>,
-    task: Task<Computed>,
+    task: Task<SkinningResult>,
     /// Hash of the part of the document that the weights are computed from.
     basis: JobBasis,
     /// Finished weights that wait to be committed; see [`landing`](super::landing).
-    held: Option<Computed>,
+    held: Option<SkinningResult>,
     /// True if a [`BindRequest`] asked for it, which [`Bound`] answers.
     is_asked: bool,
 }
 
-type Computed = Result<BoundSkin, WeightError>;
+type SkinningResult = Result<BoundSkin, WeightError>;
 
 /// Weights of a mesh, and what binding it showed.
 #[derive(Debug, Clone)]

@@ -18,7 +18,7 @@ use super::{
 use crate::rig::{
     Rig, RigEdit, Uid,
     operations::Operation,
-    step::{Committed, Step},
+    step::{Commit, Step},
 };
 
 /// Name of the step that deletes a rig.
@@ -162,13 +162,13 @@ fn follow_steps(
         let (Ok((mut deletions, stage)), Some(committed)) = (rigs.get_mut(*rig), committed) else { continue };
         let step = committed.step();
         let was_deleted = deletions.current.is_some();
-        if matches!(committed, Committed::Done(_)) && (*name == DELETE || *name == RESTORE) {
+        if matches!(committed, Commit::Done(_)) && (*name == DELETE || *name == RESTORE) {
             let before = deletions.current.take();
             let after = (*name == DELETE).then(|| step.clone());
             deletions.current.clone_from(&after);
             deletions.steps.push(Crossing { step: step.clone(), before, after });
         } else if let Some(crossing) = deletions.steps.iter().find(|known| Arc::ptr_eq(&known.step, step)) {
-            let is_undone = matches!(committed, Committed::Undone(_));
+            let is_undone = matches!(committed, Commit::Undone(_));
             let current = if is_undone { crossing.before.clone() } else { crossing.after.clone() };
             deletions.current = current;
         }

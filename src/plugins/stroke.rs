@@ -102,12 +102,12 @@ pub enum StrokeResult {
     /// The listed joints were deleted.
     Erased(Vec<Uid>),
     /// The stroke had no effect, for the given reason.
-    Nothing(NothingDrawn),
+    Nothing(StrokeFailure),
 }
 
 /// Reason why a stroke had no effect; a sentence for people without its full stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NothingDrawn {
+pub enum StrokeFailure {
     /// The rig has no mesh.
     #[error("the rig has no mesh to draw on; open one first")]
     NoMesh,
@@ -186,7 +186,7 @@ fn stroke(
         };
         let result = match answer(since, meshes.is_some(), surface) {
             Answer::Wait => None,
-            Answer::Now(None) => Some(StrokeResult::Nothing(NothingDrawn::NoMesh)),
+            Answer::Now(None) => Some(StrokeResult::Nothing(StrokeFailure::NoMesh)),
             Answer::Now(Some(surface)) => {
                 let posed = posed_joints(rig, entities, place, &joints);
                 let scene = StrokeScene { rig, selection, symmetry, tips, surface, posed: &posed };
@@ -231,7 +231,7 @@ fn act(
             edits.write_batch(operation.map(|operation| EditRequest::operation(request.rig, *operation)));
             StrokeOutcome::Done(result)
         }
-        StrokePlan::NeedsChain => StrokeOutcome::Done(StrokeResult::Nothing(NothingDrawn::NoChain)),
+        StrokePlan::NeedsChain => StrokeOutcome::Done(StrokeResult::Nothing(StrokeFailure::NoChain)),
     }
 }
 

@@ -21,7 +21,7 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-use self::refresh::{PosedMesh, Refresh, Refreshed, are_same, are_same_meshes, bend, is_same};
+use self::refresh::{PosedMesh, Refresh, RefreshedSurface, are_same, are_same_meshes, bend, is_same};
 use super::{
     RigSystems,
     commands::{Built, BuiltEntities},
@@ -121,7 +121,7 @@ pub struct RigSurface {
     wanted: Vec<PosedMesh>,
     number: u64,
     /// The current refresh, and the number of the state that it will show.
-    task: Option<(Task<Refreshed>, u64)>,
+    task: Option<(Task<RefreshedSurface>, u64)>,
     /// The meshes that `landed` was built from, or that the task builds from.
     built: Vec<PosedMesh>,
     spare: Option<Surface>,
@@ -224,8 +224,8 @@ impl RigSurface {
         }
     }
 
-    fn land(&mut self, refreshed: Refreshed, number: u64) {
-        let Refreshed { surface, is_refit, is_whole, points } = refreshed;
+    fn land(&mut self, refreshed: RefreshedSurface, number: u64) {
+        let RefreshedSurface { surface, is_refit, is_whole, points } = refreshed;
         let old = self.landed.replace((surface, number)).map(|(old, _)| old);
         (self.is_whole, self.points) = (is_whole, points);
         if is_refit {

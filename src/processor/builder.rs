@@ -38,7 +38,7 @@ pub struct RunReport {
 
 /// Work that a command needs before it counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Due {
+enum DueWork {
     Nothing,
     /// Input that the command read may have changed.
     Check,
@@ -59,7 +59,7 @@ struct Command {
     asks: bool,
     /// The run in which it ran last.
     ran_in: u32,
-    due: Due,
+    due: DueWork,
     error: Option<BuildProblem>,
     micros: f32,
     runs: u32,
@@ -138,7 +138,7 @@ impl Builder {
         let readers: Vec<u32> = self.world.cell(node, aspect).readers.clone();
         for number in readers {
             if later(&self.world, number) {
-                self.mark(number, Due::Check);
+                self.mark(number, DueWork::Check);
             }
         }
         if aspect.is_structure() {
@@ -157,8 +157,8 @@ impl Builder {
         for at in from as usize..self.list.len() {
             let number = self.list[at];
             let command = &self.commands[number as usize];
-            if command.due == Due::Nothing && command.asks {
-                self.mark(number, Due::Check);
+            if command.due == DueWork::Nothing && command.asks {
+                self.mark(number, DueWork::Check);
             }
         }
     }
@@ -197,7 +197,7 @@ impl Builder {
     /// fewer than before, until the next run.
     pub fn cursor(&self) -> usize {
         let waiting = |Reverse((place, number)): &Reverse<(u32, u32)>| {
-            let is_due = self.commands[*number as usize].due != Due::Nothing;
+            let is_due = self.commands[*number as usize].due != DueWork::Nothing;
             (is_due && self.world.places[*number as usize] == *place).then_some(*place)
         };
         self.due.iter().filter_map(waiting).min().map_or(self.cursor, |due| due.min(self.cursor)) as usize
@@ -277,14 +277,14 @@ impl Builder {
             }
             self.due.pop();
             let due = self.commands[number as usize].due;
-            if due == Due::Nothing || self.world.places[number as usize] != place {
+            if due == DueWork::Nothing || self.world.places[number as usize] != place {
                 continue;
             }
-            if due == Due::Check && self.holds(number) {
-                self.commands[number as usize].due = Due::Nothing;
+            if due == DueWork::Check && self.holds(number) {
+                self.commands[number as usize].due = DueWork::Nothing;
                 continue;
             }
-            self.commands[number as usize].due = Due::Nothing;
+            self.commands[number as usize].due = DueWork::Nothing;
             let result = self.execute(number);
             if self.commands[number as usize].active {
                 report.executed.push(self.world.commands[number as usize]);
@@ -300,7 +300,7 @@ impl Builder {
         self.cursor = target;
         if let Some((number, problem)) = failed {
             // It is tried again in the next run: whatever made it fail may be gone.
-            self.mark(number, Due::Run);
+            self.mark(number, DueWork::Run);
             self.cursor = self.world.places[number as usize];
             self.failed = Some(number);
             self.commands[number as usize].error = Some(problem.clone());

@@ -54,14 +54,14 @@ pub enum FormElement {
         content: Vec<FormElement>,
     },
     /// A line of text.
-    Text(Bound),
+    Text(FormBinding),
     /// A box to check.
-    Check(Bound),
+    Check(FormBinding),
     /// One of several values.
     Menu {
         /// The parameter.
         param: String,
-        /// See [`Bound::label`].
+        /// See [`FormBinding::label`].
         #[serde(default)]
         label: String,
         /// The values as they stand in files, without quotation marks.
@@ -71,7 +71,7 @@ pub enum FormElement {
     Slider {
         /// The parameter.
         param: String,
-        /// See [`Bound::label`].
+        /// See [`FormBinding::label`].
         #[serde(default)]
         label: String,
         /// The lowest value that the slider reaches; others can be typed.
@@ -86,12 +86,12 @@ pub enum FormElement {
         unit: String,
     },
     /// A number, or the name of an attribute that it follows ([`Amount`](super::Amount)).
-    Amount(Bound),
+    Amount(FormBinding),
     /// A number without ends.
     Number {
         /// The parameter.
         param: String,
-        /// See [`Bound::label`].
+        /// See [`FormBinding::label`].
         #[serde(default)]
         label: String,
         /// Change of the number per pixel of a drag.
@@ -102,17 +102,17 @@ pub enum FormElement {
         unit: String,
     },
     /// Three numbers or three boxes, for X, Y and Z.
-    Vector(Bound),
+    Vector(FormBinding),
     /// Three pairs of lowest and highest values, each of which may be open, for X, Y and Z.
-    Limits(Bound),
+    Limits(FormBinding),
     /// An sRGB colour; may be left out where the parameter may.
-    Color(Bound),
+    Color(FormBinding),
     /// References to nodes.
-    Node(Bound),
+    Node(FormBinding),
     /// Keys of a curve: pairs of numbers, the first ones increasing.
-    Curve(Bound),
+    Curve(FormBinding),
     /// Several values of one kind, one a line.
-    List(Bound),
+    List(FormBinding),
     /// A line across.
     Separator,
     /// A note for people.
@@ -122,7 +122,7 @@ pub enum FormElement {
 /// Binding of an element that has no settings of its own.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Bound {
+pub struct FormBinding {
     /// The parameter, or a path into it.
     pub param: String,
     /// Label beside the element; the last name of the path, with blanks, if empty.

@@ -59,12 +59,12 @@ pub(super) struct Resolution {
 }
 
 /// Reason why a reference finds nothing.
-enum Missing {
+enum MissingTarget {
     Off(Box<Gap>),
     Wrong(ResolveError),
 }
 
-impl From<Gap> for Missing {
+impl From<Gap> for MissingTarget {
     fn from(gap: Gap) -> Self {
         Self::Off(Box::new(gap))
     }
@@ -76,8 +76,8 @@ pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Res
         let mut gaps = Vec::new();
         let found = match resolve_one(world, asker, reference, &mut gaps) {
             Ok(found) => found,
-            Err(Missing::Wrong(error)) => return Err(error),
-            Err(Missing::Off(gap)) => {
+            Err(MissingTarget::Wrong(error)) => return Err(error),
+            Err(MissingTarget::Off(gap)) => {
                 gaps = vec![*gap];
                 Vec::new()
             }
@@ -94,11 +94,16 @@ pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Res
 }
 
 /// Nodes of one reference; `gaps` gets the excluded nodes of a list that is not excluded as a whole.
-fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<Gap>) -> Result<Vec<NodeId>, Missing> {
+fn resolve_one(
+    world: &World,
+    asker: Asker,
+    reference: &NodeRef,
+    gaps: &mut Vec<Gap>,
+) -> Result<Vec<NodeId>, MissingTarget> {
     if let RigScope::Rig(rig) = reference.rig
         && rig != asker.rig
     {
-        return Err(Missing::Wrong(ResolveError::OtherRig(rig)));
+        return Err(MissingTarget::Wrong(ResolveError::OtherRig(rig)));
     }
     let place = asker.place;
     let label = reference.label.map(|bearer| label_of(world, bearer, place)).transpose()?;
@@ -126,7 +131,7 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
         Source::Joints => world.joints.iter().copied().filter(alive).collect(),
         Source::Input(uid) => {
             let node = world.id(*uid).filter(|node| world.is_input(*node));
-            Some(node.ok_or(Missing::Wrong(ResolveError::NoInput(*uid)))?).into_iter().filter(alive).collect()
+            Some(node.ok_or(MissingTarget::Wrong(ResolveError::NoInput(*uid)))?).into_iter().filter(alive).collect()
         }
         Source::Joint(uid) => vec![joint(world, *uid, place)?].into_iter().filter(alive).collect(),
         Source::Hierarchy(top) => {
@@ -145,7 +150,7 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
         }
         Source::Command(uid) => {
             let command = world.creator_of(*uid).filter(|command| before(*command));
-            let command = command.ok_or(Missing::Wrong(ResolveError::NoCommand(*uid)))?;
+            let command = command.ok_or(MissingTarget::Wrong(ResolveError::NoCommand(*uid)))?;
             if let Some(gap) = world.off.command(command) {
                 return Err(gap.into());
             }
@@ -173,7 +178,7 @@ fn resolve_one(world: &World, asker: Asker, reference: &NodeRef, gaps: &mut Vec<
         return Err(gap.into());
     }
     sort(world, &mut found, place);
-    let picked = reference.pick.indices(found.len()).map_err(|error| Missing::Wrong(error.into()))?;
+    let picked = reference.pick.indices(found.len()).map_err(|error| MissingTarget::Wrong(error.into()))?;
     if reference.pick != Pick::All {
         // Of the first or the last of a list nothing is missing.
         gaps.clear();
@@ -220,17 +225,17 @@ fn type_of(kind: NodeType) -> NodeTypes {
     }
 }
 
-fn joint(world: &World, uid: Uid, place: u32) -> Result<NodeId, Missing> {
+fn joint(world: &World, uid: Uid, place: u32) -> Result<NodeId, MissingTarget> {
     match (world.id(uid).filter(|node| world.exists(*node, place)), world.off.joint(uid)) {
         (Some(node), _) => Ok(node),
         (None, Some(gap)) => Err(gap.into()),
-        (None, None) => Err(Missing::Wrong(ResolveError::NoJoint(uid))),
+        (None, None) => Err(MissingTarget::Wrong(ResolveError::NoJoint(uid))),
     }
 }
 
 /// Text of the label of a joint, or of the node that a command labels.
-fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, Missing> {
-    let bare = || Missing::Wrong(ResolveError::NoLabel(bearer));
+fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, MissingTarget> {
+    let bare = || MissingTarget::Wrong(ResolveError::NoLabel(bearer));
     let before = |command: &u32| world.places[*command as usize] < place;
     if let Some(command) = world.creator_of(bearer).filter(before) {
         if let Some(gap) = world.off.command(command) {
@@ -242,7 +247,10 @@ fn label_of(world: &World, bearer: Uid, place: u32) -> Result<String, Missing> {
     }
     match world.id(bearer).filter(|node| world.exists(*node, place)) {
         Some(node) => world.label(node, place).map(|label| label.to_string()).ok_or_else(bare),
-        None => Err(world.off.joint(bearer).map_or(Missing::Wrong(ResolveError::NoBearer(bearer)), Missing::from)),
+        None => Err(world
+            .off
+            .joint(bearer)
+            .map_or(MissingTarget::Wrong(ResolveError::NoBearer(bearer)), MissingTarget::from)),
     }
 }
 

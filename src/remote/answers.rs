@@ -19,20 +19,20 @@ use crate::{
         document::{EditRefused, Edited},
     },
     rig::{
-        step::Committed,
+        step::Commit,
         update::{Change, Take},
     },
 };
 
 /// A call that waits for its answer.
-pub(super) struct Pending {
-    pub awaited: Awaited,
+pub(super) struct PendingCall {
+    pub awaited: AwaitedEvent,
     pub reply: Sender<Answer>,
     pub until: Instant,
 }
 
 /// Event that answers a call.
-pub(super) enum Awaited {
+pub(super) enum AwaitedEvent {
     /// A change: the step of that name, or one of the history without.
     Edit { rig: Entity, step: Option<&'static str> },
     /// A run of commands.
@@ -105,22 +105,24 @@ pub(super) fn answer_calls(
     let signs = std::mem::take(&mut server.signs);
     server.pending.retain_mut(|pending| {
         let answer = match &mut pending.awaited {
-            Awaited::Edit { rig, step } => edit_answer(*rig, *step, &edited, &refused),
-            Awaited::Build { rig } => {
+            AwaitedEvent::Edit { rig, step } => edit_answer(*rig, *step, &edited, &refused),
+            AwaitedEvent::Build { rig } => {
                 let report = done.iter().rfind(|done| done.rig == *rig).map(|done| &done.report);
                 report.map(|report| {
                     let error = report.error.as_ref().map(ToString::to_string);
                     Ok(json!({"executed": report.executed, "cursor": report.cursor, "error": error}))
                 })
             }
-            Awaited::Load { rig } => signs.iter().find(|sign| sign.rig() == *rig).map(|sign| match sign {
+            AwaitedEvent::Load { rig } => signs.iter().find(|sign| sign.rig() == *rig).map(|sign| match sign {
                 Sign::Failed(rig, error) => {
                     commands.entity(*rig).try_despawn();
                     Err(CallError::Template(error.clone()))
                 }
                 Sign::Built(_) | Sign::Updated(_) => Ok(json!({"rig": rig.to_bits()})),
             }),
-            awaited @ Awaited::Update { .. } => update_answer(awaited, &signs, &sources, &templates, &mut accepted),
+            awaited @ AwaitedEvent::Update { .. } => {
+                update_answer(awaited, &signs, &sources, &templates, &mut accepted)
+            }
         };
         match answer {
             Some(answer) => {
@@ -129,7 +131,7 @@ pub(super) fn answer_calls(
                 false
             }
             None if pending.until <= Instant::now() => {
-                if let Awaited::Load { rig } = pending.awaited {
+                if let AwaitedEvent::Load { rig } = pending.awaited {
                     commands.entity(rig).try_despawn();
                 }
                 false
@@ -149,7 +151,7 @@ fn edit_answer(
         edited.rig == rig
             && match step {
                 Some(name) => edited.name == name,
-                None => matches!(edited.committed, Some(Committed::Undone(_) | Committed::Redone(_))),
+                None => matches!(edited.committed, Some(Commit::Undone(_) | Commit::Redone(_))),
             }
     };
     if let Some(edited) = edited.iter().rfind(is_asked) {
@@ -161,13 +163,13 @@ fn edit_answer(
 }
 
 fn update_answer(
-    awaited: &mut Awaited,
+    awaited: &mut AwaitedEvent,
     signs: &[Sign],
     sources: &Query<(&RigSource, Option<&UpdateOffer>)>,
     templates: &RigTemplates,
     accepted: &mut MessageWriter<AcceptUpdate>,
 ) -> Option<Answer> {
-    let Awaited::Update { rig, template, before, is_known, take, changes } = awaited else { return None };
+    let AwaitedEvent::Update { rig, template, before, is_known, take, changes } = awaited else { return None };
     let told = |changes: &[Change], ran: Value, poses: Vec<String>| {
         Some(Ok(json!({"changes": changes, "ran": ran, "poses": poses})))
     };

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::{
     Call, RemoteServer,
-    answers::{Awaited, Pending},
+    answers::{AwaitedEvent, PendingCall},
     error::CallError,
     schema::Verb,
 };
@@ -146,9 +146,9 @@ impl std::fmt::Display for RigName {
 }
 
 /// A call that is answered, or waits for its answer.
-enum Started {
+enum StartedCall {
     Answered(Value),
-    Waits(Awaited),
+    Waits(AwaitedEvent),
 }
 
 /// Carries out the calls that have come.
@@ -161,23 +161,23 @@ pub(super) fn take_calls(world: &mut World) {
         let Call { verb, params, reply, until } = call;
         match start(world, verb, params) {
             // Nobody waits any more if the connection's time is over.
-            Ok(Started::Answered(value)) => drop(reply.send(Ok(value))),
+            Ok(StartedCall::Answered(value)) => drop(reply.send(Ok(value))),
             Err(error) => drop(reply.send(Err(error))),
-            Ok(Started::Waits(awaited)) => {
-                world.resource_mut::<RemoteServer>().pending.push(Pending { awaited, reply, until });
+            Ok(StartedCall::Waits(awaited)) => {
+                world.resource_mut::<RemoteServer>().pending.push(PendingCall { awaited, reply, until });
             }
         }
     }
 }
 
-fn start(world: &mut World, verb: Verb, params: Value) -> Result<Started, CallError> {
+fn start(world: &mut World, verb: Verb, params: Value) -> Result<StartedCall, CallError> {
     match verb {
         Verb::List => {
             let NoParams {} = read(verb, params)?;
-            Ok(Started::Answered(list(world)))
+            Ok(StartedCall::Answered(list(world)))
         }
-        Verb::Describe => describe(world, read(verb, params)?).map(Started::Answered),
-        Verb::Edit => edit(world, read(verb, params)?).map(Started::Waits),
+        Verb::Describe => describe(world, read(verb, params)?).map(StartedCall::Answered),
+        Verb::Edit => edit(world, read(verb, params)?).map(StartedCall::Waits),
         Verb::Build => {
             let params: BuildParams = read(verb, params)?;
             build(world, &params.rig, if params.restart { BuildStep::Restart } else { BuildStep::All })
@@ -195,8 +195,8 @@ fn start(world: &mut World, verb: Verb, params: Value) -> Result<Started, CallEr
             };
             build(world, &params.rig, step)
         }
-        Verb::Load => load(world, read(verb, params)?).map(Started::Waits),
-        Verb::Save => save(world, read(verb, params)?).map(Started::Answered),
+        Verb::Load => load(world, read(verb, params)?).map(StartedCall::Waits),
+        Verb::Save => save(world, read(verb, params)?).map(StartedCall::Answered),
         Verb::Update => renew(world, read(verb, params)?),
     }
 }
@@ -296,7 +296,7 @@ fn commands(processor: &Processor) -> Vec<Value> {
     builder.list().into_iter().filter_map(|entry| row(entry.command)).collect()
 }
 
-fn edit(world: &mut World, params: EditParams) -> Result<Awaited, CallError> {
+fn edit(world: &mut World, params: EditParams) -> Result<AwaitedEvent, CallError> {
     let (rig, _) = document(world, &params.rig)?;
     let (change, step) = match (params.edits, params.history) {
         (Some(edits), None) => (Change::Do(Operation::Named { name: REMOTE_EDIT, edits }), Some(REMOTE_EDIT)),
@@ -305,16 +305,16 @@ fn edit(world: &mut World, params: EditParams) -> Result<Awaited, CallError> {
         _ => return Err(CallError::NotTogether("give either `edits` or `history`")),
     };
     world.write_message(EditRequest { rig, change });
-    Ok(Awaited::Edit { rig, step })
+    Ok(AwaitedEvent::Edit { rig, step })
 }
 
-fn build(world: &mut World, name: &RigName, step: BuildStep) -> Result<Started, CallError> {
+fn build(world: &mut World, name: &RigName, step: BuildStep) -> Result<StartedCall, CallError> {
     let (rig, _) = document(world, name)?;
     world.write_message(BuildRequest { rig, step });
-    Ok(Started::Waits(Awaited::Build { rig }))
+    Ok(StartedCall::Waits(AwaitedEvent::Build { rig }))
 }
 
-fn load(world: &mut World, params: LoadParams) -> Result<Awaited, CallError> {
+fn load(world: &mut World, params: LoadParams) -> Result<AwaitedEvent, CallError> {
     let gate = world.resource::<RemoteServer>().gate.clone();
     let path = gate.folders.existing(template_path(&params.path)?)?;
     let opened = path.clone();
@@ -322,7 +322,7 @@ fn load(world: &mut World, params: LoadParams) -> Result<Awaited, CallError> {
     let template = template.map_err(|_| CallError::Ended)?;
     let source = if params.live { RigSource::live(template) } else { RigSource::new(template) };
     let rig = world.spawn((source, RemoteFile(path))).id();
-    Ok(Awaited::Load { rig })
+    Ok(AwaitedEvent::Load { rig })
 }
 
 fn template_path(path: &std::path::Path) -> Result<&std::path::Path, CallError> {
@@ -351,7 +351,7 @@ fn save(world: &mut World, params: SaveParams) -> Result<Value, CallError> {
     Ok(json!({"path": path.display().to_string(), "notes": notes}))
 }
 
-fn renew(world: &mut World, params: UpdateParams) -> Result<Started, CallError> {
+fn renew(world: &mut World, params: UpdateParams) -> Result<StartedCall, CallError> {
     let gate = world.resource::<RemoteServer>().gate.clone();
     let (entity, rig) = document(world, &params.rig)?;
     let rig = rig.clone();
@@ -375,18 +375,18 @@ fn renew(world: &mut World, params: UpdateParams) -> Result<Started, CallError> 
     let file = read.map_err(|source| TemplateError::Source { file: Some(path), source })?;
     if params.dry_run {
         let updated = update(source.base().map(|base| &**base), &rig, file.rig(), take);
-        return Ok(Started::Answered(json!({"changes": updated.changes, "ran": [], "poses": []})));
+        return Ok(StartedCall::Answered(json!({"changes": updated.changes, "ran": [], "poses": []})));
     }
     let template = source.template.clone();
     let before = world.resource::<RigTemplates>().built(&template).cloned();
     let is_known = before.as_ref().is_some_and(|before| before.is_of(file.rig()));
     if is_known && world.get::<UpdateOffer>(entity).is_none() {
-        return Ok(Started::Answered(json!({"changes": [], "ran": [], "poses": []})));
+        return Ok(StartedCall::Answered(json!({"changes": [], "ran": [], "poses": []})));
     }
     if !is_known {
         let offered = template.clone();
         let sent = world.run_system_once(move |files: TemplateFiles| files.offer(&offered, content.clone()));
         sent.map_err(|_| CallError::Ended)?;
     }
-    Ok(Started::Waits(Awaited::Update { rig: entity, template, before, is_known, take, changes: None }))
+    Ok(StartedCall::Waits(AwaitedEvent::Update { rig: entity, template, before, is_known, take, changes: None }))
 }

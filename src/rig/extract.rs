@@ -10,7 +10,7 @@ use super::{
 
 /// Joints taken out of a rig.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Extracted {
+pub struct Extraction {
     /// The rig of their own.
     pub rig: Rig,
     /// References to joints, commands and features that are not among them, a sentence each.
@@ -23,7 +23,7 @@ pub struct Extracted {
 ///
 /// # Errors
 /// [`EditError::NoJoint`] for a joint that the rig does not have.
-pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSource>) -> Result<Extracted, EditError> {
+pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSource>) -> Result<Extraction, EditError> {
     let chosen: HashSet<Uid> = joints.iter().copied().collect();
     if let Some(missing) = joints.iter().find(|uid| rig.joint(**uid).is_none()) {
         return Err(EditError::NoJoint(*missing));
@@ -95,7 +95,7 @@ pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSourc
     if !inputs.is_empty() {
         out.apply(&RigEdit::SetInputs(inputs))?;
     }
-    Ok(Extracted { rig: out, left })
+    Ok(Extraction { rig: out, left })
 }
 
 /// Inputs that a tag refers to.

@@ -28,7 +28,7 @@ impl fmt::Debug for Step {
 
 /// A change that has been made to a rig, with its place in the history.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Committed {
+pub enum Commit {
     /// A new step: undone steps can no longer be redone.
     Done(Arc<Step>),
     /// The last step in effect was undone.
@@ -37,7 +37,7 @@ pub enum Committed {
     Redone(Arc<Step>),
 }
 
-impl Committed {
+impl Commit {
     /// The step that was done, undone or redone.
     pub fn step(&self) -> &Arc<Step> {
         match self {
@@ -58,7 +58,7 @@ impl Committed {
 /// once.
 pub trait StepSink: Send + Sync {
     /// Takes one change.
-    fn record(&self, committed: Committed);
+    fn record(&self, committed: Commit);
 
     /// The reason why changes cannot be stored at the moment, the same one for as long as it lasts; `None` while they
     /// can.
@@ -105,19 +105,19 @@ pub struct UndoStacks {
 
 impl UndoStacks {
     /// Follows a change. An unknown step (one done before the stacks began) is inserted.
-    pub fn follow(&mut self, committed: &Committed) {
+    pub fn follow(&mut self, committed: &Commit) {
         match committed {
-            Committed::Done(step) => {
+            Commit::Done(step) => {
                 self.undone.clear();
                 self.done.push(step.clone());
             }
-            Committed::Undone(step) => {
+            Commit::Undone(step) => {
                 if self.undoes(step) {
                     self.done.pop();
                 }
                 self.undone.push(step.clone());
             }
-            Committed::Redone(step) => {
+            Commit::Redone(step) => {
                 if self.redoes(step) {
                     self.undone.pop();
                 }
@@ -139,7 +139,7 @@ impl UndoStacks {
 
 /// A rig after a replay.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Replayed {
+pub struct Replay {
     /// The document.
     pub rig: Rig,
     /// Selection after the last change; `None` without changes.
@@ -156,8 +156,8 @@ pub struct Replayed {
 /// Applies changes to `rig` again. The first `contained` of them are already in it and only become history.
 ///
 /// A change that the rig refuses ends the replay and is left out as a whole.
-pub fn replay(mut rig: Rig, changes: &[Committed], contained: usize) -> Replayed {
-    let mut replayed = Replayed::default();
+pub fn replay(mut rig: Rig, changes: &[Commit], contained: usize) -> Replay {
+    let mut replayed = Replay::default();
     for (number, committed) in changes.iter().enumerate() {
         let (edits, selection) = committed.effect();
         if number >= contained {
@@ -171,7 +171,7 @@ pub fn replay(mut rig: Rig, changes: &[Committed], contained: usize) -> Replayed
         replayed.selection = Some(selection.to_vec());
         replayed.applied += 1;
     }
-    Replayed { rig, ..replayed }
+    Replay { rig, ..replayed }
 }
 
 /// The edits that make an empty rig with the same uid equal to `rig`.

@@ -166,7 +166,7 @@ impl Merge<'_> {
     fn header(&mut self) {
         let uid = self.now.uid();
         let base = self.base.map(Rig::about);
-        let named = Named { uid, joint: None, tag: None, prefix: "" };
+        let named = ChangeSubject { uid, joint: None, tag: None, prefix: "" };
         self.rig.about = self.fields(&about_fields(), base, self.now.about(), self.file.about(), &named);
     }
 
@@ -176,7 +176,7 @@ impl Merge<'_> {
         let mut kept: BTreeMap<Uid, GroupData> = BTreeMap::new();
         for uid in all(&lists) {
             let prefix = now.group(uid).or(file.group(uid)).map_or_else(String::new, |g| format!("group {} ", g.name));
-            let named = Named { uid, joint: None, tag: None, prefix: &prefix };
+            let named = ChangeSubject { uid, joint: None, tag: None, prefix: &prefix };
             let sides = (base.and_then(|base| base.group(uid)), now.group(uid), file.group(uid));
             if let Fate::Kept(group) | Fate::Added(group) = self.fate(&group_fields(), sides, &named) {
                 kept.insert(uid, group);
@@ -198,7 +198,7 @@ impl Merge<'_> {
         for uid in all(&lists) {
             let input = now.input(uid).or(file.input(uid));
             let prefix = input.map_or_else(String::new, |input| format!("input {} ", input.name));
-            let named = Named { uid, joint: None, tag: None, prefix: &prefix };
+            let named = ChangeSubject { uid, joint: None, tag: None, prefix: &prefix };
             let sides = (base.and_then(|base| base.input(uid)), now.input(uid), file.input(uid));
             if let Fate::Kept(input) | Fate::Added(input) = self.fate(&input_fields(), sides, &named) {
                 kept.insert(uid, input);
@@ -219,7 +219,7 @@ impl Merge<'_> {
         for uid in all(&lists) {
             let pose = now.stored_pose(uid).or(file.stored_pose(uid));
             let prefix = pose.map_or_else(String::new, |pose| format!("pose {} ", pose.name));
-            let named = Named { uid, joint: None, tag: None, prefix: &prefix };
+            let named = ChangeSubject { uid, joint: None, tag: None, prefix: &prefix };
             let sides = (base.and_then(|base| base.stored_pose(uid)), now.stored_pose(uid), file.stored_pose(uid));
             if let Fate::Kept(pose) | Fate::Added(pose) = self.fate(&pose_fields(), sides, &named) {
                 kept.insert(uid, pose);
@@ -239,7 +239,7 @@ impl Merge<'_> {
         for uid in all(&lists) {
             let label = [now, file].into_iter().find_map(|rig| rig.joint(uid)?.data.label.clone());
             let title = label.unwrap_or_else(|| uid.to_string());
-            let named = Named { uid, joint: Some(&title), tag: None, prefix: "" };
+            let named = ChangeSubject { uid, joint: Some(&title), tag: None, prefix: "" };
             let whole = |rig: &Rig| rig.joint(uid).map(|joint| (joint.data.clone(), joint.parent));
             let (was, is, theirs) = (base.and_then(whole), whole(now), whole(file));
             let fields = joint_fields(now, file);
@@ -323,7 +323,7 @@ impl Merge<'_> {
         let [from, to] = [mine, theirs].map(|parent| parent.map(|uid| joint_title(self.now, self.file, uid)));
         let label = self.now.joint(uid).and_then(|joint| joint.data.label.clone());
         let title = label.unwrap_or_else(|| uid.to_string());
-        let named = Named { uid, joint: Some(&title), tag: None, prefix: "" };
+        let named = ChangeSubject { uid, joint: Some(&title), tag: None, prefix: "" };
         let field = Some("parent".to_owned());
         self.changes.push(Change { field, from, to, conflict: true, ..named.change() });
     }
@@ -340,7 +340,7 @@ impl Merge<'_> {
             let of = |rig: &Rig| rig.find_tag(uid).filter(|(on, _)| on.data.uid == joint).map(|(_, tag)| tag.clone());
             let (was, is, theirs) = (base.and_then(of), of(now), of(file));
             let Some(name) = is.as_ref().or(theirs.as_ref()).or(was.as_ref()).map(tag_title) else { continue };
-            let named = Named { uid, joint: Some(title), tag: Some(&name), prefix: "" };
+            let named = ChangeSubject { uid, joint: Some(title), tag: Some(&name), prefix: "" };
             let keys = [&was, &is, &theirs].map(Option::as_ref);
             let fields = tag_fields(&keys, now, file);
             let fate = self.fate(&fields, (was.as_ref(), is.as_ref(), theirs.as_ref()), &named);
@@ -359,7 +359,7 @@ impl Merge<'_> {
         &mut self,
         fields: &[Field<T>],
         (base, now, file): (Option<&T>, Option<&T>, Option<&T>),
-        named: &Named,
+        named: &ChangeSubject,
     ) -> Fate<T> {
         let same = |a: &T, b: &T| fields.iter().all(|field| (field.text)(a) == (field.text)(b));
         match (now, file) {
@@ -392,7 +392,14 @@ impl Merge<'_> {
         }
     }
 
-    fn fields<T: Clone>(&mut self, fields: &[Field<T>], base: Option<&T>, now: &T, file: &T, named: &Named) -> T {
+    fn fields<T: Clone>(
+        &mut self,
+        fields: &[Field<T>],
+        base: Option<&T>,
+        now: &T,
+        file: &T,
+        named: &ChangeSubject,
+    ) -> T {
         let mut merged = now.clone();
         let is_renamed = self.renamed.contains(&named.uid);
         for field in fields.iter().filter(|field| field.is_own) {
@@ -420,21 +427,21 @@ impl Merge<'_> {
         merged
     }
 
-    fn whole(&mut self, kind: ChangeKind, named: &Named, conflict: bool) {
+    fn whole(&mut self, kind: ChangeKind, named: &ChangeSubject, conflict: bool) {
         let field = Some(named.prefix.trim().to_owned()).filter(|field| !field.is_empty());
         self.changes.push(Change { kind, field, conflict, ..named.change() });
     }
 }
 
 /// Subject of the notes about changes.
-struct Named<'a> {
+struct ChangeSubject<'a> {
     uid: Uid,
     joint: Option<&'a str>,
     tag: Option<&'a str>,
     prefix: &'a str,
 }
 
-impl Named<'_> {
+impl ChangeSubject<'_> {
     fn change(&self) -> Change {
         Change {
             kind: ChangeKind::Changed,

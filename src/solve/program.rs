@@ -44,10 +44,10 @@ pub use state::{Carry, LANES, Memory, RigState};
 use self::{
     cache::ByConstraint,
     freedom::Freedom,
-    graph::{Driven, Graph},
+    graph::{DrivenRegister, Graph},
     layout::{Ends, Layout, Layouts},
     op::{Op, Pose, Tables, X},
-    run::{Alone, Machine, Scratch},
+    run::{Machine, Scratch, SingleRegisters},
     state::SpringState,
 };
 use crate::{
@@ -73,12 +73,12 @@ pub enum Keep {
     #[default]
     All,
     /// Joints and the listed nodes; only the listed nodes can be posed and have attributes. For games.
-    DeformAndExposed(Vec<Exposed>),
+    DeformAndExposed(Vec<ExposedNode>),
 }
 
 /// A node that a game wants to pose or to read.
 #[derive(bevy::reflect::Reflect, Debug, Clone, PartialEq, Eq)]
-pub enum Exposed {
+pub enum ExposedNode {
     /// The node with this uid.
     Uid(Uid),
     /// All nodes with this label.
@@ -87,7 +87,7 @@ pub enum Exposed {
     Controls,
 }
 
-impl fmt::Display for Exposed {
+impl fmt::Display for ExposedNode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Uid(uid) => uid.fmt(f),
@@ -225,7 +225,7 @@ impl RigProgram {
                 });
             }
         }
-        let local = |node: usize| if let Driven::Local(local) = driven[node] { Some(local) } else { None };
+        let local = |node: usize| if let DrivenRegister::Local(local) = driven[node] { Some(local) } else { None };
         let count = attribute_registers.len();
         attribute_registers.extend(graph.morphs.iter().map(|morph| morph.1));
         let ends = Ends {
@@ -249,7 +249,7 @@ impl RigProgram {
                 kind: rig.nodes[*node].kind,
                 parent: rig.nodes[*node].parent.and_then(|parent| slots[parent]),
                 base: rig.nodes[*node].base,
-                is_driven: driven[*node] != Driven::Not,
+                is_driven: driven[*node] != DrivenRegister::Not,
                 pose: layout.posed(graph.pose(*node)),
                 freedom: rig.nodes[*node].control.as_ref().and_then(|control| Freedom::of(control)),
                 local: local(*node).map(|local| layout.placed(local)),
@@ -333,7 +333,7 @@ fn run_fixed(graph: &mut Graph<'_>, fixed: &[Op]) {
     let (x, n) = (&mut graph.x, &mut graph.n);
     let mut machine = Machine {
         tables: &graph.tables,
-        registers: Alone::<false> { x, n, poses: &[], changed: false, moved: &mut [] },
+        registers: SingleRegisters::<false> { x, n, poses: &[], changed: false, moved: &mut [] },
         springs: &mut [] as &mut [SpringState],
         scratch: &mut Scratch::default(),
         dt: 0.0,

@@ -36,7 +36,7 @@ use crate::rig::{
 /// Nodes that get the keys of a retargeted motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Onto {
+pub enum MotionTarget {
     /// Controls of the rig, so that an animator can go on.
     Controls,
     /// Joints of a rig without commands.
@@ -51,7 +51,7 @@ pub struct RetargetSettings {
     /// True if the clip is played over and over.
     pub looped: bool,
     /// Nodes that get keys.
-    pub onto: Onto,
+    pub onto: MotionTarget,
     /// True to let a figure travel that walks on the spot.
     pub travel: bool,
     /// True to hold standing feet in their places.
@@ -65,7 +65,7 @@ impl Default for RetargetSettings {
         Self {
             frame_rate: None,
             looped: false,
-            onto: Onto::Controls,
+            onto: MotionTarget::Controls,
             travel: true,
             lock_feet: true,
             max_frames: 100_000,
@@ -75,7 +75,7 @@ impl Default for RetargetSettings {
 
 /// A retargeted motion.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Retargeted {
+pub struct RetargetedMotion {
     /// The clip, with one layer.
     pub clip: RigClip,
     /// Numbers of keys before and after the reduction.
@@ -113,8 +113,8 @@ pub enum RetargetError {
     Limb(#[from] MatchError),
 }
 
-/// Puts a motion onto a rig. `rig` is the document and `built` the result of its commands; for [`Onto::Joints`] the rig has no
-/// commands, and `built` only its joints.
+/// Puts a motion onto a rig. `rig` is the document and `built` the result of its commands; for [`MotionTarget::Joints`]
+/// the rig has no commands, and `built` only its joints.
 ///
 /// Takes some milliseconds a frame for the controls of a character, on all cores; the result is the same on any number of them.
 ///
@@ -126,7 +126,7 @@ pub fn retarget(
     motion: &Motion,
     map: &JointMap,
     settings: &RetargetSettings,
-) -> Result<Retargeted, RetargetError> {
+) -> Result<RetargetedMotion, RetargetError> {
     if motion.frames() == 0 {
         return Err(RetargetError::NoFrames);
     }
@@ -144,18 +144,18 @@ pub fn retarget(
         notes.push("the motion walks on the spot; the figure travels by the movement of its standing feet".to_owned());
     }
     let contacts = if settings.lock_feet { Contacts::find(&body, rate) } else { Contacts::none(&body) };
-    let has_twist = settings.onto == Onto::Controls;
+    let has_twist = settings.onto == MotionTarget::Controls;
     let poses = body.poses(&contacts, rate, has_twist);
     let mut clip = tracks::empty_clip(rig, &motion.name, rate, [0.0, *times.last().unwrap_or(&0.0)], settings.looped);
     let (keyed, unmoved) = match settings.onto {
-        Onto::Controls => {
+        MotionTarget::Controls => {
             let program = std::sync::Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
             controls::keyed(built, &program, &body, &poses)?
         }
-        Onto::Joints => (joints::keyed(&body, &poses), Vec::new()),
+        MotionTarget::Joints => (joints::keyed(&body, &poses), Vec::new()),
     };
     let keys = tracks::fill(&mut clip, &keyed, &times, target.height);
-    Ok(Retargeted { clip, keys, stances: contacts.stances(&body, &times), unmoved, notes })
+    Ok(RetargetedMotion { clip, keys, stances: contacts.stances(&body, &times), unmoved, notes })
 }
 
 /// Frame rate of a motion, divided until it is at most 60.

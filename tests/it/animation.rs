@@ -19,7 +19,7 @@ use rigsmith::{
             ClipFault, ClipLayer, Ease, Key, KeyFault, LayerMode, Marker, Property, RigClip, Track, TrackTarget,
         },
         operations::{ClipOperation, KeyOperation, Operation, OperationError},
-        step::{Committed, Step, edits_from_empty, replay},
+        step::{Commit, Step, edits_from_empty, replay},
         update::{Take, clip_edits, update},
     },
     solve::program::{CompileOptions, RigProgram},
@@ -245,9 +245,9 @@ fn clips_come_back_from_edits_and_from_steps() {
         after: vec![],
     };
     let step = Arc::new(step);
-    let done = replay(rig.clone(), &[Committed::Done(step.clone())], 0);
+    let done = replay(rig.clone(), &[Commit::Done(step.clone())], 0);
     assert_eq!((done.refused, &done.rig), (None, &other));
-    let undone = replay(rig.clone(), &[Committed::Done(step.clone()), Committed::Undone(step)], 0);
+    let undone = replay(rig.clone(), &[Commit::Done(step.clone()), Commit::Undone(step)], 0);
     assert_eq!(undone.rig, rig);
     // The edits between two rigs are those alone that differ.
     let edits = clip_edits(&rig, &other).unwrap();

@@ -181,8 +181,8 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "a.rig.ron"]).0, 0);
     let text = fs::read_to_string(at("a.rig.ron")).unwrap();
     /// A process that ends with the test, passed or not.
-    struct Ended(Child);
-    impl Drop for Ended {
+    struct OwnedProcess(Child);
+    impl Drop for OwnedProcess {
         fn drop(&mut self) {
             let _ = self.0.kill();
         }
@@ -192,7 +192,7 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
         .args(["watch", "a.rig.ron", "-o", "a.glb", "--count", "4", "--json"])
         .stdout(Stdio::piped())
         .spawn();
-    let mut watch = Ended(watch.unwrap());
+    let mut watch = OwnedProcess(watch.unwrap());
     let lines = BufReader::new(watch.0.stdout.take().unwrap()).lines();
     let (told, heard) = channel();
     spawn(move || lines.map_while(Result::ok).try_for_each(|line| told.send(line)));

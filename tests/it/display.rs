@@ -526,12 +526,12 @@ fn wrong_numbers_draw_nothing_and_break_nothing() {
 
 /// What a frame hands to the renderer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Handed {
+struct RenderUpload {
     mesh_bytes: usize,
     bind_poses: usize,
 }
 
-const NOTHING: Handed = Handed { mesh_bytes: 0, bind_poses: 0 };
+const NOTHING: RenderUpload = RenderUpload { mesh_bytes: 0, bind_poses: 0 };
 
 impl Bench {
     /// Assets of a kind that were added or changed since the last call.
@@ -544,7 +544,7 @@ impl Bench {
         changed.collect()
     }
 
-    fn frame(&mut self) -> Handed {
+    fn frame(&mut self) -> RenderUpload {
         self.app.update();
         let bind_poses = self.changed::<SkinnedMeshInverseBindposes>().len();
         let changed = self.changed::<Mesh>();
@@ -553,7 +553,7 @@ impl Bench {
             let attributes: usize = mesh.attributes().map(|(_, values)| values.get_bytes().len()).sum();
             attributes + mesh.get_index_buffer_bytes().map_or(0, <[u8]>::len)
         };
-        Handed { mesh_bytes: changed.into_iter().filter_map(|id| meshes.get(id)).map(bytes).sum(), bind_poses }
+        RenderUpload { mesh_bytes: changed.into_iter().filter_map(|id| meshes.get(id)).map(bytes).sum(), bind_poses }
     }
 }
 

@@ -39,7 +39,7 @@ fn size() -> UVec2 {
 
 /// The last picture taken.
 #[derive(Resource, Default)]
-struct Taken(Option<Image>);
+struct LastPicture(Option<Image>);
 
 struct Studio {
     app: App,
@@ -52,7 +52,7 @@ struct Studio {
 impl Studio {
     fn build() -> Self {
         let mut app = App::new();
-        app.add_plugins((bevy_plugins(), RigPlugins, DrawingPlugin)).init_resource::<Taken>();
+        app.add_plugins((bevy_plugins(), RigPlugins, DrawingPlugin)).init_resource::<LastPicture>();
         app.insert_resource(ClearColor(BACKGROUND));
         app.finish();
         app.cleanup();
@@ -103,15 +103,15 @@ impl Studio {
             self.app.update();
         }
         let world = self.app.world_mut();
-        world.resource_mut::<Taken>().0 = None;
+        world.resource_mut::<LastPicture>().0 = None;
         world.spawn(Screenshot::image(self.target.clone())).observe(
-            |shot: On<ScreenshotCaptured>, mut taken: ResMut<Taken>| {
+            |shot: On<ScreenshotCaptured>, mut taken: ResMut<LastPicture>| {
                 taken.0 = Some(shot.image.clone());
             },
         );
         let image = (0..200).find_map(|_| {
             self.app.update();
-            self.app.world_mut().resource_mut::<Taken>().0.take()
+            self.app.world_mut().resource_mut::<LastPicture>().0.take()
         });
         let image = image.unwrap_or_else(|| panic!("no picture of {name} came back"));
         if let Some(folder) = &self.folder {

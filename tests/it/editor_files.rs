@@ -11,7 +11,7 @@ use rigsmith::{
         ActiveRig,
         actions::{Action, ActionRequest},
         files::{
-            FilesPlugin, Loading, OpenDocument, OpenRequest, Saving, StateFolder,
+            FilesPlugin, LoadJob, OpenDocument, OpenRequest, SaveJob, StateFolder,
             dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
             has_unsaved_changes, title,
         },
@@ -85,8 +85,8 @@ impl Window {
         for _ in 0..3 {
             self.update();
         }
-        while self.world().resource::<Loading>().what().is_some()
-            || self.world().resource::<Saving>().what().is_some()
+        while self.world().resource::<LoadJob>().what().is_some()
+            || self.world().resource::<SaveJob>().what().is_some()
             || self.world().resource::<Recovery>().is_looking()
         {
             assert!(start.elapsed() < HANG, "something never ends");

@@ -12,7 +12,7 @@ use rigsmith::{
         ActiveRig,
         actions::{Action, ActionRequest},
         files::{
-            FilesPlugin, Loading, OpenRequest, Saving, StateFolder,
+            FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder,
             dialog::{Answer, DialogAnswer},
         },
         follow::{FollowPlugin, OfferAnswer},
@@ -110,7 +110,7 @@ impl Window {
     fn settle(&mut self) {
         self.until("the end of work", |window| {
             let world = window.app.world();
-            world.resource::<Loading>().what().is_none() && world.resource::<Saving>().what().is_none()
+            world.resource::<LoadJob>().what().is_none() && world.resource::<SaveJob>().what().is_none()
         });
         let start = Instant::now();
         while start.elapsed() < Duration::from_millis(1200) {

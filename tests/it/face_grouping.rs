@@ -18,7 +18,7 @@ use crate::{
 const BEASTS: [&str; 4] = ["fox-fox.glb", "fox-dog.glb", "bird-eagle.glb", "spot.obj"];
 
 /// A head with all that is found on it.
-struct Found {
+struct AnalyzedHead {
     points: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     shells: Shells,
@@ -27,7 +27,7 @@ struct Found {
     bones: HeadBones,
 }
 
-impl Found {
+impl AnalyzedHead {
     fn new((points, triangles): Mesh) -> Self {
         let shells = find_shells(&points, &triangles);
         let landmarks = find_landmarks(&points, &triangles, &shells).unwrap();
@@ -212,7 +212,7 @@ fn a_sphere_is_a_head_without_neck() {
     let mesh = sphere(24);
     assert!(!head_part(&mesh.0, &mesh.1).unwrap().is_part);
     assert!(!guess_axes(&mesh.0, &mesh.1, None, None).unwrap().certain, "sure of a sphere");
-    let found = Found::new(mesh);
+    let found = AnalyzedHead::new(mesh);
     let HeadBones { neck, head } = found.bones;
     assert!(neck.tail == head.head && neck.head.y < neck.tail.y && head.head.y < head.tail.y);
 }
@@ -222,7 +222,7 @@ fn mask_holds_the_face() {
     let Some(folder) = test_data() else { return };
     let truth = truth(&folder);
     for name in HEADS {
-        let found = Found::new(mesh(&folder.join(format!("heads/{name}.obj"))));
+        let found = AnalyzedHead::new(mesh(&folder.join(format!("heads/{name}.obj"))));
         let mut told = found.landmarks.clone();
         told.points = std::array::from_fn(|index| found.points[truth[index]]);
         let by_truth = group_head(&found.points, &found.triangles, &found.shells, &told, None, &|_| true).unwrap();
@@ -241,7 +241,7 @@ fn mask_holds_the_face() {
 
 #[test]
 fn the_bundled_head_is_grouped_and_gets_bones() {
-    let found = Found::new(bundled());
+    let found = AnalyzedHead::new(bundled());
     found.check_mask("the bundled head");
     found.check_bones("the bundled head", &bundled());
     let missed: Vec<usize> =
@@ -252,10 +252,10 @@ fn the_bundled_head_is_grouped_and_gets_bones() {
 #[test]
 fn a_wanted_number_of_groups_is_cut() {
     for (name, mesh) in bundled_and("ict_neutral") {
-        let found = Found::new(mesh);
+        let found = AnalyzedHead::new(mesh);
         let marks = found.points_at_landmarks();
         for wanted in [0, 2, 4, 9, 40] {
-            let Found { points, triangles, shells, landmarks, .. } = &found;
+            let AnalyzedHead { points, triangles, shells, landmarks, .. } = &found;
             let groups = group_head(points, triangles, shells, landmarks, Some(wanted), &|_| true).unwrap();
             assert_eq!(groups.groups, wanted.max(2), "{name}");
             if wanted > 2 {
@@ -268,7 +268,7 @@ fn a_wanted_number_of_groups_is_cut() {
 #[test]
 fn symmetric_heads_have_symmetric_groups() {
     for (name, mesh) in bundled_and("ict_neutral") {
-        let found = Found::new(mesh);
+        let found = AnalyzedHead::new(mesh);
         let middle = found.landmarks.middle;
         let HeadBones { neck, head } = found.bones;
         assert!([neck.head, neck.tail, head.tail].iter().all(|place| place.x == middle), "{name}");
@@ -291,9 +291,9 @@ fn symmetric_heads_have_symmetric_groups() {
 fn units_do_not_matter() {
     let Some(folder) = test_data() else { return };
     let (points, triangles) = mesh(&folder.join("heads/ict_identity_1.obj"));
-    let plain = Found::new((points.clone(), triangles.clone()));
+    let plain = AnalyzedHead::new((points.clone(), triangles.clone()));
     for scale in [0.01, 100.0] {
-        let other = Found::new((points.iter().map(|point| *point * scale).collect(), triangles.clone()));
+        let other = AnalyzedHead::new((points.iter().map(|point| *point * scale).collect(), triangles.clone()));
         let differ = plain.groups.mask.iter().zip(&other.groups.mask).filter(|(a, b)| a != b).count();
         assert!(differ * 200 < points.len(), "{differ} points of the mask differ at {scale}");
         assert_eq!(plain.groups.groups, other.groups.groups);
@@ -352,7 +352,7 @@ fn check_head_part(name: &str, mesh: &Mesh, joint: &dyn Fn(&str) -> Vec3) {
         let nearest = own.iter().map(|point| point.distance(joint(limb))).fold(f32::MAX, f32::min);
         assert!(nearest > 0.1 * tall, "{name}: {limb} is in the head part");
     }
-    let found = Found::new(only((points, triangles), &part.points));
+    let found = AnalyzedHead::new(only((points, triangles), &part.points));
     found.check_mask(name);
     found.check_bones(name, mesh);
 }
@@ -392,7 +392,7 @@ fn beasts_have_a_head_part_wherever_they_look() {
             let guess = guess_axes(&points, &triangles, None, None).unwrap();
             let looks = if name == "spot.obj" { -back } else { back };
             assert_eq!((guess.axes.up, guess.axes.forward), (Vec3::Y, vec3(0.0, 0.0, looks)), "{name}");
-            let (found, is_part) = Found::of_any(&(points.clone(), triangles.clone()));
+            let (found, is_part) = AnalyzedHead::of_any(&(points.clone(), triangles.clone()));
             assert!(is_part, "{name} is taken for a head");
             // Neither wings nor feet nor tail.
             let (own_low, own_high) =

@@ -54,12 +54,12 @@ fn devices_are_not_read() {
 }
 
 /// A disk on which every file claims a length of its own; it can only be read.
-struct Lying(u64);
+struct LyingDisk(u64);
 
 /// The name of a file whose content never ends.
 const ENDLESS: &str = "endless";
 
-impl Disk for Lying {
+impl Disk for LyingDisk {
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
         RealDisk.entry(path, follow).map(|entry| Entry { len: self.0, ..entry })
     }
@@ -104,15 +104,15 @@ fn a_false_length_neither_reserves_nor_truncates() {
     let path = folder.path().join("a");
     fs::write(&path, large()).unwrap();
     for claimed in [0, 1, 1 << 40] {
-        let read = read_capped(&Lying(claimed), &path, u64::MAX).unwrap();
+        let read = read_capped(&LyingDisk(claimed), &path, u64::MAX).unwrap();
         assert_eq!(read, large());
         assert!(read.capacity() <= 16 << 20);
     }
-    let error = read_capped(&Lying(1), &path, 100).unwrap_err();
+    let error = read_capped(&LyingDisk(1), &path, 100).unwrap_err();
     assert!(matches!(error, ReadError::TooLarge { .. }), "{error}");
     let endless = folder.path().join(ENDLESS);
     fs::write(&endless, b"x").unwrap();
-    let error = read_capped(&Lying(1), &endless, 1 << 20).unwrap_err();
+    let error = read_capped(&LyingDisk(1), &endless, 1 << 20).unwrap_err();
     assert!(matches!(error, ReadError::TooLarge { .. }), "{error}");
 }
 

@@ -345,7 +345,7 @@ fn companions_are_as_private_as_their_main_file() {
 }
 
 /// A disk that carries out nothing as the real one does unless it is passed on here.
-struct Passing {
+struct PassThroughDisk {
     hard_links: bool,
     /// True if what is read back has changed on the way.
     decays: bool,
@@ -370,7 +370,7 @@ impl DiskFile for DecayingFile {
     }
 }
 
-impl Disk for Passing {
+impl Disk for PassThroughDisk {
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
         RealDisk.entry(path, follow)
     }
@@ -412,14 +412,14 @@ fn a_set_is_saved_where_there_are_neither_hard_links_nor_locks() {
     for kind in Kind::ALL {
         let folder = furnished();
         for version in [1, 2, 5] {
-            kind.save(&Passing { hard_links: false, decays: false }, folder.path(), version).unwrap();
+            kind.save(&PassThroughDisk { hard_links: false, decays: false }, folder.path(), version).unwrap();
             assert_eq!(kind.load(folder.path()), Ok(version));
             assert_eq!(names(folder.path()), expected(kind, version));
         }
         // A temporary file of today may be that of a living process.
         let temp = folder.path().join(".rigsmith-0123456700000000.tmp");
         fs::write(&temp, "half").unwrap();
-        let disk = Passing { hard_links: false, decays: false };
+        let disk = PassThroughDisk { hard_links: false, decays: false };
         assert_eq!(remove_stale_temps(&disk, folder.path()).unwrap(), 0);
         let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(4000);
         fs::File::options().write(true).open(&temp).unwrap().set_modified(long_ago).unwrap();
@@ -433,7 +433,8 @@ fn a_disk_that_returns_other_bytes_replaces_nothing() {
         let folder = furnished();
         kind.save(&RealDisk, folder.path(), 1).unwrap();
         let before = names(folder.path());
-        let error = kind.save(&Passing { hard_links: true, decays: true }, folder.path(), 2).unwrap_err().to_string();
+        let error =
+            kind.save(&PassThroughDisk { hard_links: true, decays: true }, folder.path(), 2).unwrap_err().to_string();
         assert!(error.contains("other bytes") && error.contains("unchanged"), "{error}");
         assert_eq!((kind.load(folder.path()), names(folder.path())), (Ok(1), before));
     }

@@ -6,7 +6,7 @@ use rigsmith::{
         animation::{joint_map::JointMap, motion::MotionChannel},
         format::bvh::read_bvh,
     },
-    solve::retarget::{Onto, RetargetSettings, retarget},
+    solve::retarget::{MotionTarget, RetargetSettings, retarget},
 };
 
 use crate::{bench::shipped, mutate::run_fuzz};
@@ -62,7 +62,8 @@ fn no_text_breaks_the_bvh_reader() {
                 return;
             }
             let Ok(map) = JointMap::new(&motion, &bare, &[]) else { return };
-            let settings = RetargetSettings { onto: Onto::Joints, max_frames: 200, ..RetargetSettings::default() };
+            let settings =
+                RetargetSettings { onto: MotionTarget::Joints, max_frames: 200, ..RetargetSettings::default() };
             if let Ok(done) = retarget(&bare, &Default::default(), &motion, &map, &settings) {
                 let mut tracks = done.clip.layers.iter().flat_map(|layer| layer.tracks.values());
                 assert!(

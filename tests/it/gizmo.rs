@@ -34,7 +34,7 @@ use rigsmith::{
     rig::{
         Matching, PoseOffset,
         operations::MirrorPlane,
-        step::{Committed, SinkError, StepSink},
+        step::{Commit, SinkError, StepSink},
     },
     test_app::strict_app,
 };
@@ -56,10 +56,10 @@ fn sights(place: Transform) -> [Sight; 2] {
 }
 
 #[derive(Default, Clone)]
-struct Sink(Arc<Mutex<Vec<Committed>>>);
+struct Sink(Arc<Mutex<Vec<Commit>>>);
 
 impl StepSink for Sink {
-    fn record(&self, committed: Committed) {
+    fn record(&self, committed: Commit) {
         self.0.lock().unwrap().push(committed);
     }
     fn trouble(&self) -> Option<SinkError> {

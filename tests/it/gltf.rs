@@ -6,7 +6,7 @@ mod errors;
 mod external;
 mod writing;
 
-use compose::{Composed, PNG, character, triangle};
+use compose::{ComposedDocument, PNG, character, triangle};
 use glam::{Vec2, Vec3, Vec4};
 use rigsmith::mesh::{
     gltf::{ExternalError, ExternalFile, GltfWriteSettings, read_gltf, write_glb, write_gltf},
@@ -122,7 +122,7 @@ fn clips() {
 #[test]
 fn primitive_modes() {
     let check = |mode: u32, indices: Option<&[u8]>, expected: &[[u32; 3]]| {
-        let mut file = Composed::new();
+        let mut file = ComposedDocument::new();
         let points: Vec<f32> = (0..6).flat_map(|i| [i as f32, (i * i) as f32, 0.0]).collect();
         let position = file.floats(&points, "VEC3");
         let mut primitive = json!({"attributes": {"POSITION": position}, "mode": mode});

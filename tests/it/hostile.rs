@@ -23,7 +23,7 @@ use crate::{cli::explained, prerequisites::test_data};
 const HANG: Duration = Duration::from_secs(300);
 
 /// End of a command.
-struct Ended {
+struct CommandEnd {
     code: Option<i32>,
     out: String,
     err: String,
@@ -38,7 +38,7 @@ fn anonymous(process: u32) -> u64 {
     line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or_default() * 1024
 }
 
-fn run(folder: &Path, args: &[&str]) -> Ended {
+fn run(folder: &Path, args: &[&str]) -> CommandEnd {
     // Files instead of pipes: a full pipe would stop the command while it is watched.
     let (out, err) = (folder.join("out.txt"), folder.join("err.txt"));
     let mut child = Command::new(env!("CARGO_BIN_EXE_rigsmith"))
@@ -63,11 +63,11 @@ fn run(folder: &Path, args: &[&str]) -> Ended {
         std::thread::sleep(Duration::from_millis(2));
     };
     let text = |path: &Path| String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned();
-    Ended { code: status.code(), out: text(&out), err: text(&err), memory }
+    CommandEnd { code: status.code(), out: text(&out), err: text(&err), memory }
 }
 
 /// Runs a command with `--json`, fails unless it ends as promised, and returns its answer.
-fn tried(folder: &Path, args: &[&str]) -> (Ended, Value) {
+fn tried(folder: &Path, args: &[&str]) -> (CommandEnd, Value) {
     let ended = run(folder, &[args, &["--json"]].concat());
     let said = || format!("{args:?}: {:?} {:.300} {:.300}", ended.code, ended.out, ended.err);
     assert!(matches!(ended.code, Some(0 | 1)), "{}", said());

@@ -35,7 +35,7 @@ use super::{
 
 /// What instances told.
 #[derive(Resource, Default, Debug)]
-struct Told {
+struct InstanceReport {
     built: usize,
     updated: Vec<usize>,
     ran: usize,
@@ -55,11 +55,13 @@ impl Game {
     fn with(plugin: RigInstancePlugin, assets: &Path, more: impl FnOnce(&mut App)) -> Self {
         let mut app = App::new();
         let files = AssetPlugin { file_path: assets.display().to_string(), ..default() };
-        app.add_plugins((MinimalPlugins, files, TransformPlugin, plugin)).init_resource::<Told>();
+        app.add_plugins((MinimalPlugins, files, TransformPlugin, plugin)).init_resource::<InstanceReport>();
         more(&mut app);
-        app.add_observer(|_: On<RigBuilt>, mut told: ResMut<Told>| told.built += 1)
-            .add_observer(|failed: On<RigFailed>, mut told: ResMut<Told>| told.failed.push(failed.error.to_string()))
-            .add_observer(|updated: On<rigsmith::instance::RigUpdated>, mut told: ResMut<Told>| {
+        app.add_observer(|_: On<RigBuilt>, mut told: ResMut<InstanceReport>| told.built += 1)
+            .add_observer(|failed: On<RigFailed>, mut told: ResMut<InstanceReport>| {
+                told.failed.push(failed.error.to_string())
+            })
+            .add_observer(|updated: On<rigsmith::instance::RigUpdated>, mut told: ResMut<InstanceReport>| {
                 told.updated.push(updated.changes.len());
                 told.ran = updated.ran.len();
             });
@@ -76,12 +78,12 @@ impl Game {
         Self::new(RigInstancePlugin::default(), Path::new("assets"))
     }
 
-    fn told(&self) -> &Told {
-        self.app.world().resource::<Told>()
+    fn told(&self) -> &InstanceReport {
+        self.app.world().resource::<InstanceReport>()
     }
 
     /// Updates until something is so.
-    fn until(&mut self, what: &str, is_so: impl Fn(&Told) -> bool) {
+    fn until(&mut self, what: &str, is_so: impl Fn(&InstanceReport) -> bool) {
         let start = Instant::now();
         while !is_so(self.told()) {
             assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.told());

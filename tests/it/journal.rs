@@ -13,8 +13,8 @@ use rigsmith::{
     files::{
         Disk, RealDisk,
         journal::{
-            Basis, Condition, Ending, Journal, JournalError, JournalPlaces, JournalStart, Origin, Recovered, Resumed,
-            SaveMark, file_hash, journal_beside, pending_journal, pending_journals, recover,
+            Basis, Condition, Ending, Journal, JournalError, JournalPlaces, JournalStart, Origin, RecoveredJournal,
+            ResumedJournal, SaveMark, file_hash, journal_beside, pending_journal, pending_journals, recover,
         },
         save_atomic,
     },
@@ -24,7 +24,7 @@ use rigsmith::{
     rig::{
         PoseOffset, Rig, RigEdit, SkinData, StoredPose, Uid, UidSource,
         operations::MirrorPlane,
-        step::{Committed, Replayed},
+        step::{Commit, Replay},
         template::{read_template, write_template},
     },
 };
@@ -58,7 +58,7 @@ impl Desk {
     fn operate(&mut self, operation: &Operation) {
         let done = self.history.edit(&mut self.rig, &mut self.selection, &mut self.uids, None, operation);
         if let Some(step) = done.ok().and_then(|recorded| recorded.step) {
-            self.journal.record(Committed::Done(step));
+            self.journal.record(Commit::Done(step));
         }
     }
 
@@ -72,13 +72,13 @@ impl Desk {
 
     fn undo(&mut self) {
         if let Some(Ok(step)) = self.history.undo(&mut self.rig, &mut self.selection) {
-            self.journal.record(Committed::Undone(step));
+            self.journal.record(Commit::Undone(step));
         }
     }
 
     fn redo(&mut self) {
         if let Some(Ok(step)) = self.history.redo(&mut self.rig, &mut self.selection) {
-            self.journal.record(Committed::Redone(step));
+            self.journal.record(Commit::Redone(step));
         }
     }
 
@@ -132,7 +132,7 @@ fn hash_at(path: &Path) -> Option<u64> {
 }
 
 /// The document as the editor would offer it.
-fn replayed(recovered: &Recovered) -> Replayed {
+fn replayed(recovered: &RecoveredJournal) -> Replay {
     let basis = recovered.basis(hash_at);
     let project = match basis {
         Basis::Journal => None,
@@ -143,7 +143,7 @@ fn replayed(recovered: &Recovered) -> Replayed {
     replayed
 }
 
-fn recover_at(path: &Path) -> Replayed {
+fn recover_at(path: &Path) -> Replay {
     replayed(&recover(&fs::read(path).unwrap()).unwrap())
 }
 
@@ -235,7 +235,7 @@ proptest! {
                     let plane = (step.1 % 3 == 0).then(|| MirrorPlane::sagittal(2.0));
                     let done = desk.history.edit(&mut desk.rig, &mut desk.selection, &mut desk.uids, plane, &operation);
                     if let Some(step) = done.ok().and_then(|recorded| recorded.step) {
-                        desk.journal.record(Committed::Done(step));
+                        desk.journal.record(Commit::Done(step));
                     }
                 }
             }
@@ -426,7 +426,7 @@ fn recovered_work_is_safe_from_the_next_crash() {
             let held = |path| read_template(&fs::read(path).unwrap()).unwrap().rig;
             let held = if basis == Basis::Journal { None } else { recovered.project().map(held) };
             let restored = recovered.restore(basis, held);
-            let Resumed { journal, kept } =
+            let ResumedJournal { journal, kept } =
                 Journal::resume(Arc::new(RealDisk), places.clone(), &recovered, &restored, &path);
             assert_eq!(kept, None, "{beside} {round}");
             assert_eq!(journal.position(), recovered.changes().len() as u64, "{beside} {round}");
@@ -471,7 +471,7 @@ fn what_could_not_be_replayed_is_kept() {
     other.apply(&recovered.changes()[1].step().forward[0]).unwrap();
     let restored = recovered.restore(Basis::Changed, Some(other));
     assert_eq!((restored.replayed.applied, restored.replayed.refused.is_some()), (1, true));
-    let Resumed { journal, .. } =
+    let ResumedJournal { journal, .. } =
         Journal::resume(Arc::new(RealDisk), start(folder.path()).places, &recovered, &restored, &path);
     journal.flush(LONG).unwrap();
     assert_eq!(journal.position(), 1);
@@ -487,9 +487,9 @@ fn a_journal_of_the_first_format_still_opens() {
     let back = replayed(&recovered);
     assert_eq!((recovered.ending, back.applied, back.rig.len()), (Ending::Open, 55, 11));
     assert_eq!(back.rig.about().name, "victim");
-    let kinds = |is: fn(&Committed) -> bool| recovered.changes().iter().filter(|change| is(change)).count();
-    assert!(kinds(|change| matches!(change, Committed::Undone(_))) > 0);
-    assert!(kinds(|change| matches!(change, Committed::Redone(_))) > 0);
+    let kinds = |is: fn(&Commit) -> bool| recovered.changes().iter().filter(|change| is(change)).count();
+    assert!(kinds(|change| matches!(change, Commit::Undone(_))) > 0);
+    assert!(kinds(|change| matches!(change, Commit::Redone(_))) > 0);
     assert!(back.rig.skins().count() == 1 && !back.rig.pose().is_empty());
 }
 
@@ -503,7 +503,7 @@ fn weights_of_a_large_mesh_are_handed_over_whole_and_written_once() {
         let skin = Arc::new(large.as_ref().clone());
         let operation = Operation::Edits(vec![RigEdit::SetSkin(Uid(8), Some(skin.clone()))]);
         let recorded = desk.history.edit(&mut desk.rig, &mut desk.selection, &mut desk.uids, None, &operation).unwrap();
-        desk.journal.record(Committed::Done(recorded.step.unwrap()));
+        desk.journal.record(Commit::Done(recorded.step.unwrap()));
         assert!(Arc::ptr_eq(desk.rig.skin(Uid(8)).unwrap(), &skin), "what the caller has is shared, not copied");
     }
     desk.place(1);

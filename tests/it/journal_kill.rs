@@ -28,7 +28,7 @@ use rigsmith::{
     prelude::{Change, EditRequest, Operation},
     rig::{
         PoseOffset, Rig, RigEdit, SkinData, Uid,
-        step::{Committed, SinkError, StepSink},
+        step::{Commit, SinkError, StepSink},
         template::{read_template, write_template},
     },
 };
@@ -44,14 +44,14 @@ const BLINK: Duration = Duration::from_millis(250);
 const TOGETHER: usize = 4;
 
 /// A rig that is edited at random; the same seed gives the same edits.
-struct Editing {
+struct EditSession {
     app: App,
     rig: Entity,
     random: Random,
     saves: bool,
 }
 
-impl Editing {
+impl EditSession {
     fn new(seed: u64) -> Self {
         let mut app = headless_app(seed);
         app.finish();
@@ -110,7 +110,7 @@ impl Editing {
 struct Counter(Arc<AtomicU64>);
 
 impl StepSink for Counter {
-    fn record(&self, _committed: Committed) {
+    fn record(&self, _committed: Commit) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
@@ -134,7 +134,7 @@ fn child_that_edits_until_killed() {
         return;
     };
     let seed: u64 = std::env::var(SEED).unwrap().parse().unwrap();
-    let mut editing = Editing::new(seed);
+    let mut editing = EditSession::new(seed);
     let project = folder.join("victim.rigsmith.ron");
     let places = JournalPlaces { project: None, state: Some(folder.clone()) };
     let rig = Some(editing.rig().clone());
@@ -244,7 +244,7 @@ fn kill_once(round: u64, folder: &Path) -> Outcome {
 
     // The same edits once more tell which state that is.
     let last = lines.last().map_or(0, |line| line.0);
-    let mut again = Editing::new(round);
+    let mut again = EditSession::new(round);
     let counter = Counter::default();
     let entity = again.rig;
     again.app.world_mut().entity_mut(entity).insert(RigJournal::new(counter.clone()));

@@ -78,7 +78,7 @@ fn state(program: &Arc<RigProgram>, pose: &StoredPose) -> RigState {
 }
 
 /// Compares every joint of every pose with where it stood, and fails if one is off and not listed.
-fn check(what: &str, before: &Rig, after: &Rig) -> Found {
+fn check(what: &str, before: &Rig, after: &Rig) -> PoseDeviation {
     let mut kept = after.clone();
     let notes: Vec<PoseNote> = keep_poses(before, &mut kept, &Arc::new(modules::all())).unwrap();
     let (from, to) = (program(before), program(after));
@@ -124,17 +124,17 @@ fn check(what: &str, before: &Rig, after: &Rig) -> Found {
         notes.len(),
         off.len()
     );
-    Found { plain, off: off.len() }
+    PoseDeviation { plain, off: off.len() }
 }
 
 /// What a change does to the poses: largest distance and angle where they are left as they are, and the number of poses
 /// that cannot be held.
-struct Found {
+struct PoseDeviation {
     plain: (f32, f32),
     off: usize,
 }
 
-impl Found {
+impl PoseDeviation {
     /// All poses but a few are as before, and would not be without the keeper.
     fn is_held(&self, but: usize) {
         assert!(self.off <= but, "{} poses are off", self.off);
@@ -191,7 +191,7 @@ fn command(rig: &Rig, joint: &str, module: &str, says: &str) -> Uid {
 }
 
 /// Those of the left arm and the trunk.
-struct Known {
+struct CharacterUids {
     hand_ik: Uid,
     elbow: Uid,
     pole: Uid,
@@ -204,7 +204,7 @@ struct Known {
     hips: Uid,
 }
 
-impl Known {
+impl CharacterUids {
     fn of(rig: &Rig) -> Self {
         let elbow = command(rig, "hand_l", "control", "\"elbow_l\"");
         Self {
@@ -228,7 +228,7 @@ fn names_groups_and_values_leave_poses_alone() {
     let mut after = before.clone();
     let (arm, hand) = (after.find_label("forearm_l").unwrap(), after.find_label("hand_l").unwrap());
     apply(&mut after, RigEdit::SetLabel(arm, Some("lower_arm_l".into())));
-    let known = Known::of(&before);
+    let known = CharacterUids::of(&before);
     set_params(&mut after, known.arm_fk, |params| params.replace("arm_fk_l", "forward_l"));
     let group = GroupData { uid: Uid(4711), name: "other".into(), ..after.groups()[0].clone() };
     apply(&mut after, RigEdit::AddLocalGroup(group, usize::MAX));
@@ -245,7 +245,7 @@ fn names_groups_and_values_leave_poses_alone() {
 fn controls_below_another_parent_hold_the_joints() {
     let before = posed(biped());
     let mut after = before.clone();
-    let known = Known::of(&before);
+    let known = CharacterUids::of(&before);
     set_params(&mut after, known.spine_fk, |params| params.replace(&known.torso.to_string(), &known.hips.to_string()));
     check("a spine below the hips", &before, &after).is_held(0);
     let mut after = before.clone();
@@ -274,7 +274,7 @@ fn a_control_that_is_split_holds_the_joints() {
     let mut after = before.clone();
     let spine = after.find_label("spine").unwrap();
     // The torso moved hips and spine; now the spine has a control of its own.
-    let known = Known::of(&before);
+    let known = CharacterUids::of(&before);
     let root = format!("@command control/hips#{} role:control", known.root);
     let kind = TagKind::Command {
         module: "control".into(),
@@ -312,7 +312,7 @@ fn an_inserted_joint_holds_the_others() {
 #[test]
 fn an_added_pole_holds_the_limb() {
     let mut before = biped();
-    let known = Known::of(&before);
+    let known = CharacterUids::of(&before);
     for tag in [known.pole_spaces, known.pole, known.elbow] {
         remove_tag(&mut before, tag);
     }

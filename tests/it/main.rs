@@ -124,7 +124,7 @@ mod retarget;
 mod rig_text;
 mod runtime;
 mod schema;
-mod sided;
+mod sided_values;
 mod site;
 mod skin_built;
 mod skin_file;

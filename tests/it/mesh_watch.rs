@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use rigsmith::{
     editor::{
         ActiveRig,
-        files::{FilesPlugin, Loading, OpenRequest, StateFolder},
+        files::{FilesPlugin, LoadJob, OpenRequest, StateFolder},
         mesh_watch::MeshWatchPlugin,
         notice::{Notice, Severity},
     },
@@ -60,7 +60,7 @@ fn a_saved_mesh_is_read_again_and_a_broken_one_is_told() {
         let points = &world.get::<RigMesh>(mesh)?.rest.points;
         points.iter().map(|point| point.x).reduce(f32::max)
     };
-    until(&mut app, "the mesh", &|world, _| half(world) == Some(0.5) && world.resource::<Loading>().what().is_none());
+    until(&mut app, "the mesh", &|world, _| half(world) == Some(0.5) && world.resource::<LoadJob>().what().is_none());
     // The file is looked at before it changes.
     let looks = std::time::Instant::now();
     while looks.elapsed() < Duration::from_millis(700) {

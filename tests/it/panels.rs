@@ -640,7 +640,7 @@ fn the_controls_panel_poses_resets_and_switches() {
     desk.resize(320.0, 2400.0);
     let before = inverse(&desk);
     let steps = desk.steps().0;
-    let is_other = |seen: &&desk::Seen| ["FK", "IK"].contains(&&*seen.label) && seen.on == Some(false);
+    let is_other = |seen: &&desk::ShownWidget| ["FK", "IK"].contains(&&*seen.label) && seen.on == Some(false);
     let at = desk.seen.iter().find(is_other).expect("a limb with a value to choose").rect.center();
     desk.time += 1.0;
     desk.click_at(at);

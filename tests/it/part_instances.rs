@@ -199,16 +199,16 @@ fn a_save_leaves_parts_to_their_files() {
 
 /// What instances told.
 #[derive(Resource, Default, Debug)]
-struct Told {
+struct InstanceReport {
     built: usize,
     updated: Vec<(Entity, Vec<Uid>)>,
     failed: Vec<String>,
 }
 
-fn until(app: &mut App, what: &str, is_so: impl Fn(&Told) -> bool) {
+fn until(app: &mut App, what: &str, is_so: impl Fn(&InstanceReport) -> bool) {
     let start = Instant::now();
-    while !is_so(app.world().resource::<Told>()) {
-        assert!(start.elapsed() < HANG, "{what} does not come: {:?}", app.world().resource::<Told>());
+    while !is_so(app.world().resource::<InstanceReport>()) {
+        assert!(start.elapsed() < HANG, "{what} does not come: {:?}", app.world().resource::<InstanceReport>());
         app.update();
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
@@ -220,10 +220,12 @@ fn a_saved_part_reaches_every_character_that_uses_it() {
     let part = folder.path().join("finger.rig.ron");
     fs::write(&part, FINGER).unwrap();
     let mut app = headless_app(1);
-    app.add_plugins(RigInstancePlugin::live()).init_resource::<Told>();
-    app.add_observer(|_: On<RigBuilt>, mut told: ResMut<Told>| told.built += 1)
-        .add_observer(|failed: On<RigFailed>, mut told: ResMut<Told>| told.failed.push(failed.error.to_string()))
-        .add_observer(|updated: On<RigUpdated>, mut told: ResMut<Told>| {
+    app.add_plugins(RigInstancePlugin::live()).init_resource::<InstanceReport>();
+    app.add_observer(|_: On<RigBuilt>, mut told: ResMut<InstanceReport>| told.built += 1)
+        .add_observer(|failed: On<RigFailed>, mut told: ResMut<InstanceReport>| {
+            told.failed.push(failed.error.to_string())
+        })
+        .add_observer(|updated: On<RigUpdated>, mut told: ResMut<InstanceReport>| {
             told.updated.push((updated.entity, updated.ran.to_vec()));
         });
     app.finish();
@@ -248,7 +250,7 @@ fn a_saved_part_reaches_every_character_that_uses_it() {
     let before: Vec<Vec<f32>> = characters.iter().map(|(character, _)| sizes(&app, *character)).collect();
     fs::write(&part, FINGER.replace("relative_size: 0.5", "relative_size: 0.6")).unwrap();
     until(&mut app, "the saved part", |told| told.updated.len() == 3);
-    let told = app.world().resource::<Told>();
+    let told = app.world().resource::<InstanceReport>();
     assert_eq!(told.failed, Vec::<String>::new());
     let updated = told.updated.clone();
     for (number, (character, fingers)) in characters.iter().enumerate() {
@@ -265,7 +267,7 @@ fn a_saved_part_reaches_every_character_that_uses_it() {
     // A part that breaks changes nothing; the next good save is taken over.
     fs::write(&part, "(format: 2, name: \"finger\", joints: [").unwrap();
     until(&mut app, "the failure", |told| told.failed.len() == 3);
-    assert!(app.world().resource::<Told>().failed[0].contains("finger.rig.ron"));
+    assert!(app.world().resource::<InstanceReport>().failed[0].contains("finger.rig.ron"));
     fs::write(&part, FINGER).unwrap();
     until(&mut app, "the good part", |told| told.updated.len() == 6);
     assert_eq!(sizes(&app, characters[1].0), before[1]);

@@ -133,7 +133,7 @@ fn null(uid: u64, params: &str) -> TagData {
     TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind }
 }
 
-type Made = fn(&mut Rig);
+type RigChange = fn(&mut Rig);
 
 #[test]
 fn one_change_of_a_part_is_one_line() {
@@ -142,7 +142,7 @@ fn one_change_of_a_part_is_one_line() {
         "(part: \"finger.rig.ron\", name: \"finger 1\", parent: \"palm\", ",
         "(\n            // The second.\n            part: \"finger.rig.ron\",\n            name: \"finger 1\",\n            parent: \"palm\", // on it\n            ",
     ).replace(", prefix: \"f1_\"),", ",\n            prefix: \"f1_\",\n        ),");
-    let cases: [(&str, Made, &str); 9] = [
+    let cases: [(&str, RigChange, &str); 9] = [
         (
             "a value",
             |rig| set_params(rig, "f1_bone_2", "0.4", "0.7"),

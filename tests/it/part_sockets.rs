@@ -13,7 +13,7 @@ use rigsmith::{
         Rig, RigEdit, TagKind,
         template::{read_header, read_template},
     },
-    solve::program::Exposed,
+    solve::program::ExposedNode,
 };
 
 use super::template_text::apply;
@@ -189,7 +189,7 @@ fn a_renamed_joint_keeps_its_socket_and_a_deleted_one_takes_it_along() {
 
 /// What instances told.
 #[derive(Resource, Default)]
-struct Told {
+struct InstanceReport {
     built: usize,
     updated: usize,
     failed: Vec<String>,
@@ -197,19 +197,21 @@ struct Told {
 
 fn game() -> App {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, TransformPlugin, RigInstancePlugin::default())).init_resource::<Told>();
-    app.add_observer(|_: On<RigBuilt>, mut told: ResMut<Told>| told.built += 1)
-        .add_observer(|_: On<RigUpdated>, mut told: ResMut<Told>| told.updated += 1)
-        .add_observer(|failed: On<RigFailed>, mut told: ResMut<Told>| told.failed.push(failed.error.to_string()));
+    app.add_plugins((MinimalPlugins, TransformPlugin, RigInstancePlugin::default())).init_resource::<InstanceReport>();
+    app.add_observer(|_: On<RigBuilt>, mut told: ResMut<InstanceReport>| told.built += 1)
+        .add_observer(|_: On<RigUpdated>, mut told: ResMut<InstanceReport>| told.updated += 1)
+        .add_observer(|failed: On<RigFailed>, mut told: ResMut<InstanceReport>| {
+            told.failed.push(failed.error.to_string())
+        });
     app.finish();
     app.cleanup();
     app
 }
 
-fn until(app: &mut App, is_so: impl Fn(&Told) -> bool) {
+fn until(app: &mut App, is_so: impl Fn(&InstanceReport) -> bool) {
     let start = std::time::Instant::now();
-    while !is_so(app.world().resource::<Told>()) {
-        let failed = &app.world().resource::<Told>().failed;
+    while !is_so(app.world().resource::<InstanceReport>()) {
+        let failed = &app.world().resource::<InstanceReport>().failed;
         assert!(start.elapsed() < super::bench::HANG, "nothing comes: {failed:?}");
         app.update();
         std::thread::sleep(std::time::Duration::from_millis(1));
@@ -269,14 +271,14 @@ fn an_instance_has_the_nodes_that_it_exposes() {
         let running = app.world().get::<rigsmith::instance::RunningTemplate>(none).unwrap().get().clone();
         running.built.nodes.iter().find(|node| node.control.is_some()).unwrap().uid
     };
-    app.world_mut().entity_mut(none).insert(ExposedNodes(vec![Exposed::Uid(control)]));
+    app.world_mut().entity_mut(none).insert(ExposedNodes(vec![ExposedNode::Uid(control)]));
     app.update();
     assert_eq!(controls(&app, none), of_none + 1);
-    assert_eq!(app.world().resource::<Told>().updated, 0, "the template is the same");
+    assert_eq!(app.world().resource::<InstanceReport>().updated, 0, "the template is the same");
     // A node that is not there is told, and the instance has all controls.
-    app.world_mut().entity_mut(none).insert(ExposedNodes(vec![Exposed::Label("nobody".into())]));
+    app.world_mut().entity_mut(none).insert(ExposedNodes(vec![ExposedNode::Label("nobody".into())]));
     until(&mut app, |told| !told.failed.is_empty());
-    assert!(app.world().resource::<Told>().failed[0].contains("nobody"));
+    assert!(app.world().resource::<InstanceReport>().failed[0].contains("nobody"));
     assert_eq!(controls(&app, none), of_all);
     app.world_mut().entity_mut(none).remove::<ExposedNodes>();
     app.update();

@@ -5,7 +5,7 @@ mod freedom;
 mod library;
 mod limbs;
 mod machines;
-mod off;
+mod off_parts;
 mod switches;
 mod trunk;
 

@@ -22,7 +22,7 @@ use rigsmith::{
     solve::{
         bake_clip::strike,
         program::{CompileOptions, RigProgram, RigState},
-        retarget::{Onto, RetargetSettings, Retargeted, measure_feet, retarget},
+        retarget::{MotionTarget, RetargetSettings, RetargetedMotion, measure_feet, retarget},
     },
 };
 
@@ -33,15 +33,15 @@ fn motion(data: &Path, name: &str) -> Motion {
 }
 
 /// A rig with a motion on it.
-struct Played {
+struct PlayedRig {
     rig: Rig,
     program: Arc<RigProgram>,
     map: JointMap,
-    done: Retargeted,
+    done: RetargetedMotion,
     height: f32,
 }
 
-impl Played {
+impl PlayedRig {
     fn new(rig: Rig, motion: &Motion, settings: &RetargetSettings) -> Self {
         let built: BuiltRig = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
         let map = JointMap::new(motion, &rig, &[]).unwrap();
@@ -148,7 +148,7 @@ fn from_z_up(v: Vec3) -> Vec3 {
 fn a_walk_on_the_spot_walks_on_the_biped() {
     let Some(data) = test_data() else { return };
     let motion = motion(&data, "makehuman_walk1");
-    let played = Played::new(shipped("biped"), &motion, &RetargetSettings::default());
+    let played = PlayedRig::new(shipped("biped"), &motion, &RetargetSettings::default());
     println!("unmoved {:?}, notes {:?}, keys {:?}", played.done.unmoved, played.done.notes, played.done.keys);
     assert!(played.done.unmoved.is_empty(), "{:?}", played.done.unmoved);
     let [slide, off] = played.feet();
@@ -177,7 +177,7 @@ fn a_walk_on_the_spot_walks_on_the_biped() {
 
     // In its place the hips stay, and the feet slide below them.
     let stay = RetargetSettings { travel: false, lock_feet: false, ..RetargetSettings::default() };
-    let played = Played::new(shipped("biped"), &motion, &stay);
+    let played = PlayedRig::new(shipped("biped"), &motion, &stay);
     let hips: Vec<Vec3> = played.globals(&times, &["hips"]).iter().map(|at| at[0].translation).collect();
     assert!(hips.iter().all(|place| (*place - hips[0]).with_y(0.0).length() < 0.1));
 }
@@ -187,7 +187,7 @@ fn captured_jumps_and_turns_move_the_biped() {
     let Some(data) = test_data() else { return };
     let motion = motion(&data, "cmu_01_01");
     let settings = RetargetSettings { frame_rate: Some(30.0), ..RetargetSettings::default() };
-    let played = Played::new(shipped("biped"), &motion, &settings);
+    let played = PlayedRig::new(shipped("biped"), &motion, &settings);
     println!("unmoved {:?}, notes {:?}, keys {:?}", played.done.unmoved, played.done.notes, played.done.keys);
     let [slide, off] = played.feet();
     assert!(slide <= 1.0 && off <= 1.5, "slide {slide}, off {off}");
@@ -211,7 +211,7 @@ fn captured_jumps_and_turns_move_the_biped() {
         assert!((is - was).with_y(0.0).length() < 0.15, "at {time}: {is} for {was}");
     }
     // The same input gives the same clip.
-    let again = Played::new(shipped("biped"), &motion, &settings);
+    let again = PlayedRig::new(shipped("biped"), &motion, &settings);
     assert_eq!(again.done.clip, played.done.clip);
 }
 
@@ -219,7 +219,7 @@ fn captured_jumps_and_turns_move_the_biped() {
 #[test]
 fn forward_and_inverse_controls_agree() {
     let Some(data) = test_data() else { return };
-    let played = Played::new(shipped("biped"), &motion(&data, "makehuman_walk1"), &RetargetSettings::default());
+    let played = PlayedRig::new(shipped("biped"), &motion(&data, "makehuman_walk1"), &RetargetSettings::default());
     let labels = ["thigh_l", "shin_l", "foot_l", "thigh_r", "shin_r", "foot_r", "upper_arm_l", "forearm_l", "hand_l"];
     let uids = labels.map(|label| played.rig.find_label(label).unwrap());
     for time in played.times().into_iter().step_by(4) {
@@ -260,7 +260,7 @@ fn shoulders_that_follow_their_hands_move_as_the_motion_says() {
         }
     }
     assert_eq!(changed, 2);
-    let played = [plain, automatic].map(|rig| Played::new(rig, &motion, &RetargetSettings::default()));
+    let played = [plain, automatic].map(|rig| PlayedRig::new(rig, &motion, &RetargetSettings::default()));
     let labels = ["clavicle_l", "clavicle_r", "forearm_l", "forearm_r", "hand_l", "hand_r"];
     let times = played[0].times();
     let [wanted, found] = [0, 1].map(|at| played[at].globals(&times, &labels));
@@ -317,8 +317,8 @@ fn a_clip_onto_joints_moves_a_rig_without_commands() {
     let Some(data) = test_data() else { return };
     let mut rig = shipped("biped");
     joints::strip(&mut rig);
-    let settings = RetargetSettings { onto: Onto::Joints, ..RetargetSettings::default() };
-    let played = Played::new(rig, &motion(&data, "makehuman_walk1"), &settings);
+    let settings = RetargetSettings { onto: MotionTarget::Joints, ..RetargetSettings::default() };
+    let played = PlayedRig::new(rig, &motion(&data, "makehuman_walk1"), &settings);
     let [slide, off] = played.feet();
     assert!(slide <= 1.0 && off <= 1.5, "slide {slide}, off {off}");
     assert!(played.least_bend() > -1.0);

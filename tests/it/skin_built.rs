@@ -2,7 +2,7 @@
 
 mod figure;
 mod goals;
-mod late;
+mod late_joints;
 mod measure;
 mod places;
 

@@ -27,7 +27,7 @@ use super::{
 };
 
 #[derive(Resource, Default, Debug, PartialEq)]
-struct Told {
+struct InstanceReport {
     built: usize,
     updated: usize,
     failed: Vec<String>,
@@ -51,10 +51,12 @@ impl Studio {
         fs::write(folder.path().join("link.rig.ron"), written_part(0)).unwrap();
         fs::write(&file, text).unwrap();
         let mut app = headless_app(1);
-        app.add_plugins(RigInstancePlugin::live()).init_resource::<Told>();
-        app.add_observer(|_: On<RigBuilt>, mut told: ResMut<Told>| told.built += 1)
-            .add_observer(|_: On<RigUpdated>, mut told: ResMut<Told>| told.updated += 1)
-            .add_observer(|failed: On<RigFailed>, mut told: ResMut<Told>| told.failed.push(failed.error.to_string()));
+        app.add_plugins(RigInstancePlugin::live()).init_resource::<InstanceReport>();
+        app.add_observer(|_: On<RigBuilt>, mut told: ResMut<InstanceReport>| told.built += 1)
+            .add_observer(|_: On<RigUpdated>, mut told: ResMut<InstanceReport>| told.updated += 1)
+            .add_observer(|failed: On<RigFailed>, mut told: ResMut<InstanceReport>| {
+                told.failed.push(failed.error.to_string())
+            });
         let mut app = strict_app(app);
         let path = file.clone();
         let template = app.world_mut().run_system_once(move |files: TemplateFiles| files.open(path.clone())).unwrap();
@@ -74,8 +76,8 @@ impl Studio {
         (template, built)
     }
 
-    fn told(&self) -> &Told {
-        self.app.world().resource::<Told>()
+    fn told(&self) -> &InstanceReport {
+        self.app.world().resource::<InstanceReport>()
     }
 
     fn rig(&self) -> &Rig {
@@ -127,7 +129,7 @@ fn a_live_rig_takes_over_what_the_file_changed_and_keeps_what_is_its_own() {
     studio.request(Change::Do(Operation::Pose(vec![(control, posed)])));
     let entity = studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip).unwrap();
     studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)"));
-    studio.until("the update", |world, _| world.resource::<Told>().updated == 1);
+    studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
     assert_eq!(studio.height("tail_1"), 1.5);
     assert!(studio.rig().joint(middle).unwrap().data.locked && studio.rig().offset(control) == Some(&posed));
     assert_eq!(studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip), Some(entity));
@@ -150,7 +152,7 @@ fn a_live_rig_takes_over_what_the_file_changed_and_keeps_what_is_its_own() {
     assert_eq!(studio.app.world().get::<RigSource>(studio.rig).unwrap().base(), Some(&after));
     studio.request(Change::Undo);
     studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.25, 0)"));
-    studio.until("the next", |world, _| world.resource::<Told>().updated == 2);
+    studio.until("the next", |world, _| world.resource::<InstanceReport>().updated == 2);
     assert_eq!(studio.height("tail_1"), 1.25);
     // Undo to the start.
     for _ in 0..4 {
@@ -180,7 +182,7 @@ fn a_conflict_is_offered_and_decided_by_a_choice() {
         );
         assert_eq!(studio.height("tail_1"), 2.0, "nothing happens by itself");
         studio.app.world_mut().write_message(AcceptUpdate { rig: studio.rig, take });
-        studio.until("the update", |world, _| world.resource::<Told>().updated == 1);
+        studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
         assert_eq!(studio.height("tail_1"), height);
         let tip = studio.rig().joint(studio.joint("tail_3")).unwrap().clone();
         assert!(format!("{:?}", tip.data.tags).contains("0.75"));
@@ -206,13 +208,13 @@ fn an_update_that_is_not_live_waits_and_one_that_cannot_be_built_is_taken_back()
         "parent: \"tail_1\", translation: (0, 0.3, 0), tags: [control]",
         "parent: \"tail_1\", translation: (0, 0.3, 0), tags: [control, orient(targets: \"@command control/tail_1\")]",
     ));
-    studio.until("the failure", |world, _| !world.resource::<Told>().failed.is_empty());
+    studio.until("the failure", |world, _| !world.resource::<InstanceReport>().failed.is_empty());
     studio.app.update();
     studio.app.update();
     assert_eq!((studio.rig(), studio.told().updated), (&before, 0));
     assert!(studio.app.world().get::<BuildFailure>(studio.rig).is_none(), "it is built as before");
     studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)"));
-    studio.until("the next good save", |world, _| world.resource::<Told>().updated == 1);
+    studio.until("the next good save", |world, _| world.resource::<InstanceReport>().updated == 1);
     assert_eq!(studio.height("tail_1"), 1.5);
 }
 
@@ -241,7 +243,7 @@ fn a_mesh_of_a_rig_from_a_template_is_bound() {
     studio.until("the weights", |world, rig| world.get::<Rig>(rig).is_some_and(|rig| rig.skin(uid).is_some()));
     let weights = studio.rig().skin(uid).unwrap().clone();
     studio.save(&CHAIN.replace("relative_size: 0.5", "relative_size: 0.75"));
-    studio.until("the update", |world, _| world.resource::<Told>().updated == 1);
+    studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
     assert_eq!(studio.rig().skin(uid), Some(&weights), "weights stay");
 }
 
@@ -252,16 +254,16 @@ fn another_name_in_the_file_is_the_same_joint_for_ever() {
     let entity = studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip).unwrap();
     let renamed = CHAIN.replace("tail_3", "tip");
     studio.save(&renamed);
-    studio.until("the other name", |world, _| world.resource::<Told>().updated == 1);
+    studio.until("the other name", |world, _| world.resource::<InstanceReport>().updated == 1);
     assert_eq!(studio.joint("tip"), tip);
     // Later versions of the file have the new name; what they change of the joint arrives.
     studio.save(&renamed.replace("relative_size: 0.5", "relative_size: 0.75").replace("(0, 1, 0)", "(0, 1.5, 0)"));
-    studio.until("the next save", |world, _| world.resource::<Told>().updated == 2);
+    studio.until("the next save", |world, _| world.resource::<InstanceReport>().updated == 2);
     assert_eq!((studio.joint("tip"), studio.height("tail_1")), (tip, 1.5));
     assert!(format!("{:?}", studio.rig().joint(tip).unwrap().data.tags).contains("0.75"));
     assert_eq!(studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip), Some(entity));
     studio.save(&renamed.replace("tip", "end"));
-    studio.until("a third name", |world, _| world.resource::<Told>().updated == 3);
+    studio.until("a third name", |world, _| world.resource::<InstanceReport>().updated == 3);
     assert_eq!(studio.joint("end"), tip);
 }
 
@@ -292,7 +294,7 @@ fn a_live_update_that_moves_what_a_pose_means_holds_the_joints() {
     let turned = format!("{head}{}", tail.replacen("(0, 0.3, 0)", "(0.3, 0, 0)", 1));
     assert_ne!(turned, CHAIN);
     studio.save(&turned);
-    studio.until("the update", |world, _| world.resource::<Told>().updated == 1);
+    studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
     let after = place(&mut studio);
     assert!((after - before).length() < 1e-5, "{before} {after}");
     studio.request(Change::Undo);
@@ -301,7 +303,7 @@ fn a_live_update_that_moves_what_a_pose_means_holds_the_joints() {
 
 /// A joint of a file that changes at random.
 #[derive(Clone)]
-struct Wrote {
+struct FileJoint {
     name: String,
     above: Option<usize>,
     /// Place in the rig's space, and turn about Z in degrees.
@@ -311,7 +313,7 @@ struct Wrote {
 }
 
 /// The text of a template of these joints, with a control on each and an attribute on the first.
-fn written(joints: &[Option<Wrote>]) -> String {
+fn written(joints: &[Option<FileJoint>]) -> String {
     let mut text = String::from("(\n    format: 2,\n    name: \"living\",\n    joints: [\n");
     for joint in joints.iter().flatten() {
         let above = joint.above.and_then(|above| joints[above].as_ref());
@@ -347,10 +349,10 @@ fn written_part(version: u64) -> String {
 }
 
 /// Changes a file in one way. Returns true if that changes what poses mean, and false if it leaves that alone.
-fn rewrite(joints: &mut Vec<Option<Wrote>>, dice: &mut Dice, number: usize) -> bool {
+fn rewrite(joints: &mut Vec<Option<FileJoint>>, dice: &mut Dice, number: usize) -> bool {
     let living: Vec<usize> = (1..joints.len()).filter(|at| joints[*at].is_some()).collect();
     let one = living[dice.below(living.len() as u64) as usize];
-    let is_below = |joints: &[Option<Wrote>], mut at: usize, above: usize| loop {
+    let is_below = |joints: &[Option<FileJoint>], mut at: usize, above: usize| loop {
         match joints[at].as_ref().and_then(|joint| joint.above) {
             Some(next) if next == above => return true,
             Some(next) => at = next,
@@ -367,7 +369,7 @@ fn rewrite(joints: &mut Vec<Option<Wrote>>, dice: &mut Dice, number: usize) -> b
     }
     if kind == 1 || living.len() < 4 {
         let place = joints[one].as_ref().unwrap().place + Vec3::new(0.05 + 0.001 * number as f32, 0.2, 0.0);
-        joints.push(Some(Wrote { name: format!("new_{number}"), above: Some(one), place, turn: 0.0, size: 1.0 }));
+        joints.push(Some(FileJoint { name: format!("new_{number}"), above: Some(one), place, turn: 0.0, size: 1.0 }));
         return false;
     }
     let joint = joints[one].as_mut().unwrap();
@@ -382,7 +384,7 @@ fn rewrite(joints: &mut Vec<Option<Wrote>>, dice: &mut Dice, number: usize) -> b
 
 /// What must stay through an update: poses and values of nodes, and where the joints stand.
 #[derive(Debug, PartialEq)]
-struct Standing {
+struct PosedState {
     pose: std::collections::BTreeMap<Uid, PoseOffset>,
     values: AttributeValues,
     /// Where each joint stands, and where it stands at rest.
@@ -390,7 +392,7 @@ struct Standing {
 }
 
 impl Studio {
-    fn standing(&self) -> Standing {
+    fn standing(&self) -> PosedState {
         let runtime = self.app.world().get::<RigRuntime>(self.rig).unwrap();
         let rig = self.rig();
         let joint = |joint: &RigJoint| {
@@ -398,7 +400,7 @@ impl Studio {
             Some((uid, runtime.state().global(uid)?.translation, rig.position(uid)))
         };
         let joints = rig.walk().filter_map(joint).collect();
-        Standing { pose: rig.pose().clone(), values: rig.attribute_values().clone(), joints }
+        PosedState { pose: rig.pose().clone(), values: rig.attribute_values().clone(), joints }
     }
 
     fn living(&self, node: Uid) -> bool {
@@ -408,21 +410,21 @@ impl Studio {
 
 /// Joints that an update could not hold.
 #[derive(Resource, Default)]
-struct Listed(HashSet<Uid>);
+struct ListedJoints(HashSet<Uid>);
 
 #[test]
 fn a_long_life_of_edits_and_saves_loses_nothing() {
     let steps = std::env::var("RIGSMITH_STEPS").ok().and_then(|steps| steps.parse().ok()).unwrap_or(400);
     let dice = &mut Dice(UidSource::seeded(12));
-    let mut joints: Vec<Option<Wrote>> = Vec::new();
+    let mut joints: Vec<Option<FileJoint>> = Vec::new();
     for number in 0..6usize {
         let place = Vec3::new(0.0, 0.3 * number as f32, 0.02 * number as f32);
         let above = number.checked_sub(1);
-        joints.push(Some(Wrote { name: format!("joint_{number}"), above, place, turn: 0.0, size: 1.0 }));
+        joints.push(Some(FileJoint { name: format!("joint_{number}"), above, place, turn: 0.0, size: 1.0 }));
     }
     let mut studio = Studio::of(true, &written(&joints));
-    studio.app.init_resource::<Listed>();
-    studio.app.add_observer(|updated: On<RigUpdated>, mut listed: ResMut<Listed>| {
+    studio.app.init_resource::<ListedJoints>();
+    studio.app.add_observer(|updated: On<RigUpdated>, mut listed: ResMut<ListedJoints>| {
         listed.0 = updated.poses.iter().map(|note| note.deviation.joint).collect();
     });
     let first = write_template(studio.rig());
@@ -457,7 +459,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                 let was = written(&joints);
                 let is_part = dice.below(4) == 0;
                 let mut means_other = false;
-                studio.app.world_mut().resource_mut::<Listed>().0.clear();
+                studio.app.world_mut().resource_mut::<ListedJoints>().0.clear();
                 if is_part {
                     let next =
                         (1..).map(|more| version + more).find(|next| written_part(*next) != written_part(version));
@@ -473,7 +475,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                 }
                 studio.until("the template", |world, _| {
                     world.resource::<RigTemplates>().built(&known.0).is_some_and(|now| !Arc::ptr_eq(now, &known.1))
-                        || world.resource::<Told>().failed.len() > 3
+                        || world.resource::<InstanceReport>().failed.len() > 3
                 });
                 for _ in 0..4 {
                     studio.app.update();
@@ -493,7 +495,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                 for (node, values) in before.values.iter().filter(|(node, _)| studio.living(**node)) {
                     assert_eq!(after.values.get(node), Some(values), "step {step}");
                 }
-                let listed = &studio.app.world().resource::<Listed>().0;
+                let listed = &studio.app.world().resource::<ListedJoints>().0;
                 if !means_other && !is_mixed {
                     for (node, offset) in before.pose.iter().filter(|(node, _)| studio.living(**node)) {
                         assert_eq!(after.pose.get(node), Some(offset), "step {step}");

@@ -15,7 +15,7 @@ use rigsmith::{
 
 use super::bench::HANG;
 
-struct Watched {
+struct WatchedFolder {
     app: App,
     folder: tempfile::TempDir,
     cursors: (MessageCursor<FolderRead>, MessageCursor<FolderFault>, MessageCursor<GesturesRead>),
@@ -24,7 +24,7 @@ struct Watched {
     gestures: Vec<usize>,
 }
 
-impl Watched {
+impl WatchedFolder {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut app = headless_app(1);
@@ -71,7 +71,7 @@ fn asset(path: &str) -> String {
 
 #[test]
 fn expressions_of_a_folder_come_change_and_go() {
-    let mut watched = Watched::new();
+    let mut watched = WatchedFolder::new();
     let smile = asset("expressions/happiness.expr.ron").replace("\"happiness\"", "\"beaming\"");
     assert!(smile.contains("beaming") && !watched.has("beaming"));
     watched.save("faces/beaming.expr.ron", &smile);
@@ -95,8 +95,8 @@ fn expressions_of_a_folder_come_change_and_go() {
 
 #[test]
 fn a_form_of_a_folder_is_that_of_its_module() {
-    let mut watched = Watched::new();
-    let form = |watched: &Watched| {
+    let mut watched = WatchedFolder::new();
+    let form = |watched: &WatchedFolder| {
         watched.app.world().resource::<RigModules>().0.get("control").unwrap().form.as_deref().unwrap().to_owned()
     };
     let text = asset("modules/control.ui.ron").replace("title: \"Control\"", "title: \"Handle\"");
@@ -116,7 +116,7 @@ fn a_form_of_a_folder_is_that_of_its_module() {
 
 #[test]
 fn gestures_of_a_folder_are_handed_out_at_every_save() {
-    let mut watched = Watched::new();
+    let mut watched = WatchedFolder::new();
     let list = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/gestures")).unwrap();
     let text =
         fs::read_to_string(list.map(|entry| entry.unwrap().path()).find(|path| path.is_file()).unwrap()).unwrap();

@@ -19,7 +19,7 @@ use crate::algo::{
 };
 use map::{FaceMap, Part};
 use sample::Patch;
-use spread::{Fixed, PARTS, Seat, Spreader};
+use spread::{FixedPlace, PARTS, Seat, Spreader};
 
 /// A side of the character.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -216,7 +216,7 @@ pub fn place_bones(
         return Err(FaceBonesError::TooManyBones { bones: settings.bones, vertices });
     }
     let patches = sample::patches(points, triangles, &seen, &map, group_of, PARTS.len());
-    let on_skin: Vec<Fixed> = fixed
+    let on_skin: Vec<FixedPlace> = fixed
         .iter()
         .enumerate()
         .filter(|(_, f)| f.kind == FaceBoneKind::Skin)
@@ -224,7 +224,7 @@ pub fn place_bones(
             let place = f.position;
             let part = group_of(map.part(place));
             let middle = !PARTS[part].lateral && (place.x - map.middle).abs() < 0.01 * map.scale;
-            Fixed { place, index, part, middle }
+            FixedPlace { place, index, part, middle }
         })
         .collect();
     let mut spreader = Spreader { map: &map, settings, progress, rounds: 0, pairs: 0 };
@@ -314,7 +314,7 @@ fn part_of(seat: &Seat, map: &FaceMap) -> Part {
 }
 
 /// Seats for all bones, part by part.
-fn spread(spreader: &mut Spreader, patches: &[[Patch; 2]], fixed: &[Fixed]) -> Result<Vec<Seat>, FaceBonesError> {
+fn spread(spreader: &mut Spreader, patches: &[[Patch; 2]], fixed: &[FixedPlace]) -> Result<Vec<Seat>, FaceBonesError> {
     let settings = *spreader.settings;
     let of = |part: usize| fixed.iter().copied().filter(|f| f.part == part).collect::<Vec<_>>();
     let mut symmetric = settings.symmetric;
@@ -341,9 +341,9 @@ fn spread(spreader: &mut Spreader, patches: &[[Patch; 2]], fixed: &[Fixed]) -> R
         if pairs {
             spreader.mirrored(part, sides, count, &fixed, &mut seats)?;
         } else if PARTS[part].lateral && !sides[0].is_empty() && !sides[1].is_empty() {
-            let is_right = |f: &Fixed| f.place.x < spreader.map.middle;
-            let right: Vec<Fixed> = fixed.iter().copied().filter(is_right).collect();
-            let left: Vec<Fixed> = fixed.iter().copied().filter(|f| !is_right(f)).collect();
+            let is_right = |f: &FixedPlace| f.place.x < spreader.map.middle;
+            let right: Vec<FixedPlace> = fixed.iter().copied().filter(is_right).collect();
+            let left: Vec<FixedPlace> = fixed.iter().copied().filter(|f| !is_right(f)).collect();
             let on_left = count.div_ceil(2).clamp(left.len(), count - right.len());
             spreader.plain(part, &[&sides[0]], on_left, &left, &mut seats)?;
             spreader.plain(part, &[&sides[1]], count - on_left, &right, &mut seats)?;

@@ -153,13 +153,13 @@ struct Search<'a> {
 }
 
 /// Number of a leaf in the search's list, for each limb.
-type Chosen = Vec<Option<usize>>;
+type Assignment = Vec<Option<usize>>;
 
 impl Search<'_> {
     /// Assignments without regard to sides: a pair's limbs take two leaves in rising order.
-    fn unordered(&self) -> Vec<(f32, Chosen)> {
+    fn unordered(&self) -> Vec<(f32, Assignment)> {
         let limbs = &self.template.limbs;
-        let mut partial: Vec<Chosen> = vec![vec![None; limbs.len()]];
+        let mut partial: Vec<Assignment> = vec![vec![None; limbs.len()]];
         for (index, limb) in limbs.iter().enumerate() {
             if limb.partner.is_some_and(|p| p < index) {
                 continue;
@@ -201,7 +201,7 @@ impl Search<'_> {
             }
             // Wide searches keep what is best so far.
             if next.len() > 20_000 {
-                let mut ranked: Vec<(f32, Chosen)> = next.into_iter().map(|c| (self.cost(&c), c)).collect();
+                let mut ranked: Vec<(f32, Assignment)> = next.into_iter().map(|c| (self.cost(&c), c)).collect();
                 ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
                 ranked.truncate(3_000);
                 next = ranked.into_iter().map(|r| r.1).collect();
@@ -212,7 +212,7 @@ impl Search<'_> {
     }
 
     /// The penalty of ways, pairs, and limbs and branches that are left over.
-    fn cost(&self, chosen: &Chosen) -> f32 {
+    fn cost(&self, chosen: &Assignment) -> f32 {
         let limbs = &self.template.limbs;
         let mut logs = Vec::new();
         for a in 0..limbs.len() {
@@ -301,7 +301,7 @@ impl Search<'_> {
     }
 
     /// Hypotheses of one unordered assignment: all choices of sides.
-    fn sided(&self, cost: f32, chosen: &Chosen) -> Vec<Hypothesis> {
+    fn sided(&self, cost: f32, chosen: &Assignment) -> Vec<Hypothesis> {
         let limbs = &self.template.limbs;
         let pairs: Vec<(usize, usize)> = limbs
             .iter()

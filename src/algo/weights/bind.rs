@@ -30,7 +30,7 @@ pub(crate) enum Source {
 }
 
 /// Weights of all places.
-pub(crate) struct Bound {
+pub(crate) struct BoundSurface {
     /// The place of each point: points at one position share one.
     pub place: Vec<u32>,
     /// Weights of each place.
@@ -52,7 +52,7 @@ pub(crate) fn bind(
     free: &[u32],
     settings: &WeightSettings,
     progress: &(dyn Fn(f32) -> bool + Sync),
-) -> Result<Bound, WeightError> {
+) -> Result<BoundSurface, WeightError> {
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
     let (place, count) = adjacency::weld(points);
     let (places, joints, scale) = unit_frame(points, &place, count, joints);
@@ -85,7 +85,7 @@ pub(crate) fn bind(
         let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
         (weights, stiff) = Islands::new(&places, &triangles).stiffened(&weights, &bending);
     }
-    Ok(Bound { place, weights, sources, stiff, gaps: Gaps { sight, joints, scale } })
+    Ok(BoundSurface { place, weights, sources, stiff, gaps: Gaps { sight, joints, scale } })
 }
 
 /// Joints and the surface in one frame, which is `scale` times as large as the points are.

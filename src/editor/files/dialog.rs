@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bevy::prelude::*;
 
-use super::{Then, template::Fit};
+use super::{FollowUp, template::Fit};
 use crate::files::journal::PendingJournal;
 
 /// The current question, if any.
@@ -44,7 +44,7 @@ pub enum Question {
         /// The document's name.
         name: String,
         /// Action that would lose the changes.
-        then: Then,
+        then: FollowUp,
     },
     /// Choice of a file to open.
     Open,
@@ -55,7 +55,7 @@ pub enum Question {
         /// Initial text of the field.
         suggestion: PathBuf,
         /// Action that follows.
-        then: Option<Then>,
+        then: Option<FollowUp>,
     },
     /// A file of that name exists.
     Replace {
@@ -64,7 +64,7 @@ pub enum Question {
         /// The file.
         path: PathBuf,
         /// Action that follows.
-        then: Option<Then>,
+        then: Option<FollowUp>,
     },
     /// A template has another size than the mesh.
     Fit(Fit),

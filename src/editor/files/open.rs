@@ -8,7 +8,7 @@ use bevy::{
 };
 
 use super::{
-    OpenRequest, Then, active,
+    FollowUp, OpenRequest, active,
     dialog::{Dialog, Question},
     document::{
         Context, ContextMesh, MeshSource, OpenDocument, SavedAt, close_journal, disk, is_same, is_unsaved, last_step,
@@ -25,8 +25,8 @@ use crate::{
     files::{
         Disk, FileKind, LoadedMesh, MeshState, MeshToSave, ProjectNote, RealDisk,
         journal::{
-            Journal, JournalStart, Origin, PendingJournal, Recovered, Restored, Resumed, file_hash, journal_beside,
-            pending_journal,
+            Journal, JournalStart, Origin, PendingJournal, RecoveredJournal, RestoredRig, ResumedJournal, file_hash,
+            journal_beside, pending_journal,
         },
         load_model, load_project, load_rig_text, load_template, read_capped, stem,
     },
@@ -55,7 +55,7 @@ const MAX_HASHED: u64 = 1 << 30;
 
 /// Document that is being opened.
 #[derive(Resource, Default)]
-pub struct Loading {
+pub struct LoadJob {
     job: Option<Job>,
     /// Loaded document that waits for an answer about changes that were made while it loaded.
     held: Option<(String, Box<LoadedDocument>)>,
@@ -68,7 +68,7 @@ struct Job {
     confirmed: Option<Arc<Step>>,
 }
 
-impl Loading {
+impl LoadJob {
     /// Name of the document that is being opened.
     pub fn what(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
@@ -105,8 +105,8 @@ pub(in crate::editor) struct LoadedDocument {
 
 /// Recovered work.
 pub(in crate::editor) struct Work {
-    pub recovered: Recovered,
-    pub restored: Restored,
+    pub recovered: RecoveredJournal,
+    pub restored: RestoredRig,
     pub journal: std::path::PathBuf,
 }
 
@@ -183,7 +183,7 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
 /// Registers `task` as the document that is being opened.
 pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<LoadedFile, OpenError>>) {
     let confirmed = active(world).and_then(|rig| last_step(world, rig));
-    let mut loading = world.resource_mut::<Loading>();
+    let mut loading = world.resource_mut::<LoadJob>();
     loading.job = Some(Job { name, task, confirmed });
     loading.held = None;
 }
@@ -279,7 +279,7 @@ pub(super) fn poll(world: &mut World) {
         // A journal that begins during the search could be taken for one left by a crash.
         return;
     }
-    let mut loading = world.resource_mut::<Loading>();
+    let mut loading = world.resource_mut::<LoadJob>();
     let Some(job) = &mut loading.bypass_change_detection().job else { return };
     let Some(result) = check_ready(&mut job.task) else { return };
     let Some(Job { name, confirmed, .. }) = loading.job.take() else { return };
@@ -297,8 +297,8 @@ pub(super) fn poll(world: &mut World) {
                 .and_then(|rig| world.get::<OpenDocument>(rig));
             match changed.map(|document| document.name.clone()) {
                 Some(document) => {
-                    world.resource_mut::<Loading>().held = Some((name, opened));
-                    world.resource_mut::<Dialog>().ask(Question::Unsaved { name: document, then: Then::Land });
+                    world.resource_mut::<LoadJob>().held = Some((name, opened));
+                    world.resource_mut::<Dialog>().ask(Question::Unsaved { name: document, then: FollowUp::Land });
                 }
                 None => land(world, &name, *opened),
             }
@@ -308,14 +308,14 @@ pub(super) fn poll(world: &mut World) {
 
 /// Takes over the held document; the open one may be lost.
 pub(super) fn land_held(world: &mut World) {
-    if let Some((name, opened)) = world.resource_mut::<Loading>().held.take() {
+    if let Some((name, opened)) = world.resource_mut::<LoadJob>().held.take() {
         land(world, &name, *opened);
     }
 }
 
 /// Drops the held document.
 pub(super) fn drop_held(world: &mut World) {
-    world.resource_mut::<Loading>().held = None;
+    world.resource_mut::<LoadJob>().held = None;
 }
 
 fn land(world: &mut World, name: &str, opened: LoadedDocument) {
@@ -360,7 +360,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     };
     let (bundle, journal) = match work {
         Some(work) => {
-            let Resumed { journal, kept } =
+            let ResumedJournal { journal, kept } =
                 Journal::resume(disk(), places, &work.recovered, &work.restored, &work.journal);
             warnings.extend(kept.map(|kept| format!("the former journal is kept as `{}`", kept.display())));
             journal.context(context.text());

@@ -13,7 +13,7 @@ use bevy::{
 };
 
 use super::{
-    Then, active, after_asking,
+    FollowUp, active, after_asking,
     dialog::Purpose,
     document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
     error::WriteError,
@@ -41,19 +41,19 @@ use crate::{
 
 /// Document that is being saved.
 #[derive(Resource, Default)]
-pub struct Saving {
+pub struct SaveJob {
     job: Option<Job>,
-    waiting: VecDeque<(Purpose, PathBuf, Option<Then>)>,
+    waiting: VecDeque<(Purpose, PathBuf, Option<FollowUp>)>,
 }
 
-impl Saving {
+impl SaveJob {
     /// Name of the file that is being saved.
     pub fn what(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
     }
 
     /// Schedules `then` after the current saving; returns `false` if nothing is being saved.
-    pub(super) fn wait_for(&mut self, then: Then) -> bool {
+    pub(super) fn wait_for(&mut self, then: FollowUp) -> bool {
         let Some(job) = &mut self.job else { return false };
         match self.waiting.back_mut() {
             Some((_, _, last)) => *last = Some(then),
@@ -69,7 +69,7 @@ struct Job {
     /// Last step in the snapshot.
     step: Option<Arc<Step>>,
     task: Task<Result<SavedContent, WriteError>>,
-    then: Option<Then>,
+    then: Option<FollowUp>,
 }
 
 /// Content that was written.
@@ -125,7 +125,7 @@ pub(super) fn completed(path: &Path, purpose: Purpose) -> PathBuf {
 }
 
 /// Saves the project or exports the character.
-pub(super) fn to(world: &mut World, purpose: Purpose, path: PathBuf, then: Option<Then>) {
+pub(super) fn to(world: &mut World, purpose: Purpose, path: PathBuf, then: Option<FollowUp>) {
     match purpose {
         Purpose::Save => project(world, path, then),
         Purpose::Export => export(world, path),
@@ -166,9 +166,9 @@ pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(Pro
 }
 
 /// Saves the project.
-pub(super) fn project(world: &mut World, path: PathBuf, then: Option<Then>) {
-    if world.resource::<Saving>().job.is_some() {
-        world.resource_mut::<Saving>().waiting.push_back((Purpose::Save, path, then));
+pub(super) fn project(world: &mut World, path: PathBuf, then: Option<FollowUp>) {
+    if world.resource::<SaveJob>().job.is_some() {
+        world.resource_mut::<SaveJob>().waiting.push_back((Purpose::Save, path, then));
         return;
     }
     let Some(rig) = active(world) else { return };
@@ -178,7 +178,7 @@ pub(super) fn project(world: &mut World, path: PathBuf, then: Option<Then>) {
     let position = journal.position();
     let (step, name) = (last_step(world, rig), file_name(&path));
     let task = spawn(move || store(snapshot, is_bundled, path, &journal, position));
-    world.resource_mut::<Saving>().job = Some(Job { name, rig, step, task, then });
+    world.resource_mut::<SaveJob>().job = Some(Job { name, rig, step, task, then });
 }
 
 fn store(
@@ -224,8 +224,8 @@ pub(in crate::editor) fn place_bundled(project: &Path) -> Result<PathBuf, WriteE
 
 /// Exports the format given by the path's extension.
 fn export(world: &mut World, path: PathBuf) {
-    if world.resource::<Saving>().job.is_some() {
-        world.resource_mut::<Saving>().waiting.push_back((Purpose::Export, path, None));
+    if world.resource::<SaveJob>().job.is_some() {
+        world.resource_mut::<SaveJob>().waiting.push_back((Purpose::Export, path, None));
         return;
     }
     let Some(rig) = active(world) else { return };
@@ -244,7 +244,7 @@ fn export(world: &mut World, path: PathBuf) {
         let template = (template.as_deref() == Some(&path)).then(|| Arc::new(data));
         Ok(SavedContent::Export { notes, template })
     });
-    world.resource_mut::<Saving>().job = Some(Job { name, rig, step, task, then: None });
+    world.resource_mut::<SaveJob>().job = Some(Job { name, rig, step, task, then: None });
 }
 
 fn export_to(
@@ -289,7 +289,7 @@ fn export_to(
 
 /// Reports the result of saving, and proceeds.
 pub(super) fn poll(world: &mut World) {
-    let mut saving = world.resource_mut::<Saving>();
+    let mut saving = world.resource_mut::<SaveJob>();
     let Some(job) = &mut saving.bypass_change_detection().job else { return };
     let Some(result) = check_ready(&mut job.task) else { return };
     let Some(Job { name, rig, step, then, .. }) = saving.job.take() else { return };

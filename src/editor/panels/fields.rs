@@ -90,14 +90,14 @@ pub(super) fn rename(ui: &mut Ui, rect: Rect, id: Id, said: &str, text: &mut Str
 /// Number fields: during a drag the rig shows a preview, and the release makes one step.
 #[derive(Default)]
 pub(super) struct Numbers {
-    dragged: Option<Dragged>,
+    dragged: Option<DraggedNumber>,
     /// The field left by Escape: egui returns the typed text once more in the next frame.
     dropped: Option<Id>,
 }
 
 /// The number that is being dragged.
 #[derive(Debug, Clone, Copy)]
-struct Dragged {
+struct DraggedNumber {
     id: Id,
     from: f64,
     value: f64,
@@ -205,10 +205,10 @@ impl Numbers {
         let escaped = ui.input(|input| input.key_pressed(Key::Escape));
         if response.dragged() && response.changed() && value.is_finite() {
             let from = dragged.map_or(f64::from(shown.value), |dragged| dragged.from);
-            self.dragged = Some(Dragged { id, from, value });
+            self.dragged = Some(DraggedNumber { id, from, value });
             return Some(NumberEdit::Preview(value as f32));
         }
-        if let Some(Dragged { from, value, .. }) = dragged.filter(|_| !response.dragged()) {
+        if let Some(DraggedNumber { from, value, .. }) = dragged.filter(|_| !response.dragged()) {
             self.dragged = None;
             // Escape, a lost pointer, or a return to the first value cancels the drag.
             let dropped = escaped || !response.drag_stopped() || value == from;

@@ -68,7 +68,7 @@ struct Rename {
 }
 
 /// Joints dragged to another parent.
-struct Dragged(Vec<Uid>);
+struct DraggedJoints(Vec<Uid>);
 
 impl EditorPanel for HierarchyPanel {
     fn title(&self) -> &'static str {
@@ -197,7 +197,7 @@ impl HierarchyPanel {
             requests.send(PickRequest { rig: shown.entity, what: Pick::None, add: false });
         }
         autoscroll(ui, view);
-        if let Some(dragged) = ground.dnd_release_payload::<Dragged>() {
+        if let Some(dragged) = ground.dnd_release_payload::<DraggedJoints>() {
             reparent(&dragged.0, None, shown, requests);
         }
     }
@@ -286,7 +286,7 @@ fn reparent(joints: &[Uid], parent: Option<Uid>, shown: &DisplayedRig, requests:
 /// Scrolls while dragged joints are near an edge of the view.
 fn autoscroll(ui: &Ui, view: Rect) {
     let Some(pointer) = ui.input(|input| input.pointer.latest_pos()) else { return };
-    if !DragAndDrop::has_payload_of_type::<Dragged>(ui.ctx()) || !view.x_range().contains(pointer.x) {
+    if !DragAndDrop::has_payload_of_type::<DraggedJoints>(ui.ctx()) || !view.x_range().contains(pointer.x) {
         return;
     }
     let edge = 24.0;

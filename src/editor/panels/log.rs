@@ -131,12 +131,12 @@ pub struct LogPanel {
     search: String,
     /// The entry whose full text is shown.
     chosen: Option<u64>,
-    listed: Listed,
+    listed: MatchedEntries,
 }
 
 /// Numbers of the entries that match the search, with the search they belong to.
 #[derive(Default)]
-struct Listed {
+struct MatchedEntries {
     made_from: Option<(u64, usize, String)>,
     places: Vec<usize>,
 }

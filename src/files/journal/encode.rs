@@ -7,7 +7,7 @@ use super::{
     frame::{RecordKind, put_frame, put_prelude},
     text::{SkinsOut, rig_text, step_text, value_text},
 };
-use crate::rig::step::{Committed, UndoStacks};
+use crate::rig::step::{Commit, UndoStacks};
 
 /// Payload of the header record.
 #[derive(Serialize, Deserialize)]
@@ -61,13 +61,13 @@ impl Encoder {
 
     /// Appends a change. On failure `out` is unchanged, and neither this change nor a later one can be added to this
     /// file.
-    pub(super) fn change(&mut self, out: &mut Vec<u8>, committed: &Committed) -> Result<(), JournalWriteError> {
+    pub(super) fn change(&mut self, out: &mut Vec<u8>, committed: &Commit) -> Result<(), JournalWriteError> {
         let (kind, whole) = match committed {
-            Committed::Done(_) => (RecordKind::Done, true),
-            Committed::Undone(step) if self.stacks.undoes(step) => (RecordKind::Undone, false),
-            Committed::Undone(_) => (RecordKind::UndoneOlder, true),
-            Committed::Redone(step) if self.stacks.redoes(step) => (RecordKind::Redone, false),
-            Committed::Redone(_) => (RecordKind::RedoneOlder, true),
+            Commit::Done(_) => (RecordKind::Done, true),
+            Commit::Undone(step) if self.stacks.undoes(step) => (RecordKind::Undone, false),
+            Commit::Undone(_) => (RecordKind::UndoneOlder, true),
+            Commit::Redone(step) if self.stacks.redoes(step) => (RecordKind::Redone, false),
+            Commit::Redone(_) => (RecordKind::RedoneOlder, true),
         };
         let text = if whole { step_text(committed.step(), &mut self.skins)? } else { String::new() };
         self.put_with_skins(out, kind, &text)?;

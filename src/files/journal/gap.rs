@@ -82,7 +82,7 @@ pub struct Gap {
     pub kind: Option<RecordKind>,
     /// Damage that makes the gap.
     pub damage: Damage,
-    /// Number of [`Recovered::changes`](super::Recovered::changes) before the gap.
+    /// Number of [`RecoveredJournal::changes`](super::RecoveredJournal::changes) before the gap.
     pub changes: usize,
 }
 

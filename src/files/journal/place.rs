@@ -195,7 +195,8 @@ fn unsaved(disk: &dyn Disk, summary: &Summary) -> (usize, bool) {
     (all, changed)
 }
 
-/// Present [`file_hash`] of a file; `None` if it cannot be read. For [`Recovered::basis`](super::Recovered::basis).
+/// Present [`file_hash`] of a file; `None` if it cannot be read. For
+/// [`RecoveredJournal::basis`](super::RecoveredJournal::basis).
 pub fn file_hash_at(disk: &dyn Disk, path: &Path) -> Option<u64> {
     read_capped(disk, path, MAX_PROJECT).ok().map(|bytes| file_hash(&bytes))
 }

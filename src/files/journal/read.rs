@@ -15,7 +15,7 @@ use crate::{
     rig::{
         Rig,
         skin::read_skin_data,
-        step::{Committed, Step},
+        step::{Commit, Step},
     },
 };
 
@@ -51,13 +51,13 @@ pub enum Ending {
     Open,
     /// The record that ends a journal: nothing is to be recovered.
     Closed,
-    /// Bytes that are no record: the last of the [gaps](Recovered::gaps).
+    /// Bytes that are no record: the last of the [gaps](RecoveredJournal::gaps).
     Torn,
 }
 
 /// Content of a journal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recovered {
+pub struct RecoveredJournal {
     /// Session that wrote the journal.
     pub session: u64,
     /// Id of the process that wrote the journal; 0 if it is lost.
@@ -77,9 +77,9 @@ pub struct Recovered {
 pub enum Basis {
     /// The rig that the journal holds.
     Journal,
-    /// The rig of the project file at [`Recovered::project`], which already holds the first `contained` changes.
+    /// The rig of the project file at [`RecoveredJournal::project`], which already holds the first `contained` changes.
     Project {
-        /// Number of [`Recovered::changes`] that the project file holds.
+        /// Number of [`RecoveredJournal::changes`] that the project file holds.
         contained: usize,
     },
     /// The project file was changed by another program since, or is gone. Replaying all changes on its present content
@@ -87,7 +87,7 @@ pub enum Basis {
     Changed,
 }
 
-impl Recovered {
+impl RecoveredJournal {
     /// Places where records cannot be used, in the order of the file.
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
@@ -124,7 +124,7 @@ impl Recovered {
     }
 
     /// The changes, in order.
-    pub fn changes(&self) -> &[Committed] {
+    pub fn changes(&self) -> &[Commit] {
         &self.content.changes
     }
 
@@ -175,12 +175,12 @@ impl Recovered {
 /// length.
 ///
 /// # Errors
-/// [`JournalError`] if there is no sound record. Damage is no error: see [`Recovered::gaps`].
-pub fn recover(bytes: &[u8]) -> Result<Recovered, JournalError> {
+/// [`JournalError`] if there is no sound record. Damage is no error: see [`RecoveredJournal::gaps`].
+pub fn recover(bytes: &[u8]) -> Result<RecoveredJournal, JournalError> {
     let scan = Scan::new(bytes)?;
     let content = Content { origin: Origin::Unknown, ..Content::default() };
     let mut reader = Reader {
-        recovered: Recovered {
+        recovered: RecoveredJournal {
             session: scan.session(),
             process: 0,
             ending: Ending::Open,
@@ -207,7 +207,7 @@ pub fn recover(bytes: &[u8]) -> Result<Recovered, JournalError> {
 
 /// State of the reader: the result so far, and the steps and weights that the next records refer to.
 struct Reader {
-    recovered: Recovered,
+    recovered: RecoveredJournal,
     stacks: LossyHistory,
     skins: SkinsIn,
 }
@@ -264,19 +264,19 @@ impl Reader {
         }
         let stacks = &mut self.stacks;
         let committed = match kind {
-            RecordKind::Undone => stacks.undo().map(Committed::Undone),
-            RecordKind::Redone => stacks.redo().map(Committed::Redone),
+            RecordKind::Undone => stacks.undo().map(Commit::Undone),
+            RecordKind::Redone => stacks.redo().map(Commit::Redone),
             RecordKind::UndoneOlder => {
                 stacks.undo_older(step.clone());
-                step.map(Committed::Undone)
+                step.map(Commit::Undone)
             }
             RecordKind::RedoneOlder => {
                 stacks.redo_older(step.clone());
-                step.map(Committed::Redone)
+                step.map(Commit::Redone)
             }
             _ => {
                 stacks.done(step.clone());
-                step.map(Committed::Done)
+                step.map(Commit::Done)
             }
         };
         let committed = committed.ok_or((damage, 1))?;

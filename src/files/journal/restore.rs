@@ -6,16 +6,16 @@
 
 use std::{borrow::Cow, collections::HashMap, sync::Arc};
 
-use super::{Basis, Content, Origin, Recovered};
+use super::{Basis, Content, Origin, RecoveredJournal};
 use crate::rig::{
     EditError, Rig, RigEdit, Uid,
-    step::{Committed, Replayed, Step, UndoStacks, replay},
+    step::{Commit, Replay, Step, UndoStacks, replay},
 };
 
 /// A sound change that could not be applied.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Skipped {
-    /// Index of the change in [`Recovered::changes`].
+pub struct SkippedChange {
+    /// Index of the change in [`RecoveredJournal::changes`].
     pub change: usize,
     /// Name of the change's step.
     pub name: Cow<'static, str>,
@@ -37,11 +37,11 @@ pub enum SkipReason {
 /// Rig restored from a journal, with the data that [`Journal::resume`](super::Journal::resume) needs to continue the
 /// journal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Restored {
+pub struct RestoredRig {
     /// Rig, selection and history.
-    pub replayed: Replayed,
+    pub replayed: Replay,
     /// Changes that were left out, all after a gap.
-    pub skipped: Vec<Skipped>,
+    pub skipped: Vec<SkippedChange>,
     /// Content of the next journal.
     pub(super) content: Content,
     /// Number of the changes in `content` that the project holds.
@@ -59,10 +59,10 @@ pub(super) enum SavedSteps {
     Nothing,
 }
 
-impl Recovered {
+impl RecoveredJournal {
     /// Restores the rig: on the journal's own rig (an empty one if it has none) for [`Basis::Journal`], else on
     /// `project`, the rig that the project file holds now.
-    pub fn restore(&self, basis: Basis, project: Option<Rig>) -> Restored {
+    pub fn restore(&self, basis: Basis, project: Option<Rig>) -> RestoredRig {
         let (rig, contained) = match basis {
             Basis::Journal => (self.base().cloned().unwrap_or_default(), 0),
             Basis::Project { contained } => (project.unwrap_or_default(), contained.min(self.changes().len())),
@@ -76,7 +76,7 @@ impl Recovered {
         if exact >= self.changes().len() {
             let replayed = replay(rig, self.changes(), contained);
             content.changes.truncate(replayed.applied);
-            return Restored { replayed, skipped: Vec::new(), content, contained: SavedSteps::Marked };
+            return RestoredRig { replayed, skipped: Vec::new(), content, contained: SavedSteps::Marked };
         }
         if basis == Basis::Journal {
             content.base = Some(Arc::new(rig.clone()));
@@ -95,7 +95,7 @@ impl Recovered {
         }
         content.changes = salvage.made;
         let joints = |uids: Vec<Uid>| uids.into_iter().filter(|uid| salvage.rig.joint(*uid).is_some()).collect();
-        let replayed = Replayed {
+        let replayed = Replay {
             selection: salvage.selection.map(joints),
             stacks: salvage.stacks,
             applied: content.changes.len(),
@@ -104,11 +104,11 @@ impl Recovered {
         };
         let contained =
             if matches!(basis, Basis::Project { .. }) { SavedSteps::Counted(former) } else { SavedSteps::Nothing };
-        Restored { replayed, skipped: salvage.skipped, content, contained }
+        RestoredRig { replayed, skipped: salvage.skipped, content, contained }
     }
 
-    /// The [rig, selection and history](Restored::replayed) of [`Self::restore`] alone.
-    pub fn replay(&self, basis: Basis, project: Option<Rig>) -> Replayed {
+    /// The [rig, selection and history](RestoredRig::replayed) of [`Self::restore`] alone.
+    pub fn replay(&self, basis: Basis, project: Option<Rig>) -> Replay {
         self.restore(basis, project).replayed
     }
 }
@@ -125,18 +125,18 @@ enum State {
 
 /// Rig during restoration.
 struct Restoration<'a> {
-    recovered: &'a Recovered,
+    recovered: &'a RecoveredJournal,
     rig: Rig,
     selection: Option<Vec<Uid>>,
     stacks: UndoStacks,
     /// States of steps, by the address of the journal's step.
     states: HashMap<*const Step, State>,
-    made: Vec<Committed>,
-    skipped: Vec<Skipped>,
+    made: Vec<Commit>,
+    skipped: Vec<SkippedChange>,
 }
 
 impl<'a> Restoration<'a> {
-    fn new(recovered: &'a Recovered, rig: Rig) -> Self {
+    fn new(recovered: &'a RecoveredJournal, rig: Rig) -> Self {
         Self {
             recovered,
             rig,
@@ -149,25 +149,25 @@ impl<'a> Restoration<'a> {
     }
 
     /// Follows a change that the rig already holds.
-    fn follow(&mut self, committed: &Committed) {
+    fn follow(&mut self, committed: &Commit) {
         let (_, selection) = committed.effect();
         self.selection = Some(selection.to_vec());
         self.stacks.follow(committed);
         self.made.push(committed.clone());
         let step = committed.step().clone();
-        let state = if matches!(committed, Committed::Undone(_)) { State::Undone(step) } else { State::Done(step) };
+        let state = if matches!(committed, Commit::Undone(_)) { State::Undone(step) } else { State::Done(step) };
         self.states.insert(Arc::as_ptr(committed.step()), state);
     }
 
     /// Applies a change, or lists it as skipped.
-    fn make(&mut self, number: usize, committed: &Committed, is_exact: bool) {
+    fn make(&mut self, number: usize, committed: &Commit, is_exact: bool) {
         let step = committed.step();
         let key = Arc::as_ptr(step);
-        let is_undo = matches!(committed, Committed::Undone(_));
+        let is_undo = matches!(committed, Commit::Undone(_));
         let as_made = match (self.states.get(&key), committed) {
             (Some(State::Skipped), _) => return,
-            (Some(State::Done(made)), Committed::Undone(_)) => Some(made.clone()),
-            (Some(State::Undone(made)), Committed::Redone(_)) => Some(made.clone()),
+            (Some(State::Done(made)), Commit::Undone(_)) => Some(made.clone()),
+            (Some(State::Undone(made)), Commit::Redone(_)) => Some(made.clone()),
             _ => None,
         };
         let source = as_made.as_ref().unwrap_or(step);
@@ -181,7 +181,7 @@ impl<'a> Restoration<'a> {
         let inverse = match applied {
             Ok(inverse) => inverse,
             Err(why) => {
-                self.skipped.push(Skipped { change: number, name: step.name.clone(), why });
+                self.skipped.push(SkippedChange { change: number, name: step.name.clone(), why });
                 self.states.insert(key, State::Skipped);
                 return;
             }
@@ -202,26 +202,24 @@ impl<'a> Restoration<'a> {
 
     /// Entry of the history for a change, and the state of its step. An undo or redo of a step that is no longer the
     /// last one becomes a step of its own, so that each step builds on the ones before it.
-    fn entry(&self, committed: &Committed, made: Arc<Step>, inverse: RigEdit) -> (Committed, State) {
+    fn entry(&self, committed: &Commit, made: Arc<Step>, inverse: RigEdit) -> (Commit, State) {
         let UndoStacks { done, undone } = &self.stacks;
         let is_known = self.states.contains_key(&Arc::as_ptr(committed.step()));
         let alone = |verb: &str, step: &Step, forward: &[RigEdit], before: &[Uid], after: &[Uid]| {
             let (name, forward) = (Cow::Owned(format!("{verb} {}", step.name)), forward.to_vec());
             let (before, after) = (before.to_vec(), after.to_vec());
-            Committed::Done(Arc::new(Step { name, forward, backward: vec![inverse.clone()], before, after }))
+            Commit::Done(Arc::new(Step { name, forward, backward: vec![inverse.clone()], before, after }))
         };
         match committed {
-            Committed::Done(_) => (Committed::Done(made.clone()), State::Done(made)),
-            Committed::Undone(_) if self.stacks.undoes(&made) || (!is_known && done.is_empty()) => {
-                (Committed::Undone(made.clone()), State::Undone(made))
+            Commit::Done(_) => (Commit::Done(made.clone()), State::Done(made)),
+            Commit::Undone(_) if self.stacks.undoes(&made) || (!is_known && done.is_empty()) => {
+                (Commit::Undone(made.clone()), State::Undone(made))
             }
-            Committed::Redone(_) if self.stacks.redoes(&made) || (!is_known && undone.is_empty()) => {
-                (Committed::Redone(made.clone()), State::Done(made))
+            Commit::Redone(_) if self.stacks.redoes(&made) || (!is_known && undone.is_empty()) => {
+                (Commit::Redone(made.clone()), State::Done(made))
             }
-            Committed::Undone(_) => {
-                (alone("Undo", &made, &made.backward, &made.after, &made.before), State::Undone(made))
-            }
-            Committed::Redone(_) => (alone("Redo", &made, &made.forward, &made.before, &made.after), State::Done(made)),
+            Commit::Undone(_) => (alone("Undo", &made, &made.backward, &made.after, &made.before), State::Undone(made)),
+            Commit::Redone(_) => (alone("Redo", &made, &made.forward, &made.before, &made.after), State::Done(made)),
         }
     }
 }

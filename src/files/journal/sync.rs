@@ -13,11 +13,11 @@ use crate::files::DiskFile;
 const GROUP: Duration = Duration::from_millis(50);
 
 /// Result of a sync: `Err` with the reason for a failure.
-pub(super) type Synced = Result<(), JournalWriteError>;
+pub(super) type SyncResult = Result<(), JournalWriteError>;
 
 /// A thread that syncs one file.
 pub(super) struct Syncer {
-    orders: Sender<Option<Sender<Synced>>>,
+    orders: Sender<Option<Sender<SyncResult>>>,
     thread: thread::JoinHandle<()>,
 }
 
@@ -45,7 +45,7 @@ impl Syncer {
     }
 
     /// Requests a sync at once, and its result through `answer`.
-    pub(super) fn now(&self, answer: Sender<Synced>) {
+    pub(super) fn now(&self, answer: Sender<SyncResult>) {
         if let Err(refused) = self.orders.send(Some(answer))
             && let Some(answer) = refused.0
         {
@@ -54,10 +54,14 @@ impl Syncer {
     }
 }
 
-fn run(mut file: Box<dyn DiskFile>, inbox: &Receiver<Option<Sender<Synced>>>, failed: impl FnOnce(JournalWriteError)) {
+fn run(
+    mut file: Box<dyn DiskFile>,
+    inbox: &Receiver<Option<Sender<SyncResult>>>,
+    failed: impl FnOnce(JournalWriteError),
+) {
     let mut next = Instant::now();
     while let Ok(order) = inbox.recv() {
-        let mut waiting: Vec<Sender<Synced>> = order.into_iter().collect();
+        let mut waiting: Vec<Sender<SyncResult>> = order.into_iter().collect();
         while waiting.is_empty() {
             match inbox.recv_timeout(next.saturating_duration_since(Instant::now())) {
                 Ok(order) => waiting.extend(order),

@@ -12,7 +12,7 @@ use std::{
 use super::{
     Content, JournalPlaces, JournalWriteError, SaveMark,
     encode::Encoder,
-    sync::{Synced, Syncer},
+    sync::{SyncResult, Syncer},
     writer::{Order, WriterState},
 };
 use crate::files::{
@@ -39,7 +39,7 @@ pub(super) struct Writer {
 }
 
 /// Open file of a journal.
-struct Open {
+struct OpenJournal {
     path: PathBuf,
     file: Box<dyn DiskFile>,
     /// Syncing thread; `None` if the file offers no second handle, so that every write is synced by itself.
@@ -47,9 +47,9 @@ struct Open {
     encoder: Encoder,
 }
 
-impl Open {
+impl OpenJournal {
     /// Syncs and closes every handle, which unlocks the file.
-    fn close(mut self) -> Synced {
+    fn close(mut self) -> SyncResult {
         if let Some(syncer) = self.syncer.take() {
             syncer.end();
         }
@@ -60,7 +60,7 @@ impl Open {
 /// The thread's data and its open file.
 struct Work {
     writer: Writer,
-    open: Option<Open>,
+    open: Option<OpenJournal>,
     /// Earliest time of the next attempt after a failure.
     retry: Instant,
 }
@@ -184,7 +184,7 @@ impl Work {
         }
     }
 
-    fn sync(&mut self, answer: Sender<Synced>) {
+    fn sync(&mut self, answer: Sender<SyncResult>) {
         let Some(open) = &mut self.open else {
             let trouble = self.writer.shared.trouble();
             let _ = answer.send(Err(trouble.map_or(JournalWriteError::NotOpen, |trouble| (*trouble).clone())));
@@ -232,7 +232,7 @@ impl Work {
     }
 
     /// Switches to a file that holds the whole journal, and removes the former one.
-    fn adopt(&mut self, mut open: Open) {
+    fn adopt(&mut self, mut open: OpenJournal) {
         let writer = &mut self.writer;
         let former = writer.shared.settle(Some(open.path.clone()));
         // Windows removes a file at once only if it is closed.
@@ -250,7 +250,7 @@ impl Work {
     }
 
     /// Ends the journal: nothing is to be recovered.
-    fn close(&mut self) -> Synced {
+    fn close(&mut self) -> SyncResult {
         let open = self.open.take();
         let path = self.writer.shared.settle(None);
         let Some(path) = path else { return Ok(()) };
@@ -282,7 +282,7 @@ fn create_somewhere(
     content: &Content,
     places: &JournalPlaces,
     former: Option<&Path>,
-) -> Result<Open, (PathBuf, JournalWriteError)> {
+) -> Result<OpenJournal, (PathBuf, JournalWriteError)> {
     let mut first = None;
     for (number, path) in places.candidates(writer.session).into_iter().enumerate() {
         let folder = folder_of(&path);
@@ -308,7 +308,7 @@ fn create_somewhere(
 }
 
 /// Writes a whole journal to a temporary file in the same folder, then renames it.
-fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Result<Open, JournalWriteError> {
+fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Result<OpenJournal, JournalWriteError> {
     let (encoder, bytes) = Encoder::begin(session, content)?;
     let temp = folder_of(path).join(temp_name());
     let mut file = disk.create(&temp).map_err(JournalWriteError::from)?;
@@ -325,7 +325,7 @@ fn create(disk: &dyn Disk, path: &Path, session: u64, content: &Content) -> Resu
     }
     // Without this, a power cut may bring the former file back, which ends earlier.
     let _ = disk.sync_folder(folder_of(path));
-    Ok(Open { path: path.to_owned(), file, syncer: None, encoder })
+    Ok(OpenJournal { path: path.to_owned(), file, syncer: None, encoder })
 }
 
 fn write_all(file: &mut dyn DiskFile, mut bytes: &[u8]) -> Result<(), JournalWriteError> {

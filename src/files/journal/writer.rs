@@ -13,17 +13,17 @@ use std::{
 };
 
 use super::{
-    Content, JournalPlaces, JournalWriteError, Origin, Recovered, Restored, SaveMark,
+    Content, JournalPlaces, JournalWriteError, Origin, RecoveredJournal, RestoredRig, SaveMark,
     place::{file_hash_at, set_aside},
     restore::SavedSteps,
-    sync::Synced,
+    sync::SyncResult,
     thread::Writer,
 };
 use crate::{
     files::Disk,
     rig::{
         Rig,
-        step::{Committed, SinkError, StepSink},
+        step::{Commit, SinkError, StepSink},
     },
 };
 
@@ -52,7 +52,7 @@ pub struct JournalStart {
 }
 
 /// A journal that continues recovered work.
-pub struct Resumed {
+pub struct ResumedJournal {
     /// The journal.
     pub journal: Journal,
     /// Path where the former file is kept, because it was damaged or some of its changes could not be applied.
@@ -61,14 +61,14 @@ pub struct Resumed {
 
 /// Orders to the thread.
 pub(super) enum Order {
-    Change(Committed),
+    Change(Commit),
     Context(String),
-    Saving(SaveMark, Sender<Synced>),
+    Saving(SaveMark, Sender<SyncResult>),
     Saved(SaveMark, JournalPlaces),
-    Flush(Sender<Synced>),
+    Flush(Sender<SyncResult>),
     SyncFailed(PathBuf, JournalWriteError),
-    Finish(Sender<Synced>),
-    Close(Sender<Synced>),
+    Finish(Sender<SyncResult>),
+    Close(Sender<SyncResult>),
 }
 
 /// State that the thread publishes.
@@ -138,18 +138,18 @@ impl Journal {
         Self::begin(disk, session, start.places, content, None)
     }
 
-    /// Continues with the work that was recovered from the file `old` and [restored](Recovered::restore). The journal
-    /// holds all unsaved changes from its start; once it is on the disk, `old` is removed.
+    /// Continues with the work that was recovered from the file `old` and [restored](RecoveredJournal::restore). The
+    /// journal holds all unsaved changes from its start; once it is on the disk, `old` is removed.
     ///
     /// A damaged journal is kept under the ending `.damaged`, and one whose changes could not all be applied under the
     /// ending `.kept`. No search finds those files, and the program never removes them.
     pub fn resume(
         disk: Arc<dyn Disk>,
         places: JournalPlaces,
-        recovered: &Recovered,
-        restored: &Restored,
+        recovered: &RecoveredJournal,
+        restored: &RestoredRig,
         old: &Path,
-    ) -> Resumed {
+    ) -> ResumedJournal {
         let ending = match recovered.is_damaged() {
             true => Some(".damaged"),
             false => restored.replayed.refused.is_some().then_some(".kept"),
@@ -168,7 +168,7 @@ impl Journal {
             (_, SavedSteps::Nothing) | (None, _) => {}
         }
         // The same session gives the same file name, so that the file replaces the old one in one step.
-        Resumed { journal: Self::begin(disk, recovered.session, places, content, replaces), kept }
+        ResumedJournal { journal: Self::begin(disk, recovered.session, places, content, replaces), kept }
     }
 
     fn begin(
@@ -191,7 +191,7 @@ impl Journal {
     }
 
     /// Records one change. Returns at once; large weights are encoded by the journal's own thread.
-    pub fn record(&self, committed: Committed) {
+    pub fn record(&self, committed: Commit) {
         self.inner.position.fetch_add(1, Ordering::AcqRel);
         self.order(Order::Change(committed));
     }
@@ -221,7 +221,7 @@ impl Journal {
         self.inner.shared.path()
     }
 
-    /// Replaces the caller's text, for [`Recovered::context`].
+    /// Replaces the caller's text, for [`RecoveredJournal::context`].
     pub fn context(&self, context: impl Into<String>) {
         self.order(Order::Context(context.into()));
     }
@@ -257,13 +257,13 @@ impl Journal {
         let _ = self.inner.orders.send(order);
     }
 
-    fn ask(&self, order: impl FnOnce(Sender<Synced>) -> Order, limit: Duration) -> Result<(), JournalWriteError> {
+    fn ask(&self, order: impl FnOnce(Sender<SyncResult>) -> Order, limit: Duration) -> Result<(), JournalWriteError> {
         self.inner.ask(order, limit)
     }
 }
 
 impl Inner {
-    fn ask(&self, order: impl FnOnce(Sender<Synced>) -> Order, limit: Duration) -> Result<(), JournalWriteError> {
+    fn ask(&self, order: impl FnOnce(Sender<SyncResult>) -> Order, limit: Duration) -> Result<(), JournalWriteError> {
         let (answer, inbox) = channel();
         let ended = || Err(JournalWriteError::Closed);
         if self.orders.send(order(answer)).is_err() {
@@ -286,7 +286,7 @@ impl Drop for Inner {
 }
 
 impl StepSink for Journal {
-    fn record(&self, committed: Committed) {
+    fn record(&self, committed: Commit) {
         Journal::record(self, committed);
     }
 

@@ -8,7 +8,7 @@ use super::{
     GltfError,
     budget::Budget,
     document::{BufferBytes, Document},
-    json::At,
+    json::JsonObject,
 };
 
 /// A range of a buffer; checked to lie inside it.
@@ -111,7 +111,7 @@ pub(super) struct Accessor {
 }
 
 impl Accessor {
-    pub(super) fn new(at: &At, views: &[View]) -> Result<Self, GltfError> {
+    pub(super) fn new(at: &JsonObject, views: &[View]) -> Result<Self, GltfError> {
         let count = at.need("count", at.uint("count")?)?;
         let component = Component::from_code(at.need("componentType", at.uint("componentType")?)?);
         let kind = at.need("type", at.text("type")?)?;
@@ -151,7 +151,7 @@ impl Accessor {
 }
 
 /// Checks that `count` elements of `size` bytes fit into the view.
-fn place(at: &At, view: usize, offset: usize, layout: Layout, views: &[View]) -> Result<Place, GltfError> {
+fn place(at: &JsonObject, view: usize, offset: usize, layout: Layout, views: &[View]) -> Result<Place, GltfError> {
     let Layout { count, size, packed } = layout;
     let View { length, stride, .. } = views[view];
     let stride = stride.unwrap_or(packed);
@@ -173,13 +173,13 @@ fn place(at: &At, view: usize, offset: usize, layout: Layout, views: &[View]) ->
     Ok(Place { view, offset, stride })
 }
 
-fn sparse(at: &At, layout: Layout, views: &[View]) -> Result<Sparse, GltfError> {
+fn sparse(at: &JsonObject, layout: Layout, views: &[View]) -> Result<Sparse, GltfError> {
     let count = at.need("count", at.uint("count")?)?;
     if count > layout.count {
         return Err(at.fail("count", format!("{count} of {} elements are replaced", layout.count)));
     }
     // Sparse data is packed, whatever the view says.
-    let part = |at: &At, size: usize, packed: usize| {
+    let part = |at: &JsonObject, size: usize, packed: usize| {
         let view = at.need("bufferView", at.index("bufferView", views.len(), "buffer view")?)?;
         let offset = at.uint("byteOffset")?.unwrap_or(0);
         let unstrided = [View { stride: None, ..views[view] }];

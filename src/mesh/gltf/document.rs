@@ -8,7 +8,7 @@ use super::{
     ExternalError, ExternalFile, ExternalKind, GltfError,
     accessor::{Accessor, View},
     budget::{Budget, Notes},
-    json::At,
+    json::JsonObject,
     primitive::Mesh,
     uri,
 };
@@ -40,7 +40,7 @@ impl Deref for BufferBytes<'_> {
 
 /// A node as declared; its transform is read where it is needed.
 pub(super) struct NodeEntry<'a> {
-    pub(super) at: At<'a>,
+    pub(super) at: JsonObject<'a>,
     pub(super) name: &'a str,
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
@@ -75,7 +75,7 @@ pub(super) struct AnimationEntry<'a> {
 
 /// Document whose references and ranges of bytes have been checked.
 pub(super) struct Document<'a> {
-    pub(super) root: At<'a>,
+    pub(super) root: JsonObject<'a>,
     buffers: Vec<BufferEntry<'a>>,
     pub(super) views: Vec<View>,
     pub(super) accessors: Vec<Accessor>,
@@ -106,7 +106,7 @@ const SUPPORTED: &[&str] = &[
 
 impl<'a> Document<'a> {
     pub(super) fn new(root: &'a Value, budget: &Budget, notes: &Notes) -> Result<Self, GltfError> {
-        let root = At::new(root, String::new())?;
+        let root = JsonObject::new(root, String::new())?;
         check_version(&root)?;
         let extensions_used = names(&root, "extensionsUsed")?;
         let extensions_required = names(&root, "extensionsRequired")?;
@@ -196,8 +196,8 @@ impl<'a> Document<'a> {
                     let place = format!("{place}/uri");
                     budget.take(text.len(), 1, &place)?;
                     match uri::resolve(text, &place)? {
-                        uri::Resolved::Data { bytes, .. } => BufferBytes::Shared(Rc::new(bytes)),
-                        uri::Resolved::File(path) => match files.get(&path) {
+                        uri::UriTarget::Data { bytes, .. } => BufferBytes::Shared(Rc::new(bytes)),
+                        uri::UriTarget::File(path) => match files.get(&path) {
                             Some(bytes) => BufferBytes::Shared(bytes.clone()),
                             None => {
                                 let file = ExternalFile { path: &path, kind: ExternalKind::Buffer, limit: u64::MAX };
@@ -221,7 +221,7 @@ impl<'a> Document<'a> {
     }
 }
 
-fn check_version(root: &At) -> Result<(), GltfError> {
+fn check_version(root: &JsonObject) -> Result<(), GltfError> {
     let asset = root.need("asset", root.object("asset")?)?;
     let version = asset.need("version", asset.text("version")?)?;
     let needed = asset.text("minVersion")?.unwrap_or("2.0");
@@ -232,12 +232,12 @@ fn check_version(root: &At) -> Result<(), GltfError> {
     Ok(())
 }
 
-fn names<'a>(root: &At<'a>, key: &str) -> Result<Vec<&'a str>, GltfError> {
+fn names<'a>(root: &JsonObject<'a>, key: &str) -> Result<Vec<&'a str>, GltfError> {
     let name = |value: &'a Value| value.as_str().ok_or_else(|| root.fail(key, "must be a list of names"));
     root.array(key)?.iter().map(name).collect()
 }
 
-fn view(at: &At, buffers: &[BufferEntry]) -> Result<View, GltfError> {
+fn view(at: &JsonObject, buffers: &[BufferEntry]) -> Result<View, GltfError> {
     let buffer = at.need("buffer", at.index("buffer", buffers.len(), "buffer")?)?;
     let offset = at.uint("byteOffset")?.unwrap_or(0);
     let length = at.need("byteLength", at.uint("byteLength")?)?;
@@ -253,7 +253,7 @@ fn view(at: &At, buffers: &[BufferEntry]) -> Result<View, GltfError> {
     Ok(View { buffer, offset, length, stride })
 }
 
-fn skin<'a>(at: &At<'a>, nodes: usize, accessors: &[Accessor]) -> Result<SkinEntry<'a>, GltfError> {
+fn skin<'a>(at: &JsonObject<'a>, nodes: usize, accessors: &[Accessor]) -> Result<SkinEntry<'a>, GltfError> {
     at.need("joints", at.map.get("joints"))?;
     let joints = at.indices("joints", nodes, "node")?;
     at.index("skeleton", nodes, "node")?;
@@ -272,7 +272,12 @@ fn skin<'a>(at: &At<'a>, nodes: usize, accessors: &[Accessor]) -> Result<SkinEnt
     Ok(SkinEntry { place: at.place.clone(), name: at.name(), joints, inverse_binds })
 }
 
-fn animation<'a>(at: &At<'a>, nodes: usize, accessors: usize, notes: &Notes) -> Result<AnimationEntry<'a>, GltfError> {
+fn animation<'a>(
+    at: &JsonObject<'a>,
+    nodes: usize,
+    accessors: usize,
+    notes: &Notes,
+) -> Result<AnimationEntry<'a>, GltfError> {
     let mut samplers = Vec::new();
     for sampler in at.objects("samplers")? {
         let sampler = sampler?;
@@ -299,7 +304,7 @@ fn animation<'a>(at: &At<'a>, nodes: usize, accessors: usize, notes: &Notes) -> 
 }
 
 /// The roots of the default scene, else of the first; `None` if the file has no scene.
-fn scene(root: &At, nodes: usize, notes: &Notes) -> Result<Option<Vec<usize>>, GltfError> {
+fn scene(root: &JsonObject, nodes: usize, notes: &Notes) -> Result<Option<Vec<usize>>, GltfError> {
     let count = root.array("scenes")?.len();
     let chosen = root.index("scene", count, "scene")?.unwrap_or(0);
     let mut roots = None;

@@ -9,7 +9,7 @@ use super::{
     accessor::Source,
     budget::Notes,
     document::{Document, NodeEntry},
-    json::{At, copy},
+    json::{JsonObject, copy},
     matrix,
 };
 use crate::mesh::model::{Node, Trs};
@@ -175,7 +175,7 @@ fn depth_first(document: &Document, parents: &[Option<usize>], scene: &[usize]) 
 }
 
 /// Transform of a node as declared, and as a matrix that keeps its shear.
-fn rest_transform(at: &At, notes: &Notes, needed: bool) -> Result<(Trs, DAffine3), GltfError> {
+fn rest_transform(at: &JsonObject, notes: &Notes, needed: bool) -> Result<(Trs, DAffine3), GltfError> {
     if let Some(columns) = at.vector::<16>("matrix")? {
         let matrix = DMat4::from_cols_array(&columns);
         let last = matrix.row(3);

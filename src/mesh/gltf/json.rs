@@ -8,12 +8,12 @@ use super::{GltfError, budget::Budget};
 
 /// A JSON object and the pointer to it.
 #[derive(Clone)]
-pub(super) struct At<'a> {
+pub(super) struct JsonObject<'a> {
     pub(super) map: &'a Map<String, Value>,
     pub(super) place: String,
 }
 
-impl<'a> At<'a> {
+impl<'a> JsonObject<'a> {
     pub(super) fn new(value: &'a Value, place: String) -> Result<Self, GltfError> {
         match value.as_object() {
             Some(map) => Ok(Self { map, place }),
@@ -37,8 +37,8 @@ impl<'a> At<'a> {
     }
 
     /// A nested object.
-    pub(super) fn object(&self, key: &str) -> Result<Option<At<'a>>, GltfError> {
-        self.map.get(key).map(|value| At::new(value, self.sub(key))).transpose()
+    pub(super) fn object(&self, key: &str) -> Result<Option<JsonObject<'a>>, GltfError> {
+        self.map.get(key).map(|value| JsonObject::new(value, self.sub(key))).transpose()
     }
 
     /// An array's elements; none if absent.
@@ -54,10 +54,10 @@ impl<'a> At<'a> {
     pub(super) fn objects(
         &self,
         key: &'a str,
-    ) -> Result<impl Iterator<Item = Result<At<'a>, GltfError>> + use<'a>, GltfError> {
+    ) -> Result<impl Iterator<Item = Result<JsonObject<'a>, GltfError>> + use<'a>, GltfError> {
         let place = self.sub(key);
         let list = self.array(key)?;
-        Ok(list.iter().enumerate().map(move |(i, value)| At::new(value, format!("{place}/{i}"))))
+        Ok(list.iter().enumerate().map(move |(i, value)| JsonObject::new(value, format!("{place}/{i}"))))
     }
 
     /// A whole number that is not negative; `3.0` counts as one.

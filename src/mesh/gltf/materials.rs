@@ -8,7 +8,7 @@ use super::{
     ExternalError, ExternalFile, ExternalKind, GltfError, MAX_IMAGE_BYTES,
     accessor::Source,
     budget::{Budget, Notes},
-    json::{At, copy, whole},
+    json::{JsonObject, copy, whole},
     uri,
 };
 use crate::mesh::model::{Image, MaterialSet};
@@ -39,7 +39,7 @@ pub(super) fn read(
         if let Some(extensions) = at.object("extensions")? {
             for (name, value) in extensions.map {
                 if let Some(value) = value.as_object().filter(|value| value.contains_key("source")) {
-                    let extension = At { map: value, place: extensions.sub(name) };
+                    let extension = JsonObject { map: value, place: extensions.sub(name) };
                     extension.index("source", images, "image")?;
                 }
             }
@@ -80,7 +80,7 @@ pub(super) fn declare(
 }
 
 /// A copy of an object, without references to packets of metadata that are not carried.
-fn carried(at: &At, budget: &Budget, notes: &Notes) -> Result<Value, GltfError> {
+fn carried(at: &JsonObject, budget: &Budget, notes: &Notes) -> Result<Value, GltfError> {
     let mut map = Map::new();
     for (key, value) in at.map {
         map.insert(key.clone(), copy(value, budget, &at.place)?);
@@ -99,7 +99,7 @@ fn check_textures(map: &Map<String, Value>, place: &str, textures: usize, depth:
         let Some(inner) = value.as_object().filter(|_| key != "extras" && depth < 8) else {
             continue;
         };
-        let at = At { map: inner, place: format!("{place}/{key}") };
+        let at = JsonObject { map: inner, place: format!("{place}/{key}") };
         if key.ends_with("Texture") {
             at.index("index", textures, "texture")?;
         }
@@ -144,11 +144,11 @@ fn images(
                 return Err(too_large(place));
             }
             match uri::resolve(text, &place)? {
-                uri::Resolved::Data { mime: of_uri, bytes } => {
+                uri::UriTarget::Data { mime: of_uri, bytes } => {
                     image.bytes = bytes;
                     mime = if mime.is_empty() { of_uri } else { mime };
                 }
-                uri::Resolved::File(path) => match external(ExternalFile {
+                uri::UriTarget::File(path) => match external(ExternalFile {
                     path: &path,
                     kind: ExternalKind::Image,
                     limit: MAX_IMAGE_BYTES - total,

@@ -6,7 +6,7 @@ use super::{
     GltfError,
     accessor::Accessor,
     budget::{Budget, Notes},
-    json::{At, whole},
+    json::{JsonObject, whole},
 };
 
 /// Attribute names and their accessors, in the file's order.
@@ -49,7 +49,7 @@ pub(super) fn find(attributes: &Attributes, name: &str) -> Option<usize> {
 
 impl<'a> Mesh<'a> {
     pub(super) fn new(
-        at: &At<'a>,
+        at: &JsonObject<'a>,
         accessors: &[Accessor],
         materials: usize,
         budget: &Budget,
@@ -73,7 +73,7 @@ impl<'a> Mesh<'a> {
 }
 
 /// The `weights` of a mesh or node.
-pub(super) fn morph_weights(at: &At, targets: usize) -> Result<Option<Vec<f32>>, GltfError> {
+pub(super) fn morph_weights(at: &JsonObject, targets: usize) -> Result<Option<Vec<f32>>, GltfError> {
     match at.numbers("weights")? {
         Some(weights) if weights.len() != targets => {
             Err(at.fail("weights", format!("{} weights for {targets} morph targets", weights.len())))
@@ -84,7 +84,7 @@ pub(super) fn morph_weights(at: &At, targets: usize) -> Result<Option<Vec<f32>>,
 
 impl<'a> Primitive<'a> {
     fn new(
-        at: &At<'a>,
+        at: &JsonObject<'a>,
         accessors: &[Accessor],
         materials: usize,
         budget: &Budget,
@@ -124,7 +124,7 @@ impl<'a> Primitive<'a> {
     }
 }
 
-fn attributes<'a>(at: &At<'a>, accessors: usize) -> Result<Attributes<'a>, GltfError> {
+fn attributes<'a>(at: &JsonObject<'a>, accessors: usize) -> Result<Attributes<'a>, GltfError> {
     let mut list = Vec::with_capacity(at.map.len());
     for (name, value) in at.map {
         match whole(value) {
@@ -139,7 +139,12 @@ fn attributes<'a>(at: &At<'a>, accessors: usize) -> Result<Attributes<'a>, GltfE
     Ok(list)
 }
 
-fn check_counts(at: &At, attributes: &Attributes, count: usize, accessors: &[Accessor]) -> Result<(), GltfError> {
+fn check_counts(
+    at: &JsonObject,
+    attributes: &Attributes,
+    count: usize,
+    accessors: &[Accessor],
+) -> Result<(), GltfError> {
     match attributes.iter().find(|(_, accessor)| accessors[*accessor].count != count) {
         None => Ok(()),
         Some((name, accessor)) => {

@@ -5,7 +5,7 @@ use std::{error::Error, fmt, sync::Arc};
 use super::GltfError;
 
 /// Content or file that a URI refers to.
-pub(super) enum Resolved {
+pub(super) enum UriTarget {
     /// The bytes are in the URI.
     Data {
         /// The media type, possibly empty.
@@ -117,7 +117,7 @@ pub(super) fn fault(place: &str, uri: &str, fault: impl Into<GltfUriError>) -> G
 }
 
 /// Decodes a URI and checks that it stays below the model's folder.
-pub(super) fn resolve(uri: &str, place: &str) -> Result<Resolved, GltfError> {
+pub(super) fn resolve(uri: &str, place: &str) -> Result<UriTarget, GltfError> {
     let fail = |what: GltfUriError| fault(place, uri, what);
     if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
         let (header, data) = uri[5..].split_once(',').ok_or_else(|| fail(GltfUriError::NoComma))?;
@@ -127,7 +127,7 @@ pub(super) fn resolve(uri: &str, place: &str) -> Result<Resolved, GltfError> {
         } else {
             percent_decode(data).ok_or_else(|| fail(GltfUriError::Percent))?
         };
-        return Ok(Resolved::Data { mime, bytes });
+        return Ok(UriTarget::Data { mime, bytes });
     }
     let decoded = percent_decode(uri).ok_or_else(|| fail(GltfUriError::Percent))?;
     let path = String::from_utf8(decoded).map_err(|_| fail(GltfUriError::Utf8))?;
@@ -154,7 +154,7 @@ pub(super) fn resolve(uri: &str, place: &str) -> Result<Resolved, GltfError> {
     if parts.is_empty() || path.ends_with('/') {
         return Err(fail(GltfUriError::NoFile));
     }
-    Ok(Resolved::File(parts.join("/")))
+    Ok(UriTarget::File(parts.join("/")))
 }
 
 fn percent_decode(text: &str) -> Option<Vec<u8>> {

@@ -21,7 +21,7 @@ pub(super) struct Block {
     pub filled: usize,
     /// Failure to read the text.
     pub failure: Option<Failure>,
-    pub parsed: Parsed,
+    pub parsed: BlockContent,
 }
 
 /// Failure of a block before it is parsed.
@@ -34,7 +34,7 @@ pub(super) enum Failure {
 
 /// Values parsed from a block.
 #[derive(Debug, Default)]
-pub(super) struct Parsed {
+pub(super) struct BlockContent {
     pub positions: Vec<[f32; 3]>,
     /// Colours, one a position, or empty.
     pub colors: Vec<[f32; 3]>,
@@ -55,7 +55,7 @@ pub(super) struct Parsed {
     /// Text of the events.
     pub names: Vec<u8>,
     /// Counts of skipped statements by kind.
-    pub skipped: [Skipped; SKIPS],
+    pub skipped: [SkipCount; SKIPS],
     /// Lines in the block, or before the error.
     pub lines: u32,
     pub error: Option<BlockError>,
@@ -77,7 +77,7 @@ pub(super) struct Event {
     pub what: EventKind,
     /// Number of the block's faces before the statement.
     pub face: u32,
-    /// Start of the statement's text in [`Parsed::names`].
+    /// Start of the statement's text in [`BlockContent::names`].
     pub start: u32,
     pub end: u32,
 }
@@ -93,7 +93,7 @@ pub(super) enum EventKind {
 
 /// Number of skipped statements of one kind, and the line of the first.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Skipped {
+pub(super) struct SkipCount {
     pub count: u64,
     pub first_line: u64,
 }
@@ -105,7 +105,7 @@ pub(super) const SKIP_CURVES: usize = 2;
 pub(super) const SKIP_UNKNOWN: usize = 3;
 
 impl Block {
-    /// Parses the text. An error is kept in [`Parsed::error`], together with the values before it.
+    /// Parses the text. An error is kept in [`BlockContent::error`], together with the values before it.
     pub fn parse(&mut self) {
         self.parsed.clear();
         if self.failure.is_some() {
@@ -137,7 +137,7 @@ impl Block {
     }
 }
 
-impl Parsed {
+impl BlockContent {
     fn clear(&mut self) {
         self.positions.clear();
         self.colors.clear();

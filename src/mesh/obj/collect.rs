@@ -2,7 +2,7 @@
 
 use super::{
     MAX_ELEMENTS, NONE, ObjArrays, ObjRun,
-    block::{Block, EventKind, Failure, Parsed, SKIP_CURVES, SKIP_LINES, SKIP_POINTS, SKIPS, Skipped, WHITE},
+    block::{Block, BlockContent, EventKind, Failure, SKIP_CURVES, SKIP_LINES, SKIP_POINTS, SKIPS, SkipCount, WHITE},
     error::{LISTS, LineProblem, ObjError},
 };
 
@@ -16,7 +16,7 @@ pub(super) struct Collector<'a> {
     lines: u64,
     /// Indices past the end of their lists so far, each larger than the one before it, and their lines.
     ahead: [Vec<(u32, u64)>; 3],
-    skipped: [Skipped; SKIPS],
+    skipped: [SkipCount; SKIPS],
     current: RunState,
 }
 
@@ -74,7 +74,7 @@ impl<'a> Collector<'a> {
         [self.arrays.positions.len(), self.arrays.texcoords.len(), self.arrays.normals.len()]
     }
 
-    fn resolve_relative(&self, parsed: &mut Parsed) -> Result<(), ObjError> {
+    fn resolve_relative(&self, parsed: &mut BlockContent) -> Result<(), ObjError> {
         let bases = self.counts();
         for relative in &parsed.relative {
             let list = usize::from(relative.list);
@@ -90,7 +90,7 @@ impl<'a> Collector<'a> {
     }
 
     /// The error of an index that counts back to before the first element.
-    fn before_line(&self, parsed: &Parsed, face: usize, list: usize, resolved: i64) -> ObjError {
+    fn before_line(&self, parsed: &BlockContent, face: usize, list: usize, resolved: i64) -> ObjError {
         // The error gives the distance before the first element, because the number of elements at that line is not
         // stored.
         let line = self.line(parsed.face_lines.get(face).copied().unwrap_or(parsed.lines));
@@ -100,7 +100,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    fn check_sizes(&self, parsed: &Parsed) -> Result<(), ObjError> {
+    fn check_sizes(&self, parsed: &BlockContent) -> Result<(), ObjError> {
         let new = [parsed.positions.len(), parsed.texcoords.len(), parsed.normals.len()];
         let names = ["vertices", "texture coordinates", "normals"];
         for ((old, new), what) in self.counts().into_iter().zip(new).zip(names) {
@@ -114,7 +114,7 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    fn append_events(&mut self, parsed: &Parsed) -> Result<(), ObjError> {
+    fn append_events(&mut self, parsed: &BlockContent) -> Result<(), ObjError> {
         let before = self.arrays.face_count();
         for event in &parsed.events {
             let text = String::from_utf8_lossy(&parsed.names[event.start as usize..event.end as usize]);
@@ -173,7 +173,7 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    fn append_vertices(&mut self, parsed: &Parsed) {
+    fn append_vertices(&mut self, parsed: &BlockContent) {
         let arrays = &mut *self.arrays;
         if !(arrays.colors.is_empty() && parsed.colors.is_empty()) {
             let (before, added) = (arrays.positions.len(), parsed.positions.len());
@@ -188,7 +188,7 @@ impl<'a> Collector<'a> {
         extend(&mut arrays.normals, &parsed.normals);
     }
 
-    fn append_faces(&mut self, parsed: &Parsed) {
+    fn append_faces(&mut self, parsed: &BlockContent) {
         let arrays = &mut *self.arrays;
         if parsed.face_ends.is_empty() {
             return;
@@ -215,7 +215,7 @@ impl<'a> Collector<'a> {
     }
 
     /// Notes forward indices past the end of their lists so far.
-    fn note_ahead(&mut self, parsed: &Parsed) {
+    fn note_ahead(&mut self, parsed: &BlockContent) {
         for (list, count) in self.counts().into_iter().enumerate() {
             if parsed.largest[list] as usize <= count {
                 continue;

@@ -4,12 +4,12 @@ use memchr::memchr2;
 
 use super::{
     NONE,
-    block::{Event, EventKind, Parsed, Relative, SKIP_CURVES, SKIP_LINES, SKIP_POINTS, SKIP_UNKNOWN},
+    block::{BlockContent, Event, EventKind, Relative, SKIP_CURVES, SKIP_LINES, SKIP_POINTS, SKIP_UNKNOWN},
     error::{LISTS, LineProblem, excerpt},
     number,
 };
 
-impl Parsed {
+impl BlockContent {
     /// Reads the statement that `text` starts with, over all its continued lines. Returns the number of bytes read.
     pub fn statement(&mut self, text: &[u8]) -> Result<usize, LineProblem> {
         let (mut end, mut next) = line_bounds(text, 0);

@@ -18,12 +18,12 @@ const STACK: usize = (WIDTH - 1) * DEPTH + 1;
 const MOST_LEAVES: usize = 384;
 
 /// Stack of children to visit, the best on top, each with a bound of the distances in it (less is better).
-struct Waiting {
+struct ChildStack {
     children: [(f32, Child); STACK],
     len: usize,
 }
 
-impl Waiting {
+impl ChildStack {
     fn new(tree: &Tree) -> Self {
         Self { children: [(f32::NEG_INFINITY, Child::ROOT); STACK], len: usize::from(!tree.nodes.is_empty()) }
     }
@@ -72,7 +72,7 @@ impl Tree {
     fn extreme<const FAR: bool>(&self, frame: &Frame, boxes: &BoxRay) -> Option<Crossing> {
         let mut best: Option<Crossing> = None;
         let (mut from, mut to) = (0.0_f32, f32::INFINITY);
-        let mut waiting = Waiting::new(self);
+        let mut waiting = ChildStack::new(self);
         let mut touched = 0;
         while let Some((bound, child)) = waiting.pop() {
             if if FAR { -bound < from } else { bound > to } {
@@ -126,7 +126,7 @@ impl Tree {
     /// crosses none of their triangles runs along a flat surface, and crosses nothing.
     pub fn crosses(&self, frame: &Frame, boxes: &BoxRay, from: f32, to: f32) -> bool {
         let between = |crossing: &Crossing| (f64::from(from)..f64::from(to)).contains(&crossing.distance);
-        let mut waiting = Waiting::new(self);
+        let mut waiting = ChildStack::new(self);
         let mut leaves = 0;
         while let Some((_, child)) = waiting.pop() {
             match child.target() {
@@ -152,7 +152,7 @@ impl Tree {
 
     /// Collects every crossing, in no order.
     pub fn all(&self, frame: &Frame, boxes: &BoxRay, out: &mut Vec<Crossing>) {
-        let mut waiting = Waiting::new(self);
+        let mut waiting = ChildStack::new(self);
         let mut touched = 0;
         while let Some((_, child)) = waiting.pop() {
             match child.target() {
@@ -195,7 +195,7 @@ impl Tree {
     pub fn nearest_point(&self, point: Vec3) -> Option<(f32, u32, Vec3)> {
         let mut best: Option<(f32, u32, u32, Vec3)> = None;
         let reach = self.bounds.low.abs().max(self.bounds.high.abs()).max(point.abs()).max_element();
-        let mut waiting = Waiting::new(self);
+        let mut waiting = ChildStack::new(self);
         while let Some((bound, child)) = waiting.pop() {
             if best.is_some_and(|best| bound > best.0) {
                 continue;

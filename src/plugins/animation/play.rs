@@ -23,14 +23,14 @@ const LAPS: usize = 16;
 /// The clip that a player plays, compiled.
 #[derive(Component, Debug, Default)]
 pub struct PlayedClip {
-    compiled: Option<Compiled>,
+    compiled: Option<CompiledClip>,
     /// Time up to which markers were told.
     told: Option<f32>,
     is_due: bool,
 }
 
 #[derive(Debug)]
-struct Compiled {
+struct CompiledClip {
     clip: Arc<RigClip>,
     sampler: ClipSampler,
     cursor: SampleCursor,
@@ -77,11 +77,11 @@ pub(super) fn compile(
         if known != Some(player.clip) {
             played.told = None;
         }
-        played.compiled = Some(Compiled::new(clip));
+        played.compiled = Some(CompiledClip::new(clip));
     }
 }
 
-impl Compiled {
+impl CompiledClip {
     fn new(clip: &RigClip) -> Self {
         let sampler = ClipSampler::new(clip);
         let mut nodes: BTreeMap<Uid, PlayedNode> = BTreeMap::new();
@@ -151,7 +151,7 @@ pub(super) fn play(
         if rest.is_some_and(|rest| rest.0) {
             continue;
         }
-        let Compiled { sampler, cursor, values, nodes, .. } = compiled;
+        let CompiledClip { sampler, cursor, values, nodes, .. } = compiled;
         sampler.sample(player.time, cursor, values);
         let held = motion.as_ref().map(|motion| motion.node);
         for node in nodes.iter() {

@@ -24,7 +24,7 @@ use crate::{
 
 /// Components that a build gives to nodes and constraints.
 #[derive(QueryData)]
-pub(super) struct Guarded {
+pub(super) struct GuardedComponents {
     of: Option<&'static NodeOf>,
     by: Option<&'static CreatedBy>,
     role: Option<&'static CreatedRole>,
@@ -38,7 +38,7 @@ pub(super) struct Guarded {
     constrains: Option<&'static Constrains>,
 }
 
-type Written = (
+type GuardedWrites = (
     Or<(
         Changed<NodeOf>,
         Changed<CreatedBy>,
@@ -59,7 +59,7 @@ type Written = (
 
 /// Entities that lost such a component.
 #[derive(SystemParam)]
-pub(super) struct RemovedGuarded<'w, 's> {
+pub(super) struct GuardedRemovals<'w, 's> {
     of: RemovedComponents<'w, 's, NodeOf>,
     by: RemovedComponents<'w, 's, CreatedBy>,
     role: RemovedComponents<'w, 's, CreatedRole>,
@@ -73,7 +73,7 @@ pub(super) struct RemovedGuarded<'w, 's> {
     constrains: RemovedComponents<'w, 's, Constrains>,
 }
 
-impl RemovedGuarded<'_, '_> {
+impl GuardedRemovals<'_, '_> {
     fn entities(&mut self) -> BTreeSet<Entity> {
         let nodes = self.of.read().chain(self.by.read()).chain(self.role.read()).chain(self.layer.read());
         let kinds = self.control.read().chain(self.null.read()).chain(self.joint.read()).chain(self.parked.read());
@@ -88,9 +88,9 @@ type GuardedRig<'a> = (&'a JointEntities, &'a TagEntities, &'a BuiltEntities);
 /// writes are as they expect them. A relation whose target went away is restored silently.
 pub(super) fn keep_built(
     mut commands: Commands,
-    written: Query<Entity, Written>,
-    mut removed: RemovedGuarded,
-    views: Query<Guarded, Allow<Disabled>>,
+    written: Query<Entity, GuardedWrites>,
+    mut removed: GuardedRemovals,
+    views: Query<GuardedComponents, Allow<Disabled>>,
     rigs: Query<GuardedRig>,
     index: Res<EntityIndex>,
     mut refused: MessageWriter<EditRefused>,
@@ -153,7 +153,7 @@ impl Guard<'_, '_, '_> {
         self.hold(found, wanted) && found.is_some()
     }
 
-    fn joint(&mut self, rig: Entity, uid: Uid, built: &BuiltEntities, view: &GuardedItem) {
+    fn joint(&mut self, rig: Entity, uid: Uid, built: &BuiltEntities, view: &GuardedComponentsItem) {
         let node = built.joints.get(&uid).filter(|(of, _)| *of == self.entity).map(|(_, node)| node);
         let layer = node.and_then(|node| node.layer.as_deref()).cloned().map(NodeLayer);
         let mut is_other = self.hold(view.of, Some(NodeOf(rig)));
@@ -166,7 +166,7 @@ impl Guard<'_, '_, '_> {
         }
     }
 
-    fn node(&mut self, rig: Entity, uid: Uid, tags: &TagEntities, built: &BuiltEntities, view: &GuardedItem) {
+    fn node(&mut self, rig: Entity, uid: Uid, tags: &TagEntities, built: &BuiltEntities, view: &GuardedComponentsItem) {
         let Some(mirrored) = built.nodes.get(&uid).filter(|mirrored| mirrored.entity == self.entity) else { return };
         if mirrored.is_parked {
             if self.mark::<Parked>(view.is_parked, true) {
@@ -189,7 +189,7 @@ impl Guard<'_, '_, '_> {
         }
     }
 
-    fn constraint(&mut self, uid: Uid, (joints, tags, built): GuardedRig, view: &GuardedItem) {
+    fn constraint(&mut self, uid: Uid, (joints, tags, built): GuardedRig, view: &GuardedComponentsItem) {
         let Some(mirrored) = built.constraints.get(&uid).filter(|mirrored| mirrored.entity == self.entity) else {
             return;
         };

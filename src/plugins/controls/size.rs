@@ -35,7 +35,7 @@ pub struct MeasuredShapes {
     built: Option<Arc<BuiltRig>>,
     /// Surface of these meshes at rest.
     surface: Option<Arc<Surface>>,
-    task: Option<Task<Measured>>,
+    task: Option<Task<MeasuredFactors>>,
 }
 
 impl MeasuredShapes {
@@ -51,12 +51,12 @@ impl MeasuredShapes {
         self.task = Some(AsyncComputeTaskPool::get().spawn(async move {
             let surface = surface.unwrap_or_else(|| Arc::new(surface_of(&meshes)));
             let factors = shape_factors(&built, &surface);
-            Measured { surface, factors }
+            MeasuredFactors { surface, factors }
         }));
     }
 }
 
-struct Measured {
+struct MeasuredFactors {
     surface: Arc<Surface>,
     /// Controls with factors above 1.
     factors: Vec<(Uid, f32)>,

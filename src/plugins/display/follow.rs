@@ -34,7 +34,7 @@ use crate::{
 
 /// Picture of a mesh.
 #[derive(Component)]
-pub(super) struct Displayed {
+pub(super) struct DisplayedMesh {
     model: Arc<Model>,
     plans: Plans,
     surface: Layer,
@@ -91,7 +91,7 @@ impl FromWorld for EdgeMaterials {
 pub(super) fn place_meshes(
     mut commands: Commands,
     placed: Query<(Entity, &SkinOf, Option<&ChildOf>), (With<RigMesh>, Or<(Added<RigMesh>, Changed<SkinOf>)>)>,
-    gone: Query<(Entity, &Displayed), Or<(Without<RigMesh>, Without<SkinOf>)>>,
+    gone: Query<(Entity, &DisplayedMesh), Or<(Without<RigMesh>, Without<SkinOf>)>>,
     orphans: Query<Entity, (With<DisplayPiece>, Without<ChildOf>)>,
 ) {
     for (mesh, of, child_of) in &placed {
@@ -105,7 +105,7 @@ pub(super) fn place_meshes(
         for piece in displayed.surface.entities().chain(displayed.edges.entities()) {
             commands.entity(piece).try_despawn();
         }
-        commands.entity(mesh).try_remove::<(Displayed, DisplayJob)>();
+        commands.entity(mesh).try_remove::<(DisplayedMesh, DisplayJob)>();
     }
     // Pieces that were spawned in the same frame in which their mesh was removed.
     for piece in &orphans {
@@ -117,7 +117,7 @@ pub(super) fn place_meshes(
 pub(super) fn start_jobs(
     mut commands: Commands,
     display: Res<MeshDisplay>,
-    mut meshes: Query<(Entity, Ref<RigMesh>, &SkinOf, Option<Ref<InstanceSkin>>, Option<&mut Displayed>)>,
+    mut meshes: Query<(Entity, Ref<RigMesh>, &SkinOf, Option<Ref<InstanceSkin>>, Option<&mut DisplayedMesh>)>,
     rigs: Query<Ref<Rig>>,
     bodies: Query<(), With<InstanceBody>>,
     images: Res<Assets<Image>>,
@@ -134,7 +134,7 @@ pub(super) fn start_jobs(
         }
         let surface = LayerKey { skin: skin.clone(), colors: display.weights };
         let edges = LayerKey { skin, colors: WeightColors::Off };
-        let start = |displayed: &mut Displayed| {
+        let start = |displayed: &mut DisplayedMesh| {
             if displayed.surface.key.as_ref() != Some(&surface) {
                 displayed.surface.start(&displayed.model, &displayed.plans, surface.clone());
             }
@@ -150,7 +150,7 @@ pub(super) fn start_jobs(
                 start(&mut displayed);
             }
             None => {
-                let mut displayed = Displayed::new(&mesh.rest, &images);
+                let mut displayed = DisplayedMesh::new(&mesh.rest, &images);
                 start(&mut displayed);
                 commands.entity(entity).try_insert(displayed);
             }
@@ -158,7 +158,7 @@ pub(super) fn start_jobs(
     }
 }
 
-impl Displayed {
+impl DisplayedMesh {
     fn new(model: &Arc<Model>, images: &Assets<Image>) -> Self {
         let mut displayed = Self {
             model: model.clone(),
@@ -209,7 +209,7 @@ impl Displayed {
 /// Spawns finished pieces, a bounded amount a frame.
 pub(super) fn land_jobs(
     mut commands: Commands,
-    mut displays: Query<(Entity, &RigMesh, &mut Displayed, Option<&mut DisplayJob>)>,
+    mut displays: Query<(Entity, &RigMesh, &mut DisplayedMesh, Option<&mut DisplayJob>)>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut images: ResMut<Assets<Image>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
@@ -241,7 +241,7 @@ pub(super) fn land_jobs(
     }
 }
 
-impl Displayed {
+impl DisplayedMesh {
     fn land_textures(
         &mut self,
         images: &mut Assets<Image>,
@@ -280,7 +280,7 @@ impl Displayed {
 /// Links pieces to their joints, and gives the renderer the rest transforms of the joints.
 pub(super) fn follow_skins(
     mut commands: Commands,
-    mut displays: Query<(&mut Displayed, Ref<SkinOf>)>,
+    mut displays: Query<(&mut DisplayedMesh, Ref<SkinOf>)>,
     rigs: Query<(Entity, Ref<Rig>, Ref<JointEntities>, Option<Ref<Built>>, Option<Ref<BuiltEntities>>)>,
     bodies: Query<(Entity, Ref<InstanceBody>, &RigRuntime), Without<Rig>>,
     mut bind_assets: ResMut<Assets<SkinnedMeshInverseBindposes>>,
@@ -309,7 +309,7 @@ pub(super) fn follow_skins(
 
 /// Links the pieces of a mesh to the entities of its joints.
 fn follow_joints(
-    displayed: &mut Mut<Displayed>,
+    displayed: &mut Mut<DisplayedMesh>,
     entity: Entity,
     rig: &Rig,
     skeleton: &DeformSkeleton,
@@ -391,7 +391,7 @@ pub(super) fn assign_materials(
     mut commands: Commands,
     display: Res<MeshDisplay>,
     edges: Res<EdgeMaterials>,
-    mut displays: Query<&mut Displayed>,
+    mut displays: Query<&mut DisplayedMesh>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
     for mut displayed in &mut displays {

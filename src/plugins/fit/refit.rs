@@ -15,7 +15,7 @@ use crate::{
         document::{Change, EditRequest, Edited},
         history::RigHistory,
     },
-    rig::{EditError, Rig, RigEdit, Uid, operations::Operation, step::Committed},
+    rig::{EditError, Rig, RigEdit, Uid, operations::Operation, step::Commit},
 };
 
 /// Distance, as a share of the body's height, from which on a joint has been moved.
@@ -30,7 +30,7 @@ pub(super) fn follow_moves(
 ) {
     for Edited { rig: entity, name, committed, .. } in edited.read() {
         // A fit that is undone can no longer be corrected.
-        if *name == FIT && matches!(committed, Some(Committed::Undone(_))) {
+        if *name == FIT && matches!(committed, Some(Commit::Undone(_))) {
             commands.entity(*entity).try_remove::<FittedRig>();
             continue;
         }
@@ -39,7 +39,7 @@ pub(super) fn follow_moves(
         let now: Vec<Option<Vec3>> =
             report.joints.iter().map(|(uid, _)| rig.joint(*uid).map(|_| rig.position(*uid))).collect();
         let before = std::mem::replace(&mut fitted.places, now.clone());
-        let Committed::Done(step) = committed else { continue };
+        let Commit::Done(step) = committed else { continue };
         if *name == FIT || *name == FIT_AROUND {
             continue;
         }

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use bevy::prelude::*;
 
-use super::{Finished, FitFailure, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig};
+use super::{FinishedFit, FitFailure, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig};
 use crate::{
     algo::fit_template::{FitSettings, FittedSkeleton, MeshAnalysis, TemplateJoint, choose_template, fit_template},
     plugins::surface::RigMesh,
@@ -68,7 +68,7 @@ impl Work {
         }
     }
 
-    pub(super) fn run(self, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<Finished, FitFailure> {
+    pub(super) fn run(self, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<FinishedFit, FitFailure> {
         let begin = Instant::now();
         let candidates = self.candidates()?;
         let Self { from: _, mesh, request, modules, .. } = self;
@@ -133,7 +133,7 @@ impl Work {
             before: None,
         };
         let target = fitted.target(&modules)?;
-        Ok(Finished { fitted, target })
+        Ok(FinishedFit { fitted, target })
     }
 }
 

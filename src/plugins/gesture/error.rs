@@ -1,6 +1,6 @@
 //! Reasons why gestures have no effect.
 
-use crate::plugins::{document::ChangeError, fit::FitFailure, stroke::NothingDrawn};
+use crate::plugins::{document::ChangeError, fit::FitFailure, stroke::StrokeFailure};
 
 /// Reason why a gesture had no effect; a sentence for people without its full stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -36,7 +36,7 @@ pub(super) enum GestureError {
     NoOperation,
     /// The stroke had no effect.
     #[error(transparent)]
-    Stroke(#[from] NothingDrawn),
+    Stroke(#[from] StrokeFailure),
     /// The change was refused.
     #[error(transparent)]
     Change(#[from] ChangeError),

@@ -22,7 +22,7 @@ use crate::{
     rig::{
         Rig, Uid,
         operations::{MirrorPlane, Operation},
-        step::Committed,
+        step::Commit,
     },
 };
 
@@ -105,7 +105,7 @@ pub(super) struct Answers<'w, 's> {
     meshes: Query<'w, 's, &'static SkinOf>,
 }
 
-type Scripted<'a> = (
+type ScriptedRig<'a> = (
     Entity,
     &'a mut GestureScript,
     &'a Rig,
@@ -116,7 +116,7 @@ type Scripted<'a> = (
 );
 
 /// Reads the answers to the last gesture of each script and carries out the next one.
-pub(super) fn run_scripts(mut scripts: Query<Scripted>, mut requests: Requests, mut answers: Answers) {
+pub(super) fn run_scripts(mut scripts: Query<ScriptedRig>, mut requests: Requests, mut answers: Answers) {
     answers.collect(&mut scripts);
     for (entity, mut script, rig, selection, mut symmetry, surface, meshes) in &mut scripts {
         if script.pending
@@ -158,7 +158,7 @@ impl GestureScript {
 }
 
 impl Answers<'_, '_> {
-    fn collect(&mut self, scripts: &mut Query<Scripted>) {
+    fn collect(&mut self, scripts: &mut Query<ScriptedRig>) {
         for Picked { rig: entity, joints } in self.picked.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             match joints.as_slice() {
@@ -215,8 +215,7 @@ impl Answers<'_, '_> {
             }
         }
         // Joints around a moved one are fitted again by themselves, in answer to no gesture.
-        let follows =
-            |edited: &Edited| edited.name == FIT_AROUND && matches!(edited.committed, Some(Committed::Done(_)));
+        let follows = |edited: &Edited| edited.name == FIT_AROUND && matches!(edited.committed, Some(Commit::Done(_)));
         let own = |edited: &&Edited| !edited.preview && !follows(edited);
         for Edited { rig: entity, name, .. } in self.edited.read().filter(own) {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };

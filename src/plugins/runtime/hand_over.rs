@@ -21,11 +21,11 @@ pub struct OutsideTransform(pub Isometry3d);
 
 /// A rig whose nodes do not stand where its program puts them.
 #[derive(Component)]
-pub(super) struct HandedOver;
+pub(super) struct HandedOverRig;
 
 /// Writes the world transforms of nodes of rigs that are handed over.
 pub(super) fn hand_over(
-    rigs: Query<(Entity, &RigRuntime, Option<&HandOver>, &GlobalTransform, Has<HandedOver>)>,
+    rigs: Query<(Entity, &RigRuntime, Option<&HandOver>, &GlobalTransform, Has<HandedOverRig>)>,
     outside: Query<&OutsideTransform>,
     mut nodes: Query<&mut GlobalTransform, Without<RigRuntime>>,
     mut commands: Commands,
@@ -34,9 +34,9 @@ pub(super) fn hand_over(
         let share = hand_over.map_or(0.0, |hand_over| hand_over.share.clamp(0.0, 1.0));
         let is_over = share > 0.0;
         if is_over && !was_over {
-            commands.entity(rig).try_insert(HandedOver);
+            commands.entity(rig).try_insert(HandedOverRig);
         } else if was_over && !is_over {
-            commands.entity(rig).try_remove::<HandedOver>();
+            commands.entity(rig).try_remove::<HandedOverRig>();
         }
         if !is_over && !was_over {
             continue;

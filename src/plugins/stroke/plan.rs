@@ -5,7 +5,7 @@
 
 use bevy::prelude::*;
 
-use super::{FoundChain, NothingDrawn, ParentReason, StrokeRequest, StrokeResult, StrokeTips, stroke_parent};
+use super::{FoundChain, ParentReason, StrokeFailure, StrokeRequest, StrokeResult, StrokeTips, stroke_parent};
 use crate::{
     algo::{
         placement::{PlaceSettings, place_hits},
@@ -53,7 +53,7 @@ pub enum StrokePlan {
 /// Plans a stroke on a rig in its current state. `chain` is the result of following it, if that was done.
 pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<FoundChain>) -> StrokePlan {
     let StrokeScene { rig, selection, symmetry, tips, surface, posed } = *scene;
-    let nothing = |why: NothingDrawn| StrokePlan::Ready { operation: None, result: StrokeResult::Nothing(why) };
+    let nothing = |why: StrokeFailure| StrokePlan::Ready { operation: None, result: StrokeResult::Nothing(why) };
     match stroke_kind(request, rig, posed) {
         StrokeKind::Erase { joints } => {
             let joints: Vec<Uid> = joints.into_iter().map(|number| posed[number].0).collect();
@@ -64,7 +64,7 @@ pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<F
             let (child, end) = posed[bone];
             let parent = rig.joint(child).and_then(|joint| joint.parent);
             let start = parent.and_then(|parent| posed.iter().find(|(uid, _)| *uid == parent)).map(|(_, place)| *place);
-            let Some(start) = start else { return nothing(NothingDrawn::NoBone) };
+            let Some(start) = start else { return nothing(StrokeFailure::NoBone) };
             // The crossing gives the place along the bone; in depth the joint is placed like a click there, but only if
             // the bone itself runs through the volumes of the ray.
             let along = start.lerp(end, t);
@@ -92,7 +92,7 @@ pub fn plan_stroke(request: &StrokeRequest, scene: &StrokeScene, chain: Option<F
             let skip = usize::from(from.is_some());
             let positions: Vec<Vec3> = chain.joints.iter().skip(skip).map(|joint| joint.position).collect();
             let Some(first) = positions.first() else {
-                return nothing(NothingDrawn::TooShort);
+                return nothing(StrokeFailure::TooShort);
             };
             let (parent, why) = match from {
                 Some(from) => (Some(from), ParentReason::StartsOn),

@@ -69,7 +69,7 @@ pub(super) struct Refresh {
 }
 
 /// Result of a refresh.
-pub(super) struct Refreshed {
+pub(super) struct RefreshedSurface {
     pub(super) surface: Arc<Surface>,
     /// Marks a refit of `base`.
     pub(super) is_refit: bool,
@@ -86,7 +86,7 @@ impl Refresh {
     }
 
     /// Skins the points, then refits or builds the hierarchy.
-    pub(super) fn run(self) -> Refreshed {
+    pub(super) fn run(self) -> RefreshedSurface {
         let Self { meshes, base, spare, points: mut memory } = self;
         let points = posed_points(&meshes, &mut memory);
         let old = spare.or_else(|| base.as_deref().cloned());
@@ -97,7 +97,7 @@ impl Refresh {
             Some(surface) => (surface, true),
             None => build(&meshes, points),
         };
-        Refreshed { surface: Arc::new(surface), is_refit, is_whole, points: memory }
+        RefreshedSurface { surface: Arc::new(surface), is_refit, is_whole, points: memory }
     }
 }
 

@@ -4,7 +4,7 @@ use std::{cmp::Reverse, collections::HashSet, sync::Arc};
 
 use bevy::platform::collections::HashMap;
 
-use super::{Builder, Command, Due};
+use super::{Builder, Command, DueWork};
 use crate::{
     mesh::model::Trs,
     processor::{
@@ -53,7 +53,7 @@ impl Builder {
                 if *params != *command.params {
                     command.params = params.as_str().into();
                     command.loaded = None;
-                    self.mark(number, Due::Run);
+                    self.mark(number, DueWork::Run);
                 }
                 true
             }
@@ -219,12 +219,12 @@ impl Builder {
                         trace: Trace::default(),
                         asks: false,
                         ran_in: 0,
-                        due: Due::Nothing,
+                        due: DueWork::Nothing,
                         error: None,
                         micros: 0.0,
                         runs: 0,
                     });
-                    self.mark(number, Due::Run);
+                    self.mark(number, DueWork::Run);
                 } else {
                     let command = &mut self.commands[number as usize];
                     (command.enabled, command.feature) = (tag.enabled, *feature);
@@ -236,7 +236,7 @@ impl Builder {
                     }
                     if reads_anew || command.active != active || command.joint != uid {
                         (command.active, command.joint) = (active, uid);
-                        self.mark(number, Due::Run);
+                        self.mark(number, DueWork::Run);
                     }
                 }
                 list.push(number);
@@ -257,7 +257,7 @@ impl Builder {
             let number = self.list[at];
             self.world.places[number as usize] = at as u32;
             let command = &mut self.commands[number as usize];
-            command.due = command.due.max(Due::Check);
+            command.due = command.due.max(DueWork::Check);
             self.due.push(Reverse((at as u32, number)));
         }
         self.graph_changed = Some(0);
@@ -269,7 +269,7 @@ impl Builder {
         }
     }
 
-    pub(super) fn mark(&mut self, number: u32, due: Due) {
+    pub(super) fn mark(&mut self, number: u32, due: DueWork) {
         let command = &mut self.commands[number as usize];
         if command.due < due {
             command.due = due;

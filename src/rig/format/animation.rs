@@ -4,8 +4,8 @@
 //! beside it, so that the clips can be put onto another rig, too: see [`ReadAnimation::onto`]. One key is one line. Reading
 //! checks everything before it returns, reading what was written gives the same clips, and writing those the same bytes.
 
+mod clip_binding;
 mod file;
-mod onto;
 mod write;
 
 pub(super) use file::{ClipFile, ClipPlace, clip_fields};
@@ -141,7 +141,7 @@ impl ReadAnimation {
     /// The clips on a rig: nodes are found by their uid, else by their label and role, where only one node has them and the
     /// file has no node with its uid.
     pub fn onto(&self, rig: &Rig, built: Option<&BuiltRig>) -> BoundClips {
-        onto::onto(self, &NodeNames::of(rig, built))
+        clip_binding::bind_clips(self, &NodeNames::of(rig, built))
     }
 }
 

@@ -21,7 +21,7 @@ pub(crate) struct Field<'a> {
     pub end: usize,
 }
 
-struct Open {
+struct OpenBracket {
     bracket: usize,
     owner: Option<usize>,
     current: Option<usize>,
@@ -30,8 +30,8 @@ struct Open {
 /// Fields of a text in the order of their names. Time is linear, and the depth of nesting is unlimited.
 pub(crate) fn fields(text: &str) -> Vec<Field<'_>> {
     let mut fields: Vec<Field> = Vec::new();
-    let mut outer: Vec<Open> = Vec::new();
-    let mut here = Open { bracket: 0, owner: None, current: None };
+    let mut outer: Vec<OpenBracket> = Vec::new();
+    let mut here = OpenBracket { bracket: 0, owner: None, current: None };
     let mut brackets = 0;
     let mut before: Option<Token> = None;
     for token in tokens(text) {
@@ -39,7 +39,7 @@ pub(crate) fn fields(text: &str) -> Vec<Field<'_>> {
             "(" | "[" | "{" => {
                 brackets += 1;
                 let owner = here.current.or(here.owner);
-                outer.push(std::mem::replace(&mut here, Open { bracket: brackets, owner, current: None }));
+                outer.push(std::mem::replace(&mut here, OpenBracket { bracket: brackets, owner, current: None }));
             }
             ")" | "]" | "}" => {
                 if let Some(open) = outer.pop() {

@@ -59,7 +59,7 @@ impl<'a> Tree<'a> {
     pub fn parse(text: &'a str) -> Option<Self> {
         let mut nodes: Vec<Node> = vec![Node::plain(0..0)];
         // The item under construction of every open bracket: its key, its start, its value.
-        let mut open: Vec<(NodeId, Option<Pending>)> = vec![(0, None)];
+        let mut open: Vec<(NodeId, Option<PendingItem>)> = vec![(0, None)];
         for token in tokens(text).skip(attribute(text)) {
             if open.len() > DEPTH || nodes.len() > FREE_NODES + text.len() / BYTES_PER_NODE {
                 return None;
@@ -76,7 +76,7 @@ impl<'a> Tree<'a> {
                         Some(_) => return None,
                         None => {
                             nodes.push(Node::plain(start..end));
-                            let pending = pending.get_or_insert(Pending { key: None, start, value: None });
+                            let pending = pending.get_or_insert(PendingItem { key: None, start, value: None });
                             *pending.value.insert(nodes.len() - 1)
                         }
                     };
@@ -108,7 +108,7 @@ impl<'a> Tree<'a> {
                     pending.key = Some(&text[nodes[key].range.clone()]);
                 }
                 _ => {
-                    let pending = pending.get_or_insert(Pending { key: None, start, value: None });
+                    let pending = pending.get_or_insert(PendingItem { key: None, start, value: None });
                     match pending.value {
                         Some(value) => nodes[value].range.end = end,
                         None => {
@@ -177,13 +177,13 @@ impl Node<'_> {
     }
 }
 
-struct Pending<'a> {
+struct PendingItem<'a> {
     key: Option<&'a str>,
     start: usize,
     value: Option<NodeId>,
 }
 
-impl<'a> Pending<'a> {
+impl<'a> PendingItem<'a> {
     fn finished(self, nodes: &[Node], comma: Option<usize>) -> Option<Item<'a>> {
         let value = self.value?;
         let end = comma.unwrap_or(nodes[value].range.end);

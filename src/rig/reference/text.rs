@@ -60,7 +60,7 @@ struct Reader<'a, 'o> {
 }
 
 /// A name with or without a uid, not looked up yet.
-struct Named {
+struct NamedReference {
     name: Option<String>,
     uid: Option<Uid>,
     place: Range<usize>,
@@ -233,8 +233,8 @@ impl<'a> Reader<'a, '_> {
         }
     }
 
-    fn look_up(&mut self, scope: NameScope, kind: NameKind, named: Named) -> Read<Uid> {
-        let Named { name, uid, place } = named;
+    fn look_up(&mut self, scope: NameScope, kind: NameKind, named: NamedReference) -> Read<Uid> {
+        let NamedReference { name, uid, place } = named;
         let start = place.start;
         if let Some(uid) = uid {
             self.written.push(NamedUid { kind, uid, name: place, has_uid: true });
@@ -267,7 +267,7 @@ impl<'a> Reader<'a, '_> {
     }
 
     /// A name, a uid, or both.
-    fn named(&mut self, expected: &'static str) -> Read<Named> {
+    fn named(&mut self, expected: &'static str) -> Read<NamedReference> {
         self.blanks();
         let start = self.at;
         let name = if self.peek() == Some('#') { None } else { Some(self.name(expected)?) };
@@ -275,11 +275,11 @@ impl<'a> Reader<'a, '_> {
         self.blanks();
         let hash = self.at;
         if !self.take('#') {
-            return Ok(Named { name, uid: None, place });
+            return Ok(NamedReference { name, uid: None, place });
         }
         let digits = self.word();
         match digits.parse() {
-            Ok(uid) => Ok(Named { name, uid: Some(uid), place }),
+            Ok(uid) => Ok(NamedReference { name, uid: Some(uid), place }),
             Err(_) => Err(self.error(hash, ReferenceProblem::BadUid(digits.to_owned()))),
         }
     }
@@ -412,7 +412,7 @@ impl<'a> Reader<'a, '_> {
 
 #[derive(Default)]
 struct NamedFilters {
-    rig: Option<Named>,
-    group: Option<Named>,
-    label: Option<Named>,
+    rig: Option<NamedReference>,
+    group: Option<NamedReference>,
+    label: Option<NamedReference>,
 }

@@ -10,7 +10,7 @@ use super::{
 use crate::rig::nearest::nearest;
 
 /// Result of a scan.
-pub(super) struct Scanned {
+pub(super) struct ScanResult {
     /// The evaluator's form.
     pub(super) canonical: String,
     /// Indices of variables that occur, ascending.
@@ -18,7 +18,7 @@ pub(super) struct Scanned {
 }
 
 /// Scans a whole expression.
-pub(super) fn scan(text: &str, variables: &[&str]) -> Result<Scanned, ExpressionError> {
+pub(super) fn scan(text: &str, variables: &[&str]) -> Result<ScanResult, ExpressionError> {
     // Characters past the limit are not counted.
     let chars: Vec<char> = text.chars().take(MOST_CHARACTERS + 1).collect();
     if chars.len() > MOST_CHARACTERS {
@@ -30,7 +30,7 @@ pub(super) fn scan(text: &str, variables: &[&str]) -> Result<Scanned, Expression
         at: 0,
         out: String::with_capacity(4 * chars.len()),
         used: Vec::new(),
-        open: vec![Open::new(0, None)],
+        open: vec![OpenParenthesis::new(0, None)],
         operands: 0,
         due: true,
         negative: false,
@@ -38,11 +38,11 @@ pub(super) fn scan(text: &str, variables: &[&str]) -> Result<Scanned, Expression
     };
     scan.run()?;
     scan.used.sort_unstable();
-    Ok(Scanned { canonical: scan.out, used: scan.used })
+    Ok(ScanResult { canonical: scan.out, used: scan.used })
 }
 
 /// An open parenthesis, or the whole expression.
-struct Open {
+struct OpenParenthesis {
     at: usize,
     function: Option<&'static Function>,
     commas: usize,
@@ -51,7 +51,7 @@ struct Open {
     comparison: bool,
 }
 
-impl Open {
+impl OpenParenthesis {
     fn new(at: usize, function: Option<&'static Function>) -> Self {
         Self { at, function, commas: 0, power: false, comparison: false }
     }
@@ -64,7 +64,7 @@ struct Scan<'a> {
     out: String,
     used: Vec<usize>,
     /// Open parentheses, never empty: the first entry is the whole expression.
-    open: Vec<Open>,
+    open: Vec<OpenParenthesis>,
     operands: usize,
     /// Marks that an operand must come next.
     due: bool,
@@ -200,7 +200,7 @@ impl Scan<'_> {
         if self.open.len() > MOST_NESTED {
             return error(self.at, Problem::TooDeep);
         }
-        self.open.push(Open::new(self.at, function));
+        self.open.push(OpenParenthesis::new(self.at, function));
         self.at += 1;
         match function {
             Some(function) if function.arity == Arity::One => {

@@ -32,7 +32,7 @@ pub(super) struct Step {
 
 /// Register that constraints drive of a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Driven {
+pub(super) enum DrivenRegister {
     /// No register.
     Not,
     /// The local transform.
@@ -462,13 +462,13 @@ fn exposed(rig: &BuiltRig, index: &HashMap<Uid, usize>, keep: &Keep) -> Result<V
     for wanted in list {
         let mut found = false;
         match wanted {
-            super::Exposed::Uid(uid) => {
+            super::ExposedNode::Uid(uid) => {
                 if let Some(at) = index.get(uid) {
                     exposed[*at] = true;
                     found = true;
                 }
             }
-            super::Exposed::Label(label) => {
+            super::ExposedNode::Label(label) => {
                 for (at, node) in rig.nodes.iter().enumerate() {
                     if node.label.as_deref() == Some(label) {
                         exposed[at] = true;
@@ -476,7 +476,7 @@ fn exposed(rig: &BuiltRig, index: &HashMap<Uid, usize>, keep: &Keep) -> Result<V
                     }
                 }
             }
-            super::Exposed::Controls => {
+            super::ExposedNode::Controls => {
                 for (at, node) in rig.nodes.iter().enumerate() {
                     exposed[at] |= node.kind == NodeType::Control;
                 }

@@ -4,9 +4,9 @@
 //! has a register for each state in between. So an operation is a pure function of the registers it reads, and running
 //! only those whose inputs changed gives the same bits as running all.
 
+mod comparison;
 mod operands;
 mod readers;
-mod same;
 
 pub(super) use operands::Operand;
 pub(super) use readers::{ColliderReg, ConeOp, PathOp, ReaderOp, RivetOp, TravelOp};

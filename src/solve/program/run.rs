@@ -56,7 +56,7 @@ pub(super) trait Registers {
 }
 
 /// The registers of a single instance. With `TRACK`, it notes whether an operation changed any bit of its results.
-pub(super) struct Alone<'a, const TRACK: bool> {
+pub(super) struct SingleRegisters<'a, const TRACK: bool> {
     pub x: &'a mut [Trs],
     pub n: &'a mut [f32],
     pub poses: &'a [PoseOffset],
@@ -66,7 +66,7 @@ pub(super) struct Alone<'a, const TRACK: bool> {
     pub moved: &'a mut [u64],
 }
 
-impl<const TRACK: bool> Registers for Alone<'_, TRACK> {
+impl<const TRACK: bool> Registers for SingleRegisters<'_, TRACK> {
     #[inline]
     fn x(&self, X(register): X) -> Trs {
         self.x[register as usize]

@@ -12,7 +12,7 @@ pub use self::{carry::Carry, four::LANES};
 use super::{
     ContentHash, RigProgram, StateError,
     graph::valid,
-    run::{Alone, Machine, Scratch, on},
+    run::{Machine, Scratch, SingleRegisters, on},
 };
 use crate::{
     mesh::model::Trs,
@@ -125,8 +125,13 @@ impl Workspace {
     }
 
     fn run(&mut self, state: &mut RigState, first: usize, dt: f32) {
-        let registers =
-            Alone::<false> { x: &mut self.x, n: &mut self.n, poses: &state.poses, changed: false, moved: &mut [] };
+        let registers = SingleRegisters::<false> {
+            x: &mut self.x,
+            n: &mut self.n,
+            poses: &state.poses,
+            changed: false,
+            moved: &mut [],
+        };
         let RigState { program, springs, frame, .. } = state;
         let (tables, scratch) = (&program.tables, &mut self.scratch);
         let mut machine = Machine { tables, registers, springs, scratch, dt, frame: *frame };
@@ -374,13 +379,13 @@ impl RigState {
             dirty.fill(0);
             moved.fill(u64::MAX);
             let tables = &program.tables;
-            let registers = Alone::<false> { x, n, poses, changed: false, moved: &mut [] };
+            let registers = SingleRegisters::<false> { x, n, poses, changed: false, moved: &mut [] };
             let mut machine = Machine { tables, registers, springs, scratch, dt, frame };
             program.ops.iter().for_each(|op| machine.run(op));
             return;
         }
         let tables = &program.tables;
-        let registers = Alone::<true> { x, n, poses, changed: false, moved };
+        let registers = SingleRegisters::<true> { x, n, poses, changed: false, moved };
         let mut machine = Machine { tables, registers, springs, scratch, dt, frame };
         for word in 0..dirty.len() {
             while dirty[word] != 0 {

@@ -38,7 +38,7 @@ pub(super) struct Body<'a> {
     /// Up in the target's space.
     pub up: Vec3,
     /// Joints of the target that are turned, with the joint of the source that tells by how much, and a constant rotation.
-    turned: BTreeMap<usize, Turned>,
+    turned: BTreeMap<usize, TurnedJoint>,
     /// Further joints that turn alike.
     pairs: Vec<(usize, usize)>,
     pub limbs: Vec<Limb>,
@@ -50,7 +50,7 @@ pub(super) struct Body<'a> {
 
 /// Joint of the target that turns with joints of the source.
 #[derive(Debug, Clone, Copy)]
-struct Turned {
+struct TurnedJoint {
     /// Joints of the source, and the share of the second.
     from: (usize, usize, f32),
     /// Rotation that brings the rest pose onto that of the source.
@@ -112,7 +112,7 @@ impl<'a> Body<'a> {
     }
 
     /// Joints that turn, but for those of limbs.
-    fn find_turned(&self, map: &JointMap) -> BTreeMap<usize, Turned> {
+    fn find_turned(&self, map: &JointMap) -> BTreeMap<usize, TurnedJoint> {
         let mut found = BTreeMap::new();
         let limb_of =
             |side: BodySide, kind: LimbKind| self.limbs.iter().find(|limb| limb.side == side && limb.kind == kind);
@@ -129,7 +129,7 @@ impl<'a> Body<'a> {
                 HumanBone::Spine | HumanBone::Neck => {
                     let shares = shared(self.source, from, self.target, to);
                     for (joint, from) in to.iter().zip(shares) {
-                        found.insert(*joint, Turned { from, rest });
+                        found.insert(*joint, TurnedJoint { from, rest });
                     }
                 }
                 HumanBone::Limb(
@@ -137,7 +137,7 @@ impl<'a> Body<'a> {
                     LimbBone::UpperArm | LimbBone::LowerArm | LimbBone::UpperLeg | LimbBone::LowerLeg,
                 ) => {}
                 _ => {
-                    found.insert(to[0], Turned { from: (last, last, 0.0), rest });
+                    found.insert(to[0], TurnedJoint { from: (last, last, 0.0), rest });
                 }
             }
         }
@@ -207,7 +207,7 @@ impl<'a> Body<'a> {
 
     /// Rotation of a joint of the target in the rig's space that a frame asks for.
     pub fn turn_of(&self, joint: usize, frame: usize) -> Option<Quat> {
-        let Turned { from: (a, b, share), rest } = self.turned.get(&joint)?;
+        let TurnedJoint { from: (a, b, share), rest } = self.turned.get(&joint)?;
         let turns = &self.frames[frame].turns;
         let turn = if *share > 0.0 { slerp(turns[*a], turns[*b], *share) } else { turns[*a] };
         Some((turn * *rest * self.target.joints[joint].rest.rotation).normalize())

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::{RetargetError, body::Body, limbs::LimbKind, tracks::Keyed};
+use super::{RetargetError, body::Body, limbs::LimbKind, tracks::KeyedTracks};
 use crate::{
     mesh::model::Trs,
     rig::{BuiltRig, Matching, NodeType, PoseOffset, SwitchData, animation::humanoid::HumanBone},
@@ -61,7 +61,7 @@ pub(super) fn keyed(
     program: &Arc<RigProgram>,
     body: &Body,
     poses: &[Vec<Trs>],
-) -> Result<(Keyed, Vec<String>), RetargetError> {
+) -> Result<(KeyedTracks, Vec<String>), RetargetError> {
     let mut state = RigState::new(program.clone());
     let limbs = limbs(built, body);
     for (switch, _, value) in &limbs {
@@ -73,7 +73,7 @@ pub(super) fn keyed(
     let blocks: Vec<&[Vec<Trs>]> = poses.chunks(BLOCK).collect();
     let dials: Vec<usize> =
         steps.iter().filter_map(|step| if let Step::Dial(dial) = step { Some(dial.attribute) } else { None }).collect();
-    let posed: Vec<Result<Vec<Posed>, RetargetError>> = blocks
+    let posed: Vec<Result<Vec<PosedFrame>, RetargetError>> = blocks
         .par_iter()
         .map(|block| {
             let mut state = state.clone();
@@ -84,7 +84,7 @@ pub(super) fn keyed(
             let mut list = Vec::with_capacity(block.len());
             for pose in *block {
                 state = strike(built, state, &steps, pose)?;
-                list.push(Posed {
+                list.push(PosedFrame {
                     offsets: (0..program.nodes().len()).map(|slot| state.offset_at(slot)).collect(),
                     dials: dials.iter().map(|slot| state.attribute_at(*slot)).collect(),
                 });
@@ -92,11 +92,11 @@ pub(super) fn keyed(
             Ok(list)
         })
         .collect();
-    let mut frames: Vec<Posed> = Vec::with_capacity(poses.len());
+    let mut frames: Vec<PosedFrame> = Vec::with_capacity(poses.len());
     for block in posed {
         frames.extend(block?);
     }
-    let mut keyed = Keyed::default();
+    let mut keyed = KeyedTracks::default();
     for (slot, node) in program.nodes().iter().enumerate() {
         if frames.iter().any(|frame| frame.offsets[slot] != PoseOffset::IDENTITY) {
             keyed.nodes.push((node.uid, frames.iter().map(|frame| frame.offsets[slot]).collect()));
@@ -113,7 +113,7 @@ pub(super) fn keyed(
 }
 
 /// Offsets of all nodes, and the attributes that turn joints.
-struct Posed {
+struct PosedFrame {
     offsets: Vec<PoseOffset>,
     dials: Vec<f32>,
 }

@@ -1,13 +1,13 @@
 //! A motion on joints: offsets of joints that no command drives.
 
-use super::{body::Body, tracks::Keyed};
+use super::{body::Body, tracks::KeyedTracks};
 use crate::{
     mesh::model::Trs,
     rig::{PoseOffset, RestTransform},
 };
 
 /// Offsets of all joints that the motion moves.
-pub(super) fn keyed(body: &Body, poses: &[Vec<Trs>]) -> Keyed {
+pub(super) fn keyed(body: &Body, poses: &[Vec<Trs>]) -> KeyedTracks {
     let hips = body.hips_place(0, 0.0).map(|(joint, _)| joint);
     let joints = body.target.joints.iter().enumerate().filter(|(at, _)| body.is_moved(*at));
     let nodes = joints.map(|(at, joint)| {
@@ -23,5 +23,5 @@ pub(super) fn keyed(body: &Body, poses: &[Vec<Trs>]) -> Keyed {
         };
         (joint.uid, poses.iter().map(offset).collect())
     });
-    Keyed { nodes: nodes.collect(), ..Keyed::default() }
+    KeyedTracks { nodes: nodes.collect(), ..KeyedTracks::default() }
 }

@@ -10,7 +10,7 @@ use crate::rig::{
 
 /// Offsets of nodes frame by frame, attributes that are constant, and attributes frame by frame.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Keyed {
+pub(super) struct KeyedTracks {
     pub nodes: Vec<(Uid, Vec<PoseOffset>)>,
     pub values: Vec<(Uid, String, f32)>,
     /// Attributes frame by frame.
@@ -26,7 +26,7 @@ pub(super) fn empty_clip(rig: &Rig, name: &str, rate: f32, range: [f32; 2], loop
 
 /// Adds the keys to the clip's first layer, reduced within what nobody sees on a figure of that height. Returns the numbers of
 /// keys before and after.
-pub(super) fn fill(clip: &mut RigClip, keyed: &Keyed, times: &[f32], height: f32) -> [usize; 2] {
+pub(super) fn fill(clip: &mut RigClip, keyed: &KeyedTracks, times: &[f32], height: f32) -> [usize; 2] {
     let usual = KeyTolerance::default();
     // The tolerance is for humans in metres.
     let tolerance = KeyTolerance { distance: usual.distance * (height / 1.7).max(1e-6), ..usual };

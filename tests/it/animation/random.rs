@@ -19,9 +19,9 @@ use rigsmith::{
 use super::{BASE, CLIP, Random, animated, share, target};
 
 /// Keys of the base layer by target and time, as they are expected.
-type Expected = BTreeMap<TrackTarget, BTreeMap<u32, Key>>;
+type ExpectedKeys = BTreeMap<TrackTarget, BTreeMap<u32, Key>>;
 
-fn keys_of(rig: &Rig) -> Expected {
+fn keys_of(rig: &Rig) -> ExpectedKeys {
     let layer = &rig.clip(CLIP).unwrap().layers[0];
     let of = |key: &Key| (key.time.to_bits(), *key);
     layer.tracks.iter().map(|(target, track)| (target.clone(), track.keys.iter().map(of).collect())).collect()
@@ -74,7 +74,7 @@ fn deed(rig: &Rig, random: &mut Random) -> Operation {
 }
 
 /// A change of keys, with what is expected after it.
-fn change(random: &mut Random, rig: &Rig, expected: &mut Expected) -> Operation {
+fn change(random: &mut Random, rig: &Rig, expected: &mut ExpectedKeys) -> Operation {
     let targets: Vec<TrackTarget> = expected.keys().cloned().collect();
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let fresh = || target(Uid(0), Property::Rotation);
@@ -121,8 +121,8 @@ fn keys_live_through_random_deeds_and_undo_brings_back_the_first_bytes() {
     let (mut history, mut selection, mut uids) = (RigHistory::default(), Selection::default(), UidSource::seeded(2));
     let mut random = Random(2026);
     // What is expected after each step in effect, and what was before the first.
-    let mut expected: Vec<Expected> = vec![keys_of(&rig)];
-    let mut undone: Vec<Expected> = Vec::new();
+    let mut expected: Vec<ExpectedKeys> = vec![keys_of(&rig)];
+    let mut undone: Vec<ExpectedKeys> = Vec::new();
     let (mut built, mut orphaned) = (0, 0);
     let mut known = NodeNames::default();
     for step in 0..steps {

@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 
 /// A document and its binary chunk.
 #[derive(Clone)]
-pub struct Composed {
+pub struct ComposedDocument {
     pub json: Value,
     pub bin: Vec<u8>,
 }
 
-impl Composed {
+impl ComposedDocument {
     pub fn new() -> Self {
         let json = json!({
             "asset": {"version": "2.0"}, "accessors": [], "bufferViews": [], "meshes": [], "nodes": [],
@@ -126,8 +126,8 @@ pub const PNG: &[u8] =
 \xcf\xc0\0\0\x03\x01\x01\0\xc9\xfe\x92\xef\0\0\0\0IEND\xaeB`\x82";
 
 /// One triangle at the root.
-pub fn triangle() -> Composed {
-    let mut file = Composed::new();
+pub fn triangle() -> ComposedDocument {
+    let mut file = ComposedDocument::new();
     let position = file.floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], "VEC3");
     let mesh = file.push("meshes", json!({"name": "triangle", "primitives": [{"attributes": {"POSITION": position}}]}));
     file.root(json!({"mesh": mesh}));
@@ -139,8 +139,8 @@ pub fn triangle() -> Composed {
 /// part below a joint, a mirrored static part, and clips of every kind.
 ///
 /// Nodes: 0 armature, 1 hip, 2 knee, 3 toe (no weights), 4 body, 5 hat, 6 stone. Joints: knee, hip, toe.
-pub fn character() -> Composed {
-    let mut file = Composed::new();
+pub fn character() -> ComposedDocument {
+    let mut file = ComposedDocument::new();
     let position = file.floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 2.0, 0.1], "VEC3");
     let normal = file.floats(&[0.0, 0.0, 1.0].repeat(4), "VEC3");
     let tangent = file.floats(&[1.0, 0.0, 0.0, -1.0].repeat(4), "VEC4");
@@ -227,8 +227,8 @@ pub fn character() -> Composed {
 
 /// Sparse and strided accessors, strips, a gap in texture coordinates, several roots and scenes, two skins over the same
 /// joints, two sets of weights, data URIs.
-pub fn extremes() -> Composed {
-    let mut file = Composed::new();
+pub fn extremes() -> ComposedDocument {
+    let mut file = ComposedDocument::new();
     let points: Vec<f32> = (0..8).flat_map(|i| [(i / 2) as f32, (i % 2) as f32, 0.25, f32::NAN]).collect();
     let points: Vec<u8> = points.iter().flat_map(|value| value.to_le_bytes()).collect();
     let position = file.accessor(&points[..124], 5126, "VEC3", 8);

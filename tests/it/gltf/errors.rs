@@ -1,6 +1,6 @@
 //! Faults of a file are said with the file's name and the place, before anything is built on it.
 
-use super::compose::{Composed, character, glb, read, triangle};
+use super::compose::{ComposedDocument, character, glb, read, triangle};
 use rigsmith::mesh::gltf::{ExternalError, ExternalFile, MAX_IMAGE_BYTES, memory_limit, read_gltf};
 use serde_json::{Value, json};
 
@@ -13,7 +13,7 @@ fn error(bytes: &[u8]) -> String {
 
 #[test]
 fn fields() {
-    let set = |file: &mut Composed, place: &str, value: Value| {
+    let set = |file: &mut ComposedDocument, place: &str, value: Value| {
         let (parent, key) = place.rsplit_once('/').unwrap();
         let parent = file.json.pointer_mut(parent).unwrap();
         match parent {
@@ -269,7 +269,7 @@ fn memory() {
     assert!(error(text.as_bytes()).contains("takes more than"));
 
     // Many instances of a large mesh.
-    let mut file = Composed::new();
+    let mut file = ComposedDocument::new();
     let position = file.floats(&vec![0.5; 30_000], "VEC3");
     file.push("meshes", json!({"primitives": [{"attributes": {"POSITION": position}}]}));
     for _ in 0..2000 {

@@ -1,6 +1,8 @@
 //! Damaged journals: whatever happened to the file, every sound record comes back, what is lost is told, and the file stays.
 
-use rigsmith::files::journal::{Condition, Damage, Gap, PendingJournal, RecordCount, RecordKind, Resumed, SkipReason};
+use rigsmith::files::journal::{
+    Condition, Damage, Gap, PendingJournal, RecordCount, RecordKind, ResumedJournal, SkipReason,
+};
 
 use super::*;
 
@@ -59,19 +61,19 @@ fn long_work(folder: &Path) -> (Desk, Vec<u8>) {
 }
 
 /// The rig that remains when one change is missing: whatever needs it is left out, as a whole.
-fn without(base: &Rig, changes: &[Committed], missing: usize) -> Rig {
+fn without(base: &Rig, changes: &[Commit], missing: usize) -> Rig {
     let mut rig = base.clone();
     let mut inverses: Vec<(Arc<rigsmith::rig::step::Step>, Vec<RigEdit>)> = Vec::new();
     for (number, committed) in changes.iter().enumerate() {
         let known = inverses.iter().position(|(step, _)| Arc::ptr_eq(step, committed.step()));
         match (committed, known) {
             _ if number == missing => {}
-            (Committed::Undone(_), Some(known)) => {
+            (Commit::Undone(_), Some(known)) => {
                 let (_, backward) = &inverses[known];
                 rig.apply(&RigEdit::Batch(backward.clone())).unwrap();
             }
-            (Committed::Undone(_) | Committed::Redone(_), None) => {}
-            (Committed::Done(step) | Committed::Redone(step), _) => {
+            (Commit::Undone(_) | Commit::Redone(_), None) => {}
+            (Commit::Done(step) | Commit::Redone(step), _) => {
                 if let Ok(inverse) = rig.apply(&RigEdit::Batch(step.forward.clone())) {
                     inverses.retain(|(known, _)| !Arc::ptr_eq(known, step));
                     inverses.push((step.clone(), vec![inverse]));
@@ -83,7 +85,7 @@ fn without(base: &Rig, changes: &[Committed], missing: usize) -> Rig {
 }
 
 /// Every undo leads back, down to the rig that the work started with, and every redo forth again.
-pub fn check_history(back: &Replayed, base: &Rig, context: &str) {
+pub fn check_history(back: &Replay, base: &Rig, context: &str) {
     let mut history = RigHistory::restored(&back.stacks);
     let (mut rig, mut selection) = (back.rig.clone(), Selection::default());
     let ahead = history.steps().0.len() - history.steps().1;
@@ -369,7 +371,8 @@ fn what_a_saved_project_holds_is_not_made_twice() {
             assert_eq!(restored.replayed.rig, rig, "record {number}");
         }
         // The journal that goes on says the same.
-        let Resumed { journal, kept } = Journal::resume(Arc::new(RealDisk), places.clone(), &found, &restored, &path);
+        let ResumedJournal { journal, kept } =
+            Journal::resume(Arc::new(RealDisk), places.clone(), &found, &restored, &path);
         journal.flush(LONG).unwrap();
         let again = recover(&fs::read(journal.path().unwrap()).unwrap()).unwrap();
         assert!(!again.is_damaged() && again.changes().len() == unsaved);

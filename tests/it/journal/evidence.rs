@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use rigsmith::files::journal::{Condition, Resumed, project_beside};
+use rigsmith::files::journal::{Condition, ResumedJournal, project_beside};
 
 use super::{
     damage::{PRELUDE, check_history, damaged, flipped, offered, records},
@@ -26,7 +26,7 @@ fn a_damaged_journal_is_kept_whatever_becomes_of_its_work() {
     fs::write(&path, &bytes).unwrap();
     let found = recover(&bytes).unwrap();
     let restored = found.restore(Basis::Journal, None);
-    let Resumed { journal, kept } =
+    let ResumedJournal { journal, kept } =
         Journal::resume(Arc::new(RealDisk), start(folder.path()).places, &found, &restored, &path);
     journal.flush(LONG).unwrap();
     let kept = kept.unwrap();
@@ -43,7 +43,7 @@ fn a_damaged_journal_is_kept_whatever_becomes_of_its_work() {
     // Saved and closed: still there.
     let found = recover(&fs::read(&path).unwrap()).unwrap();
     let restored = found.restore(Basis::Journal, None);
-    let Resumed { journal, kept: none } =
+    let ResumedJournal { journal, kept: none } =
         Journal::resume(Arc::new(RealDisk), start(folder.path()).places, &found, &restored, &path);
     assert_eq!(none, None, "this one was whole");
     journal.flush(LONG).unwrap();

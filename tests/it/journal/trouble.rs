@@ -142,9 +142,9 @@ fn whatever_fails_what_was_said_to_be_safe_is_recovered() {
 }
 
 /// A disk that is full while the switch is on.
-struct Switched(Arc<AtomicBool>);
+struct SwitchedDisk(Arc<AtomicBool>);
 
-impl Switched {
+impl SwitchedDisk {
     fn check(&self) -> io::Result<RealDisk> {
         if self.0.load(Ordering::Relaxed) {
             return Err(io::ErrorKind::StorageFull.into());
@@ -153,7 +153,7 @@ impl Switched {
     }
 }
 
-struct SwitchedFile(Box<dyn DiskFile>, Switched);
+struct SwitchedFile(Box<dyn DiskFile>, SwitchedDisk);
 
 impl DiskFile for SwitchedFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
@@ -168,7 +168,7 @@ impl DiskFile for SwitchedFile {
     }
 }
 
-impl Disk for Switched {
+impl Disk for SwitchedDisk {
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
         RealDisk.entry(path, follow)
     }
@@ -210,7 +210,7 @@ fn a_full_disk_is_told_and_nothing_is_missing_once_there_is_room() {
     let full = Arc::new(AtomicBool::new(false));
     let set = |on| full.store(on, Ordering::Relaxed);
     let begin = JournalStart { rig: Some(Rig::new(Uid(42), "random")), ..start(folder.path()) };
-    let mut desk = Desk::new(Arc::new(Switched(full.clone())), begin);
+    let mut desk = Desk::new(Arc::new(SwitchedDisk(full.clone())), begin);
     desk.place(0);
     desk.flush();
     assert_eq!(desk.journal.trouble(), None);

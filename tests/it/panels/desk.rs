@@ -30,7 +30,7 @@ pub struct Desk {
     pub time: f64,
     events: Vec<Event>,
     /// Everything in the last frame: what it says, its value, and where it is.
-    pub seen: Vec<Seen>,
+    pub seen: Vec<ShownWidget>,
     held: Modifiers,
     /// How many shapes the last frame was drawn with.
     pub shapes: usize,
@@ -38,7 +38,7 @@ pub struct Desk {
 
 /// A widget.
 #[derive(Debug, Clone)]
-pub struct Seen {
+pub struct ShownWidget {
     pub label: String,
     pub value: String,
     pub rect: Rect,
@@ -108,7 +108,7 @@ impl Desk {
         self.frames(3);
     }
 
-    pub fn look(&self, label: &str) -> Option<&Seen> {
+    pub fn look(&self, label: &str) -> Option<&ShownWidget> {
         self.seen.iter().find(|seen| seen.label == label)
     }
 
@@ -118,7 +118,7 @@ impl Desk {
     }
 
     #[track_caller]
-    pub fn find(&self, label: &str) -> Seen {
+    pub fn find(&self, label: &str) -> ShownWidget {
         let labels: Vec<&str> = self.seen.iter().map(|seen| seen.label.as_str()).collect();
         self.look(label).unwrap_or_else(|| panic!("{label:?} is not among {labels:?}")).clone()
     }
@@ -258,13 +258,13 @@ impl Desk {
     }
 }
 
-fn seen(node: &accesskit::Node) -> Option<Seen> {
+fn seen(node: &accesskit::Node) -> Option<ShownWidget> {
     let bounds = node.bounds()?;
     let rect = Rect::from_min_max(
         egui::pos2(bounds.x0 as f32, bounds.y0 as f32),
         egui::pos2(bounds.x1 as f32, bounds.y1 as f32),
     );
-    Some(Seen {
+    Some(ShownWidget {
         label: node.label().unwrap_or_default().to_owned(),
         value: node.value().unwrap_or_default().to_owned(),
         rect,

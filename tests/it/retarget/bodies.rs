@@ -10,7 +10,7 @@ use rigsmith::{
     solve::retarget::RetargetSettings,
 };
 
-use super::{Played, motion};
+use super::{PlayedRig, motion};
 use crate::prerequisites::test_data;
 
 /// The biped in a body of the data folder.
@@ -28,7 +28,7 @@ fn check(body: &str) {
     let rig = fitted(&data.join("bodies").join(body));
     for (name, rate) in [("makehuman_walk1", None), ("cmu_01_01", Some(30.0))] {
         let settings = RetargetSettings { frame_rate: rate, ..RetargetSettings::default() };
-        let played = Played::new(rig.clone(), &motion(&data, name), &settings);
+        let played = PlayedRig::new(rig.clone(), &motion(&data, name), &settings);
         let [slide, off] = played.feet();
         println!("{body}, {name}: slide {slide:.3} %, ankles off {off:.3} %");
         assert!(slide <= 1.0 && off <= 1.5, "{body}, {name}: slide {slide}, off {off}");

@@ -4,7 +4,7 @@ use super::{biped::biped, *};
 use proptest::prelude::*;
 use rigsmith::{
     rig::{BuiltRig, Channel, Collider, Constraint, Output, Uid},
-    solve::program::{ContentHash, Exposed, Keep, LANES, Memory, ProgramCache},
+    solve::program::{ContentHash, ExposedNode, Keep, LANES, Memory, ProgramCache},
 };
 
 fn compile(rig: &BuiltRig, keep: Keep) -> Arc<RigProgram> {
@@ -13,7 +13,7 @@ fn compile(rig: &BuiltRig, keep: Keep) -> Arc<RigProgram> {
 }
 
 fn deform() -> Keep {
-    Keep::DeformAndExposed(vec![Exposed::Controls])
+    Keep::DeformAndExposed(vec![ExposedNode::Controls])
 }
 
 /// A change of one input, with numbers between 0 and 1.

@@ -3,7 +3,7 @@
 use super::*;
 use rigsmith::{
     rig::{Constraint, KeyEase, Output, Uid},
-    solve::program::{Exposed, ExternalNode, Keep, ProgramError, StateError},
+    solve::program::{ExposedNode, ExternalNode, Keep, ProgramError, StateError},
 };
 
 fn error(rig: &RigBuilder) -> ProgramError {
@@ -193,7 +193,7 @@ fn outside_nodes_are_inputs() {
     assert!(matches!(error(&rig), ProgramError::MissingNode { .. }));
     let rest = Trs { translation: Vec3::Z, ..Trs::IDENTITY };
     let options = CompileOptions { inputs: vec![ExternalNode { uid: wheel, rest }], ..CompileOptions::default() };
-    for keep in [Keep::All, Keep::DeformAndExposed(vec![Exposed::Controls])] {
+    for keep in [Keep::All, Keep::DeformAndExposed(vec![ExposedNode::Controls])] {
         let program = RigProgram::compile(&rig.rig, &CompileOptions { keep, ..options.clone() }).unwrap();
         let mut state = RigState::new(Arc::new(program));
         state.evaluate(0.0);
@@ -218,7 +218,7 @@ fn states_refuse_what_they_cannot_take() {
     let mut rig = controls(&[("a", Vec3::ZERO), ("b", Vec3::X)]);
     rig.node("joint", NodeType::Joint, "b", Vec3::Y);
     rig.attribute("b", "value", 0.0, (0.0, 1.0));
-    let keep = Keep::DeformAndExposed(vec![Exposed::Label("b".to_owned())]);
+    let keep = Keep::DeformAndExposed(vec![ExposedNode::Label("b".to_owned())]);
     let program = RigProgram::compile(&rig.rig, &CompileOptions { keep, ..CompileOptions::default() }).unwrap();
     let mut state = RigState::new(Arc::new(program));
     let (a, b, joint) = (rig.uid("a"), rig.uid("b"), rig.uid("joint"));
@@ -231,7 +231,7 @@ fn states_refuse_what_they_cannot_take() {
     assert!(matches!(state.set_attribute(b, "values", 7.0), Err(StateError::UnknownAttribute { .. })));
     assert_eq!(state.set_attribute(b, "value", f32::NAN), Err(StateError::NotFinite(b)));
     assert!(state.global(a).is_none());
-    let keep = Keep::DeformAndExposed(vec![Exposed::Label("elbow".to_owned())]);
+    let keep = Keep::DeformAndExposed(vec![ExposedNode::Label("elbow".to_owned())]);
     let wrong = RigProgram::compile(&rig.rig, &CompileOptions { keep, ..CompileOptions::default() });
     assert!(matches!(wrong, Err(ProgramError::UnknownExposed { .. })));
 }

@@ -5,7 +5,7 @@ use bevy::{animation::AnimationPlugin, prelude::*, time::TimeUpdateStrategy};
 use rigsmith::{
     plugins::runtime::{ControlPose, DrivenMorphs, InstanceMode, RigRuntime, RuntimePlugin, spawn_instance},
     rig::{Constraint, KeyEase, Output},
-    solve::program::{Exposed, Keep},
+    solve::program::{ExposedNode, Keep},
     test_app::strict_app,
 };
 
@@ -38,7 +38,7 @@ fn world_position(app: &App, rig: Entity, label: &str) -> Vec3 {
 }
 
 fn in_games() -> Keep {
-    Keep::DeformAndExposed(vec![Exposed::Controls])
+    Keep::DeformAndExposed(vec![ExposedNode::Controls])
 }
 
 #[test]
@@ -73,24 +73,27 @@ fn what_stands_still_does_nothing() {
         })
         .collect();
     #[derive(Resource, Default)]
-    struct Ran(Vec<Entity>);
-    app.init_resource::<Ran>().add_systems(Last, |mut ran: ResMut<Ran>, rigs: Query<Entity, Changed<RigRuntime>>| {
-        ran.0 = rigs.iter().collect();
-    });
+    struct ChangedRigs(Vec<Entity>);
+    app.init_resource::<ChangedRigs>().add_systems(
+        Last,
+        |mut ran: ResMut<ChangedRigs>, rigs: Query<Entity, Changed<RigRuntime>>| {
+            ran.0 = rigs.iter().collect();
+        },
+    );
     app.update();
     app.update();
-    assert!(app.world().resource::<Ran>().0.is_empty());
+    assert!(app.world().resource::<ChangedRigs>().0.is_empty());
     let posed = entity(&app, rigs[4], "chest");
     app.world_mut().entity_mut(posed).insert(ControlPose::from(turned(Vec3::Y, 30.0)));
     app.update();
-    assert_eq!(app.world().resource::<Ran>().0, [rigs[4]]);
+    assert_eq!(app.world().resource::<ChangedRigs>().0, [rigs[4]]);
     app.update();
-    assert!(app.world().resource::<Ran>().0.is_empty());
+    assert!(app.world().resource::<ChangedRigs>().0.is_empty());
     // A rig that moves as a whole takes its joints along without running.
     let before = world_position(&app, rigs[2], "head");
     app.world_mut().get_mut::<Transform>(rigs[2]).unwrap().translation.y += 3.0;
     app.update();
-    assert!(app.world().resource::<Ran>().0.is_empty());
+    assert!(app.world().resource::<ChangedRigs>().0.is_empty());
     near(world_position(&app, rigs[2], "head"), before + Vec3::Y * 3.0, 1e-5);
     // With a rig, its nodes go.
     let head = entity(&app, rigs[2], "head");

@@ -47,7 +47,7 @@ fn controls_without_effect_are_hidden() {
 
 /// Controls in layers, as they are drawn and picked.
 #[cfg(feature = "draw")]
-mod drawn {
+mod drawn_layers {
     use bevy::ecs::system::RunSystemOnce;
     use rigsmith::{
         algo::view::ViewPlane,

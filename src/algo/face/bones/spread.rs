@@ -46,7 +46,7 @@ pub(crate) struct Seat {
 
 /// A fixed place and the part that it lies in.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Fixed {
+pub(crate) struct FixedPlace {
     pub place: Vec3,
     pub index: usize,
     pub part: usize,
@@ -56,8 +56,8 @@ pub(crate) struct Fixed {
 /// Fixed places of a half before it is clustered, two in one slot where both sides are fixed.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
-    first: Fixed,
-    second: Option<Fixed>,
+    first: FixedPlace,
+    second: Option<FixedPlace>,
 }
 
 /// Number of bones of each part: `bones` in all, at least `least` each, none for an empty part.
@@ -106,7 +106,7 @@ impl Spreader<'_> {
         part: usize,
         patch: &[&Patch],
         count: usize,
-        fixed: &[Fixed],
+        fixed: &[FixedPlace],
         seats: &mut Vec<Seat>,
     ) -> Result<(), FaceBonesError> {
         let mut points = Vec::new();
@@ -136,10 +136,10 @@ impl Spreader<'_> {
         part: usize,
         patches: &[Patch; 2],
         count: usize,
-        fixed: &[Fixed],
+        fixed: &[FixedPlace],
         seats: &mut Vec<Seat>,
     ) -> Result<(), FaceBonesError> {
-        let on_plane: Vec<Fixed> = fixed.iter().copied().filter(|f| f.middle).collect();
+        let on_plane: Vec<FixedPlace> = fixed.iter().copied().filter(|f| f.middle).collect();
         let slots = self.slots(fixed);
         let mut folded: Vec<Vec3> = Vec::new();
         for patch in patches {
@@ -201,7 +201,7 @@ impl Spreader<'_> {
     }
 
     /// Fixed places beside the plane; two that mirror each other share a slot.
-    fn slots(&self, fixed: &[Fixed]) -> Vec<Slot> {
+    fn slots(&self, fixed: &[FixedPlace]) -> Vec<Slot> {
         let mut slots: Vec<Slot> = Vec::new();
         for &f in fixed.iter().filter(|f| !f.middle) {
             let left = f.place.x >= self.map.middle;
@@ -220,7 +220,7 @@ impl Spreader<'_> {
     }
 
     /// Least number of seats for the fixed places of a part, with their partners.
-    pub fn needed(&self, fixed: &[Fixed]) -> usize {
+    pub fn needed(&self, fixed: &[FixedPlace]) -> usize {
         fixed.iter().filter(|f| f.middle).count() + 2 * self.slots(fixed).len()
     }
 

@@ -67,7 +67,8 @@ pub fn repair_folds(
             break;
         }
         let neighbourhood = neighbourhood.get_or_insert_with(|| Neighbourhood::new(points, triangles));
-        let mut averaged = Averaged { neighbourhood, weights, own: vec![Vec::new(); neighbourhood.points.len()] };
+        let mut averaged =
+            AveragedWeights { neighbourhood, weights, own: vec![Vec::new(); neighbourhood.points.len()] };
         averaged.smooth(points, triangles, folded, &poses);
         *weights = averaged.weights();
         if let Some(mirror) = &mirror {
@@ -159,14 +160,14 @@ impl Neighbourhood {
 }
 
 /// Weights of a surface, some of them averaged.
-struct Averaged<'a> {
+struct AveragedWeights<'a> {
     neighbourhood: &'a Neighbourhood,
     weights: &'a Weights,
     /// Averaged weights of each place; empty where they are as they were.
     own: Vec<Influences>,
 }
 
-impl Averaged<'_> {
+impl AveragedWeights<'_> {
     /// Averages until no triangle is folded or all rounds are over.
     fn smooth(&mut self, points: &[Vec3], triangles: &[[u32; 3]], mut folded: Vec<u32>, poses: &[Vec<Affine3A>]) {
         for round in 0..ROUNDS {

@@ -83,7 +83,7 @@ fn rings(body: &Body, away: &[f32], tip: usize, farthest: f32) -> Vec<Ring> {
     };
     let mut order: Vec<usize> = (0..body.joined.len()).collect();
     order.sort_by(|a, b| ends(&body.joined[*a]).1.total_cmp(&ends(&body.joined[*b]).1));
-    let mut joined = Joined((0..body.places.len() as u32).collect());
+    let mut joined = JoinedPlaces((0..body.places.len() as u32).collect());
     let mut next = 0;
     let mut rings = Vec::with_capacity(PLANES);
     for step in 1..=PLANES {
@@ -125,9 +125,9 @@ fn rings(body: &Body, away: &[f32], tip: usize, farthest: f32) -> Vec<Ring> {
 }
 
 /// Union-find of connected places.
-struct Joined(Vec<u32>);
+struct JoinedPlaces(Vec<u32>);
 
-impl Joined {
+impl JoinedPlaces {
     fn root(&mut self, mut place: u32) -> u32 {
         while self.0[place as usize] != place {
             let above = self.0[self.0[place as usize] as usize];

@@ -21,7 +21,7 @@ pub(in super::super) struct State {
 
 /// The model in a state.
 #[derive(Debug, Clone)]
-pub(super) struct Posed {
+pub(super) struct PosedModel {
     pub(super) joints: Vec<Vec3>,
     pub(super) points: Vec<Vec3>,
     pub(super) normals: Vec<Vec3>,
@@ -89,7 +89,7 @@ impl State {
     }
 
     /// The model in this state.
-    pub(super) fn posed(&self, model: &HumanModel) -> Posed {
+    pub(super) fn posed(&self, model: &HumanModel) -> PosedModel {
         let skeleton = self.skeleton(model);
         let points = (0..model.points.len()).map(|i| self.point(model, &skeleton, i)).collect();
         let normals = model
@@ -100,7 +100,7 @@ impl State {
                 sum.normalize_or_zero()
             })
             .collect();
-        Posed { joints: skeleton.joints, points, normals }
+        PosedModel { joints: skeleton.joints, points, normals }
     }
 }
 

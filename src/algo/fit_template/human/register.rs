@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{
     model::{BONE_COUNT, HumanModel, bone},
-    pose::{Posed, SHAPE, State},
+    pose::{PosedModel, SHAPE, State},
     solve::{Holds, Place, Row, step},
 };
 use crate::{
@@ -150,7 +150,7 @@ fn robust(distance: f32, reach: f32) -> f32 {
 }
 
 /// Rows that bring points of the model to the nearest surface that faces the same way.
-fn to_surface(model: &HumanModel, posed: &Posed, goal: &Goal, reach: f32) -> Vec<Row> {
+fn to_surface(model: &HumanModel, posed: &PosedModel, goal: &Goal, reach: f32) -> Vec<Row> {
     let whole: f32 = model.points.iter().map(|p| p.importance).sum();
     let one = |i: usize| {
         let (place, normal) = (posed.points[i], posed.normals[i]);
@@ -176,7 +176,7 @@ fn to_surface(model: &HumanModel, posed: &Posed, goal: &Goal, reach: f32) -> Vec
 }
 
 /// Rows that bring the nearest point of the model to each sample of the surface.
-fn to_model(model: &HumanModel, posed: &Posed, samples: &[Sample], reach: f32) -> Vec<Row> {
+fn to_model(model: &HumanModel, posed: &PosedModel, samples: &[Sample], reach: f32) -> Vec<Row> {
     let each = 1.0 / samples.len().max(1) as f32;
     let one = |sample: &Sample| {
         let mut best = (f32::INFINITY, usize::MAX);

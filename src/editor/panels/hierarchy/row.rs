@@ -5,7 +5,7 @@ use bevy_egui::egui::{
     UiBuilder, WidgetInfo, WidgetType, containers::collapsing_header::paint_default_icon, pos2, vec2,
 };
 
-use super::{Dragged, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
+use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
 use crate::{
     editor::{
         panel::Requests,
@@ -184,9 +184,9 @@ fn drag(
             true => tops(&shown.rig, &shown.selection.0),
             false => vec![joint],
         };
-        response.dnd_set_drag_payload(Dragged(joints));
+        response.dnd_set_drag_payload(DraggedJoints(joints));
     }
-    if let Some(dragged) = response.dnd_hover_payload::<Dragged>() {
+    if let Some(dragged) = response.dnd_hover_payload::<DraggedJoints>() {
         let over_itself = dragged.0.contains(&joint);
         let refused = obstacle(&dragged.0, Some(joint), shown).filter(|_| !over_itself);
         let color = if refused.is_some() { ui.visuals().error_fg_color } else { ui.visuals().selection.stroke.color };
@@ -196,7 +196,7 @@ fn drag(
         ui.ctx().set_cursor_icon(if refused.is_some() { CursorIcon::NotAllowed } else { CursorIcon::Grabbing });
         carried(ui, &dragged.0, shown, refused.as_deref());
     }
-    if let Some(dragged) = response.dnd_release_payload::<Dragged>() {
+    if let Some(dragged) = response.dnd_release_payload::<DraggedJoints>() {
         reparent(&dragged.0, Some(joint), shown, requests);
     }
 }

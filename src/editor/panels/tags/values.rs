@@ -402,7 +402,7 @@ fn form_of(module: &ModuleInfo) -> Form {
 
 fn made_form(module: &ModuleInfo) -> Form {
     let element = |name: &str, kind: &str| {
-        let bound = crate::processor::form::Bound { param: name.to_owned(), label: String::new() };
+        let bound = crate::processor::form::FormBinding { param: name.to_owned(), label: String::new() };
         match kind {
             "bool" => FormElement::Check(bound),
             "f32" => {

@@ -2,7 +2,7 @@
 
 use bevy::platform::collections::HashMap;
 
-use super::{Driven, Graph, NodeState};
+use super::{DrivenRegister, Graph, NodeState};
 use crate::{
     rig::AttributeKind,
     solve::program::op::{N, Op, Operand, Span, X},
@@ -12,7 +12,7 @@ impl Graph<'_> {
     /// Ends every node, attribute and morph target with the operation that makes its final value.
     ///
     /// Returns the driven register of each node.
-    pub(in super::super) fn finish(&mut self) -> Vec<Driven> {
+    pub(in super::super) fn finish(&mut self) -> Vec<DrivenRegister> {
         for node in 0..self.rig.nodes.len() {
             self.close(node);
             let (parent, out) = (self.parent(node), self.global(node));
@@ -52,9 +52,9 @@ impl Graph<'_> {
             });
         }
         let driven = |state: &NodeState| match (state.local, state.whole) {
-            (None, _) => Driven::Not,
-            (Some(_), Some(_)) => Driven::Global,
-            (Some(local), None) => Driven::Local(local),
+            (None, _) => DrivenRegister::Not,
+            (Some(_), Some(_)) => DrivenRegister::Global,
+            (Some(local), None) => DrivenRegister::Local(local),
         };
         self.nodes.iter().map(driven).collect()
     }

@@ -36,12 +36,12 @@ pub(super) struct Four {
 struct Columns {
     x: Vec<Place<f32x4>>,
     n: Vec<[f32; LANES]>,
-    poses: Vec<Posed>,
+    poses: Vec<PoseLanes>,
 }
 
 /// Pose offsets, with a mask of the instances that have one.
 #[derive(Clone, Copy)]
-struct Posed {
+struct PoseLanes {
     offset: Place<f32x4>,
     is_posed: f32x4,
 }
@@ -106,7 +106,7 @@ impl Four {
         poses.extend((0..program.poses).map(|pose| {
             let offsets = states.each_ref().map(|state| &state.poses[pose]);
             let is_posed = offsets.map(|offset| *offset != PoseOffset::IDENTITY);
-            Posed { offset: together(offsets.map(Place::from)), is_posed: mask(is_posed) }
+            PoseLanes { offset: together(offsets.map(Place::from)), is_posed: mask(is_posed) }
         }));
         if is_same { program.layout.settings } else { 0 }
     }
@@ -243,7 +243,7 @@ impl Columns {
     }
 }
 
-impl Posed {
+impl PoseLanes {
     /// The transform `moved` for instances with a pose, `still` for those without.
     #[inline(always)]
     fn pick(&self, moved: &Place<f32x4>, still: impl FnOnce() -> Place<f32x4>) -> Place<f32x4> {
@@ -279,7 +279,7 @@ impl Registers for Column<'_> {
 
     #[inline]
     fn offset(&self, pose: Pose) -> Option<PoseOffset> {
-        let Posed { offset, .. } = self.columns.poses.get(pose.0 as usize)?;
+        let PoseLanes { offset, .. } = self.columns.poses.get(pose.0 as usize)?;
         let Trs { translation, rotation, scale } = one(offset, self.lane).into();
         Some(PoseOffset { translation, rotation, scale })
     }

@@ -142,7 +142,7 @@ struct Entries {
 }
 
 /// A change of the list of features that are off.
-enum Switched {
+enum FeatureListChange {
     /// The number of the one that is on again.
     On(usize),
     /// The name of one that is off now.
@@ -196,8 +196,8 @@ impl Overrides<'_, '_> {
                 let entry = entries.get(&Target::Tag(tag.uid)).copied();
                 let switched = entry.is_none().then(|| self.switch(instance, part, tag)).flatten();
                 match switched {
-                    Some(Switched::On(place)) => on.push(place),
-                    Some(Switched::Off(name)) => off.push(quoted(&name)),
+                    Some(FeatureListChange::On(place)) => on.push(place),
+                    Some(FeatureListChange::Off(name)) => off.push(quoted(&name)),
                     None => self.tag((instance, part), tag.uid, entry, &mut changes),
                 }
             }
@@ -245,7 +245,7 @@ impl Overrides<'_, '_> {
     }
 
     /// Change of the list `off` that turns a feature on or off; `None` if that does not say what is different.
-    fn switch(&self, instance: &PartInstance, part: &Rig, tag: &TagData) -> Option<Switched> {
+    fn switch(&self, instance: &PartInstance, part: &Rig, tag: &TagData) -> Option<FeatureListChange> {
         let name = switch_name(tag)?;
         let here = instance.uid_of(tag.uid);
         let ((_, was), (_, is)) = (self.rigs.before.find_tag(here)?, self.rig.find_tag(here)?);
@@ -256,8 +256,8 @@ impl Overrides<'_, '_> {
             return None;
         }
         match (is.enabled, place) {
-            (true, Some(place)) if tag.enabled => Some(Switched::On(place)),
-            (false, None) => Some(Switched::Off(name)),
+            (true, Some(place)) if tag.enabled => Some(FeatureListChange::On(place)),
+            (false, None) => Some(FeatureListChange::Off(name)),
             _ => None,
         }
     }

@@ -29,11 +29,11 @@ struct ItemChanges {
     /// Numbers of the items that go.
     removed: BTreeSet<usize>,
     /// The items that come.
-    added: Vec<Added>,
+    added: Vec<AddedItem>,
 }
 
 /// An item that comes into a bracket.
-struct Added {
+struct AddedItem {
     /// Number of the item behind which it comes; `None` before the first.
     behind: Option<usize>,
     text: String,
@@ -142,7 +142,7 @@ impl<'d, 'a> Patch<'d, 'a> {
         }
         self.remove(list, gone.iter().copied());
         for text in fresh {
-            let added = Added { behind: count.checked_sub(1), text: text.clone(), is_line: true };
+            let added = AddedItem { behind: count.checked_sub(1), text: text.clone(), is_line: true };
             self.items.entry(list).or_default().added.push(added);
         }
     }
@@ -159,7 +159,7 @@ impl<'d, 'a> Patch<'d, 'a> {
             }
             None => format!("{field}: [{}]", elements.join(", ")),
         };
-        let added = Added { behind: items.len().checked_sub(1), text, is_line: true };
+        let added = AddedItem { behind: items.len().checked_sub(1), text, is_line: true };
         self.items.entry(node).or_default().added.push(added);
     }
 
@@ -239,7 +239,7 @@ impl<'d, 'a> Patch<'d, 'a> {
 
     /// Inserts an item behind another one, or before the first.
     fn insert(&mut self, node: NodeId, behind: Option<usize>, text: &str) {
-        self.items.entry(node).or_default().added.push(Added { behind, text: text.to_owned(), is_line: false });
+        self.items.entry(node).or_default().added.push(AddedItem { behind, text: text.to_owned(), is_line: false });
     }
 
     /// Writes which items of a bracket go, and which come behind those that stay.
@@ -268,12 +268,12 @@ impl<'d, 'a> Patch<'d, 'a> {
             }
             self.changes.push((range, String::new()));
         }
-        let mut added: BTreeMap<Option<usize>, Vec<&Added>> = BTreeMap::new();
+        let mut added: BTreeMap<Option<usize>, Vec<&AddedItem>> = BTreeMap::new();
         for item in &changes.added {
             let behind = item.behind.and_then(|behind| (0..=behind).rev().find(stays));
             added.entry(behind).or_default().push(item);
         }
-        let on_line = |item: &Added, blanks: &str| match item.is_line {
+        let on_line = |item: &AddedItem, blanks: &str| match item.is_line {
             true => format!("\n{blanks}{}", item.text),
             false => format!("\n{blanks}{}", laid_out_item(&item.text, blanks.len())),
         };

@@ -20,7 +20,7 @@ use crate::{
     rig::{
         BuiltRig, Rig, RigEdit, SkinData, Uid,
         deform::DeformSkeleton,
-        step::{Committed, Step},
+        step::{Commit, Step},
     },
 };
 
@@ -39,7 +39,7 @@ pub(super) fn start_late_shares(
 ) {
     let mut switched: Vec<Entity> = Vec::new();
     for message in edited.read() {
-        if let Some(Committed::Done(step)) = &message.committed
+        if let Some(Commit::Done(step)) = &message.committed
             && switches_on(step)
             && !switched.contains(&message.rig)
         {

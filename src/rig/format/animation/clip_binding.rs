@@ -6,7 +6,7 @@ use super::{BoundClips, ReadAnimation};
 use crate::rig::{Uid, animation::NodeNames};
 
 /// The clips with uids of the nodes of a rig.
-pub(super) fn onto(read: &ReadAnimation, there: &NodeNames) -> BoundClips {
+pub(super) fn bind_clips(read: &ReadAnimation, there: &NodeNames) -> BoundClips {
     let masked = read.clips.iter().flat_map(|clip| &clip.layers).flat_map(|layer| layer.mask.iter().copied());
     let nodes: BTreeSet<Uid> = read.clips.iter().flat_map(|clip| clip.nodes()).chain(masked).collect();
     let mut taken: BTreeSet<Uid> = nodes.iter().copied().filter(|node| there.0.contains_key(node)).collect();

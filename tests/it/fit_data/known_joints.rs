@@ -12,7 +12,7 @@ use rigsmith::{
 
 /// Mesh: file, template, and pairs of template label and name of the joint that is in its place. `@` stands for a side, as the
 /// file writes it.
-struct Known {
+struct KnownMesh {
     file: &'static str,
     template: &'static str,
     joints: &'static [(&'static str, &'static str)],
@@ -81,8 +81,8 @@ const LEGS_OF_FOXES: &[(&str, &str)] = &[
     ("tail_6", "Tail_Tip"),
 ];
 
-const OTHERS: [Known; 6] = [
-    Known {
+const OTHERS: [KnownMesh; 6] = [
+    KnownMesh {
         file: "gltf_skinned/CesiumMan.glb",
         template: "biped",
         joints: &[
@@ -103,7 +103,7 @@ const OTHERS: [Known; 6] = [
         ],
         sides: ["L", "R"],
     },
-    Known {
+    KnownMesh {
         file: "gltf_skinned/RobotExpressive.glb",
         template: "biped",
         joints: &[
@@ -120,7 +120,7 @@ const OTHERS: [Known; 6] = [
         ],
         sides: ["L", "R"],
     },
-    Known {
+    KnownMesh {
         file: "characters/Mage.glb",
         template: "biped",
         joints: &[
@@ -138,9 +138,9 @@ const OTHERS: [Known; 6] = [
         ],
         sides: ["l", "r"],
     },
-    Known { file: "creatures/fox-fox.glb", template: "quadruped", joints: LEGS_OF_FOXES, sides: ["L", "R"] },
-    Known { file: "creatures/fox-dog.glb", template: "quadruped", joints: LEGS_OF_FOXES, sides: ["L", "R"] },
-    Known {
+    KnownMesh { file: "creatures/fox-fox.glb", template: "quadruped", joints: LEGS_OF_FOXES, sides: ["L", "R"] },
+    KnownMesh { file: "creatures/fox-dog.glb", template: "quadruped", joints: LEGS_OF_FOXES, sides: ["L", "R"] },
+    KnownMesh {
         file: "creatures/bird-eagle.glb",
         template: "bird",
         joints: &[
@@ -182,7 +182,7 @@ pub fn figures(data: &Path) -> Result<Vec<Figure>, Box<dyn Error>> {
         };
         figures.push(Figure::new(body, &model, "biped", HUMAN, ["l", "r"], &place));
     }
-    for Known { file, template, joints, sides } in OTHERS {
+    for KnownMesh { file, template, joints, sides } in OTHERS {
         let model = load_model(&RealDisk, &data.join(file))?;
         let globals = model.rest_globals();
         let place = |name: &str| {
