@@ -105,7 +105,7 @@ fn main() -> AppExit {
         world.write_message(EditRequest::operation(rig, Operation::Edits(edits)));
     }
     if bind {
-        world.write_message(BindRequest { mesh, settings: default(), parts: Vec::new() });
+        world.write_message(BindRequest::new(mesh));
     }
     let middle = (low + high) / 2.0;
     let size = (high - low).length().max(1e-3);

@@ -11,7 +11,7 @@
 //! writes the `Transform`s of all nodes that moved. The document's pose is passed on only where the document changes.
 
 mod attachments;
-mod driven;
+mod driven_attributes;
 mod hand_over;
 mod inputs;
 mod spawn;
@@ -46,7 +46,7 @@ impl Plugin for RuntimePlugin {
                 (
                     (inputs::check_inputs, inputs::read_inputs, systems::note_controls).chain(),
                     systems::feel_motion,
-                    (systems::solve, driven::tell_driven).chain(),
+                    (systems::solve, driven_attributes::tell_driven).chain(),
                     (systems::scatter_locals, systems::scatter_attributes, systems::scatter_morphs).chain(),
                 )
                     .chain()
