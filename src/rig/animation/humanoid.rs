@@ -179,7 +179,21 @@ pub fn by_names(joints: &[SkeletonJoint]) -> HumanJoints {
             named.insert(bone, at);
         }
     }
+    if !named.contains_key(&HumanBone::Head)
+        && let Some(head) = end_of_spine(joints, &named)
+    {
+        named.insert(HumanBone::Head, head);
+    }
     complete(joints, &named)
+}
+
+/// Last joint of a numbered spine that goes on above the arms: the head.
+fn end_of_spine(joints: &[SkeletonJoint], named: &BTreeMap<HumanBone, usize>) -> Option<usize> {
+    let [left, right] = BodySide::BOTH.map(|side| named.get(&HumanBone::Limb(side, LimbBone::UpperArm)).copied());
+    let chest = common_ancestor(joints, left?, right?)?;
+    let numbers = joints.iter().enumerate().filter_map(|(at, joint)| Some((names::spine_number(&joint.name)?, at)));
+    let (_, last) = numbers.max()?;
+    is_above(joints, chest, last).then_some(last)
 }
 
 /// Bones with the joints between those that are known. Empty without hips and legs.

@@ -6,22 +6,39 @@
 
 use super::{BodySide, Finger, HumanBone, LimbBone};
 
+/// Beginnings of names that say which tool made the skeleton.
+const PREFIXES: [&[&str]; 8] =
+    [&["j", "bip"], &["mixamorig"], &["def"], &["org"], &["bip", "1"], &["bip", "01"], &["bip", "001"], &["bip"]];
+
+/// Words of a name without namespace and without the tool's prefix.
+fn own_words(name: &str) -> Vec<String> {
+    let name = name.rsplit([':', '|']).next().unwrap_or(name);
+    let mut words = words(name);
+    for prefix in PREFIXES {
+        if words.len() > prefix.len() && words.iter().zip(prefix).all(|(word, known)| word == known) {
+            words.drain(..prefix.len());
+        }
+    }
+    words
+}
+
+/// Number of a joint of a numbered spine that goes on to the head, as Rigify has it (`DEF-spine.006`); 0 for the first.
+pub(super) fn spine_number(name: &str) -> Option<u32> {
+    match own_words(name).as_slice() {
+        [word] if word == "spine" => Some(0),
+        [word, number] if word == "spine" => number.parse().ok(),
+        _ => None,
+    }
+}
+
 /// Bone that a name means, and a rank: among several joints for a bone the lowest counts.
 pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
-    let name = name.rsplit([':', '|']).next().unwrap_or(name);
     // MakeHuman's motions have helpers of that form, from a joint to where the next one begins.
     if name.starts_with("__") {
         return None;
     }
-    let words = words(name);
+    let words = own_words(name);
     let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
-    let prefixes: [&[&str]; 8] =
-        [&["j", "bip"], &["mixamorig"], &["def"], &["org"], &["bip", "1"], &["bip", "01"], &["bip", "001"], &["bip"]];
-    for prefix in prefixes {
-        if words.len() > prefix.len() && words.starts_with(prefix) {
-            words.drain(..prefix.len());
-        }
-    }
     let mut side = None;
     words.retain(|word| {
         let of = match *word {
@@ -42,6 +59,11 @@ pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
             .then_some(())
             .and(side)
             .map(|side| (HumanBone::Finger(side, finger, number), 0));
+    }
+    // MakeHuman: `toe2-1` begins the second toe, which stands for all of them.
+    if let ["toe", toe, "1"] = words[..] {
+        let rank = 1 + usize::from(toe.parse::<u8>().ok()?.abs_diff(2));
+        return Some((HumanBone::Limb(side?, LimbBone::Toes), rank));
     }
     if number > 1 && side.is_some() {
         return None;
