@@ -128,9 +128,9 @@ fn units_do_what_the_true_shapes_do() {
         let Some(([residual, cosine, amplitude], regions)) = beside_truth(name) else { return };
         assert!(residual <= most, "{name}: {residual} of the shapes is left");
         assert!(cosine >= 0.89, "{name}: cosine {cosine}");
-        assert!((0.85..=1.15).contains(&amplitude), "{name}: amplitude {amplitude}");
+        assert!((0.8..=1.1).contains(&amplitude), "{name}: amplitude {amplitude}");
         for (region, size) in REGIONS.iter().zip(regions) {
-            assert!((0.8..=1.2).contains(&size), "{name}, {region}: amplitude {size}");
+            assert!((0.66..=1.2).contains(&size), "{name}, {region}: amplitude {size}");
         }
     }
 }

@@ -188,6 +188,11 @@ fn bent_limbs_keep_what_they_kept() {
 fn limbs_are_bent_by_a_right_angle() {
     for figure in figures() {
         for (joint, side) in Joint::ALL.into_iter().flat_map(|joint| SIDES.map(|side| (joint, side))) {
+            if joint.is_raised(&figure, side) {
+                // Its right angle is one with the trunk.
+                assert!(figure.name.ends_with("action"), "{}: {joint:?}{side} is raised", figure.name);
+                continue;
+            }
             let bent = joint.bend(&figure, side);
             let angle = joint.angle(&figure, side, &bent).to_degrees();
             assert!((angle - 90.0).abs() < 3.0, "{}: {joint:?}{side} turns by {angle}", figure.name);

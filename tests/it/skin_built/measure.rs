@@ -7,6 +7,9 @@ use rigsmith::solve::program::RigState;
 
 use super::figure::{Figure, carry};
 
+/// Share of the way to the front from which on a limb counts as raised: 45 degrees.
+const RAISED: f32 = 0.7;
+
 /// The joints that are bent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Joint {
@@ -34,8 +37,15 @@ impl Joint {
         matches!(self, Self::Knee | Self::Elbow)
     }
 
+    /// True if the limb of a hip or shoulder is raised to the front at rest: a right angle more would press the limb into
+    /// the trunk.
+    pub fn is_raised(self, figure: &Figure, side: &str) -> bool {
+        let [root, mid, _] = self.limb(side).0.map(|label| figure.at(&label));
+        !self.is_hinge() && (mid - root).normalize().z > RAISED
+    }
+
     /// The rig with the joint bent by a right angle through the goal and the pole of its limb: hinges in their plane,
-    /// hips and shoulders to the front.
+    /// hips and shoulders to the front. A limb that is raised at rest is bent to a right angle with the trunk.
     pub fn bend(self, figure: &Figure, side: &str) -> RigState {
         let (joints, [goal, pole]) = self.limb(side);
         let [root, mid, end] = joints.map(|label| figure.at(&label));
@@ -51,6 +61,9 @@ impl Joint {
             let turn = Quat::from_axis_angle((end - mid).cross(-ahead).normalize(), std::f32::consts::FRAC_PI_2);
             carry(&mut state, goal, about(mid, turn));
         } else {
+            if self.is_raised(figure, side) {
+                return self.swing(figure, side, Vec3::Z);
+            }
             let from = (mid - root).normalize();
             return self.swing(figure, side, Vec3::Z - from * from.z);
         }

@@ -28,6 +28,7 @@ use super::{NEAR, Stage, shipped};
 use crate::random::Random;
 
 /// Fails unless the entities say what the document says, all of it and nothing else.
+#[track_caller]
 fn check(stage: &mut Stage, what: &str) {
     let rig = stage.document().clone();
     // Commands may put joints below other nodes.
@@ -54,7 +55,11 @@ fn check(stage: &mut Stage, what: &str) {
             assert_eq!(is_null, data.kind == NodeKind::Null, "{what}: the kind of {}", data.uid);
             assert_eq!(stage.get::<NodeLabel>(entity).map(|label| &label.0), data.label.as_ref(), "{what}");
             assert_eq!(stage.get::<RestTransform>(entity), Some(&data.rest), "{what}");
-            let group = stage.get::<InGroup>(entity).map(|group| *stage.get::<Uid>(group.0).unwrap());
+            let of_group = |group: &InGroup| {
+                let uid = stage.get::<Uid>(group.0).copied();
+                uid.unwrap_or_else(|| panic!("{what}: {} is in {}, which is no group", data.uid, group.0))
+            };
+            let group = stage.get::<InGroup>(entity).map(of_group);
             let is_there = data.group.map(|group| rig.group(group).is_some());
             assert_eq!(group, data.group, "{what}: the group of {}, which is there: {is_there:?}", data.uid);
             let tags: Vec<Uid> = stage

@@ -8,7 +8,6 @@
 
 mod moving_skin;
 mod pose_problem;
-mod region_gains;
 mod samples;
 
 use std::sync::OnceLock;
@@ -18,7 +17,6 @@ use rayon::prelude::*;
 
 use self::{
     moving_skin::MovingSkin,
-    region_gains::RegionGains,
     samples::{Mark, Sample},
 };
 use super::{
@@ -39,8 +37,8 @@ use crate::{
 const HOLD: f64 = 0.02;
 /// Stiffness between bones with common skin.
 const STIFF: f64 = 0.01;
-/// Angle of the jaw, in radians, at which the size of its movement is measured.
-const OPEN: f64 = 0.3;
+/// Factor of the field. What bones cannot follow is lost, and makes the rest smaller than the field on average.
+const GAIN: f64 = 1.09;
 /// Largest area of triangles that are ignored, as a share of their longest edge squared.
 pub(super) const SLIVER: f32 = 1e-3;
 /// Shares by which the movements of bones are brought nearer to each other where skin folds, one a round.
@@ -61,7 +59,6 @@ pub struct FittedFace {
     /// The lines of mouth and eyes; `None` for degenerate landmarks, with which nothing moves.
     opening_lines: Option<OpeningLines>,
     samples: Vec<Sample>,
-    gains: RegionGains,
     /// The Cholesky factor.
     factor: Vec<f64>,
     /// Movements of the skin bones for each unit on the left and the right side at full strength, without the jaw.
@@ -107,7 +104,6 @@ impl FittedFace {
             skin: (0..bones.len()).filter(|&bone| bones[bone].kind == FaceBoneKind::Skin).collect(),
             opening_lines: OpeningLines::new(landmarks),
             samples: Vec::new(),
-            gains: RegionGains::default(),
             factor: Vec::new(),
             unit_movements: units.units().iter().map(|_| [OnceLock::new(), OnceLock::new()]).collect(),
             jaw: JawMovements::default(),
@@ -117,7 +113,6 @@ impl FittedFace {
         let Some(opening_lines) = face.opening_lines.clone() else { return face };
         let (samples, apart) = samples::gather(points, mask, weights, bones, landmarks, &opening_lines);
         face.samples = samples;
-        face.gains = RegionGains::new(&face.samples, bones, &face.skin);
         face.factorise();
         face.jaw = face.jaw_movements(&opening_lines);
         face.moving = MovingSkin::new(points, triangles, weights, bones, &apart);
@@ -167,61 +162,32 @@ impl FittedFace {
         self.factor = matrix;
     }
 
-    /// Displacements that the samples should have; of pairs, the difference.
-    fn targets(&self, displacement: impl Fn(&Mark) -> DVec3) -> Vec<DVec3> {
-        let target = |sample: &Sample| {
-            let minus = sample.minus.as_ref().map_or(DVec3::ZERO, &displacement);
-            displacement(&sample.mark) - minus
-        };
-        self.samples.iter().map(target).collect()
-    }
-
-    /// Movements of the skin bones whose skin follows targets at the samples best.
-    fn movements(&self, targets: &[DVec3]) -> Vec<DVec3> {
+    /// Movements of the skin bones whose skin follows a displacement best.
+    fn movements(&self, displacement: impl Fn(&Mark) -> DVec3) -> Vec<DVec3> {
         let mut right = vec![DVec3::ZERO; self.skin.len()];
-        for (sample, target) in self.samples.iter().zip(targets) {
+        for sample in &self.samples {
+            let mut target = displacement(&sample.mark);
             // The mean of the field over a bone's patch is a target, too.
-            let counts = if sample.minus.is_some() { sample.counts } else { sample.counts * (1.0 + HOLD) };
+            let mut counts = sample.counts * (1.0 + HOLD);
+            if let Some(minus) = &sample.minus {
+                target -= displacement(minus);
+                counts = sample.counts;
+            }
             for &(unknown, weight) in &sample.influences {
-                right[unknown as usize] += counts * weight * *target;
+                right[unknown as usize] += counts * weight * target;
             }
         }
         substitute(&self.factor, &mut right);
         right
     }
 
-    /// Displacements of the samples by movements of the skin bones.
-    fn moved(&self, movements: &[DVec3]) -> Vec<DVec3> {
-        let moved = |sample: &Sample| {
-            sample.influences.iter().map(|(unknown, weight)| movements[*unknown as usize] * *weight).sum()
-        };
-        self.samples.iter().map(moved).collect()
-    }
-
     fn jaw_movements(&self, opening_lines: &OpeningLines) -> JawMovements {
         let pivot = jaw_pivot(&self.bones, &self.landmarks);
-        let share = |mark: &Mark| f64::from(opening_lines.jaw(mark.place, mark.known));
-        let arms = self.targets(|mark| (mark.place - pivot).as_dvec3() * share(mark));
-        let against = self.targets(|mark| (pivot - mark.place).as_dvec3() * mark.jaw);
-        let shift = self.movements(&self.targets(|mark| DVec3::splat(-mark.jaw)));
-        let rotation = self.movements(&against);
-        let turn = DMat3::from_rotation_x(OPEN) - DMat3::IDENTITY;
-        let turned = |list: &[DVec3]| list.iter().map(|arm| turn * *arm).collect::<Vec<DVec3>>();
-        let by_jaw: Vec<DVec3> = self
-            .moved(&turned(&rotation))
-            .iter()
-            .zip(turned(&against))
-            .map(|(moved, against)| *moved - against)
-            .collect();
-        let fit = |targets: &[DVec3]| {
-            let moved = self.moved(&self.movements(targets));
-            moved.iter().zip(&by_jaw).map(|(moved, by_jaw)| *moved + *by_jaw).collect()
-        };
-        let arms = self.gains.enlarged(&self.samples, &arms, &turned(&arms), fit);
+        let share = |mark: &Mark| f64::from(opening_lines.jaw(mark.place, mark.known)) * GAIN;
         JawMovements {
-            skin: self.movements(&arms),
-            rotation,
-            shift: shift.into_iter().map(|movement| movement.x).collect(),
+            skin: self.movements(|mark| (mark.place - pivot).as_dvec3() * share(mark)),
+            rotation: self.movements(|mark| (pivot - mark.place).as_dvec3() * mark.jaw),
+            shift: self.movements(|mark| DVec3::splat(-mark.jaw)).into_iter().map(|movement| movement.x).collect(),
         }
     }
 
@@ -229,9 +195,7 @@ impl FittedFace {
     fn unit_movements(&self, unit: usize, side: usize, opening_lines: &OpeningLines) -> &[DVec3] {
         self.unit_movements[unit][side].get_or_init(|| {
             let field = Field::of_unit(&self.units.units()[unit], side, opening_lines, &self.landmarks);
-            let targets = self.targets(|mark| field.at(mark.place, mark.known).as_dvec3());
-            let fit = |targets: &[DVec3]| self.moved(&self.movements(targets));
-            self.movements(&self.gains.enlarged(&self.samples, &targets, &targets, fit))
+            self.movements(|mark| field.at(mark.place, mark.known).as_dvec3() * GAIN)
         })
     }
 
