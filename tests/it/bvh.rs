@@ -154,7 +154,7 @@ fn all_files_of_the_data_folder_load() {
 /// Skeletons of the kinds that people have, by the names of their joints alone.
 #[test]
 fn bones_are_found_by_the_names_of_many_programs() {
-    let skeletons: [(&str, [&str; 13]); 9] = [
+    let skeletons: [(&str, [&str; 13]); 11] = [
         (
             "Mixamo",
             [
