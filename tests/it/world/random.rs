@@ -62,13 +62,16 @@ fn check(stage: &mut Stage, what: &str) {
             let group = stage.get::<InGroup>(entity).map(of_group);
             let is_there = data.group.map(|group| rig.group(group).is_some());
             assert_eq!(group, data.group, "{what}: the group of {}, which is there: {is_there:?}", data.uid);
-            let tags: Vec<Uid> = stage
-                .get::<Tags>(entity)
-                .map_or_else(Vec::new, |tags| tags.iter().map(|tag| *stage.get::<Uid>(tag).unwrap()).collect());
+            let of_tag = |tag: Entity| {
+                let uid = stage.get::<Uid>(tag).copied();
+                uid.unwrap_or_else(|| panic!("{what}: {} bears {tag}, which is no tag", data.uid))
+            };
+            let tags: Vec<Uid> =
+                stage.get::<Tags>(entity).map_or_else(Vec::new, |tags| tags.iter().map(of_tag).collect());
             assert_eq!(tags, data.tags.iter().map(|tag| tag.uid).collect::<Vec<_>>(), "{what}");
             for tag in &data.tags {
                 let entity = stage.get::<TagEntities>(stage.rig).unwrap().get(tag.uid).unwrap();
-                let told = stage.get::<Tag>(entity).unwrap();
+                let told = stage.get::<Tag>(entity).unwrap_or_else(|| panic!("{what}: {} is no tag", tag.uid));
                 assert_eq!((told.enabled, &told.comment), (tag.enabled, &tag.comment), "{what}");
                 match &tag.kind {
                     TagKind::Command { module, params, feature } => {
@@ -134,6 +137,7 @@ fn check_built(stage: &Stage, built: &BuiltRig, what: &str) {
         let layer = stage.get::<NodeLayer>(entity).map(|layer| &layer.0);
         assert_eq!(layer, node.layer.as_deref(), "{what}: the layer of {}", node.name);
         let Some(origin) = &node.origin else { continue };
+        assert_eq!(stage.get::<Name>(entity).map(Name::as_str), Some(&*node.name), "{what}: the name of a node");
         assert_eq!(stage.get::<NodeOf>(entity), Some(&NodeOf(stage.rig)), "{what}: the rig of {}", node.name);
         let control = stage.get::<Control>(entity).map(|control| &control.0);
         assert_eq!(control, node.control.as_deref(), "{what}: the control {}", node.name);

@@ -205,7 +205,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             return;
         }
         let group = node.group.and_then(|group| self.groups.get(group));
-        let is_as_built = view.label.map(|label| label.0.as_str()) == node.label.as_deref()
+        let is_as_built = view.name.is_some_and(|name| *name.as_str() == *node.name)
+            && view.label.map(|label| label.0.as_str()) == node.label.as_deref()
             && view.in_group.map(|group| group.0) == group
             && view.rest.copied() == Some(node.base.into())
             && view.child_of.map(ChildOf::parent) == mirrored.parent;

@@ -11,7 +11,7 @@ use super::{
     sorting::RigWrites,
 };
 use crate::{
-    plugins::schema::TagOf,
+    plugins::schema::{Tag, TagOf},
     rig::{RigEdit, TagData, TagKind, Uid},
 };
 
@@ -114,6 +114,13 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 }
                 None => write_tag(self.commands, entity, &mirrored.data, None, self.tags),
             }
+        }
+        if view.tag.is_none()
+            && let Some(known) = self.tags.tags.get(&uid)
+        {
+            // A tag without the component counts as one that is enabled and has no comment.
+            let (enabled, comment) = (known.data.enabled, known.data.comment.clone());
+            self.commands.entity(entity).try_insert(Tag { enabled, comment });
         }
         let above = view.tag_of.map(|of| of.0);
         let known = self.joints.get(mirrored.joint);
