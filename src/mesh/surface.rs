@@ -28,6 +28,9 @@ use crossing::{Frame, resolve, usable};
 use node::BoxRay;
 use tree::Tree;
 
+/// Tangent of the angle by which a ray is tilted that runs along a flat surface.
+const TILT: f32 = 1e-3;
+
 /// A bounding volume hierarchy over triangles.
 ///
 /// Distances and positions are in the space and unit of the points it was built from. It owns a compact copy of the
@@ -134,9 +137,17 @@ impl Surface {
     }
 
     /// True if a triangle crosses `ray` at a distance from `from` to `to`: cheaper than asking for the first hit. A ray that
-    /// runs along hundreds of triangles, as within a flat mesh, crosses none.
+    /// runs along hundreds of triangles, as within a flat mesh, is tilted a little.
     pub fn crosses(&self, ray: &Ray, from: f32, to: f32) -> bool {
-        self.prepare(ray).is_some_and(|(frame, boxes)| self.tree.crosses(&frame, &boxes, from, to))
+        let aside = ray.direction.any_orthonormal_vector();
+        let tilts = [Vec3::ZERO, aside, ray.direction.cross(aside)];
+        let crossed = tilts.iter().find_map(|tilt| {
+            let tilted = Ray { direction: (ray.direction + *tilt * TILT).normalize(), ..*ray };
+            let ray = if *tilt == Vec3::ZERO { ray } else { &tilted };
+            let Some((frame, boxes)) = self.prepare(ray) else { return Some(false) };
+            self.tree.crosses(&frame, &boxes, from, to)
+        });
+        crossed.unwrap_or(false)
     }
 
     /// The point of the surface closest to `point`; `None` if the surface is empty or `point` is not finite. Of

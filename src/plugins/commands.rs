@@ -29,7 +29,7 @@ pub use super::{
 use crate::{
     modules,
     processor::{BuildError, BuildRange, Builder, CommandStatus, Modules, RigModule, RunReport},
-    rig::{BuiltRig, Rig, RigEdit, Uid, step::Commit},
+    rig::{BuiltRig, Revision, Rig, RigEdit, Uid, step::Commit},
 };
 
 /// Plugin that builds rigs: runs the commands of tags and spawns entities for what they create.
@@ -50,7 +50,7 @@ impl Plugin for CommandsPlugin {
                 nodes::unsorted_rigs.pipe(nodes::order_siblings),
                 nodes::despawn_parked,
                 constraints::follow_constraints,
-                guard::keep_built,
+                (guard::keep_built, guard::keep_places),
                 (run::run_built, report_commands),
                 nodes::note_revisions,
             )
@@ -134,9 +134,16 @@ pub struct Processor {
     /// Number of commands that an edit rebuilds up to; `None` for all commands.
     goal: Option<usize>,
     follow: bool,
+    /// Revision of the document that the builder follows.
+    revision: Revision,
 }
 
 impl Processor {
+    fn new(modules: &RigModules) -> Self {
+        let builder = Builder::new(modules.0.clone());
+        Self { builder, goal: None, follow: true, revision: Revision::default() }
+    }
+
     /// The builder, for queries: list of commands, their states, breakpoints.
     pub fn builder(&self) -> &Builder {
         &self.builder
@@ -193,12 +200,14 @@ fn build_rigs(
         }
     }
     for (entity, edits, complete) in changed {
-        if complete && edits.iter().all(RigEdit::is_of_motion) {
+        let Ok((rig, Some(mut processor), built, failed)) = rigs.get_mut(entity) else { continue };
+        if processor.revision.is_same(rig.revision()) {
             continue;
         }
-        let Ok((rig, Some(mut processor), built, failed)) = rigs.get_mut(entity) else { continue };
         let processor = &mut *processor;
-        match complete && edits.len() < 16 {
+        processor.revision = rig.revision().clone();
+        // A step of motion may have reverted a preview of other things, which no message lists.
+        match complete && edits.len() < 16 && !edits.iter().all(RigEdit::is_of_motion) {
             true => edits.iter().for_each(|edit| processor.builder.touch(rig, edit)),
             false => processor.builder.sync(rig),
         }
@@ -222,18 +231,16 @@ fn build_rigs(
                 &mut stored
             }
             _ => {
-                fresh = Processor { builder: Builder::new(modules.0.clone()), goal: None, follow: true };
+                fresh = Processor::new(&modules);
                 fresh.builder.sync(rig);
+                fresh.revision = rig.revision().clone();
                 &mut fresh
             }
         };
         let report = carry_out(processor, rig, step);
         finish(&mut commands, *entity, &mut processor.builder, (built, failed), report, &mut done);
         if is_fresh {
-            let processor = std::mem::replace(
-                processor,
-                Processor { builder: Builder::new(modules.0.clone()), goal: None, follow: true },
-            );
+            let processor = std::mem::replace(processor, Processor::new(&modules));
             commands.entity(*entity).try_insert(processor);
         }
     }

@@ -153,6 +153,12 @@ impl RigRuntime {
         &mut self.state
     }
 
+    /// Local `Transform` that was last written to or read from the entity of a node; `None` if there is none.
+    pub(in crate::plugins) fn shown_at(&self, node: Uid) -> Option<Transform> {
+        let slot = self.state.program().node(node)?;
+        self.shown.get(slot).copied().filter(Transform::is_finite)
+    }
+
     /// Output mode of the instance.
     pub fn mode(&self) -> InstanceMode {
         self.mode
@@ -189,6 +195,8 @@ impl RigRuntime {
         let first = attributes.partition_point(|attribute| attribute.node < slot);
         let slots = first..first + attributes[first..].partition_point(|attribute| attribute.node == slot);
         if !slots.is_empty() {
+            // Values of an entity that the program has never written are none that other code set.
+            self.values[slots.clone()].fill(f32::NAN);
             let slots: Vec<u32> = slots.map(|number| number as u32).collect();
             if had_any {
                 self.attributes.retain(|_, known| known != &slots);

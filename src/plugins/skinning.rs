@@ -28,7 +28,7 @@ pub use self::{
 };
 use self::{
     bends::{TriedBend, push_edits, tried_bends},
-    parts::{object_points, runs},
+    parts::{object_points, runs_by_value},
 };
 use super::{
     RigSystems,
@@ -255,8 +255,9 @@ impl SkinningInput {
             };
             runs.into_iter().for_each(|run| binding_of[run.start as usize..run.end as usize].fill(number as u32));
         }
+        let mut runs_of = runs_by_value(&binding_of, bindings.len());
         for (number, (part, binding)) in bindings.iter().enumerate() {
-            let runs = runs(&binding_of, number as u32);
+            let runs = std::mem::take(&mut runs_of[number]);
             match binding {
                 _ if runs.is_empty() => {}
                 PartBinding::Bends => {

@@ -103,8 +103,10 @@ fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: V
             builder.sync(&trial);
             let Some(error) = builder.run_all().error.filter(|error| error.command == next.command) else { break };
             let left = match &error.problem {
+                // A number that the text does not say is a default that fits no other value: no fault of its own.
                 BuildProblem::Module(ModuleError::OutOfRange { parameter, .. }) => {
-                    without_field(&next.params, field_of(parameter))
+                    let Some(left) = without_field(&next.params, field_of(parameter)) else { break };
+                    Some(left)
                 }
                 _ if next.only_ranges => break,
                 _ => None,

@@ -122,9 +122,9 @@ impl Tree {
         }
     }
 
-    /// True if a triangle is crossed at a distance between `from` and `to`. A ray that meets [`MOST_LEAVES`] leaves and
-    /// crosses none of their triangles runs along a flat surface, and crosses nothing.
-    pub fn crosses(&self, frame: &Frame, boxes: &BoxRay, from: f32, to: f32) -> bool {
+    /// True if a triangle is crossed at a distance between `from` and `to`; `None` for a ray that meets [`MOST_LEAVES`]
+    /// leaves and crosses none of their triangles, as one that runs along a flat surface.
+    pub fn crosses(&self, frame: &Frame, boxes: &BoxRay, from: f32, to: f32) -> Option<bool> {
         let between = |crossing: &Crossing| (f64::from(from)..f64::from(to)).contains(&crossing.distance);
         let mut waiting = ChildStack::new(self);
         let mut leaves = 0;
@@ -141,13 +141,16 @@ impl Tree {
                     let mut found = false;
                     self.test(index, two, frame, |crossing| found |= between(&crossing));
                     leaves += 1;
-                    if found || leaves == MOST_LEAVES {
-                        return found;
+                    if found {
+                        return Some(true);
+                    }
+                    if leaves == MOST_LEAVES {
+                        return None;
                     }
                 }
             }
         }
-        false
+        Some(false)
     }
 
     /// Collects every crossing, in no order.

@@ -14,12 +14,13 @@ use crate::{
             EditRefused, EntityWriteError, JointEntities, TagEntities,
             entities::{BuiltEntities, EntityIndex, EntityPart, IndexedEntity},
         },
+        runtime::RigRuntime,
         schema::{
             Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, Joint, NodeLayer, NodeOf,
             NodeSlot, Null, Parked,
         },
     },
-    rig::{BuiltNode, NodeType, Uid},
+    rig::{BuiltNode, NodeType, RestTransform, Rig, Uid},
 };
 
 /// Components that a build gives to nodes and constraints.
@@ -114,6 +115,32 @@ pub(super) fn keep_built(
             warn!("{reason}");
             refused.write(EditRefused { rig, reason: reason.into() });
         }
+    }
+}
+
+/// Gives a `Transform` back to nodes from which other code took it, so that they stand where they last stood.
+pub(super) fn keep_places(
+    mut commands: Commands,
+    mut removed: RemovedComponents<Transform>,
+    bare: Query<(Option<&RestTransform>, Option<&Name>), (Without<Transform>, Allow<Disabled>)>,
+    rigs: Query<(&Rig, Option<&RigRuntime>)>,
+    index: Res<EntityIndex>,
+    mut refused: MessageWriter<EditRefused>,
+) {
+    for entity in removed.read() {
+        let Some(IndexedEntity { rig, uid, part: EntityPart::Joint | EntityPart::Node }) = index.get(entity) else {
+            continue;
+        };
+        let (Ok((rest, name)), Ok((document, runtime))) = (bare.get(entity), rigs.get(rig)) else { continue };
+        let posed = || {
+            let offset = document.offset(uid).copied().unwrap_or_default();
+            offset.on(&rest.copied().unwrap_or_default())
+        };
+        let place = runtime.and_then(|runtime| runtime.shown_at(uid)).unwrap_or_else(posed);
+        commands.entity(entity).try_insert(place);
+        let reason = EntityWriteError::BuiltContent { name: name.map_or_else(|| uid.to_string(), Name::to_string) };
+        warn!("{reason}");
+        refused.write(EditRefused { rig, reason: reason.into() });
     }
 }
 

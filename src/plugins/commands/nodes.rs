@@ -127,10 +127,10 @@ pub(super) fn unsorted_rigs(
 }
 
 /// Notes that the entities of a rig follow its document, after all systems that write them.
-pub(super) fn note_revisions(mut rigs: Query<(&Rig, &mut JointEntities), Changed<Rig>>) {
+pub(super) fn note_revisions(mut rigs: Query<(&Rig, &mut JointEntities)>) {
     for (rig, mut joints) in &mut rigs {
         if !joints.follow(rig) {
-            joints.bypass_change_detection().revision = Some(rig.revision().clone());
+            joints.bypass_change_detection().note_all(rig);
         }
     }
 }

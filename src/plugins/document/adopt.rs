@@ -208,7 +208,7 @@ pub(super) fn adopt_writes(
         if outcome.respawn {
             rig.set_changed();
             joints.set_changed();
-            joints.revision = None;
+            joints.forget_revision();
         }
         if !outcome.edits.is_empty() {
             edits.0.push((rig_entity, outcome.edits));

@@ -79,7 +79,11 @@ pub struct JointEntities {
     /// Pose offsets of the document that the joints' transforms were last set to.
     pub(super) posed: BTreeMap<Uid, PoseOffset>,
     /// Revision of the document that all entities of the rig follow; `None` if one of them has to be written again.
-    pub(in crate::plugins) revision: Option<Revision>,
+    revision: Option<Revision>,
+    /// Revision that the entities of joints and groups follow, while those of tags and nodes may lag behind.
+    of_joints: Option<Revision>,
+    /// Revision that the entities of tags follow.
+    of_tags: Option<Revision>,
 }
 
 /// Entity of a joint and the values last written to it.
@@ -104,7 +108,32 @@ impl JointEntities {
 
     /// True if the entities of joints, tags, groups and created nodes follow the document in everything but its pose.
     pub(in crate::plugins) fn follow(&self, rig: &Rig) -> bool {
-        self.revision.as_ref().is_some_and(|revision| revision.is_same(rig.revision()))
+        is_of(self.revision.as_ref(), rig)
+    }
+
+    /// True if the entities of tags have to follow the document, whose joints have entities already.
+    pub(super) fn are_tags_due(&self, rig: &Rig) -> bool {
+        is_of(self.of_joints.as_ref(), rig) && !is_of(self.of_tags.as_ref(), rig)
+    }
+
+    pub(super) fn note_joints(&mut self, rig: &Rig) {
+        self.of_joints = Some(rig.revision().clone());
+    }
+
+    pub(super) fn note_tags(&mut self, rig: &Rig) {
+        self.of_tags = Some(rig.revision().clone());
+    }
+
+    /// Notes that all entities follow the document, unless it was replaced after those of joints or tags followed it.
+    pub(in crate::plugins) fn note_all(&mut self, rig: &Rig) {
+        if is_of(self.of_joints.as_ref(), rig) && is_of(self.of_tags.as_ref(), rig) {
+            self.revision.clone_from(&self.of_tags);
+        }
+    }
+
+    /// Lets all entities be written again.
+    pub(super) fn forget_revision(&mut self) {
+        (self.revision, self.of_joints, self.of_tags) = (None, None, None);
     }
 
     pub(in crate::plugins) fn mirrored_mut(&mut self, joint: Uid) -> Option<&mut MirroredJoint> {
@@ -122,6 +151,10 @@ impl JointEntities {
             None => self.posed.remove(&joint),
         };
     }
+}
+
+fn is_of(revision: Option<&Revision>, rig: &Rig) -> bool {
+    revision.is_some_and(|revision| revision.is_same(rig.revision()))
 }
 
 /// The entities of a rig's tags.

@@ -130,6 +130,7 @@ pub(in crate::plugins) fn follow_rigs(
             }
             known.set_posed(data.uid, offset);
         }
+        known.note_joints(rig);
         if is_other {
             joints.set_changed();
         }
@@ -236,14 +237,15 @@ fn follow_groups(
 /// Spawns, updates and despawns the entities of tags so that they match the document.
 pub(in crate::plugins) fn follow_tags(
     mut commands: Commands,
-    mut rigs: Query<(Entity, &Rig, &mut JointEntities, &mut TagEntities), Changed<Rig>>,
+    mut rigs: Query<(Entity, &Rig, &mut JointEntities, &mut TagEntities)>,
     mut index: ResMut<EntityIndex>,
 ) {
     for (rig_entity, rig, mut joints, mut tags) in &mut rigs {
         let (joints, known) = (joints.bypass_change_detection(), &mut *tags.bypass_change_detection());
-        if joints.follow(rig) {
+        if !joints.are_tags_due(rig) {
             continue;
         }
+        joints.note_tags(rig);
         let mut gone: Vec<Uid> = known.tags.keys().filter(|uid| rig.find_tag(**uid).is_none()).copied().collect();
         gone.sort_unstable();
         for uid in gone {

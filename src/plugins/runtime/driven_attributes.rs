@@ -9,6 +9,7 @@ use crate::{
     plugins::{
         commands::Built,
         document::{EditRefused, EntityWriteError},
+        schema::Attributes,
     },
     rig::{Dependency, Rig, TagKind, Uid},
 };
@@ -18,12 +19,14 @@ pub(super) fn tell_driven(
     mut rigs: Query<(Entity, &mut RigRuntime, Option<&Built>, Option<&Rig>), Changed<RigRuntime>>,
     mut told: Local<BTreeSet<(Entity, Arc<str>)>>,
     mut refused: MessageWriter<EditRefused>,
+    holders: Query<(), With<Attributes>>,
 ) {
     for (rig, mut runtime, built, document) in &mut rigs {
         if runtime.driven_writes.is_empty() {
             continue;
         }
         let writes = std::mem::take(&mut runtime.bypass_change_detection().driven_writes);
+        told.retain(|(entity, _)| holders.contains(*entity));
         let program = runtime.state.program();
         for (entity, slot) in writes {
             let Some(attribute) = program.attributes().get(slot as usize) else { continue };

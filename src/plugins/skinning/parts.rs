@@ -27,6 +27,8 @@ pub struct MeshParts {
     piece_of: Vec<u32>,
     /// Object of each piece: that of its first point.
     objects: Vec<Option<usize>>,
+    /// Number of the pieces of each object.
+    counts: Vec<usize>,
     /// Name of each piece.
     names: Vec<String>,
     /// Name of each object.
@@ -51,7 +53,13 @@ impl MeshParts {
                 names[piece] = name;
             }
         }
-        Self { piece_of, objects, names, object_names }
+        let mut counts = vec![0; model.objects.len()];
+        for object in objects.iter().flatten() {
+            if let Some(count) = counts.get_mut(*object) {
+                *count += 1;
+            }
+        }
+        Self { piece_of, objects, counts, names, object_names }
     }
 
     /// Part with a name, as [`MeshParts::name`] gives it; `part N` names the piece with that number, counted from 1.
@@ -96,7 +104,7 @@ impl MeshParts {
     }
 
     fn pieces_of(&self, object: usize) -> usize {
-        self.objects.iter().filter(|of| **of == Some(object)).count()
+        self.counts.get(object).copied().unwrap_or(0)
     }
 }
 
@@ -118,6 +126,20 @@ pub(super) fn runs(list: &[u32], value: u32) -> Vec<Range<u32>> {
         (same[0] == value).then_some(start..at)
     };
     list.chunk_by(|a, b| a == b).filter_map(run).collect()
+}
+
+/// Runs of following places of a list by their values, those from `count` on left out.
+pub(super) fn runs_by_value(list: &[u32], count: usize) -> Vec<Vec<Range<u32>>> {
+    let mut runs = vec![Vec::new(); count];
+    let mut at = 0;
+    for same in list.chunk_by(|a, b| a == b) {
+        let start = at;
+        at += same.len() as u32;
+        if let Some(runs) = runs.get_mut(same[0] as usize) {
+            runs.push(start..at);
+        }
+    }
+    runs
 }
 
 /// The piece of each point, or `NONE`, and the number of pieces.

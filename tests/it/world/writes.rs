@@ -11,7 +11,7 @@ use rigsmith::{
         },
     },
     prelude::*,
-    rig::{RestTransform, TagData, TagKind, template::write_template},
+    rig::{PoseOffset, RestTransform, TagData, TagKind, template::write_template},
 };
 
 use super::{NEAR, Stage, shipped};
@@ -307,4 +307,37 @@ fn constraints_are_entities_that_name_their_nodes() {
     assert!(built.constraints.iter().all(|constraint| known(&stage, constraint.uid).is_none()));
     stage.step(BuildStep::All);
     assert!(built.constraints.iter().all(|constraint| known(&stage, constraint.uid).is_some()));
+}
+
+/// A step of motion that ends a preview of something else builds the rig as the document says, not as was previewed.
+#[test]
+fn a_pose_that_ends_a_preview_brings_the_build_back() {
+    let mut stage = chain();
+    stage.step(BuildStep::All);
+    let rest = RestTransform::from_translation(Vec3::new(0.0, 3.0, 0.0));
+    let preview = Operation::Edits(vec![RigEdit::SetRest(Uid(2), rest)]);
+    stage.change(Change::Preview(preview));
+    stage.app.update();
+    let base = |stage: &Stage| stage.get::<Built>(stage.rig).unwrap().0.node(Uid(2)).unwrap().base.translation;
+    assert_eq!(base(&stage), Vec3::new(0.0, 3.0, 0.0));
+    let offset = PoseOffset::from_rotation(Quat::from_rotation_x(0.3));
+    stage.change(Change::Do(Operation::Pose(vec![(Uid(1), offset)])));
+    stage.app.update();
+    assert_eq!(base(&stage), Vec3::Y, "the preview is gone from the build");
+    assert!(stage.off() <= NEAR);
+}
+
+/// A node whose `Transform` other code takes off gets it back where it stood, and the take is told.
+#[test]
+fn a_transform_that_is_taken_off_comes_back_in_place() {
+    let (_, rig) = shipped().into_iter().find(|(name, _)| name == "arm").unwrap();
+    let mut stage = Stage::built(rig);
+    let (_, control) = stage.get::<BuiltEntities>(stage.rig).unwrap().iter().next().unwrap();
+    stage.app.world_mut().get_mut::<Transform>(control).unwrap().translation += 0.05 * Vec3::Y;
+    stage.app.update();
+    let place = *stage.get::<Transform>(control).unwrap();
+    stage.app.world_mut().entity_mut(control).remove::<Transform>();
+    stage.app.update();
+    assert_eq!(stage.get::<Transform>(control), Some(&place));
+    assert!(stage.off() <= NEAR);
 }

@@ -37,6 +37,8 @@ use crate::{
 const HOLD: f64 = 0.02;
 /// Stiffness between bones with common skin.
 const STIFF: f64 = 0.01;
+/// Factor of the field. What bones cannot follow is lost, and makes the rest smaller than the field on average.
+const GAIN: f64 = 1.09;
 /// Largest area of triangles that are ignored, as a share of their longest edge squared.
 pub(super) const SLIVER: f32 = 1e-3;
 /// Shares by which the movements of bones are brought nearer to each other where skin folds, one a round.
@@ -181,7 +183,7 @@ impl FittedFace {
 
     fn jaw_movements(&self, opening_lines: &OpeningLines) -> JawMovements {
         let pivot = jaw_pivot(&self.bones, &self.landmarks);
-        let share = |mark: &Mark| f64::from(opening_lines.jaw(mark.place, mark.known)) * mark.gain;
+        let share = |mark: &Mark| f64::from(opening_lines.jaw(mark.place, mark.known)) * GAIN;
         JawMovements {
             skin: self.movements(|mark| (mark.place - pivot).as_dvec3() * share(mark)),
             rotation: self.movements(|mark| (pivot - mark.place).as_dvec3() * mark.jaw),
@@ -193,7 +195,7 @@ impl FittedFace {
     fn unit_movements(&self, unit: usize, side: usize, opening_lines: &OpeningLines) -> &[DVec3] {
         self.unit_movements[unit][side].get_or_init(|| {
             let field = Field::of_unit(&self.units.units()[unit], side, opening_lines, &self.landmarks);
-            self.movements(|mark| field.at(mark.place, mark.known).as_dvec3() * mark.gain)
+            self.movements(|mark| field.at(mark.place, mark.known).as_dvec3() * GAIN)
         })
     }
 

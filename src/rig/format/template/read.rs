@@ -102,7 +102,9 @@ fn read_without_faulty<'a>(
         {
             return None;
         }
-        let fault = SourceError::from_ron(text, &error);
+        // Offsets in bytes are the same in both texts, columns are not.
+        let fault = SourceError::from_ron(&readable, &error);
+        let fault = SourceError::at(text, fault.offset, fault.message);
         let at = fault.offset;
         faults.push(fault);
         let around = fields.iter().filter(|field| field.value <= at && at < field.end);

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     algo::face::{
-        bones::{FaceBone, FaceBoneKind, Region},
+        bones::{FaceBone, FaceBoneKind},
         expression::openings::{OpeningLines, OpeningSide},
         landmarks::Landmarks,
     },
@@ -23,19 +23,6 @@ const PAIRS: [[usize; 2]; 9] =
 /// Number of the first [`PAIRS`] whose first landmark must stay above the second: lips and lids.
 const APART: usize = 7;
 
-/// Factor of the field in a region. What bones cannot follow is lost, and makes the rest smaller than the field on average;
-/// measured on heads with true shapes, cheeks and forehead lose most, and lips nothing.
-fn gain(region: Region) -> f64 {
-    match region {
-        Region::Cheek => 1.5,
-        Region::Forehead => 1.22,
-        Region::Nose => 1.18,
-        Region::Lip => 1.05,
-        Region::Jaw | Region::Temple => 1.07,
-        Region::Brow | Region::Lid | Region::Eye => 1.09,
-    }
-}
-
 /// A place at which the field is sampled.
 #[derive(Clone)]
 pub(super) struct Mark {
@@ -45,8 +32,6 @@ pub(super) struct Mark {
     pub known: OpeningSide,
     /// Weight of the jaw bone there.
     pub jaw: f64,
-    /// Factor of the field there.
-    pub gain: f64,
 }
 
 /// A point of the skin that should follow the field.
@@ -212,23 +197,18 @@ impl Skin<'_> {
 
     /// A sample of a point, if bones move it at all.
     fn sample(&self, index: usize, place: Vec3) -> Option<Sample> {
-        let mark = Mark { place, known: OpeningSide::default(), jaw: 0.0, gain: 0.0 };
+        let mark = Mark { place, known: OpeningSide::default(), jaw: 0.0 };
         let mut sample = Sample { mark, minus: None, counts: 0.0, influences: Vec::new() };
-        let (mut all, mut gains, mut of_skin) = (0.0, 0.0, 0.0);
+        let mut all = 0.0;
         for (joint, weight) in influences(self.weights, index) {
             let Some(bone) = self.bone(joint).filter(|_| weight.is_finite()) else { continue };
             all += weight;
             match self.bones[bone].kind {
-                FaceBoneKind::Skin => {
-                    sample.influences.push((self.unknown_of[bone], f64::from(weight)));
-                    gains += f64::from(weight) * gain(self.bones[bone].region);
-                    of_skin += f64::from(weight);
-                }
+                FaceBoneKind::Skin => sample.influences.push((self.unknown_of[bone], f64::from(weight))),
                 FaceBoneKind::Jaw => sample.mark.jaw += f64::from(weight),
                 FaceBoneKind::Eye => {}
             }
         }
-        sample.mark.gain = if of_skin > 0.0 { gains / of_skin } else { 1.0 };
         (all > 0.02 && place.is_finite() && !sample.influences.is_empty()).then_some(sample)
     }
 }
