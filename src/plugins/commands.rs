@@ -50,7 +50,7 @@ impl Plugin for CommandsPlugin {
                 nodes::unsorted_rigs.pipe(nodes::order_siblings),
                 nodes::despawn_parked,
                 constraints::follow_constraints,
-                (guard::keep_built, guard::keep_places),
+                (guard::keep_built, guard::keep_places).chain(),
                 (run::run_built, report_commands),
                 nodes::note_revisions,
             )
