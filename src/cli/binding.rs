@@ -102,7 +102,7 @@ pub(super) fn chosen_parts(rigid: &[String], blend: &[String], bench: &Workbench
 }
 
 /// Names of a list with commas between them, unless all of it is one name.
-fn separated<'a>(list: &'a str, is_name: impl Fn(&str) -> bool) -> Vec<&'a str> {
+fn separated(list: &str, is_name: impl Fn(&str) -> bool) -> Vec<&str> {
     if is_name(list) { vec![list] } else { list.split(',').map(str::trim).collect() }
 }
 

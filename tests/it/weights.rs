@@ -608,7 +608,7 @@ fn stiff_pieces_and_idle_joints_are_told() {
     assert!(matches!(far.reason, IdleReason::Outside { distance } if (distance - 8.338).abs() < 0.01), "{far:?}");
     assert_eq!(far.joint, 3);
     // A piece that bends is told no more, and a joint that is locked has another reason.
-    let settings = WeightSettings { bending: vec![first..first + 1], ..WeightSettings::default() };
+    let settings = WeightSettings { bending: std::iter::once(first..first + 1).collect(), ..WeightSettings::default() };
     let bent = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap().1;
     assert_eq!((bent.stiff, bent.stiff_pieces.len()), (0, 0));
     let mut present = Weights::default();

@@ -93,7 +93,7 @@ pub(crate) fn build(
     for (index, joint) in joints.iter().enumerate() {
         let Some(owner) = owners[index] else { continue };
         let is_leaf = children[index] == 0 && !helpers[index];
-        if !is_leaf && !(claims[index] && segments.iter().all(|segment| segment.joint != owner)) {
+        if !(is_leaf || claims[index] && segments.iter().all(|segment| segment.joint != owner)) {
             continue;
         }
         let tail = joint.tail.filter(|t| t.distance(joint.head) > SAME);

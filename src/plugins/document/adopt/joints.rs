@@ -104,10 +104,10 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 // Inspectors write the name of an entity.
                 label.clone_from(&name);
             }
-            if label != mirrored.label {
-                if self.trial.edit(EntityWrite::Label, vec![RigEdit::SetLabel(uid, label.clone())]) {
-                    next.label.clone_from(&label);
-                }
+            if label != mirrored.label
+                && self.trial.edit(EntityWrite::Label, vec![RigEdit::SetLabel(uid, label.clone())])
+            {
+                next.label.clone_from(&label);
             }
             // Label and `Name` are equal; an empty label counts as none.
             match &next.label {
