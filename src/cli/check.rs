@@ -1,7 +1,7 @@
 //! `rigsmith check`: problems in files.
 
 use std::{
-    collections::HashSet,
+    collections::{BTreeMap, HashSet},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -24,7 +24,7 @@ use crate::{
     rig::{
         Rig, SourceError, TagData, TagKind, Uid,
         feature::{FeatureKinds, undecided_choices},
-        template,
+        template::{self, PartOrigin},
     },
     solve::program::{CompileOptions, RigProgram},
 };
@@ -145,14 +145,15 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
         }
     };
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes));
-    let (mut rig, mut remarks) = (template.rig.clone(), template.notes.clone());
+    let (mut rig, mut remarks, mut origins) = (template.rig.clone(), template.notes.clone(), BTreeMap::new());
     match PartFiles::new(&RealDisk).put_together(path, &text, template) {
-        Ok(template) => (rig, remarks) = (template.rig, template.notes),
+        Ok(template) => (rig, remarks, origins) = (template.rig, template.notes, template.origins),
         Err(fault) => faults.push(fault),
     }
     let explicit = template::explicit(&text);
     let places = SourceText::new(&explicit);
-    let CommandProblems { listed: commands, problems, commands: failing } = problems_of_commands(&rig, &places);
+    let CommandProblems { listed: commands, problems, commands: failing } =
+        problems_of_commands(&rig, &places, &origins);
     let unknown = FeatureKinds::default().unknown_in(&rig);
     let unknown_kinds = unknown.len();
     let kinds: Vec<SourceError> = unknown
@@ -214,22 +215,31 @@ struct CommandProblems {
     commands: usize,
 }
 
-fn problems_of_commands(rig: &Rig, places: &SourceText) -> CommandProblems {
+fn problems_of_commands(rig: &Rig, places: &SourceText, origins: &BTreeMap<Uid, PartOrigin>) -> CommandProblems {
+    let locate = |error: &BuildError| match origins.get(&error.command) {
+        Some(origin) => places.locate_in_part(rig, error, *origin),
+        None => places.locate(rig, error),
+    };
     let modules = Arc::new(modules::all());
     let problems = review(rig, &modules);
     if problems.is_empty() {
-        let listed: Vec<SourceError> = problem_of_program(rig, &modules, places).into_iter().collect();
+        let listed: Vec<SourceError> = problem_of_program(rig, &modules, places, &locate).into_iter().collect();
         let count = listed.len();
         return CommandProblems { listed, problems: count, commands: count };
     }
     let commands: HashSet<Uid> = problems.iter().map(|problem| problem.command).collect();
-    let listed = problems.iter().take(LISTED).map(|problem| places.locate(rig, problem)).collect();
+    let listed = problems.iter().take(LISTED).map(locate).collect();
     CommandProblems { listed, problems: problems.len(), commands: commands.len() }
 }
 
 /// Problem that keeps a fully built rig from moving, such as constraints that wait for each other by way of a parent;
 /// placed at the first command that it names.
-fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, places: &SourceText) -> Option<SourceError> {
+fn problem_of_program(
+    rig: &Rig,
+    modules: &Arc<Modules>,
+    places: &SourceText,
+    locate: &dyn Fn(&BuildError) -> SourceError,
+) -> Option<SourceError> {
     let built = Builder::build(rig, modules).ok()?;
     let problem = RigProgram::compile(&built, &CompileOptions::default()).err()?;
     let found = problem.commands().iter().find_map(|command| rig.find_tag(*command));
@@ -243,7 +253,7 @@ fn problem_of_program(rig: &Rig, modules: &Arc<Modules>, places: &SourceText) ->
         module: module.as_str().into(),
         problem: BuildProblem::Module(ModuleError::other(problem.to_string())),
     };
-    Some(places.locate(rig, &error))
+    Some(locate(&error))
 }
 
 fn remarks_on_model(model: &Model) -> Vec<String> {

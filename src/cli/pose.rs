@@ -25,8 +25,9 @@ pub(super) struct PoseSteps {
     /// CONTROL is a name, a label or a reference (@...); may be repeated
     #[arg(long = "set", value_name = "NODE.CHANNEL=VALUE", allow_hyphen_values = true)]
     pub set: Vec<String>,
-    /// Throws a switch before anything is set, without a jump: NAME=ik, fk or the name of a space; NAME is a local
-    /// group, a control or a joint of the limb; may be repeated
+    /// Throws a switch without a jump: NAME=ik, fk or the name of a space; NAME is a local group, a control or a joint of
+    /// the limb; the pose that --set makes is kept, and what --set says of controls that the switch moves holds
+    /// afterwards, too; may be repeated
     #[arg(long = "switch", value_name = "NAME=VALUE")]
     pub switches: Vec<String>,
     /// Frames of a sixtieth of a second that pass afterwards, for springs
@@ -133,17 +134,19 @@ pub(super) fn parsed(steps: &PoseSteps) -> Result<Vec<ControlWrite>, Failure> {
     steps.set.iter().map(|text| Ok(text.parse::<ControlWrite>()?)).collect()
 }
 
-/// Builds the rig, sets switches, writes values, and simulates frames.
+/// Builds the rig, writes values, throws switches, which keep that pose, writes the values again, for the controls that the
+/// switches moved, and simulates frames.
 pub(super) fn run_steps(bench: &mut Workbench, steps: &PoseSteps, writes: &[ControlWrite]) -> Result<(), Failure> {
     if let Some(error) = bench.build(BuildStep::All).error {
         return Err(Failure::Input(Box::new(error)));
     }
+    let mut switches = Vec::with_capacity(steps.switches.len());
     for switch in &steps.switches {
         let wrong = || Failure::Usage(format!("--switch {switch}: write NAME=VALUE, for example arm_l=fk"));
         let (name, value) = switch.split_once('=').ok_or_else(wrong)?;
-        bench.switch(name.trim(), value.trim())?;
+        switches.push((name.trim(), value.trim()));
     }
-    bench.pose(writes)?;
+    bench.pose_through(writes, &switches)?;
     bench.frames(steps.frames);
     Ok(())
 }

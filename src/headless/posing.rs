@@ -246,19 +246,37 @@ impl Workbench {
     /// # Errors
     /// See [`PoseError`]; nothing is written then.
     pub fn pose(&mut self, writes: &[ControlWrite]) -> Result<(), PoseError> {
-        let runtime = self.runtime()?;
-        let program = Arc::clone(runtime.state().program());
+        self.pose_through(writes, &[])
+    }
+
+    /// Writes values as [`pose`](Self::pose) does, then sets switches, each given by name and value, which keep that pose as
+    /// [`switch`](Self::switch) does, then writes the values once more, for controls that the switches moved.
+    ///
+    /// # Errors
+    /// See [`PoseError`].
+    pub fn pose_through(&mut self, writes: &[ControlWrite], switches: &[(&str, &str)]) -> Result<(), PoseError> {
+        self.runtime()?;
         let mut found = Vec::with_capacity(writes.len());
         for write in writes {
             let node = self.find_node(&write.node, &write.value)?;
             let value = write.value.on(&node)?;
             found.push((self.entity(node.uid).ok_or(PoseError::NotBuilt)?, node, value));
         }
-        for (entity, node, value) in found {
-            let world = self.app.world_mut();
+        self.write_values(&found)?;
+        for (name, value) in switches {
+            self.switch(name, value)?;
+        }
+        if switches.is_empty() { Ok(()) } else { self.write_values(&found) }
+    }
+
+    /// Writes values to entities, and runs one frame.
+    fn write_values(&mut self, values: &[(Entity, BuiltNode, WriteValue)]) -> Result<(), PoseError> {
+        let program = Arc::clone(self.runtime()?.state().program());
+        for (entity, node, value) in values {
+            let (entity, world) = (*entity, self.app.world_mut());
             if let WriteValue::Attribute(name, value) = value {
                 if let Some(mut attributes) = world.get_mut::<Attributes>(entity) {
-                    attributes.0.insert(name, value);
+                    attributes.0.insert(name.clone(), *value);
                 }
                 continue;
             }
@@ -266,7 +284,7 @@ impl Workbench {
             let rest = RestTransform::from(base);
             let Some(mut transform) = world.get_mut::<Transform>(entity) else { continue };
             let before = PoseOffset::between(&rest, &transform);
-            let offset = match value {
+            let offset = match *value {
                 WriteValue::Translate(translation) => PoseOffset { translation, ..before },
                 WriteValue::Rotate(degrees) => {
                     let [x, y, z] = degrees.to_array().map(f32::to_radians);

@@ -13,7 +13,7 @@ use crate::rig::{
     Field, Rig, RigEdit, SourceError, TagData, TagKind, Uid, fields,
     reference::{GroupScope, references_in},
     same_place,
-    template::Explicit,
+    template::{Explicit, PartOrigin},
 };
 
 /// Largest number of failing commands that a review looks for, and of runs for further faults of theirs.
@@ -224,11 +224,57 @@ impl<'a> SourceText<'a> {
         }
     }
 
+    /// The place of a problem of a command that a part brought: in the parameter that the instance's change gives it, else
+    /// at the change or at the instance.
+    pub fn locate_in_part(&self, rig: &Rig, error: &BuildError, origin: PartOrigin) -> SourceError {
+        let problem = match &error.problem {
+            BuildProblem::Parameters(inner) => inner.message.clone(),
+            other => other.to_string(),
+        };
+        let message = format!("{} on joint {}: {problem}", error.module, error.joint_label);
+        let fields = &self.fields;
+        let is_instance = |field: &&Field| {
+            field.depth == 3 && field.name == "part" && self.explicit.in_source(field.start) == origin.offset
+        };
+        let Some(instance) = fields.iter().find(is_instance) else { return self.at(0, message) };
+        let list = fields.iter().position(|field| field.bracket == instance.bracket && field.name == "changes");
+        let is_subject =
+            |field: &&Field| field.parent == list && list.is_some() && matches!(field.name, "tag" | "joint");
+        let change = origin.change.and_then(|number| fields.iter().filter(is_subject).nth(number));
+        let params = change.and_then(|change| {
+            let at = fields.iter().position(|field| field.bracket == change.bracket && field.name == "params")?;
+            let faulty = faulty_parameter(rig, error);
+            let is_faulty = |field: &&Field| field.parent == Some(at) && Some(field.name) == faulty.as_deref();
+            let named = fields.iter().find(is_faulty);
+            Some(named.unwrap_or(&fields[at]))
+        });
+        self.at(params.or(change).unwrap_or(instance).start, message)
+    }
+
     /// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.
     pub fn locate_declared(&self, uid: Uid, field: &str, message: String) -> SourceError {
         let Some(declared) = declaration(&self.explicit.text, &self.fields, uid) else { return self.at(0, message) };
         let named = self.fields.iter().find(|other| other.bracket == declared.bracket && other.name == field);
         self.at(named.unwrap_or(declared).start, message)
+    }
+}
+
+/// Name of the parameter that is wrong, if the problem is one of a parameter.
+fn faulty_parameter(rig: &Rig, error: &BuildError) -> Option<String> {
+    match &error.problem {
+        BuildProblem::Parameters(inner) => {
+            let (_, tag) = rig.find_tag(error.command)?;
+            let TagKind::Command { params, .. } = &tag.kind else { return None };
+            let mut fields = fields(params).into_iter().filter(|field| field.depth == 1);
+            let faulty = fields.find(|field| field.start <= inner.offset && inner.offset < field.end)?;
+            Some(faulty.name.to_owned())
+        }
+        BuildProblem::Module(
+            ModuleError::Reference { parameter, .. }
+            | ModuleError::Parameter { parameter, .. }
+            | ModuleError::OutOfRange { parameter, .. },
+        ) => Some(field_of(parameter).to_owned()),
+        _ => None,
     }
 }
 

@@ -223,7 +223,7 @@ fn choices_are_set_by_name() {
 }
 
 #[test]
-fn switches_are_set_without_a_jump_before_values() {
+fn switches_keep_the_pose_and_values_hold_after_them() {
     let folder = folder();
     let arm = bundled("parts/arm");
     let joints = |json: &Value| -> Vec<(String, Vec3)> {
@@ -246,6 +246,36 @@ fn switches_are_set_without_a_jump_before_values() {
     };
     assert!(hand("arm_l=fk") > 0.1, "forward controls drive the arm");
     assert!(hand("arm_l=ik") < 1e-4, "forward controls have no effect");
+    // A goal that is moved, then left for forward kinematics; by the name of the goal and by the label that both controls have.
+    for goal in ["hand_ik_l", "hand_l"] {
+        let set = format!("{goal}.translate=(0,-0.05,0.1)");
+        let led = pose(folder.path(), &arm, &["--set", &set]);
+        let forward = pose(folder.path(), &arm, &["--set", &set, "--switch", "arm_l=fk"]);
+        assert!(place(&led, "hand_l").distance(place(&pose(folder.path(), &arm, &[]), "hand_l")) > 0.05, "{goal}");
+        for ((uid, before), (_, after)) in joints(&led).into_iter().zip(joints(&forward)) {
+            assert!(before.distance(after) < 1e-4, "{goal}: {uid} from {before} to {after}");
+        }
+    }
+}
+
+/// A foot that rolls stands as it stood when its leg goes over to forward kinematics, and when it comes back.
+#[test]
+fn a_rolled_foot_keeps_its_place_through_switches() {
+    let folder = folder();
+    let leg = bundled("biped");
+    let all = |more: &[&str]| {
+        let rolled =
+            ["--set", "foot_ik_l.translate=(0,0.2,0.1)", "--set", "foot_ik_l.roll=40", "--set", "foot_ik_l.bank=10"];
+        let json = pose(folder.path(), &leg, &[&rolled[..], more].concat());
+        ["shin_l", "foot_l", "toe_l"].map(|name| (place(&json, name), quat(&node(&json, name)["rotation"])))
+    };
+    let before = all(&[]);
+    for switches in [&["--switch", "leg_l=fk"][..], &["--switch", "leg_l=fk", "--switch", "leg_l=ik"]] {
+        for ((at, turn), (at_before, turn_before)) in all(switches).into_iter().zip(before) {
+            let angle = turn.angle_between(turn_before).to_degrees();
+            assert!(at.distance(at_before) < 1e-4 && angle < 0.1, "{switches:?}: {at_before} to {at}, {angle} degrees");
+        }
+    }
 }
 
 #[test]

@@ -11,7 +11,7 @@ mod blend;
 mod part;
 mod push;
 
-use std::{collections::BTreeMap, f32::consts::FRAC_PI_2};
+use std::collections::BTreeMap;
 
 use glam::Vec3;
 
@@ -35,7 +35,7 @@ const REACH: f32 = 1.2;
 /// Joints that move one place, with their weights.
 type Row = Vec<(u32, f32)>;
 
-/// A right-angled bend of a joint whose skin a half joint holds.
+/// Bend of a joint whose skin a half joint holds: by a right angle, or less where the limb is raised at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bend {
     /// Index of the half joint.
@@ -44,6 +44,8 @@ pub struct Bend {
     pub joint: usize,
     /// Unit vector of the axis about which it bends, in the space of the points.
     pub axis: Vec3,
+    /// Angle of the bend, in radians.
+    pub angle: f32,
     /// Unit vector of an axis about which the joint turns aside, both ways, if it is no hinge: there the mesh must not swell.
     pub aside: Option<Vec3>,
     /// Unit vector along the bone above the joint, towards it.
@@ -137,7 +139,7 @@ impl<'a> Flesh<'a> {
             // Each bend changes the weights that it found; where two change one place, the place gets the mean of both.
             let mut changes: BTreeMap<u32, Vec<Row>> = BTreeMap::new();
             for (((bend, part), section), length) in bends.iter().zip(&parts).zip(&sections).zip(&lengths) {
-                let pose = Pose::new(bend, bend.axis, FRAC_PI_2, length.unwrap_or(bend.push[0]));
+                let pose = Pose::new(bend, bend.axis, bend.angle, length.unwrap_or(bend.push[0]));
                 let mut blend = Blend::new(self, part);
                 if let Some(section) = section {
                     blend.fill(&pose, *section);

@@ -1,6 +1,9 @@
 //! Bends that are tried on a mesh while it is bound: which they are, and what becomes of what they show.
 
-use std::{collections::BTreeMap, f32::consts::FRAC_PI_4};
+use std::{
+    collections::BTreeMap,
+    f32::consts::{FRAC_PI_2, FRAC_PI_4},
+};
 
 use bevy::math::{Vec3, ops};
 
@@ -23,6 +26,8 @@ use crate::{
 const BENT: f32 = 0.02;
 /// Least share of the bone below that the bone above a hinge has.
 const HINGED: f32 = 0.8;
+/// Least angle of a bend that is tried, in radians: a limb raised to the front further than that bends no more.
+const LEAST: f32 = 0.2;
 /// The most by which half joints of hinges and of sockets move outwards, as a share of the bone below. Around sockets they hold
 /// half of the skin at most.
 const MOST: [f32; 2] = [0.3, 0.9];
@@ -47,8 +52,8 @@ pub struct FittedPush {
     pub push: f32,
 }
 
-/// Right-angled bends of the joints with half joints: hinges the way in which they are bent at rest, others to the front
-/// (+Z), which is how arms and legs work.
+/// Bends of the joints with half joints by a right angle: hinges the way in which they are bent at rest, others to the front
+/// (+Z), which is how arms and legs work; limbs that are raised at rest to a right angle with the trunk.
 pub(super) fn tried_bends(
     rig: &Rig,
     built: &BuiltRig,
@@ -69,12 +74,17 @@ pub(super) fn tried_bends(
         let upper = at(joint) - at(parent);
         let (up, down) = (upper.try_normalize()?, below.try_normalize()?);
         let is_hinge = upper.length() >= HINGED * below.length();
+        let is_raised = !is_hinge && down.z > ops::cos(FRAC_PI_4);
         let axis = if is_hinge {
             let plane = up.cross(down);
             if plane.length() > BENT { plane.try_normalize()? } else { return None }
         } else {
-            down.cross(Vec3::Z).try_normalize().filter(|_| down.z.abs() < ops::cos(FRAC_PI_4))?
+            down.cross(Vec3::Z).try_normalize().filter(|_| down.z > -ops::cos(FRAC_PI_4))?
         };
+        let angle = if is_raised { down.angle_between(Vec3::Z) } else { FRAC_PI_2 };
+        if angle < LEAST {
+            return None;
+        }
         let node = built.nodes.iter().find(|node| node.uid == data.uid)?;
         let command = node.origin.as_ref()?.command;
         let turn = built.constraints.iter().find_map(|constraint| match &*constraint.constraint {
@@ -95,8 +105,9 @@ pub(super) fn tried_bends(
         });
         let push = if is_fitted { [0.0, MOST[usize::from(!is_hinge)]] } else { [now, now] };
         let section = if is_hinge { 0.0 } else { 0.5 };
-        let aside = (!is_hinge).then_some(Vec3::Z);
-        let bend = Bend { half, joint, axis, aside, above: up, below, section, share, push };
+        let aside = if is_raised { down.cross(axis) } else { Vec3::Z };
+        let aside = (!is_hinge).then_some(aside);
+        let bend = Bend { half, joint, axis, angle, aside, above: up, below, section, share, push };
         Some(TriedBend { bend, command, is_fitted })
     };
     joints.iter().enumerate().filter_map(tried).collect()

@@ -28,6 +28,8 @@ mod text_patch;
 mod tidy;
 mod write;
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 pub(in crate::rig) use read::read_text;
@@ -166,6 +168,17 @@ pub struct Template {
     pub parts: Vec<PartInstance>,
     /// Parts that have been put into the rig.
     pub instances: Vec<PartInstance>,
+    /// Instances of the commands that come of parts.
+    pub origins: BTreeMap<Uid, PartOrigin>,
     /// Notes about content that the reader ignored (fields of a newer format, a wrong joint count), a sentence each.
     pub notes: Vec<String>,
+}
+
+/// Where a command comes from that a part brought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PartOrigin {
+    /// Place of the part instance in the template's text, in bytes.
+    pub offset: usize,
+    /// Number of the last change of the instance that gives the command parameters, counted from 0.
+    pub change: Option<usize>,
 }

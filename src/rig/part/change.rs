@@ -10,7 +10,7 @@ use crate::rig::{
     format::tree::{Tree, with_field},
     nearest::did_you_mean,
     operations::Draft,
-    reference::{NameKind, NameScope, Names, bind_names, given_name, map_references},
+    reference::{NameKind, NameScope, Names, bind_known_names, given_name, map_references},
 };
 
 /// A difference of an instance from its part: of a joint or of a tag.
@@ -70,15 +70,11 @@ impl PartInstance {
                 }
             })?;
             if let Some(others) = &change.params {
-                // Names are those of the part first, then those of the template.
-                let (bound, _) = bind_names(others, &PartNames { part, host: draft.rig() });
-                let others = &map_references(&bound, |reference| {
+                // Names are those of the part first, then those of the template, in which other parts may bring more.
+                let names = PartNames { part, host: draft.rig(), instance: self, joints: &places };
+                let others = &map_references(&bind_known_names(others, &names), |reference| {
                     for (_, uid) in reference.uids_mut() {
-                        match places.get(uid) {
-                            Some(joint) => *uid = *joint,
-                            None if part.is_taken(*uid) => *uid = self.uid_of(*uid),
-                            None => {}
-                        }
+                        *uid = names.uid_here(*uid);
                     }
                 });
                 set_tag(draft, tag, |tag| {
@@ -197,20 +193,37 @@ impl PartInstance {
     }
 }
 
-/// Names in a part, then those in the template that uses it.
+/// Names in a part, then those in the template that uses it, each for the uid that it has there.
 struct PartNames<'a> {
     part: &'a Rig,
     host: &'a Rig,
+    instance: &'a PartInstance,
+    /// Joints of the template onto which joints of the part went.
+    joints: &'a HashMap<Uid, Uid>,
+}
+
+impl PartNames<'_> {
+    /// The uid in the template of something that has this one in the part; any other uid as it is.
+    fn uid_here(&self, uid: Uid) -> Uid {
+        match self.joints.get(&uid) {
+            Some(joint) => *joint,
+            None if self.part.is_taken(uid) => self.instance.uid_of(uid),
+            None => uid,
+        }
+    }
 }
 
 impl Names for PartNames<'_> {
     fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
-        self.part.name_of(kind, uid).or_else(|| self.host.name_of(kind, uid))
+        self.host.name_of(kind, uid).or_else(|| self.part.name_of(kind, uid))
     }
 
     fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
         let found = self.part.find(scope, kind, name);
-        if found.is_empty() { self.host.find(scope, kind, name) } else { found }
+        match found.is_empty() {
+            true => self.host.find(scope, kind, name),
+            false => found.into_iter().map(|uid| self.uid_here(uid)).collect(),
+        }
     }
 
     fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {

@@ -61,8 +61,8 @@ pub enum ReferenceProblem {
     /// A number that is too large.
     #[error("{0} is too large a number of a node; they count from 0")]
     BadNumber(String),
-    /// A name without a uid where names cannot be looked up.
-    #[error("the {kind} \"{name}\" has no uid beside it; bind names to a rig first, or write NAME#UID")]
+    /// A name without a uid where names are not looked up any more: those of a rig have uids once they are bound to it.
+    #[error("the rig has no {kind} \"{name}\", or several; correct the name, or write NAME#UID")]
     Unbound {
         /// Kind of the named object.
         kind: NameKind,

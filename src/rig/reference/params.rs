@@ -103,6 +103,40 @@ pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<
     (bound, bad)
 }
 
+/// The parameters with the uid beside every name that exactly one object has. Other names stay alone, and so do texts that
+/// are no references.
+pub fn bind_known_names<'a>(params: &'a str, names: &dyn Names) -> Cow<'a, str> {
+    rewritten(params, literals(params), |text| {
+        let mut places = Vec::new();
+        read_with(text, Some(&PartialNames(names)), &mut places).ok()?;
+        places.retain(|place| place.has_uid || place.uid != NO_OBJECT);
+        renamed(text, &places, names)
+    })
+}
+
+/// Uid in place of the one of a name that no object has, or several.
+const NO_OBJECT: Uid = Uid(0);
+
+/// Names in which every name is found.
+struct PartialNames<'a>(&'a dyn Names);
+
+impl Names for PartialNames<'_> {
+    fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
+        self.0.name_of(kind, uid)
+    }
+
+    fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
+        match self.0.find(scope, kind, name)[..] {
+            [uid] => vec![uid],
+            _ => vec![NO_OBJECT],
+        }
+    }
+
+    fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {
+        self.0.all(scope, kind)
+    }
+}
+
 /// The parameters with names alone in place of the uids that `leave_out` chooses, in every reference that [`bind_names`]
 /// gives the same uids again.
 pub fn without_uids<'a>(params: &'a str, names: &dyn Names, leave_out: impl Fn(Uid) -> bool) -> Cow<'a, str> {

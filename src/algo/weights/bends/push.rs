@@ -1,7 +1,5 @@
 //! Lengths by which half joints leave a bend.
 
-use std::f32::consts::FRAC_PI_2;
-
 use super::{Bend, Flesh, Part, Pose};
 
 /// Loss of volume, as a share of a section, that is aimed at.
@@ -13,7 +11,7 @@ const ASIDE: f32 = 1.0;
 
 /// The least push of a bend with which a mesh loses little, in limits.
 pub(super) fn push(flesh: &Flesh, bend: &Bend, part: &Part, section: f32) -> Option<f32> {
-    let lost = |push: f32| part.lost(flesh, &Pose::new(bend, bend.axis, FRAC_PI_2, push)) / section;
+    let lost = |push: f32| part.lost(flesh, &Pose::new(bend, bend.axis, bend.angle, push)) / section;
     let [least, mut most] = bend.push;
     for (axis, angle) in bend.aside.into_iter().flat_map(|axis| [(axis, ASIDE), (axis, -ASIDE)]) {
         let gained = |push: f32| -part.lost(flesh, &Pose::new(bend, axis, angle, push)) / section;

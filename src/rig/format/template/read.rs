@@ -5,7 +5,7 @@ mod parts;
 
 use std::{
     borrow::Cow,
-    collections::{HashMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
 };
 
 use bevy::math::{Quat, Vec3};
@@ -221,7 +221,7 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
             notes.push("the header says other needs than the part has; saving corrects it".to_owned());
         }
     }
-    Template { rig, chains, sockets, options, parts: instances, instances: Vec::new(), notes }
+    Template { rig, chains, sockets, options, parts: instances, instances: Vec::new(), origins: BTreeMap::new(), notes }
 }
 
 /// Adds uids to references that people wrote as names alone, and updates the names beside uids.

@@ -1,6 +1,10 @@
 //! Parts in a template's file: what it lets others vary, and the parts that it uses itself.
 
-use std::{collections::HashSet, fmt, sync::Arc};
+use std::{
+    collections::{HashMap, HashSet},
+    fmt,
+    sync::Arc,
+};
 
 use bevy::math::{Quat, Vec3};
 use ron::value::RawValue;
@@ -8,7 +12,7 @@ use serde::Serialize;
 
 use super::{
     super::{
-        FORMAT, Template,
+        FORMAT, PartOrigin, Template,
         file::{ChainFile, OptionFile, OptionTargetFile, PartChangeFile, PartFile, SocketFile},
         shorthand::Declarations,
     },
@@ -302,6 +306,19 @@ fn rotation_of(text: &str) -> Result<Quat, PartChangeError> {
     Ok(Quat::from_xyzw(x, y, z, w))
 }
 
+impl PartInstance {
+    /// Origins of the commands that come of the instance; `fitted` is what comes of the part.
+    fn origins(&self, fitted: &Rig) -> Vec<(Uid, PartOrigin)> {
+        let changes = self.changes.iter().enumerate().filter(|(_, change)| change.params.is_some());
+        let changed: HashMap<Uid, usize> = changes
+            .filter_map(|(number, change)| Some((self.find_tag(fitted, change.tag.as_deref()?).ok()?, number)))
+            .collect();
+        let tags = fitted.walk().flat_map(|joint| &joint.data.tags);
+        let origin = |tag: &TagData| PartOrigin { offset: self.offset, change: changed.get(&tag.uid).copied() };
+        tags.map(|tag| (self.uid_of(tag.uid), origin(tag))).collect()
+    }
+}
+
 impl Template {
     /// The template with its parts, each of which `part` gives.
     ///
@@ -322,12 +339,13 @@ impl Template {
                 let fitted = instance.fitted(&part, mirror)?;
                 let brought = instance.sockets_in(&self.rig, &part, &fitted);
                 let notes = instance.put_into(&mut self.rig, &part, &fitted, mirror, socket.as_ref())?;
-                Ok((notes, brought))
+                Ok((notes, brought, instance.origins(&fitted)))
             });
             match put {
-                Ok((notes, brought)) => {
+                Ok((notes, brought, origins)) => {
                     self.notes.extend(notes);
                     of_parts.extend(brought);
+                    self.origins.extend(origins);
                 }
                 Err(error) => {
                     let message = format!("part \"{}\": {error}", instance.title());
